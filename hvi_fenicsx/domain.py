@@ -1,0 +1,136 @@
+"""The body: mesh, named boundary parts and regions, in SI. Knows no effect and no solver."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from dolfinx import mesh as dmesh
+from mpi4py import MPI
+
+from . import meshfile
+from .errors import InputError
+from .parallel import agree
+
+Facets = npt.NDArray[np.int32]
+_AXIS_OF_SIDE = {"left": (0, 0), "right": (0, 1), "bottom": (-1, 0), "top": (-1, 1), "front": (1, 0), "back": (1, 1)}
+"""Axis (-1: the last, the vertical one) and end of each named side."""
+
+
+@dataclass(frozen=True)
+class Domain:
+    """A mesh with named sides and regions.
+
+    Attributes:
+        mesh: the dolfinx mesh, SI coordinates.
+        sides: local facet indices by name (built-in sides, or physical groups of a file).
+        regions: local cell indices by name (physical groups of a file).
+        lower, upper: corners of the bounding box, shape (d,), the same on all ranks.
+    """
+
+    mesh: dmesh.Mesh
+    sides: Mapping[str, Facets]
+    regions: Mapping[str, Facets]
+    lower: npt.NDArray[np.float64]
+    upper: npt.NDArray[np.float64]
+
+    @property
+    def dimension(self) -> int:
+        """2 or 3."""
+        return int(self.mesh.geometry.dim)
+
+    @property
+    def length(self) -> float:
+        """The longest edge of the bounding box, m: the length scale L."""
+        return float(np.max(self.upper - self.lower))
+
+    @property
+    def centre(self) -> npt.NDArray[np.float64]:
+        """Centre of the bounding box, shape (3,), m."""
+        return np.pad((self.lower + self.upper) / 2, (0, 3 - self.dimension))
+
+    def facets(self, names: Sequence[str]) -> Facets:
+        """Local facets of the named sides together, sorted.
+
+        Raises:
+            InputError: a name that the domain does not have (the same on all ranks).
+        """
+        for name in names:
+            if name not in self.sides:
+                raise InputError(
+                    f"the domain has no boundary part {name!r}; it has {', '.join(sorted(self.sides))}"
+                )
+        return np.unique(np.concatenate([self.sides[name] for name in names])).astype(np.int32)
+
+    def cells(self, names: Sequence[str]) -> Facets:
+        """Local cells of the named regions together, sorted.
+
+        Raises:
+            InputError: a name that the domain does not have (the same on all ranks).
+        """
+        for name in names:
+            if name not in self.regions:
+                known = ", ".join(sorted(self.regions)) or "no named regions"
+                raise InputError(f"the domain has no region {name!r}; it has {known}")
+        return np.unique(np.concatenate([self.regions[name] for name in names])).astype(np.int32)
+
+
+def rectangle(comm: MPI.Comm, size: Sequence[float], cells: Sequence[int]) -> Domain:
+    """[0, size] cut into right-diagonal triangles (``create_rectangle``). Collective."""
+    mesh = dmesh.create_rectangle(
+        comm,
+        [np.zeros(2), np.asarray(size, dtype=float)],
+        list(cells),
+        dmesh.CellType.triangle,
+        ghost_mode=dmesh.GhostMode.none,
+        diagonal=dmesh.DiagonalType.right,
+    )
+    return _box_domain(mesh, np.asarray(size, dtype=float))
+
+
+def box(comm: MPI.Comm, size: Sequence[float], cells: Sequence[int]) -> Domain:
+    """[0, size] cut into tetrahedra (``create_box``). Collective."""
+    corners = [np.zeros(3), np.asarray(size, dtype=float)]
+    mesh = dmesh.create_box(
+        comm, corners, list(cells), dmesh.CellType.tetrahedron, ghost_mode=dmesh.GhostMode.none
+    )
+    return _box_domain(mesh, np.asarray(size, dtype=float))
+
+
+def from_file(comm: MPI.Comm, path: Path, dimension: int) -> Domain:
+    """A gmsh file, its physical groups being sides and regions. Collective.
+
+    Raises:
+        InputError: on all ranks alike, when the file cannot be read or is no usable mesh.
+    """
+    mesh, sides, regions = meshfile.read(comm, path, dimension)
+    return Domain(mesh, sides, regions, *_bounding_box(mesh))
+
+
+def _box_domain(mesh: dmesh.Mesh, size: npt.NDArray[np.float64]) -> Domain:
+    names = [n for n in _AXIS_OF_SIDE if mesh.geometry.dim == 3 or n not in ("front", "back")]
+    sides = {name: _side(mesh, name, size) for name in names}
+    return Domain(mesh, sides, {}, np.zeros(len(size)), size)
+
+
+def _side(mesh: dmesh.Mesh, name: str, size: npt.NDArray[np.float64]) -> Facets:
+    axis, end = _AXIS_OF_SIDE[name]
+    axis %= len(size)
+    tolerance = 1e-9 * size[axis]
+
+    def on_side(x: npt.NDArray[np.float64]) -> Any:
+        return np.abs(x[axis] - end * size[axis]) < tolerance
+
+    return dmesh.locate_entities_boundary(mesh, mesh.topology.dim - 1, on_side)
+
+
+def _bounding_box(mesh: dmesh.Mesh) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+    x = mesh.geometry.x[:, : mesh.geometry.dim]
+    inside = x if len(x) else np.full((1, x.shape[1]), np.nan)
+    lower, upper = np.fmin.reduce(inside, axis=0), np.fmax.reduce(inside, axis=0)
+    gathered = agree(mesh.comm, (lower, upper))
+    return np.nanmin([g[0] for g in gathered], axis=0), np.nanmax([g[1] for g in gathered], axis=0)

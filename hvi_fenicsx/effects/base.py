@@ -1,0 +1,185 @@
+"""What an effect is: one physical contribution, validated data with what it adds to a problem.
+
+A new effect is a new subclass of :class:`Effect` in a module of its own; it registers itself under its ``key``, which
+is then a key of the scene file at its ``place``. Nothing else is edited.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import Enum
+from typing import Annotated, Any, ClassVar, Protocol
+
+import numpy as np
+import numpy.typing as npt
+from pydantic import BaseModel, BeforeValidator, ConfigDict, PlainSerializer, WithJsonSchema
+from pydantic_core import PydanticCustomError
+
+from ..errors import InputError
+from ..expressions import Formula
+from ..laws import Superpotential
+
+
+class Place(Enum):
+    """Where in a scene an effect stands."""
+
+    BOUNDARY = "boundary"
+    BODY = "body"
+    MATERIAL = "material"
+
+
+class Conflict(InputError):
+    """Effects that cannot act together, with the reason."""
+
+
+def _formula(value: Any) -> Formula:
+    try:
+        return value if isinstance(value, Formula) else Formula(value)
+    except InputError as error:
+        # As pydantic's own error it is reported with its place in the scene.
+        raise PydanticCustomError("formula", "{reason}", {"reason": str(error)}) from None
+
+
+FormulaField = Annotated[
+    Formula,
+    BeforeValidator(_formula),
+    PlainSerializer(lambda f: f.source),
+    WithJsonSchema({"anyOf": [{"type": "number"}, {"type": "string"}], "title": "a number or a formula in x, y, z"}),
+]
+"""A number or a formula in x, y, z (SI), as a field of a scene model."""
+
+
+class Direction(Enum):
+    """The scalar displacement that a law of Γc acts on."""
+
+    SLIP = "slip"
+    """u_t; in 3D |u_t|."""
+    OPENING = "opening"
+    """-u·n, n outward: positive when the body lifts off."""
+    PENETRATION = "penetration"
+    """u·n: positive when the body is pressed into its support."""
+
+
+@dataclass(frozen=True, slots=True)
+class Condition:
+    """A prescribed displacement component (SI) on a part."""
+
+    component: int
+    value: Formula
+
+
+@dataclass(frozen=True, slots=True)
+class NormalBounds:
+    """lower ≤ -u·n ≤ upper on a part (SI; None: no bound). Unilateral contact with gap g has lower = -g."""
+
+    lower: Formula | None
+    upper: Formula | None
+
+
+@dataclass(frozen=True, slots=True)
+class BoundaryLaw:
+    """A superpotential (SI) acting on one scalar displacement of a part."""
+
+    direction: Direction
+    law: Superpotential
+
+
+@dataclass(frozen=True, slots=True)
+class Contribution:
+    """What one effect adds to the problem; forms are nondimensional UFL in the stage's arguments."""
+
+    bilinear: tuple[Any, ...] = ()
+    linear: tuple[Any, ...] = ()
+    conditions: tuple[Condition, ...] = ()
+    bounds: tuple[NormalBounds, ...] = ()
+    laws: tuple[BoundaryLaw, ...] = ()
+
+
+class Stage(Protocol):
+    """What an effect may see of the problem that is being composed."""
+
+    dimension: int
+    trial: Any
+    test: Any
+    normal: Any
+
+    @property
+    def length(self) -> float:
+        """Length scale L in m."""
+
+    @property
+    def stress(self) -> float:
+        """Stress scale p0 in N/m²."""
+
+    @property
+    def modulus(self) -> float:
+        """Young's modulus scale E0 in N/m²."""
+
+    def number(self, value: float) -> Any:
+        """A ``fem.Constant``, so that the value is not compiled into the form."""
+
+    def render(self, formula: Formula) -> Any:
+        """A formula in UFL, in the SI coordinates of the mesh."""
+
+    def cells(self, region: str | None) -> Any:
+        """The measure dx/L^d of a region (None: the whole body)."""
+
+    def facets(self, part: str) -> Any:
+        """The measure ds/L^(d-1) of a boundary part."""
+
+
+Evaluate = Callable[[Formula], float]
+"""Largest absolute value of a formula over the place of an effect."""
+
+
+class Effect(BaseModel):
+    """One physical contribution: validated data (SI) and what it adds.
+
+    Class attributes:
+        key: the scene file's key. place: where the key stands. term: what it adds, in words and symbols.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+
+    key: ClassVar[str]
+    place: ClassVar[Place]
+    term: ClassVar[str]
+    registry: ClassVar[dict[Place, dict[str, type[Effect]]]] = {place: {} for place in Place}
+
+    @classmethod
+    def __pydantic_init_subclass__(cls, **kwargs: Any) -> None:
+        super().__pydantic_init_subclass__(**kwargs)
+        if "key" in cls.__dict__:
+            known = Effect.registry[cls.place].setdefault(cls.key, cls)
+            if known is not cls and known.__qualname__ != cls.__qualname__:
+                raise TypeError(f"two effects are called {cls.key!r}: {known} and {cls}")
+
+    @abstractmethod
+    def contribute(self, stage: Stage, where: str | None) -> Contribution:
+        """What it adds on ``where`` (a boundary part, a region, or None for the whole body)."""
+
+    def stress_scale(self, largest: Evaluate, length: float) -> float:
+        """The largest stress (N/m²) it drives the body with; 0 for one that drives nothing."""
+        return 0.0
+
+    def check(self, dimension: int) -> None:
+        """Refuse what makes no sense in 2D or 3D.
+
+        Raises:
+            InputError: with the reason and the mend.
+        """
+
+
+def components(formulas: tuple[Any, ...], dimension: int, key: str) -> None:
+    """Refuse a vector of the wrong length.
+
+    Raises:
+        InputError: with the number of components wanted.
+    """
+    if len(formulas) != dimension:
+        raise InputError(f"{key} has {len(formulas)} components; a {dimension}D scene wants {dimension}")
+
+
+Array = npt.NDArray[np.float64]

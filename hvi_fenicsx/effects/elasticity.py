@@ -1,0 +1,54 @@
+"""Linear elasticity of a region: stress from strain, a(u, v) = ∫ σ(u):ε(v) dx (paper, section 4)."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, ClassVar, Literal
+
+import ufl
+from pydantic import Field
+
+from ..errors import InputError
+from .base import Contribution, Effect, Place, Stage
+
+
+def strain(v: Any) -> Any:
+    """ε(v), the symmetric gradient."""
+    return ufl.sym(ufl.grad(v))
+
+
+class IsotropicElasticity(Effect):
+    """Isotropic elasticity; plane stress is the paper's own Hooke law (equation (tau))."""
+
+    key: ClassVar[str] = "isotropic"
+    place: ClassVar[Place] = Place.MATERIAL
+    term: ClassVar[str] = "a(u, v) = ∫ σ(u):ε(v) dx, isotropic"
+
+    model: Literal["plane_stress", "plane_strain", "three_dimensional"]
+    youngs_modulus: Annotated[float, Field(gt=0, allow_inf_nan=False)]
+    """E in N/m²."""
+    poisson_ratio: Annotated[float, Field(gt=-1, lt=0.5, allow_inf_nan=False)]
+    """ν, between -1 and 0.5."""
+
+    def lame(self) -> tuple[float, float]:
+        """λ of the trace term and 2μ, N/m²; plane stress uses the paper's Eν/(1-ν²)."""
+        e, nu = self.youngs_modulus, self.poisson_ratio
+        trace = e * nu / (1 - nu**2) if self.model == "plane_stress" else e * nu / ((1 + nu) * (1 - 2 * nu))
+        return trace, e / (1 + nu)
+
+    def stress(self, deformation: Any, number: Any, modulus: float) -> Any:
+        """σ/E0 of a strain tensor, in UFL."""
+        lam, two_mu = (number(value / modulus) for value in self.lame())
+        return lam * ufl.tr(deformation) * ufl.Identity(len(deformation[0, :])) + two_mu * deformation
+
+    def contribute(self, stage: Stage, where: str | None) -> Contribution:
+        """The bilinear form, with strains multiplied by L: nondimensional."""
+        length = stage.number(stage.length)
+        sigma = self.stress(length * strain(stage.trial), stage.number, stage.modulus)
+        form = ufl.inner(sigma, length * strain(stage.test)) * stage.cells(where)
+        return Contribution(bilinear=(form,))
+
+    def check(self, dimension: int) -> None:
+        """Plane models are for 2D, the other for 3D."""
+        if (self.model == "three_dimensional") != (dimension == 3):
+            allowed = "three_dimensional" if dimension == 3 else "plane_stress or plane_strain"
+            raise InputError(f'model = "{self.model}" in a {dimension}D scene; use {allowed}')

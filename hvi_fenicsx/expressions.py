@@ -1,0 +1,237 @@
+"""Numbers and formulas in x, y, z: parsed by Python's own ``ast`` through a whitelist, never evaluated.
+
+A formula is checked once, when the scene is read, and then rendered into whatever algebra is at hand
+(UFL for the forms, NumPy for values at vertices): see :class:`Algebra`.
+"""
+
+from __future__ import annotations
+
+import ast
+import difflib
+import math
+import operator
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from .errors import InputError
+
+COORDINATES = ("x", "y", "z")
+CONSTANTS = {"pi": math.pi}
+FUNCTIONS = (
+    "abs",
+    "sqrt",
+    "exp",
+    "log",
+    "sin",
+    "cos",
+    "tan",
+    "sinh",
+    "cosh",
+    "tanh",
+    "min",
+    "max",
+)
+_TWO_ARGUMENTS = ("min", "max")
+_BINARY: Mapping[type[ast.operator], Callable[[Any, Any], Any]] = {
+    ast.Add: operator.add,
+    ast.Sub: operator.sub,
+    ast.Mult: operator.mul,
+    ast.Div: operator.truediv,
+    ast.Pow: operator.pow,
+}
+_COMPARE: Mapping[type[ast.cmpop], str] = {ast.Lt: "lt", ast.LtE: "le", ast.Gt: "gt", ast.GtE: "ge"}
+_LONGEST, _DEEPEST, _LARGEST_POWER = 2000, 50, 64
+
+
+@dataclass(frozen=True, slots=True)
+class Algebra:
+    """The operations a formula needs beyond Python's operators.
+
+    Attributes:
+        number: turns a literal into a value of the algebra.
+        functions: by name, those of :data:`FUNCTIONS`.
+        compare: by name (``lt``, ``le``, ``gt``, ``ge``).
+        where: ``where(condition, if_true, if_false)``.
+    """
+
+    number: Callable[[float], Any]
+    functions: Mapping[str, Callable[..., Any]]
+    compare: Mapping[str, Callable[[Any, Any], Any]]
+    where: Callable[[Any, Any, Any], Any]
+
+
+NUMPY = Algebra(
+    number=np.float64,
+    functions={
+        **{name: getattr(np, name) for name in FUNCTIONS if name not in _TWO_ARGUMENTS},
+        "min": np.minimum,
+        "max": np.maximum,
+    },
+    compare={"lt": np.less, "le": np.less_equal, "gt": np.greater, "ge": np.greater_equal},
+    where=np.where,
+)
+
+
+def ufl_algebra(number: Callable[[float], Any]) -> Algebra:
+    """UFL's operations; ``number`` wraps a literal (as a ``fem.Constant``, so that no value is compiled in)."""
+    import ufl
+
+    names = {name: getattr(ufl, name) for name in FUNCTIONS if name not in ("abs", "log", "min", "max")}
+    functions = {**names, "abs": abs, "log": ufl.ln, "min": ufl.min_value, "max": ufl.max_value}
+    compare = {"lt": ufl.lt, "le": ufl.le, "gt": ufl.gt, "ge": ufl.ge}
+    return Algebra(number=number, functions=functions, compare=compare, where=ufl.conditional)
+
+
+class Formula:
+    """A number or a checked formula in x, y, z (SI).
+
+    Args:
+        source: a finite number, or a formula such as ``"-1e6*(1 - 1.8*x)"``.
+
+    Raises:
+        InputError: not a finite number, not a formula, or a formula with anything but coordinates, numbers,
+            ``pi``, the operators ``+ - * / **``, comparisons within ``a if c else b`` and :data:`FUNCTIONS`.
+    """
+
+    __slots__ = ("_tree", "source")
+
+    def __init__(self, source: float | int | str) -> None:
+        if isinstance(source, bool) or not isinstance(source, int | float | str):
+            raise InputError(f"a number or a formula in x, y, z is wanted, not {source!r}")
+        self.source = source if isinstance(source, str) else float(source)
+        text = source if isinstance(source, str) else repr(float(source))
+        if not isinstance(source, str) and not math.isfinite(source):
+            raise InputError(f"{source!r} is not a finite number; give a finite one")
+        self._tree = _parse(text)
+
+    @property
+    def is_number(self) -> bool:
+        """Whether it is a plain number."""
+        return isinstance(self.source, float)
+
+    def __repr__(self) -> str:
+        return f"Formula({self.source!r})"
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Formula) and other.source == self.source
+
+    def __hash__(self) -> int:
+        return hash(self.source)
+
+    def render(self, x: Any, algebra: Algebra) -> Any:
+        """The formula in another algebra; ``x`` is indexed by coordinate (missing ones count as 0)."""
+        return _render(self._tree, x, algebra)
+
+    def at(self, points: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+        """Values at points of shape (n, 3), SI; shape (n,). Not checked for finiteness."""
+        with np.errstate(all="ignore"):
+            value = self.render(points.T, NUMPY)
+        return np.broadcast_to(np.asarray(value, dtype=np.float64), (points.shape[0],)).copy()
+
+
+def _parse(text: str) -> ast.expr:
+    if len(text) > _LONGEST:
+        raise InputError(f"the formula has {len(text)} characters; {_LONGEST} at most")
+    try:
+        tree = ast.parse(text.strip(), mode="eval").body
+    except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
+        raise InputError(f"{text!r} is not a formula: {getattr(error, 'msg', error)}") from None
+    _check(tree, text, 0)
+    return tree
+
+
+def _check(node: ast.expr, text: str, depth: int) -> None:
+    if depth > _DEEPEST:
+        raise InputError(f"the formula is nested more than {_DEEPEST} deep")
+    match node:
+        case ast.Constant(value=bool()) | ast.Constant(value=complex()):
+            raise InputError(f"{ast.unparse(node)} in {text!r} is not a number")
+        case ast.Constant(value=int() | float() as value):
+            _check_finite(value, text)
+            return
+        case ast.Name(id=name):
+            _check_name(name, text)
+            return
+        case ast.BinOp(left=left, op=op, right=right) if type(op) in _BINARY:
+            _check_power(op, right, text)
+            children = [left, right]
+        case ast.UnaryOp(op=ast.USub() | ast.UAdd(), operand=operand):
+            children = [operand]
+        case ast.Call(func=ast.Name(id=name), args=args, keywords=[]):
+            _check_call(name, len(args), text)
+            children = args
+        case ast.IfExp(test=ast.Compare(left=a, ops=[op], comparators=[b]), body=yes, orelse=no) if (
+            type(op) in _COMPARE
+        ):
+            children = [a, b, yes, no]
+        case _:
+            raise InputError(
+                f"{ast.unparse(node)!r} in {text!r} is not allowed; a formula has numbers, x, y, z, pi, "
+                f"+ - * / **, 'a if x < 1 else b' and {', '.join(FUNCTIONS)}"
+            )
+    for child in children:
+        _check(child, text, depth + 1)
+
+
+def _check_finite(value: float, text: str) -> None:
+    try:
+        finite = math.isfinite(float(value))
+    except OverflowError:
+        finite = False
+    if not finite:
+        raise InputError(f"a number in {text!r} is not finite")
+
+
+def _check_name(name: str, text: str) -> None:
+    if name in COORDINATES or name in CONSTANTS:
+        return
+    hint = "" if name not in FUNCTIONS else f"; {name} is a function: write {name}(...)"
+    raise InputError(f"{name!r} in {text!r} is not known; a formula may use x, y, z and pi{hint}")
+
+
+def _check_call(name: str, count: int, text: str) -> None:
+    if name not in FUNCTIONS:
+        close = difflib.get_close_matches(name, FUNCTIONS, 1)
+        hint = f"did you mean {close[0]}? " if close else ""
+        raise InputError(f"function {name!r} in {text!r} is not known; {hint}allowed: {', '.join(FUNCTIONS)}")
+    wanted = 2 if name in _TWO_ARGUMENTS else 1
+    if count != wanted:
+        raise InputError(f"{name} in {text!r} takes {wanted} argument{'s'[: wanted - 1]}, not {count}")
+
+
+def _check_power(op: ast.operator, exponent: ast.expr, text: str) -> None:
+    if not isinstance(op, ast.Pow) or not isinstance(exponent, ast.Constant):
+        return
+    if isinstance(exponent.value, int | float) and abs(exponent.value) > _LARGEST_POWER:
+        raise InputError(f"the power {exponent.value} in {text!r} is too large; {_LARGEST_POWER} at most")
+
+
+def _render(node: ast.expr, x: Any, algebra: Algebra) -> Any:
+    match node:
+        case ast.Constant(value=value):
+            return algebra.number(float(value))  # type: ignore[arg-type]
+        case ast.Name(id=name):
+            return algebra.number(CONSTANTS[name]) if name in CONSTANTS else _coordinate(name, x, algebra)
+        case ast.BinOp(left=left, op=ast.Pow(), right=ast.Constant(value=int() as power)):
+            # An integer power stays one: UFL then multiplies, and a negative base is allowed.
+            return _render(left, x, algebra) ** power
+        case ast.BinOp(left=left, op=op, right=right):
+            return _BINARY[type(op)](_render(left, x, algebra), _render(right, x, algebra))
+        case ast.UnaryOp(op=op, operand=operand):
+            value = _render(operand, x, algebra)
+            return -value if isinstance(op, ast.USub) else value
+        case ast.Call(func=ast.Name(id=name), args=args):
+            return algebra.functions[name](*(_render(a, x, algebra) for a in args))
+        case ast.IfExp(test=ast.Compare(left=a, ops=[op], comparators=[b]), body=yes, orelse=no):
+            condition = algebra.compare[_COMPARE[type(op)]](_render(a, x, algebra), _render(b, x, algebra))
+            return algebra.where(condition, _render(yes, x, algebra), _render(no, x, algebra))
+    raise AssertionError(f"unchecked node {ast.dump(node)}")  # _check has refused everything else
+
+
+def _coordinate(name: str, x: Any, algebra: Algebra) -> Any:
+    index = COORDINATES.index(name)
+    return x[index] if index < len(x) else algebra.number(0.0)

@@ -1,0 +1,106 @@
+"""Gmsh files (.msh, .geo) read into dolfinx: boundary parts and regions by the names of physical groups."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from dolfinx import mesh as dmesh
+from mpi4py import MPI
+
+from . import compat
+from .errors import InputError
+from .parallel import on_root
+
+Entities = npt.NDArray[np.int32]
+_SIMPLEX = {2: 2, 3: 4}
+"""Gmsh's element type of the linear simplex, by dimension."""
+
+
+def read(
+    comm: MPI.Comm, path: Path, dimension: int
+) -> tuple[dmesh.Mesh, Mapping[str, Entities], Mapping[str, Entities]]:
+    """Mesh, boundary parts and regions (local entities by name) of a gmsh file. Collective.
+
+    Raises:
+        InputError: on all ranks alike: not readable, no named groups, wrong dimension, not linear simplices,
+            inverted or degenerate cells.
+    """
+    with _gmsh(comm) as gmsh:
+        names = on_root(comm, lambda: _open(gmsh, path, dimension))
+        model = gmsh.model if comm.rank == 0 else None
+        mesh, cell_tags, facet_tags = compat.mesh_from_gmsh(model, comm, 0, dimension)
+    mesh.topology.create_connectivity(dimension - 1, dimension)
+    return mesh, _by_name(facet_tags, names[dimension - 1]), _by_name(cell_tags, names[dimension])
+
+
+@contextmanager
+def _gmsh(comm: MPI.Comm) -> Iterator[Any]:
+    """Gmsh, started on rank 0 only and always finalised."""
+    if comm.rank != 0:
+        yield None
+        return
+    import gmsh
+
+    gmsh.initialize(["-noenv"], readConfigFiles=False, interruptible=False)
+    gmsh.option.setNumber("General.Terminal", 0)
+    try:
+        yield gmsh
+    finally:
+        gmsh.finalize()
+
+
+def _open(gmsh: Any, path: Path, dimension: int) -> dict[int, dict[str, int]]:
+    if not path.is_file():
+        raise InputError(f"mesh file {path}: there is no such file; give the path from the scene's folder")
+    try:
+        gmsh.open(str(path))
+        if not len(gmsh.model.mesh.getNodes()[0]):
+            gmsh.model.mesh.generate(dimension)
+    except Exception as error:
+        # gmsh raises bare Exceptions, whatever is wrong with a file
+        raise InputError(f"mesh file {path}: gmsh cannot read it: {error}") from None
+    _check_cells(gmsh, path, dimension)
+    return {d: _names(gmsh, path, d) for d in (dimension - 1, dimension)}
+
+
+def _names(gmsh: Any, path: Path, dimension: int) -> dict[str, int]:
+    named = {gmsh.model.getPhysicalName(d, tag): tag for d, tag in gmsh.model.getPhysicalGroups(dimension)}
+    for name, tag in named.items():
+        if not len(gmsh.model.mesh.getNodesForPhysicalGroup(dimension, tag)[0]):
+            raise InputError(f"mesh file {path}: physical group {name!r} is empty; remove it or fill it")
+    if not named:
+        kind = "region" if dimension == gmsh.model.getDimension() else "boundary part"
+        raise InputError(f"mesh file {path}: no physical group of dimension {dimension} (a {kind}); add one in gmsh")
+    return {name or str(tag): tag for name, tag in named.items()}
+
+
+def _check_cells(gmsh: Any, path: Path, dimension: int) -> None:
+    if gmsh.model.getDimension() != dimension:
+        found = gmsh.model.getDimension()
+        raise InputError(f"mesh file {path}: its cells have dimension {found}, the material's model wants {dimension}")
+    types, tags, _ = gmsh.model.mesh.getElements(dimension)
+    if list(types) != [_SIMPLEX[dimension]]:
+        shape = "triangles" if dimension == 2 else "tetrahedra"
+        raise InputError(f"mesh file {path}: linear {shape} only; remesh with order 1 and without recombination")
+    quality = np.asarray(gmsh.model.mesh.getElementQualities(tags[0], "volume"))
+    if not np.all(np.abs(quality) > 0):
+        bad = int(np.argmin(np.abs(quality)))
+        raise InputError(f"mesh file {path}: cell {tags[0][bad]} has no volume; remesh")
+    _check_plane(gmsh, path, dimension)
+
+
+def _check_plane(gmsh: Any, path: Path, dimension: int) -> None:
+    points = np.asarray(gmsh.model.mesh.getNodes()[1]).reshape(-1, 3)
+    if not np.all(np.isfinite(points)):
+        raise InputError(f"mesh file {path}: a node's coordinates are not finite numbers")
+    if dimension == 2 and np.ptp(points[:, 2]) > 1e-12 * np.ptp(points[:, :2]):
+        raise InputError(f"mesh file {path}: a 2D mesh must lie in a plane z = constant")
+
+
+def _by_name(tags: Any, names: Mapping[str, int]) -> dict[str, Entities]:
+    return {name: tags.find(tag) for name, tag in names.items()}

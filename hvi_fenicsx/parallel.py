@@ -1,0 +1,67 @@
+"""Small collective helpers: all ranks agree, on values and on errors, before any of them goes on."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+from mpi4py import MPI
+
+from .errors import HviError
+
+T = TypeVar("T")
+
+
+def agree(comm: MPI.Comm, value: T) -> list[T]:
+    """Every rank's value, on every rank. Collective."""
+    return comm.allgather(value)
+
+
+def together(comm: MPI.Comm, action: Callable[[], T]) -> T:
+    """Run a local action on all ranks; if it fails anywhere, all ranks raise the first rank's error. Collective.
+
+    Raises:
+        HviError: the error of the lowest rank that failed.
+    """
+    error: HviError | None = None
+    result: Any = None
+    try:
+        result = action()
+    except HviError as caught:
+        error = caught
+    _raise_first(agree(comm, error))
+    return result  # type: ignore[no-any-return]
+
+
+def on_root(comm: MPI.Comm, action: Callable[[], T]) -> T:
+    """Run an action on rank 0 only; all ranks get its result, or raise its error. Collective.
+
+    Raises:
+        HviError: what the action raised.
+    """
+    error: HviError | None = None
+    result: Any = None
+    if comm.rank == 0:
+        try:
+            result = action()
+        except HviError as caught:
+            error = caught
+    error, result = comm.bcast((error, result), root=0)
+    _raise_first([error])
+    return result  # type: ignore[no-any-return]
+
+
+def _raise_first(errors: list[HviError | None]) -> None:
+    for error in errors:
+        if error is not None:
+            raise error
+
+
+def total(comm: MPI.Comm, value: float) -> float:
+    """Sum over the ranks. Collective."""
+    return float(comm.allreduce(value, op=MPI.SUM))
+
+
+def largest(comm: MPI.Comm, value: float) -> float:
+    """Maximum over the ranks. Collective."""
+    return float(comm.allreduce(value, op=MPI.MAX))
