@@ -1,0 +1,30 @@
+"""Nonmonotone laws: superpotentials as objects, the catalogue, and laws of one's own (docs/laws.md)."""
+
+from .base import ConvexPart, Directional, Superpotential
+from .catalogue import Graph, LinearSpring, QuadraticLinear, QuadraticLinearLiteral, Sawtooth, Tresca
+from .polyline import PolylineLaw, PolylinePart
+from .registry import available, create
+from .sampled import SampledLaw, sample_traction
+from .traction_graph import TractionGraph
+from .weakening import Exponential, WeakeningLaw
+
+__all__ = [
+    "ConvexPart",
+    "Directional",
+    "Exponential",
+    "Graph",
+    "LinearSpring",
+    "PolylineLaw",
+    "PolylinePart",
+    "QuadraticLinear",
+    "QuadraticLinearLiteral",
+    "SampledLaw",
+    "Sawtooth",
+    "Superpotential",
+    "TractionGraph",
+    "Tresca",
+    "WeakeningLaw",
+    "available",
+    "create",
+    "sample_traction",
+]

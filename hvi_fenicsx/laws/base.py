@@ -1,0 +1,235 @@
+"""What a superpotential is: the law j with -σ ∈ ∂j(u), and all that a solver and a certificate ask of it.
+
+A law is a locally Lipschitz function j: R → R of one displacement (a slip u_t, in 3D its length, or an
+opening), an energy per area in N/m. Its derivative is the traction in N/m²; at a kink of j the traction is
+any value of an interval, Clarke's subdifferential ∂j. Every law is given by its split j = H - G into two
+convex functions (D.C., "difference of convex"); everything else in this class follows from it.
+Any consistent system of units will do; `scaled` changes it.
+"""
+
+from __future__ import annotations
+
+import inspect
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, ClassVar
+
+import numpy as np
+import numpy.typing as npt
+
+from ..errors import InputError
+from .extremes import Extremes, extremes
+
+FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+
+
+def quotient(a: FloatArray, b: FloatArray | float) -> FloatArray:
+    """A / b; numpy's stubs do not know that the quotient of doubles is one."""
+    result: FloatArray = np.divide(a, b)
+    return result
+
+
+_REGISTRY: dict[str, type[Superpotential]] = {}
+
+
+@dataclass(frozen=True)
+class Directional:
+    """A positively homogeneous function on the line: its values in the directions -1 and +1 (may be inf)."""
+
+    minus: float
+    plus: float
+
+
+class ConvexPart(ABC):
+    """A convex function on the line; H or G of a law's split j = H - G. Arrays in and out have shape (m,)."""
+
+    @property
+    @abstractmethod
+    def kinks(self) -> FloatArray:
+        """Positions (k,), ascending, at which the derivative jumps upwards."""
+
+    @abstractmethod
+    def value(self, x: FloatArray) -> FloatArray:
+        """The function."""
+
+    @abstractmethod
+    def left(self, x: FloatArray) -> FloatArray:
+        """Left derivative, nondecreasing."""
+
+    @abstractmethod
+    def right(self, x: FloatArray) -> FloatArray:
+        """Right derivative, nondecreasing; equals `left` off the kinks."""
+
+    @abstractmethod
+    def second(self, x: FloatArray) -> FloatArray:
+        """Second derivative off the kinks; the larger one-sided one where the derivative's slope breaks."""
+
+    @property
+    def jumps(self) -> FloatArray:
+        """Heights (k,) of the jumps of the derivative at the kinks, all positive."""
+        return self.right(self.kinks) - self.left(self.kinks)
+
+
+class Superpotential(ABC):
+    """A law j: R → R. To write one's own, see docs/laws.md: usually a simpler base class serves.
+
+    A subclass with a `name` is registered under it (unless declared with `register=False`) and can then be
+    named in a scene file; the parameters there are those of its constructor.
+    Required: value, convex, concave, growth, energy_scale, length_scale, even. The rest has defaults.
+    """
+
+    name: ClassVar[str]
+
+    def __init_subclass__(cls, *, register: bool = True, **kwargs: Any) -> None:
+        super().__init_subclass__(**kwargs)
+        _refuse_hidden_properties(cls)
+        if register and "name" in cls.__dict__:
+            _register(cls)
+
+    @abstractmethod
+    def value(self, x: FloatArray) -> FloatArray:
+        """J at the displacements x (m,), in N/m, with j(0) = 0 (smoothed laws: to within their bound)."""
+
+    @property
+    @abstractmethod
+    def convex(self) -> ConvexPart:
+        """H of the split j = H - G: the rising parts and upward jumps of the traction."""
+
+    @property
+    @abstractmethod
+    def concave(self) -> ConvexPart:
+        """G of the split j = H - G, convex as well: the falling parts and downward jumps of the traction."""
+
+    @property
+    @abstractmethod
+    def growth(self) -> Directional:
+        """j^∞(±1) = lim j(±t)/t for t → ∞, in N/m²: the residual resistance."""
+
+    @property
+    @abstractmethod
+    def energy_scale(self) -> float:
+        """A typical energy per area, N/m: roughly, the area under the law's graph up to the first kink."""
+
+    @property
+    @abstractmethod
+    def length_scale(self) -> float:
+        """A displacement typical of the law, m: where its first kink off zero lies."""
+
+    @property
+    @abstractmethod
+    def even(self) -> bool:
+        """Whether j(-x) = j(x), so that the law can act on the length of a slip in 3D."""
+
+    @property
+    def traction_scale(self) -> float:
+        """energy_scale / length_scale, N/m²."""
+        return self.energy_scale / self.length_scale
+
+    def left(self, x: FloatArray) -> FloatArray:
+        """Left derivative of j at x (m,), N/m²."""
+        return self.convex.left(x) - self.concave.left(x)
+
+    def right(self, x: FloatArray) -> FloatArray:
+        """Right derivative of j at x (m,), N/m²."""
+        return self.convex.right(x) - self.concave.right(x)
+
+    @cached_property
+    def kinks(self) -> FloatArray:
+        """Positions (k,), ascending, of all kinks of j."""
+        return np.union1d(self.convex.kinks, self.concave.kinks)
+
+    def interval(self, x: FloatArray, atol: float = 0.0) -> tuple[FloatArray, FloatArray]:
+        """Clarke's subdifferential [lo, hi] of j at x (m,), N/m².
+
+        With `atol` (a length), the hull of the intervals at x and at every kink within atol of x: so a
+        displacement that means a kink but misses it by rounding is given the kink's whole interval.
+        """
+        lo, hi = self._clarke(x)
+        for kink in self._kinks_within(x, atol):
+            near = np.abs(x - kink) <= atol
+            low, high = self._clarke(np.array([kink]))
+            lo = np.where(near, np.minimum(lo, low[0]), lo)
+            hi = np.where(near, np.maximum(hi, high[0]), hi)
+        return lo, hi
+
+    def distance(self, x: FloatArray, traction: FloatArray, atol: float = 0.0) -> FloatArray:
+        """Distance (m,) of a traction from ∂j(x), N/m², zero if the law allows it. `atol`: see `interval`."""
+        lo, hi = self.interval(x, atol)
+        return np.asarray(np.maximum(np.maximum(lo - traction, traction - hi), 0.0))
+
+    def piece(self, x: FloatArray) -> IntArray:
+        """Index (m,) of the law's piece that x lies on, counted from 0 by |x|; this default knows one."""
+        return np.zeros(np.shape(x), dtype=np.int64)
+
+    def branch(self, x: FloatArray, atol: float = 0.0) -> IntArray:
+        """Index (m,) of the active piece, counted from 0 by |x|; -1 on a kink or within atol of it."""
+        result = self.piece(x)
+        for kink in self._kinks_within(x, atol):
+            result = np.where(np.abs(x - kink) <= atol, -1, result)
+        return result
+
+    @property
+    def peak(self) -> Directional:
+        """The largest resistance: Clarke's derivative j⁰(x; ±1) at its supremum over x, N/m².
+
+        Unless a law overrides it, a bound from above, sharp to a relative 1e-6. So are c3 and c4.
+        """
+        return Directional(self._extremes.peak_minus, self._extremes.peak_plus)
+
+    @property
+    def c3(self) -> float:
+        """Growth condition (i) of Ovcharova and Gwinner, section 4: |η| ≤ c3 (1 + |x|) for η ∈ ∂j(x)."""
+        return self._extremes.c3
+
+    @property
+    def c4(self) -> float:
+        """Growth condition (ii) of Ovcharova and Gwinner, section 4: -η x ≤ c4 |x| for η ∈ ∂j(x)."""
+        return self._extremes.c4
+
+    def scaled(self, length: float, traction: float) -> Superpotential:
+        """The same law in units of `length` and `traction`: j(length x) / (length traction)."""
+        from .scaled import ScaledLaw
+
+        return ScaledLaw(self, length, traction)
+
+    @cached_property
+    def _extremes(self) -> Extremes:
+        return extremes(self)
+
+    def _clarke(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
+        left, right = self.left(x), self.right(x)
+        return np.minimum(left, right), np.maximum(left, right)
+
+    def _kinks_within(self, x: FloatArray, atol: float) -> FloatArray:
+        if np.size(x) == 0:
+            return np.empty(0)
+        return self.kinks[(self.kinks >= np.min(x) - atol) & (self.kinks <= np.max(x) + atol)]
+
+
+def _refuse_hidden_properties(cls: type[Superpotential]) -> None:
+    """A parameter called `peak`, say, would silently replace the property of that name."""
+    reserved = {key for key in vars(Superpotential) if not key.startswith("_")}
+    hidden = sorted(reserved & (inspect.get_annotations(cls).keys() - {"name"}))
+    if hidden:
+        raise InputError(
+            f"law class {cls.__name__}: the parameter name {hidden[0]!r} is taken by a property that "
+            f"every law has; choose another, for example {hidden[0] + '_parameter'!r}"
+        )
+
+
+def _register(cls: type[Superpotential]) -> None:
+    """Enter the class under its name; the same class again (a notebook's cell run twice) replaces it."""
+    old = _REGISTRY.get(cls.name)
+    if old is not None and (old.__module__, old.__qualname__) != (cls.__module__, cls.__qualname__):
+        raise InputError(
+            f"law class {cls.__name__}: the name {cls.name!r} is taken by "
+            f"{old.__module__}.{old.__qualname__}; choose another name"
+        )
+    _REGISTRY[cls.name] = cls
+
+
+def registered() -> dict[str, type[Superpotential]]:
+    """All laws that can be created by name, sorted by it."""
+    return dict(sorted(_REGISTRY.items()))

@@ -1,0 +1,251 @@
+"""The polyline laws provided: parameters in, `TractionGraph` out.
+
+Displacements in m, tractions in N/m² (or any consistent units); `name` is the scene file's `law = "name"`.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from typing_extensions import override
+
+from ..errors import InputError
+from .base import Superpotential
+from .checks import require_number, require_ordered, require_positive
+from .polyline import PolylineLaw
+from .traction_graph import TractionGraph
+
+
+@dataclass(frozen=True)
+class QuadraticLinear(PolylineLaw):
+    """j(x) = min{γ1/(2δ) x², γ2 |x|}: traction rises to γ1 at δ, drops to γ2 = γ1/2 and stays there.
+
+    Ovcharova and Gwinner, section 5.1, read as an even law. The two pieces cross at 2 δ γ2/γ1; only with
+    γ1 = 2 γ2 is that δ, and InputError is raised otherwise.
+    """
+
+    name = "quadratic_linear"
+    gamma1: float
+    gamma2: float
+    delta: float
+
+    def __post_init__(self) -> None:
+        require_positive(self.name, gamma1=self.gamma1, gamma2=self.gamma2, delta=self.delta)
+        if abs(self.gamma1 - 2.0 * self.gamma2) > 1e-12 * self.gamma1:
+            raise InputError(
+                f"law {self.name!r}: gamma1 = {self.gamma1!r} must be 2 gamma2 = {2 * self.gamma2!r}: then "
+                f'the drop lies at delta. For any other drop state the graph: law = "graph", points = '
+                f"[[0, 0], [{self.delta!r}, {self.gamma1!r}], [{self.delta!r}, {self.gamma2!r}]]"
+            )
+
+    @override
+    def build(self) -> TractionGraph:
+        return TractionGraph.from_points([(0.0, 0.0), (self.delta, self.gamma1), (self.delta, self.gamma2)])
+
+    @override
+    def scaled(self, length: float, traction: float) -> Superpotential:
+        return QuadraticLinear(self.gamma1 / traction, self.gamma2 / traction, self.delta / length)
+
+
+@dataclass(frozen=True)
+class QuadraticLinearLiteral(PolylineLaw):
+    """j(x) = min{γ1/(2δ) x², γ2 x}, the formula of Ovcharova and Gwinner read literally, on the whole line.
+
+    For x < 0 the traction is +γ2 and pushes the body on; at 0 it drops to 0 (a concave kink), then rises to
+    2 γ2 at 2 δ γ2/γ1 and drops to γ2. Here c4 = γ2, the constant of the paper's existence condition.
+    """
+
+    name = "quadratic_linear_literal"
+    gamma1: float
+    gamma2: float
+    delta: float
+
+    def __post_init__(self) -> None:
+        require_positive(self.name, gamma1=self.gamma1, gamma2=self.gamma2, delta=self.delta)
+
+    @override
+    def build(self) -> TractionGraph:
+        crossing, slope = 2.0 * self.delta * self.gamma2 / self.gamma1, self.gamma1 / self.delta
+        return TractionGraph(
+            np.array([0.0, crossing]),
+            np.array([self.gamma2, 2.0 * self.gamma2]),
+            np.array([0.0, self.gamma2]),
+            np.array([0.0, slope, 0.0]),
+        )
+
+    @override
+    def scaled(self, length: float, traction: float) -> Superpotential:
+        return QuadraticLinearLiteral(self.gamma1 / traction, self.gamma2 / traction, self.delta / length)
+
+
+@dataclass(frozen=True)
+class Tresca(PolylineLaw):
+    """j(x) = yield_traction |x|: stick below the yield traction, slip at it. A convex kink at 0.
+
+    The law has no length of its own; `reference_slip` (m) serves its energy scale and so the relative
+    smoothing only.
+    """
+
+    name = "tresca"
+    yield_traction: float
+    reference_slip: float = 1e-6
+
+    def __post_init__(self) -> None:
+        require_positive(self.name, yield_traction=self.yield_traction, reference_slip=self.reference_slip)
+
+    @override
+    @property
+    def reference_length(self) -> float:
+        return self.reference_slip
+
+    @override
+    def build(self) -> TractionGraph:
+        return TractionGraph.from_points([(0.0, self.yield_traction)])
+
+    @override
+    def scaled(self, length: float, traction: float) -> Superpotential:
+        return Tresca(self.yield_traction / traction, self.reference_slip / length)
+
+
+@dataclass(frozen=True)
+class LinearSpring(PolylineLaw):
+    """j(x) = ½ stiffness x², stiffness in N/m³. No kink; `reference_slip` (m) is for the energy scale."""
+
+    name = "linear_spring"
+    stiffness: float
+    reference_slip: float = 1e-6
+
+    def __post_init__(self) -> None:
+        require_positive(self.name, stiffness=self.stiffness, reference_slip=self.reference_slip)
+
+    @override
+    @property
+    def reference_length(self) -> float:
+        return self.reference_slip
+
+    @override
+    def build(self) -> TractionGraph:
+        zero = np.zeros(1)
+        return TractionGraph(zero, zero, zero, np.full(2, float(self.stiffness)))
+
+    @override
+    def scaled(self, length: float, traction: float) -> Superpotential:
+        return LinearSpring(self.stiffness * length / traction, self.reference_slip / length)
+
+
+@dataclass(frozen=True)
+class Sawtooth(PolylineLaw):
+    """Teeth of width delta: the traction rises to the k-th peak at k delta, then drops to the residual.
+
+    The peaks descend evenly from peak_traction, the k-th of n = `drops` being
+    residual + (peak - residual)(n + 1 - k)/n. With one drop it is the quadratic-linear law for any γ1 > γ2.
+    The zigzag laws of Panagiotopoulos (delamination, Scanlon's diagram of concrete) have this form.
+    """
+
+    name = "sawtooth"
+    peak_traction: float
+    residual_traction: float
+    delta: float
+    drops: int
+
+    def __post_init__(self) -> None:
+        require_positive(self.name, delta=self.delta)
+        require_ordered(self.name, residual_traction=self.residual_traction, peak_traction=self.peak_traction)
+        if self.residual_traction == self.peak_traction:
+            raise InputError(
+                f"law {self.name!r}: residual_traction = peak_traction = {self.peak_traction!r} leaves no "
+                f"drop; lower residual_traction"
+            )
+        if isinstance(self.drops, bool) or not isinstance(self.drops, int) or self.drops < 1:
+            raise InputError(f"law {self.name!r}: drops = {self.drops!r} must be a whole number >= 1")
+
+    @override
+    def build(self) -> TractionGraph:
+        points = [(0.0, 0.0)]
+        for k in range(1, self.drops + 1):
+            share = (self.drops + 1 - k) / self.drops
+            height = self.residual_traction + (self.peak_traction - self.residual_traction) * share
+            points += [(k * self.delta, height), (k * self.delta, self.residual_traction)]
+        return TractionGraph.from_points(points)
+
+    @override
+    def scaled(self, length: float, traction: float) -> Superpotential:
+        return replace(
+            self,
+            peak_traction=self.peak_traction / traction,
+            delta=self.delta / length,
+            residual_traction=self.residual_traction / traction,
+        )
+
+
+@dataclass(frozen=True)
+class Graph(PolylineLaw):
+    """The law as its graph: points (displacement, traction), vertical segments up or down being jumps.
+
+    Displacements start at 0 and do not descend; after the last point the traction stays constant.
+    The law is odd in the traction (even in the energy), or zero for negative displacements if one_sided. A
+    nonzero traction at displacement 0 is a kink there (Tresca friction for the odd law).
+    """
+
+    name = "graph"
+    points: tuple[tuple[float, float], ...]
+    one_sided: bool = False
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "points", _checked_points(self.name, self.points))
+        if not any(traction for _, traction in self.points):
+            raise InputError(f"law {self.name!r}: the traction of every point is 0; leave the law away")
+
+    @override
+    def build(self) -> TractionGraph:
+        return TractionGraph.from_points(self.points, self.one_sided)
+
+    @override
+    def scaled(self, length: float, traction: float) -> Superpotential:
+        return replace(self, points=tuple((x / length, t / traction) for x, t in self.points))
+
+
+def _checked_points(law: str, points: Sequence[Sequence[float]]) -> tuple[tuple[float, float], ...]:
+    """The points as pairs of floats; InputError where they are not the graph of a law."""
+    for point in points:
+        if isinstance(point, str) or len(point) != 2:
+            raise InputError(f"law {law!r}: point {point!r} is not a pair [displacement, traction]")
+        require_number(law, displacement=point[0], traction=point[1])
+    pairs = tuple((float(x), float(t)) for x, t in points)
+    if not pairs or pairs[0][0] != 0.0:
+        raise InputError(f"law {law!r}: the first point must have the displacement 0, for example [0, 0]")
+    for before, after in itertools.pairwise(pairs):
+        _check_segment(law, before, after)
+    _check_jumps(law, pairs)
+    return pairs
+
+
+def _check_segment(law: str, before: tuple[float, float], after: tuple[float, float]) -> None:
+    step = after[0] - before[0]
+    if step < 0.0:
+        raise InputError(
+            f"law {law!r}: the displacement falls from {before[0]!r} to {after[0]!r}; order the points"
+        )
+    if step > 0.0 and not math.isfinite((after[1] - before[1]) / step):
+        raise InputError(
+            f"law {law!r}: the segment from {before!r} to {after!r} is too steep for a float; "
+            f"make it vertical, which is a jump"
+        )
+
+
+def _check_jumps(law: str, pairs: tuple[tuple[float, float], ...]) -> None:
+    for first, _, third in zip(pairs, pairs[1:], pairs[2:], strict=False):
+        if first[0] == third[0]:
+            raise InputError(
+                f"law {law!r}: three points at the displacement {first[0]!r}; a jump has two ends, "
+                f"leave out the one in between"
+            )
+    if len(pairs) > 1 and pairs[1][0] == 0.0 and pairs[0][1] != 0.0:
+        raise InputError(
+            f"law {law!r}: two points at the displacement 0, the first with traction {pairs[0][1]!r}; "
+            f"a jump at 0 starts at [0, 0]"
+        )

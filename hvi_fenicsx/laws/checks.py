@@ -1,0 +1,36 @@
+"""Checks of a law's parameters, with messages that say what, what is allowed and how to mend it."""
+
+from __future__ import annotations
+
+import math
+from numbers import Real
+
+from ..errors import InputError
+
+
+def require_number(law: str, **parameters: object) -> None:
+    """Refuse anything but finite real numbers."""
+    for key, value in parameters.items():
+        if isinstance(value, bool) or not isinstance(value, Real) or not math.isfinite(value):
+            raise InputError(f"law {law!r}: {key} = {value!r} is not usable; give a finite number")
+
+
+def require_positive(law: str, **parameters: object) -> None:
+    """Refuse anything but finite numbers > 0."""
+    require_number(law, **parameters)
+    for key, value in parameters.items():
+        if not float(value) > 0.0:  # type: ignore[arg-type]
+            raise InputError(
+                f"law {law!r}: {key} = {value!r} must be > 0; give its magnitude, in the scene's units"
+            )
+
+
+def require_ordered(law: str, **parameters: float) -> None:
+    """Refuse a residual below 0 or above the peak: `require_ordered(law, residual=..., peak=...)`."""
+    require_number(law, **parameters)
+    (low_name, low), (high_name, high) = parameters.items()
+    if not 0.0 <= low <= high or high == 0.0:
+        raise InputError(
+            f"law {law!r}: {low_name} = {low!r} and {high_name} = {high!r} do not fit; "
+            f"allowed is 0 <= {low_name} <= {high_name} with {high_name} > 0"
+        )

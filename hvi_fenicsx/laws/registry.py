@@ -1,0 +1,81 @@
+"""Laws by name, from plain data such as a scene file's table."""
+
+from __future__ import annotations
+
+import difflib
+import inspect
+import json
+from collections.abc import Iterable, Mapping
+from typing import Any, get_type_hints
+
+from pydantic import ConfigDict, ValidationError, create_model
+
+from ..errors import InputError
+from .base import Superpotential, registered
+
+_STRICT = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False, arbitrary_types_allowed=True)
+
+
+def available() -> tuple[str, ...]:
+    """Names of all laws, the user's own among them."""
+    return tuple(registered())
+
+
+def create(name: str, parameters: Mapping[str, Any]) -> Superpotential:
+    """The law `name` with the given parameters, checked as strictly as a scene file's.
+
+    Integers serve as floats; strings, booleans, infinities and unknown parameters do not. InputError says
+    what is allowed, and names the closest match of a misspelt name.
+    """
+    law = registered().get(name)
+    if law is None:
+        raise InputError(
+            f"unknown law {name!r}{_closest(name, available())}; available: {', '.join(available())}"
+        )
+    allowed = inspect.signature(law).parameters
+    _check_keys(name, parameters, allowed)
+    return law(**_checked(law, parameters, allowed))
+
+
+def _check_keys(name: str, given: Mapping[str, Any], allowed: Mapping[str, inspect.Parameter]) -> None:
+    listing = f"law {name!r} takes {', '.join(allowed) or 'no parameters'}"
+    for key in given:
+        if key not in allowed:
+            raise InputError(f"law {name!r}: unknown parameter {key!r}{_closest(key, allowed)}; {listing}")
+    missing = [key for key, p in allowed.items() if p.default is p.empty and key not in given]
+    if missing:
+        raise InputError(f"law {name!r}: {', '.join(missing)} missing; {listing}")
+
+
+def _checked(
+    law: type[Superpotential], given: Mapping[str, Any], allowed: Mapping[str, inspect.Parameter]
+) -> dict[str, Any]:
+    """The given values in the types that the law's constructor declares."""
+    hints = get_type_hints(law.__init__)
+    fields: dict[str, Any] = {key: (hints.get(key, Any), ...) for key in allowed if key in given}
+    model = create_model(law.__name__, __config__=_STRICT, **fields)
+    try:
+        # As JSON, strict means what a scene file means by it: a list is a tuple, an integer is a float.
+        checked = model.model_validate_json(json.dumps(dict(given), default=_plain))
+    except ValidationError as error:
+        raise InputError(_message(law.name, error)) from error
+    return {key: getattr(checked, key) for key in fields}
+
+
+def _plain(value: Any) -> Any:
+    """Numpy's numbers and arrays, and tomlkit's wrappers, as plain data."""
+    if hasattr(value, "tolist"):
+        return value.tolist()
+    raise InputError(f"{value!r} is not plain data; give numbers, booleans, strings or lists of them")
+
+
+def _message(name: str, error: ValidationError) -> str:
+    """One line for the first thing that is wrong."""
+    first = error.errors()[0]
+    where = "".join(f"[{part}]" if isinstance(part, int) else str(part) for part in first["loc"])
+    return f"law {name!r}: {where} = {first['input']!r} is not usable: {first['msg']}"
+
+
+def _closest(name: str, names: Iterable[str]) -> str:
+    match = difflib.get_close_matches(str(name), list(names), n=1)
+    return f" (did you mean {match[0]!r}?)" if match else ""

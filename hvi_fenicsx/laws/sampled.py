@@ -1,0 +1,89 @@
+"""Laws from a Python function of the traction, sampled into a graph: the shortest way to one's own law."""
+
+from __future__ import annotations
+
+import itertools
+from abc import abstractmethod
+from collections.abc import Callable, Sequence
+from typing import ClassVar
+
+import numpy as np
+from typing_extensions import override
+
+from ..errors import InputError
+from .base import FloatArray, IntArray
+from .polyline import PolylineLaw
+from .traction_graph import TractionGraph
+
+_JUMP = 1e-9
+"""Relative to the largest traction: a smaller difference of the limits at an end is not meant as a jump."""
+
+
+class SampledLaw(PolylineLaw):
+    """A law given by its traction at displacements x > 0 and the ends of its smooth pieces.
+
+    The traction is interpolated linearly between `samples` + 1 points a piece, so it is off by at most
+    max |traction''| (piece length / samples)² / 8; jumps, at ends only, are exact. What is solved and
+    certified is this interpolated law. It is odd, or zero for x < 0 where `one_sided = True`, and constant
+    after the last end.
+    """
+
+    samples: ClassVar[int] = 200
+    one_sided: ClassVar[bool] = False
+
+    @abstractmethod
+    def traction(self, x: FloatArray) -> FloatArray:
+        """Traction (m,) at displacements x (m,) > 0 inside the pieces."""
+
+    @abstractmethod
+    def ends(self) -> Sequence[float]:
+        """Where pieces end, ascending, > 0: every jump, every break of slope, and the start of the tail."""
+
+    @override
+    def build(self) -> TractionGraph:
+        return TractionGraph.from_points(
+            sample_traction(self.traction, self.ends(), self.samples), self.one_sided
+        )
+
+    def piece(self, x: FloatArray) -> IntArray:
+        """Number (m,) of ends between 0 and x."""
+        slip = np.maximum(x, 0.0) if self.one_sided else np.abs(x)
+        return np.asarray(
+            np.searchsorted(np.asarray(self.ends(), dtype=float), slip, side="right"), dtype=np.int64
+        )
+
+
+def sample_traction(
+    traction: Callable[[FloatArray], FloatArray], ends: Sequence[float], samples: int = 200
+) -> tuple[tuple[float, float], ...]:
+    """Points of a graph law from a traction function, smooth between 0 and the ends (ascending, > 0)."""
+    stops = np.append(0.0, np.asarray(ends, dtype=float))
+    if stops.size < 2 or not np.all(np.isfinite(stops)) or np.any(np.diff(stops) <= 0.0) or samples < 1:
+        raise InputError(
+            f"ends = {list(ends)!r}, samples = {samples!r}: give ascending finite ends > 0 and samples >= 1"
+        )
+    pieces = [_sample_piece(traction, a, b, samples) for a, b in itertools.pairwise(stops)]
+    size = max(float(np.abs(t).max()) for _, t in pieces)
+    points = [(0.0, float(pieces[0][1][0]) if abs(pieces[0][1][0]) > _JUMP * size else 0.0)]
+    for (x, t), follower in zip(pieces, [*pieces[1:], None], strict=True):
+        points += [(float(a), float(b)) for a, b in zip(x[1:], t[1:], strict=True)]
+        if follower is not None and abs(follower[1][0] - t[-1]) > _JUMP * size:
+            points.append((float(x[-1]), float(follower[1][0])))
+    return tuple(points)
+
+
+def _sample_piece(
+    traction: Callable[[FloatArray], FloatArray], a: float, b: float, samples: int
+) -> tuple[FloatArray, FloatArray]:
+    """Abscissae and tractions of a piece; at its ends those just inside, for the one-sided limits."""
+    x: FloatArray = np.linspace(a, b, samples + 1, dtype=np.float64)
+    inside = x.copy()
+    inside[0] = max(np.nextafter(a, b), a + 1e-12 * (b - a))
+    inside[-1] = min(np.nextafter(b, a), b - 1e-12 * (b - a))
+    values = np.asarray(traction(inside), dtype=np.float64)
+    if values.shape != x.shape or not np.all(np.isfinite(values)):
+        raise InputError(
+            f"the traction function must return one finite value for each displacement; between {a!r} and "
+            f"{b!r} it returned {values!r}"
+        )
+    return x, values

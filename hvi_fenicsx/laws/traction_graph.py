@@ -1,0 +1,154 @@
+"""The numerical kernel of all polyline laws: a piecewise linear traction over the whole line."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from .base import FloatArray, IntArray, quotient
+
+
+@dataclass(frozen=True, eq=False)
+class TractionGraph:
+    """A piecewise linear traction over displacement, and its primitive with the value 0 at 0.
+
+    breaks (k,): displacements, strictly ascending, one of them 0. left, right (k,): the limits there.
+    slopes (k+1,): slope of each piece, the first and the last one being unbounded.
+    """
+
+    breaks: FloatArray
+    left: FloatArray
+    right: FloatArray
+    slopes: FloatArray
+
+    @staticmethod
+    def from_points(points: Sequence[Sequence[float]], one_sided: bool = False) -> TractionGraph:
+        """Graph through points (displacement, traction) from displacement 0 on, constant after the last one.
+
+        Odd, or zero for negative displacements if one_sided. Displacements do not descend; two points
+        at the same displacement make a jump.
+        """
+        table = np.array(points, dtype=float)
+        breaks, first = np.unique(table[:, 0], return_index=True)
+        last = np.append(first[1:], len(table)) - 1
+        near, far = table[first, 1], table[last, 1]
+        slopes = np.append((near[1:] - far[:-1]) / np.diff(breaks), 0.0)
+        if one_sided:
+            start = np.append(0.0, near[1:])
+            return TractionGraph(breaks, start, far, np.append(0.0, slopes))
+        return TractionGraph(
+            np.append(-breaks[:0:-1], breaks),
+            np.concatenate([-far[:0:-1], [-far[0]], near[1:]]),
+            np.append(-near[:0:-1], far),
+            np.append(slopes[::-1], slopes),
+        )
+
+    @staticmethod
+    def from_slopes(
+        breaks: FloatArray, slopes: FloatArray, jumps: FloatArray, start: FloatArray
+    ) -> TractionGraph:
+        """Graph of given slopes (k+1,) and jumps (k,), with the limits `start` = (left, right) at 0."""
+        zero = int(np.searchsorted(breaks, 0.0))
+        near, far = _outward(breaks[zero:], slopes[zero + 1 :], jumps[zero:], start[1])
+        near_m, far_m = _outward(-breaks[zero::-1], slopes[zero::-1], jumps[zero::-1], -start[0])
+        return TractionGraph(
+            breaks,
+            np.concatenate([-far_m[:0:-1], [start[0]], near[1:]]),
+            np.concatenate([-near_m[:0:-1], [start[1]], far[1:]]),
+            slopes,
+        )
+
+    @property
+    def jumps(self) -> FloatArray:
+        """Jumps (k,) of the traction at the breaks; most of them may be 0."""
+        return self.right - self.left
+
+    @cached_property
+    def zero(self) -> int:
+        """Index of the break at displacement 0."""
+        return int(np.searchsorted(self.breaks, 0.0))
+
+    @cached_property
+    def _anchor(self) -> IntArray:
+        """For each piece the break nearest to 0. Evaluated from there, an odd graph is odd to the bit."""
+        return np.append(np.arange(self.zero + 1), np.arange(self.zero, self.breaks.size))
+
+    @cached_property
+    def _start(self) -> FloatArray:
+        """Traction of each piece at its anchor."""
+        return np.append(self.left[: self.zero + 1], self.right[self.zero :])
+
+    @cached_property
+    def _energy(self) -> FloatArray:
+        """Primitive at the breaks (k,), summed outward from 0."""
+        z, gaps = self.zero, np.diff(self.breaks)
+        steps = (
+            np.append(self.left[1 : z + 1], self.right[z:-1])
+            * gaps
+            * np.append(-np.ones(z), np.ones(gaps.size - z))
+        )
+        steps += 0.5 * self.slopes[1:-1] * gaps**2
+        return np.concatenate([np.cumsum(steps[:z][::-1])[::-1], [0.0], np.cumsum(steps[z:])])
+
+    def traction(self, x: FloatArray, side: str) -> FloatArray:
+        """Limit (m,) of the traction at x from the given side, "left" or "right"."""
+        piece = np.searchsorted(self.breaks, x, side="left" if side == "left" else "right")
+        with np.errstate(over="ignore", under="ignore"):
+            return self._start[piece] + self.slopes[piece] * (x - self.breaks[self._anchor[piece]])
+
+    def slope(self, x: FloatArray) -> FloatArray:
+        """Slope (m,) at x; at a break the larger of the two."""
+        before, after = (
+            np.searchsorted(self.breaks, x, side="left"),
+            np.searchsorted(self.breaks, x, side="right"),
+        )
+        return np.asarray(np.maximum(self.slopes[before], self.slopes[after]))
+
+    def primitive(self, x: FloatArray) -> FloatArray:
+        """Integral (m,) of the traction from 0 to x; inf where that is beyond the largest float."""
+        # Of a break's two pieces the one nearer to 0, so that an even law is even to the bit.
+        ahead, behind = np.searchsorted(self.breaks, x), np.searchsorted(self.breaks, x, side="right")
+        piece = np.where(x < 0.0, behind, ahead)
+        anchor = self._anchor[piece]
+        d = x - self.breaks[anchor]
+        with np.errstate(over="ignore", under="ignore"):
+            return np.asarray(
+                self._energy[anchor] + (self._start[piece] + (0.5 * self.slopes[piece]) * d) * d
+            )
+
+    def split(self) -> tuple[TractionGraph, TractionGraph]:
+        """H' and G': rising parts and upward jumps, and falling parts and downward jumps, turned round."""
+        at_zero = np.array([self.left[self.zero], self.right[self.zero]])
+        up, none = at_zero[1] >= at_zero[0], np.zeros(2)
+        rising = TractionGraph.from_slopes(
+            self.breaks, np.maximum(self.slopes, 0.0), np.maximum(self.jumps, 0.0), at_zero if up else none
+        )
+        falling = TractionGraph.from_slopes(
+            self.breaks, np.maximum(-self.slopes, 0.0), np.maximum(-self.jumps, 0.0), none if up else -at_zero
+        )
+        return rising, falling
+
+    def scaled(self, length: float, traction: float) -> TractionGraph:
+        """The same graph with displacements measured in `length` and tractions in `traction`."""
+        return TractionGraph(
+            quotient(self.breaks, length),
+            quotient(self.left, traction),
+            quotient(self.right, traction),
+            self.slopes * (length / traction),
+        )
+
+
+def _outward(
+    breaks: FloatArray, slopes: FloatArray, jumps: FloatArray, start: float
+) -> tuple[FloatArray, FloatArray]:
+    """Limits before and behind each break of a half-line that starts at 0 with the traction `start`."""
+    near, far = np.full(breaks.size, start), np.full(breaks.size, start)
+    rises = slopes[:-1] * np.diff(breaks)
+    # One after the other: without a jump the two limits must be equal to the bit.
+    for i, rise in enumerate(rises, start=1):
+        near[i] = far[i - 1] + rise
+        far[i] = near[i] + jumps[i]
+    return near, far

@@ -1,0 +1,135 @@
+"""Laws that start with a convex kink and weaken smoothly: the exponential one, and a base for others."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from typing_extensions import override
+
+from .base import ConvexPart, Directional, FloatArray, Superpotential
+from .checks import require_ordered, require_positive
+from .extremes import Extremes
+from .polyline import PolylinePart
+from .traction_graph import TractionGraph
+
+
+@dataclass(frozen=True)
+class WeakeningLaw(Superpotential):
+    """Traction sign(x) [peak - (peak - residual) w(|x|/delta)], weakening from ±peak to ±residual.
+
+    A subclass gives a name and the shape w: w(0) = 0, rising monotonically to w(∞) = 1, with its integral W
+    and derivative w'. Split: H = peak |x| and G = (peak - residual) delta W(|x|/delta), which is smooth.
+    Tractions in N/m², delta in m; InputError unless 0 ≤ residual ≤ peak, peak > 0 and delta > 0.
+    """
+
+    peak_traction: float
+    residual_traction: float
+    delta: float
+
+    def __post_init__(self) -> None:
+        require_positive(self.name, delta=self.delta)
+        require_ordered(self.name, residual_traction=self.residual_traction, peak_traction=self.peak_traction)
+
+    @abstractmethod
+    def shape(self, z: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """W(z) = ∫₀ᶻ w, w(z) and w'(z) at slips z = |x|/delta ≥ 0, shape (m,), dimensionless."""
+
+    @override
+    @cached_property
+    def convex(self) -> ConvexPart:
+        return PolylinePart(TractionGraph.from_points([(0.0, self.peak_traction)]))
+
+    @override
+    @cached_property
+    def concave(self) -> ConvexPart:
+        return _Weakened(self)
+
+    @override
+    def value(self, x: FloatArray) -> FloatArray:
+        return self.convex.value(x) - self.concave.value(x)
+
+    @override
+    @cached_property
+    def growth(self) -> Directional:
+        return Directional(self.residual_traction, self.residual_traction)
+
+    @cached_property
+    def _extremes(self) -> Extremes:
+        # |traction| falls with |x|: it is largest at the onset of slip, and never acts along the slip.
+        peak = self.peak_traction
+        return Extremes(peak, peak, c3=peak, c4=0.0)
+
+    @override
+    @property
+    def energy_scale(self) -> float:
+        return self.peak_traction * self.delta
+
+    @override
+    @property
+    def length_scale(self) -> float:
+        return self.delta
+
+    @override
+    @property
+    def even(self) -> bool:
+        return True
+
+    @override
+    def scaled(self, length: float, traction: float) -> Superpotential:
+        return replace(
+            self,
+            peak_traction=self.peak_traction / traction,
+            delta=self.delta / length,
+            residual_traction=self.residual_traction / traction,
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class _Weakened(ConvexPart):
+    """G of a weakening law."""
+
+    law: WeakeningLaw
+
+    @override
+    @property
+    def kinks(self) -> FloatArray:
+        return np.empty(0)
+
+    @override
+    def value(self, x: FloatArray) -> FloatArray:
+        return (self._drop * self.law.delta) * self._shape(x)[0]
+
+    @override
+    def left(self, x: FloatArray) -> FloatArray:
+        return self.right(x)
+
+    @override
+    def right(self, x: FloatArray) -> FloatArray:
+        return self._drop * np.sign(x) * self._shape(x)[1]
+
+    @override
+    def second(self, x: FloatArray) -> FloatArray:
+        return (self._drop / self.law.delta) * self._shape(x)[2]
+
+    @property
+    def _drop(self) -> float:
+        return self.law.peak_traction - self.law.residual_traction
+
+    def _shape(self, x: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        with np.errstate(over="ignore", under="ignore"):
+            return self.law.shape(np.abs(x) / self.law.delta)
+
+
+@dataclass(frozen=True)
+class Exponential(WeakeningLaw):
+    """Exponential slip weakening: traction sign(x) [residual + (peak - residual) exp(-|x|/delta)]."""
+
+    name = "exponential"
+
+    @override
+    def shape(self, z: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        decay = np.exp(-z)
+        return z + np.expm1(-z), -np.expm1(-z), decay
