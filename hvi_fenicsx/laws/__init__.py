@@ -3,7 +3,7 @@
 from .base import ConvexPart, Directional, Superpotential
 from .catalogue import Graph, LinearSpring, QuadraticLinear, QuadraticLinearLiteral, Sawtooth, Tresca
 from .polyline import PolylineLaw, PolylinePart
-from .registry import available, create
+from .registry import available, create, describe
 from .sampled import SampledLaw, sample_traction
 from .traction_graph import TractionGraph
 from .weakening import Exponential, WeakeningLaw
@@ -26,5 +26,6 @@ __all__ = [
     "WeakeningLaw",
     "available",
     "create",
+    "describe",
     "sample_traction",
 ]

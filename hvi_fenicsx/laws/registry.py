@@ -37,6 +37,16 @@ def create(name: str, parameters: Mapping[str, Any]) -> Superpotential:
     return law(**_checked(law, parameters, allowed))
 
 
+def describe(law: Superpotential) -> dict[str, Any]:
+    """The table of a scene file that `create` makes this law from: its name and parameters, as plain data."""
+    parameters = {key: getattr(law, key) for key in inspect.signature(type(law)).parameters}
+    return {"law": law.name} | {key: _listed(value) for key, value in parameters.items() if value is not None}
+
+
+def _listed(value: Any) -> Any:
+    return [_listed(entry) for entry in value] if isinstance(value, list | tuple) else value
+
+
 def _check_keys(name: str, given: Mapping[str, Any], allowed: Mapping[str, inspect.Parameter]) -> None:
     listing = f"law {name!r} takes {', '.join(allowed) or 'no parameters'}"
     for key in given:
