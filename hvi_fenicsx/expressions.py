@@ -10,6 +10,7 @@ import ast
 import difflib
 import math
 import operator
+import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -45,6 +46,7 @@ _BINARY: Mapping[type[ast.operator], Callable[[Any, Any], Any]] = {
 }
 _COMPARE: Mapping[type[ast.cmpop], str] = {ast.Lt: "lt", ast.LtE: "le", ast.Gt: "gt", ast.GtE: "ge"}
 _LONGEST, _DEEPEST, _LARGEST_POWER = 2000, 50, 64
+_LONGEST_SHOWN = 60
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,7 +79,7 @@ NUMPY = Algebra(
 
 
 def ufl_algebra(number: Callable[[float], Any]) -> Algebra:
-    """UFL's operations; ``number`` wraps a literal (as a ``fem.Constant``, so that no value is compiled in)."""
+    """UFL's operations; ``number`` wraps a literal (a ``fem.Constant``, so that no value is compiled in)."""
     import ufl
 
     names = {name: getattr(ufl, name) for name in FUNCTIONS if name not in ("abs", "log", "min", "max")}
@@ -101,12 +103,18 @@ class Formula:
 
     def __init__(self, source: float | int | str) -> None:
         if isinstance(source, bool) or not isinstance(source, int | float | str):
-            raise InputError(f"a number or a formula in x, y, z is wanted, not {source!r}")
-        self.source = source if isinstance(source, str) else float(source)
-        text = source if isinstance(source, str) else repr(float(source))
-        if not isinstance(source, str) and not math.isfinite(source):
-            raise InputError(f"{source!r} is not a finite number; give a finite one")
-        self._tree = _parse(text)
+            raise InputError(f"must be a number or a formula in x, y, z in quotes, not {_shown(source)}")
+        self.source = source if isinstance(source, str) else _finite(source)
+        self._tree = _parse(self.source if isinstance(self.source, str) else repr(self.source))
+        if not any(isinstance(node, ast.Name) and node.id in COORDINATES for node in ast.walk(self._tree)):
+            self._check_constant()
+
+    def _check_constant(self) -> None:
+        """Without coordinates the value is known now: ``1/0`` need not wait for the mesh."""
+        with np.errstate(all="ignore"):
+            value = self.render((), NUMPY)
+        if not np.isfinite(value):
+            raise InputError(f"{self.source!r} is {value}, not a finite number; give a finite one")
 
     @property
     def is_number(self) -> bool:
@@ -133,15 +141,41 @@ class Formula:
         return np.broadcast_to(np.asarray(value, dtype=np.float64), (points.shape[0],)).copy()
 
 
+def _shown(value: object) -> str:
+    return {True: "true", False: "false"}[value] if isinstance(value, bool) else f"a {type(value).__name__}"
+
+
+def _finite(value: float | int) -> float:
+    try:
+        number = float(value)
+    except OverflowError:
+        number = math.inf
+    if not math.isfinite(number):
+        raise InputError(f"must be a finite number (is {number})")
+    return number
+
+
 def _parse(text: str) -> ast.expr:
+    text = text.strip()
+    if "#" in text:
+        raise InputError(f"{text!r} has a comment in it; put it behind the formula's quotes")
     if len(text) > _LONGEST:
         raise InputError(f"the formula has {len(text)} characters; {_LONGEST} at most")
     try:
-        tree = ast.parse(text.strip(), mode="eval").body
+        with warnings.catch_warnings():  # Python's own about "1if x < 2 else 3" and the like
+            warnings.simplefilter("ignore")
+            tree = ast.parse(text, mode="eval").body
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
         raise InputError(f"{text!r} is not a formula: {getattr(error, 'msg', error)}") from None
     _check(tree, text, 0)
     return tree
+
+
+def _source(node: ast.expr, text: str) -> str:
+    """The part of the formula that a node was read from."""
+    # Not ast.unparse: it recurses, and fails on the deep nesting that is to be refused.
+    part = ast.get_source_segment(text, node) or text
+    return repr(part if len(part) <= _LONGEST_SHOWN else part[:_LONGEST_SHOWN] + "...")
 
 
 def _check(node: ast.expr, text: str, depth: int) -> None:
@@ -149,7 +183,7 @@ def _check(node: ast.expr, text: str, depth: int) -> None:
         raise InputError(f"the formula is nested more than {_DEEPEST} deep")
     match node:
         case ast.Constant(value=bool()) | ast.Constant(value=complex()):
-            raise InputError(f"{ast.unparse(node)} in {text!r} is not a number")
+            raise InputError(f"{_source(node, text)} in {text!r} is not a real number")
         case ast.Constant(value=int() | float() as value):
             _check_finite(value, text)
             return
@@ -170,7 +204,7 @@ def _check(node: ast.expr, text: str, depth: int) -> None:
             children = [a, b, yes, no]
         case _:
             raise InputError(
-                f"{ast.unparse(node)!r} in {text!r} is not allowed; a formula has numbers, x, y, z, pi, "
+                f"{_source(node, text)} in {text!r} is not allowed; a formula has numbers, x, y, z, pi, "
                 f"+ - * / **, 'a if x < 1 else b' and {', '.join(FUNCTIONS)}"
             )
     for child in children:
@@ -204,10 +238,13 @@ def _check_call(name: str, count: int, text: str) -> None:
 
 
 def _check_power(op: ast.operator, exponent: ast.expr, text: str) -> None:
+    while isinstance(exponent, ast.UnaryOp):  # x**-2
+        exponent = exponent.operand
     if not isinstance(op, ast.Pow) or not isinstance(exponent, ast.Constant):
         return
     if isinstance(exponent.value, int | float) and abs(exponent.value) > _LARGEST_POWER:
-        raise InputError(f"the power {exponent.value} in {text!r} is too large; {_LARGEST_POWER} at most")
+        power = _source(exponent, text)
+        raise InputError(f"the power {power} in {text!r} is too large; {_LARGEST_POWER} at most")
 
 
 def _render(node: ast.expr, x: Any, algebra: Algebra) -> Any:

@@ -1,7 +1,7 @@
 """What an effect is: one physical contribution, validated data with what it adds to a problem.
 
-A new effect is a new subclass of :class:`Effect` in a module of its own; it registers itself under its ``key``, which
-is then a key of the scene file at its ``place``. Nothing else is edited.
+A new effect is a new subclass of :class:`Effect` in a module of its own; it registers itself under
+its ``key``, which is then a key of the scene file at its ``place``. Nothing else is edited.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from typing import Annotated, Any, ClassVar, Protocol
 
 import numpy as np
 import numpy.typing as npt
-from pydantic import BaseModel, BeforeValidator, ConfigDict, PlainSerializer, WithJsonSchema
+from pydantic import BaseModel, BeforeValidator, ConfigDict, PlainSerializer
 from pydantic_core import PydanticCustomError
 
 from ..errors import InputError
@@ -30,25 +30,33 @@ class Place(Enum):
     MATERIAL = "material"
 
 
-class Conflict(InputError):
-    """Effects that cannot act together, with the reason."""
+class Drive(Enum):
+    """How an effect drives the body; the scales come from the first kind that is there."""
+
+    LOAD = "load"
+    KINEMATIC = "prescribed displacement or strain"
+    RESISTANCE = "none: it only resists"
 
 
 def _formula(value: Any) -> Formula:
     try:
         return value if isinstance(value, Formula) else Formula(value)
     except InputError as error:
-        # As pydantic's own error it is reported with its place in the scene.
-        raise PydanticCustomError("formula", "{reason}", {"reason": str(error)}) from None
+        raise refusal(str(error)) from None
 
 
 FormulaField = Annotated[
     Formula,
     BeforeValidator(_formula),
     PlainSerializer(lambda f: f.source),
-    WithJsonSchema({"anyOf": [{"type": "number"}, {"type": "string"}], "title": "a number or a formula in x, y, z"}),
 ]
 """A number or a formula in x, y, z (SI), as a field of a scene model."""
+
+
+def refusal(text: str) -> PydanticCustomError:
+    """A refusal for a validator to raise; the scene reports it with its place."""
+    # Through the context, since braces in the text itself would be taken for places to fill.
+    return PydanticCustomError("effect", "{reason}", {"reason": text})
 
 
 class Direction(Enum):
@@ -139,13 +147,18 @@ class Effect(BaseModel):
 
     Class attributes:
         key: the scene file's key. place: where the key stands. term: what it adds, in words and symbols.
+        drive: how it drives the body. exclusive: whether a side of the body bears only one of its kind.
     """
 
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+    model_config = ConfigDict(
+        extra="forbid", frozen=True, strict=True, arbitrary_types_allowed=True, use_attribute_docstrings=True
+    )
 
     key: ClassVar[str]
     place: ClassVar[Place]
     term: ClassVar[str]
+    drive: ClassVar[Drive] = Drive.RESISTANCE
+    exclusive: ClassVar[bool] = False
     registry: ClassVar[dict[Place, dict[str, type[Effect]]]] = {place: {} for place in Place}
 
     @classmethod
@@ -160,9 +173,17 @@ class Effect(BaseModel):
     def contribute(self, stage: Stage, where: str | None) -> Contribution:
         """What it adds on ``where`` (a boundary part, a region, or None for the whole body)."""
 
-    def stress_scale(self, largest: Evaluate, length: float) -> float:
-        """The largest stress (N/m²) it drives the body with; 0 for one that drives nothing."""
+    def stress_scale(self, largest: Evaluate, length: float, modulus: float) -> float:
+        """The largest stress (N/m²) it brings, from the body's length (m) and Young's modulus (N/m²)."""
         return 0.0
+
+    def modulus_scale(self) -> float:
+        """The largest Young's modulus (N/m²) it brings."""
+        return 0.0
+
+    def dimension(self) -> int | None:
+        """The dimension of space that it is made for; None: any."""
+        return None
 
     def check(self, dimension: int) -> None:
         """Refuse what makes no sense in 2D or 3D.

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Annotated, Any, ClassVar, Literal
 
-import ufl
 from pydantic import Field
 
 from ..errors import InputError
@@ -13,6 +12,8 @@ from .base import Contribution, Effect, Place, Stage
 
 def strain(v: Any) -> Any:
     """ε(v), the symmetric gradient."""
+    import ufl  # here and below: a scene is read without it
+
     return ufl.sym(ufl.grad(v))
 
 
@@ -24,10 +25,11 @@ class IsotropicElasticity(Effect):
     term: ClassVar[str] = "a(u, v) = ∫ σ(u):ε(v) dx, isotropic"
 
     model: Literal["plane_stress", "plane_strain", "three_dimensional"]
+    """plane_stress (the paper's), plane_strain, three_dimensional"""
     youngs_modulus: Annotated[float, Field(gt=0, allow_inf_nan=False)]
-    """E in N/m²."""
+    """E in N/m²"""
     poisson_ratio: Annotated[float, Field(gt=-1, lt=0.5, allow_inf_nan=False)]
-    """ν, between -1 and 0.5."""
+    """ν, between -1 and 0.5"""
 
     def lame(self) -> tuple[float, float]:
         """λ of the trace term and 2μ, N/m²; plane stress uses the paper's Eν/(1-ν²)."""
@@ -37,18 +39,30 @@ class IsotropicElasticity(Effect):
 
     def stress(self, deformation: Any, number: Any, modulus: float) -> Any:
         """σ/E0 of a strain tensor, in UFL."""
+        import ufl
+
         lam, two_mu = (number(value / modulus) for value in self.lame())
         return lam * ufl.tr(deformation) * ufl.Identity(len(deformation[0, :])) + two_mu * deformation
 
     def contribute(self, stage: Stage, where: str | None) -> Contribution:
         """The bilinear form, with strains multiplied by L: nondimensional."""
+        import ufl
+
         length = stage.number(stage.length)
         sigma = self.stress(length * strain(stage.trial), stage.number, stage.modulus)
         form = ufl.inner(sigma, length * strain(stage.test)) * stage.cells(where)
         return Contribution(bilinear=(form,))
 
+    def modulus_scale(self) -> float:
+        """E."""
+        return self.youngs_modulus
+
+    def dimension(self) -> int | None:
+        """2 for the plane models."""
+        return 3 if self.model == "three_dimensional" else 2
+
     def check(self, dimension: int) -> None:
         """Plane models are for 2D, the other for 3D."""
-        if (self.model == "three_dimensional") != (dimension == 3):
+        if self.dimension() != dimension:
             allowed = "three_dimensional" if dimension == 3 else "plane_stress or plane_strain"
             raise InputError(f'model = "{self.model}" in a {dimension}D scene; use {allowed}')

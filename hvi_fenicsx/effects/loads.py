@@ -2,13 +2,30 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar
 
-import ufl
-from pydantic import model_validator
+from pydantic import (
+    BeforeValidator,
+    PlainSerializer,
+    SerializerFunctionWrapHandler,
+    model_serializer,
+    model_validator,
+)
 
 from ..errors import InputError
-from .base import Condition, Contribution, Effect, Evaluate, FormulaField, Place, Stage, components
+from ..expressions import Formula
+from .base import (
+    Condition,
+    Contribution,
+    Drive,
+    Effect,
+    Evaluate,
+    FormulaField,
+    Place,
+    Stage,
+    components,
+    refusal,
+)
 
 
 class _Listed(Effect):
@@ -19,7 +36,15 @@ class _Listed(Effect):
     @model_validator(mode="before")
     @classmethod
     def _from_list(cls, data: Any) -> Any:
-        return {"values": tuple(data)} if isinstance(data, list | tuple) else data
+        if isinstance(data, list | tuple):
+            return {"values": tuple(data)}
+        if isinstance(data, cls) or (isinstance(data, dict) and "values" in data):
+            return data
+        raise refusal("must be a list in square brackets, one entry for each component, like [1e6, 0.0]")
+
+    @model_serializer(mode="wrap")
+    def _as_list(self, handler: SerializerFunctionWrapHandler) -> Any:
+        return list(handler(self)["values"])
 
     def check(self, dimension: int) -> None:
         """As many components as the scene has dimensions."""
@@ -27,56 +52,85 @@ class _Listed(Effect):
 
 
 class Traction(_Listed):
-    """Surface traction t (N/m²): <g, v> gains ∫ t·v ds."""
+    """Surface traction t (N/m²), a list of formulas, one for each component."""
 
     key: ClassVar[str] = "traction"
     place: ClassVar[Place] = Place.BOUNDARY
+    drive: ClassVar[Drive] = Drive.LOAD
     term: ClassVar[str] = "<g, v> += ∫ t·v ds"
 
     values: tuple[FormulaField, ...]
 
     def contribute(self, stage: Stage, where: str | None) -> Contribution:
         """The linear form over its part."""
+        import ufl  # here and below: a scene is read without it
+
         if where is None:
             raise InputError("a traction needs a boundary part")
         vector = ufl.as_vector([stage.render(f) for f in self.values]) / stage.number(stage.stress)
         return Contribution(linear=(ufl.inner(vector, stage.test) * stage.facets(where),))
 
-    def stress_scale(self, largest: Evaluate, length: float) -> float:
+    def stress_scale(self, largest: Evaluate, length: float, modulus: float) -> float:
         """The largest component."""
         return max(largest(f) for f in self.values)
 
 
 class BodyForce(_Listed):
-    """Force per volume f (N/m³): <g, v> gains ∫ f·v dx."""
+    """Force per volume f (N/m³), a list of formulas, one for each component."""
 
     key: ClassVar[str] = "force"
     place: ClassVar[Place] = Place.BODY
+    drive: ClassVar[Drive] = Drive.LOAD
     term: ClassVar[str] = "<g, v> += ∫ f·v dx"
 
     values: tuple[FormulaField, ...]
 
     def contribute(self, stage: Stage, where: str | None) -> Contribution:
         """The linear form over its region."""
+        import ufl
+
         factor = stage.number(stage.length / stage.stress)
         vector = factor * ufl.as_vector([stage.render(f) for f in self.values])
         return Contribution(linear=(ufl.inner(vector, stage.test) * stage.cells(where),))
 
-    def stress_scale(self, largest: Evaluate, length: float) -> float:
+    def stress_scale(self, largest: Evaluate, length: float, modulus: float) -> float:
         """The largest component times the body's length."""
         return max(largest(f) for f in self.values) * length
 
 
+def _component(value: Any) -> Any:
+    try:
+        return value if value == "free" or isinstance(value, Formula) else Formula(value)
+    except InputError as error:
+        raise refusal(f'{error}; or write "free" to leave the component alone') from None
+
+
+Component = Annotated[
+    Any,
+    BeforeValidator(_component),
+    PlainSerializer(lambda value: value.source if isinstance(value, Formula) else value),
+]
+"""A formula or "free"."""
+
+
 class PrescribedDisplacement(_Listed):
-    """Displacement by component (m); ``"free"`` leaves a component alone."""
+    """Displacement by component (m), a list of formulas; ``"free"`` leaves a component alone."""
 
     key: ClassVar[str] = "displacement"
     place: ClassVar[Place] = Place.BOUNDARY
+    drive: ClassVar[Drive] = Drive.KINEMATIC
     term: ClassVar[str] = "u_i = value, by component"
 
-    values: tuple[Literal["free"] | FormulaField, ...]
+    values: tuple[Component, ...]
 
     def contribute(self, stage: Stage, where: str | None) -> Contribution:
         """The conditions of its components that are not free."""
-        fixed = [(i, f) for i, f in enumerate(self.values) if f != "free"]
-        return Contribution(conditions=tuple(Condition(i, f) for i, f in fixed))
+        return Contribution(conditions=tuple(Condition(i, self.values[i]) for i in self.prescribed()))
+
+    def prescribed(self) -> tuple[int, ...]:
+        """Indices of the components that are not free."""
+        return tuple(i for i, f in enumerate(self.values) if f != "free")
+
+    def stress_scale(self, largest: Evaluate, length: float, modulus: float) -> float:
+        """The stress of the largest component, as a strain over the body's length."""
+        return max((largest(f) for f in self.values if f != "free"), default=0.0) * modulus / length
