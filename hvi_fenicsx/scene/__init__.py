@@ -1,0 +1,22 @@
+"""The scene: what the user asked for, from a TOML file (:func:`read_scene`) or Python (:class:`Scene`)."""
+
+from .model import Placed, Scene
+from .parts import Body, Boundary, Material
+from .reader import read_scene
+from .settings import Solver
+from .shapes import Box, MeshFile, Rectangle
+from .writer import dump_scene
+
+__all__ = [
+    "Body",
+    "Boundary",
+    "Box",
+    "Material",
+    "MeshFile",
+    "Placed",
+    "Rectangle",
+    "Scene",
+    "Solver",
+    "dump_scene",
+    "read_scene",
+]

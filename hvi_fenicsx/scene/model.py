@@ -1,0 +1,92 @@
+"""The scene: what the user asked for, validated, frozen, in SI."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from typing import Annotated, Any, NamedTuple
+
+from pydantic import AfterValidator, Field, model_validator
+from pydantic_core import PydanticCustomError
+
+from ..effects import Effect, Place
+from .checks import contradictions
+from .parts import Bodies, Boundary, Materials
+from .settings import Solver
+from .shapes import Domain, MeshFile
+from .tables import Problem, Table, refuse
+
+_NAME = re.compile(r"\w[\w.-]{0,99}")
+
+
+class Placed(NamedTuple):
+    """An effect with its place in the scene."""
+
+    place: Place
+    where: str | None
+    """The name of a boundary table, of a region of the mesh, or None for the whole body."""
+    effect: Effect
+
+
+def _title(text: str) -> str:
+    if not text.isprintable():
+        raise PydanticCustomError("scene", "must be a single line of printable characters")
+    return text
+
+
+class Scene(Table):
+    """A whole scene.
+
+    Built with keywords, from the tables of a scene file (``Scene.model_validate({...})``), or with
+    :func:`read_scene`.
+    """
+
+    title: Annotated[str, Field(max_length=200), AfterValidator(_title)] = ""
+    """one line that says what this is"""
+    domain: Domain
+    """the body's shape"""
+    material: Materials
+    """what the body is made of"""
+    body: Bodies = Field(default_factory=dict)
+    """what acts in the body's volume"""
+    boundary: dict[str, Boundary] = Field(default_factory=dict)
+    """parts of the boundary and what acts on them"""
+    solver: Solver = Solver()
+    """how to solve"""
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Scene:
+        problems = [*_bad_names(self.boundary)] or contradictions(self)
+        if problems:
+            raise refuse(problems)
+        return self
+
+    @property
+    def dimension(self) -> int:
+        """2 or 3. A mesh file's is that of its material models."""
+        if not isinstance(self.domain, MeshFile):
+            return self.domain.dimension
+        known = (material.elasticity.dimension() for material in self.material.values())
+        return next((dimension for dimension in known if dimension), 2)
+
+    @property
+    def parts(self) -> dict[str, tuple[str, ...]]:
+        """The sides (or physical groups) that each boundary table stands on."""
+        return {name: boundary.on for name, boundary in self.boundary.items()}
+
+    def effects(self) -> Iterator[Placed]:
+        """All effects with their places; one that stands on several regions comes once for each."""
+        for material in self.material.values():
+            for region in material.region or (None,):
+                yield Placed(Place.MATERIAL, region, material.elasticity)
+        for body in self.body.values():
+            for region in body.region or (None,):
+                yield from (Placed(Place.BODY, region, effect) for effect in body.effects)
+        for name, boundary in self.boundary.items():
+            yield from (Placed(Place.BOUNDARY, name, effect) for effect in boundary.effects)
+
+
+def _bad_names(boundary: Mapping[str, Any]) -> Iterator[Problem]:
+    """Names go into tables and file names."""
+    text = "is no usable name for a part; use letters, digits, _ - . only"
+    return (Problem(("boundary", name), text) for name in boundary if not _NAME.fullmatch(name))

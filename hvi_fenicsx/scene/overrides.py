@@ -1,0 +1,83 @@
+"""``--set dotted.key=TOML-VALUE``: single values changed on the command line."""
+
+from __future__ import annotations
+
+import tomllib
+from typing import Any
+
+from ..errors import InputError
+from .words import shown, unknown
+
+Path = tuple[str | int, ...]
+
+
+def override(data: dict[str, Any], assignment: str) -> Path:
+    """Set one value in the tables; tables that are not there are made. Returns its place.
+
+    Raises:
+        InputError: no ``key=value``, a value that is no TOML, or a way that leads nowhere.
+    """
+    key, equals, value = assignment.partition("=")
+    if not equals or not key.strip():
+        raise InputError(f"--set {assignment}: must be KEY=VALUE, like --set solver.tolerance=1e-10")
+    steps = _steps(key, assignment)
+    return _put(data, steps, _value(value, assignment), assignment)
+
+
+def _steps(key: str, assignment: str) -> list[str]:
+    try:
+        parsed: Any = tomllib.loads(f"{key} = 0")
+    except (ValueError, RecursionError):
+        raise InputError(
+            f"--set {assignment}: {shown(key)} is no dotted key, like boundary.floor.friction.delta"
+        ) from None
+    steps = []
+    while isinstance(parsed, dict) and len(parsed) == 1:
+        step, parsed = next(iter(parsed.items()))
+        steps.append(step)
+    if parsed != 0:
+        raise InputError(f"--set {assignment}: {shown(key)} is no dotted key")
+    return steps
+
+
+def _value(text: str, assignment: str) -> Any:
+    try:
+        parsed = tomllib.loads(f"value = {text.strip()}")
+    except (ValueError, RecursionError):
+        parsed = {}
+    if set(parsed) == {"value"}:
+        return parsed["value"]
+    key = assignment.partition("=")[0]
+    raise InputError(
+        f"--set {assignment}: {shown(text)} is no TOML value; a text needs quotes, and the shell more around "
+        f"them: --set '{key}=\"{text.strip()}\"'"
+    )
+
+
+def _put(data: dict[str, Any], steps: list[str], value: Any, assignment: str) -> Path:
+    table: Any = data
+    place: list[str | int] = []
+    for step in steps[:-1]:
+        index = _index(table, step, place, assignment)
+        if isinstance(table, dict):
+            table.setdefault(step, {})
+        table = table[index]
+        place.append(index)
+    index = _index(table, steps[-1], place, assignment)
+    table[index] = value
+    return (*place, index)
+
+
+def _index(table: Any, step: str, place: list[str | int], assignment: str) -> str | int:
+    """The step as a key of a table or an index of a list."""
+    here = ".".join(map(str, place))
+    if isinstance(table, dict):
+        return step
+    if not isinstance(table, list):
+        raise InputError(
+            f"--set {assignment}: {here} is {shown(table)}, not a table; it has no {shown(step)}"
+        )
+    allowed = [str(i) for i in range(len(table))]
+    if step not in allowed:
+        raise InputError(f"--set {assignment}: {here} is a list: {unknown('index', step, allowed)}")
+    return int(step)
