@@ -1,0 +1,30 @@
+"""Rigid motions: the kernel of a scene in words, and whether its load can be borne."""
+
+from ..laws.base import Directional
+from .kernel import Fixed, kernel, modes
+from .motions import Body, Mode, describe, motion_at, rigid_fields
+from .parts import ContactCone, Resistance, RigidProblem
+from .solvability import analyse, load_factors
+from .verdict import LoadFactors, Paper, Solvability, State, combine
+
+__all__ = [
+    "Body",
+    "ContactCone",
+    "Directional",
+    "Fixed",
+    "LoadFactors",
+    "Mode",
+    "Paper",
+    "Resistance",
+    "RigidProblem",
+    "Solvability",
+    "State",
+    "analyse",
+    "combine",
+    "describe",
+    "kernel",
+    "load_factors",
+    "modes",
+    "motion_at",
+    "rigid_fields",
+]

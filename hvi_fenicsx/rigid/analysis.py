@@ -1,0 +1,227 @@
+"""The convex programmes of one scene, run one after the other on the rank that holds the reduced data."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..laws.base import Directional
+from .kernel import modes, natural_basis, null_space, triangle
+from .motions import Mode, describe
+from .parts import Reduced, RigidProblem
+from .programme import Functional, Minimum, Programme, Region, ball, cross
+from .verdict import LoadFactors, Paper, Solvability, State
+
+Array = NDArray[np.float64]
+
+TIE = 1e-9  # a margin this small beside the work of the loads is an equality
+SNAPS = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8)  # coefficients a direction may do without
+
+
+@dataclass(frozen=True)
+class Analysis:
+    """Growth, peak and load of a scene on its rigid motions. Serial; not cached across scenes.
+
+    `growth` and `peak` are tuples of convex functionals whose pointwise minimum counts: one, unless a law is
+    not convex at infinity.
+    """
+
+    problem: RigidProblem
+    reduced: Reduced
+
+    @cached_property
+    def growth(self) -> tuple[Functional, ...]:
+        """∫ j^∞(y)."""
+        return self._majorants(tuple(part.growth for part in self.problem.resistances))
+
+    @cached_property
+    def peak(self) -> tuple[Functional, ...]:
+        """∫ ĵ(y)."""
+        return self._majorants(tuple(part.peak for part in self.problem.resistances))
+
+    @cached_property
+    def work(self) -> Array:
+        """Work of the whole load on the kernel's basis, (k,)."""
+        return np.asarray(sum(self.reduced.loads.values(), np.zeros(self.reduced.frame.shape[1])))
+
+    @cached_property
+    def tie(self) -> float:
+        """Works of less than this are zero: relative to the loads, without any to the laws."""
+        return TIE * (self.reduced.load_scale or self._law_scale or 1.0)
+
+    @cached_property
+    def programme(self) -> Programme:
+        """The shared cuts."""
+        return Programme(
+            self.reduced.frame, self.reduced.slips, self.reduced.load_scale + self._law_scale or 1.0
+        )
+
+    @cached_property
+    def free(self) -> Array:
+        """Orthonormal basis (k, q) of the motions that nothing holds and on which the load does no work."""
+        rows = np.vstack([self.reduced.contact, *self._resisted()])
+        loose = null_space(triangle(rows))
+        work = self.work @ loose
+        return loose if np.abs(work).max(initial=0.0) <= self.tie else loose @ null_space(work[None])
+
+    @property
+    def exact(self) -> bool:
+        """One functional is the true one; with one motion the majorants are exact on both its rays."""
+        return len(self.growth) == 1 or self.reduced.frame.shape[1] == 1
+
+    def solvability(self) -> Solvability:
+        """The whole verdict."""
+        still = np.zeros_like(self.work)
+        held, critical = self._factor(self.growth, self.work, still)
+        peak, last = self._factor(self.peak, self.work, still)
+        margin = self._margin(self.growth)
+        state = self._state(margin)
+        free = natural_basis(self.reduced.frame @ self.free, self.problem.body.dimension)
+        return Solvability(
+            state=state,
+            margin=None if margin is None else self._flat(margin.value),
+            lambda_held=held,
+            lambda_peak=peak,
+            direction=self._direction(
+                state, margin, critical if TIE < held < 1.0 else None, last if TIE < peak < 1.0 else None
+            ),
+            critical=critical,
+            kernel=modes(self.reduced.frame, self.problem.body),
+            free=modes(free, self.problem.body),
+            paper=self._paper(),
+            exact=self.exact,
+        )
+
+    def load_factors(self, load: str | None) -> LoadFactors:
+        """The factors of one load, the others constant, or of the whole load."""
+        moved = self.work if load is None else self.reduced.loads[load]
+        held, mode = self._factor(self.growth, moved, self.work - moved)
+        peak, peak_mode = self._factor(self.peak, moved, self.work - moved)
+        start, _ = self._factor(self.growth, -moved, self.work - moved)
+        return LoadFactors(-start, held, peak, mode, peak_mode)
+
+    def _factor(
+        self, functionals: Iterable[Functional], moved: Array, rest: Array
+    ) -> tuple[float, Mode | None]:
+        """The largest λ with <rest + λ moved, y> <= f(y) on all cones, and the motion that limits it."""
+        best: tuple[float, Mode | None] = (np.inf, None)
+        for f in (f.minus(rest) for f in functionals):
+            factor, y = self.programme.ratio(f, moved, self.tie)
+            if y is not None and factor < best[0]:
+                best = (factor, self._mode(f.minus(moved, factor) if np.isfinite(factor) else f, y))
+        return best
+
+    def _state(self, margin: Minimum | None) -> State:
+        """The state, from the margin of the growth and, if that is negative, of the peak."""
+        if margin is None or margin.value > self.tie:
+            return "held" if self.exact else "metastable"
+        if margin.value >= -self.tie:
+            return "borderline"
+        peak = self._margin(self.peak)
+        if peak is not None and peak.value < -self.tie:
+            return "escapes"
+        if self.free.shape[1]:
+            peak = self._sphere(self.peak, self.free)  # a motion that is free both ways decides nothing
+        return "metastable" if peak is None or peak.value > self.tie else "borderline"
+
+    def _direction(
+        self, state: State, margin: Minimum | None, held: Mode | None, peak: Mode | None
+    ) -> Mode | None:
+        """The direction of escape: the motion that limits the load first, where load factors tell one."""
+        if state == "held" or margin is None:
+            return None
+        if state == "escapes":
+            return peak or self._steepest(self.peak)
+        if margin.value < -self.tie:
+            return held or self._steepest(self.growth)
+        return self._tied(margin) if state == "borderline" else None
+
+    def _margin(self, functionals: Iterable[Functional]) -> Minimum | None:
+        """Minimum of f - <g,·> over |y| = 1: if negative that over the ball, else one for each face."""
+        inner = self._lowest(functionals, ball(self.reduced.frame))
+        return inner if inner.value < -self.tie else self._sphere(functionals, self.free[:, :0])
+
+    def _lowest(self, functionals: Iterable[Functional], region: Region) -> Minimum:
+        """Minimum over a region that contains the origin."""
+        nothing = Minimum(0.0, np.zeros_like(self.work), 0.0)
+        found = [self.programme.minimise(f.minus(self.work), region) for f in functionals]
+        return min((one or nothing for one in found), key=lambda one: one.value)
+
+    def _sphere(self, functionals: Iterable[Functional], across: Array) -> Minimum | None:
+        """Minimum over |y| = 1 and y orthogonal to `across` (k, q); None if the cone holds no such y."""
+        found = [self.programme.sphere(f.minus(self.work), across.T) for f in functionals]
+        known = [one for one in found if one is not None]
+        return min(known, key=lambda one: one.value) if known else None
+
+    def _steepest(self, functionals: tuple[Functional, ...]) -> Mode:
+        """A direction of escape easy to name: on |y|_1 <= 1 the minimum is mostly at a pure motion."""
+        region = cross(self.reduced.frame)
+        f = min(functionals, key=lambda one: self._lowest([one], region).value)
+        return self._mode(f.minus(self.work), self._lowest([f], region).y)
+
+    def _tied(self, margin: Minimum) -> Mode:
+        """The motion along which load and growth are equal; a free one only if there is no other."""
+        y, strict = margin.y, self._sphere(self.growth, self.free)
+        if self.free.shape[1] and (strict is None or strict.value > self.tie):
+            y = self.free[:, 0]
+        elif strict is not None:
+            y = strict.y
+        return self._mode(self.growth[0].minus(self.work), y)
+
+    def _mode(self, f: Functional, y: Array) -> Mode:
+        """The motion y in words, in its simplest form among those with the same value of f."""
+        z = self._simplest(f, y)
+        return Mode(describe(z, self.problem.body, signed=True), tuple(float(c) for c in z))
+
+    def _simplest(self, f: Functional, y: Array) -> Array:
+        """Unit rigid coefficients (3|6,) of y, small ones dropped if f stays as low and y in the cone."""
+        z = self.reduced.frame @ y
+        z, limit = z / np.abs(z).max(), self.programme.evaluate(f, y) / np.abs(z).max() + self.tie
+        for snap in SNAPS:
+            short = np.where(np.abs(z) <= snap, 0.0, z)
+            trial = np.linalg.lstsq(self.reduced.frame, short, rcond=None)[0]
+            off = max(np.abs(self.reduced.frame @ trial - short).max(), (f.cone @ trial).max(initial=0.0))
+            if off <= TIE and self.programme.evaluate(f, trial) <= limit:
+                return np.asarray(short)
+        return np.asarray(z)
+
+    def _paper(self) -> Paper:
+        """The paper's conditions look at the load and the contact alone; the laws enter by c."""
+        c4 = np.array([part.c4 for part in self.problem.resistances])
+        lawless = Functional(np.zeros_like(self.work), np.zeros(len(c4)), self.reduced.contact)
+        margin = self._margin([lawless])
+        c = float(np.sqrt(c4**2 @ self.reduced.areas))
+        return Paper(c, None if margin is None else self._flat(margin.value))
+
+    def _flat(self, margin: float) -> float:
+        return 0.0 if abs(margin) <= self.tie else margin
+
+    @cached_property
+    def _law_scale(self) -> float:
+        """The largest resistance to a unit motion, roughly."""
+        linear = max(float(np.abs(f.linear).max(initial=0.0)) for f in self.growth + self.peak)
+        return linear + max(float(f.factors @ self.reduced.areas) for f in self.growth + self.peak)
+
+    def _majorants(self, laws: tuple[Directional, ...]) -> tuple[Functional, ...]:
+        """The functional of the laws; if not convex, convex ones above it, as -|s| is below its tangents.
+
+        The concave parts are linearised along every mode of the kernel, both ways.
+        """
+        f, k = self.reduced.functional(laws), self.reduced.frame.shape[1]
+        concave = np.minimum(f.factors, 0.0)
+        if not concave.any():
+            return (f,)
+        tangents = [
+            sum((b * g.subgradient(y) for b, g in zip(concave, self.reduced.slips, strict=True)), np.zeros(k))
+            for y in np.vstack([np.eye(k), -np.eye(k)])
+        ]
+        return tuple(replace(f, linear=f.linear + slope, factors=f.factors - concave) for slope in tangents)
+
+    def _resisted(self) -> list[Array]:
+        """Unit rows (m, k) of the slips that a law resists, on its way or at last."""
+        sides = [(p.growth.minus, p.growth.plus, p.peak.minus, p.peak.plus) for p in self.problem.resistances]
+        return [self.reduced.slip_rows(p) for p, values in enumerate(sides) if any(values)]

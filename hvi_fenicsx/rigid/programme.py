@@ -1,0 +1,271 @@
+"""Minimising a positively homogeneous convex function over a polyhedral cone of rigid motions.
+
+The function is  linear·y + Σ_p factors_p G_p(y)  with the slip integrals  G_p(y) = Σ_i |B_pi y|, y in R^k,
+k <= 6, and factors >= 0. Kelley's cutting planes: a subgradient of G_p bounds G_p from below everywhere,
+whatever the load and the strength of the law, so the cuts are kept and shared by all programmes.
+Each linear programme has k unknowns plus one for each part and is solved by HiGHS; of the cone it sees only
+the rows that were once violated. With scalar slips the result is exact after finitely many cuts; with vector
+slips (3D) the lower bound and the value attained approach each other until HiGHS' own accuracy stops them,
+some 1e-11 of the scale.
+
+Everything here is serial and deterministic: one rank runs it and tells the others.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import SolverError
+
+Array = NDArray[np.float64]
+
+FEASIBLE = 1e-10  # violation of a cone row of unit length that still counts as none
+MAX_ROUNDS = 500  # linear programmes for one minimum; 3D friction needs about 40
+TIGHT, LOOSE, PATIENCE = (
+    1e-13,
+    1e-9,
+    4,
+)  # gaps relative to the scale; a loose one will do if it shrinks no more
+HIGHS = {"presolve": False, "primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance": 1e-10}
+
+
+@dataclass(frozen=True)
+class SlipIntegral:
+    """G(y) = Σ_i |B_i y|: `rows` (m, r, k) holds the B_i with the lumped area folded in, r = 1 or 2 slips."""
+
+    rows: Array
+
+    def value(self, y: Array) -> float:
+        """The integral at y, (k,)."""
+        return float(np.linalg.norm(self.rows @ y, axis=1).sum())
+
+    def subgradient(self, y: Array) -> Array:
+        """One subgradient at y, (k,): a vertex without slip contributes the zero of its ball."""
+        slip = self.rows @ y
+        size = np.linalg.norm(slip, axis=1, keepdims=True)
+        unit = np.divide(slip, size, out=np.zeros_like(slip), where=size > 0.0)
+        return np.asarray(np.tensordot(unit, self.rows, axes=2))
+
+
+@dataclass(frozen=True)
+class Functional:
+    """The function linear·y + Σ_p factors_p G_p(y) on the cone {cone @ y <= 0}.
+
+    linear (k,), factors (p,), cone (c, k) with rows of length one.
+    """
+
+    linear: Array
+    factors: Array
+    cone: Array
+
+    def minus(self, load: Array, factor: float = 1.0) -> Functional:
+        """The functional less the work of `factor` times the load (k,)."""
+        return replace(self, linear=self.linear - factor * load)
+
+
+@dataclass(frozen=True)
+class Region:
+    """The bounded set {upper @ y <= 1, equal @ y = value} to search; arrays (q, k), (e, k), (e,)."""
+
+    upper: Array
+    equal: Array
+    value: Array
+
+
+@dataclass(frozen=True)
+class Minimum:
+    """An attained value, the motion y (k,) that attains it, and the lower bound that proves it."""
+
+    value: float
+    y: Array
+    lower: float
+
+
+@dataclass
+class Progress:
+    """Whether the gap between value and bound is small, or at least small enough and stuck in rounding."""
+
+    scale: float
+    best: float = np.inf
+    stalled: int = 0
+
+    def done(self, gap: float) -> bool:
+        """To be asked once for each linear programme."""
+        self.stalled = 0 if gap < 0.9 * self.best else self.stalled + 1
+        self.best = min(self.best, gap)
+        return gap <= TIGHT * self.scale or (self.stalled >= PATIENCE and gap <= LOOSE * self.scale)
+
+
+def ball(frame: Array) -> Region:
+    """|y| <= 1 in the largest of the rigid coefficients z = frame @ y, frame (n, k)."""
+    none = np.zeros((0, frame.shape[1]))
+    return Region(np.vstack([frame, -frame]), none, np.zeros(0))
+
+
+def cross(frame: Array) -> Region:
+    """Σ|z_j| <= 1: its corners are pure translations and rotations, so it yields directions easy to name."""
+    signs = np.array(list(product((1.0, -1.0), repeat=frame.shape[0])))
+    return replace(ball(frame), upper=signs @ frame)
+
+
+def faces(frame: Array, across: Array) -> Iterator[Region]:
+    """The faces of the sphere |y| = 1, less the motions `across` (q, k) to which y is to be orthogonal."""
+    whole = ball(frame)
+    for row in whole.upper[np.abs(whole.upper).max(axis=1) > 0.0]:
+        yield replace(whole, equal=np.vstack([row, across]), value=np.r_[1.0, np.zeros(len(across))])
+
+
+@dataclass
+class Programme:
+    """The motions with rigid coefficients frame @ y, their slip integrals, and the cuts found so far.
+
+    `scale` is the size of the works that are compared.
+    """
+
+    frame: Array
+    integrals: tuple[SlipIntegral, ...]
+    scale: float
+    cuts: list[list[Array]] = field(default_factory=list)
+    solved: int = 0
+
+    def __post_init__(self) -> None:
+        k = self.frame.shape[1]
+        self.cuts = [[] for _ in self.integrals]
+        for start in np.vstack([np.eye(k), -np.eye(k)]):
+            self._cut(start)
+
+    def evaluate(self, f: Functional, y: Array) -> float:
+        """The value of f at y, all vertices summed; the cone is not looked at."""
+        slip = sum(b * g.value(y) for b, g in zip(f.factors, self.integrals, strict=True) if b > 0.0)
+        return float(f.linear @ y + slip)
+
+    def minimise(self, f: Functional, region: Region, give_up: float = np.inf) -> Minimum | None:
+        """Minimum of f over region and cone, None if that is empty or nothing in it is below `give_up`."""
+        best = Minimum(np.inf, np.zeros(self.frame.shape[1]), -np.inf)
+        active, progress = _seeds(f.cone), Progress(self.scale)
+        for _ in range(MAX_ROUNDS):
+            found = self._solve(f, region, active)
+            if found is None or found.lower > give_up:
+                return None
+            if not _violated(f.cone, found.y, active):
+                value = self.evaluate(f, found.y)
+                best = Minimum(value, found.y, found.lower) if value < best.value else best
+            if progress.done(best.value - found.lower):
+                return replace(best, lower=found.lower)
+            self._cut_towards(found.y, best.y)
+        raise SolverError(f"rigid motions: {MAX_ROUNDS} cutting planes left a gap of {progress.best:.1e}")
+
+    def sphere(self, f: Functional, across: Array) -> Minimum | None:
+        """Minimum of f over the cone and |y| = 1, one programme for each face; None if there is no such y."""
+        best: Minimum | None = None
+        for face in faces(self.frame, across):
+            found = self.minimise(f, face, np.inf if best is None else best.value)
+            best = found if best is None or (found is not None and found.value < best.value) else best
+        return best
+
+    def ratio(self, f: Functional, load: Array, least: float) -> tuple[float, Array | None]:
+        """The largest λ with λ load·y <= f(y) on the cone, and the motion that limits it (None if none does).
+
+        Works of at most `least` for a unit motion count as none. (inf, None): no λ is too large; (-inf, y):
+        none is small enough, for y forbids it. Dinkelbach's iteration: λ only falls, each motion below the
+        current plane lowers it; so the linear programmes stay bounded, and they share their cuts.
+        """
+        start = self.minimise(replace(f, linear=-load, factors=np.zeros_like(f.factors)), ball(self.frame))
+        if start is None or -start.value <= least:
+            return self._unlimited(f, load, least)
+        factor, limit = self.evaluate(f, start.y) / -start.value, start.y
+        active, progress = _seeds(f.cone), Progress(self.scale)
+        for _ in range(MAX_ROUNDS):
+            found = self._solve(f.minus(load, factor), ball(self.frame), active)
+            if found is None or progress.done(-found.lower):
+                return factor, limit
+            if not _violated(f.cone, found.y, active):
+                value, work = self.evaluate(f, found.y), float(load @ found.y)
+                if work <= least and value - factor * work < -LOOSE * self.scale:
+                    return -np.inf, found.y
+                if work > least and value < factor * work:
+                    factor, limit = value / work, found.y
+            self._cut_towards(found.y, limit)
+        raise SolverError(f"rigid motions: no load factor after {MAX_ROUNDS} cutting planes")
+
+    def _unlimited(self, f: Functional, load: Array, least: float) -> tuple[float, Array | None]:
+        """A load that only ever holds has no largest factor, unless a motion it does no work on escapes."""
+        idle = replace(ball(self.frame), equal=load[None], value=np.zeros(1))
+        found = self.minimise(f, idle)
+        return (np.inf, None) if found is None or found.value >= -least else (-np.inf, found.y)
+
+    def _cut(self, y: Array) -> None:
+        for integral, cuts in zip(self.integrals, self.cuts, strict=True):
+            cuts.append(integral.subgradient(y))
+
+    def _cut_towards(self, y: Array, best: Array) -> None:
+        """Cut at y and half way to the best motion known: where G is smooth this halves the rounds."""
+        self._cut(y)
+        self._cut(0.5 * (y + best))
+
+    def _solve(self, f: Functional, region: Region, active: list[int]) -> Minimum | None:
+        """Minimum of the cut model; `value` and `lower` are both the model's."""
+        self.solved += 1
+        if self.frame.shape[1] == 1:
+            return self._solve_line(f, region)
+        # Imported here: it takes longer than the whole analysis of a kernel with one motion, that needs none.
+        from scipy.optimize import linprog
+
+        c, a_ub, b_ub = self._rows(f, region, active)
+        size = float(np.abs(c).max()) or 1.0
+        k, a_eq = len(f.linear), np.zeros((len(region.equal), len(c)))
+        a_eq[:, :k] = region.equal
+        bounds = [(None, None)] * k + [(0.0, None)] * (len(c) - k)
+        result = linprog(c / size, a_ub, b_ub, a_eq, region.value, bounds, "highs-ds", options=HIGHS)
+        if result.status == 2:
+            return None
+        if result.status != 0:
+            raise SolverError(f"HiGHS on the rigid motions: {result.message}")
+        return Minimum(result.fun * size, np.asarray(result.x[:k]), result.fun * size)
+
+    def _rows(self, f: Functional, region: Region, active: list[int]) -> tuple[Array, Array, Array]:
+        """Cost and inequality rows of the cut model in (y, one height for each part with factor > 0)."""
+        parts = [p for p, b in enumerate(f.factors) if b > 0.0]
+        cuts = [np.array(self.cuts[p]) for p in parts]
+        left = np.vstack([region.upper, f.cone[active], *cuts])
+        heights = np.zeros((len(left), len(parts)))
+        top = len(region.upper) + len(active)
+        for column, rows in enumerate(cuts):
+            heights[top : top + len(rows), column] = -1.0
+            top += len(rows)
+        right = np.zeros(len(left))
+        right[: len(region.upper)] = 1.0
+        return np.r_[f.linear, f.factors[parts]], np.hstack([left, heights]), right
+
+    def _solve_line(self, f: Functional, region: Region) -> Minimum | None:
+        """One motion only: two rays and the origin, no linear programme."""
+        reach = 1.0 / np.abs(self.frame).max()
+        points = [np.array([t]) for t in (reach, -reach, 0.0)]
+        inside = [y for y in points if _inside(f, region, y)]
+        values = [self.evaluate(f, y) for y in inside]
+        i = int(np.argmin(values)) if values else 0
+        return Minimum(values[i], inside[i], values[i]) if values else None
+
+
+def _inside(f: Functional, region: Region, y: Array) -> bool:
+    held = np.abs(region.equal @ y - region.value).max(initial=0.0) <= FEASIBLE
+    return bool(held and (f.cone @ y).max(initial=0.0) <= FEASIBLE)
+
+
+def _seeds(cone: Array) -> list[int]:
+    """Rows extreme in one coefficient: on a straight part these are its ends, and no other is ever needed."""
+    return sorted({*cone.argmin(axis=0).tolist(), *cone.argmax(axis=0).tolist()}) if len(cone) else []
+
+
+def _violated(cone: Array, y: Array, active: list[int]) -> bool:
+    """Whether y leaves the cone; the row it violates most is then added to the active ones."""
+    excess = cone @ y
+    if not len(cone) or excess.max() <= FEASIBLE or int(excess.argmax()) in active:
+        return False
+    active.append(int(excess.argmax()))
+    return True

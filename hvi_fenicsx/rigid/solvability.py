@@ -1,0 +1,61 @@
+"""Can a solution exist, along which rigid motion would the body escape, and how much more load would it bear?
+
+With C = Y ∩ K∞ the rigid motions that the contact admits, j^∞ the growth and ĵ the peak of the laws:
+held if <g,y> < ∫ j^∞(y) for all y ≠ 0 in C, escapes if <g,y> > ∫ ĵ(y) for some y in C, metastable in between,
+borderline where one of these is an equality. The theory and the closed forms are in docs/solvability.md.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TypeVar, cast
+
+import numpy as np
+from mpi4py import MPI
+
+from ..errors import HviError, InputError
+from .analysis import Analysis
+from .parts import Reduced, RigidProblem, reduce
+from .verdict import LoadFactors, Solvability, unmovable
+
+Result = TypeVar("Result")
+
+
+def analyse(comm: MPI.Comm, problem: RigidProblem) -> Solvability:
+    """The state of a scene and its margins, before anything is solved. Collective; the same on all ranks."""
+    basis, reduced = reduce(comm, problem)
+    if basis.shape[1] == 0:
+        return unmovable(_paper_c(comm, problem))
+    return _on_root(comm, reduced, lambda found: Analysis(problem, found).solvability())
+
+
+def load_factors(comm: MPI.Comm, problem: RigidProblem, load: str | None = None) -> LoadFactors:
+    """Factors of one named load, the others constant, or of the whole load (None).
+
+    Collective; the same on all ranks.
+    """
+    if load is not None and load not in problem.loads:
+        raise InputError(f"there is no load {load!r}; there are: {', '.join(problem.loads) or 'none'}")
+    basis, reduced = reduce(comm, problem)
+    if basis.shape[1] == 0:
+        return LoadFactors(-np.inf, np.inf, np.inf, None, None)
+    return _on_root(comm, reduced, lambda found: Analysis(problem, found).load_factors(load))
+
+
+def _paper_c(comm: MPI.Comm, problem: RigidProblem) -> float:
+    square = sum(part.c4**2 * float(part.weights.sum()) for part in problem.resistances)
+    return float(np.sqrt(comm.allreduce(square)))
+
+
+def _on_root(comm: MPI.Comm, reduced: Reduced | None, work: Callable[[Reduced], Result]) -> Result:
+    """Work on the rank that holds the data and tell all ranks what came out, be it an error."""
+    outcome: Result | HviError | None = None
+    if reduced is not None:
+        try:
+            outcome = work(reduced)
+        except HviError as error:
+            outcome = error
+    outcome = comm.bcast(outcome, root=0)
+    if isinstance(outcome, HviError):
+        raise outcome
+    return cast(Result, outcome)
