@@ -26,7 +26,7 @@ IntArray = npt.NDArray[np.int64]
 
 
 def quotient(a: FloatArray, b: FloatArray | float) -> FloatArray:
-    """A / b; numpy's stubs do not know that the quotient of doubles is one."""
+    """The quotient a / b; numpy's stubs do not know that of doubles it is one."""
     result: FloatArray = np.divide(a, b)
     return result
 

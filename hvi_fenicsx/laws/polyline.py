@@ -116,7 +116,7 @@ class PolylineLaw(Superpotential):
     @cached_property
     def growth(self) -> Directional:
         g = self.graph
-        return Directional(-_limit(g.left[0], -g.slopes[0]), _limit(g.right[-1], g.slopes[-1]))
+        return Directional(_limit(-g.left[0], g.slopes[0]), _limit(g.right[-1], g.slopes[-1]))
 
     @override
     @cached_property
@@ -124,7 +124,7 @@ class PolylineLaw(Superpotential):
         g = self.graph
         limits = np.concatenate([g.left, g.right])
         return Directional(
-            max(self.growth.minus, float(np.max(-limits))), max(self.growth.plus, float(np.max(limits)))
+            max(self.growth.minus, float(np.max(-limits)) + 0.0), max(self.growth.plus, float(np.max(limits)))
         )
 
     @cached_property
@@ -151,14 +151,18 @@ class PolylineLaw(Superpotential):
     def energy_scale(self) -> float:
         return self._scales[1]
 
+    @property
+    def _corners(self) -> FloatArray:
+        """Displacements that mean something where the law has no kink off zero."""
+        return self.graph.breaks
+
     @cached_property
     def _scales(self) -> tuple[float, float]:
-        """The first kink off zero (else break, else the reference length) before which the law does work.
+        """The first kink off zero (else corner, else the reference length) by which the law does work.
 
         The energy is the triangle ½ a max |traction| over |x| ≤ a: for the quadratic-linear law γ2 δ.
         """
-        g = self.graph
-        candidates = [g.breaks[g.jumps != 0.0], g.breaks, np.array([self.reference_length])]
+        candidates = [self.kinks, self._corners, np.array([self.reference_length])]
         lengths = np.concatenate([np.unique(np.abs(c[c != 0.0])) for c in candidates])
         for a in lengths:
             traction = self._largest(float(a))
@@ -180,4 +184,4 @@ class PolylineLaw(Superpotential):
 
 def _limit(traction: npt.ArrayLike, slope: float) -> float:
     """Limit of a ray that starts at the given traction with the given slope."""
-    return float(np.asarray(traction)) if slope == 0.0 else float(np.copysign(np.inf, slope))
+    return float(np.asarray(traction)) + 0.0 if slope == 0.0 else float(np.copysign(np.inf, slope))

@@ -52,6 +52,12 @@ class SampledLaw(PolylineLaw):
             np.searchsorted(np.asarray(self.ends(), dtype=float), slip, side="right"), dtype=np.int64
         )
 
+    @property
+    @override
+    def _corners(self) -> FloatArray:
+        # Not the samples: how finely the law is sampled is no scale of it.
+        return np.asarray(self.ends(), dtype=np.float64)
+
 
 def sample_traction(
     traction: Callable[[FloatArray], FloatArray], ends: Sequence[float], samples: int = 200

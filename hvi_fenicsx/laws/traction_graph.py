@@ -94,10 +94,12 @@ class TractionGraph:
         return np.concatenate([np.cumsum(steps[:z][::-1])[::-1], [0.0], np.cumsum(steps[z:])])
 
     def traction(self, x: FloatArray, side: str) -> FloatArray:
-        """Limit (m,) of the traction at x from the given side, "left" or "right"."""
-        piece = np.searchsorted(self.breaks, x, side="left" if side == "left" else "right")
-        with np.errstate(over="ignore", under="ignore"):
-            return self._start[piece] + self.slopes[piece] * (x - self.breaks[self._anchor[piece]])
+        """Limit (m,) of the traction at x from the given side, "left" or "right"; at a break to the bit."""
+        next_break, passed = np.searchsorted(self.breaks, x), np.searchsorted(self.breaks, x, side="right")
+        piece, limits = (next_break, self.left) if side == "left" else (passed, self.right)
+        with np.errstate(over="ignore"):
+            inside = self._start[piece] + self.slopes[piece] * (x - self.breaks[self._anchor[piece]])
+        return np.where(passed > next_break, limits[np.minimum(next_break, limits.size - 1)], inside)
 
     def slope(self, x: FloatArray) -> FloatArray:
         """Slope (m,) at x; at a break the larger of the two."""
@@ -114,7 +116,7 @@ class TractionGraph:
         piece = np.where(x < 0.0, behind, ahead)
         anchor = self._anchor[piece]
         d = x - self.breaks[anchor]
-        with np.errstate(over="ignore", under="ignore"):
+        with np.errstate(over="ignore"):
             return np.asarray(
                 self._energy[anchor] + (self._start[piece] + (0.5 * self.slopes[piece]) * d) * d
             )

@@ -119,7 +119,7 @@ class _Weakened(ConvexPart):
         return self.law.peak_traction - self.law.residual_traction
 
     def _shape(self, x: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        with np.errstate(over="ignore", under="ignore"):
+        with np.errstate(over="ignore"):
             return self.law.shape(np.abs(x) / self.law.delta)
 
 
