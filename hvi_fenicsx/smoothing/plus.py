@@ -47,7 +47,7 @@ class PlusFunction(ABC):
             return np.asarray(self._at(t, e)[2] / e)
 
     def _at(self, t: FloatArray, e: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-        with np.errstate(over="ignore", under="ignore"):
+        with np.errstate(over="ignore"):
             return self.profile(np.abs(t) / e)
 
 

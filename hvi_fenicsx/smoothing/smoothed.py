@@ -57,7 +57,7 @@ class SmoothedPart(ConvexPart):
     def second(self, x: FloatArray) -> FloatArray:
         folded, _ = self._fold(x)
         _, _, curvatures = self._profiles(folded)
-        with np.errstate(over="ignore", under="ignore"):
+        with np.errstate(over="ignore"):
             stiffness = np.minimum(self._heights / self.epsilon * self._heights, _LARGEST)
             return np.asarray(self.part.second(folded) + (curvatures * stiffness).sum(axis=1))
 
@@ -79,7 +79,7 @@ class SmoothedPart(ConvexPart):
 
     def _profiles(self, x: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """D, D', D'' (m, k) of each point and kink, at their distance in units of the kink's width ε/jump."""
-        with np.errstate(over="ignore", under="ignore"):
+        with np.errstate(over="ignore"):
             return self.plus.profile(np.abs(x[:, None] - self._places) / self.epsilon * self._heights)
 
 

@@ -1,0 +1,396 @@
+"""Smoothings: the promised bounds and decays, limits for ε → 0, zero slip, no overflow, the paper's own S."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from hvi_fenicsx import laws, smoothing
+from hvi_fenicsx.errors import InputError
+from hvi_fenicsx.laws.base import Superpotential
+from hvi_fenicsx.laws.scaled import ScaledLaw
+from hvi_fenicsx.smoothing import PLUS_FUNCTIONS, PaperSmoothing, PlusFunction, SmoothedLaw
+
+GAMMA1, GAMMA2, DELTA = 1.0e3, 0.5e3, 9.0e-6
+MODEL = laws.QuadraticLinear(GAMMA1, GAMMA2, DELTA)
+LAWS: dict[str, Superpotential] = {
+    "model": MODEL,
+    "literal": laws.QuadraticLinearLiteral(GAMMA1, GAMMA2, DELTA),
+    "tresca": laws.Tresca(300.0),
+    "spring": laws.LinearSpring(1e8),
+    "sawtooth": laws.Sawtooth(1e3, 200.0, 2e-6, 5),
+    "exponential": laws.Exponential(1e3, 300.0, 5e-6),
+    "graph": laws.Graph(
+        ((0.0, 2.0), (1e-6, 5.0), (1e-6, -3.0), (2e-6, -4.0), (3e-6, 1.0), (3e-6, 6.0), (5e-6, 0.5))
+    ),
+    "one-sided": laws.Graph(((0.0, 0.0), (1e-6, 5.0), (1e-6, 1.0), (2e-6, 1.0), (2e-6, 4.0)), one_sided=True),
+    "scaled": ScaledLaw(MODEL, 3e-6, 7.0),
+}
+each_law = pytest.mark.parametrize("law", LAWS.values(), ids=LAWS.keys())
+each_plus = pytest.mark.parametrize("plus", PLUS_FUNCTIONS.values(), ids=PLUS_FUNCTIONS.keys())
+each_epsilon = pytest.mark.parametrize("epsilon", [1e-12, 1e-6, 1e-2, 1.0, 1e3])
+
+
+def around(law: Superpotential, width: float = 1e-3) -> np.ndarray:
+    """Displacements on both sides, on every kink, at `width` length scales from them, and far out."""
+    spread = law.length_scale * np.concatenate(
+        [[0.0], np.geomspace(1e-3, 1e3, 61), np.linspace(0.05, 8.3, 83)]
+    )
+    near = law.kinks[:, None] + width * law.length_scale * np.linspace(-1.0, 1.0, 41)
+    return np.unique(np.concatenate([spread, -spread, near.ravel()]))
+
+
+def literal_plus(name: str, t: float, e: float) -> float:
+    """The three formulas as printed in the literature."""
+    if name == "quadratic":
+        return 0.0 if t <= -e / 2 else t if t >= e / 2 else (t + e / 2) ** 2 / (2 * e)
+    if name == "chks":
+        return (t + math.sqrt(t * t + 4 * e * e)) / 2
+    return e * math.log(1 + math.exp(t / e))
+
+
+@each_plus
+@settings(deadline=None)
+@given(t=st.floats(-20, 20), e=st.floats(0.05, 20))
+def test_plus_functions_are_their_formulas(plus: PlusFunction, t: float, e: float) -> None:
+    x, h = np.array([t]), 1e-4 * e
+    exact = literal_plus(plus.name, t, e)
+    assert plus.value(x, e)[0] == pytest.approx(exact, rel=1e-12, abs=1e-12)
+    slope = (literal_plus(plus.name, t + h, e) - literal_plus(plus.name, t - h, e)) / (2 * h)
+    assert plus.derivative(x, e)[0] == pytest.approx(slope, abs=1e-4)
+    if abs(abs(t) - e / 2) > 2 * h:
+        curvature = (plus.derivative(x + h, e) - plus.derivative(x - h, e))[0] / (2 * h)
+        assert plus.second(x, e)[0] * e == pytest.approx(curvature * e, abs=1e-6)
+
+
+@each_plus
+@settings(deadline=None)
+@given(t=st.floats(-1e300, 1e300), e=st.floats(1e-12, 1e3))
+def test_error_and_decay_of_the_plus_functions(plus: PlusFunction, t: float, e: float) -> None:
+    with np.errstate(over="raise", invalid="raise", divide="raise"):
+        error = plus.value(np.array([t]), e)[0] - max(t, 0.0)
+        slope = plus.derivative(np.array([t]), e)[0]
+        assert np.isfinite(plus.second(np.array([t]), e)[0])
+    rounding = 1e-15 * abs(t)
+    assert -rounding <= error <= plus.kappa * e * (1 + 1e-12) + rounding
+    assert 0.0 <= slope <= 1.0
+    z = abs(t) / e
+    decay = {
+        "quadratic": 0.0 if z >= 0.5 else 1.0,
+        "chks": 1 / max(z, 1.0),
+        "log_exp": math.exp(-min(z, 700)),
+    }
+    assert error <= decay[plus.name] * e * (1 + 1e-12) + rounding
+
+
+@each_plus
+def test_kappa_is_attained_at_the_kink(plus: PlusFunction) -> None:
+    assert plus.value(np.zeros(1), 3.0)[0] == pytest.approx(3.0 * plus.kappa, rel=1e-15)
+    assert plus.derivative(np.zeros(1), 3.0)[0] == 0.5
+
+
+@each_law
+@each_plus
+@each_epsilon
+def test_error_bound(law: Superpotential, plus: PlusFunction, epsilon: float) -> None:
+    smooth = SmoothedLaw.relative(law, epsilon, plus)
+    for width in (1e-3, epsilon):
+        x = around(law, width)
+        error = np.abs(smooth.value(x) - law.value(x))
+        assert np.all(error <= smooth.bound * (1 + 1e-12) + 1e-15 * np.abs(law.value(x)))
+    if law.kinks.size:
+        assert smooth.bound >= plus.kappa * epsilon * law.energy_scale * (1 - 1e-12)
+
+
+@settings(deadline=None)
+@given(
+    st.sampled_from(list(LAWS.values())),
+    st.sampled_from(list(PLUS_FUNCTIONS.values())),
+    st.floats(-12, 3),
+    st.floats(-1e3, 1e3),
+)
+def test_error_bound_at_random(
+    law: Superpotential, plus: PlusFunction, exponent: float, place: float
+) -> None:
+    smooth = SmoothedLaw.relative(law, 10.0**exponent, plus)
+    x = np.append(place * law.length_scale, law.kinks + place * 10.0**exponent * law.length_scale)
+    error = np.abs(smooth.value(x) - law.value(x))
+    assert np.all(error <= smooth.bound * (1 + 1e-12) + 1e-15 * np.abs(law.value(x)))
+
+
+@each_law
+@each_plus
+@pytest.mark.parametrize("epsilon", [1e-2, 1.0, 1e3])
+def test_derivatives_of_the_smoothed_law(law: Superpotential, plus: PlusFunction, epsilon: float) -> None:
+    smooth = SmoothedLaw.relative(law, epsilon, plus)
+    h = 1e-6 * law.length_scale
+    x = around(law)
+    x = x[np.abs(x) < 10 * law.length_scale]
+    quotient = (smooth.value(x + h) - smooth.value(x - h)) / (2 * h)
+    rounding = 1e-15 * np.abs(smooth.value(x)).max() / h
+    np.testing.assert_allclose(smooth.right(x), quotient, atol=1e-3 * law.traction_scale + rounding)
+    np.testing.assert_array_equal(smooth.left(x), smooth.right(x))
+    assert smooth.kinks.size == 0
+
+
+@each_law
+@each_plus
+@each_epsilon
+def test_split_of_the_smoothed_law(law: Superpotential, plus: PlusFunction, epsilon: float) -> None:
+    smooth = SmoothedLaw.relative(law, epsilon, plus)
+    x = np.union1d(around(law), around(law, epsilon))
+    h, g = smooth.convex, smooth.concave
+    size = np.abs(h.value(x)) + np.abs(g.value(x)) + law.energy_scale
+    assert np.all(np.abs(h.value(x) - g.value(x) - smooth.value(x)) <= 1e-13 * size)
+    for part in (h, g):
+        slope = part.right(x)
+        assert np.all(np.diff(slope) >= -1e-12 * (np.abs(slope[1:]) + law.traction_scale))
+        assert np.all(part.second(x) >= 0.0)
+        assert part.kinks.size == 0
+
+
+@each_law
+@each_plus
+def test_second_derivative_of_the_smoothed_parts(law: Superpotential, plus: PlusFunction) -> None:
+    smooth = SmoothedLaw.relative(law, 0.5, plus)
+    h = 1e-6 * law.length_scale
+    x = np.random.default_rng(3).uniform(-8, 8, 200) * law.length_scale
+    for part in (smooth.convex, smooth.concave):
+        quotient = (part.right(x + h) - part.right(x - h)) / (2 * h)
+        off = np.abs(part.second(x) - quotient) > 1e-3 * law.traction_scale / law.length_scale
+        # the quadratic plus function and the law's own breaks have jumps of the curvature
+        assert off.sum() <= 2
+
+
+@each_law
+@each_plus
+def test_gradients_tend_into_the_subdifferential(law: Superpotential, plus: PlusFunction) -> None:
+    """Near a kink, where x moves with ε, into the kink's interval; elsewhere to the derivative."""
+    for place in law.kinks:
+        gaps = []
+        for epsilon in (1e-2, 1e-4, 1e-6, 1e-8):
+            smooth = SmoothedLaw.relative(law, epsilon, plus)
+            x = place + epsilon * law.length_scale * np.linspace(-2, 2, 41)
+            (lo,), (hi,) = law.interval(np.array([place]))
+            gaps.append(np.maximum(np.maximum(lo - smooth.right(x), smooth.right(x) - hi), 0.0).max())
+        assert gaps[-1] <= 1e-5 * law.peak.plus
+        assert gaps[-1] <= gaps[0] + 1e-12 * law.peak.plus
+    x = around(law)
+    x = x[np.all(np.abs(x[:, None] - law.kinks) > 1e-4 * law.length_scale, axis=1)] if law.kinks.size else x
+    smooth = SmoothedLaw.relative(law, 1e-9, plus)
+    assert law.distance(x, smooth.right(x)).max() <= 1e-6 * law.traction_scale
+
+
+@each_law
+@each_plus
+@each_epsilon
+def test_untouched_at_zero_slip(law: Superpotential, plus: PlusFunction, epsilon: float) -> None:
+    smooth = SmoothedLaw.relative(law, epsilon, plus)
+    assert smooth.even == law.even
+    if not law.even:
+        return
+    assert smooth.right(np.zeros(1))[0] == 0.0
+    assert smooth.convex.right(np.zeros(1))[0] == smooth.concave.right(np.zeros(1))[0] == 0.0
+    x = around(law)
+    np.testing.assert_array_equal(smooth.value(x), smooth.value(-x))
+    np.testing.assert_array_equal(smooth.right(x), -smooth.right(-x))
+
+
+def test_the_quadratic_smoothing_leaves_the_law_alone_away_from_the_drop() -> None:
+    smooth = SmoothedLaw.relative(MODEL, 0.01)
+    reach = 0.5 * smooth.epsilon_absolute / (GAMMA1 - GAMMA2)
+    x = np.concatenate([np.linspace(0, DELTA - reach, 50), np.linspace(DELTA + reach * 1.001, 5 * DELTA, 50)])
+    np.testing.assert_array_equal(smooth.value(x), MODEL.value(x))
+    np.testing.assert_array_equal(smooth.right(x[:-50]), MODEL.right(x[:-50]))
+
+
+@each_law
+@each_plus
+@pytest.mark.parametrize("absolute", [1e-300, 1e-12, 1.0, 1e3, 1e300])
+def test_no_overflow(law: Superpotential, plus: PlusFunction, absolute: float) -> None:
+    smooth = SmoothedLaw(law, absolute, plus)
+    x = np.concatenate(
+        [[0.0], law.kinks, np.geomspace(1e-300, 1e300, 200), -np.geomspace(1e-300, 1e300, 200)]
+    )
+    if isinstance(law, ScaledLaw):
+        x = x[np.abs(x) < 1e290]
+    with np.errstate(over="raise", invalid="raise", divide="raise"):
+        results = [smooth.right(x), smooth.convex.second(x), smooth.concave.second(x), smooth.distance(x, x)]
+        value = smooth.value(x)
+    assert all(np.all(np.isfinite(r)) for r in results if law is not LAWS["spring"])
+    assert not np.any(np.isnan(value))
+
+
+@each_law
+@each_plus
+@each_epsilon
+def test_bounds_of_the_smoothed_law_hold(law: Superpotential, plus: PlusFunction, epsilon: float) -> None:
+    smooth = SmoothedLaw.relative(law, epsilon, plus).scaled(law.length_scale, 1.0)
+    x = np.union1d(around(smooth), around(smooth, epsilon))
+    slope, slack = smooth.right(x), 1e-9 * smooth.traction_scale
+    assert smooth.growth == law.scaled(law.length_scale, 1.0).growth
+    assert slope.max() <= smooth.peak.plus + slack
+    assert -slope.min() <= smooth.peak.minus + slack
+    assert np.all(np.abs(slope) <= smooth.c3 * (1 + np.abs(x)) + slack)
+    assert np.all(-slope * x <= smooth.c4 * np.abs(x) + slack * np.abs(x))
+    if np.isfinite(smooth.peak.plus):
+        assert smooth.peak.plus <= max(slope.max(), smooth.growth.plus) * 1.05 + slack
+
+
+def test_an_opposing_traction_never_appears_by_smoothing_the_model() -> None:
+    for plus in PLUS_FUNCTIONS.values():
+        assert SmoothedLaw.relative(MODEL, 0.1, plus).c4 == 0.0
+    assert SmoothedLaw.relative(LAWS["literal"], 1e-6).c4 == pytest.approx(GAMMA2, rel=1e-5)
+
+
+@each_law
+@each_plus
+def test_scaled_smoothing(law: Superpotential, plus: PlusFunction) -> None:
+    smooth, length, traction = SmoothedLaw.relative(law, 0.3, plus), 2.5e-6, 17.0
+    scaled = smooth.scaled(length, traction)
+    assert isinstance(scaled, SmoothedLaw)
+    assert scaled.epsilon == pytest.approx(0.3)
+    x = np.random.default_rng(4).uniform(-8, 8, 300) * law.length_scale
+    np.testing.assert_allclose(scaled.value(x / length) * length * traction, smooth.value(x), rtol=1e-9)
+    np.testing.assert_allclose(
+        scaled.right(x / length) * traction, smooth.right(x), rtol=1e-7, atol=1e-9 * law.traction_scale
+    )
+    np.testing.assert_array_equal(smooth.branch(x), law.branch(x))
+
+
+def papers_s(x: float, epsilon: float) -> float:
+    """S of section 5.2, letter by letter, with g read as g2 and γ2 x as γ2 |x|."""
+    g1, g2 = -GAMMA1 / (2 * DELTA) * x**2, -GAMMA2 * abs(x)
+    if g2 - g1 <= -epsilon / 2:
+        return g1
+    if g2 - g1 >= epsilon / 2:
+        return g2
+    return 1 / (2 * epsilon) * (g2 - g1) ** 2 + 0.5 * (g2 + g1) + epsilon / 8
+
+
+PAPER_EPSILONS = (1e-8, 1e-5, 1e-3, 2.25e-3, 2.3e-3, 0.1, 10.0)
+
+
+@pytest.mark.parametrize("epsilon", PAPER_EPSILONS)
+def test_papers_smoothing_is_the_papers_formula(epsilon: float) -> None:
+    law = PaperSmoothing(MODEL, epsilon)
+    x = np.linspace(-4 * DELTA, 4 * DELTA, 2001)
+    expected = -np.array([papers_s(float(v), epsilon) for v in x])
+    np.testing.assert_allclose(law.value(x), expected, rtol=1e-10, atol=1e-12 * law.energy_scale)
+    assert np.all(np.abs(law.value(x) - MODEL.value(x)) <= law.bound * (1 + 1e-12) + 1e-16)
+    h = 1e-6 * DELTA
+    away = np.abs(x) > 2 * h
+    quotient = (law.value(x + h) - law.value(x - h)) / (2 * h)
+    tolerance = GAMMA1 * (1e-6 + h * GAMMA1 / epsilon)
+    np.testing.assert_allclose(law.right(x)[away], quotient[away], atol=tolerance, rtol=1e-5)
+
+
+def test_papers_own_data_return_250_at_zero_slip() -> None:
+    law = PaperSmoothing(MODEL, 0.1)
+    np.testing.assert_allclose(law.right(np.array([0.0, 1e-12])), 250.0, rtol=1e-6)
+    x = np.linspace(1e-9, 6e-6, 100)
+    np.testing.assert_allclose(law.right(x), (GAMMA1 * x / DELTA + GAMMA2) / 2, rtol=0.05)
+
+
+@pytest.mark.parametrize("epsilon", PAPER_EPSILONS)
+def test_papers_smoothing_has_a_false_kink_at_zero_for_every_epsilon(epsilon: float) -> None:
+    law = PaperSmoothing(MODEL, epsilon)
+    (lo,), (hi,) = law.interval(np.zeros(1))
+    assert (lo, hi) == pytest.approx((-GAMMA2 / 2, GAMMA2 / 2))
+    np.testing.assert_array_equal(law.convex.kinks, [0.0])
+    assert law.branch(np.zeros(1))[0] == -1
+    x = around(MODEL)
+    np.testing.assert_array_equal(law.value(x), law.value(-x))
+    np.testing.assert_array_equal(law.right(x), -law.left(-x))
+
+
+@pytest.mark.parametrize("epsilon", [1e-14, *PAPER_EPSILONS])
+def test_papers_split(epsilon: float) -> None:
+    law = PaperSmoothing(MODEL, epsilon)
+    x = np.union1d(around(MODEL), DELTA + epsilon / GAMMA2 * np.linspace(-2, 2, 81))
+    h, g = law.convex, law.concave
+    np.testing.assert_allclose(h.value(x) - g.value(x), law.value(x), atol=1e-12 * (1 + h.value(x).max()))
+    for part in (h, g):
+        slopes = np.column_stack([part.left(x), part.right(x)]).ravel()
+        assert np.all(np.diff(slopes) >= -1e-9 * (np.abs(slopes[1:]) + GAMMA1))
+        assert np.all(part.second(x) >= 0.0)
+        step = 1e-5 * min(epsilon / GAMMA2, DELTA)
+        quotient = (part.right(x + step) - part.right(x - step)) / (2 * step)
+        wrong = np.abs(quotient - part.second(x)) > 1e-2 * part.second(x).max()
+        # breaks of the curvature, and the kink
+        if epsilon >= 1e-8:
+            assert wrong.sum() <= 8
+    np.testing.assert_allclose(
+        np.diff(g.value(x)),
+        0.5 * (g.right(x[1:]) + g.right(x[:-1])) * np.diff(x),
+        atol=2e-2 * law.energy_scale,
+        rtol=0.2,
+    )
+
+
+def test_papers_smoothing_integrates_its_second_derivative() -> None:
+    """G and G' in closed form against quadrature of G''."""
+    for epsilon in (1e-3, 4e-3, 0.1):
+        g = PaperSmoothing(MODEL, epsilon).concave
+        x = np.linspace(0, 30e-6, 600_001)
+        rate = np.concatenate([[0], np.cumsum(0.5 * (g.second(x[1:]) + g.second(x[:-1])) * np.diff(x))])
+        np.testing.assert_allclose(g.right(x), rate, atol=1e-4 * GAMMA1)
+        value = np.concatenate([[0], np.cumsum(0.5 * (g.right(x[1:]) + g.right(x[:-1])) * np.diff(x))])
+        np.testing.assert_allclose(g.value(x), value, atol=1e-8 * GAMMA1 * DELTA)
+
+
+def test_papers_smoothing_far_out_and_scaled() -> None:
+    law = PaperSmoothing(MODEL, 0.1)
+    x = np.concatenate([[0.0], np.geomspace(1e-300, 1e300, 100)])
+    with np.errstate(over="raise", invalid="raise", divide="raise"):
+        for y in (x, -x):
+            for part in (law.convex, law.concave):
+                assert np.all(np.isfinite(part.right(y)))
+                assert np.all(np.isfinite(part.second(y)))
+            assert np.all(np.isfinite(law.value(y)))
+            np.testing.assert_allclose(np.abs(law.right(y)[-1]), GAMMA2)
+    scaled = law.scaled(2e-6, 30.0)
+    x = np.linspace(-3e-5, 3e-5, 101)
+    np.testing.assert_allclose(scaled.right(x / 2e-6) * 30.0, law.right(x), rtol=1e-9)
+    assert law.growth == MODEL.growth
+    assert law.peak.plus > GAMMA1
+    assert law.right(np.linspace(0, 1e-4, 100_001)).max() == pytest.approx(law.peak.plus, rel=1e-3)
+
+
+def test_create() -> None:
+    law = smoothing.create("chks", MODEL, epsilon=0.01)
+    assert isinstance(law, SmoothedLaw)
+    assert law.epsilon_absolute == pytest.approx(0.01 * GAMMA2 * DELTA)
+    paper = smoothing.create("paper", MODEL, epsilon_absolute=0.1)
+    assert paper == PaperSmoothing(MODEL, 0.1)
+    assert set(smoothing.available()) == {"quadratic", "chks", "log_exp", "paper"}
+
+
+@pytest.mark.parametrize(
+    ("kind", "given_epsilon", "said"),
+    [
+        ("quadratik", {"epsilon": 1.0}, "did you mean 'quadratic'"),
+        ("none", {"epsilon": 1.0}, "available: chks"),
+        ("chks", {}, "either epsilon"),
+        ("chks", {"epsilon": 1.0, "epsilon_absolute": 1.0}, "either epsilon"),
+        ("chks", {"epsilon": 0.0}, "> 0"),
+        ("chks", {"epsilon": -1.0}, "> 0"),
+        ("chks", {"epsilon_absolute": math.nan}, "finite"),
+        ("chks", {"epsilon_absolute": math.inf}, "finite"),
+        ("chks", {"epsilon": True}, "finite number"),
+        ("chks", {"epsilon": "0.1"}, "finite number"),
+    ],
+)
+def test_refusals(kind: str, given_epsilon: dict[str, Any], said: str) -> None:
+    with pytest.raises(InputError, match=said):
+        smoothing.create(kind, MODEL, **given_epsilon)
+
+
+def test_papers_smoothing_refuses_other_laws() -> None:
+    with pytest.raises(InputError, match=r'"quadratic_linear" only.*"log_exp"'):
+        smoothing.create("paper", laws.Tresca(1.0), epsilon=0.1)
