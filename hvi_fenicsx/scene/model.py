@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
-from typing import Annotated, Any, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 from pydantic import AfterValidator, Field, model_validator
 from pydantic_core import PydanticCustomError
@@ -53,6 +53,11 @@ class Scene(Table):
     """parts of the boundary and what acts on them"""
     solver: Solver = Solver()
     """how to solve"""
+
+    if TYPE_CHECKING:
+
+        def __init__(self, **keys: Any) -> None:
+            """The keys of the scene file; tables as objects or as the scene file writes them."""
 
     @model_validator(mode="after")
     def _consistent(self) -> Scene:

@@ -32,11 +32,6 @@ class Holder(Table):
     model_config = ConfigDict(extra="allow")
     place: ClassVar[Place]
 
-    if TYPE_CHECKING:
-
-        def __init__(self, **keys: Any) -> None:
-            """The keys of the scene file; effects as objects or as the scene file writes them."""
-
     @property
     def effects(self) -> tuple[Effect, ...]:
         """Its effects, in the order they were given."""
@@ -106,6 +101,11 @@ class Boundary(Holder):
     on: Names
     """a side of the shape, a physical group of the mesh file, or a list of them"""
 
+    if TYPE_CHECKING:
+
+        def __init__(self, **keys: Any) -> None:
+            """The keys of the scene file; effects as objects or as the scene file writes them."""
+
 
 class Body(Holder):
     """What acts in the body, or in a region of it."""
@@ -114,6 +114,11 @@ class Body(Holder):
 
     region: Names | None = None
     """a physical group of cells, or a list of them; the whole body if it is left out"""
+
+    if TYPE_CHECKING:
+
+        def __init__(self, **keys: Any) -> None:
+            """The keys of the scene file; effects as objects or as the scene file writes them."""
 
 
 class Material(Table):

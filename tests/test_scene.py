@@ -1,0 +1,583 @@
+"""Scenes: what is read, what is refused and in which words; a damaged file never breaks the reader."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any, ClassVar
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from pydantic import ValidationError
+
+from hvi_fenicsx import laws
+from hvi_fenicsx.effects import Effect, Place
+from hvi_fenicsx.effects.base import Contribution, Stage
+from hvi_fenicsx.effects.contact import Contact, Friction
+from hvi_fenicsx.errors import InputError
+from hvi_fenicsx.scene import Boundary, MeshFile, Rectangle, Scene, Solver, dump_scene, read_scene
+from hvi_fenicsx.scene.locate import lines_of
+from hvi_fenicsx.scene.reference import reference
+
+ROOT = Path(__file__).parent.parent
+DEMOS = sorted((ROOT / "demos").glob("*.toml"))
+PAPER = """\
+title = "Wall left"
+[domain]
+shape = "rectangle"
+size = [1.0, 1.0]
+cells = [32, 32]
+[material]
+model = "plane_stress"
+youngs_modulus = 2.15e11
+poisson_ratio = 0.29
+[boundary.wall]
+on = "left"
+displacement = [0.0, "free"]
+[boundary.pull]
+on = "right"
+traction = [1.0e6, 0.0]
+[boundary.floor]
+on = "bottom"
+contact = { gap = 0.0 }
+friction = { law = "quadratic_linear", gamma1 = 1.0e3, gamma2 = 0.5e3, delta = 9.0e-6 }
+[solver]
+smoothing = "paper"
+epsilon_absolute = 0.1
+"""
+FRICTION = 'law = "quadratic_linear", gamma1 = 1.0e3, gamma2 = 0.5e3, delta = 9.0e-6'
+BOX = """\
+[domain]
+shape = "box"
+size = [1, 2, 3]
+cells = [1, 2, 3]
+[material]
+model = "three_dimensional"
+youngs_modulus = 1e9
+poisson_ratio = 0.3
+[boundary.front]
+on = ["front", "back"]
+displacement = ["free", 0, "free"]
+[boundary.top]
+on = "top"
+traction = [0, 0, "-1e6*(1 - 1.8*x)"]
+"""
+
+
+@pytest.fixture
+def write(tmp_path: Path) -> Callable[..., Path]:
+    def write_text(text: str, name: str = "s.toml") -> Path:
+        path = tmp_path / name
+        path.write_text(text, encoding="utf-8")
+        return path
+
+    return write_text
+
+
+def message(path: Path, *overrides: str) -> str:
+    with pytest.raises(InputError) as caught:
+        read_scene(path, overrides)
+    assert caught.value.exit_code == 2
+    return str(caught.value).replace(f"{path.parent}/", "")
+
+
+# What was written, what it was changed to, and the whole message.
+REFUSED = {
+    "unknown key": (
+        "poisson_ratio",
+        "colour = 3\npoisson_ratio",
+        's.toml:9: material.colour: unknown key "colour"; allowed: model, youngs_modulus, '
+        "poisson_ratio, region, "
+        "elasticity",
+    ),
+    "misspelt key": (
+        "youngs_modulus",
+        "young_modulus",
+        's.toml:8: material.young_modulus: unknown key "young_modulus"; did you mean '
+        '"youngs_modulus"? allowed: '
+        "model, youngs_modulus, poisson_ratio, region, elasticity",
+    ),
+    "misspelt side": (
+        '"bottom"',
+        '"botom"',
+        's.toml:17: boundary.floor.on: unknown side "botom"; did you mean "bottom"? allowed: left, '
+        "right, bottom, "
+        "top (a rectangle)",
+    ),
+    "negative modulus": (
+        "2.15e11",
+        "-1",
+        "s.toml:8: material.youngs_modulus: must be greater than 0 (is -1)",
+    ),
+    "number as text": (
+        "2.15e11",
+        '"2.15e11"',
+        's.toml:8: material.youngs_modulus: must be a number (is "2.15e11"); write it without quotes',
+    ),
+    "boolean": ("2.15e11", "true", "s.toml:8: material.youngs_modulus: must be a number (is true)"),
+    "nan": ("0.29", "nan", "s.toml:9: material.poisson_ratio: must be a finite number (is nan)"),
+    "nan in a list": (
+        "[1.0e6, 0.0]",
+        "[nan, 0.0]",
+        "s.toml:15: boundary.pull.traction.0: must be a finite number (is nan)",
+    ),
+    "missing key": (
+        "poisson_ratio = 0.29",
+        "",
+        "s.toml:6: material.poisson_ratio: is missing: ν, between -1 and 0.5",
+    ),
+    "missing on": (
+        'on = "left"',
+        "",
+        "s.toml:10: boundary.wall.on: is missing: a side of the shape, a physical group of the "
+        "mesh file, or a list "
+        "of them",
+    ),
+    "wrong cells": ("[32, 32]", "[32.5, 32]", "s.toml:5: domain.cells.0: must be a whole number (is 32.5)"),
+    "too few cells": ("[32, 32]", "[32]", "s.toml:5: domain.cells: must have 2 entries, not 1"),
+    "too many cells": (
+        "[32, 32]",
+        "[100000, 100000]",
+        "s.toml:5: domain.cells: make 2.0e+10 unknowns; 2.1e+09 at most: use fewer cells",
+    ),
+    "shape": (
+        '"rectangle"',
+        '"rectangel"',
+        's.toml:3: domain.shape: unknown shape "rectangel"; did you mean "rectangle"? allowed: '
+        "rectangle, box, file",
+    ),
+    "not a table": ("{ gap = 0.0 }", "0.0", "s.toml:18: boundary.floor.contact: must be a table (is 0.0)"),
+    "list wanted": (
+        "[1.0e6, 0.0]",
+        "1.0e6",
+        "s.toml:15: boundary.pull.traction: must be a list in square brackets, one entry for each "
+        "component, like "
+        "[1e6, 0.0]",
+    ),
+    "three components": (
+        "[1.0e6, 0.0]",
+        "[1, 2, 3]",
+        "s.toml:15: boundary.pull.traction: traction has 3 components; a 2D scene wants 2",
+    ),
+    "foreign name": (
+        "[1.0e6, 0.0]",
+        '["1e6*t", 0.0]',
+        "s.toml:15: boundary.pull.traction.0: 't' in '1e6*t' is not known; a formula may use x, y, z and pi",
+    ),
+    "misspelt free": (
+        '"free"',
+        '"fre"',
+        "s.toml:12: boundary.wall.displacement.1: 'fre' in 'fre' is not known; a formula may use "
+        "x, y, z and pi; or "
+        'write "free" to leave the component alone',
+    ),
+    "model of the other dimension": (
+        '"plane_stress"',
+        '"three_dimensional"',
+        's.toml:6: material: model = "three_dimensional" in a 2D scene; use plane_stress or plane_strain',
+    ),
+    "misspelt model": (
+        '"plane_stress"',
+        '"plain_stress"',
+        's.toml:7: material.model: unknown value "plain_stress"; did you mean "plane_stress"? '
+        "allowed: plane_stress, "
+        "plane_strain, three_dimensional",
+    ),
+    "region of a built-in shape": (
+        "[material]",
+        '[material]\nregion = "a"',
+        's.toml:7: material.region: a built-in shape has no regions; leave region out, or use shape = "file"',
+    ),
+    "friction without a law's name": (
+        'law = "quadratic_linear", ',
+        "",
+        f's.toml:19: boundary.floor.friction: the law\'s name is missing: law = "name"; allowed: '
+        f"{', '.join(laws.available())}",
+    ),
+    "contact twice": (
+        '[boundary.floor]\non = "bottom"',
+        '[boundary.a]\non = ["top", "bottom"]\ncontact = { gap = 0 }\n[boundary.floor]\non = "bottom"',
+        's.toml:21: boundary.floor.contact: "bottom" has contact already, from boundary.a.contact; '
+        "give it once",
+    ),
+    "component twice": (
+        'on = "right"\ntraction = [1.0e6, 0.0]',
+        'on = ["left", "right"]\ndisplacement = [0, 0]',
+        's.toml:15: boundary.pull.displacement: "left" has u_x prescribed already, by '
+        "boundary.wall.displacement; "
+        'write "free" in one',
+    ),
+    "contact where nothing can close": (
+        'on = "bottom"',
+        'on = "left"',
+        's.toml:18: boundary.floor.contact: the displacement normal to "left" is prescribed by '
+        'boundary.wall.displacement; leave contact out or write "free" there',
+    ),
+    "traction that does nothing": (
+        'on = "right"',
+        'on = "left"',
+        's.toml:15: boundary.pull.traction: component 1 does nothing: u_x is prescribed on "left" by '
+        'boundary.wall.displacement; write 0 here or "free" there',
+    ),
+    "smoothing without a width": (
+        "epsilon_absolute = 0.1",
+        "",
+        "s.toml:21: solver.smoothing: needs its width: add epsilon = 0.01 (relative to the law's "
+        "energy at its kink) "
+        "or epsilon_absolute = 0.1 (N/m), or leave smoothing out to solve the law itself",
+    ),
+    "two widths": (
+        "epsilon_absolute = 0.1",
+        "epsilon_absolute = 0.1\nepsilon = 0.1",
+        "s.toml:22: solver.epsilon_absolute: epsilon is given too; leave one of them out",
+    ),
+    "paper's smoothing of another law": (
+        FRICTION,
+        'law = "tresca", yield_traction = 1e3',
+        's.toml:21: solver.smoothing: "paper" is made for law = "quadratic_linear", not for '
+        '"tresca"; use "quadratic"',
+    ),
+    "exact method with smoothing": (
+        "[solver]",
+        '[solver]\nmethod = "branch"',
+        's.toml:21: solver.method: "branch" solves the law without smoothing; leave out smoothing '
+        "and epsilon, or use "
+        '"auto"',
+    ),
+    "text without quotes": (
+        'on = "left"',
+        "on = left",
+        "s.toml:11:6: not valid TOML: Invalid value; texts need quotes: on = left",
+    ),
+    "name that no file can have": (
+        "[boundary.wall]",
+        '[boundary."a,b"]',
+        "s.toml:10: boundary.a,b: is no usable name for a part; use letters, digits, _ - . only",
+    ),
+    "missing mesh file": (
+        'shape = "rectangle"\nsize = [1.0, 1.0]\ncells = [32, 32]',
+        'shape = "file"\nfile = "part.msh"',
+        "s.toml:4: domain.file: part.msh does not exist",
+    ),
+    "two at once": (
+        "2.15e11\npoisson_ratio = 0.29",
+        "0\npoisson_ratio = 0.5",
+        "s.toml:8: material.youngs_modulus: must be greater than 0 (is 0)\n"
+        "s.toml:9: material.poisson_ratio: must be less than 0.5 (is 0.5)",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_what_is_refused_and_in_which_words(case: str, write: Callable[..., Path]) -> None:
+    old, new, wanted = REFUSED[case]
+    assert PAPER.count(old) == 1
+    assert message(write(PAPER.replace(old, new))) == wanted
+
+
+# Here the law writes the message; the place and the essential words count.
+REFUSED_BY_LAWS = {
+    "misspelt law": ('"quadratic_linear"', '"quadratc_linear"', "friction.law: ", "quadratic_linear"),
+    "misspelt parameter": ("gamma1", "gama1", "friction.gama1: ", "gamma1"),
+    "negative parameter": ("1.0e3", "-1.0e3", "friction.gamma1: ", "-1000"),
+    "text": ("1.0e3", '"1.0e3"', "friction.gamma1: must be a number", "without quotes"),
+    "infinite": ("1.0e3", "inf", "friction.gamma1: must be a finite number", "inf"),
+    "gamma1 is not 2 gamma2": ("0.5e3", "0.4e3", "friction.gamma1: ", '"graph"'),
+    "graph": (
+        FRICTION,
+        'law = "graph", points = [[0, 0], [1, "a"]]',
+        "friction.points.1.1: must be a number",
+        '"a"',
+    ),
+}
+
+
+@pytest.mark.parametrize("case", REFUSED_BY_LAWS)
+def test_what_laws_refuse(case: str, write: Callable[..., Path]) -> None:
+    old, new, place, word = REFUSED_BY_LAWS[case]
+    found = message(write(PAPER.replace(old, new, 1)))
+    assert found.startswith(f"s.toml:19: boundary.floor.{place}")
+    assert word in found
+    assert "Input should" not in found
+
+
+def test_at_most_ten_problems_are_listed(write: Callable[..., Path]) -> None:
+    lines = message(write(PAPER + "".join(f"wrong{i} = {i}\n" for i in range(14)))).splitlines()
+    assert len(lines) == 11
+    assert lines[-1] == "... and 4 more"
+
+
+OVERRIDES: dict[str, Callable[[Any], bool]] = {
+    "solver.tolerance=1e-12": lambda s: s.solver.tolerance == 1e-12,
+    "domain.cells.1=8": lambda s: s.domain.cells == (32, 8),
+    'solver.linear_solver="lu"': lambda s: s.solver.linear_solver == "lu",
+    "solver={}": lambda s: s.solver == Solver(),
+    "boundary.floor.friction.delta=1e-5": lambda s: s.boundary["floor"].effects[1].law.delta == 1e-5,
+    'boundary.lid={on="top", traction=[0, "x"]}': lambda s: s.parts["lid"] == ("top",),
+}
+
+
+@pytest.mark.parametrize("assignment", OVERRIDES)
+def test_overrides(assignment: str, write: Callable[..., Path]) -> None:
+    assert OVERRIDES[assignment](read_scene(write(PAPER), [assignment]))
+
+
+WRONG_OVERRIDES = {
+    "solver.tolerance=2": "--set solver.tolerance: must be less than 1 (is 2)",
+    "solver.method=branch": '--set solver.method=branch: "branch" is no TOML value; a text needs quotes, and '
+    "the shell more around them: --set 'solver.method=\"branch\"'",
+    "domain.cells.2=8": '--set domain.cells.2=8: domain.cells is a list: unknown index "2"; allowed: 0, 1',
+    "title.x=1": '--set title.x=1: title is "Wall left", not a table; it has no "x"',
+    "solver": "--set solver: must be KEY=VALUE, like --set solver.tolerance=1e-10",
+    "solver.tolerence=1e-3": '--set solver.tolerence: unknown key "tolerence"; did you mean "tolerance"? '
+    "allowed: method, "
+    "smoothing, epsilon, epsilon_absolute, tolerance, linear_solver, max_iterations",
+}
+
+
+@pytest.mark.parametrize("assignment", WRONG_OVERRIDES)
+def test_wrong_overrides(assignment: str, write: Callable[..., Path]) -> None:
+    assert message(write(PAPER), assignment) == WRONG_OVERRIDES[assignment]
+
+
+def test_files_that_are_no_scenes(tmp_path: Path, write: Callable[..., Path]) -> None:
+    assert message(tmp_path / "none.toml") == "none.toml: does not exist"
+    assert message(tmp_path).endswith("is a folder; give the scene file in it")
+    assert message(write(" \n")) == "s.toml: is empty; a scene has at least [domain] and [material]"
+    (tmp_path / "s.toml").write_bytes(b'title = "\xff"')
+    assert message(tmp_path / "s.toml") == "s.toml:1: is not UTF-8; save the scene as UTF-8"
+    (tmp_path / "s.toml").write_bytes(b"\x7fELF\0\0")
+    assert message(tmp_path / "s.toml") == "s.toml: is no text file; a scene is TOML in UTF-8"
+    assert message(write("#" * 1_000_001)) == "s.toml: has more than 1 MB; that is no scene file"
+    assert message(write("a = " + "[" * 5000)).startswith("s.toml")
+    assert message(write("a = " + "1" * 5000)) == "s.toml: has a number of too many digits"
+    assert message(Path("/dev/null")) == "null: is no ordinary file"
+    with pytest.raises(InputError, match="cannot be read"):
+        read_scene("a\0b")
+    with pytest.raises(InputError, match=r"does not exist; .* has s.toml"):
+        read_scene(tmp_path / "z.toml")
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may read anything")
+def test_unreadable_file(write: Callable[..., Path]) -> None:
+    path = write(PAPER)
+    path.chmod(0)
+    assert "cannot be read: Permission denied" in message(path)
+
+
+def test_byte_order_mark_and_windows_line_ends(tmp_path: Path) -> None:
+    path = tmp_path / "s.toml"
+    path.write_bytes(b"\xef\xbb\xbf" + PAPER.replace("\n", "\r\n").encode())
+    assert read_scene(path).title == "Wall left"
+
+
+@pytest.mark.parametrize(
+    "text", [PAPER, BOX, *(d.read_text() for d in DEMOS)], ids=["paper", "box", *(d.stem for d in DEMOS)]
+)
+def test_round_trip(text: str, write: Callable[..., Path]) -> None:
+    scene = read_scene(write(text))
+    assert read_scene(write(dump_scene(scene), "again.toml")) == scene
+
+
+def test_round_trip_of_a_mesh_file_with_regions(tmp_path: Path, write: Callable[..., Path]) -> None:
+    (tmp_path / "part.msh").touch()
+    text = """
+    [domain]
+    shape = "file"
+    file = "part.msh"
+    scale = 1e-3
+    [material.steel]
+    region = ["a", "b"]
+    model = "plane_strain"
+    youngs_modulus = 2e11
+    poisson_ratio = 0.3
+    [material.glue]
+    region = "c"
+    model = "plane_strain"
+    youngs_modulus = 2e9
+    poisson_ratio = 0.4
+    [body.weight]
+    region = "a"
+    force = [0, -7.8e4]
+    [boundary.foot]
+    on = "Foot 1"
+    displacement = [0, 0]
+    """
+    scene = read_scene(write(text))
+    assert isinstance(scene.domain, MeshFile)
+    assert scene.domain.file == tmp_path / "part.msh"
+    assert scene.dimension == 2
+    assert [p.where for p in scene.effects()] == ["a", "b", "c", "a", "foot"]
+    elsewhere = tmp_path / "results"
+    elsewhere.mkdir()
+    (elsewhere / "scene.toml").write_text(dump_scene(scene))
+    assert read_scene(elsewhere / "scene.toml") == scene
+
+
+def test_materials_need_regions_of_their_own(tmp_path: Path, write: Callable[..., Path]) -> None:
+    (tmp_path / "part.msh").touch()
+    steel = 'model = "plane_strain"\nyoungs_modulus = 2e11\npoisson_ratio = 0.3\n'
+    head = '[domain]\nshape = "file"\nfile = "part.msh"\n'
+    assert "material.b: region is missing" in message(
+        write(f'{head}[material.a]\nregion = "r"\n{steel}[material.b]\n{steel}')
+    )
+    assert 'material.b.region: "r" has a material already, a; name it once' in message(
+        write(f'{head}[material.a]\nregion = "r"\n{steel}[material.b]\nregion = "r"\n{steel}')
+    )
+
+
+def test_a_scene_from_python() -> None:
+    friction = Friction(law=laws.create("quadratic_linear", {"gamma1": 2.0, "gamma2": 1.0, "delta": 1e-3}))
+    scene = Scene(
+        domain=Rectangle(size=(1.0, 1.0), cells=(4, 4)),
+        material={"model": "plane_stress", "youngs_modulus": 1.0, "poisson_ratio": 0.0},
+        boundary={
+            "floor": Boundary(on="bottom", contact=Contact.model_validate({"gap": 0.0}), friction=friction)
+        },
+    )
+    assert scene.dimension == 2
+    assert [(p.place, p.where, p.effect.key) for p in scene.effects()] == [
+        (Place.MATERIAL, None, "isotropic"),
+        (Place.BOUNDARY, "floor", "contact"),
+        (Place.BOUNDARY, "floor", "friction"),
+    ]
+    with pytest.raises(ValidationError, match="frozen"):
+        scene.title = "other"
+
+
+def test_epsilon_alone_means_quadratic_smoothing() -> None:
+    assert Solver(epsilon=0.01).smoothing == "quadratic"
+    assert Solver().smoothing is None
+
+
+@pytest.fixture
+def glue() -> Iterator[type[Effect]]:
+    class Glue(Effect):
+        """An effect of a user's own."""
+
+        key: ClassVar[str] = "glue"
+        place: ClassVar[Place] = Place.BOUNDARY
+        term: ClassVar[str] = "nothing"
+        strength: float
+
+        def contribute(self, stage: Stage, where: str | None) -> Contribution:
+            return Contribution()
+
+    yield Glue
+    del Effect.registry[Place.BOUNDARY]["glue"]
+
+
+def test_a_new_effect_is_a_key_at_once(glue: type[Effect], write: Callable[..., Path]) -> None:
+    text = PAPER.replace("contact =", "glue = { strength = 2 }\ncontact =")
+    scene = read_scene(write(text))
+    assert scene.boundary["floor"].effects[0] == glue.model_validate({"strength": 2})
+    assert read_scene(write(dump_scene(scene), "again.toml")) == scene
+    assert "boundary.floor.glue.strength: must be a number" in message(
+        write(text.replace("= 2 }", '= "2" }'))
+    )
+
+
+def test_lines_are_found_in_every_way_of_writing() -> None:
+    text = 'a.b = 1 # a.c = 2\n[t."x.y"]\nk = """\nz = 1\n"""\nl = { m = [\n  1,\n  { n = 2 } ] }\n'
+    text += "[[v]]\nw=1\n[[v]]\nw=2\n"
+    lines = lines_of(text)
+    assert lines["a", "b"] == 1
+    assert ("a", "c") not in lines
+    assert lines["t", "x.y", "k"] == 3
+    assert ("t", "x.y", "z") not in lines
+    assert lines["t", "x.y", "l", "m", 1, "n"] == 8
+    assert lines["v", 1, "w"] == 12
+
+
+def test_reading_a_scene_needs_no_dolfinx() -> None:
+    heavy = ("dolfinx", "ufl", "petsc4py", "mpi4py")
+    code = f"import sys, hvi_fenicsx.scene; sys.exit(any(m in sys.modules for m in {heavy}))"
+    assert subprocess.run([sys.executable, "-c", code], cwd=ROOT).returncode == 0
+
+
+def test_the_reference_is_what_the_classes_say() -> None:
+    assert (ROOT / "docs" / "scene.md").read_text() == reference(), (
+        "renew it: python3 -m hvi_fenicsx.scene.reference > docs/scene.md"
+    )
+
+
+# Damage: pieces of the scene exchanged for others, cut, doubled, or set to something odd.
+_ODD = [
+    "nan", "inf", "-1", "0", "1e400", "9" * 400, "true", '""', '"x"', "[]", "{}", "[[1]]", '"1/0"',
+    '"x.__class__"', "1979-05-27", "[1, [2, [3]]]", "{ law = 3 }", '{ law = "graph", points = [[0]] }',
+    '"\\u0000"', "0x10", '"' + "-" * 300 + 'x"', "-0.0", "1e-320", "'''a\nb'''", '["left", "left"]', '"lambda: 0"', "7_7",
+    "[1e6, 'y', nan]",
+]  # fmt: skip
+_LINES = PAPER.splitlines()
+
+
+def _damaged(kind: int, line: int, other: int, odd: str, cut: int) -> str:
+    lines = list(_LINES)
+    key = lines[line].partition("=")[0]
+    if kind == 0:
+        lines[line] = f"{key}= {odd}"
+    elif kind == 1:
+        lines[line], lines[other] = lines[other], lines[line]
+    elif kind == 2:
+        lines[line] = lines[line][: cut % (len(lines[line]) + 1)]
+    elif kind == 3:
+        del lines[line]
+    elif kind == 4:
+        lines.insert(other, lines[line])
+    else:
+        middle = cut % (len(lines[line]) + 1)
+        lines[line] = lines[line][:middle] + odd + lines[line][middle:]
+    return "\n".join(lines)
+
+
+_LINE = st.integers(0, len(_LINES) - 1)
+_TEXT = st.text(st.characters(codec="utf-8"), max_size=8)
+
+
+@settings(max_examples=600, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.integers(0, 5), _LINE, _LINE, st.sampled_from(_ODD) | _TEXT, st.integers(0, 99))
+def test_damaged_scenes_are_read_or_refused(
+    tmp_path: Path, kind: int, line: int, other: int, odd: str, cut: int
+) -> None:
+    path = tmp_path / "damaged.toml"
+    path.write_bytes(_damaged(kind, line, other, odd, cut).encode())
+    try:
+        scene = read_scene(path)
+    except InputError as error:
+        found = str(error)
+    else:
+        path.write_text(dump_scene(scene))
+        assert read_scene(path) == scene
+        return
+    assert "Input should" not in found
+    assert "pydantic" not in found
+    assert 0 < len(found) < 4000
+
+
+_VALUES = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats() | _TEXT,
+    lambda v: st.lists(v, max_size=3) | st.dictionaries(_TEXT, v, max_size=3),
+    max_leaves=6,
+)
+
+
+@settings(max_examples=200, deadline=None)
+@given(st.dictionaries(st.sampled_from([*Scene.model_fields, "x"]), _VALUES))
+def test_any_tables_are_refused_in_one_way(data: dict[str, Any]) -> None:
+    with pytest.raises(ValidationError):
+        Scene.model_validate(data)
+
+
+@settings(max_examples=300, deadline=None)
+@given(
+    st.text(max_size=30)
+    | st.sampled_from([f"{k}={v}" for k in ("solver.epsilon", "domain.size.0", "a.b") for v in _ODD])
+)
+def test_any_override_is_applied_or_refused(assignment: str) -> None:
+    with contextlib.suppress(InputError):
+        assert isinstance(read_scene(DEMOS[-1], [assignment]), Scene)
