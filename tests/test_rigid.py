@@ -627,6 +627,13 @@ def test_what_cannot_be_meant_is_refused() -> None:
         Resistance(points, np.ones(1), np.zeros((1, 1, 2)), Directional(np.nan, 0.0), even(1.0))
 
 
+def test_the_example_in_the_documents_prints_what_they_say(capsys: pytest.CaptureFixture[str]) -> None:
+    text = (Path(__file__).parents[1] / "docs" / "solvability.md").read_text()
+    source, printed = text.split("```python\n")[1].split("```", 1)
+    exec(compile(source, "docs/solvability.md", "exec"), {})
+    assert capsys.readouterr().out.strip() == printed.split("```")[1].strip()
+
+
 def scenes() -> dict[str, RigidProblem]:
     """What is compared between one rank and several."""
     return {
