@@ -510,8 +510,8 @@ def test_the_reference_is_what_the_classes_say() -> None:
 _ODD = [
     "nan", "inf", "-1", "0", "1e400", "9" * 400, "true", '""', '"x"', "[]", "{}", "[[1]]", '"1/0"',
     '"x.__class__"', "1979-05-27", "[1, [2, [3]]]", "{ law = 3 }", '{ law = "graph", points = [[0]] }',
-    '"\\u0000"', "0x10", '"' + "-" * 300 + 'x"', "-0.0", "1e-320", "'''a\nb'''", '["left",
-    "left"]', '"lambda: 0"', "7_7",
+    '"\\u0000"', "0x10", '"' + "-" * 300 + 'x"', "-0.0", "1e-320", "'''a\nb'''", '["left", "left"]',
+    '"lambda: 0"', "7_7",
     "[1e6, 'y', nan]",
 ]  # fmt: skip
 _LINES = PAPER.splitlines()
