@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -15,6 +15,9 @@ from mpi4py import MPI
 from . import meshfile
 from .errors import InputError
 from .parallel import agree
+
+if TYPE_CHECKING:
+    from .scene import Box, MeshFile, Rectangle
 
 Facets = npt.NDArray[np.int32]
 _AXIS_OF_SIDE = {"left": (0, 0), "right": (0, 1), "bottom": (-1, 0), "top": (-1, 1), "front": (1, 0), "back": (1, 1)}
@@ -101,13 +104,25 @@ def box(comm: MPI.Comm, size: Sequence[float], cells: Sequence[int]) -> Domain:
     return _box_domain(mesh, np.asarray(size, dtype=float))
 
 
-def from_file(comm: MPI.Comm, path: Path, dimension: int) -> Domain:
-    """A gmsh file, its physical groups being sides and regions. Collective.
+def build(comm: MPI.Comm, shape: Rectangle | Box | MeshFile, dimension: int) -> Domain:
+    """The domain that a scene's ``[domain]`` table describes. Collective.
+
+    Raises:
+        InputError: on all ranks alike, when a file cannot be read or is no usable mesh.
+    """
+    if shape.shape == "file":
+        return from_file(comm, shape.file, dimension, shape.scale)
+    return {"rectangle": rectangle, "box": box}[shape.shape](comm, shape.size, shape.cells)
+
+
+def from_file(comm: MPI.Comm, path: Path, dimension: int, scale: float = 1.0) -> Domain:
+    """A gmsh file, its physical groups being sides and regions; ``scale`` is m per unit of the file. Collective.
 
     Raises:
         InputError: on all ranks alike, when the file cannot be read or is no usable mesh.
     """
     mesh, sides, regions = meshfile.read(comm, path, dimension)
+    mesh.geometry.x[:] *= scale
     return Domain(mesh, sides, regions, *_bounding_box(mesh))
 
 

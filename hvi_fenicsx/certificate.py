@@ -1,0 +1,173 @@
+"""Is it a solution of the inequality? Decided from (u, problem) alone, whatever the solver says.
+
+Each entry is relative to a scale that is stated with it; ``passed`` means that all of them are within the tolerance.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+
+import numpy as np
+import numpy.typing as npt
+from dolfinx import fem
+from mpi4py import MPI
+
+from . import boundary
+from .boundary import NEAR, Forces, State
+from .parallel import agree, largest, total
+from .problem import Problem
+from .system import traction_scale
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Certificate:
+    """How far u is from a solution.
+
+    Attributes:
+        equilibrium: residual force that nothing carries, over the load's, Euclidean norms.
+        penetration: largest violation of a bound, over the largest displacement.
+        tension: largest contact traction of the wrong sign, over the load's stress.
+        complementarity: largest min(gap over the largest displacement, contact traction over the load's stress).
+        inclusion: largest distance of -σ_t (σ_n of a normal law) from ∂j, over the law's traction scale (not less than a
+            thousandth of the load's stress), for the law that was solved.
+        inclusion_true: the same for the unsmoothed law.
+        second_order: ``local minimiser``, ``not a minimiser`` (a vertex on a concave kink: moving it off lowers the energy)
+            or ``undecided`` (a law with negative curvature).
+        tolerance, passed: what was asked for, and whether all but ``inclusion_true`` are within it.
+    """
+
+    equilibrium: float
+    penetration: float
+    tension: float
+    complementarity: float
+    inclusion: float
+    inclusion_true: float
+    second_order: str
+    tolerance: float
+    passed: bool
+
+    def as_dict(self) -> dict[str, float | str | bool]:
+        """For ``summary.json``."""
+        return asdict(self)
+
+
+@dataclass(frozen=True)
+class Examined:
+    """The certificate and what it was read off, nondimensional.
+
+    Attributes:
+        certificate: the verdict. energy: ½a(u, u) - <g, u> + Σ laws. forces, states: reactions and Γc.
+    """
+
+    certificate: Certificate
+    energy: float
+    forces: Forces
+    states: tuple[State, ...]
+
+
+def examine(problem: Problem, u: fem.Function, tolerance: float) -> Examined:
+    """Certify u. Collective.
+
+    Args:
+        problem: what was solved. u: nondimensional, ghosts updated. tolerance: relative.
+    """
+    comm = problem.domain.mesh.comm
+    forces = boundary.forces(problem, u)
+    states = boundary.states(problem, u, forces.reaction)
+    size = largest(comm, float(np.max(np.abs(u.x.array), initial=0.0))) or 1.0
+    entries = {
+        "equilibrium": _equilibrium(problem, forces, states),
+        "penetration": largest(comm, _worst(states, _penetration)) / size,
+        "tension": largest(comm, _worst(states, _tension)),
+        "complementarity": largest(comm, _worst(states, lambda s: _complementarity(s, size))),
+        "inclusion": largest(comm, max((_inclusion(s) for s in states), default=0.0)),
+    }
+    passed = all(np.isfinite(v) and v <= tolerance for v in entries.values())
+    true = largest(comm, _inclusion_true(states))
+    certificate = Certificate(**entries, inclusion_true=true, second_order=_second_order(comm, states),
+                              tolerance=tolerance, passed=passed)
+    return Examined(certificate, _energy(problem, u, forces, states), forces, states)
+
+
+def _energy(problem: Problem, u: fem.Function, forces: Forces, states: Sequence[State]) -> float:
+    """½u·(Au) - b·u = ½u·(reaction - load), plus the laws. Collective."""
+    values = u.x.array[: forces.load.size]
+    elastic = 0.5 * float(values @ (forces.reaction - forces.load).ravel())
+    laws = sum(float(np.sum(s.surface.weights * t.law.value(a))) for s in states for t, a in zip(s.terms, s.arguments))
+    return total(problem.domain.mesh.comm, elastic + laws)
+
+
+def _equilibrium(problem: Problem, forces: Forces, states: Sequence[State]) -> float:
+    """Relative to the loads, or to the supports' reactions where these are larger. Collective."""
+    comm = problem.domain.mesh.comm
+    rest = boundary.balanced(problem, forces.reaction, states)
+    norms = [np.sqrt(total(comm, float(np.sum(v**2)))) for v in (rest, forces.load, forces.reaction)]
+    return float(norms[0] / (max(norms[1:]) or 1.0))
+
+
+def _worst(states: Sequence[State], measure: object) -> float:
+    values = [measure(s) for s in states if s.bounds is not None]  # type: ignore[operator]
+    return max((float(np.max(v, initial=0.0)) for v in values), default=0.0)
+
+
+def _penetration(state: State) -> Array:
+    return np.maximum(state.normal - state.bounds.upper, state.bounds.lower - state.normal)  # type: ignore[union-attr]
+
+
+def _pressure(state: State) -> Array:
+    """σ_n less what a normal law carries: the contact's own; 0 where u·n is prescribed."""
+    pressure = state.pressure.copy()
+    for term, argument in zip(state.terms, state.arguments, strict=True):
+        sign = np.sum(term.directions[:, 0, :] * state.surface.normals, axis=1)
+        if np.any(np.abs(sign) > 0.5):
+            low, high = term.law.interval(argument)
+            pressure = pressure + sign * np.clip(-sign * pressure, low, high)
+    return pressure
+
+
+def _tension(state: State) -> Array:
+    """Pulling at the upper bound of u·n, pushing at the lower one."""
+    pressure, bounds = _pressure(state), state.bounds
+    upper = state.normal >= bounds.upper - NEAR  # type: ignore[union-attr]
+    lower = state.normal <= bounds.lower + NEAR  # type: ignore[union-attr]
+    wrong = np.where(upper & lower, 0.0, np.where(upper, pressure, np.where(lower, -pressure, 0.0)))
+    return np.maximum(wrong, 0.0)
+
+
+def _complementarity(state: State, size: float) -> Array:
+    bounds = state.bounds
+    gap = np.minimum(bounds.upper - state.normal, state.normal - bounds.lower)  # type: ignore[union-attr]
+    return np.minimum(np.abs(_pressure(state)), np.maximum(gap, 0.0) / size)
+
+
+def _inclusion(state: State) -> float:
+    pairs = [d / traction_scale(t) for t, d in zip(state.terms, state.distances, strict=True)]
+    return max((float(np.max(p, initial=0.0)) for p in pairs), default=0.0)
+
+
+def _inclusion_true(states: Sequence[State]) -> float:
+    worst = 0.0
+    for state in states:
+        for term, argument, traction in zip(state.terms, state.arguments, state.tractions, strict=True):
+            true = term.exact
+            away = np.where(boundary.prescribed(term), 0.0, true.distance(argument, traction, NEAR))
+            worst = max(worst, float(np.max(away, initial=0.0)) / max(true.traction_scale, 1e-3))
+    return worst
+
+
+def _second_order(comm: MPI.Comm, states: Sequence[State]) -> str:
+    kink = curved = False
+    for state in states:
+        for term, argument in zip(state.terms, state.arguments, strict=True):
+            concave = term.law.concave
+            x = argument[~boundary.prescribed(term)]
+            on = [np.abs(x - k) <= NEAR for k in concave.kinks]
+            kink |= bool(np.any(on))
+            curved |= bool(np.any(concave.second(x) > term.law.convex.second(x)))
+    found = agree(comm, (kink, curved))
+    if any(k for k, _ in found):
+        return "not a minimiser"
+    return "undecided" if any(c for _, c in found) else "local minimiser"

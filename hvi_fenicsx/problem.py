@@ -1,0 +1,308 @@
+"""The problem: the sum of what a scene's effects contribute, as nondimensional UFL forms, conditions, bounds and laws.
+
+Nothing that the scene does not name is compiled or stored. Displacements are in units of u0, stresses of p0, lengths of
+L (:mod:`.scales`); the mesh itself stays in SI, the forms carry the factors.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import dolfinx
+import numpy as np
+import numpy.typing as npt
+import ufl
+from dolfinx import fem
+from petsc4py import PETSc
+
+from . import scales as scaling
+from . import surface
+from .domain import Domain
+from .effects.base import BoundaryLaw, Condition, Contribution, Direction, Effect, NormalBounds, Place
+from .errors import InputError
+from .expressions import Formula, ufl_algebra
+from .lawterm import LawTerm
+from .laws import Superpotential
+from .parallel import agree
+from .scales import Placed, Scales
+from .surface import Surface
+
+Array = npt.NDArray[np.float64]
+_VERTEX = {"quadrature_rule": "vertex", "quadrature_degree": 1}
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """lower ≤ u·n ≤ upper at a surface's vertices, nondimensional, shape (m,), infinite where there is none."""
+
+    surface: Surface
+    lower: Array
+    upper: Array
+
+
+@dataclass(frozen=True)
+class Problem:
+    """Minimise ½a(u, u) - <g, u> + Σ laws over the admissible u, nondimensional.
+
+    Attributes:
+        domain, scales: as they are. space: P1 vectors.
+        bilinear, linear: UFL forms a(u, v) and <g, v>, the latter by name of its part.
+        conditions: Dirichlet conditions, nondimensional values.
+        fixed: local scalar dofs (owned and ghost) that they prescribe.
+        bounds: by part. terms: the laws at their vertices.
+        surfaces: of the parts with bounds or laws, in the scene's order.
+    """
+
+    domain: Domain
+    scales: Scales
+    space: fem.FunctionSpace
+    bilinear: Any
+    linear: dict[str, Any]
+    conditions: tuple[fem.DirichletBC, ...]
+    fixed: npt.NDArray[np.int32]
+    bounds: tuple[Bounds, ...]
+    terms: tuple[LawTerm, ...]
+    surfaces: tuple[Surface, ...]
+
+
+class Stage:
+    """What effects see of the problem while it is composed (:class:`.effects.base.Stage`)."""
+
+    def __init__(self, domain: Domain, parts: Mapping[str, Sequence[str]], scales: Scales) -> None:
+        self.domain, self.dimension = domain, domain.dimension
+        self.length, self.stress, self.modulus = scales.length, scales.stress, scales.modulus
+        self.space = fem.functionspace(domain.mesh, ("Lagrange", 1, (self.dimension,)))
+        self.trial, self.test = ufl.TrialFunction(self.space), ufl.TestFunction(self.space)
+        self.normal = ufl.FacetNormal(domain.mesh)
+        self.part_facets = {name: domain.facets(on) for name, on in parts.items()}
+
+    def number(self, value: float) -> Any:
+        """A constant that is not compiled into the form."""
+        return fem.Constant(self.domain.mesh, PETSc.ScalarType(value))
+
+    def render(self, formula: Formula) -> Any:
+        """A formula in UFL, in SI coordinates."""
+        return formula.render(ufl.SpatialCoordinate(self.domain.mesh), ufl_algebra(self.number))
+
+    @functools.cached_property
+    def _facet_tags(self) -> tuple[Any, dict[str, tuple[int, ...]]]:
+        return _tags(self.domain.mesh, self.dimension - 1, self.part_facets)
+
+    @functools.cached_property
+    def _cell_tags(self) -> tuple[Any, dict[str, tuple[int, ...]]]:
+        return _tags(self.domain.mesh, self.dimension, dict(self.domain.regions))
+
+    def cells(self, region: str | None) -> Any:
+        """dx/L^d."""
+        scale = self.number(self.length**-self.dimension)
+        if region is None:
+            return _Scaled(scale, ufl.dx(domain=self.domain.mesh))
+        self.domain.cells([region])
+        tags, ids = self._cell_tags
+        return _Scaled(scale, ufl.Measure("dx", domain=self.domain.mesh, subdomain_data=tags)(ids[region]))
+
+    def facets(self, part: str) -> Any:
+        """ds/L^(d-1)."""
+        return _Scaled(self.number(self.length ** (1 - self.dimension)), self.boundary(part))
+
+    def boundary(self, part: str, **metadata: Any) -> Any:
+        """ds over a part, SI."""
+        tags, ids = self._facet_tags
+        measure = ufl.Measure("ds", domain=self.domain.mesh, subdomain_data=tags, metadata=metadata)
+        return measure(ids[part])
+
+
+class _Scaled:
+    """A measure with a factor: ``integrand * _Scaled`` is ``factor * integrand * measure``."""
+
+    def __init__(self, factor: Any, measure: Any) -> None:
+        self.factor, self.measure = factor, measure
+
+    def __rmul__(self, integrand: Any) -> Any:
+        return self.factor * integrand * self.measure
+
+
+def _tags(mesh: Any, dimension: int, parts: dict[str, Any]) -> tuple[Any, dict[str, tuple[int, ...]]]:
+    """Mesh tags in which overlapping parts are unions of atoms. The atoms' numbers agree on all ranks. Collective."""
+    names = sorted(parts)
+    codes: dict[int, int] = {}
+    for bit, name in enumerate(names):
+        for entity in parts[name]:
+            codes[int(entity)] = codes.get(int(entity), 0) | 1 << bit
+    atoms = sorted({code for rank in agree(mesh.comm, set(codes.values())) for code in rank})
+    number = {code: i + 1 for i, code in enumerate(atoms)}
+    entities = np.array(sorted(codes), dtype=np.int32)
+    values = np.array([number[codes[int(e)]] for e in entities], dtype=np.int32)
+    ids = {n: tuple(number[c] for c in atoms if c >> bit & 1) for bit, n in enumerate(names)}
+    return dolfinx.mesh.meshtags(mesh, dimension, entities, values), ids
+
+
+def compose(
+    domain: Domain,
+    parts: Mapping[str, Sequence[str]],
+    effects: Sequence[Placed],
+    modify: Callable[[Superpotential], Superpotential] = lambda law: law,
+) -> Problem:
+    """The problem of a scene's effects on a domain. Collective.
+
+    Args:
+        domain: the body.
+        parts: the sides that each boundary part lies on.
+        effects: (where, effect), where being a part, a region or None.
+        modify: what to do with each law (smoothing it, say), in SI.
+
+    Raises:
+        InputError: on all ranks alike: a part without facets, a load that is not finite somewhere on its part, a bound
+            that excludes a prescribed displacement.
+    """
+    for name, on in parts.items():
+        if not sum(agree(domain.mesh.comm, len(domain.facets(on)))):
+            raise InputError(f"boundary.{name}: no facet lies on it; see `on`")
+    scales = scaling.choose(
+        domain.length, domain.dimension, effects, lambda placed: functools.partial(_largest, domain, parts, placed)
+    )
+    stage = Stage(domain, parts, scales)
+    return _sum(stage, scales, [(where, e, e.contribute(stage, where)) for where, e in effects], modify)
+
+
+def _largest(domain: Domain, parts: Mapping[str, Sequence[str]], placed: Placed, formula: Formula) -> float:
+    where, effect = placed
+    values = formula.at(_points(domain, parts[where] if where and effect.place is Place.BOUNDARY else None))
+    finite = bool(np.all(np.isfinite(values)))
+    gathered = agree(domain.mesh.comm, (finite, float(np.max(np.abs(values), initial=0.0))))
+    if not all(ok for ok, _ in gathered):
+        place = f"boundary.{where}" if where else "body"
+        raise InputError(f"{place}.{effect.key}: the formula {formula.source!r} is not finite everywhere there")
+    return max(value for _, value in gathered)
+
+
+def _points(domain: Domain, sides: Sequence[str] | None) -> Array:
+    mesh = domain.mesh
+    if sides is None:
+        return mesh.geometry.x
+    facets = domain.facets(sides)
+    if not len(facets):
+        return np.empty((0, 3))  # dolfinx divides by their number
+    return mesh.geometry.x[np.unique(dolfinx.mesh.entities_to_geometry(mesh, domain.dimension - 1, facets))]
+
+
+Made = tuple[str | None, Effect, Contribution]
+
+
+def _sum(
+    stage: Stage, scales: Scales, made: Sequence[Made], modify: Callable[[Superpotential], Superpotential]
+) -> Problem:
+    conditions, fixed = _conditions(stage, scales, made)
+    surfaces = {
+        where: surface.build(
+            where,
+            stage.space,
+            stage.part_facets[where],
+            stage.boundary(where, **_VERTEX),
+            stage.length ** (stage.dimension - 1),
+        )
+        for where, _, c in made
+        if where is not None and (c.bounds or c.laws)
+    }
+    bounds = [_bounds(surfaces[w], b, scales) for w, _, c in made if w is not None for b in c.bounds]
+    _check_compatible(stage, bounds, conditions, fixed)
+    terms = [
+        _term(stage, surfaces[w], law, modify, scales, fixed)
+        for w, _, c in made
+        if w is not None
+        for law in c.laws
+    ]
+    bilinear = [form for _, _, c in made for form in c.bilinear]
+    linear = {f"{w or 'body'}.{e.key}": sum(c.linear) for w, e, c in made if c.linear}
+    return Problem(
+        stage.domain,
+        scales,
+        stage.space,
+        sum(bilinear),
+        linear,
+        conditions,
+        fixed,
+        tuple(bounds),
+        tuple(terms),
+        tuple(surfaces.values()),
+    )
+
+
+def _conditions(
+    stage: Stage, scales: Scales, made: Sequence[Made]
+) -> tuple[tuple[fem.DirichletBC, ...], npt.NDArray[np.int32]]:
+    pairs = [(where, c) for where, _, contribution in made for c in contribution.conditions]
+    found = [_condition(stage, scales, str(where), c) for where, c in pairs]
+    dofs = [bc.dof_indices()[0] for bc in found]
+    return tuple(found), np.unique(np.concatenate([np.empty(0, np.int32), *dofs])).astype(np.int32)
+
+
+def _condition(stage: Stage, scales: Scales, part: str, condition: Condition) -> fem.DirichletBC:
+    facets, dim = stage.part_facets[part], stage.dimension - 1
+    component = stage.space.sub(condition.component)
+    if condition.value.is_number:
+        value = PETSc.ScalarType(condition.value.source / scales.displacement)  # type: ignore[operator]
+        return fem.dirichletbc(value, fem.locate_dofs_topological(component, dim, facets), component)
+    collapsed, _ = component.collapse()
+    function = fem.Function(collapsed)
+    function.interpolate(lambda x: condition.value.at(x.T) / scales.displacement)
+    return fem.dirichletbc(function, fem.locate_dofs_topological((component, collapsed), dim, facets), component)
+
+
+def _bounds(where: Surface, bounds: NormalBounds, scales: Scales) -> Bounds:
+    def value(formula: Formula | None) -> Array:
+        if formula is None:
+            return np.full(len(where.blocks), np.inf)
+        return formula.at(where.points) / scales.displacement
+
+    # lower ≤ -u·n ≤ upper
+    return Bounds(where, -value(bounds.upper), -value(bounds.lower) if bounds.lower else value(None))
+
+
+def _check_compatible(stage: Stage, bounds: Sequence[Bounds], conditions: Any, fixed: Any) -> None:
+    """A bound that excludes a prescribed value would silently change it (solver-notes.md)."""
+    prescribed = fem.Function(stage.space)
+    for condition in conditions:
+        condition.set(prescribed.x.array)
+    bad: list[str] = []
+    for b in bounds:
+        un = np.sum(b.surface.values(prescribed.x.array) * b.surface.normals, axis=1)
+        axis = np.argmax(np.abs(b.surface.normals), axis=1)
+        held = np.isin(b.surface.blocks * stage.dimension + axis, fixed)
+        out = held & ((un < b.lower - 1e-12) | (un > b.upper + 1e-12))
+        bad += [f"{b.surface.part} at {tuple(map(float, b.surface.points[i]))}" for i in np.flatnonzero(out)[:1]]
+    found = [b for rank in agree(stage.domain.mesh.comm, bad) for b in rank]
+    if found:
+        raise InputError(f"boundary.{found[0]}: the prescribed displacement violates the contact bound there")
+
+
+def _term(
+    stage: Stage,
+    where: Surface,
+    law: BoundaryLaw,
+    modify: Callable[[Superpotential], Superpotential],
+    scales: Scales,
+    fixed: npt.NDArray[np.int32],
+) -> LawTerm:
+    directions = {
+        Direction.SLIP: where.tangents,
+        Direction.OPENING: -where.normals[:, None, :],
+        Direction.PENETRATION: where.normals[:, None, :],
+    }[law.direction]
+    solved, exact = (j.scaled(scales.displacement, scales.stress) for j in (modify(law.law), law.law))
+    dofs = where.blocks[:, None] * stage.dimension + np.arange(stage.dimension)
+    free = (~np.isin(dofs, fixed)).astype(np.float64)
+    density = fem.Function(stage.space, name="clarke_derivative")
+    rates = fem.Function(
+        fem.functionspace(stage.domain.mesh, ("Lagrange", 1, (stage.dimension, stage.dimension))), name="clarke_rate"
+    )
+    ds = _Scaled(stage.number(stage.length ** (1 - stage.dimension)), stage.boundary(where.part, **_VERTEX))
+    residual = ufl.inner(density, stage.test) * ds
+    tangent = ufl.inner(ufl.dot(rates, stage.trial), stage.test) * ds
+    return LawTerm(where, law.direction, solved, exact, directions, free, density, rates, fem.form(residual), fem.form(tangent))
+
+
+__all__ = ["Bounds", "Place", "Problem", "compose"]

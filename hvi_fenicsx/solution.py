@@ -1,0 +1,150 @@
+"""From a scene to a certified solution: the one direction of flow (scene, domain, problem, existence, solve, certificate)."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from dolfinx import fem
+from mpi4py import MPI
+
+from . import certificate, domain, existence, problem, smoothing, solvers, system
+from .certificate import Examined
+from .errors import SolverError
+from .laws import Superpotential
+from .problem import Problem
+from .rigid import Solvability
+from .solvers.base import Progress, Solved, silent
+from .timing import Timer
+
+if TYPE_CHECKING:
+    from .scene import Scene
+
+CERTIFIED, BAD_INPUT, NO_SOLUTION, NOT_CONVERGED = 0, 2, 3, 4
+"""Exit codes (design.md, the contract)."""
+
+
+@dataclass(frozen=True)
+class Solution:
+    """What a run found.
+
+    Attributes:
+        scene, problem: what was solved; the problem's laws are the smoothed ones where the scene smooths.
+        solvability: whether a solution can exist.
+        solved: what the method found, None when the state is *escapes* (nothing was solved).
+        examined: the certificate and the state of Γc, None likewise.
+        dofs: unknowns. timer: wall time by phase.
+    """
+
+    scene: Scene
+    problem: Problem
+    solvability: Solvability
+    solved: Solved | None
+    examined: Examined | None
+    dofs: int
+    timer: Timer
+
+    @property
+    def converged(self) -> bool:
+        """Certified within the tolerance."""
+        return self.examined is not None and self.examined.certificate.passed
+
+    @property
+    def exit_code(self) -> int:
+        """By the contract: certified, no solution exists, or not converged."""
+        if self.converged:
+            return CERTIFIED
+        return NO_SOLUTION if self.solved is None else NOT_CONVERGED
+
+    @property
+    def reason(self) -> str:
+        """Why it ended as it did, in words."""
+        if self.solved is None:
+            return "no solution exists: the load moves the body away"
+        if self.converged:
+            local = " (a local equilibrium: the state is metastable)" if self.solvability.state == "metastable" else ""
+            return f"certified{local}"
+        if self.solvability.state == "metastable":
+            return f"metastable, and no equilibrium found ({self.solved.reason})"
+        return f"not certified ({self.solved.reason})"
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """A scene made into a problem, assembled, its existence known."""
+
+    scene: Scene
+    problem: Problem
+    system: system.System
+    solvability: Solvability
+    timer: Timer
+
+
+def prepare(scene: Scene, comm: MPI.Comm = MPI.COMM_WORLD, timer: Timer | None = None) -> Prepared:
+    """Everything before the solve: mesh, forms, assembly, existence. Collective.
+
+    Raises:
+        InputError: on all ranks alike.
+    """
+    timer = timer or Timer()
+    with timer("mesh"):
+        body = domain.build(comm, scene.domain, scene.dimension)
+    with timer("jit"):
+        placed = [(p.where, p.effect) for p in scene.effects()]
+        composed = problem.compose(body, scene.parts, placed, _modification(scene))
+        compiled = system.compile_forms(composed)
+    assembled = system.System(composed, compiled, timer)
+    with timer("assembly"):
+        verdict = existence.solvability(composed, assembled.forces)
+    return Prepared(scene, composed, assembled, verdict, timer)
+
+
+def solve(
+    scene: Scene, comm: MPI.Comm = MPI.COMM_WORLD, *, progress: Progress = silent, timer: Timer | None = None
+) -> Solution:
+    """Solve a scene and certify what was found. Collective.
+
+    Raises:
+        InputError: the scene does not fit its mesh, on all ranks alike.
+    """
+    return finish(prepare(scene, comm, timer), progress)
+
+
+def finish(prepared: Prepared, progress: Progress = silent) -> Solution:
+    """The solve and the certificate of a prepared scene; nothing is solved when no solution exists. Collective."""
+    found = examined = None
+    if prepared.solvability.state != "escapes":
+        found = _solved(prepared, progress)
+        with prepared.timer("certificate"):
+            tolerance = prepared.scene.solver.tolerance
+            examined = certificate.examine(prepared.problem, found.u, tolerance)
+    return Solution(
+        prepared.scene,
+        prepared.problem,
+        prepared.solvability,
+        found,
+        examined,
+        prepared.system.dofs,
+        prepared.timer,
+    )
+
+
+def _solved(prepared: Prepared, progress: Progress) -> Solved:
+    method = solvers.create(prepared.scene.solver, prepared.system, prepared.timer, progress)
+    try:
+        return method.solve()
+    except SolverError as error:
+        u = fem.Function(prepared.problem.space, name="displacement")
+        return Solved(u, method.name, False, str(error))
+
+
+def _modification(scene: Scene) -> Callable[[Superpotential], Superpotential]:
+    """What the scene's solver table does to a law: smooth it, or nothing."""
+    wanted = scene.solver
+    if wanted.smoothing is None:
+        return lambda law: law
+    return functools.partial(
+        smoothing.create, wanted.smoothing, epsilon=wanted.epsilon, epsilon_absolute=wanted.epsilon_absolute
+    )

@@ -1,0 +1,44 @@
+"""The methods, one file each. A new method is a new class here and an entry in :data:`METHODS`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Protocol
+
+from ..errors import InputError
+from ..system import System
+from ..timing import Timer
+from .activeset import ActiveSetSolver
+from .base import Progress, Settings, Solved
+from .branch import BranchIteration
+from .linear import LinearSettings
+
+if TYPE_CHECKING:
+    from ..scene import Solver
+
+
+class Method(Protocol):
+    """A way to solve the inequality on a system."""
+
+    name: str
+
+    def __init__(self, solver: ActiveSetSolver, settings: Settings) -> None: ...
+
+    def solve(self) -> Solved:
+        """A stationary point, or what was reached. Collective."""
+
+
+METHODS: Mapping[str, type[Method]] = {"auto": BranchIteration, "branch": BranchIteration, "snes_vi": BranchIteration}
+
+
+def create(wanted: Solver, system: System, timer: Timer, progress: Progress) -> Method:
+    """The method of a scene's solver table, ready to solve.
+
+    Raises:
+        InputError: the method is not there.
+    """
+    if wanted.method not in METHODS:
+        raise InputError(f'solver.method = "{wanted.method}" is not available; use {", ".join(METHODS)}')
+    linear = LinearSettings.choose(system, wanted.linear_solver)
+    settings = Settings(tolerance=wanted.tolerance, max_newton=wanted.max_iterations, progress=progress)
+    return METHODS[wanted.method](ActiveSetSolver(system, linear, timer), settings)

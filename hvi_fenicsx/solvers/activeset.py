@@ -1,0 +1,213 @@
+"""One smooth, bound-constrained solve by PETSc's reduced-space active-set Newton method (SNES VI, ``vinewtonrsls``).
+
+What the plain recipe lacks (solver-notes.md) is here: a convergence test on the residual of the inequality, an energy as
+merit function, and a preconditioner that works at full size.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from ..system import Model, System
+from ..timing import Timer
+from .linear import HeldPreconditioner, LinearSettings
+from .options import configure
+
+Array = npt.NDArray[np.float64]
+Progress = Callable[[int, float, int], None]
+"""Called with iteration, residual, and vertices in contact (of this rank)."""
+_ON_BOUND = 1e-12
+_ROUNDING, _PATIENCE = 1e-7, 4
+"""Below the first, so many steps without halving the residual mean that rounding allows no more."""
+_RUNAWAY = 1e8
+"""A displacement of so many times p0 L / E0 is a body that slides away."""
+_REASON = {v: k for k, v in vars(PETSc.SNES.ConvergedReason).items() if isinstance(v, int) and not k.startswith("_")}
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """How one solve ended.
+
+    Attributes:
+        converged: by our own test. newton, linear: iterations. measure: residual of the inequality, relative.
+        reason: PETSc's name of the reason, or ours.
+    """
+
+    converged: bool
+    newton: int
+    linear: int
+    measure: float
+    reason: str
+
+
+class ActiveSetSolver:
+    """Bound-constrained minimisation over a system; keeps its preconditioner from solve to solve."""
+
+    def __init__(
+        self, system: System, settings: LinearSettings, timer: Timer, progress: Progress | None = None
+    ) -> None:
+        self.system, self.settings, self.timer = system, settings, timer
+        self.held = HeldPreconditioner(system, settings, timer)
+        self.progress = progress
+        self._residual = system.load.duplicate()
+
+    def destroy(self) -> None:
+        """Free the PETSc objects."""
+        self.held.destroy()
+        self._residual.destroy()
+
+    def measure(self, x: PETSc.Vec, residual: PETSc.Vec, lower: PETSc.Vec, upper: PETSc.Vec) -> float:
+        """The residual of the inequality over its scale: at most ``tolerance`` when solved. Collective.
+
+        The larger of its norm relative to the load's, and of the largest nodal traction error on Γc relative to what is
+        allowed there.
+        """
+        r = projected(x.array_r, residual.array_r, lower.array_r, upper.array_r)
+        nodal = float(np.max(np.abs(r) / self.system.allowed(1.0), initial=0.0))
+        comm = self.system.comm
+        norm = float(np.sqrt(comm.allreduce(float(r @ r)))) / self.system.scale
+        return max(norm, comm.allreduce(nodal, op=MPI.MAX))
+
+    def newton_step(self, x: PETSc.Vec, held: npt.NDArray[np.int32], models: Sequence[Model], rtol: float) -> Outcome:
+        """One Newton step with some dofs (local, owned) kept at their values in x. Collective."""
+        self.system.set_rates(self.system.tangents(x, models))
+        self.system.residual(x, self._residual, models)
+        self._residual.array[held] = 0.0
+        self.held.prepare(held)
+        step = x.duplicate()
+        step.set(0.0)
+        iterations, reason = self.held.solve(self._residual, step, rtol)
+        step.array[held] = 0.0  # multigrid leaves rounding there, and a vertex must stay exactly on its bound
+        finite = np.isfinite(step.norm())
+        if finite:
+            x.axpy(-1.0, step)
+        step.destroy()
+        return Outcome(reason > 0 and finite, 1, iterations, float("nan"), f"KSP reason {reason}")
+
+    def solve(
+        self,
+        x: PETSc.Vec,
+        models: Sequence[Model],
+        tolerance: float,
+        *,
+        lower: PETSc.Vec,
+        upper: PETSc.Vec,
+        line_search: str = "bt",
+        max_iterations: int = 60,
+    ) -> Outcome:
+        """Minimise the energy of the models between the bounds, from and into x. Collective.
+
+        Args:
+            x: start and result. models: what stands for the laws, by term.
+            tolerance: of :meth:`measure`. lower, upper: bounds.
+            line_search: PETSc's name; ``bt`` uses the energy. max_iterations: Newton steps.
+        """
+        with self.timer("solve"):
+            run = _Run(self, models, tolerance, lower, upper)
+            snes = run.create(line_search, max_iterations)
+            try:
+                snes.solve(None, x)
+            except PETSc.Error as error:
+                return Outcome(False, snes.getIterationNumber(), run.linear, run.last, f"PETSc error {error.ierr}")
+            finally:
+                run.forget(snes)
+            reason = _REASON.get(int(run.reason), str(run.reason))
+            return Outcome(run.last <= tolerance, run.iterations, run.linear, run.last, reason)
+
+
+class _Run:
+    """The callbacks of one SNES solve."""
+
+    def __init__(
+        self, owner: ActiveSetSolver, models: Sequence[Model], tolerance: float, lower: PETSc.Vec, upper: PETSc.Vec
+    ) -> None:
+        self.owner, self.models, self.tolerance = owner, models, tolerance
+        self.lower, self.upper = lower, upper
+        self.last, self.linear, self.iterations, self.reason = float("inf"), 0, 0, 0
+        self._stalled = 0
+
+    def create(self, line_search: str, max_iterations: int) -> PETSc.SNES:
+        """The configured SNES."""
+        system = self.owner.system
+        snes = PETSc.SNES().create(system.comm)
+        snes.setType("vinewtonrsls")
+        snes.setFunction(self._function, system.load.duplicate())
+        snes.setJacobian(self._jacobian, system.matrix)
+        snes.setVariableBounds(self.lower, self.upper)
+        snes.setObjective(lambda _, x: system.energy(x, self.models))
+        snes.setConvergenceTest(self._converged)
+        snes.setTolerances(max_it=max_iterations)
+        snes.getKSP().setTolerances(rtol=1e-4, atol=0.0, max_it=2000)
+        snes.getKSP().setPC(self._preconditioner(snes))
+        defaults = {"snes_linesearch_type": line_search, "snes_vi_zero_tolerance": _ON_BOUND}
+        configure(snes, {**defaults, **self.owner.settings.ksp})
+        return snes
+
+    def _preconditioner(self, snes: PETSc.SNES) -> PETSc.PC:
+        pc = snes.getKSP().getPC()
+        pc.setType(PETSc.PC.Type.PYTHON)
+        pc.setPythonContext(_ReducedPC(snes, self.owner.held))
+        return pc
+
+    def forget(self, snes: PETSc.SNES) -> None:
+        """Read off what is needed and free the SNES."""
+        self.iterations, self.reason = snes.getIterationNumber(), snes.getConvergedReason()
+        self.linear = snes.getLinearSolveIterations()
+        snes.destroy()
+
+    def _function(self, snes: PETSc.SNES, x: PETSc.Vec, f: PETSc.Vec) -> None:
+        self.owner.system.residual(x, f, self.models)
+
+    def _jacobian(self, snes: PETSc.SNES, x: PETSc.Vec, j: PETSc.Mat, p: PETSc.Mat) -> None:
+        system = self.owner.system
+        system.set_rates(system.tangents(x, self.models))
+
+    def _converged(self, snes: PETSc.SNES, iteration: int, norms: Any) -> int:
+        x, (f, _) = snes.getSolution(), snes.getFunction()[:2]
+        if iteration:
+            self.owner.held.report(snes.getKSP().getIterationNumber())
+        previous, self.last = self.last, self.owner.measure(x, f, self.lower, self.upper)
+        if self.owner.progress:
+            active = int(np.count_nonzero(x.array_r <= self.lower.array_r + _ON_BOUND))
+            self.owner.progress(iteration, self.last, active)
+        if not np.isfinite(self.last) or x.norm(PETSc.NormType.INFINITY) > _RUNAWAY:
+            return PETSc.SNES.ConvergedReason.DIVERGED_FNORM_NAN
+        if self.last <= self.tolerance:
+            return PETSc.SNES.ConvergedReason.CONVERGED_FNORM_RELATIVE
+        self._stalled = self._stalled + 1 if self.last > 0.5 * previous else 0
+        if self.last < _ROUNDING and self._stalled >= _PATIENCE:
+            return PETSc.SNES.ConvergedReason.DIVERGED_DTOL
+        return PETSc.SNES.ConvergedReason.CONVERGED_ITERATING
+
+
+class _ReducedPC:
+    """PETSc's view of :class:`HeldPreconditioner` on the inactive dofs of a SNES VI step."""
+
+    def __init__(self, snes: PETSc.SNES, held: HeldPreconditioner) -> None:
+        self._snes, self._held = snes, held
+        self._inactive: PETSc.IS | None = None
+
+    def setUp(self, pc: PETSc.PC) -> None:  # noqa: N802 - PETSc's name
+        """Take the active dofs of this step and prepare for them."""
+        self._inactive = self._snes.getVIInactiveSet()
+        start, end = self._held.system.load.owner_range
+        active = np.setdiff1d(np.arange(start, end), self._inactive.getIndices(), assume_unique=True)
+        self._held.prepare((active - start).astype(np.int32))
+
+    def apply(self, pc: PETSc.PC, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        """y = P^-1 x on the inactive dofs."""
+        self._held.apply_reduced(self._inactive, x, y)
+
+
+def projected(x: Array, residual: Array, lower: Array, upper: Array) -> Array:
+    """The residual less what the bounds may carry: zero exactly where the inequality holds; shape (n,)."""
+    at_lower, at_upper = x <= lower + _ON_BOUND, x >= upper - _ON_BOUND
+    r = np.where(at_lower, np.minimum(residual, 0.0), residual)
+    return np.where(at_upper, np.maximum(r, 0.0), r)

@@ -1,0 +1,102 @@
+"""What every method shares: its settings, its result, and the start that holds the rigid motions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+from dolfinx import fem
+from petsc4py import PETSc
+
+from ..system import System, normal_dofs
+from .activeset import ActiveSetSolver
+from .models import Resting
+
+Progress = Callable[[str, float | None, int, float, int], None]
+"""Called with the stage's name, ε, iteration, residual and (this rank's) vertices in contact."""
+
+
+def silent(stage: str, epsilon: float | None, iteration: int, residual: float, contact: int) -> None:
+    """A progress display that shows nothing."""
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """What a method is told.
+
+    Attributes:
+        tolerance: of the residual of the inequality, relative. max_branches: convex steps of the branch iteration.
+        max_newton: Newton steps of one solve.
+    """
+
+    tolerance: float = 1e-8
+    max_branches: int = 200
+    max_newton: int = 60
+    progress: Progress = silent
+
+
+@dataclass
+class Counts:
+    """Iterations spent."""
+
+    newton: int = 0
+    linear: int = 0
+    branch: int = 0
+
+
+@dataclass(frozen=True)
+class Solved:
+    """What a method found.
+
+    Attributes:
+        u: the displacement in units of u0, ghosts updated. method: its name. converged: by the method's own test.
+        reason: in words. counts: iterations. energies: after each convex step, nondimensional.
+    """
+
+    u: fem.Function
+    method: str
+    converged: bool
+    reason: str
+    counts: Counts = field(default_factory=Counts)
+    energies: tuple[float, ...] = ()
+
+
+def held_dofs(system: System) -> npt.NDArray[np.int32]:
+    """Scalar dofs (local, owned, sorted) that the start holds: normal ones on contact parts, stuck ones of laws."""
+    d = system.problem.scales.dimension
+    dofs = [normal_dofs(b.surface.blocks, b.surface.normals)[0] for b in system.problem.bounds]
+    for term in system.terms:
+        if np.any(term.law.convex.kinks == 0.0):
+            touched = np.any(term.directions != 0, axis=1)
+            dofs.append((term.surface.blocks[:, None] * d + np.arange(d))[touched])
+    joined = np.unique(np.concatenate([np.empty(0, np.int64), *dofs]))
+    return np.setdiff1d(joined, system.problem.fixed).astype(np.int32)
+
+
+def resting_start(solver: ActiveSetSolver, rtol: float) -> tuple[PETSc.Vec, int]:
+    """Contact closed, laws at rest: one linear solve in which no rigid motion is free. Collective.
+
+    From u = 0 no vertex counts as active, the reduced matrix is singular and the first step is 1e9 (solver-notes.md);
+    the reactions of this start give the active set instead.
+    """
+    system = solver.system
+    x = system.load.duplicate()
+    x.set(0.0)
+    low, high = system.lower.array_r, system.upper.array_r
+    contact = np.concatenate(
+        [np.empty(0, np.int64), *(normal_dofs(b.surface.blocks, b.surface.normals)[0] for b in system.problem.bounds)]
+    )
+    x.array[contact] = closed(low[contact], high[contact])
+    owned = system.problem.fixed[system.problem.fixed < x.local_size]
+    x.array[owned] = system.load.array_r[owned]
+    outcome = solver.newton_step(x, held_dofs(system), [Resting(t.law) for t in system.terms], rtol)
+    return x, outcome.linear
+
+
+def closed(lower: npt.NDArray[np.float64], upper: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """The bound to close on: the only finite one, or of two the point nearest 0; 0 where there is none."""
+    both = np.isfinite(lower) & np.isfinite(upper)
+    one = np.where(np.isfinite(lower), lower, np.where(np.isfinite(upper), upper, 0.0))
+    return np.where(both, np.clip(0.0, lower, upper), one)

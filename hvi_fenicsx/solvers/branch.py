@@ -1,0 +1,200 @@
+"""The exact branch iteration: a DC (difference of convex) algorithm for the unsmoothed inequality.
+
+j = H - G; G is linearised at the current slips, the convex inequality that remains is solved, and so on
+(majorisation-minimisation; Tao and An 1997). The true energy falls at each step; for piecewise laws the iteration ends
+after finitely many changes of ξ ∈ ∂G. No Hessian is ever indefinite. Where G is curved (a smoothed law, slip weakening)
+it converges linearly, so a Newton step with the true curvature is tried and kept if the energy does not rise.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+from dolfinx import fem
+from petsc4py import PETSc
+
+from ..errors import SolverError
+from ..laws import Superpotential
+from ..system import Model
+from . import kinks
+from .activeset import ActiveSetSolver, Outcome
+from .base import Counts, Settings, Solved, resting_start
+from .models import Cells, Full, Majorant
+
+Array = npt.NDArray[np.float64]
+_LOOSE = 1e-4
+"""Tolerance of convex steps while ξ still changes."""
+_NEAR = 1e-11
+"""Distance (of u0) from a kink that counts as being on it."""
+_CELL_CHANGES = 200
+_LINE_SEARCHES = ("bt", "basic", "l2")
+
+
+class BranchIteration:
+    """The iteration on one system; call :meth:`solve` once."""
+
+    name = "branch"
+
+    def __init__(self, solver: ActiveSetSolver, settings: Settings) -> None:
+        self.solver, self.settings, self.system = solver, settings, solver.system
+        self.counts = Counts()
+        self.energies: list[float] = []
+        self._laws = [t.law for t in self.system.terms]
+        self._residual = self.system.load.duplicate()
+
+    def solve(self, start: PETSc.Vec | None = None, epsilon: float | None = None) -> Solved:
+        """A stationary point reached from a start (default: the resting one). Collective.
+
+        Raises:
+            SolverError: a convex step did not lower the energy.
+        """
+        solver = self.solver
+        x = start
+        if x is None:
+            x, linear = resting_start(solver, min(1e-4, self.settings.tolerance))
+            self.counts.linear += linear
+        solver.progress = lambda it, res, act: self.settings.progress(self.name, epsilon, it, res, act)
+        outcome = self._descend(x, self._cells(x), self._subgradients(x, 0.0))
+        while outcome.converged and (better := self._off_kinks(x)) is not None:
+            better.copy(x)
+        return self._result(x, outcome)
+
+    def _descend(self, x: PETSc.Vec, cells: list[Cells], xi: list[Array]) -> Outcome:
+        """Convex steps from and into x until ξ stands."""
+        outcome = Outcome(False, 0, 0, float("inf"), "no convex step")
+        for _ in range(self.settings.max_branches):
+            cells, outcome, done = self._step(x, cells, xi)
+            if done:
+                return outcome
+            xi = self._subgradients(x, 0.0)
+        return replace(outcome, converged=False, reason=f"ξ still changes after {self.settings.max_branches} steps")
+
+    def _off_kinks(self, x: PETSc.Vec) -> PETSc.Vec | None:
+        """A point of lower energy, where x sits on a kink of G: both sides are tried (a start there hides a descent)."""
+        on = [law.concave.left(a - _NEAR) < law.concave.right(a + _NEAR) - self._slack(law)
+              for law, a in zip(self._laws, self._arguments(x), strict=True)]
+        if not self._any(on):
+            return None
+        energy = self._energy(x)
+        for side in (-_NEAR, _NEAR):
+            trial = x.copy()
+            outcome = self._descend(trial, self._cells(trial), self._subgradients(trial, side))
+            if outcome.converged and self._energy(trial) < energy - self._rounding(energy):
+                return trial
+        return None
+
+    @staticmethod
+    def _slack(law: Superpotential) -> float:
+        """What G' may change within _NEAR without a kink."""
+        return 1e-6 * law.traction_scale
+
+    def _step(self, x: PETSc.Vec, cells: list[Cells], xi: list[Array]) -> tuple[list[Cells], Outcome, bool]:
+        """One convex step, first to a loose tolerance, then, if ξ stands, to the wanted one."""
+        before = self._energy(x)
+        for tolerance in (max(_LOOSE, self.settings.tolerance), self.settings.tolerance):
+            cells, outcome = self._convex(x, cells, xi, tolerance)
+            if not outcome.converged or self._measure(x, cells, xi) > tolerance:
+                break
+        self.counts.branch += 1
+        self._check_fall(before, self._energy(x), outcome)
+        stationary = outcome.converged and self._measure(x, cells, xi) <= self.settings.tolerance
+        if stationary or not outcome.converged:
+            return cells, outcome, True
+        return cells, *self._accelerated(x, cells, outcome)
+
+    def _convex(
+        self, x: PETSc.Vec, cells: list[Cells], xi: list[Array], tolerance: float
+    ) -> tuple[list[Cells], Outcome]:
+        """Minimise the majorant over K, from and into x; cells change until no kink is overloaded."""
+        for _ in range(_CELL_CHANGES):
+            models = [Majorant(law, c, s) for law, c, s in zip(self._laws, cells, xi, strict=True)]
+            outcome = self._bounded(x, models, cells, tolerance)
+            self.system.residual(x, self._residual, models)
+            moves = kinks.overloaded(self.system, x, self._residual, cells, self.settings.tolerance)
+            if not outcome.converged or not self._any(moves):
+                return cells, outcome
+            cells = [c.moved(m) for c, m in zip(cells, moves, strict=True)]
+        return cells, replace(outcome, converged=False, reason="the states of the convex kinks keep changing")
+
+    def _bounded(self, x: PETSc.Vec, models: Sequence[Model], cells: list[Cells], tolerance: float) -> Outcome:
+        lower, upper = kinks.boxes(self.system, cells)
+        outcome = Outcome(False, 0, 0, float("inf"), "not started")
+        kept = x.copy()
+        for search in _LINE_SEARCHES:
+            outcome = self.solver.solve(
+                x,
+                models,
+                tolerance,
+                lower=lower,
+                upper=upper,
+                line_search=search,
+                max_iterations=self.settings.max_newton,
+            )
+            self.counts.newton += outcome.newton
+            self.counts.linear += outcome.linear
+            if outcome.converged:
+                break
+            kept.copy(x)
+        return outcome
+
+    def _accelerated(self, x: PETSc.Vec, cells: list[Cells], outcome: Outcome) -> tuple[Outcome, bool]:
+        """Newton with the true curvature where G is curved; dropped unless it ends lower and solves the inequality."""
+        curved = [bool(np.any(law.concave.second(a) > 0)) for law, a in zip(self._laws, self._arguments(x), strict=True)]
+        if not self._any([np.array(curved)]):
+            return outcome, False
+        trial = x.copy()
+        lower, upper = kinks.boxes(self.system, cells)
+        full = [Full(law, c) for law, c in zip(self._laws, cells, strict=True)]
+        found = self.solver.solve(
+            trial, full, self.settings.tolerance, lower=lower, upper=upper, line_search="bt", max_iterations=15
+        )
+        self.counts.newton += found.newton
+        self.counts.linear += found.linear
+        if found.converged and self._energy(trial) <= self._energy(x) + self._rounding(self._energy(x)):
+            trial.copy(x)
+            return found, True
+        return outcome, False
+
+    def _measure(self, x: PETSc.Vec, cells: list[Cells], xi: list[Array]) -> float:
+        """The residual of the true inequality: ξ stands if it is still in ∂G. Collective."""
+        models = [
+            Majorant(law, c, np.clip(s, law.concave.left(a), law.concave.right(a)))
+            for law, c, s, a in zip(self._laws, cells, xi, self._arguments(x), strict=True)
+        ]
+        self.system.residual(x, self._residual, models)
+        lower, upper = kinks.boxes(self.system, cells)
+        return self.solver.measure(x, self._residual, lower, upper)
+
+    def _arguments(self, x: PETSc.Vec) -> list[Array]:
+        return [t.argument(x.array_r) for t in self.system.terms]
+
+    def _cells(self, x: PETSc.Vec) -> list[Cells]:
+        return [Cells.around(law.convex, a) for law, a in zip(self._laws, self._arguments(x), strict=True)]
+
+    def _subgradients(self, x: PETSc.Vec, shift: float) -> list[Array]:
+        """ξ ∈ ∂G at the slips, which may be moved to one side of a kink."""
+        return [law.concave.left(a + shift) for law, a in zip(self._laws, self._arguments(x), strict=True)]
+
+    def _energy(self, x: PETSc.Vec) -> float:
+        return self.system.energy(x, self._laws)  # type: ignore[arg-type]
+
+    def _rounding(self, energy: float) -> float:
+        return 1e-10 * max(abs(energy), 1e-300)
+
+    def _check_fall(self, before: float, after: float, outcome: Outcome) -> None:
+        self.energies.append(after)
+        if outcome.converged and after > before + self._rounding(before):
+            raise SolverError(f"a convex step raised the energy from {before:.12g} to {after:.12g}")
+
+    def _any(self, flags: Sequence[npt.NDArray[np.generic]]) -> bool:
+        return bool(self.system.comm.allreduce(any(bool(np.any(f)) for f in flags)))
+
+    def _result(self, x: PETSc.Vec, outcome: Outcome) -> Solved:
+        u = fem.Function(self.system.problem.space, name="displacement")
+        u.x.array[: x.local_size] = x.array_r
+        u.x.scatter_forward()
+        reason = "stationary" if outcome.converged else outcome.reason
+        return Solved(u, self.name, outcome.converged, reason, self.counts, tuple(self.energies))

@@ -1,0 +1,66 @@
+"""The convex kinks of the laws as bounds on slips, and which of them are overloaded."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+from petsc4py import PETSc
+
+from ..laws import ConvexPart
+from ..lawterm import LawTerm
+from ..system import System, traction_scale
+from .models import Cells
+
+Array = npt.NDArray[np.float64]
+
+
+def boxes(system: System, cells: Sequence[Cells]) -> tuple[PETSc.Vec, PETSc.Vec]:
+    """The bounds of the scene cut with the cells of the laws; the system's own where no law has a convex kink."""
+    if not any(len(c.kinks) for c in cells):
+        return system.lower, system.upper
+    lower, upper = system.lower.copy(), system.upper.copy()
+    for term, c in zip(system.terms, cells, strict=True):
+        dofs, sign, free = _slip_dofs(term)
+        low, high = np.where(sign > 0, c.lower, -c.upper), np.where(sign > 0, c.upper, -c.lower)
+        lower.array[dofs[free]] = np.maximum(lower.array[dofs], low)[free]
+        upper.array[dofs[free]] = np.minimum(upper.array[dofs], high)[free]
+    return lower, upper
+
+
+def overloaded(
+    system: System, x: PETSc.Vec, residual: PETSc.Vec, cells: Sequence[Cells], tolerance: float
+) -> list[npt.NDArray[np.int64]]:
+    """Per vertex -1, 0 or 1: where it goes if the kink it sits on cannot carry its force.
+
+    ``residual`` is that of the convex step, H' being taken from within the cell: at the lower end the right derivative,
+    from which the kink's jump leads to the left one.
+    """
+    moves = []
+    for term, c in zip(system.terms, cells, strict=True):
+        argument = term.argument(x.array_r)
+        force = np.einsum("md,md->m", term.directions[:, 0, :], term.surface.values(residual.array_r))
+        weight = term.surface.weights
+        slack = 0.1 * tolerance * traction_scale(term) * weight
+        _, _, free = _slip_dofs(term)
+        part = term.law.convex
+        down = free & (argument <= c.lower) & (force - weight * _jump(part, c.lower) > slack)
+        up = free & (argument >= c.upper) & (force + weight * _jump(part, c.upper) < -slack)
+        moves.append(up.astype(np.int64) - down.astype(np.int64))
+    return moves
+
+
+def _slip_dofs(term: LawTerm) -> tuple[npt.NDArray[np.int64], Array, npt.NDArray[np.bool_]]:
+    """The scalar dof of each slip, the sign of its direction, and whether it is not prescribed."""
+    direction = term.directions[:, 0, :]
+    axis = np.argmax(np.abs(direction), axis=1)
+    rows = np.arange(len(axis))
+    dofs = term.surface.blocks.astype(np.int64) * direction.shape[1] + axis
+    return dofs, direction[rows, axis], term.free[rows, axis] > 0
+
+
+def _jump(part: ConvexPart, at: Array) -> Array:
+    """The jump of H' at each position; 0 at infinity."""
+    finite = np.where(np.isfinite(at), at, 0.0)
+    return np.where(np.isfinite(at), part.right(finite) - part.left(finite), 0.0)

@@ -1,0 +1,114 @@
+"""What stands for a law j = H - G in one nonlinear solve, kept within one cell between H's kinks.
+
+H's kinks (Tresca, |u_t| at zero, upward jumps) stay in the convex step: each vertex is kept in the cell between two kinks
+by bounds on its slip, where H is smooth up to the ends; a vertex that sits on a kink and whose force exceeds what the
+kink can carry moves on to the next cell.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from ..laws import ConvexPart, Superpotential
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Cells:
+    """For each vertex the cell [lower, upper] between two kinks of H that it is kept in; shape (m,)."""
+
+    kinks: Array
+    index: npt.NDArray[np.int64]
+
+    @classmethod
+    def around(cls, part: ConvexPart, x: Array) -> Cells:
+        """The cells that hold x; on a kink the one above."""
+        return cls(part.kinks, np.searchsorted(part.kinks, x, side="right"))
+
+    @property
+    def lower(self) -> Array:
+        """Lower ends; -inf where there is none."""
+        return np.concatenate([[-np.inf], self.kinks])[self.index]
+
+    @property
+    def upper(self) -> Array:
+        """Upper ends; inf where there is none."""
+        return np.concatenate([self.kinks, [np.inf]])[self.index]
+
+    def moved(self, step: npt.NDArray[np.int64]) -> Cells:
+        """The cells after each vertex moved by -1, 0 or 1."""
+        return Cells(self.kinks, self.index + step)
+
+
+def _inside(part: ConvexPart, cells: Cells, x: Array) -> Array:
+    """Derivative of H, extended from within the cell to its ends."""
+    at_lower, at_upper = x <= cells.lower, x >= cells.upper
+    lower, upper = np.where(at_lower, cells.lower, x), np.where(at_upper, cells.upper, x)
+    return np.where(at_lower, part.right(lower), np.where(at_upper, part.left(upper), part.right(x)))
+
+
+@dataclass(frozen=True)
+class Majorant:
+    """H(x) - ξ x: the convex function that touches j at the point where ξ ∈ ∂G was taken, up to a constant."""
+
+    law: Superpotential
+    cells: Cells
+    xi: Array
+
+    def value(self, x: Array) -> Array:
+        """Energy per area."""
+        return self.law.convex.value(x) - self.xi * x
+
+    def derivative(self, x: Array) -> Array:
+        """H' - ξ."""
+        return _inside(self.law.convex, self.cells, x) - self.xi
+
+    def second(self, x: Array) -> Array:
+        """H'' ≥ 0."""
+        return self.law.convex.second(x)
+
+
+@dataclass(frozen=True)
+class Full:
+    """j itself, with its true (perhaps negative) curvature."""
+
+    law: Superpotential
+    cells: Cells
+
+    def value(self, x: Array) -> Array:
+        """Energy per area."""
+        return self.law.value(x)
+
+    def derivative(self, x: Array) -> Array:
+        """H' - G', the middle of G's interval on a kink of G."""
+        concave = self.law.concave
+        return _inside(self.law.convex, self.cells, x) - (concave.left(x) + concave.right(x)) / 2
+
+    def second(self, x: Array) -> Array:
+        """H'' - G''."""
+        return self.law.convex.second(x) - self.law.concave.second(x)
+
+
+@dataclass(frozen=True)
+class Resting:
+    """The tangent of j at rest: what holds a body at the start, x ↦ H'(0)x + ½ H''(0) x²."""
+
+    law: Superpotential
+
+    def value(self, x: Array) -> Array:
+        """Energy per area."""
+        return self.derivative(np.zeros_like(x)) * x + self.second(x) * x**2 / 2
+
+    def derivative(self, x: Array) -> Array:
+        """The middle of ∂j(0) plus H''(0) x."""
+        zero = np.zeros_like(x)
+        lo, hi = self.law.interval(zero)
+        return (lo + hi) / 2 + self.second(x) * x
+
+    def second(self, x: Array) -> Array:
+        """H''(0)."""
+        return self.law.convex.second(np.zeros_like(x))

@@ -1,0 +1,105 @@
+"""Γc at its vertices: where each contact part's nodes are, their normals, tangents and lumped areas.
+
+Vertex (trapezoidal) quadrature makes every boundary term a sum over these nodes (paper, section 4.2).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import ufl
+from dolfinx import fem
+from petsc4py import PETSc
+
+from .errors import InputError
+from .parallel import agree
+
+Array = npt.NDArray[np.float64]
+Indices = npt.NDArray[np.int32]
+
+
+@dataclass(frozen=True, slots=True)
+class Surface:
+    """The vertices of one boundary part that this rank owns (m of them).
+
+    Attributes:
+        part: name. blocks: local vertex (block) indices, shape (m,). points: SI, shape (m, 3).
+        normals: outward unit, shape (m, d). tangents: shape (m, d-1, d), by design.md's rule.
+        weights: lumped area of each vertex over L^(d-1), shape (m,).
+    """
+
+    part: str
+    blocks: Indices
+    points: Array
+    normals: Array
+    tangents: Array
+    weights: Array
+
+    def values(self, u: Array) -> Array:
+        """The vectors at these vertices of a local array of a P1 vector field; shape (m, d)."""
+        return u.reshape(-1, self.normals.shape[1])[self.blocks]
+
+
+def build(part: str, space: fem.FunctionSpace, facets: Indices, measure: Any, area: float) -> Surface:
+    """The nodes of a part. Collective.
+
+    Args:
+        part: its name.
+        space: the P1 vector space.
+        facets: its local facets.
+        measure: ds with vertex quadrature over the part, SI.
+        area: L^(d-1), what the weights are divided by.
+
+    Raises:
+        InputError: on all ranks, where a vertex's normal is not parallel to an axis.
+    """
+    dimension = space.mesh.geometry.dim
+    dofs = fem.locate_dofs_topological(space, dimension - 1, facets)
+    blocks = np.unique(dofs[dofs < space.dofmap.index_map.size_local]).astype(np.int32)
+    normal = _assembled(ufl.FacetNormal(space.mesh), space, measure)[blocks]
+    ones = ufl.as_vector([fem.Constant(space.mesh, 1.0)] * dimension)
+    weights = _assembled(ones, space, measure)[blocks, 0] / area
+    normals = normal / np.linalg.norm(normal, axis=1, keepdims=True)
+    points = space.tabulate_dof_coordinates()[blocks]
+    _check_axis_parallel(part, space.mesh.comm, normals, points)
+    return Surface(part, blocks, points, np.round(normals), tangents(np.round(normals)), weights)
+
+
+def _assembled(density: Any, space: fem.FunctionSpace, measure: Any) -> Array:
+    form = fem.form(ufl.inner(density, ufl.TestFunction(space)) * measure)
+    vector = fem.petsc.assemble_vector(form)
+    vector.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
+    values: Array = vector.array.reshape(-1, space.mesh.geometry.dim).copy()
+    vector.destroy()
+    return values
+
+
+def _check_axis_parallel(part: str, comm: Any, normals: Array, points: Array) -> None:
+    slanted = np.flatnonzero(np.max(np.abs(normals), axis=1, initial=0.0) < 1 - 1e-8) if len(normals) else []
+    bad = [tuple(float(c) for c in points[i]) for i in slanted[:1]]
+    found = [b for rank in agree(comm, bad) for b in rank]
+    if found:
+        raise InputError(
+            f"boundary.{part}: contact and friction want a part whose normal is parallel to an axis; at {found[0]} it "
+            "is slanted. Give the sides that meet at a corner a boundary table each"
+        )
+
+
+def tangents(normals: Array) -> Array:
+    """Unit tangents of outward normals (m, d), shape (m, d-1, d).
+
+    In 2D the one whose larger component is positive; in 3D t1 is the projected x-axis (the y-axis where n is within
+    45° of x) and t2 = n x t1.
+    """
+    if normals.shape[1] == 2:
+        t = np.column_stack([-normals[:, 1], normals[:, 0]])
+        rows = np.arange(len(t))
+        return (t * np.sign(t[rows, np.argmax(np.abs(t), axis=1)])[:, None])[:, None, :] + 0.0
+    steep = np.abs(normals[:, 0]) > np.sqrt(0.5)
+    axis = np.where(steep[:, None], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0])
+    t1 = axis - np.sum(axis * normals, axis=1)[:, None] * normals
+    t1 /= np.linalg.norm(t1, axis=1)[:, None]
+    return np.stack([t1, np.cross(normals, t1)], axis=1) + 0.0

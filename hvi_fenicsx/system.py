@@ -1,0 +1,241 @@
+"""A problem assembled: PETSc matrix, load, bounds, and the law terms' residual, tangent and energy on top of them.
+
+The bulk matrix is assembled once. Laws touch only the diagonal blocks of Γc's vertices: a change of their tangent K is
+assembled as a difference, into those rows alone. With J = A + W K in force, the residual is J u - b + W (τ(u) - K u).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
+from dolfinx import fem
+from dolfinx.fem.petsc import apply_lifting, assemble_matrix, assemble_vector, set_bc
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from .lawterm import LawTerm
+from .problem import Problem
+from .timing import Timer
+
+Array = npt.NDArray[np.float64]
+_ADD, _INSERT = PETSc.InsertMode.ADD, PETSc.InsertMode.INSERT
+_FORWARD, _REVERSE = PETSc.ScatterMode.FORWARD, PETSc.ScatterMode.REVERSE
+
+
+class Model(Protocol):
+    """What stands for a law in one nonlinear solve: a function of its argument (m,) with two derivatives."""
+
+    def value(self, x: Array) -> Array:
+        """Energy per area."""
+
+    def derivative(self, x: Array) -> Array:
+        """Traction."""
+
+    def second(self, x: Array) -> Array:
+        """Tangent stiffness."""
+
+
+@dataclass(frozen=True)
+class Compiled:
+    """A problem's compiled forms."""
+
+    bilinear: fem.Form
+    linear: dict[str, fem.Form]
+
+
+def compile_forms(problem: Problem) -> Compiled:
+    """Compile (or take from the cache) what the assembly needs. Collective."""
+    return Compiled(fem.form(problem.bilinear), {name: fem.form(f) for name, f in problem.linear.items()})
+
+
+class System:
+    """A problem's matrix, load and bounds (PETSc objects owned by this, freed with it). Creation is collective.
+
+    Attributes:
+        problem: what was assembled.
+        matrix: J = A + W K, symmetric, Dirichlet rows and columns replaced by the identity; block size d.
+        load: b, lifted; the prescribed values stand in the Dirichlet rows.
+        lower, upper: bounds of u; infinite on Dirichlet rows.
+        scale: norm of the load, what residuals are relative to.
+        forces: the assembled load vectors by name, unlifted (for the virtual work of rigid motions).
+    """
+
+    def __init__(self, problem: Problem, compiled: Compiled, timer: Timer) -> None:
+        self.problem, self.terms = problem, problem.terms
+        with timer("assembly"):
+            conditions = list(problem.conditions)
+            self.matrix = assemble_matrix(compiled.bilinear, conditions)
+            self.matrix.assemble()
+            self.matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+            self.matrix.setOption(PETSc.Mat.Option.SPD, True)
+            self.forces = {name: _assembled(form) for name, form in compiled.linear.items()}
+            self.load = self._lifted(compiled)
+            self.near_null = rigid_modes(problem)
+            self.matrix.setNearNullSpace(self.near_null)
+        self._rates = [np.zeros((*t.free.shape, t.free.shape[1])) for t in self.terms]
+        self._work = self.load.duplicate()
+        self.lower, self.upper = self._bounds()
+        free = self.load.copy()
+        free.array[problem.fixed[problem.fixed < free.local_size]] = 0.0
+        self.scale = float(free.norm()) or 1.0
+
+    @property
+    def comm(self) -> MPI.Comm:
+        """The communicator."""
+        return self.problem.domain.mesh.comm
+
+    @property
+    def dofs(self) -> int:
+        """Global number of unknowns."""
+        return int(self.load.size)
+
+    def _lifted(self, compiled: Compiled) -> PETSc.Vec:
+        load = new_vector(self.problem.space)
+        for force in self.forces.values():
+            load.axpy(1.0, force)
+        conditions = list(self.problem.conditions)
+        with load.localForm() as local:
+            local.array_w[load.local_size :] = 0.0
+        apply_lifting(load, [compiled.bilinear], [conditions])
+        load.ghostUpdate(addv=_ADD, mode=_REVERSE)
+        set_bc(load, conditions)
+        return load
+
+    def _bounds(self) -> tuple[PETSc.Vec, PETSc.Vec]:
+        lower, upper = self.load.duplicate(), self.load.duplicate()
+        lower.set(-np.inf)
+        upper.set(np.inf)
+        for bounds in self.problem.bounds:
+            dofs, sign = normal_dofs(bounds.surface.blocks, bounds.surface.normals)
+            positive = sign > 0
+            low = np.where(positive, bounds.lower, -bounds.upper)
+            high = np.where(positive, bounds.upper, -bounds.lower)
+            lower.array[dofs] = np.maximum(lower.array[dofs], low)
+            upper.array[dofs] = np.minimum(upper.array[dofs], high)
+        owned = self.problem.fixed[self.problem.fixed < lower.local_size]
+        lower.array[owned], upper.array[owned] = -np.inf, np.inf
+        return lower, upper
+
+    def set_rates(self, rates: Sequence[Array]) -> None:
+        """Make K the tangent in force: J changes in Γc's rows only. Collective."""
+        for term, new, old in zip(self.terms, rates, self._rates, strict=True):
+            changed = self.comm.allreduce(bool(np.any(new != old)), op=MPI.LOR)
+            if changed:
+                term.set_rates(new - old)
+                assemble_matrix(self.matrix, term.tangent)
+                self.matrix.assemble()
+                old[...] = new
+
+    @property
+    def rates(self) -> list[Array]:
+        """A copy of the K in force, by term."""
+        return [k.copy() for k in self._rates]
+
+    def drift(self, rates: Sequence[Array]) -> float:
+        """Largest nodal stiffness (an elastic one is about 1) by which this rank's K differs from ``rates``."""
+        changes = (
+            np.max(np.abs(new - old) * term.surface.weights[:, None, None], initial=0.0)
+            for term, new, old in zip(self.terms, self._rates, rates, strict=True)
+        )
+        return float(max(changes, default=0.0))
+
+    def residual(self, x: PETSc.Vec, out: PETSc.Vec, models: Sequence[Model]) -> None:
+        """J u - b + W (τ(u) - K u) into ``out``, which must have ghosts. Collective."""
+        self.matrix.mult(x, out)
+        out.axpy(-1.0, self.load)
+        with out.localForm() as local:
+            local.array_w[out.local_size :] = 0.0
+        for term, model, rates in zip(self.terms, models, self._rates, strict=True):
+            u = x.array_r
+            term.set_traction(u, model.derivative(term.argument(u)), rates)
+            assemble_vector(out, term.residual)
+        out.ghostUpdate(addv=_ADD, mode=_REVERSE)
+
+    def tangents(self, x: PETSc.Vec, models: Sequence[Model]) -> list[Array]:
+        """K of the models at u, by term."""
+        u = x.array_r
+        arguments = [term.argument(u) for term in self.terms]
+        return [
+            term.rate(u, model.derivative(a), model.second(a))
+            for term, model, a in zip(self.terms, models, arguments, strict=True)
+        ]
+
+    def energy(self, x: PETSc.Vec, models: Sequence[Model]) -> float:
+        """½ a(u, u) - <g, u> + Σ w models, up to a constant of the prescribed displacements. Collective."""
+        self.matrix.mult(x, self._work)
+        u = x.array_r
+        local = 0.0
+        for term, model, rates in zip(self.terms, models, self._rates, strict=True):
+            v, w = term.surface.values(u), term.surface.weights
+            local += float(np.sum(w * model.value(term.argument(u))))
+            local -= 0.5 * float(np.einsum("m,mi,mij,mj->", w, v, rates, v))
+        return 0.5 * float(x.dot(self._work)) - float(self.load.dot(x)) + float(self.comm.allreduce(local))
+
+    def allowed(self, tolerance: float) -> Array:
+        """Largest residual a dof of Γc may keep for its traction to be right within tolerance; infinite elsewhere."""
+        allowed = np.full(self.load.local_size, np.inf)
+        d = self.problem.scales.dimension
+        for bounds in self.problem.bounds:
+            dofs, _ = normal_dofs(bounds.surface.blocks, bounds.surface.normals)
+            allowed[dofs] = np.minimum(allowed[dofs], tolerance * bounds.surface.weights)
+        for term in self.terms:
+            dofs = term.surface.blocks[:, None] * d + np.arange(d)
+            touched = np.any(term.directions != 0, axis=1)
+            limit = tolerance * traction_scale(term) * term.surface.weights
+            allowed[dofs[touched]] = np.minimum(allowed[dofs], limit[:, None])[touched]
+        return allowed
+
+
+def traction_scale(term: LawTerm) -> float:
+    """What a law's traction is judged by: its own scale, but nothing finer than a thousandth of the load's."""
+    return max(term.law.traction_scale, 1e-3)
+
+
+def normal_dofs(blocks: npt.NDArray[np.int32], normals: Array) -> tuple[npt.NDArray[np.int64], Array]:
+    """The scalar dof of u·n at vertices with axis-parallel normals, and the sign of n."""
+    axis = np.argmax(np.abs(normals), axis=1)
+    return blocks.astype(np.int64) * normals.shape[1] + axis, normals[np.arange(len(axis)), axis]
+
+
+def new_vector(space: fem.FunctionSpace) -> PETSc.Vec:
+    """A zero vector of a space, with ghosts. Collective."""
+    function = fem.Function(space)  # must outlive the duplication: its vector does not own the memory
+    vector = function.x.petsc_vec.duplicate()
+    vector.set(0.0)
+    return vector
+
+
+def _assembled(form: fem.Form) -> PETSc.Vec:
+    vector = assemble_vector(form)
+    vector.ghostUpdate(addv=_ADD, mode=_REVERSE)
+    return vector
+
+
+def rigid_modes(problem: Problem) -> PETSc.NullSpace:
+    """The near-null space: all rigid motions of the free body, orthonormal, with constant ghosts. Collective."""
+    space, d = problem.space, problem.scales.dimension
+    x = (space.tabulate_dof_coordinates() - problem.domain.centre) / problem.scales.length
+    fields = [np.eye(d)[i] + np.zeros((len(x), d)) for i in range(d)]
+    pairs = [(0, 1)] if d == 2 else [(1, 2), (2, 0), (0, 1)]
+    for i, j in pairs:
+        rotation = np.zeros((len(x), d))
+        rotation[:, i], rotation[:, j] = -x[:, j], x[:, i]
+        fields.append(rotation)
+    vectors = []
+    for field in fields:
+        vector = new_vector(space)
+        vector.array[:] = field.ravel()[: vector.local_size]
+        vectors.append(vector)
+    _orthonormalise(vectors)
+    return PETSc.NullSpace().create(vectors=vectors, comm=space.mesh.comm)
+
+
+def _orthonormalise(vectors: list[PETSc.Vec]) -> None:
+    for i, vector in enumerate(vectors):
+        for other in vectors[:i]:
+            vector.axpy(-vector.dot(other), other)
+        vector.normalize()

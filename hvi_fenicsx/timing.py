@@ -1,0 +1,40 @@
+"""Wall time by phase, as ``summary.json`` reports it."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+PHASES = ("jit", "mesh", "assembly", "setup", "solve", "certificate", "output")
+
+
+class Timer:
+    """Accumulates wall time (s) by phase; an inner phase is taken out of the one around it."""
+
+    def __init__(self) -> None:
+        self.seconds = dict.fromkeys(PHASES, 0.0)
+        self._start = time.perf_counter()
+        self._inner: list[float] = []
+
+    @contextmanager
+    def __call__(self, phase: str) -> Iterator[None]:
+        """Time a block as one phase."""
+        start = time.perf_counter()
+        self._inner.append(0.0)
+        try:
+            yield
+        finally:
+            elapsed = time.perf_counter() - start
+            self.seconds[phase] += elapsed - self._inner.pop()
+            if self._inner:
+                self._inner[-1] += elapsed
+
+    @property
+    def total(self) -> float:
+        """Since the timer was made, s."""
+        return time.perf_counter() - self._start
+
+    def report(self) -> dict[str, float]:
+        """Seconds by phase, with the total."""
+        return {**self.seconds, "total": self.total}
