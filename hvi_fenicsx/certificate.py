@@ -60,12 +60,14 @@ class Examined:
 
     Attributes:
         certificate: the verdict. energy: ½a(u, u) - <g, u> + Σ laws. forces, states: reactions and Γc.
+        smoothing_error: largest distance of a law's traction from the unsmoothed law's, in units of p0.
     """
 
     certificate: Certificate
     energy: float
     forces: Forces
     states: tuple[State, ...]
+    smoothing_error: float
 
 
 def examine(problem: Problem, u: fem.Function, tolerance: float) -> Examined:
@@ -86,10 +88,10 @@ def examine(problem: Problem, u: fem.Function, tolerance: float) -> Examined:
         "inclusion": largest(comm, max((_inclusion(s) for s in states), default=0.0)),
     }
     passed = all(np.isfinite(v) and v <= tolerance for v in entries.values())
-    true = largest(comm, _inclusion_true(states))
+    true, error = (largest(comm, value) for value in _inclusion_true(states))
     certificate = Certificate(**entries, inclusion_true=true, second_order=_second_order(comm, states),
                               tolerance=tolerance, passed=passed)
-    return Examined(certificate, _energy(problem, u, forces, states), forces, states)
+    return Examined(certificate, _energy(problem, u, forces, states), forces, states, error)
 
 
 def _energy(problem: Problem, u: fem.Function, forces: Forces, states: Sequence[State]) -> float:
@@ -148,14 +150,16 @@ def _inclusion(state: State) -> float:
     return max((float(np.max(p, initial=0.0)) for p in pairs), default=0.0)
 
 
-def _inclusion_true(states: Sequence[State]) -> float:
-    worst = 0.0
+def _inclusion_true(states: Sequence[State]) -> tuple[float, float]:
+    """Relative to the law's scale, and in units of p0."""
+    worst = absolute = 0.0
     for state in states:
         for term, argument, traction in zip(state.terms, state.arguments, state.tractions, strict=True):
             true = term.exact
             away = np.where(boundary.prescribed(term), 0.0, true.distance(argument, traction, NEAR))
-            worst = max(worst, float(np.max(away, initial=0.0)) / max(true.traction_scale, 1e-3))
-    return worst
+            size = float(np.max(away, initial=0.0))
+            worst, absolute = max(worst, size / traction_scale(term)), max(absolute, size)
+    return worst, absolute
 
 
 def _second_order(comm: MPI.Comm, states: Sequence[State]) -> str:

@@ -22,7 +22,7 @@ from .timing import Timer
 if TYPE_CHECKING:
     from .scene import Scene
 
-CERTIFIED, BAD_INPUT, NO_SOLUTION, NOT_CONVERGED = 0, 2, 3, 4
+CERTIFIED, NO_SOLUTION, NOT_CONVERGED, INTERRUPTED = 0, 3, 4, 130
 """Exit codes (design.md, the contract)."""
 
 
@@ -56,7 +56,9 @@ class Solution:
         """By the contract: certified, no solution exists, or not converged."""
         if self.converged:
             return CERTIFIED
-        return NO_SOLUTION if self.solved is None else NOT_CONVERGED
+        if self.solved is None:
+            return NO_SOLUTION
+        return INTERRUPTED if self.solved.interrupted else NOT_CONVERGED
 
     @property
     def reason(self) -> str:
@@ -66,7 +68,7 @@ class Solution:
         if self.converged:
             local = " (a local equilibrium: the state is metastable)" if self.solvability.state == "metastable" else ""
             return f"certified{local}"
-        if self.solvability.state == "metastable":
+        if self.solvability.state == "metastable" and not self.solved.interrupted:
             return f"metastable, and no equilibrium found ({self.solved.reason})"
         return f"not certified ({self.solved.reason})"
 
@@ -112,11 +114,17 @@ def solve(
     return finish(prepare(scene, comm, timer), progress)
 
 
-def finish(prepared: Prepared, progress: Progress = silent) -> Solution:
-    """The solve and the certificate of a prepared scene; nothing is solved when no solution exists. Collective."""
+def finish(
+    prepared: Prepared, progress: Progress = silent, interrupted: Callable[[], bool] = lambda: False
+) -> Solution:
+    """The solve and the certificate of a prepared scene; nothing is solved when no solution exists. Collective.
+
+    Args:
+        prepared: the scene. progress: see :mod:`.solvers.base`. interrupted: whether to stop (collective, asked often).
+    """
     found = examined = None
     if prepared.solvability.state != "escapes":
-        found = _solved(prepared, progress)
+        found = _solved(prepared, progress, interrupted)
         with prepared.timer("certificate"):
             tolerance = prepared.scene.solver.tolerance
             examined = certificate.examine(prepared.problem, found.u, tolerance)
@@ -131,8 +139,8 @@ def finish(prepared: Prepared, progress: Progress = silent) -> Solution:
     )
 
 
-def _solved(prepared: Prepared, progress: Progress) -> Solved:
-    method = solvers.create(prepared.scene.solver, prepared.system, prepared.timer, progress)
+def _solved(prepared: Prepared, progress: Progress, interrupted: Callable[[], bool]) -> Solved:
+    method = solvers.create(prepared.scene.solver, prepared.system, prepared.timer, progress, interrupted)
     try:
         return method.solve()
     except SolverError as error:

@@ -26,12 +26,13 @@ class Surface:
     """The vertices of one boundary part that this rank owns (m of them).
 
     Attributes:
-        part: name. blocks: local vertex (block) indices, shape (m,). points: SI, shape (m, 3).
+        part: name. facets: its local facets. blocks: local vertex (block) indices, shape (m,). points: SI, shape (m, 3).
         normals: outward unit, shape (m, d). tangents: shape (m, d-1, d), by design.md's rule.
         weights: lumped area of each vertex over L^(d-1), shape (m,).
     """
 
     part: str
+    facets: Indices
     blocks: Indices
     points: Array
     normals: Array
@@ -65,7 +66,7 @@ def build(part: str, space: fem.FunctionSpace, facets: Indices, measure: Any, ar
     normals = normal / np.linalg.norm(normal, axis=1, keepdims=True)
     points = space.tabulate_dof_coordinates()[blocks]
     _check_axis_parallel(part, space.mesh.comm, normals, points)
-    return Surface(part, blocks, points, np.round(normals), tangents(np.round(normals)), weights)
+    return Surface(part, facets, blocks, points, np.round(normals), tangents(np.round(normals)), weights)
 
 
 def _assembled(density: Any, space: fem.FunctionSpace, measure: Any) -> Array:

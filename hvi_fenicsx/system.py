@@ -192,7 +192,7 @@ class System:
 
 def traction_scale(term: LawTerm) -> float:
     """What a law's traction is judged by: its own scale, but nothing finer than a thousandth of the load's."""
-    return max(term.law.traction_scale, 1e-3)
+    return max(term.exact.traction_scale, 1e-3)
 
 
 def normal_dofs(blocks: npt.NDArray[np.int32], normals: Array) -> tuple[npt.NDArray[np.int64], Array]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Protocol
 
 from ..errors import InputError
@@ -31,7 +31,9 @@ class Method(Protocol):
 METHODS: Mapping[str, type[Method]] = {"auto": BranchIteration, "branch": BranchIteration, "snes_vi": BranchIteration}
 
 
-def create(wanted: Solver, system: System, timer: Timer, progress: Progress) -> Method:
+def create(
+    wanted: Solver, system: System, timer: Timer, progress: Progress, interrupted: Callable[[], bool]
+) -> Method:
     """The method of a scene's solver table, ready to solve.
 
     Raises:
@@ -41,4 +43,4 @@ def create(wanted: Solver, system: System, timer: Timer, progress: Progress) -> 
         raise InputError(f'solver.method = "{wanted.method}" is not available; use {", ".join(METHODS)}')
     linear = LinearSettings.choose(system, wanted.linear_solver)
     settings = Settings(tolerance=wanted.tolerance, max_newton=wanted.max_iterations, progress=progress)
-    return METHODS[wanted.method](ActiveSetSolver(system, linear, timer), settings)
+    return METHODS[wanted.method](ActiveSetSolver(system, linear, timer, interrupted), settings)

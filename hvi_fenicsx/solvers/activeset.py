@@ -22,7 +22,7 @@ from .options import configure
 
 Array = npt.NDArray[np.float64]
 Progress = Callable[[int, float, int], None]
-"""Called with iteration, residual, and vertices in contact (of this rank)."""
+"""Called with iteration, residual, and vertices in contact (of all ranks)."""
 _ON_BOUND = 1e-12
 _ROUNDING, _PATIENCE = 1e-7, 4
 """Below the first, so many steps without halving the residual mean that rounding allows no more."""
@@ -37,7 +37,7 @@ class Outcome:
 
     Attributes:
         converged: by our own test. newton, linear: iterations. measure: residual of the inequality, relative.
-        reason: PETSc's name of the reason, or ours.
+        reason: PETSc's name of the reason, or ours. interrupted: whether it was told to stop.
     """
 
     converged: bool
@@ -45,23 +45,34 @@ class Outcome:
     linear: int
     measure: float
     reason: str
+    interrupted: bool = False
 
 
 class ActiveSetSolver:
     """Bound-constrained minimisation over a system; keeps its preconditioner from solve to solve."""
 
     def __init__(
-        self, system: System, settings: LinearSettings, timer: Timer, progress: Progress | None = None
+        self,
+        system: System,
+        settings: LinearSettings,
+        timer: Timer,
+        interrupted: Callable[[], bool] = lambda: False,
     ) -> None:
         self.system, self.settings, self.timer = system, settings, timer
         self.held = HeldPreconditioner(system, settings, timer)
-        self.progress = progress
+        self.interrupted = interrupted
+        self.progress: Progress | None = None
         self._residual = system.load.duplicate()
 
     def destroy(self) -> None:
         """Free the PETSc objects."""
         self.held.destroy()
         self._residual.destroy()
+
+    def in_contact(self, x: PETSc.Vec) -> int:
+        """Vertices on a bound of the scene. Collective."""
+        u, lower, upper = x.array_r, self.system.lower.array_r, self.system.upper.array_r
+        return int(self.system.comm.allreduce(int(np.count_nonzero((u <= lower) | (u >= upper)))))
 
     def measure(self, x: PETSc.Vec, residual: PETSc.Vec, lower: PETSc.Vec, upper: PETSc.Vec) -> float:
         """The residual of the inequality over its scale: at most ``tolerance`` when solved. Collective.
@@ -119,7 +130,9 @@ class ActiveSetSolver:
             finally:
                 run.forget(snes)
             reason = _REASON.get(int(run.reason), str(run.reason))
-            return Outcome(run.last <= tolerance, run.iterations, run.linear, run.last, reason)
+            if run.stopped:
+                reason = "interrupted"
+            return Outcome(run.last <= tolerance, run.iterations, run.linear, run.last, reason, run.stopped)
 
 
 class _Run:
@@ -131,7 +144,7 @@ class _Run:
         self.owner, self.models, self.tolerance = owner, models, tolerance
         self.lower, self.upper = lower, upper
         self.last, self.linear, self.iterations, self.reason = float("inf"), 0, 0, 0
-        self._stalled = 0
+        self._stalled, self.stopped = 0, False
 
     def create(self, line_search: str, max_iterations: int) -> PETSc.SNES:
         """The configured SNES."""
@@ -175,8 +188,10 @@ class _Run:
             self.owner.held.report(snes.getKSP().getIterationNumber())
         previous, self.last = self.last, self.owner.measure(x, f, self.lower, self.upper)
         if self.owner.progress:
-            active = int(np.count_nonzero(x.array_r <= self.lower.array_r + _ON_BOUND))
-            self.owner.progress(iteration, self.last, active)
+            self.owner.progress(iteration, self.last, self.owner.in_contact(x))
+        self.stopped = self.owner.interrupted()
+        if self.stopped:
+            return PETSc.SNES.ConvergedReason.DIVERGED_FUNCTION_COUNT
         if not np.isfinite(self.last) or x.norm(PETSc.NormType.INFINITY) > _RUNAWAY:
             return PETSc.SNES.ConvergedReason.DIVERGED_FNORM_NAN
         if self.last <= self.tolerance:

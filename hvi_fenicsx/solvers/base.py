@@ -15,7 +15,7 @@ from .activeset import ActiveSetSolver
 from .models import Resting
 
 Progress = Callable[[str, float | None, int, float, int], None]
-"""Called with the stage's name, ε, iteration, residual and (this rank's) vertices in contact."""
+"""Called with the stage's name, ε, iteration, residual and vertices in contact."""
 
 
 def silent(stage: str, epsilon: float | None, iteration: int, residual: float, contact: int) -> None:
@@ -53,6 +53,7 @@ class Solved:
     Attributes:
         u: the displacement in units of u0, ghosts updated. method: its name. converged: by the method's own test.
         reason: in words. counts: iterations. energies: after each convex step, nondimensional.
+        interrupted: whether it ended because it was told to.
     """
 
     u: fem.Function
@@ -61,6 +62,7 @@ class Solved:
     reason: str
     counts: Counts = field(default_factory=Counts)
     energies: tuple[float, ...] = ()
+    interrupted: bool = False
 
 
 def held_dofs(system: System) -> npt.NDArray[np.int32]:

@@ -135,9 +135,10 @@ class BranchIteration:
             )
             self.counts.newton += outcome.newton
             self.counts.linear += outcome.linear
-            if outcome.converged:
+            if outcome.converged or outcome.interrupted:
                 break
             kept.copy(x)
+        kept.destroy()
         return outcome
 
     def _accelerated(self, x: PETSc.Vec, cells: list[Cells], outcome: Outcome) -> tuple[Outcome, bool]:
@@ -197,4 +198,4 @@ class BranchIteration:
         u.x.array[: x.local_size] = x.array_r
         u.x.scatter_forward()
         reason = "stationary" if outcome.converged else outcome.reason
-        return Solved(u, self.name, outcome.converged, reason, self.counts, tuple(self.energies))
+        return Solved(u, self.name, outcome.converged, reason, self.counts, tuple(self.energies), outcome.interrupted)

@@ -1,0 +1,26 @@
+"""Versions of everything a result depends on."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import platform
+import sys
+
+from . import __version__
+
+_MODULES = ("numpy", "scipy", "pydantic", "mpi4py", "pyvista", "matplotlib", "gmsh")
+
+
+def versions() -> dict[str, str]:
+    """By name; "absent" for what is not installed."""
+    from .compat import VERSION, petsc_version
+
+    found = {"hvi_fenicsx": __version__, "python": platform.python_version(), "dolfinx": VERSION, "petsc": petsc_version()}
+    return {**found, **{name: _version(name) for name in _MODULES}, "platform": sys.platform}
+
+
+def _version(name: str) -> str:
+    try:
+        return importlib.metadata.version(name)
+    except importlib.metadata.PackageNotFoundError:
+        return "absent"
