@@ -31,11 +31,11 @@ class Certificate:
         penetration: largest violation of a bound, over the largest displacement.
         tension: largest contact traction of the wrong sign, over the load's stress.
         complementarity: largest min(gap over the largest displacement, contact traction over the load's stress).
-        inclusion: largest distance of -σ_t (σ_n of a normal law) from ∂j, over the law's traction scale (not less than a
-            thousandth of the load's stress), for the law that was solved.
+        inclusion: largest distance of -σ_t (σ_n of a normal law) from ∂j, over the law's traction scale (not less than
+            a thousandth of the load's stress), for the law that was solved.
         inclusion_true: the same for the unsmoothed law.
-        second_order: ``local minimiser``, ``not a minimiser`` (a vertex on a concave kink: moving it off lowers the energy)
-            or ``undecided`` (a law with negative curvature).
+        second_order: ``local minimiser``, ``not a minimiser`` (a vertex on a concave kink: moving it off lowers the
+            energy) or ``undecided`` (a law with negative curvature).
         tolerance, passed: what was asked for, and whether all but ``inclusion_true`` are within it.
     """
 
@@ -89,8 +89,9 @@ def examine(problem: Problem, u: fem.Function, tolerance: float) -> Examined:
     }
     passed = all(np.isfinite(v) and v <= tolerance for v in entries.values())
     true, error = (largest(comm, value) for value in _inclusion_true(states))
-    certificate = Certificate(**entries, inclusion_true=true, second_order=_second_order(comm, states),
-                              tolerance=tolerance, passed=passed)
+    certificate = Certificate(
+        **entries, inclusion_true=true, second_order=_second_order(comm, states), tolerance=tolerance, passed=passed
+    )
     return Examined(certificate, _energy(problem, u, forces, states), forces, states, error)
 
 
@@ -98,7 +99,11 @@ def _energy(problem: Problem, u: fem.Function, forces: Forces, states: Sequence[
     """½u·(Au) - b·u = ½u·(reaction - load), plus the laws. Collective."""
     values = u.x.array[: forces.load.size]
     elastic = 0.5 * float(values @ (forces.reaction - forces.load).ravel())
-    laws = sum(float(np.sum(s.surface.weights * t.law.value(a))) for s in states for t, a in zip(s.terms, s.arguments))
+    laws = sum(
+        float(np.sum(s.surface.weights * t.law.value(a)))
+        for s in states
+        for t, a in zip(s.terms, s.arguments, strict=True)
+    )
     return total(problem.domain.mesh.comm, elastic + laws)
 
 

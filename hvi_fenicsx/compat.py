@@ -26,7 +26,7 @@ def geometry_dofmap(mesh: _mesh.Mesh) -> npt.NDArray[np.int32]:
 
 def mesh_from_gmsh(model: Any, comm: Any, rank: int, dimension: int) -> tuple[Any, Any, Any]:
     """Mesh, cell tags and facet tags of the gmsh model open on ``rank``. Collective."""
-    return tuple(gmsh_io.model_to_mesh(model, comm, rank, gdim=dimension)[:3])  # type: ignore[return-value]
+    return tuple(gmsh_io.model_to_mesh(model, comm, rank, gdim=dimension)[:3])
 
 
 def submesh_nodes(mesh: _mesh.Mesh, dimension: int, entities: npt.NDArray[np.int32]) -> tuple[Any, Any]:

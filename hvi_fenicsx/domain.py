@@ -64,9 +64,7 @@ class Domain:
         """
         for name in names:
             if name not in self.sides:
-                raise InputError(
-                    f"the domain has no boundary part {name!r}; it has {', '.join(sorted(self.sides))}"
-                )
+                raise InputError(f"the domain has no boundary part {name!r}; it has {', '.join(sorted(self.sides))}")
         return np.unique(np.concatenate([self.sides[name] for name in names])).astype(np.int32)
 
     def cells(self, names: Sequence[str]) -> Facets:
@@ -98,9 +96,7 @@ def rectangle(comm: MPI.Comm, size: Sequence[float], cells: Sequence[int]) -> Do
 def box(comm: MPI.Comm, size: Sequence[float], cells: Sequence[int]) -> Domain:
     """[0, size] cut into tetrahedra (``create_box``). Collective."""
     corners = [np.zeros(3), np.asarray(size, dtype=float)]
-    mesh = dmesh.create_box(
-        comm, corners, list(cells), dmesh.CellType.tetrahedron, ghost_mode=dmesh.GhostMode.none
-    )
+    mesh = dmesh.create_box(comm, corners, list(cells), dmesh.CellType.tetrahedron, ghost_mode=dmesh.GhostMode.none)
     return _box_domain(mesh, np.asarray(size, dtype=float))
 
 

@@ -18,7 +18,7 @@ Array = npt.NDArray[np.float64]
 def body_of(problem: Problem) -> Body:
     """The body, with lengths in units of L."""
     length = problem.scales.length
-    return Body(problem.scales.dimension, problem.domain.centre / length, length)
+    return Body(problem.scales.dimension, np.asarray(problem.domain.centre / length), length)
 
 
 def solvability(problem: Problem, forces: Mapping[str, PETSc.Vec]) -> Solvability:
@@ -44,7 +44,7 @@ def _bilateral(bounds: Bounds) -> bool:
 
 
 def _scaled(problem: Problem, points: Array) -> Array:
-    return points / problem.scales.length
+    return np.asarray(points / problem.scales.length)
 
 
 def _direction(problem: Problem, points: Array, directions: Array) -> Fixed:

@@ -250,7 +250,7 @@ def _check_power(op: ast.operator, exponent: ast.expr, text: str) -> None:
 def _render(node: ast.expr, x: Any, algebra: Algebra) -> Any:
     match node:
         case ast.Constant(value=value):
-            return algebra.number(float(value))  # type: ignore[arg-type]
+            return algebra.number(float(value))
         case ast.Name(id=name):
             return algebra.number(CONSTANTS[name]) if name in CONSTANTS else _coordinate(name, x, algebra)
         case ast.BinOp(left=left, op=ast.Pow(), right=ast.Constant(value=int() as power)):

@@ -57,7 +57,7 @@ class LawTerm:
         return float(np.sum(self.surface.weights * self.law.value(self.argument(u))))
 
     def set_traction(self, u: Array, derivative: Array, rate_times: Array) -> None:
-        """τ from the law's derivative (m,) at u, less K·u for the K in force (m, d, d); ghosts are updated. Collective."""
+        """τ from the law's derivative (m,) at u, less K·u for the K (m, d, d) in force; ghosts updated. Collective."""
         tau = self._vector(u, derivative) * self.free - np.einsum("mij,mj->mi", rate_times, self.surface.values(u))
         self.density.x.array.reshape(-1, tau.shape[1])[self.surface.blocks] = tau
         self.density.x.scatter_forward()

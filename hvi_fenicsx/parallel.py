@@ -30,7 +30,7 @@ def together(comm: MPI.Comm, action: Callable[[], T]) -> T:
     except HviError as caught:
         error = caught
     _raise_first(agree(comm, error))
-    return result  # type: ignore[no-any-return]
+    return result
 
 
 def on_root(comm: MPI.Comm, action: Callable[[], T]) -> T:
@@ -48,7 +48,7 @@ def on_root(comm: MPI.Comm, action: Callable[[], T]) -> T:
             error = caught
     error, result = comm.bcast((error, result), root=0)
     _raise_first([error])
-    return result  # type: ignore[no-any-return]
+    return result
 
 
 def _raise_first(errors: list[HviError | None]) -> None:

@@ -24,8 +24,8 @@ from .domain import Domain
 from .effects.base import BoundaryLaw, Condition, Contribution, Direction, Effect, NormalBounds, Place
 from .errors import InputError
 from .expressions import Formula, ufl_algebra
-from .lawterm import LawTerm
 from .laws import Superpotential
+from .lawterm import LawTerm
 from .parallel import agree
 from .scales import Placed, Scales
 from .surface import Surface
@@ -109,7 +109,7 @@ class Stage:
         return _Scaled(self.number(self.length ** (1 - self.dimension)), self.boundary(part))
 
     def boundary(self, part: str, **metadata: Any) -> Any:
-        """ds over a part, SI."""
+        """Ds over a part, SI."""
         tags, ids = self._facet_tags
         measure = ufl.Measure("ds", domain=self.domain.mesh, subdomain_data=tags, metadata=metadata)
         return measure(ids[part])
@@ -210,10 +210,7 @@ def _sum(
     bounds = [_bounds(surfaces[w], b, scales) for w, _, c in made if w is not None for b in c.bounds]
     _check_compatible(stage, bounds, conditions, fixed)
     terms = [
-        _term(stage, surfaces[w], law, modify, scales, fixed)
-        for w, _, c in made
-        if w is not None
-        for law in c.laws
+        _term(stage, surfaces[w], law, modify, scales, fixed) for w, _, c in made if w is not None for law in c.laws
     ]
     bilinear = [form for _, _, c in made for form in c.bilinear]
     linear = {f"{w or 'body'}.{e.key}": sum(c.linear) for w, e, c in made if c.linear}
@@ -256,7 +253,7 @@ def _bounds(where: Surface, bounds: NormalBounds, scales: Scales) -> Bounds:
     def value(formula: Formula | None) -> Array:
         if formula is None:
             return np.full(len(where.blocks), np.inf)
-        return formula.at(where.points) / scales.displacement
+        return np.asarray(formula.at(where.points) / scales.displacement)
 
     # lower ≤ -u·n ≤ upper
     return Bounds(where, -value(bounds.upper), -value(bounds.lower) if bounds.lower else value(None))
@@ -302,7 +299,9 @@ def _term(
     ds = _Scaled(stage.number(stage.length ** (1 - stage.dimension)), stage.boundary(where.part, **_VERTEX))
     residual = ufl.inner(density, stage.test) * ds
     tangent = ufl.inner(ufl.dot(rates, stage.trial), stage.test) * ds
-    return LawTerm(where, law.direction, solved, exact, directions, free, density, rates, fem.form(residual), fem.form(tangent))
+    return LawTerm(
+        where, law.direction, solved, exact, directions, free, density, rates, fem.form(residual), fem.form(tangent)
+    )
 
 
 __all__ = ["Bounds", "Place", "Problem", "compose"]

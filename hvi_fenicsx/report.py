@@ -66,8 +66,8 @@ def outcome(solution: Solution) -> Iterator[str]:
     energy = solution.examined.energy * solution.problem.scales.energy
     unit = "J/m" if solution.problem.scales.dimension == 2 else "J"
     yield (
-        f"energy {energy:.10g} {unit}; {counts.branch} branch steps, {counts.newton} Newton steps, {counts.linear} linear "
-        f"iterations, {solution.timer.seconds['setup'] + solution.timer.seconds['solve']:.2f} s"
+        f"energy {energy:.10g} {unit}; {counts.branch} branch steps, {counts.newton} Newton steps, {counts.linear} "
+        f"linear iterations, {solution.timer.seconds['setup'] + solution.timer.seconds['solve']:.2f} s"
     )
 
 

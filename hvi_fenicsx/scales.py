@@ -41,9 +41,7 @@ Placed = tuple[str | None, Effect]
 """An effect with where it acts: a boundary part, a region, or None for the whole body."""
 
 
-def choose(
-    length: float, dimension: int, effects: Sequence[Placed], evaluate: Callable[[Placed], Evaluate]
-) -> Scales:
+def choose(length: float, dimension: int, effects: Sequence[Placed], evaluate: Callable[[Placed], Evaluate]) -> Scales:
     """The scales of a scene. Collective where ``evaluate`` is.
 
     The stress scale is the largest load; without one, that of the largest other driving effect (prescribed

@@ -1,4 +1,4 @@
-"""From a scene to a certified solution: the one direction of flow (scene, domain, problem, existence, solve, certificate)."""
+"""From a scene to a certified solution: domain, problem, existence, solve, certificate, in one direction."""
 
 from __future__ import annotations
 

@@ -26,7 +26,7 @@ class Surface:
     """The vertices of one boundary part that this rank owns (m of them).
 
     Attributes:
-        part: name. facets: its local facets. blocks: local vertex (block) indices, shape (m,). points: SI, shape (m, 3).
+        part: name. facets: its local facets. blocks: local vertex (block) indices (m,). points: SI (m, 3).
         normals: outward unit, shape (m, d). tangents: shape (m, d-1, d), by design.md's rule.
         weights: lumped area of each vertex over L^(d-1), shape (m,).
     """
@@ -79,7 +79,7 @@ def _assembled(density: Any, space: fem.FunctionSpace, measure: Any) -> Array:
 
 
 def _check_axis_parallel(part: str, comm: Any, normals: Array, points: Array) -> None:
-    slanted = np.flatnonzero(np.max(np.abs(normals), axis=1, initial=0.0) < 1 - 1e-8) if len(normals) else []
+    slanted = np.flatnonzero(np.max(np.abs(normals), axis=1, initial=0.0) < 1 - 1e-8)
     bad = [tuple(float(c) for c in points[i]) for i in slanted[:1]]
     found = [b for rank in agree(comm, bad) for b in rank]
     if found:

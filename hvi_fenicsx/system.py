@@ -138,10 +138,10 @@ class System:
     def drift(self, rates: Sequence[Array]) -> float:
         """Largest nodal stiffness (an elastic one is about 1) by which this rank's K differs from ``rates``."""
         changes = (
-            np.max(np.abs(new - old) * term.surface.weights[:, None, None], initial=0.0)
+            float(np.max(np.abs(new - old) * term.surface.weights[:, None, None], initial=0.0))
             for term, new, old in zip(self.terms, self._rates, rates, strict=True)
         )
-        return float(max(changes, default=0.0))
+        return max(changes, default=0.0)
 
     def residual(self, x: PETSc.Vec, out: PETSc.Vec, models: Sequence[Model]) -> None:
         """J u - b + W (τ(u) - K u) into ``out``, which must have ghosts. Collective."""

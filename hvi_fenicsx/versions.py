@@ -15,7 +15,12 @@ def versions() -> dict[str, str]:
     """By name; "absent" for what is not installed."""
     from .compat import VERSION, petsc_version
 
-    found = {"hvi_fenicsx": __version__, "python": platform.python_version(), "dolfinx": VERSION, "petsc": petsc_version()}
+    found = {
+        "hvi_fenicsx": __version__,
+        "python": platform.python_version(),
+        "dolfinx": VERSION,
+        "petsc": petsc_version(),
+    }
     return {**found, **{name: _version(name) for name in _MODULES}, "platform": sys.platform}
 
 

@@ -186,9 +186,7 @@ def test_what_is_no_number(value: Any) -> None:
 
 
 @settings(max_examples=500, deadline=None)
-@given(
-    st.text(alphabet="xyzpi0123456789.e+-*/() ,<>=ifelsanbdlmr_[]:'\n\\", max_size=40) | st.text(max_size=20)
-)
+@given(st.text(alphabet="xyzpi0123456789.e+-*/() ,<>=ifelsanbdlmr_[]:'\n\\", max_size=40) | st.text(max_size=20))
 def test_any_text_is_a_formula_or_refused(source: str) -> None:
     try:
         formula = Formula(source)

@@ -81,9 +81,7 @@ def graphs(draw: st.DrawFn) -> laws.Graph:
 
 def around(law: Superpotential) -> np.ndarray:
     """Displacements on both sides, on every kink, close to the kinks and far out."""
-    spread = law.length_scale * np.concatenate(
-        [[0.0], np.geomspace(1e-3, 1e3, 61), np.linspace(0.05, 8.3, 83)]
-    )
+    spread = law.length_scale * np.concatenate([[0.0], np.geomspace(1e-3, 1e3, 61), np.linspace(0.05, 8.3, 83)])
     near = law.kinks[:, None] + 1e-3 * law.length_scale * np.array([-1.0, 0.0, 1.0])
     return np.unique(np.concatenate([spread, -spread, near.ravel()]))
 
@@ -267,9 +265,7 @@ def test_model_law_is_the_papers_minimum() -> None:
     np.testing.assert_allclose(MODEL.value(x), expected, rtol=1e-12, atol=1e-18)
     assert MODEL.energy_scale == pytest.approx(GAMMA2 * DELTA)
     assert MODEL.length_scale == DELTA
-    np.testing.assert_array_equal(
-        MODEL.branch(np.array([-2, -1, -0.5, 0, 0.5, 1, 2]) * DELTA), [1, -1, 0, 0, 0, -1, 1]
-    )
+    np.testing.assert_array_equal(MODEL.branch(np.array([-2, -1, -0.5, 0, 0.5, 1, 2]) * DELTA), [1, -1, 0, 0, 0, -1, 1])
     assert MODEL.convex.kinks.size == 0
     np.testing.assert_array_equal(MODEL.concave.kinks, [-DELTA, DELTA])
     np.testing.assert_allclose(MODEL.convex.right(x), GAMMA1 / DELTA * np.clip(x, -DELTA, DELTA), rtol=1e-12)
@@ -438,9 +434,4 @@ def test_scales_of_a_sampled_law_are_not_those_of_its_samples() -> None:
 def test_empty_arrays_are_fine() -> None:
     nothing = np.empty(0)
     for law in LAWS.values():
-        assert (
-            law.value(nothing).shape
-            == law.branch(nothing, 1.0).shape
-            == law.interval(nothing, 1.0)[0].shape
-            == (0,)
-        )
+        assert law.value(nothing).shape == law.branch(nothing, 1.0).shape == law.interval(nothing, 1.0)[0].shape == (0,)

@@ -74,9 +74,7 @@ def floor_2d(
     return ContactCone(points, normals), Resistance(points, weights, tangents, growth, peak, c4)
 
 
-def floor_3d(
-    cells: int, growth: float, peak: float, a: float = 1.0, b: float = 1.0
-) -> tuple[ContactCone, Resistance]:
+def floor_3d(cells: int, growth: float, peak: float, a: float = 1.0, b: float = 1.0) -> tuple[ContactCone, Resistance]:
     """The floor [0, a] × [0, b] at z = 0 with a law of the length of the slip."""
     x, wx = edge((0.0, 0.0), (a, 0.0), cells)
     y, wy = edge((0.0, 0.0), (0.0, b), cells)
@@ -256,9 +254,7 @@ def test_an_adhesive_strip_peels_about_its_far_end() -> None:
     body = Body(2, np.array([0.5, 0.0, 0.0]))
     points, weights = edge((0.0, 0.0), (1.0, 0.0), 10)
     contact, friction = floor_2d(10, even(50.0), even(50.0))
-    glue = Resistance(
-        points, weights, np.tile([[0.0, 1.0]], (11, 1, 1)), Directional(0.0, 0.6), Directional(0.0, 0.9)
-    )
+    glue = Resistance(points, weights, np.tile([[0.0, 1.0]], (11, 1, 1)), Directional(0.0, 0.6), Directional(0.0, 0.9))
     loads = {"pull": force(body, (1.0, 0.0, 0.0), (0.0, 1.0))}
     factors = load_factors(ALONE, RigidProblem(body, loads, (), (contact,), (friction, glue)))
     assert (factors.held, factors.peak) == (pytest.approx(0.3, abs=1e-9), pytest.approx(0.45, abs=1e-9))
@@ -316,9 +312,7 @@ def test_the_literal_law_pushes_the_body_to_the_left() -> None:
 def test_a_growth_that_is_not_convex_is_never_called_held_unless_it_can_be() -> None:
     """Falling below zero both ways: along one motion exact, else an upper bound that is not trusted."""
     points, weights = edge((0.0, 0.0), (0.0, 1.0), 4)
-    law = Resistance(
-        points, weights, np.tile([[0.0, 1.0]], (5, 1, 1)), Directional(-0.7, 0.2), Directional(0.0, 0.4)
-    )
+    law = Resistance(points, weights, np.tile([[0.0, 1.0]], (5, 1, 1)), Directional(-0.7, 0.2), Directional(0.0, 0.4))
     verdict = analyse(ALONE, wall(1.0, (law,)))
     assert verdict.exact
     assert (verdict.state, verdict.margin) == ("held", pytest.approx(1.2, abs=1e-12))
@@ -528,9 +522,7 @@ def test_no_sampled_motion_is_worse_than_the_margin(seed: int) -> None:
     values = 0.8 * np.linalg.norm(slip, axis=2) @ part.weights - trials @ g
     assert verdict.margin is not None
     assert values.min() >= verdict.margin - 1e-9
-    assert verdict.state == (
-        "held" if verdict.margin > 0 else "metastable" if verdict.lambda_peak > 1 else "escapes"
-    )
+    assert verdict.state == ("held" if verdict.margin > 0 else "metastable" if verdict.lambda_peak > 1 else "escapes")
     assert (verdict.lambda_held > 1.0) == (verdict.margin > 0.0)
 
 
@@ -664,8 +656,7 @@ def share(problem: RigidProblem, rank: int, size: int) -> RigidProblem:
 def verdicts(comm: MPI.Comm) -> dict[str, object]:
     parts = {name: share(problem, comm.rank, comm.size) for name, problem in scenes().items()}
     return {
-        name: {**analyse(comm, part).summary(), "push": load_factors(comm, part).peak}
-        for name, part in parts.items()
+        name: {**analyse(comm, part).summary(), "push": load_factors(comm, part).peak} for name, part in parts.items()
     }
 
 

@@ -148,8 +148,7 @@ REFUSED = {
     "shape": (
         '"rectangle"',
         '"rectangel"',
-        's.toml:3: domain.shape: unknown shape "rectangel"; did you mean "rectangle"? allowed: '
-        "rectangle, box, file",
+        's.toml:3: domain.shape: unknown shape "rectangel"; did you mean "rectangle"? allowed: rectangle, box, file',
     ),
     "not a table": ("{ gap = 0.0 }", "0.0", "s.toml:18: boundary.floor.contact: must be a table (is 0.0)"),
     "list wanted": (
@@ -202,8 +201,7 @@ REFUSED = {
     "contact twice": (
         '[boundary.floor]\non = "bottom"',
         '[boundary.a]\non = ["top", "bottom"]\ncontact = { gap = 0 }\n[boundary.floor]\non = "bottom"',
-        's.toml:21: boundary.floor.contact: "bottom" has contact already, from boundary.a.contact; '
-        "give it once",
+        's.toml:21: boundary.floor.contact: "bottom" has contact already, from boundary.a.contact; give it once',
     ),
     "component twice": (
         'on = "right"\ntraction = [1.0e6, 0.0]',
@@ -239,8 +237,7 @@ REFUSED = {
     "paper's smoothing of another law": (
         FRICTION,
         'law = "tresca", yield_traction = 1e3',
-        's.toml:21: solver.smoothing: "paper" is made for law = "quadratic_linear", not for '
-        '"tresca"; use "quadratic"',
+        's.toml:21: solver.smoothing: "paper" is made for law = "quadratic_linear", not for "tresca"; use "quadratic"',
     ),
     "exact method with smoothing": (
         "[solver]",
@@ -436,9 +433,7 @@ def test_a_scene_from_python() -> None:
     scene = Scene(
         domain=Rectangle(size=(1.0, 1.0), cells=(4, 4)),
         material={"model": "plane_stress", "youngs_modulus": 1.0, "poisson_ratio": 0.0},
-        boundary={
-            "floor": Boundary(on="bottom", contact=Contact.model_validate({"gap": 0.0}), friction=friction)
-        },
+        boundary={"floor": Boundary(on="bottom", contact=Contact.model_validate({"gap": 0.0}), friction=friction)},
     )
     assert scene.dimension == 2
     assert [(p.place, p.where, p.effect.key) for p in scene.effects()] == [
@@ -477,9 +472,7 @@ def test_a_new_effect_is_a_key_at_once(glue: type[Effect], write: Callable[..., 
     scene = read_scene(write(text))
     assert scene.boundary["floor"].effects[0] == glue.model_validate({"strength": 2})
     assert read_scene(write(dump_scene(scene), "again.toml")) == scene
-    assert "boundary.floor.glue.strength: must be a number" in message(
-        write(text.replace("= 2 }", '= "2" }'))
-    )
+    assert "boundary.floor.glue.strength: must be a number" in message(write(text.replace("= 2 }", '= "2" }')))
 
 
 def test_lines_are_found_in_every_way_of_writing() -> None:

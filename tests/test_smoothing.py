@@ -25,9 +25,7 @@ LAWS: dict[str, Superpotential] = {
     "spring": laws.LinearSpring(1e8),
     "sawtooth": laws.Sawtooth(1e3, 200.0, 2e-6, 5),
     "exponential": laws.Exponential(1e3, 300.0, 5e-6),
-    "graph": laws.Graph(
-        ((0.0, 2.0), (1e-6, 5.0), (1e-6, -3.0), (2e-6, -4.0), (3e-6, 1.0), (3e-6, 6.0), (5e-6, 0.5))
-    ),
+    "graph": laws.Graph(((0.0, 2.0), (1e-6, 5.0), (1e-6, -3.0), (2e-6, -4.0), (3e-6, 1.0), (3e-6, 6.0), (5e-6, 0.5))),
     "one-sided": laws.Graph(((0.0, 0.0), (1e-6, 5.0), (1e-6, 1.0), (2e-6, 1.0), (2e-6, 4.0)), one_sided=True),
     "scaled": ScaledLaw(MODEL, 3e-6, 7.0),
 }
@@ -38,9 +36,7 @@ each_epsilon = pytest.mark.parametrize("epsilon", [1e-12, 1e-6, 1e-2, 1.0, 1e3])
 
 def around(law: Superpotential, width: float = 1e-3) -> np.ndarray:
     """Displacements on both sides, on every kink, at `width` length scales from them, and far out."""
-    spread = law.length_scale * np.concatenate(
-        [[0.0], np.geomspace(1e-3, 1e3, 61), np.linspace(0.05, 8.3, 83)]
-    )
+    spread = law.length_scale * np.concatenate([[0.0], np.geomspace(1e-3, 1e3, 61), np.linspace(0.05, 8.3, 83)])
     near = law.kinks[:, None] + width * law.length_scale * np.linspace(-1.0, 1.0, 41)
     return np.unique(np.concatenate([spread, -spread, near.ravel()]))
 
@@ -114,9 +110,7 @@ def test_error_bound(law: Superpotential, plus: PlusFunction, epsilon: float) ->
     st.floats(-12, 3),
     st.floats(-1e3, 1e3),
 )
-def test_error_bound_at_random(
-    law: Superpotential, plus: PlusFunction, exponent: float, place: float
-) -> None:
+def test_error_bound_at_random(law: Superpotential, plus: PlusFunction, exponent: float, place: float) -> None:
     smooth = SmoothedLaw.relative(law, 10.0**exponent, plus)
     x = np.append(place * law.length_scale, law.kinks + place * 10.0**exponent * law.length_scale)
     error = np.abs(smooth.value(x) - law.value(x))
@@ -214,9 +208,7 @@ def test_the_quadratic_smoothing_leaves_the_law_alone_away_from_the_drop() -> No
 @pytest.mark.parametrize("absolute", [1e-300, 1e-12, 1.0, 1e3, 1e300])
 def test_no_overflow(law: Superpotential, plus: PlusFunction, absolute: float) -> None:
     smooth = SmoothedLaw(law, absolute, plus)
-    x = np.concatenate(
-        [[0.0], law.kinks, np.geomspace(1e-300, 1e300, 200), -np.geomspace(1e-300, 1e300, 200)]
-    )
+    x = np.concatenate([[0.0], law.kinks, np.geomspace(1e-300, 1e300, 200), -np.geomspace(1e-300, 1e300, 200)])
     if isinstance(law, ScaledLaw):
         x = x[np.abs(x) < 1e290]
     with np.errstate(over="raise", invalid="raise", divide="raise"):

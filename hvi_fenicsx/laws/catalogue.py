@@ -227,9 +227,7 @@ def _checked_points(law: str, points: Sequence[Sequence[float]]) -> tuple[tuple[
 def _check_segment(law: str, before: tuple[float, float], after: tuple[float, float]) -> None:
     step = after[0] - before[0]
     if step < 0.0:
-        raise InputError(
-            f"law {law!r}: the displacement falls from {before[0]!r} to {after[0]!r}; order the points"
-        )
+        raise InputError(f"law {law!r}: the displacement falls from {before[0]!r} to {after[0]!r}; order the points")
     if step > 0.0 and not math.isfinite((after[1] - before[1]) / step):
         raise InputError(
             f"law {law!r}: the segment from {before!r} to {after!r} is too steep for a float; "

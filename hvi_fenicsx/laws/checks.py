@@ -20,9 +20,7 @@ def require_positive(law: str, **parameters: object) -> None:
     require_number(law, **parameters)
     for key, value in parameters.items():
         if not float(value) > 0.0:  # type: ignore[arg-type]
-            raise InputError(
-                f"law {law!r}: {key} = {value!r} must be > 0; give its magnitude, in the scene's units"
-            )
+            raise InputError(f"law {law!r}: {key} = {value!r} must be > 0; give its magnitude, in the scene's units")
 
 
 def require_ordered(law: str, **parameters: float) -> None:

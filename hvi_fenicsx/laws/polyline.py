@@ -176,9 +176,7 @@ class PolylineLaw(Superpotential):
         inside = np.abs(g.breaks) <= a
         ends = np.array([-a, a])
         return float(
-            np.max(
-                np.abs(np.concatenate([g.left[inside], g.right[inside], self.left(ends), self.right(ends)]))
-            )
+            np.max(np.abs(np.concatenate([g.left[inside], g.right[inside], self.left(ends), self.right(ends)])))
         )
 
 

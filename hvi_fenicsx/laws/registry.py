@@ -29,9 +29,7 @@ def create(name: str, parameters: Mapping[str, Any]) -> Superpotential:
     """
     law = registered().get(name)
     if law is None:
-        raise InputError(
-            f"unknown law {name!r}{_closest(name, available())}; available: {', '.join(available())}"
-        )
+        raise InputError(f"unknown law {name!r}{_closest(name, available())}; available: {', '.join(available())}")
     allowed = inspect.signature(law).parameters
     _check_keys(name, parameters, allowed)
     return law(**_checked(law, parameters, allowed))

@@ -41,16 +41,12 @@ class SampledLaw(PolylineLaw):
 
     @override
     def build(self) -> TractionGraph:
-        return TractionGraph.from_points(
-            sample_traction(self.traction, self.ends(), self.samples), self.one_sided
-        )
+        return TractionGraph.from_points(sample_traction(self.traction, self.ends(), self.samples), self.one_sided)
 
     def piece(self, x: FloatArray) -> IntArray:
         """Number (m,) of ends between 0 and x."""
         slip = np.maximum(x, 0.0) if self.one_sided else np.abs(x)
-        return np.asarray(
-            np.searchsorted(np.asarray(self.ends(), dtype=float), slip, side="right"), dtype=np.int64
-        )
+        return np.asarray(np.searchsorted(np.asarray(self.ends(), dtype=float), slip, side="right"), dtype=np.int64)
 
     @property
     @override

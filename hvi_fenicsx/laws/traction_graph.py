@@ -47,9 +47,7 @@ class TractionGraph:
         )
 
     @staticmethod
-    def from_slopes(
-        breaks: FloatArray, slopes: FloatArray, jumps: FloatArray, start: FloatArray
-    ) -> TractionGraph:
+    def from_slopes(breaks: FloatArray, slopes: FloatArray, jumps: FloatArray, start: FloatArray) -> TractionGraph:
         """Graph of given slopes (k+1,) and jumps (k,), with the limits `start` = (left, right) at 0."""
         zero = int(np.searchsorted(breaks, 0.0))
         near, far = _outward(breaks[zero:], slopes[zero + 1 :], jumps[zero:], start[1])
@@ -86,9 +84,7 @@ class TractionGraph:
         """Primitive at the breaks (k,), summed outward from 0."""
         z, gaps = self.zero, np.diff(self.breaks)
         steps = (
-            np.append(self.left[1 : z + 1], self.right[z:-1])
-            * gaps
-            * np.append(-np.ones(z), np.ones(gaps.size - z))
+            np.append(self.left[1 : z + 1], self.right[z:-1]) * gaps * np.append(-np.ones(z), np.ones(gaps.size - z))
         )
         steps += 0.5 * self.slopes[1:-1] * gaps**2
         return np.concatenate([np.cumsum(steps[:z][::-1])[::-1], [0.0], np.cumsum(steps[z:])])
@@ -117,9 +113,7 @@ class TractionGraph:
         anchor = self._anchor[piece]
         d = x - self.breaks[anchor]
         with np.errstate(over="ignore"):
-            return np.asarray(
-                self._energy[anchor] + (self._start[piece] + (0.5 * self.slopes[piece]) * d) * d
-            )
+            return np.asarray(self._energy[anchor] + (self._start[piece] + (0.5 * self.slopes[piece]) * d) * d)
 
     def split(self) -> tuple[TractionGraph, TractionGraph]:
         """H' and G': rising parts and upward jumps, and falling parts and downward jumps, turned round."""
@@ -143,9 +137,7 @@ class TractionGraph:
         )
 
 
-def _outward(
-    breaks: FloatArray, slopes: FloatArray, jumps: FloatArray, start: float
-) -> tuple[FloatArray, FloatArray]:
+def _outward(breaks: FloatArray, slopes: FloatArray, jumps: FloatArray, start: float) -> tuple[FloatArray, FloatArray]:
     """Limits before and behind each break of a half-line that starts at 0 with the traction `start`."""
     near, far = np.full(breaks.size, start), np.full(breaks.size, start)
     rises = slopes[:-1] * np.diff(breaks)

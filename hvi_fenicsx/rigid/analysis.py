@@ -56,9 +56,7 @@ class Analysis:
     @cached_property
     def programme(self) -> Programme:
         """The shared cuts."""
-        return Programme(
-            self.reduced.frame, self.reduced.slips, self.reduced.load_scale + self._law_scale or 1.0
-        )
+        return Programme(self.reduced.frame, self.reduced.slips, self.reduced.load_scale + self._law_scale or 1.0)
 
     @cached_property
     def free(self) -> Array:
@@ -104,9 +102,7 @@ class Analysis:
         start, _ = self._factor(self.growth, -moved, self.work - moved)
         return LoadFactors(-start, held, peak, mode, peak_mode)
 
-    def _factor(
-        self, functionals: Iterable[Functional], moved: Array, rest: Array
-    ) -> tuple[float, Mode | None]:
+    def _factor(self, functionals: Iterable[Functional], moved: Array, rest: Array) -> tuple[float, Mode | None]:
         """The largest λ with <rest + λ moved, y> <= f(y) on all cones, and the motion that limits it."""
         best: tuple[float, Mode | None] = (np.inf, None)
         for f in (f.minus(rest) for f in functionals):
@@ -128,9 +124,7 @@ class Analysis:
             peak = self._sphere(self.peak, self.free)  # a motion that is free both ways decides nothing
         return "metastable" if peak is None or peak.value > self.tie else "borderline"
 
-    def _direction(
-        self, state: State, margin: Minimum | None, held: Mode | None, peak: Mode | None
-    ) -> Mode | None:
+    def _direction(self, state: State, margin: Minimum | None, held: Mode | None, peak: Mode | None) -> Mode | None:
         """The direction of escape: the motion that limits the load first, where load factors tell one."""
         if state == "held" or margin is None:
             return None

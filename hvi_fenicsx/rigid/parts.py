@@ -94,9 +94,7 @@ class RigidProblem:
     def __post_init__(self) -> None:
         for name, work in self.loads.items():
             if np.shape(work) != (self.body.motions,) or not np.isfinite(work).all():
-                raise InputError(
-                    f"load {name!r} wants {self.body.motions} finite numbers, one for each rigid motion"
-                )
+                raise InputError(f"load {name!r} wants {self.body.motions} finite numbers, one for each rigid motion")
 
     def conditions(self) -> tuple[Fixed, ...]:
         """The fixed conditions, and those of laws whose growth is infinite both ways (linear springs)."""
@@ -130,9 +128,7 @@ class Reduced:
             if np.isinf(side)
         ]
         linear = np.array([linear_part(law) for law in laws]) @ self.moments
-        return Functional(
-            linear, np.array([even_part(law) for law in laws]), np.vstack([self.contact, *blocked])
-        )
+        return Functional(linear, np.array([even_part(law) for law in laws]), np.vstack([self.contact, *blocked]))
 
     def slip_rows(self, p: int) -> Array:
         """The slips of part p as rows (q, k) of length one; vanishing ones are left out."""
@@ -147,19 +143,12 @@ def reduce(comm: MPI.Comm, problem: RigidProblem) -> tuple[Array, Reduced | None
         return basis, None
     normals = [_work(p.points, p.normals[:, None, :], problem.body, basis)[:, 0] for p in problem.contact]
     local = np.unique(unit_rows(np.vstack([np.zeros((0, basis.shape[1])), *normals]), TINY_ROW), axis=0)
-    slips = [
-        _work(p.points, p.directions, problem.body, basis) * p.weights[:, None, None]
-        for p in problem.resistances
-    ]
+    slips = [_work(p.points, p.directions, problem.body, basis) * p.weights[:, None, None] for p in problem.resistances]
     pieces = comm.gather((local, slips, [float(p.weights.sum()) for p in problem.resistances]), root=0)
     if pieces is None:
         return basis, None
-    integrals = tuple(
-        SlipIntegral(np.concatenate([piece[1][p] for piece in pieces])) for p in range(len(slips))
-    )
-    moments = [
-        g.rows[:, 0].sum(axis=0) if g.rows.shape[1] == 1 else np.zeros(basis.shape[1]) for g in integrals
-    ]
+    integrals = tuple(SlipIntegral(np.concatenate([piece[1][p] for piece in pieces])) for p in range(len(slips)))
+    moments = [g.rows[:, 0].sum(axis=0) if g.rows.shape[1] == 1 else np.zeros(basis.shape[1]) for g in integrals]
     works = {name: np.asarray(work) @ basis for name, work in problem.loads.items()}
     return basis, Reduced(
         frame=basis,

@@ -74,9 +74,7 @@ def _index(table: Any, step: str, place: list[str | int], assignment: str) -> st
     if isinstance(table, dict):
         return step
     if not isinstance(table, list):
-        raise InputError(
-            f"--set {assignment}: {here} is {shown(table)}, not a table; it has no {shown(step)}"
-        )
+        raise InputError(f"--set {assignment}: {here} is {shown(table)}, not a table; it has no {shown(step)}")
     allowed = [str(i) for i in range(len(table))]
     if step not in allowed:
         raise InputError(f"--set {assignment}: {here} is a list: {unknown('index', step, allowed)}")

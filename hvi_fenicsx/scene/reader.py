@@ -88,9 +88,7 @@ def _toml(file: Path, text: str) -> dict[str, Any]:
     except tomllib.TOMLDecodeError as error:
         raise InputError(_broken(file, text, str(error))) from None
     except (ValueError, RecursionError) as error:
-        reason = (
-            "is nested too deep" if isinstance(error, RecursionError) else "has a number of too many digits"
-        )
+        reason = "is nested too deep" if isinstance(error, RecursionError) else "has a number of too many digits"
         raise InputError(f"{file}: {reason}") from None
 
 
@@ -113,9 +111,7 @@ def _scene(file: Path, text: str, data: dict[str, Any], changed: Sequence[_Place
     raise InputError(_listed(file, lines_of(text), problems, changed))
 
 
-def _listed(
-    file: Path, lines: Mapping[_Place, int], problems: Iterable[Problem], changed: Sequence[_Place]
-) -> str:
+def _listed(file: Path, lines: Mapping[_Place, int], problems: Iterable[Problem], changed: Sequence[_Place]) -> str:
     found = [(Problem(tuple(s for s in p.where if s != WHOLE), p.text)) for p in problems]
     found.sort(key=lambda p: line_of(lines, p.where) or 0)
     texts = [f"{_where(file, lines, p.where, changed)}: {p.text}" for p in found]

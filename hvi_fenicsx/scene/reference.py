@@ -97,9 +97,7 @@ def _row(name: str, field: FieldInfo) -> str:
 def _limits(field: FieldInfo) -> str:
     signs = {"gt": ">", "ge": "≥", "lt": "<", "le": "≤"}
     found = [(sign, getattr(m, key, None)) for m in field.metadata for key, sign in signs.items()]
-    return ", ".join(
-        f"{sign} {limit:g}" for sign, limit in found if limit is not None and math.isfinite(limit)
-    )
+    return ", ".join(f"{sign} {limit:g}" for sign, limit in found if limit is not None and math.isfinite(limit))
 
 
 def _choices(field: FieldInfo) -> str:

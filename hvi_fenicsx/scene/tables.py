@@ -35,9 +35,7 @@ class Problem(NamedTuple):
 def refuse(problems: Iterable[Problem]) -> ValidationError:
     """The problems as pydantic's own error, which keeps each one's place when tables are nested."""
     details = [
-        InitErrorDetails(
-            type=PydanticCustomError("scene", "{text}", {"text": p.text}), loc=p.where, input=None
-        )
+        InitErrorDetails(type=PydanticCustomError("scene", "{text}", {"text": p.text}), loc=p.where, input=None)
         for p in problems
     ]
     return ValidationError.from_exception_data("scene", details)

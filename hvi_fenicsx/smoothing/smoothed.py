@@ -168,6 +168,4 @@ class SmoothedLaw(Superpotential, register=False):
 
     @override
     def scaled(self, length: float, traction: float) -> Superpotential:
-        return SmoothedLaw(
-            self.law.scaled(length, traction), self.epsilon_absolute / (length * traction), self.plus
-        )
+        return SmoothedLaw(self.law.scaled(length, traction), self.epsilon_absolute / (length * traction), self.plus)

@@ -31,9 +31,7 @@ class Method(Protocol):
 METHODS: Mapping[str, type[Method]] = {"auto": BranchIteration, "branch": BranchIteration, "snes_vi": BranchIteration}
 
 
-def create(
-    wanted: Solver, system: System, timer: Timer, progress: Progress, interrupted: Callable[[], bool]
-) -> Method:
+def create(wanted: Solver, system: System, timer: Timer, progress: Progress, interrupted: Callable[[], bool]) -> Method:
     """The method of a scene's solver table, ready to solve.
 
     Raises:

@@ -1,7 +1,7 @@
 """One smooth, bound-constrained solve by PETSc's reduced-space active-set Newton method (SNES VI, ``vinewtonrsls``).
 
-What the plain recipe lacks (solver-notes.md) is here: a convergence test on the residual of the inequality, an energy as
-merit function, and a preconditioner that works at full size.
+What the plain recipe lacks (solver-notes.md) is here: a convergence test on the residual of the inequality, an energy
+as merit function, and a preconditioner that works at full size.
 """
 
 from __future__ import annotations
@@ -209,7 +209,7 @@ class _ReducedPC:
         self._snes, self._held = snes, held
         self._inactive: PETSc.IS | None = None
 
-    def setUp(self, pc: PETSc.PC) -> None:  # noqa: N802 - PETSc's name
+    def setUp(self, pc: PETSc.PC) -> None:
         """Take the active dofs of this step and prepare for them."""
         self._inactive = self._snes.getVIInactiveSet()
         start, end = self._held.system.load.owner_range
@@ -217,7 +217,7 @@ class _ReducedPC:
         self._held.prepare((active - start).astype(np.int32))
 
     def apply(self, pc: PETSc.PC, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        """y = P^-1 x on the inactive dofs."""
+        """Y = P^-1 x on the inactive dofs."""
         self._held.apply_reduced(self._inactive, x, y)
 
 

@@ -73,9 +73,11 @@ class BranchIteration:
         return replace(outcome, converged=False, reason=f"ξ still changes after {self.settings.max_branches} steps")
 
     def _off_kinks(self, x: PETSc.Vec) -> PETSc.Vec | None:
-        """A point of lower energy, where x sits on a kink of G: both sides are tried (a start there hides a descent)."""
-        on = [law.concave.left(a - _NEAR) < law.concave.right(a + _NEAR) - self._slack(law)
-              for law, a in zip(self._laws, self._arguments(x), strict=True)]
+        """A point of lower energy, where x sits on a kink of G: both sides are tried (it hides a descent)."""
+        on = [
+            law.concave.left(a - _NEAR) < law.concave.right(a + _NEAR) - self._slack(law)
+            for law, a in zip(self._laws, self._arguments(x), strict=True)
+        ]
         if not self._any(on):
             return None
         energy = self._energy(x)
@@ -143,7 +145,9 @@ class BranchIteration:
 
     def _accelerated(self, x: PETSc.Vec, cells: list[Cells], outcome: Outcome) -> tuple[Outcome, bool]:
         """Newton with the true curvature where G is curved; dropped unless it ends lower and solves the inequality."""
-        curved = [bool(np.any(law.concave.second(a) > 0)) for law, a in zip(self._laws, self._arguments(x), strict=True)]
+        curved = [
+            bool(np.any(law.concave.second(a) > 0)) for law, a in zip(self._laws, self._arguments(x), strict=True)
+        ]
         if not self._any([np.array(curved)]):
             return outcome, False
         trial = x.copy()

@@ -1,8 +1,8 @@
 """Linear solves in which some dofs are held: the full-size matrix with those rows and columns replaced by the identity.
 
 SNES VI extracts the inactive rows and columns into a matrix without block size and near-null space, and algebraic
-multigrid then fails. Here the full size is kept, whatever is held (solver-notes.md): one preconditioner serves the start
-and every Newton step with the same active set.
+multigrid then fails. Here the full size is kept, whatever is held (solver-notes.md): one preconditioner serves the
+start and every Newton step with the same active set.
 """
 
 from __future__ import annotations
@@ -62,8 +62,8 @@ class LinearSettings:
 class HeldPreconditioner:
     """The preconditioner of the system's matrix with some dofs held; set up anew only when it has to be.
 
-    A direct solve wants the very matrix. A Krylov method is content with that of a similar active set and tangent, as long
-    as its iterations do not grow.
+    A direct solve wants the very matrix. A Krylov method is content with that of a similar active set and tangent, as
+    long as its iterations do not grow.
     """
 
     def __init__(self, system: System, settings: LinearSettings, timer: Timer) -> None:
@@ -122,7 +122,7 @@ class HeldPreconditioner:
         self._held = None
 
     def apply_full(self, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        """y = P^-1 x, full size. Collective."""
+        """Y = P^-1 x, full size. Collective."""
         self._pc.apply(x, y)  # type: ignore[union-attr]
 
     def apply_reduced(self, inactive: PETSc.IS, x: PETSc.Vec, y: PETSc.Vec) -> None:

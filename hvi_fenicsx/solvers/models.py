@@ -1,8 +1,8 @@
 """What stands for a law j = H - G in one nonlinear solve, kept within one cell between H's kinks.
 
-H's kinks (Tresca, |u_t| at zero, upward jumps) stay in the convex step: each vertex is kept in the cell between two kinks
-by bounds on its slip, where H is smooth up to the ends; a vertex that sits on a kink and whose force exceeds what the
-kink can carry moves on to the next cell.
+H's kinks (Tresca, |u_t| at zero, upward jumps) stay in the convex step: each vertex is kept in the cell between two
+kinks by bounds on its slip, where H is smooth up to the ends; a vertex on a kink that cannot
+carry its force moves on to the next cell.
 """
 
 from __future__ import annotations
