@@ -35,7 +35,7 @@ class Solution:
         solvability: whether a solution can exist.
         solved: what the method found, None when the state is *escapes* (nothing was solved).
         examined: the certificate and the state of Γc, None likewise.
-        dofs: unknowns. timer: wall time by phase.
+        dofs: unknowns. epsilon: relative width of the smoothing, None for exact laws. timer: wall time by phase.
     """
 
     scene: Scene
@@ -44,6 +44,7 @@ class Solution:
     solved: Solved | None
     examined: Examined | None
     dofs: int
+    epsilon: float | None
     timer: Timer
 
     @property
@@ -135,6 +136,7 @@ def finish(
         found,
         examined,
         prepared.system.dofs,
+        solvers.relative_width(prepared.scene.solver, prepared.system),
         prepared.timer,
     )
 

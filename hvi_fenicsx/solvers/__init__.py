@@ -11,6 +11,7 @@ from ..timing import Timer
 from .activeset import ActiveSetSolver
 from .base import Progress, Settings, Solved
 from .branch import BranchIteration
+from .continuation import Continuation
 from .linear import LinearSettings
 
 if TYPE_CHECKING:
@@ -28,7 +29,15 @@ class Method(Protocol):
         """A stationary point, or what was reached. Collective."""
 
 
-METHODS: Mapping[str, type[Method]] = {"auto": BranchIteration, "branch": BranchIteration, "snes_vi": BranchIteration}
+METHODS: Mapping[str, type[Method]] = {"auto": BranchIteration, "branch": BranchIteration, "snes_vi": Continuation}
+
+
+def relative_width(wanted: Solver, system: System) -> float | None:
+    """ε relative to the first law's energy scale; None for exact laws, or without a law."""
+    if wanted.epsilon_absolute is None or not system.terms:
+        return wanted.epsilon
+    scales = system.problem.scales
+    return wanted.epsilon_absolute / (system.terms[0].exact.energy_scale * scales.stress * scales.displacement)
 
 
 def create(wanted: Solver, system: System, timer: Timer, progress: Progress, interrupted: Callable[[], bool]) -> Method:
@@ -40,5 +49,8 @@ def create(wanted: Solver, system: System, timer: Timer, progress: Progress, int
     if wanted.method not in METHODS:
         raise InputError(f'solver.method = "{wanted.method}" is not available; use {", ".join(METHODS)}')
     linear = LinearSettings.choose(system, wanted.linear_solver)
-    settings = Settings(tolerance=wanted.tolerance, max_newton=wanted.max_iterations, progress=progress)
+    epsilon = relative_width(wanted, system)
+    settings = Settings(
+        tolerance=wanted.tolerance, max_newton=wanted.max_iterations, progress=progress, epsilon=epsilon
+    )
     return METHODS[wanted.method](ActiveSetSolver(system, linear, timer, interrupted), settings)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -10,6 +10,7 @@ import numpy.typing as npt
 from dolfinx import fem
 from petsc4py import PETSc
 
+from ..laws import Superpotential
 from ..system import System, normal_dofs
 from .activeset import ActiveSetSolver
 from .models import Resting
@@ -28,12 +29,13 @@ class Settings:
 
     Attributes:
         tolerance: of the residual of the inequality, relative. max_branches: convex steps of the branch iteration.
-        max_newton: Newton steps of one solve.
+        max_newton: Newton steps of one solve. epsilon: relative width of the laws' smoothing, None for exact laws.
     """
 
     tolerance: float = 1e-8
     max_branches: int = 200
     max_newton: int = 60
+    epsilon: float | None = None
     progress: Progress = silent
 
 
@@ -44,6 +46,12 @@ class Counts:
     newton: int = 0
     linear: int = 0
     branch: int = 0
+
+    def add(self, other: Counts) -> None:
+        """Count another solve in."""
+        self.newton += other.newton
+        self.linear += other.linear
+        self.branch += other.branch
 
 
 @dataclass(frozen=True)
@@ -65,19 +73,19 @@ class Solved:
     interrupted: bool = False
 
 
-def held_dofs(system: System) -> npt.NDArray[np.int32]:
+def held_dofs(system: System, laws: Sequence[Superpotential]) -> npt.NDArray[np.int32]:
     """Scalar dofs (local, owned, sorted) that the start holds: normal ones on contact parts, stuck ones of laws."""
     d = system.problem.scales.dimension
     dofs = [normal_dofs(b.surface.blocks, b.surface.normals)[0] for b in system.problem.bounds]
-    for term in system.terms:
-        if np.any(term.law.convex.kinks == 0.0):
+    for term, law in zip(system.terms, laws, strict=True):
+        if np.any(law.convex.kinks == 0.0):
             touched = np.any(term.directions != 0, axis=1)
             dofs.append((term.surface.blocks[:, None] * d + np.arange(d))[touched])
     joined = np.unique(np.concatenate([np.empty(0, np.int64), *dofs]))
     return np.setdiff1d(joined, system.problem.fixed).astype(np.int32)
 
 
-def resting_start(solver: ActiveSetSolver, rtol: float) -> tuple[PETSc.Vec, int]:
+def resting_start(solver: ActiveSetSolver, laws: Sequence[Superpotential], rtol: float) -> tuple[PETSc.Vec, int]:
     """Contact closed, laws at rest: one linear solve in which no rigid motion is free. Collective.
 
     From u = 0 no vertex counts as active, the reduced matrix is singular and the first step is 1e9 (solver-notes.md);
@@ -93,7 +101,7 @@ def resting_start(solver: ActiveSetSolver, rtol: float) -> tuple[PETSc.Vec, int]
     x.array[contact] = closed(low[contact], high[contact])
     owned = system.problem.fixed[system.problem.fixed < x.local_size]
     x.array[owned] = system.load.array_r[owned]
-    outcome = solver.newton_step(x, held_dofs(system), [Resting(t.law) for t in system.terms], rtol)
+    outcome = solver.newton_step(x, held_dofs(system, laws), [Resting(law) for law in laws], rtol)
     return x, outcome.linear
 
 

@@ -8,6 +8,7 @@ it converges linearly, so a Newton step with the true curvature is tried and kep
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -34,39 +35,69 @@ _LINE_SEARCHES = ("bt", "basic", "l2")
 
 
 class BranchIteration:
-    """The iteration on one system; call :meth:`solve` once."""
+    """The iteration on one system; call :meth:`solve` once.
+
+    Args:
+        solver: of the convex steps. settings: tolerance and limits.
+        laws: what stands for the system's laws (nondimensional), by default they themselves. epsilon: their width,
+            for the progress display.
+    """
 
     name = "branch"
 
-    def __init__(self, solver: ActiveSetSolver, settings: Settings) -> None:
+    def __init__(
+        self,
+        solver: ActiveSetSolver,
+        settings: Settings,
+        laws: Sequence[Superpotential] | None = None,
+        epsilon: float | None = None,
+    ) -> None:
         self.solver, self.settings, self.system = solver, settings, solver.system
         self.counts = Counts()
         self.energies: list[float] = []
-        self._laws = [t.law for t in self.system.terms]
+        self._laws = [t.law for t in self.system.terms] if laws is None else list(laws)
+        self._epsilon = settings.epsilon if epsilon is None else epsilon
         self._residual = self.system.load.duplicate()
 
-    def solve(self, start: PETSc.Vec | None = None, epsilon: float | None = None) -> Solved:
-        """A stationary point reached from a start (default: the resting one). Collective.
+    def solve(self, start: PETSc.Vec | None = None, branches: PETSc.Vec | None = None) -> Solved:
+        """A stationary point. Collective.
+
+        Args:
+            start: where to begin; by default the resting start, which holds every rigid motion. A start of one's own
+                must hold them too.
+            branches: a displacement whose pieces of the laws to begin on; by default those of no slip, an
+                unbroken bond, so that a vertex passes a drop only when the load drives it there.
 
         Raises:
             SolverError: a convex step did not lower the energy.
         """
-        solver = self.solver
-        x = start
-        if x is None:
-            x, linear = resting_start(solver, min(1e-4, self.settings.tolerance))
-            self.counts.linear += linear
-        solver.progress = lambda it, res, act: self.settings.progress(self.name, epsilon, it, res, act)
-        outcome = self._descend(x, self._cells(x), self._subgradients(x, 0.0))
+        x = start.copy() if start is not None else self._resting()
+        self.solver.progress = self._progress
+        if branches is not None or start is not None:
+            xi = self._subgradients(start if branches is None else branches, 0.0)
+        else:
+            xi = [law.concave.left(np.zeros_like(a)) for law, a in zip(self._laws, self._arguments(x), strict=True)]
+        outcome = self._descend(x, self._cells(x), xi)
         while outcome.converged and (better := self._off_kinks(x)) is not None:
             better.copy(x)
         return self._result(x, outcome)
 
+    def _resting(self) -> PETSc.Vec:
+        x, linear = resting_start(self.solver, self._laws, min(1e-4, self.settings.tolerance))
+        self.counts.linear += linear
+        return x
+
+    def _progress(self, iteration: int, residual: float, contact: int) -> None:
+        self.settings.progress(self.name, self._epsilon, iteration, residual, contact)
+
     def _descend(self, x: PETSc.Vec, cells: list[Cells], xi: list[Array]) -> Outcome:
-        """Convex steps from and into x until ξ stands."""
+        """Convex steps from and into x until ξ stands. The first ξ may be that of another point."""
         outcome = Outcome(False, 0, 0, float("inf"), "no convex step")
+        before = math.inf
         for _ in range(self.settings.max_branches):
             cells, outcome, done = self._step(x, cells, xi)
+            self._check_fall(before, outcome, x)
+            before = self.energies[-1]
             if done:
                 return outcome
             xi = self._subgradients(x, 0.0)
@@ -95,13 +126,11 @@ class BranchIteration:
 
     def _step(self, x: PETSc.Vec, cells: list[Cells], xi: list[Array]) -> tuple[list[Cells], Outcome, bool]:
         """One convex step, first to a loose tolerance, then, if ξ stands, to the wanted one."""
-        before = self._energy(x)
         for tolerance in (max(_LOOSE, self.settings.tolerance), self.settings.tolerance):
             cells, outcome = self._convex(x, cells, xi, tolerance)
             if not outcome.converged or self._measure(x, cells, xi) > tolerance:
                 break
         self.counts.branch += 1
-        self._check_fall(before, self._energy(x), outcome)
         stationary = outcome.converged and self._measure(x, cells, xi) <= self.settings.tolerance
         if stationary or not outcome.converged:
             return cells, outcome, True
@@ -115,7 +144,7 @@ class BranchIteration:
             models = [Majorant(law, c, s) for law, c, s in zip(self._laws, cells, xi, strict=True)]
             outcome = self._bounded(x, models, cells, tolerance)
             self.system.residual(x, self._residual, models)
-            moves = kinks.overloaded(self.system, x, self._residual, cells, self.settings.tolerance)
+            moves = kinks.overloaded(self.system, x, self._residual, models, self.settings.tolerance)
             if not outcome.converged or not self._any(moves):
                 return cells, outcome
             cells = [c.moved(m) for c, m in zip(cells, moves, strict=True)]
@@ -189,9 +218,10 @@ class BranchIteration:
     def _rounding(self, energy: float) -> float:
         return 1e-10 * max(abs(energy), 1e-300)
 
-    def _check_fall(self, before: float, after: float, outcome: Outcome) -> None:
+    def _check_fall(self, before: float, outcome: Outcome, x: PETSc.Vec) -> None:
+        after = self._energy(x)
         self.energies.append(after)
-        if outcome.converged and after > before + self._rounding(before):
+        if outcome.converged and math.isfinite(before) and after > before + self._rounding(before):
             raise SolverError(f"a convex step raised the energy from {before:.12g} to {after:.12g}")
 
     def _any(self, flags: Sequence[npt.NDArray[np.generic]]) -> bool:

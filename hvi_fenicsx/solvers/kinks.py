@@ -11,7 +11,7 @@ from petsc4py import PETSc
 from ..laws import ConvexPart
 from ..lawterm import LawTerm
 from ..system import System, traction_scale
-from .models import Cells
+from .models import Cells, Majorant
 
 Array = npt.NDArray[np.float64]
 
@@ -30,7 +30,7 @@ def boxes(system: System, cells: Sequence[Cells]) -> tuple[PETSc.Vec, PETSc.Vec]
 
 
 def overloaded(
-    system: System, x: PETSc.Vec, residual: PETSc.Vec, cells: Sequence[Cells], tolerance: float
+    system: System, x: PETSc.Vec, residual: PETSc.Vec, models: Sequence[Majorant], tolerance: float
 ) -> list[npt.NDArray[np.int64]]:
     """Per vertex -1, 0 or 1: where it goes if the kink it sits on cannot carry its force.
 
@@ -38,13 +38,13 @@ def overloaded(
     from which the kink's jump leads to the left one.
     """
     moves = []
-    for term, c in zip(system.terms, cells, strict=True):
+    for term, model in zip(system.terms, models, strict=True):
+        c, part = model.cells, model.law.convex
         argument = term.argument(x.array_r)
         force = np.einsum("md,md->m", term.directions[:, 0, :], term.surface.values(residual.array_r))
         weight = term.surface.weights
         slack = 0.1 * tolerance * traction_scale(term) * weight
         _, _, free = _slip_dofs(term)
-        part = term.law.convex
         down = free & (argument <= c.lower) & (force - weight * _jump(part, c.lower) > slack)
         up = free & (argument >= c.upper) & (force + weight * _jump(part, c.upper) < -slack)
         moves.append(up.astype(np.int64) - down.astype(np.int64))

@@ -1,0 +1,39 @@
+"""SNES VI on the smoothed problem with ε-continuation: from a wide smoothing to the one that was asked for.
+
+Each width is solved from the last one's solution. Where the scene smooths nothing, the last step solves the law itself.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from ..smoothing import SmoothedLaw
+from .activeset import ActiveSetSolver
+from .base import Counts, Settings, Solved
+from .branch import BranchIteration
+
+_WIDTHS = (1.0, 1e-1, 1e-2, 1e-3)
+"""Relative widths that are passed through, as long as they are wider than the wanted one."""
+
+
+class Continuation:
+    """The continuation on one system; call :meth:`solve` once."""
+
+    name = "snes_vi"
+
+    def __init__(self, solver: ActiveSetSolver, settings: Settings) -> None:
+        self.solver, self.settings = solver, settings
+
+    def solve(self) -> Solved:
+        """A stationary point of the wanted law, reached along the widths. Collective."""
+        counts, start = Counts(), None
+        loose = replace(self.settings, tolerance=max(1e-4, self.settings.tolerance))
+        for width in (w for w in _WIDTHS if w > (self.settings.epsilon or 0.0)):
+            laws = [SmoothedLaw.relative(t.exact, width) for t in self.solver.system.terms]
+            found = BranchIteration(self.solver, loose, laws, width).solve(start)
+            counts.add(found.counts)
+            if found.converged:
+                start = found.u.x.petsc_vec.copy()
+        last = BranchIteration(self.solver, self.settings).solve(start)
+        counts.add(last.counts)
+        return replace(last, method=self.name, counts=counts)
