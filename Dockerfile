@@ -20,6 +20,7 @@ ENV PYTHONPATH=/opt/hvi_fenicsx \
     XDG_CACHE_HOME=/home/hvi/.cache \
     LANG=C.UTF-8 \
     OMP_NUM_THREADS=1 \
+    OMPI_MCA_btl=^tcp \
     OMPI_ALLOW_RUN_AS_ROOT=1 \
     OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 \
     PRTE_MCA_rmaps_default_mapping_policy=:oversubscribe
