@@ -20,6 +20,7 @@ from .effects.base import Direction
 from .lawterm import LawTerm
 from .problem import Bounds, Problem
 from .surface import Surface
+from .system import normal_dofs
 
 Array = npt.NDArray[np.float64]
 NEAR = 1e-10
@@ -44,7 +45,7 @@ class State:
     Attributes:
         surface: the part. bounds: of its normal displacement, or None. terms: its laws.
         normal, slip: u·n (m,) and u·t (m, d-1). gap: to the lower bound of -u·n, (m,), inf where there is none.
-        pressure: σ_n (m,). friction: -σ_t (m, d-1). contact: on a bound, (m,).
+        pressure: σ_n (m,). friction: -σ_t (m, d-1). contact: on a bound, (m,). held: u·n is prescribed, (m,).
         arguments, tractions, distances: of each law, by term: what it acts on, the traction it should give, and how far
             that is from Clarke's subdifferential; (m,) each.
     """
@@ -58,6 +59,7 @@ class State:
     pressure: Array
     friction: Array
     contact: npt.NDArray[np.bool_]
+    held: npt.NDArray[np.bool_]
     arguments: tuple[Array, ...]
     tractions: tuple[Array, ...]
     distances: tuple[Array, ...]
@@ -99,7 +101,10 @@ def _state(problem: Problem, surface: Surface, u: Array, reaction: Array) -> Sta
     normal = np.sum(displacement * surface.normals, axis=1)
     friction = -np.einsum("mkd,md->mk", surface.tangents, traction)
     arguments = tuple(t.argument(u) for t in terms)
-    wanted = tuple(_wanted(t, traction, u, a) for t, a in zip(terms, arguments, strict=True))
+    touching = _touching(bounds, normal)
+    wanted = tuple(
+        _beside_contact(t, _wanted(t, traction, u, a), a, bounds, normal) for t, a in zip(terms, arguments, strict=True)
+    )
     for term, value in zip(terms, wanted, strict=True):
         if term.direction is Direction.SLIP:
             friction = _with_prescribed(term, friction, value)
@@ -112,7 +117,8 @@ def _state(problem: Problem, surface: Surface, u: Array, reaction: Array) -> Sta
         np.full(len(normal), np.inf) if bounds is None else bounds.upper - normal,
         np.sum(traction * surface.normals, axis=1),
         friction,
-        _touching(bounds, normal),
+        touching,
+        np.isin(normal_dofs(surface.blocks, surface.normals)[0], problem.fixed),
         arguments,
         wanted,
         tuple(t.law.distance(a, w, NEAR) for t, a, w in zip(terms, arguments, wanted, strict=True)),
@@ -142,6 +148,16 @@ def _wanted(term: LawTerm, traction: Array, u: Array, argument: Array) -> Array:
         value = np.where(argument > NEAR, along, np.linalg.norm(pulled, axis=1))
     low, high = term.law.interval(argument)
     return np.where(prescribed(term), (low + high) / 2, value)
+
+
+def _beside_contact(term: LawTerm, value: Array, argument: Array, bounds: Bounds | None, normal: Array) -> Array:
+    """Of a normal law on a closed vertex, what contact cannot carry: it only pushes, the law gives the rest."""
+    if bounds is None or term.direction is Direction.SLIP:
+        return value
+    low, high = term.law.interval(argument, NEAR)
+    outward = (normal >= bounds.upper - NEAR) == (term.direction is Direction.OPENING)
+    onto = np.where(outward, np.maximum(value, low), np.minimum(value, high))
+    return np.where(_touching(bounds, normal), onto, value)
 
 
 def _with_prescribed(term: LawTerm, friction: Array, value: Array) -> Array:

@@ -132,7 +132,7 @@ def _pressure(state: State) -> Array:
         if np.any(np.abs(sign) > 0.5):
             low, high = term.law.interval(argument)
             pressure = pressure + sign * np.clip(-sign * pressure, low, high)
-    return pressure
+    return np.where(state.held, 0.0, pressure)
 
 
 def _tension(state: State) -> Array:

@@ -207,13 +207,18 @@ def _sum(
         for where, _, c in made
         if where is not None and (c.bounds or c.laws)
     }
-    bounds = [_bounds(surfaces[w], b, scales) for w, _, c in made if w is not None for b in c.bounds]
+    bounds = [_bounds(stage, surfaces[w], b, scales) for w, _, c in made if w is not None for b in c.bounds]
     _check_compatible(stage, bounds, conditions, fixed)
+    _check_normal_laws(made)
     terms = [
         _term(stage, surfaces[w], law, modify, scales, fixed) for w, _, c in made if w is not None for law in c.laws
     ]
     bilinear = [form for _, _, c in made for form in c.bilinear]
-    linear = {f"{w or 'body'}.{e.key}": sum(c.linear) for w, e, c in made if c.linear}
+    linear: dict[str, Any] = {}
+    for where, effect, c in made:
+        for form in c.linear:  # several tables may load one place
+            name = f"{where or 'body'}.{effect.key}"
+            linear[name] = linear[name] + form if name in linear else form
     return Problem(
         stage.domain,
         scales,
@@ -226,6 +231,17 @@ def _sum(
         tuple(terms),
         tuple(surfaces.values()),
     )
+
+
+def _check_normal_laws(made: Sequence[Made]) -> None:
+    """Two normal laws on one part would be one law of the opening: the user states it."""
+    normal = [w for w, _, c in made for law in c.laws if law.direction is not Direction.SLIP]
+    for where in normal:
+        if normal.count(where) > 1:
+            raise InputError(
+                f"boundary.{where}: adhesion and support act on the same displacement; state them as one law of the "
+                'opening, adhesion = { law = "graph", ... }'
+            )
 
 
 def _conditions(
@@ -249,11 +265,20 @@ def _condition(stage: Stage, scales: Scales, part: str, condition: Condition) ->
     return fem.dirichletbc(function, fem.locate_dofs_topological((component, collapsed), dim, facets), component)
 
 
-def _bounds(where: Surface, bounds: NormalBounds, scales: Scales) -> Bounds:
+def _bounds(stage: Stage, where: Surface, bounds: NormalBounds, scales: Scales) -> Bounds:
+    """Collective.
+
+    Raises:
+        InputError: on all ranks alike: a bound that is not a finite number at some vertex.
+    """
+
     def value(formula: Formula | None) -> Array:
         if formula is None:
             return np.full(len(where.blocks), np.inf)
-        return np.asarray(formula.at(where.points) / scales.displacement)
+        found = formula.at(where.points) / scales.displacement
+        if not all(agree(stage.domain.mesh.comm, bool(np.all(np.isfinite(found))))):
+            raise InputError(f"boundary.{where.part}.contact: the gap is not finite everywhere there; see its formula")
+        return np.asarray(found)
 
     # lower ≤ -u·n ≤ upper
     return Bounds(where, -value(bounds.upper), -value(bounds.lower) if bounds.lower else value(None))

@@ -18,7 +18,8 @@ from pydantic import ValidationError
 from hvi_fenicsx import laws
 from hvi_fenicsx.effects import Effect, Place
 from hvi_fenicsx.effects.base import Contribution, Stage
-from hvi_fenicsx.effects.contact import Contact, Friction
+from hvi_fenicsx.effects.contact import Contact
+from hvi_fenicsx.effects.friction import Friction
 from hvi_fenicsx.errors import InputError
 from hvi_fenicsx.scene import Boundary, MeshFile, Rectangle, Scene, Solver, dump_scene, read_scene
 from hvi_fenicsx.scene.locate import lines_of

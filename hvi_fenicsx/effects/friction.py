@@ -1,0 +1,23 @@
+"""Nonmonotone friction on Γc (paper: j)."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from ..errors import InputError
+from .base import Direction
+from .lawfield import LawEffect
+
+
+class Friction(LawEffect):
+    """A law of the tangential displacement: -σ_t in ∂j(u_t); on lifted vertices too, as in the paper."""
+
+    key: ClassVar[str] = "friction"
+    term: ClassVar[str] = "∫ j⁰(u_t; v_t - u_t) ds on Γc, vertex quadrature"
+    direction: ClassVar[Direction] = Direction.SLIP
+
+    def check(self, dimension: int) -> None:
+        """In 3D the law acts on |u_t| and must be even."""
+        if dimension == 3 and not self.law.even:
+            reason = "is one-sided; in 3D friction acts on |u_t| and must be even"
+            raise InputError(f'law = "{self.law.name}" {reason}')

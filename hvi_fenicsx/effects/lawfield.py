@@ -1,0 +1,77 @@
+"""Superpotentials as fields of a scene, and what every effect that brings one to Γc shares."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, ClassVar
+
+from pydantic import (
+    BeforeValidator,
+    PlainSerializer,
+    SerializerFunctionWrapHandler,
+    ValidationError,
+    model_serializer,
+    model_validator,
+)
+
+from .. import laws
+from ..errors import InputError
+from .base import BoundaryLaw, Contribution, Direction, Effect, Evaluate, Place, Stage, refusal
+
+
+def _law(value: Any) -> laws.Superpotential:
+    if isinstance(value, laws.Superpotential):
+        return value
+    if not isinstance(value, dict):
+        raise refusal('must be a table, like { law = "name", ... }')
+    parameters = dict(value)
+    name = parameters.pop("law", None)
+    if not isinstance(name, str):
+        raise refusal(f'the law\'s name is missing: law = "name"; allowed: {", ".join(laws.available())}')
+    try:
+        return laws.create(name, parameters)
+    except InputError as error:
+        if isinstance(error.__cause__, ValidationError):
+            raise error.__cause__ from None  # it knows the place of each wrong parameter
+        raise refusal(str(error)) from None
+
+
+LawField = Annotated[
+    laws.Superpotential,
+    BeforeValidator(_law),
+    PlainSerializer(lambda law: laws.describe(law)),
+]
+"""A superpotential as a field of a scene model: ``{ law = "name", ...parameters }``."""
+
+
+class LawEffect(Effect):
+    """A law that acts on one displacement of a boundary part.
+
+    Class attributes:
+        direction: the displacement it acts on.
+    """
+
+    place: ClassVar[Place] = Place.BOUNDARY
+    exclusive: ClassVar[bool] = True
+    direction: ClassVar[Direction]
+
+    law: LawField
+    """the law's name; its parameters stand beside it"""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _from_table(cls, data: Any) -> Any:
+        law = data.get("law") if isinstance(data, dict) else None
+        made = isinstance(data, cls) or isinstance(law, laws.Superpotential)
+        return data if made else {"law": _law(data)}
+
+    @model_serializer(mode="wrap")
+    def _as_table(self, handler: SerializerFunctionWrapHandler) -> Any:
+        return handler(self)["law"]
+
+    def contribute(self, stage: Stage, where: str | None) -> Contribution:
+        """The law, acting on its displacement."""
+        return Contribution(laws=(BoundaryLaw(self.direction, self.law),))
+
+    def stress_scale(self, largest: Evaluate, length: float, modulus: float) -> float:
+        """The law's own."""
+        return self.law.traction_scale
