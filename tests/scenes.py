@@ -1,0 +1,80 @@
+"""Scenes that many tests share, as plain tables, and ways to look at a solution without the package's writers."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from hvi_fenicsx import Scene, Solution, solve
+
+Array = npt.NDArray[np.float64]
+Table = dict[str, Any]
+E, NU, P, Q, DELTA = 2.15e11, 0.29, 1.0e6, 1.0e6, 9.0e-6
+STEEL = {"model": "plane_stress", "youngs_modulus": E, "poisson_ratio": NU}
+
+
+def quadratic_linear(gamma1: float, delta: float = DELTA) -> Table:
+    """The paper's law, of any strength."""
+    return {"law": "quadratic_linear", "gamma1": gamma1, "gamma2": gamma1 / 2, "delta": delta}
+
+
+def model(
+    cells: int = 4, pull: float = P, press: float = Q, friction: Table | None = None, gap: Any = 0.0, **solver: Any
+) -> Table:
+    """The paper's model problem, wall left, on the unit square; without friction unless a law is given."""
+    floor = {"on": "bottom", "contact": {"gap": gap}} | ({"friction": friction} if friction else {})
+    return {
+        "domain": {"shape": "rectangle", "size": [1.0, 1.0], "cells": [cells, cells]},
+        "material": dict(STEEL),
+        "boundary": {
+            "wall": {"on": "left", "displacement": [0.0, "free"]},
+            "pull": {"on": "right", "traction": [pull, 0.0]},
+            "press": {"on": "top", "traction": [0.0, -press]},
+            "floor": floor,
+        },
+        "solver": solver,
+    }
+
+
+def block(cells: int = 3, push: float = P, press: float = Q, friction: Table | None = None, **solver: Any) -> Table:
+    """The same square without the wall: a free block on the floor, pushed at its right side."""
+    table = model(cells, push, press, friction, **solver)
+    del table["boundary"]["wall"]
+    return table
+
+
+def solved(table: Table) -> Solution:
+    """The solution of a scene given as tables."""
+    return solve(Scene.model_validate(table))
+
+
+def points(solution: Solution) -> Array:
+    """The vertices, m, shape (n, 2)."""
+    found: Array = solution.problem.space.tabulate_dof_coordinates()[:, : solution.scene.dimension]
+    return found
+
+
+def displacement(solution: Solution) -> Array:
+    """The displacement at the vertices, m, shape (n, d)."""
+    assert solution.solved is not None
+    u = solution.solved.u.x.array.reshape(-1, solution.scene.dimension)
+    return np.asarray(u * solution.problem.scales.displacement)
+
+
+def energy(solution: Solution) -> float:
+    """The energy, J/m."""
+    assert solution.examined is not None
+    return solution.examined.energy * solution.problem.scales.energy
+
+
+def ordered(points: Array, values: Array) -> Array:
+    """Values sorted by their points, so that two numberings of one mesh compare."""
+    keys = np.round(points / np.max(np.abs(points)), 9)
+    return np.asarray(values[np.lexsort(keys.T)])
+
+
+def far(found: Array, wanted: Array) -> float:
+    """The largest difference, relative to the largest wanted value."""
+    return float(np.max(np.abs(found - wanted)) / np.max(np.abs(wanted)))
