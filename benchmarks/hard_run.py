@@ -1,0 +1,87 @@
+"""One case with one method: solved, certified, told in a record. Imports dolfinx, so only workers import it."""
+
+from __future__ import annotations
+
+import gc
+import inspect
+import time
+import traceback
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import hard_scenes
+from covering import Case
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from hvi_fenicsx import certificate, solution, solvers
+from hvi_fenicsx.errors import HviError
+from hvi_fenicsx.solvers.base import Solved, silent
+
+COMM = MPI.COMM_WORLD
+UNDECIDED = ("metastable", "borderline")
+Record = dict[str, Any]
+
+
+def methods() -> list[str]:
+    """All methods there are."""
+    return list(solvers.METHODS)
+
+
+def attempt(case: Case, data: Mapping[str, Any], method: str, limit: float) -> Record:
+    """The outcome of a case: certified, escapes, no_equilibrium, or failed. Collective."""
+    begin = time.monotonic()
+    try:
+        record = _attempt(case, data, method, lambda: _late(begin, limit))
+    except Exception as error:
+        # An unforeseen error of one rank leaves the others waiting: only those that all ranks share are told.
+        if COMM.size > 1 and not isinstance(error, HviError):
+            traceback.print_exc()
+            COMM.Abort(1)
+        record = {"outcome": "failed", "reason": f"{type(error).__name__}: {error}"}
+    gc.collect()
+    PETSc.garbage_cleanup(COMM)
+    return {**record, "seconds": time.monotonic() - begin}
+
+
+def _late(begin: float, limit: float) -> bool:
+    return bool(COMM.allreduce(time.monotonic() - begin > limit, op=MPI.LOR))
+
+
+def _attempt(case: Case, data: Mapping[str, Any], method: str, late: Callable[[], bool]) -> Record:
+    prepared = hard_scenes.prepare(case, data, method, COMM)
+    known = prepared.solvability
+    about = {"state": known.state, "margin": known.margin, "dofs": prepared.system.dofs}
+    if known.state == "escapes":
+        return {**about, "outcome": "escapes", "reason": "no solution exists"}
+    found = _solved(case, data, prepared, late)
+    proof = certificate.examine(prepared.problem, found.u, data["tolerance"])
+    outcome = "certified" if proof.certificate.passed else _unsolved(known.state, found)
+    return {
+        **about,
+        "outcome": outcome,
+        "reason": "time limit" if found.interrupted else found.reason,
+        "newton": found.counts.newton,
+        "linear": found.counts.linear,
+        "branch": found.counts.branch,
+        "claimed": found.converged,
+        "energy": proof.energy,
+        "certificate": proof.certificate.as_dict(),
+    }
+
+
+def _unsolved(state: str, found: Solved) -> str:
+    """What has neither a proof of existence nor of the opposite may end without; a raised energy or no time may not."""
+    broken = found.interrupted or "raised the energy" in found.reason
+    return "no_equilibrium" if state in UNDECIDED and not broken else "failed"
+
+
+def _solved(case: Case, data: Mapping[str, Any], prepared: solution.Prepared, late: Callable[[], bool]) -> Solved:
+    """The method's result; the case's start is for the methods that begin on pieces of the laws."""
+    method = solvers.create(prepared.scene.solver, prepared.system, prepared.timer, silent, late)
+    begin = hard_scenes.branches(case, prepared, data)
+    takes = "branches" in inspect.signature(method.solve).parameters
+    try:
+        return method.solve(branches=begin) if takes else method.solve()  # type: ignore[call-arg]
+    except HviError as error:
+        return Solved(solution.fem.Function(prepared.problem.space), method.name, False, str(error))
