@@ -16,15 +16,14 @@ from dolfinx import fem
 from dolfinx.fem.petsc import assemble_vector
 from petsc4py import PETSc
 
+from . import ledger
 from .effects.base import Direction
 from .lawterm import LawTerm
+from .ledger import NEAR, Ledger
 from .problem import Bounds, Problem
 from .surface import Surface
-from .system import normal_dofs
 
 Array = npt.NDArray[np.float64]
-NEAR = 1e-10
-"""Distance (of u0) from a kink or a bound that counts as being on it."""
 
 
 @dataclass(frozen=True)
@@ -45,9 +44,11 @@ class State:
     Attributes:
         surface: the part. bounds: of its normal displacement, or None. terms: its laws.
         normal, slip: u·n (m,) and u·t (m, d-1). gap: to the lower bound of -u·n, (m,), inf where there is none.
-        pressure: σ_n (m,). friction: -σ_t (m, d-1). contact: on a bound, (m,). held: u·n is prescribed, (m,).
-        arguments, tractions, distances: of each law, by term: what it acts on, the traction it should give, and how far
-            that is from Clarke's subdifferential; (m,) each.
+        pressure: σ_n (m,). contact_pressure: what of it contact carries. friction: -σ_t (m, d-1).
+        contact: on a bound, (m,).
+        arguments, tractions, distances: of each law, by term: what it acts on, the traction it gives, and how far that
+            is from Clarke's subdifferential; (m,) each.
+        hidden: of each law, where a support hides what it gives; (m,) each.
     """
 
     surface: Surface
@@ -57,12 +58,13 @@ class State:
     slip: Array
     gap: Array
     pressure: Array
+    contact_pressure: Array
     friction: Array
     contact: npt.NDArray[np.bool_]
-    held: npt.NDArray[np.bool_]
     arguments: tuple[Array, ...]
     tractions: tuple[Array, ...]
     distances: tuple[Array, ...]
+    hidden: tuple[npt.NDArray[np.bool_], ...]
 
     def branch(self, *directions: Direction) -> npt.NDArray[np.int64] | None:
         """The active piece of the law in one of these directions, (m,); None where there is no such law."""
@@ -89,82 +91,122 @@ def _vector(form: object) -> Array:
 
 
 def states(problem: Problem, u: fem.Function, reaction: Array) -> tuple[State, ...]:
-    """The state of each part with bounds or laws, in the problem's order. Local."""
-    return tuple(_state(problem, surface, u.x.array, reaction) for surface in problem.surfaces)
+    """The state of each part with bounds or laws, in the problem's order. Collective."""
+    book, terms, bounds = ledger.carried(problem, u.x.array, reaction)
+    read = [_law(book, term, t, u.x.array) for term, t in zip(problem.terms, terms, strict=True)]
+    contact = {id(b.surface): _contact(book, b) for b in bounds}
+    originals = {id(b.surface): contact[id(t.surface)] for b, t in zip(problem.bounds, bounds, strict=True)}
+    return tuple(
+        _state(problem, s, u.x.array, reaction, dict(zip(map(id, problem.terms), read, strict=True)), originals)
+        for s in problem.surfaces
+    )
 
 
-def _state(problem: Problem, surface: Surface, u: Array, reaction: Array) -> State:
+@dataclass(frozen=True)
+class _Law:
+    """What the ledger says of one law: argument, traction, distance, hidden; (m,) each."""
+
+    argument: Array
+    traction: Array
+    distance: Array
+    hidden: npt.NDArray[np.bool_]
+
+
+def _law(book: Ledger, term: LawTerm, local: LawTerm, u: Array) -> _Law:
+    argument = term.argument(u)
+    low, high = term.law.interval(argument, NEAR)
+    parts, hidden = [], np.zeros(len(argument), dtype=bool)
+    for dofs, sign in ledger.components(local):
+        share = np.where(sign > 0, book.share[dofs], 1.0 - book.share[dofs])
+        parts.append(low + share * (high - low) + sign * book.excess[dofs])
+        hidden |= book.held[dofs]
+    if len(parts) == 1:
+        return _Law(argument, parts[0], _away(parts[0], low, high), hidden)
+    return _radial(book, term, local, argument, u, hidden)
+
+
+def _radial(
+    book: Ledger, term: LawTerm, local: LawTerm, argument: Array, u: Array, hidden: npt.NDArray[np.bool_]
+) -> _Law:
+    """A law of |u_t|: the traction is a vector along the slip, at zero slip any within the kink's disc."""
+    dofs = [d for d, _ in ledger.components(local)]
+    signs = np.stack([s for _, s in ledger.components(local)], axis=1)
+    carried_elsewhere = np.stack([book.held[d] | book.contact[d] for d in dofs], axis=1)
+    needed = np.stack([book.needed[d] for d in dofs], axis=1) * signs / term.surface.weights[:, None]
+    slip, moving = term.slip(u), argument > NEAR
+    unit = np.divide(slip, argument[:, None], out=np.zeros_like(slip), where=moving[:, None])
+    low, high = term.law.interval(argument, NEAR)
+    needed = np.where(carried_elsewhere, unit * ((low + high) / 2)[:, None], needed)
+    along = np.where(moving, np.sum(needed * unit, axis=1), np.linalg.norm(needed, axis=1))
+    across = np.where(moving, np.linalg.norm(needed - along[:, None] * unit, axis=1), 0.0)
+    return _Law(argument, along, np.hypot(_away(along, low, high), across), hidden)
+
+
+def _away(traction: Array, low: Array, high: Array) -> Array:
+    return np.maximum(np.maximum(low - traction, traction - high), 0.0)
+
+
+def _contact(book: Ledger, bounds: Bounds) -> Array:
+    """σ_n that contact carries, (m,); off the bounds what is left there, which should be nothing."""
+    dofs, sign = ledger.along(bounds.surface.blocks, bounds.surface.normals)
+    weight = np.where(book.contact[dofs], book.contact_weight[dofs], bounds.surface.weights)
+    return sign * book.contact_force[dofs] / weight
+
+
+def _state(
+    problem: Problem, surface: Surface, u: Array, reaction: Array, laws: dict[int, _Law], contact: dict[int, Array]
+) -> State:
     bounds = next((b for b in problem.bounds if b.surface is surface), None)
     terms = tuple(t for t in problem.terms if t.surface is surface)
+    read = tuple(laws[id(t)] for t in terms)
     traction = reaction[surface.blocks] / surface.weights[:, None]
-    displacement = surface.values(u)
-    normal = np.sum(displacement * surface.normals, axis=1)
-    friction = -np.einsum("mkd,md->mk", surface.tangents, traction)
-    arguments = tuple(t.argument(u) for t in terms)
-    touching = _touching(bounds, normal)
-    wanted = tuple(
-        _beside_contact(t, _wanted(t, traction, u, a), a, bounds, normal) for t, a in zip(terms, arguments, strict=True)
-    )
-    for term, value in zip(terms, wanted, strict=True):
-        if term.direction is Direction.SLIP:
-            friction = _with_prescribed(term, friction, value)
+    normal = np.sum(surface.values(u) * surface.normals, axis=1)
+    own = contact.get(id(surface), np.zeros(len(normal)))
+    pressure, friction = _tractions(terms, read, bounds, surface, traction, own)
     return State(
         surface,
         bounds,
         terms,
         normal,
-        np.einsum("mkd,md->mk", surface.tangents, displacement),
+        np.einsum("mkd,md->mk", surface.tangents, surface.values(u)),
         np.full(len(normal), np.inf) if bounds is None else bounds.upper - normal,
-        np.sum(traction * surface.normals, axis=1),
+        pressure,
+        own,
         friction,
-        touching,
-        np.isin(normal_dofs(surface.blocks, surface.normals)[0], problem.fixed),
-        arguments,
-        wanted,
-        tuple(t.law.distance(a, w, NEAR) for t, a, w in zip(terms, arguments, wanted, strict=True)),
+        _touching(bounds, normal),
+        tuple(r.argument for r in read),
+        tuple(r.traction for r in read),
+        tuple(r.distance for r in read),
+        tuple(r.hidden for r in read),
     )
+
+
+def _tractions(
+    terms: Sequence[LawTerm],
+    read: Sequence[_Law],
+    bounds: Bounds | None,
+    surface: Surface,
+    traction: Array,
+    contact: Array,
+) -> tuple[Array, Array]:
+    """σ_n and -σ_t: of what acts on the part where something does, else the residual."""
+    pressure = contact.copy() if bounds is not None else np.sum(traction * surface.normals, axis=1)
+    friction = -np.einsum("mkd,md->mk", surface.tangents, traction)
+    normal_laws = [(t, r) for t, r in zip(terms, read, strict=True) if t.direction is not Direction.SLIP]
+    if normal_laws and bounds is None:
+        pressure = np.zeros_like(pressure)
+    for term, law in normal_laws:
+        pressure = pressure - np.sum(term.directions[:, 0] * surface.normals, axis=1) * law.traction
+    for term, law in zip(terms, read, strict=True):
+        if term.direction is Direction.SLIP and friction.shape[1] == 1:
+            friction = law.traction[:, None]
+    return pressure, friction
 
 
 def _touching(bounds: Bounds | None, normal: Array) -> npt.NDArray[np.bool_]:
     if bounds is None:
         return np.zeros(len(normal), dtype=bool)
     return (normal >= bounds.upper - NEAR) | (normal <= bounds.lower + NEAR)
-
-
-def prescribed(term: LawTerm) -> npt.NDArray[np.bool_]:
-    """Whether a component that the law acts along is prescribed."""
-    along = np.any(np.abs(term.directions) > NEAR, axis=1)
-    return np.any(along & (term.free == 0), axis=1)
-
-
-def _wanted(term: LawTerm, traction: Array, u: Array, argument: Array) -> Array:
-    """The traction that the law must give to balance the residual, along the law's argument; (m,)."""
-    pulled = -np.einsum("mkd,md->mk", term.directions, traction)
-    if pulled.shape[1] == 1:
-        value = pulled[:, 0]
-    else:
-        slip = term.slip(u)
-        along = np.sum(pulled * slip, axis=1) / np.where(argument > NEAR, argument, 1.0)
-        value = np.where(argument > NEAR, along, np.linalg.norm(pulled, axis=1))
-    low, high = term.law.interval(argument)
-    return np.where(prescribed(term), (low + high) / 2, value)
-
-
-def _beside_contact(term: LawTerm, value: Array, argument: Array, bounds: Bounds | None, normal: Array) -> Array:
-    """Of a normal law on a closed vertex, what contact cannot carry: it only pushes, the law gives the rest."""
-    if bounds is None or term.direction is Direction.SLIP:
-        return value
-    low, high = term.law.interval(argument, NEAR)
-    outward = (normal >= bounds.upper - NEAR) == (term.direction is Direction.OPENING)
-    onto = np.where(outward, np.maximum(value, low), np.minimum(value, high))
-    return np.where(_touching(bounds, normal), onto, value)
-
-
-def _with_prescribed(term: LawTerm, friction: Array, value: Array) -> Array:
-    held = prescribed(term)
-    if friction.shape[1] > 1 or not np.any(held):
-        return friction
-    return np.where(held[:, None], value[:, None], friction)
 
 
 def balanced(problem: Problem, reaction: Array, parts: Sequence[State]) -> Array:

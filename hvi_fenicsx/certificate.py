@@ -14,7 +14,8 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from . import boundary
-from .boundary import NEAR, Forces, State
+from .boundary import Forces, State
+from .ledger import NEAR
 from .parallel import agree, largest, total
 from .problem import Problem
 from .system import traction_scale
@@ -124,20 +125,9 @@ def _penetration(state: State) -> Array:
     return np.maximum(state.normal - state.bounds.upper, state.bounds.lower - state.normal)  # type: ignore[union-attr]
 
 
-def _pressure(state: State) -> Array:
-    """σ_n less what a normal law carries: the contact's own; 0 where u·n is prescribed."""
-    pressure = state.pressure.copy()
-    for term, argument in zip(state.terms, state.arguments, strict=True):
-        sign = np.sum(term.directions[:, 0, :] * state.surface.normals, axis=1)
-        if np.any(np.abs(sign) > 0.5):
-            low, high = term.law.interval(argument)
-            pressure = pressure + sign * np.clip(-sign * pressure, low, high)
-    return np.where(state.held, 0.0, pressure)
-
-
 def _tension(state: State) -> Array:
     """Pulling at the upper bound of u·n, pushing at the lower one."""
-    pressure, bounds = _pressure(state), state.bounds
+    pressure, bounds = state.contact_pressure, state.bounds
     upper = state.normal >= bounds.upper - NEAR  # type: ignore[union-attr]
     lower = state.normal <= bounds.lower + NEAR  # type: ignore[union-attr]
     wrong = np.where(upper & lower, 0.0, np.where(upper, pressure, np.where(lower, -pressure, 0.0)))
@@ -147,7 +137,7 @@ def _tension(state: State) -> Array:
 def _complementarity(state: State, size: float) -> Array:
     bounds = state.bounds
     gap = np.minimum(bounds.upper - state.normal, state.normal - bounds.lower)  # type: ignore[union-attr]
-    return np.minimum(np.abs(_pressure(state)), np.maximum(gap, 0.0) / size)
+    return np.minimum(np.abs(state.contact_pressure), np.maximum(gap, 0.0) / size)
 
 
 def _inclusion(state: State) -> float:
@@ -159,9 +149,11 @@ def _inclusion_true(states: Sequence[State]) -> tuple[float, float]:
     """Relative to the law's scale, and in units of p0."""
     worst = absolute = 0.0
     for state in states:
-        for term, argument, traction in zip(state.terms, state.arguments, state.tractions, strict=True):
+        for term, argument, traction, hidden in zip(
+            state.terms, state.arguments, state.tractions, state.hidden, strict=True
+        ):
             true = term.exact
-            away = np.where(boundary.prescribed(term), 0.0, true.distance(argument, traction, NEAR))
+            away = np.where(hidden, 0.0, true.distance(argument, traction, NEAR))
             size = float(np.max(away, initial=0.0))
             worst, absolute = max(worst, size / traction_scale(term)), max(absolute, size)
     return worst, absolute
@@ -170,9 +162,9 @@ def _inclusion_true(states: Sequence[State]) -> tuple[float, float]:
 def _second_order(comm: MPI.Comm, states: Sequence[State]) -> str:
     kink = curved = False
     for state in states:
-        for term, argument in zip(state.terms, state.arguments, strict=True):
+        for term, argument, hidden in zip(state.terms, state.arguments, state.hidden, strict=True):
             concave = term.law.concave
-            x = argument[~boundary.prescribed(term)]
+            x = argument[~hidden]
             on = [np.abs(x - k) <= NEAR for k in concave.kinks]
             kink |= bool(np.any(on))
             curved |= bool(np.any(concave.second(x) > term.law.convex.second(x)))

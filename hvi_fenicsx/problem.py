@@ -203,6 +203,7 @@ def _sum(
             stage.part_facets[where],
             stage.boundary(where, **_VERTEX),
             stage.length ** (stage.dimension - 1),
+            next((b.direction for w, _, other in made if w == where for b in other.bounds), None),
         )
         for where, _, c in made
         if where is not None and (c.bounds or c.laws)

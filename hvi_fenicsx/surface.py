@@ -5,6 +5,7 @@ Vertex (trapezoidal) quadrature makes every boundary term a sum over these nodes
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,9 +14,6 @@ import numpy.typing as npt
 import ufl
 from dolfinx import fem
 from petsc4py import PETSc
-
-from .errors import InputError
-from .parallel import agree
 
 Array = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.int32]
@@ -44,7 +42,14 @@ class Surface:
         return u.reshape(-1, self.normals.shape[1])[self.blocks]
 
 
-def build(part: str, space: fem.FunctionSpace, facets: Indices, measure: Any, area: float) -> Surface:
+def build(
+    part: str,
+    space: fem.FunctionSpace,
+    facets: Indices,
+    measure: Any,
+    area: float,
+    direction: Sequence[float] | None = None,
+) -> Surface:
     """The nodes of a part. Collective.
 
     Args:
@@ -53,9 +58,7 @@ def build(part: str, space: fem.FunctionSpace, facets: Indices, measure: Any, ar
         facets: its local facets.
         measure: ds with vertex quadrature over the part, SI.
         area: L^(d-1), what the weights are divided by.
-
-    Raises:
-        InputError: on all ranks, where a vertex's normal is not parallel to an axis.
+        direction: a constant unit vector that stands for the normal (that towards a flat obstacle).
     """
     dimension = space.mesh.geometry.dim
     dofs = fem.locate_dofs_topological(space, dimension - 1, facets)
@@ -63,10 +66,13 @@ def build(part: str, space: fem.FunctionSpace, facets: Indices, measure: Any, ar
     normal = _assembled(ufl.FacetNormal(space.mesh), space, measure)[blocks]
     ones = ufl.as_vector([fem.Constant(space.mesh, 1.0)] * dimension)
     weights = _assembled(ones, space, measure)[blocks, 0] / area
+    if direction is not None:
+        normal = np.broadcast_to(np.asarray(direction, dtype=np.float64), normal.shape)
     normals = normal / np.linalg.norm(normal, axis=1, keepdims=True)
     points = space.tabulate_dof_coordinates()[blocks]
-    _check_axis_parallel(part, space.mesh.comm, normals, points)
-    return Surface(part, facets, blocks, points, np.round(normals), tangents(np.round(normals)), weights)
+    # Rounding must not make an axis-parallel part a slanted one.
+    normals = np.where(np.max(np.abs(normals), axis=1, keepdims=True) > 1 - 1e-10, np.round(normals), normals)
+    return Surface(part, facets, blocks, points, normals, tangents(normals), weights)
 
 
 def _assembled(density: Any, space: fem.FunctionSpace, measure: Any) -> Array:
@@ -76,17 +82,6 @@ def _assembled(density: Any, space: fem.FunctionSpace, measure: Any) -> Array:
     values: Array = vector.array.reshape(-1, space.mesh.geometry.dim).copy()
     vector.destroy()
     return values
-
-
-def _check_axis_parallel(part: str, comm: Any, normals: Array, points: Array) -> None:
-    slanted = np.flatnonzero(np.max(np.abs(normals), axis=1, initial=0.0) < 1 - 1e-8)
-    bad = [tuple(float(c) for c in points[i]) for i in slanted[:1]]
-    found = [b for rank in agree(comm, bad) for b in rank]
-    if found:
-        raise InputError(
-            f"boundary.{part}: contact and friction want a part whose normal is parallel to an axis; at {found[0]} it "
-            "is slanted. Give the sides that meet at a corner a boundary table each"
-        )
 
 
 def tangents(normals: Array) -> Array:

@@ -17,6 +17,7 @@ from dolfinx.fem.petsc import apply_lifting, assemble_matrix, assemble_vector, s
 from mpi4py import MPI
 from petsc4py import PETSc
 
+from . import frames
 from .lawterm import LawTerm
 from .problem import Problem
 from .timing import Timer
@@ -56,7 +57,8 @@ class System:
     """A problem's matrix, load and bounds (PETSc objects owned by this, freed with it). Creation is collective.
 
     Attributes:
-        problem: what was assembled.
+        problem: what was assembled. frames, rotation: of vertices with slanted normals; None where there are none.
+        terms, bounds: the problem's, in the unknowns' components.
         matrix: J = A + W K, symmetric, Dirichlet rows and columns replaced by the identity; block size d.
         load: b, lifted; the prescribed values stand in the Dirichlet rows.
         lower, upper: bounds of u; infinite on Dirichlet rows.
@@ -65,7 +67,8 @@ class System:
     """
 
     def __init__(self, problem: Problem, compiled: Compiled, timer: Timer) -> None:
-        self.problem, self.terms = problem, problem.terms
+        self.problem, self.frames = problem, frames.build(problem)
+        self.terms, self.bounds = problem.terms, problem.bounds
         with timer("assembly"):
             conditions = list(problem.conditions)
             self.matrix = assemble_matrix(compiled.bilinear, conditions)
@@ -74,11 +77,12 @@ class System:
             self.matrix.setOption(PETSc.Mat.Option.SPD, True)
             self.forces = {name: _assembled(form) for name, form in compiled.linear.items()}
             self.load = self._lifted(compiled)
-            self.near_null = rigid_modes(problem)
+            self.rotation = self._rotate()
+            self.near_null = rigid_modes(problem, self.rotation)
             self.matrix.setNearNullSpace(self.near_null)
         self._rates = [np.zeros((*t.free.shape, t.free.shape[1])) for t in self.terms]
         self._work = self.load.duplicate()
-        self.lower, self.upper = self._bounds()
+        self.lower, self.upper = self._box()
         free = self.load.copy()
         free.array[problem.fixed[problem.fixed < free.local_size]] = 0.0
         self.scale = float(free.norm()) or 1.0
@@ -93,6 +97,39 @@ class System:
         """Global number of unknowns."""
         return int(self.load.size)
 
+    def _rotate(self) -> PETSc.Mat | None:
+        """Go over to local components where normals are slanted; the matrix Q with u = Q û, or None."""
+        if self.frames is None:
+            return None
+        q = self.frames.matrix(self.problem, self.matrix)
+        rows, columns = self.matrix.getLGMap()
+        rotated = self.matrix.ptap(q)
+        rotated.setLGMap(rows, columns)
+        self.matrix.destroy()
+        self.matrix = rotated
+        cartesian = self.load.copy()
+        q.multTranspose(cartesian, self.load)
+        self.terms = tuple(self.frames.term(t) for t in self.terms)
+        self.bounds = tuple(self.frames.bounds(b) for b in self.bounds)
+        return q
+
+    def displacement(self, x: PETSc.Vec) -> fem.Function:
+        """Unknowns as a displacement field (Cartesian, in units of u0, ghosts updated). Collective."""
+        u = fem.Function(self.problem.space, name="displacement")
+        cartesian = x if self.rotation is None else self.rotation * x
+        u.x.array[: x.local_size] = cartesian.array_r
+        u.x.scatter_forward()
+        return u
+
+    def unknowns(self, u: fem.Function) -> PETSc.Vec:
+        """A displacement field as unknowns. Collective."""
+        x = new_vector(self.problem.space)
+        x.array[:] = u.x.array[: x.local_size]
+        if self.rotation is not None:
+            cartesian = x.copy()
+            self.rotation.multTranspose(cartesian, x)
+        return x
+
     def _lifted(self, compiled: Compiled) -> PETSc.Vec:
         load = new_vector(self.problem.space)
         for force in self.forces.values():
@@ -105,11 +142,11 @@ class System:
         set_bc(load, conditions)
         return load
 
-    def _bounds(self) -> tuple[PETSc.Vec, PETSc.Vec]:
+    def _box(self) -> tuple[PETSc.Vec, PETSc.Vec]:
         lower, upper = self.load.duplicate(), self.load.duplicate()
         lower.set(-np.inf)
         upper.set(np.inf)
-        for bounds in self.problem.bounds:
+        for bounds in self.bounds:
             dofs, sign = normal_dofs(bounds.surface.blocks, bounds.surface.normals)
             positive = sign > 0
             low = np.where(positive, bounds.lower, -bounds.upper)
@@ -179,7 +216,7 @@ class System:
         """Largest residual a dof of Γc may keep for its traction to be right within tolerance; infinite elsewhere."""
         allowed = np.full(self.load.local_size, np.inf)
         d = self.problem.scales.dimension
-        for bounds in self.problem.bounds:
+        for bounds in self.bounds:
             dofs, _ = normal_dofs(bounds.surface.blocks, bounds.surface.normals)
             allowed[dofs] = np.minimum(allowed[dofs], tolerance * bounds.surface.weights)
         for term in self.terms:
@@ -215,20 +252,23 @@ def _assembled(form: fem.Form) -> PETSc.Vec:
     return vector
 
 
-def rigid_modes(problem: Problem) -> PETSc.NullSpace:
-    """The near-null space: all rigid motions of the free body, orthonormal, with constant ghosts. Collective."""
+def rigid_modes(problem: Problem, rotation: PETSc.Mat | None = None) -> PETSc.NullSpace:
+    """The near-null space: all rigid motions of the free body, orthonormal, in the unknowns' components. Collective."""
     space, d = problem.space, problem.scales.dimension
     x = (space.tabulate_dof_coordinates() - problem.domain.centre) / problem.scales.length
     fields = [np.eye(d)[i] + np.zeros((len(x), d)) for i in range(d)]
     pairs = [(0, 1)] if d == 2 else [(1, 2), (2, 0), (0, 1)]
     for i, j in pairs:
-        rotation = np.zeros((len(x), d))
-        rotation[:, i], rotation[:, j] = -x[:, j], x[:, i]
-        fields.append(rotation)
+        turning = np.zeros((len(x), d))
+        turning[:, i], turning[:, j] = -x[:, j], x[:, i]
+        fields.append(turning)
     vectors = []
     for field in fields:
         vector = new_vector(space)
         vector.array[:] = field.ravel()[: vector.local_size]
+        if rotation is not None:
+            cartesian = vector.copy()
+            rotation.multTranspose(cartesian, vector)
         vectors.append(vector)
     _orthonormalise(vectors)
     return PETSc.NullSpace().create(vectors=vectors, comm=space.mesh.comm)

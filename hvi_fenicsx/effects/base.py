@@ -80,10 +80,14 @@ class Condition:
 
 @dataclass(frozen=True, slots=True)
 class NormalBounds:
-    """lower ≤ -u·n ≤ upper on a part (SI; None: no bound). Unilateral contact with gap g has lower = -g."""
+    """lower ≤ -u·n ≤ upper on a part (SI; None: no bound). Unilateral contact with gap g has lower = -g.
+
+    ``direction`` stands for n where it is given: the unit vector towards a flat obstacle.
+    """
 
     lower: Formula | None
     upper: Formula | None
+    direction: tuple[float, ...] | None = None
 
 
 @dataclass(frozen=True, slots=True)

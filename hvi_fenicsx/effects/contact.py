@@ -2,16 +2,33 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+import math
+from typing import Annotated, Any, ClassVar
 
-from pydantic import model_serializer, model_validator
+from pydantic import BaseModel, ConfigDict, Field, model_serializer, model_validator
 
-from ..expressions import Formula
-from .base import Contribution, Effect, FormulaField, NormalBounds, Place, Stage, refusal
+from ..expressions import COORDINATES, Formula
+from .base import Contribution, Effect, FormulaField, NormalBounds, Place, Stage, components, refusal
+
+Coordinate = Annotated[float, Field(allow_inf_nan=False)]
+
+
+class Obstacle(BaseModel):
+    """A flat obstacle."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    point: tuple[Coordinate, ...]
+    """a point of its surface, m"""
+    normal: tuple[Coordinate, ...]
+    """its normal, towards the body; of any length"""
 
 
 class Contact(Effect):
-    """Unilateral, gap - u·n ≥ 0, or bilateral, lower ≤ -u·n ≤ upper, at every vertex of the part; n outward."""
+    """Unilateral, gap - u·n ≥ 0, or bilateral, lower ≤ -u·n ≤ upper, at every vertex of the part; n outward.
+
+    With an obstacle n is the direction towards it, and the gap the distance to it.
+    """
 
     key: ClassVar[str] = "contact"
     place: ClassVar[Place] = Place.BOUNDARY
@@ -25,10 +42,18 @@ class Contact(Effect):
     upper: FormulaField | None = None
     """with lower: largest opening in m, a number or a formula"""
 
+    obstacle: Obstacle | None = None
+    """instead of a gap: a flat obstacle under a curved part, { point = [0, 0], normal = [0, 1] }"""
+
     @model_validator(mode="after")
     def _one_way(self) -> Contact:
-        if (self.gap is None) == (self.lower is None) or (self.lower is None) != (self.upper is None):
-            raise refusal("needs either gap = 0.0, or lower and upper: { lower = -1e-6, upper = 1e-6 }")
+        ways = [w is not None for w in (self.gap, self.lower, self.obstacle)]
+        if sum(ways) != 1 or (self.lower is None) != (self.upper is None):
+            raise refusal(
+                "needs one of gap = 0.0, both lower and upper, or obstacle = { point = [...], normal = [...] }"
+            )
+        if self.obstacle is not None and not any(self.obstacle.normal):
+            raise refusal("normal of the obstacle is zero; give the direction towards the body")
         ends = [f.source for f in (self.lower, self.upper) if f is not None and f.is_number]
         if len(ends) == 2 and ends[0] > ends[1]:  # type: ignore[operator]
             raise refusal(f"lower = {ends[0]:g} is above upper = {ends[1]:g}; swap them")
@@ -36,12 +61,30 @@ class Contact(Effect):
 
     @model_serializer(mode="plain")
     def _as_table(self) -> dict[str, Any]:
-        return {k: f.source for k in ("gap", "lower", "upper") if (f := getattr(self, k)) is not None}
+        found = {k: f.source for k in ("gap", "lower", "upper") if (f := getattr(self, k)) is not None}
+        return found if self.obstacle is None else {"obstacle": self.obstacle.model_dump(mode="json")}
 
     def contribute(self, stage: Stage, where: str | None) -> Contribution:
         """The bounds on the normal displacement."""
+        if self.obstacle is not None:
+            return Contribution(bounds=(_towards(self.obstacle),))
         lower = self.lower if self.gap is None else _negative(self.gap)
         return Contribution(bounds=(NormalBounds(lower=lower, upper=self.upper),))
+
+    def check(self, dimension: int) -> None:
+        """An obstacle has as many components as the scene has dimensions."""
+        if self.obstacle is not None:
+            components(self.obstacle.point, dimension, "contact.obstacle.point")
+            components(self.obstacle.normal, dimension, "contact.obstacle.normal")
+
+
+def _towards(obstacle: Obstacle) -> NormalBounds:
+    """The gap is (x - point)·normal, and -normal stands for the outward normal."""
+    length = math.hypot(*obstacle.normal)
+    normal = [c / length for c in obstacle.normal]
+    terms = zip(normal, COORDINATES[: len(normal)], obstacle.point, strict=True)
+    gap = " + ".join(f"({n!r})*({x} - ({p!r}))" for n, x, p in terms)
+    return NormalBounds(lower=Formula(f"-({gap})"), upper=None, direction=tuple(-c for c in normal))
 
 
 def _negative(formula: Formula) -> Formula:

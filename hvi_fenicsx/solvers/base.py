@@ -76,7 +76,7 @@ class Solved:
 def held_dofs(system: System, laws: Sequence[Superpotential]) -> npt.NDArray[np.int32]:
     """Scalar dofs (local, owned, sorted) that the start holds: normal ones on contact parts, stuck ones of laws."""
     d = system.problem.scales.dimension
-    dofs = [normal_dofs(b.surface.blocks, b.surface.normals)[0] for b in system.problem.bounds]
+    dofs = [normal_dofs(b.surface.blocks, b.surface.normals)[0] for b in system.bounds]
     for term, law in zip(system.terms, laws, strict=True):
         if np.any(law.convex.kinks == 0.0):
             touched = np.any(term.directions != 0, axis=1)
@@ -96,7 +96,7 @@ def resting_start(solver: ActiveSetSolver, laws: Sequence[Superpotential], rtol:
     x.set(0.0)
     low, high = system.lower.array_r, system.upper.array_r
     contact = np.concatenate(
-        [np.empty(0, np.int64), *(normal_dofs(b.surface.blocks, b.surface.normals)[0] for b in system.problem.bounds)]
+        [np.empty(0, np.int64), *(normal_dofs(b.surface.blocks, b.surface.normals)[0] for b in system.bounds)]
     )
     x.array[contact] = closed(low[contact], high[contact])
     owned = system.problem.fixed[system.problem.fixed < x.local_size]

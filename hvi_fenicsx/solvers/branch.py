@@ -14,7 +14,6 @@ from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
-from dolfinx import fem
 from petsc4py import PETSc
 
 from ..errors import SolverError
@@ -228,8 +227,13 @@ class BranchIteration:
         return bool(self.system.comm.allreduce(any(bool(np.any(f)) for f in flags)))
 
     def _result(self, x: PETSc.Vec, outcome: Outcome) -> Solved:
-        u = fem.Function(self.system.problem.space, name="displacement")
-        u.x.array[: x.local_size] = x.array_r
-        u.x.scatter_forward()
         reason = "stationary" if outcome.converged else outcome.reason
-        return Solved(u, self.name, outcome.converged, reason, self.counts, tuple(self.energies), outcome.interrupted)
+        return Solved(
+            self.system.displacement(x),
+            self.name,
+            outcome.converged,
+            reason,
+            self.counts,
+            tuple(self.energies),
+            outcome.interrupted,
+        )

@@ -33,7 +33,7 @@ class Continuation:
             found = BranchIteration(self.solver, loose, laws, width).solve(start)
             counts.add(found.counts)
             if found.converged:
-                start = found.u.x.petsc_vec.copy()
+                start = self.solver.system.unknowns(found.u)
         last = BranchIteration(self.solver, self.settings).solve(start)
         counts.add(last.counts)
         return replace(last, method=self.name, counts=counts)
