@@ -1,0 +1,95 @@
+"""The fields that ParaView opens: ``displacement.pvd`` on the body, ``contact.pvd`` on Γc, in SI. Collective."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+from dolfinx import fem
+from dolfinx import mesh as dmesh
+from dolfinx.io import VTKFile
+
+from .. import compat
+from ..boundary import State
+from ..existence import body_of
+from ..problem import Problem
+from ..rigid import Mode, rigid_fields
+
+Array = npt.NDArray[np.float64]
+
+
+def write_body(path: Path, problem: Problem, u: fem.Function) -> None:
+    """The displacement, m."""
+    field = fem.Function(problem.space, name="displacement")
+    field.x.array[:] = u.x.array * problem.scales.displacement
+    _write(path, problem.domain.mesh, [field])
+
+
+def write_escape(path: Path, problem: Problem, mode: Mode) -> None:
+    """The rigid motion along which the body escapes, dimensionless."""
+    field = fem.Function(problem.space, name="escape_mode")
+    points = problem.space.tabulate_dof_coordinates() / problem.scales.length
+    motion = np.einsum("n,vnd->vd", np.asarray(mode.coefficients), rigid_fields(points, body_of(problem)))
+    field.x.array[:] = motion.ravel()
+    _write(path, problem.domain.mesh, [field])
+
+
+def write_contact(path: Path, problem: Problem, states: Sequence[State]) -> None:
+    """Γc as a mesh of its own with nodal values; a vertex of two parts has those of the later one."""
+    mesh, d = problem.domain.mesh, problem.scales.dimension
+    facets = np.unique(np.concatenate([s.facets for s in (state.surface for state in states)])).astype(np.int32)
+    surface, nodes = compat.submesh_nodes(mesh, d - 1, facets)
+    parent = _dof_of_node(problem.space)[nodes]
+    space = fem.functionspace(surface, ("Lagrange", 1))
+    target = _dof_of_node(space)
+    fields = []
+    for name, values in _nodal(problem, states).items():
+        field = fem.Function(space, name=name)
+        field.x.array[target] = values[parent]
+        fields.append(field)
+    _write(path, surface, fields)
+
+
+def _nodal(problem: Problem, states: Sequence[State]) -> dict[str, Array]:
+    """By name, values at all local vertices of the body (NaN where there is none). Collective."""
+    scalar = fem.functionspace(problem.domain.mesh, ("Lagrange", 1))
+    u, p = problem.scales.displacement, problem.scales.stress
+    found: dict[str, fem.Function] = {}
+
+    def put(name: str, state: State, values: Array) -> None:
+        if name not in found:
+            found[name] = fem.Function(scalar)
+            found[name].x.array[:] = np.nan
+        found[name].x.array[state.surface.blocks] = values
+
+    for state in states:
+        put("u_n", state, state.normal * u)
+        put("sigma_n", state, state.pressure * p)
+        put("gap", state, state.gap * u)
+        put("contact", state, state.contact.astype(float))
+        for i in range(problem.scales.dimension - 1):
+            put(f"u_t{i + 1}", state, state.slip[:, i] * u)
+            put(f"friction_t{i + 1}", state, state.friction[:, i] * p)
+        distances = state.distances
+        put("inclusion_distance", state, np.max(distances, axis=0) * p if distances else 0.0 * state.normal)
+    for field in found.values():
+        field.x.scatter_forward()
+    return {name: field.x.array for name, field in found.items()}
+
+
+def _dof_of_node(space: fem.FunctionSpace) -> npt.NDArray[np.int32]:
+    """The (block) dof at each geometry node of a P1 space on simplices."""
+    mesh = space.mesh
+    result = np.zeros(mesh.geometry.x.shape[0], dtype=np.int32)
+    cells = (
+        mesh.topology.index_map(mesh.topology.dim).size_local + mesh.topology.index_map(mesh.topology.dim).num_ghosts
+    )
+    result[compat.geometry_dofmap(mesh)[:cells]] = space.dofmap.list[:cells]
+    return result
+
+
+def _write(path: Path, mesh: dmesh.Mesh, fields: Sequence[fem.Function]) -> None:
+    with VTKFile(mesh.comm, str(path), "w") as file:
+        file.write_function(list(fields), 0.0)

@@ -1,0 +1,99 @@
+"""``summary.json``: the run in numbers, by the contract (design.md)."""
+
+from __future__ import annotations
+
+import math
+import resource
+import sys
+from typing import Any
+
+import numpy as np
+
+from .. import versions
+from ..parallel import agree, largest, total
+from ..problem import Problem
+from ..solution import Solution
+
+
+def summary(solution: Solution) -> dict[str, Any]:
+    """All of ``summary.json``; null for infinite or absent. Collective; the same on all ranks."""
+    problem, solved, examined = solution.problem, solution.solved, solution.examined
+    comm = problem.domain.mesh.comm
+    wanted = solution.scene.solver
+    return _plain(
+        {
+            "scene": solution.scene.title,
+            "dofs": solution.dofs,
+            "ranks": comm.size,
+            "converged": solution.converged,
+            "reason": solution.reason,
+            "exit_code": solution.exit_code,
+            "method": solved.method if solved else None,
+            "smoothing": wanted.smoothing,
+            "epsilon": solution.epsilon,
+            "iterations": _iterations(solution),
+            "energy": examined.energy * problem.scales.energy if examined else None,
+            "contact": _contact(solution),
+            "solvability": solution.solvability.summary(),
+            "certificate": examined.certificate.as_dict() if examined else None,
+            "estimate": None,
+            "effects": [_effect(p) for p in solution.scene.effects()],
+            "scales": _scales(problem),
+            "time": {name: largest(comm, value) for name, value in solution.timer.report().items()},
+            "peak_memory_mb": total(comm, _peak_memory()),
+            "versions": versions.versions(),
+        }
+    )
+
+
+def _iterations(solution: Solution) -> dict[str, int] | None:
+    if solution.solved is None:
+        return None
+    counts = solution.solved.counts
+    return {"newton": counts.newton, "linear": counts.linear, "levels": 1, "branch": counts.branch}
+
+
+def _contact(solution: Solution) -> dict[str, Any] | None:
+    """Over all parts with contact: vertices, those closed, largest gap and penetration (m), resultant (N/m or N)."""
+    examined, scales = solution.examined, solution.problem.scales
+    states = [s for s in examined.states if s.bounds is not None] if examined else []
+    comm = solution.problem.domain.mesh.comm
+    if not sum(agree(comm, len(solution.problem.bounds))) or examined is None:
+        return None
+    gaps = [s.gap[np.isfinite(s.gap)] for s in states]
+    forces = [s.surface.weights[:, None] * s.pressure[:, None] * s.surface.normals for s in states]
+    resultant = comm.allreduce(sum(f.sum(axis=0) for f in forces))
+    return {
+        "vertices": comm.allreduce(sum(len(s.gap) for s in states)),
+        "active": comm.allreduce(sum(int(np.count_nonzero(s.contact)) for s in states)),
+        "max_gap": largest(comm, max((float(np.max(g, initial=0.0)) for g in gaps), default=0.0)) * scales.displacement,
+        "max_penetration": largest(comm, max((float(np.max(0.0 - g, initial=0.0)) for g in gaps), default=0.0))
+        * scales.displacement,
+        "resultant": [float(f) * scales.force for f in resultant],
+    }
+
+
+def _effect(placed: Any) -> dict[str, str | None]:
+    return {"effect": placed.effect.key, "where": placed.where, "adds": placed.effect.term}
+
+
+def _scales(problem: Problem) -> dict[str, float]:
+    s = problem.scales
+    return {"length": s.length, "stress": s.stress, "displacement": s.displacement, "energy": s.energy}
+
+
+def _peak_memory() -> float:
+    """Of this rank, MB."""
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return peak / 2**20 if sys.platform == "darwin" else peak / 2**10
+
+
+def _plain(value: Any) -> Any:
+    """What JSON can say: no infinities, no NumPy."""
+    if isinstance(value, dict):
+        return {k: _plain(v) for k, v in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(v) for v in value]
+    if isinstance(value, np.generic):
+        value = value.item()
+    return None if isinstance(value, float) and not math.isfinite(value) else value
