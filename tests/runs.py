@@ -1,0 +1,51 @@
+"""Runs of the command line as users start them: a process, serial or under mpirun, and what it left behind."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from hvi_fenicsx import Scene, dump_scene
+
+ROOT = Path(__file__).parent.parent
+
+
+def command(*words: object, ranks: int = 1) -> list[str]:
+    """The command line of a run."""
+    serial = [sys.executable, "-m", "hvi_fenicsx"]
+    parallel = ["mpirun", "-n", str(ranks), sys.executable, "-m", "mpi4py", "-m", "hvi_fenicsx"]
+    return [*(serial if ranks == 1 else parallel), *map(str, words)]
+
+
+def hvi(*words: object, ranks: int = 1, cwd: Path = ROOT) -> subprocess.CompletedProcess[str]:
+    """Run a command to its end."""
+    return subprocess.run(
+        command(*words, ranks=ranks), cwd=cwd, capture_output=True, text=True, check=False, timeout=300
+    )
+
+
+def write_scene(path: Path, table: dict[str, Any]) -> Path:
+    """A scene file of these tables."""
+    path.write_text(dump_scene(Scene.model_validate(table)), encoding="utf-8")
+    return path
+
+
+def summary(folder: Path) -> dict[str, Any]:
+    """The run in numbers; NaN and infinity, which are no JSON, are refused."""
+
+    def refuse(word: str) -> None:
+        raise ValueError(f"{word} is no JSON")
+
+    found: dict[str, Any] = json.loads((folder / "summary.json").read_text(encoding="utf-8"), parse_constant=refuse)
+    return found
+
+
+def contact(folder: Path) -> npt.NDArray[Any]:
+    """``contact.csv`` by NumPy, columns by name; empty cells are NaN."""
+    return np.genfromtxt(folder / "contact.csv", delimiter=",", names=True, dtype=None, encoding="utf-8")
