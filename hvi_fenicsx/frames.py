@@ -122,8 +122,8 @@ def _normals_at_slanted(problem: Problem) -> dict[int, list[Array]]:
     """By vertex, the normals of all parts there, where one of them is slanted."""
     found: dict[int, list[Array]] = {}
     for surface in problem.surfaces:
-        for i, block in enumerate(surface.blocks.tolist()):
-            found.setdefault(block, []).append(surface.normals[i])
+        for block, normal in zip(surface.blocks, surface.normals, strict=True):
+            found.setdefault(int(block), []).append(np.asarray(normal))
     return {block: normals for block, normals in found.items() if _slanted(np.array(normals)).any()}
 
 

@@ -43,6 +43,11 @@ class LawTerm:
     residual: Any
     tangent: Any
 
+    @property
+    def radial(self) -> bool:
+        """Whether the law acts on the length of a slip vector (|u_t| in 3D)."""
+        return self.directions.shape[1] > 1
+
     def slip(self, u: Array) -> Array:
         """The displacement along the directions, of a local array; shape (m, k)."""
         return np.einsum("mkd,md->mk", self.directions, self.surface.values(u))
@@ -56,9 +61,9 @@ class LawTerm:
         """Σ w j over this rank's vertices."""
         return float(np.sum(self.surface.weights * self.law.value(self.argument(u))))
 
-    def set_traction(self, u: Array, derivative: Array, rate_times: Array) -> None:
-        """τ from the law's derivative (m,) at u, less K·u for the K (m, d, d) in force; ghosts updated. Collective."""
-        tau = self._vector(u, derivative) * self.free - np.einsum("mij,mj->mi", rate_times, self.surface.values(u))
+    def set_traction(self, u: Array, derivative: Array) -> None:
+        """τ from the law's derivative (m,) at u; ghosts are updated. Collective."""
+        tau = self._vector(u, derivative) * self.free
         self.density.x.array.reshape(-1, tau.shape[1])[self.surface.blocks] = tau
         self.density.x.scatter_forward()
 

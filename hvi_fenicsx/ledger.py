@@ -1,8 +1,8 @@
 """Who carries the residual force at a vertex of Γc: laws, contact, prescribed displacements; component by component.
 
 At most vertices a component has one carrier. At corners, at the seam of two parts, and where adhesion acts beside
-contact there are several, and only their sum is known. Laws may then carry any value of the (weighted, Minkowski) sum of
-their Clarke intervals; a bound that is reached, or a support, carries the rest; without one it is an error of the laws.
+contact there are several, and only their sum is known. Laws may then carry any value of the (weighted, Minkowski) sum
+of their Clarke intervals; a bound that is reached, or a support, carries the rest; without one it is the laws' error.
 """
 
 from __future__ import annotations

@@ -316,6 +316,11 @@ def _term(
         Direction.PENETRATION: where.normals[:, None, :],
     }[law.direction]
     solved, exact = (j.scaled(scales.displacement, scales.stress) for j in (modify(law.law), law.law))
+    if directions.shape[1] > 1 and np.any(solved.convex.kinks > 0):
+        raise InputError(
+            f'boundary.{where.part}: law = "{law.law.name}" jumps upwards at a slip > 0, which in 3D is a ring that '
+            "bounds cannot follow; smooth it: [solver] smoothing and epsilon"
+        )
     dofs = where.blocks[:, None] * stage.dimension + np.arange(stage.dimension)
     free = (~np.isin(dofs, fixed)).astype(np.float64)
     density = fem.Function(stage.space, name="clarke_derivative")

@@ -1,7 +1,8 @@
 """A problem assembled: PETSc matrix, load, bounds, and the law terms' residual, tangent and energy on top of them.
 
-The bulk matrix is assembled once. Laws touch only the diagonal blocks of Γc's vertices: a change of their tangent K is
-assembled as a difference, into those rows alone. With J = A + W K in force, the residual is J u - b + W (τ(u) - K u).
+The bulk matrix A is assembled once. Laws touch only the diagonal blocks of Γc's vertices: for a new tangent K these
+blocks of J = A + W K are reset and assembled again, nothing else. Where a law acts, residuals are computed from the rows of A
+itself: K may be larger than A by any factor, and a difference of the two would leave rounding only.
 """
 
 from __future__ import annotations
@@ -81,6 +82,7 @@ class System:
             self.near_null = rigid_modes(problem, self.rotation)
             self.matrix.setNearNullSpace(self.near_null)
         self._rates = [np.zeros((*t.free.shape, t.free.shape[1])) for t in self.terms]
+        self._bulk = _BulkRows(self.matrix, self.terms) if self.terms else None
         self._work = self.load.duplicate()
         self.lower, self.upper = self._box()
         free = self.load.copy()
@@ -159,13 +161,15 @@ class System:
 
     def set_rates(self, rates: Sequence[Array]) -> None:
         """Make K the tangent in force: J changes in Γc's rows only. Collective."""
+        changed = any(bool(np.any(new != old)) for new, old in zip(rates, self._rates, strict=True))
+        if self._bulk is None or not self.comm.allreduce(changed, op=MPI.LOR):
+            return
+        self._bulk.restore_blocks(self.matrix)
         for term, new, old in zip(self.terms, rates, self._rates, strict=True):
-            changed = self.comm.allreduce(bool(np.any(new != old)), op=MPI.LOR)
-            if changed:
-                term.set_rates(new - old)
-                assemble_matrix(self.matrix, term.tangent)
-                self.matrix.assemble()
-                old[...] = new
+            term.set_rates(new)
+            assemble_matrix(self.matrix, term.tangent)
+            old[...] = new
+        self.matrix.assemble()
 
     @property
     def rates(self) -> list[Array]:
@@ -181,16 +185,22 @@ class System:
         return max(changes, default=0.0)
 
     def residual(self, x: PETSc.Vec, out: PETSc.Vec, models: Sequence[Model]) -> None:
-        """J u - b + W (τ(u) - K u) into ``out``, which must have ghosts. Collective."""
-        self.matrix.mult(x, out)
+        """A u - b + W τ(u) into ``out``, which must have ghosts. Collective."""
+        self._stiffness_times(x, out)
         out.axpy(-1.0, self.load)
         with out.localForm() as local:
             local.array_w[out.local_size :] = 0.0
-        for term, model, rates in zip(self.terms, models, self._rates, strict=True):
+        for term, model in zip(self.terms, models, strict=True):
             u = x.array_r
-            term.set_traction(u, model.derivative(term.argument(u)), rates)
+            term.set_traction(u, model.derivative(term.argument(u)))
             assemble_vector(out, term.residual)
         out.ghostUpdate(addv=_ADD, mode=_REVERSE)
+
+    def _stiffness_times(self, x: PETSc.Vec, out: PETSc.Vec) -> None:
+        """A u: by J, but by A's own rows where they differ."""
+        self.matrix.mult(x, out)
+        if self._bulk is not None:
+            self._bulk.overwrite(x, out)
 
     def tangents(self, x: PETSc.Vec, models: Sequence[Model]) -> list[Array]:
         """K of the models at u, by term."""
@@ -203,13 +213,11 @@ class System:
 
     def energy(self, x: PETSc.Vec, models: Sequence[Model]) -> float:
         """½ a(u, u) - <g, u> + Σ w models, up to a constant of the prescribed displacements. Collective."""
-        self.matrix.mult(x, self._work)
+        self._stiffness_times(x, self._work)
         u = x.array_r
         local = 0.0
-        for term, model, rates in zip(self.terms, models, self._rates, strict=True):
-            v, w = term.surface.values(u), term.surface.weights
-            local += float(np.sum(w * model.value(term.argument(u))))
-            local -= 0.5 * float(np.einsum("m,mi,mij,mj->", w, v, rates, v))
+        for term, model in zip(self.terms, models, strict=True):
+            local += float(np.sum(term.surface.weights * model.value(term.argument(u))))
         return 0.5 * float(x.dot(self._work)) - float(self.load.dot(x)) + float(self.comm.allreduce(local))
 
     def allowed(self, tolerance: float) -> Array:
@@ -225,6 +233,37 @@ class System:
             limit = tolerance * traction_scale(term) * term.surface.weights
             allowed[dofs[touched]] = np.minimum(allowed[dofs], limit[:, None])[touched]
         return allowed
+
+
+class _BulkRows:
+    """The rows of the bulk matrix at the vertices where laws act."""
+
+    def __init__(self, matrix: PETSc.Mat, terms: Sequence[LawTerm]) -> None:
+        d = matrix.getBlockSize()
+        blocks = np.unique(np.concatenate([t.surface.blocks for t in terms]))
+        self._dofs = (blocks[:, None] * d + np.arange(d)).ravel()
+        start = matrix.getOwnershipRange()[0]
+        rows = PETSc.IS().createGeneral((self._dofs + start).astype(PETSc.IntType), comm=matrix.comm)
+        self._matrix = matrix.createSubMatrix(rows, None)
+        self._product = self._matrix.createVecLeft()
+        self._blocks = (blocks + start // d).astype(PETSc.IntType)
+        self._values = self._diagonal_blocks(matrix, d)
+
+    def _diagonal_blocks(self, matrix: PETSc.Mat, d: int) -> Array:
+        dofs = self._blocks[:, None] * d + np.arange(d, dtype=PETSc.IntType)
+        return np.array([matrix.getValues(i, i) for i in dofs], dtype=np.float64).reshape(-1, d, d)
+
+    def restore_blocks(self, matrix: PETSc.Mat) -> None:
+        """Put the bulk's diagonal blocks back into J. Collective."""
+        for block, values in zip(self._blocks, self._values, strict=True):
+            matrix.setValuesBlocked([block], [block], values)
+        matrix.assemblyBegin(PETSc.Mat.AssemblyType.FLUSH)
+        matrix.assemblyEnd(PETSc.Mat.AssemblyType.FLUSH)
+
+    def overwrite(self, x: PETSc.Vec, out: PETSc.Vec) -> None:
+        """Replace these rows of a product with J by those of the product with A. Collective."""
+        self._matrix.mult(x, self._product)
+        out.array[self._dofs] = self._product.array_r
 
 
 def traction_scale(term: LawTerm) -> float:

@@ -186,10 +186,11 @@ class BranchIteration:
         )
         self.counts.newton += found.newton
         self.counts.linear += found.linear
-        if found.converged and self._energy(trial) <= self._energy(x) + self._rounding(self._energy(x)):
-            trial.copy(x)
-            return found, True
-        return outcome, False
+        if not found.converged or self._energy(trial) > self._energy(x) + self._rounding(self._energy(x)):
+            return outcome, False
+        trial.copy(x)
+        self.system.residual(x, self._residual, full)
+        return found, not self._any(kinks.overloaded(self.system, x, self._residual, full, self.settings.tolerance))
 
     def _measure(self, x: PETSc.Vec, cells: list[Cells], xi: list[Array]) -> float:
         """The residual of the true inequality: ξ stands if it is still in ∂G. Collective."""
@@ -205,7 +206,8 @@ class BranchIteration:
         return [t.argument(x.array_r) for t in self.system.terms]
 
     def _cells(self, x: PETSc.Vec) -> list[Cells]:
-        return [Cells.around(law.convex, a) for law, a in zip(self._laws, self._arguments(x), strict=True)]
+        terms = zip(self.system.terms, self._laws, self._arguments(x), strict=True)
+        return [Cells.around(law.convex, a, radial=term.radial) for term, law, a in terms]
 
     def _subgradients(self, x: PETSc.Vec, shift: float) -> list[Array]:
         """ξ ∈ ∂G at the slips, which may be moved to one side of a kink."""

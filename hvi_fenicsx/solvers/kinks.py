@@ -11,7 +11,7 @@ from petsc4py import PETSc
 from ..laws import ConvexPart
 from ..lawterm import LawTerm
 from ..system import System, traction_scale
-from .models import Cells, Majorant
+from .models import Cells, Full, Majorant
 
 Array = npt.NDArray[np.float64]
 
@@ -22,6 +22,9 @@ def boxes(system: System, cells: Sequence[Cells]) -> tuple[PETSc.Vec, PETSc.Vec]
         return system.lower, system.upper
     lower, upper = system.lower.copy(), system.upper.copy()
     for term, c in zip(system.terms, cells, strict=True):
+        if term.radial:
+            _hold_stuck(term, c, lower, upper)
+            continue
         dofs, sign, free = _slip_dofs(term)
         low, high = np.where(sign > 0, c.lower, -c.upper), np.where(sign > 0, c.upper, -c.lower)
         lower.array[dofs[free]] = np.maximum(lower.array[dofs], low)[free]
@@ -30,7 +33,7 @@ def boxes(system: System, cells: Sequence[Cells]) -> tuple[PETSc.Vec, PETSc.Vec]
 
 
 def overloaded(
-    system: System, x: PETSc.Vec, residual: PETSc.Vec, models: Sequence[Majorant], tolerance: float
+    system: System, x: PETSc.Vec, residual: PETSc.Vec, models: Sequence[Majorant | Full], tolerance: float
 ) -> list[npt.NDArray[np.int64]]:
     """Per vertex -1, 0 or 1: where it goes if the kink it sits on cannot carry its force.
 
@@ -41,6 +44,9 @@ def overloaded(
     for term, model in zip(system.terms, models, strict=True):
         c, part = model.cells, model.law.convex
         argument = term.argument(x.array_r)
+        if term.radial:
+            moves.append(_radial_moves(term, model, argument, residual, tolerance))
+            continue
         force = np.einsum("md,md->m", term.directions[:, 0, :], term.surface.values(residual.array_r))
         weight = term.surface.weights
         slack = 0.1 * tolerance * traction_scale(term) * weight
@@ -49,6 +55,31 @@ def overloaded(
         up = free & (argument >= c.upper) & (force + weight * _jump(part, c.upper) < -slack)
         moves.append(up.astype(np.int64) - down.astype(np.int64))
     return moves
+
+
+def _hold_stuck(term: LawTerm, cells: Cells, lower: PETSc.Vec, upper: PETSc.Vec) -> None:
+    """Both components of a stuck vertex's slip are kept at zero."""
+    d = term.free.shape[1]
+    dofs = term.surface.blocks[:, None].astype(np.int64) * d + np.arange(d)
+    stuck = (cells.index == 0)[:, None] & np.any(np.abs(term.directions) > 0.5, axis=1) & (term.free > 0)
+    if len(cells.kinks):
+        lower.array[dofs[stuck]] = upper.array[dofs[stuck]] = 0.0
+
+
+def _radial_moves(
+    term: LawTerm, model: Majorant | Full, argument: Array, residual: PETSc.Vec, tolerance: float
+) -> npt.NDArray[np.int64]:
+    """A law of |u_t|: a stuck vertex goes when the force leaves the kink's disc, a free one sticks below the ramp."""
+    cells = model.cells
+    if not len(cells.kinks):
+        return np.zeros(len(argument), dtype=np.int64)
+    force = np.einsum("mkd,md->mk", term.directions, term.surface.values(residual.array_r) * term.free)
+    weight = term.surface.weights
+    disc = weight * model.law.convex.right(np.zeros_like(argument))
+    slack = 0.1 * tolerance * traction_scale(term) * weight
+    go = (cells.index == 0) & (np.linalg.norm(force, axis=1) > disc + slack)
+    stick = (cells.index == 1) & (argument <= cells.ramp)
+    return go.astype(np.int64) - stick.astype(np.int64)
 
 
 def _slip_dofs(term: LawTerm) -> tuple[npt.NDArray[np.int64], Array, npt.NDArray[np.bool_]]:

@@ -8,6 +8,7 @@ carry its force moves on to the next cell.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -15,19 +16,30 @@ import numpy.typing as npt
 from ..laws import ConvexPart, Superpotential
 
 Array = npt.NDArray[np.float64]
+_FIRST_RAMP = 1e-2
+"""Of the largest slip; it shrinks whenever a stuck vertex is let go."""
+_SHRINK = 0.3
 
 
 @dataclass(frozen=True)
 class Cells:
-    """For each vertex the cell [lower, upper] between two kinks of H that it is kept in; shape (m,)."""
+    """For each vertex the cell [lower, upper] between two kinks of H that it is kept in; shape (m,).
+
+    For a law of |u_t| in 3D there is one kink, at zero, and two cells: stuck (0) and free (1). ``ramp`` is then the
+    slip below which a free vertex meets a traction that grows from zero, so that its direction may still turn; a vertex
+    that stays below it is stuck. It is 0 for laws of a signed slip.
+    """
 
     kinks: Array
     index: npt.NDArray[np.int64]
+    ramp: float = 0.0
 
     @classmethod
-    def around(cls, part: ConvexPart, x: Array) -> Cells:
-        """The cells that hold x; on a kink the one above."""
-        return cls(part.kinks, np.searchsorted(part.kinks, x, side="right"))
+    def around(cls, part: ConvexPart, x: Array, *, radial: bool = False) -> Cells:
+        """The cells that hold x; on a kink the one above, for a law of |u_t| stuck."""
+        side: Literal["left", "right"] = "left" if radial else "right"
+        ramp = _FIRST_RAMP * max(float(np.max(x, initial=0.0)), 1e-6) if radial and len(part.kinks) else 0.0
+        return cls(part.kinks, np.searchsorted(part.kinks, x, side=side), ramp)
 
     @property
     def lower(self) -> Array:
@@ -41,14 +53,24 @@ class Cells:
 
     def moved(self, step: npt.NDArray[np.int64]) -> Cells:
         """The cells after each vertex moved by -1, 0 or 1."""
-        return Cells(self.kinks, self.index + step)
+        return Cells(self.kinks, self.index + step, self.ramp * (_SHRINK if np.any(step > 0) else 1.0))
 
 
 def _inside(part: ConvexPart, cells: Cells, x: Array) -> Array:
     """Derivative of H, extended from within the cell to its ends."""
+    if cells.ramp > 0:
+        return part.right(np.maximum(x, cells.ramp)) * np.minimum(x / cells.ramp, 1.0)
     at_lower, at_upper = x <= cells.lower, x >= cells.upper
     lower, upper = np.where(at_lower, cells.lower, x), np.where(at_upper, cells.upper, x)
     return np.where(at_lower, part.right(lower), np.where(at_upper, part.left(upper), part.right(x)))
+
+
+def _curvature(part: ConvexPart, cells: Cells, x: Array) -> Array:
+    """Second derivative of H, that of the ramp below it."""
+    if cells.ramp > 0:
+        steep = part.right(np.array([cells.ramp])) / cells.ramp
+        return np.where(x < cells.ramp, steep, part.second(np.maximum(x, cells.ramp)))
+    return part.second(x)
 
 
 @dataclass(frozen=True)
@@ -69,7 +91,7 @@ class Majorant:
 
     def second(self, x: Array) -> Array:
         """H'' ≥ 0."""
-        return self.law.convex.second(x)
+        return _curvature(self.law.convex, self.cells, x)
 
 
 @dataclass(frozen=True)
@@ -90,7 +112,7 @@ class Full:
 
     def second(self, x: Array) -> Array:
         """H'' - G''."""
-        return self.law.convex.second(x) - self.law.concave.second(x)
+        return _curvature(self.law.convex, self.cells, x) - self.law.concave.second(x)
 
 
 @dataclass(frozen=True)
