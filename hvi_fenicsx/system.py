@@ -1,8 +1,8 @@
 """A problem assembled: PETSc matrix, load, bounds, and the law terms' residual, tangent and energy on top of them.
 
 The bulk matrix A is assembled once. Laws touch only the diagonal blocks of Γc's vertices: for a new tangent K these
-blocks of J = A + W K are reset and assembled again, nothing else. Where a law acts, residuals are computed from the rows of A
-itself: K may be larger than A by any factor, and a difference of the two would leave rounding only.
+blocks of J = A + W K are reset and assembled again, nothing else. Where a law acts, residuals are computed from the
+rows of A itself: K may be larger than A by any factor, and a difference of the two would leave rounding only.
 """
 
 from __future__ import annotations
