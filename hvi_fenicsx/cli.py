@@ -65,7 +65,7 @@ def _ranks(text: str) -> int:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command; the exit code by the contract. Collective under mpirun."""
-    words = list(sys.argv[1:] if arguments is None else arguments)
+    words = _joined(sys.argv[1:] if arguments is None else arguments)
     try:
         return _dispatch(parser().parse_args(words), words)
     except HviError as error:
@@ -74,6 +74,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         _complain("hvi: interrupted; nothing was written")
         return INTERRUPTED
+
+
+def _joined(words: Sequence[str]) -> list[str]:
+    """``--petsc OPTIONS`` as one word: options begin with a dash, which argparse takes for options of its own."""
+    found = list(words)
+    if "--petsc" in found[:-1]:
+        at = found.index("--petsc")
+        found[at : at + 2] = [f"--petsc={found[at + 1]}"]
+    return found
 
 
 def _dispatch(options: argparse.Namespace, words: Sequence[str]) -> int:

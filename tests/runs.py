@@ -48,4 +48,7 @@ def summary(folder: Path) -> dict[str, Any]:
 
 def contact(folder: Path) -> npt.NDArray[Any]:
     """``contact.csv`` by NumPy, columns by name; empty cells are NaN."""
-    return np.genfromtxt(folder / "contact.csv", delimiter=",", names=True, dtype=None, encoding="utf-8")
+    file = folder / "contact.csv"
+    names = file.read_text(encoding="utf-8").splitlines()[0].split(",")
+    kinds = [(name, "U40" if name == "part" else "f8") for name in names]
+    return np.genfromtxt(file, delimiter=",", dtype=kinds, skip_header=1, encoding="utf-8")
