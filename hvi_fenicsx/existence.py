@@ -10,7 +10,7 @@ from petsc4py import PETSc
 
 from .lawterm import LawTerm
 from .problem import Bounds, Problem
-from .rigid import Body, ContactCone, Fixed, Resistance, RigidProblem, Solvability, analyse, rigid_fields
+from .rigid import Body, ContactCone, Fixed, Resistance, RigidProblem, Solvability, analyse, kernel, rigid_fields
 
 Array = npt.NDArray[np.float64]
 
@@ -37,6 +37,13 @@ def rigid_problem(problem: Problem, forces: Mapping[str, PETSc.Vec]) -> RigidPro
         tuple(ContactCone(_scaled(problem, b.surface.points), b.surface.normals) for b in unilateral),
         tuple(_resistance(problem, term) for term in problem.terms),
     )
+
+
+def moves_with_contact_closed(problem: Problem) -> bool:
+    """Whether a rigid motion is left when every contact part is held in its normal direction. Collective."""
+    held = [_direction(problem, b.surface.points, b.surface.normals) for b in problem.bounds]
+    basis = kernel(problem.domain.mesh.comm, body_of(problem), (_prescribed(problem), *held))
+    return basis.shape[1] > 0
 
 
 def _bilateral(bounds: Bounds) -> bool:

@@ -10,6 +10,7 @@ import numpy.typing as npt
 from dolfinx import fem
 from petsc4py import PETSc
 
+from .. import existence
 from ..laws import Superpotential
 from ..system import System, normal_dofs
 from .activeset import ActiveSetSolver
@@ -74,11 +75,15 @@ class Solved:
 
 
 def held_dofs(system: System, laws: Sequence[Superpotential]) -> npt.NDArray[np.int32]:
-    """Scalar dofs (local, owned, sorted) that the start holds: normal ones on contact parts, stuck ones of laws."""
+    """Scalar dofs (local, owned, sorted) that the start holds. Collective.
+
+    The normal ones of contact parts; where these leave a rigid motion, also slips at which a law has a convex kink.
+    """
     d = system.problem.scales.dimension
     dofs = [normal_dofs(b.surface.blocks, b.surface.normals)[0] for b in system.bounds]
+    loose = existence.moves_with_contact_closed(system.problem)
     for term, law in zip(system.terms, laws, strict=True):
-        if np.any(law.convex.kinks == 0.0):
+        if loose and np.any(law.convex.kinks == 0.0):
             touched = np.any(term.directions != 0, axis=1)
             dofs.append((term.surface.blocks[:, None] * d + np.arange(d))[touched])
     joined = np.unique(np.concatenate([np.empty(0, np.int64), *dofs]))
