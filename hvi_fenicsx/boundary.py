@@ -16,7 +16,7 @@ from dolfinx import fem
 from dolfinx.fem.petsc import assemble_vector
 from petsc4py import PETSc
 
-from . import ledger
+from . import dilatation, ledger
 from .effects.base import Direction
 from .lawterm import LawTerm
 from .ledger import NEAR, Ledger
@@ -78,6 +78,8 @@ def forces(problem: Problem, u: fem.Function) -> Forces:
     """Reassembled from the forms, whatever a solver believes. Collective."""
     d = problem.scales.dimension
     internal = _vector(ufl.action(problem.bilinear, u)).reshape(-1, d)
+    for part in dilatation.assemble(problem.averaged):
+        internal += part.force(u).reshape(-1, d)
     load = sum((_vector(form).reshape(-1, d) for form in problem.linear.values()), np.zeros_like(internal))
     return Forces(internal - load, load)
 

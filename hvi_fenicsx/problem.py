@@ -21,7 +21,7 @@ from petsc4py import PETSc
 from . import scales as scaling
 from . import surface
 from .domain import Domain
-from .effects.base import BoundaryLaw, Condition, Contribution, Direction, Effect, NormalBounds, Place
+from .effects.base import Averaged, BoundaryLaw, Condition, Contribution, Direction, Effect, NormalBounds, Place
 from .errors import InputError
 from .expressions import Formula, ufl_algebra
 from .laws import Superpotential
@@ -50,6 +50,7 @@ class Problem:
     Attributes:
         domain, scales: as they are. space: P1 vectors.
         bilinear, linear: UFL forms a(u, v) and <g, v>, the latter by name of its part.
+        averaged: volumetric parts of a(u, v) that are averaged by vertex.
         conditions: Dirichlet conditions, nondimensional values.
         fixed: local scalar dofs (owned and ghost) that they prescribe.
         bounds: by part. terms: the laws at their vertices.
@@ -60,6 +61,7 @@ class Problem:
     scales: Scales
     space: fem.FunctionSpace
     bilinear: Any
+    averaged: tuple[Averaged, ...]
     linear: dict[str, Any]
     conditions: tuple[fem.DirichletBC, ...]
     fixed: npt.NDArray[np.int32]
@@ -76,6 +78,7 @@ class Stage:
         self.length, self.stress, self.modulus = scales.length, scales.stress, scales.modulus
         self.space = fem.functionspace(domain.mesh, ("Lagrange", 1, (self.dimension,)))
         self.trial, self.test = ufl.TrialFunction(self.space), ufl.TestFunction(self.space)
+        self.scalar_test = ufl.TestFunction(fem.functionspace(domain.mesh, ("Lagrange", 1)))
         self.normal = ufl.FacetNormal(domain.mesh)
         self.part_facets = {name: domain.facets(on) for name, on in parts.items()}
 
@@ -225,6 +228,7 @@ def _sum(
         scales,
         stage.space,
         sum(bilinear),
+        tuple(a for _, _, c in made for a in c.averaged),
         linear,
         conditions,
         fixed,

@@ -14,11 +14,11 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 from dolfinx import fem
-from dolfinx.fem.petsc import apply_lifting, assemble_matrix, assemble_vector, set_bc
+from dolfinx.fem.petsc import assemble_matrix, assemble_vector, set_bc
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from . import frames
+from . import dilatation, frames
 from .lawterm import LawTerm
 from .problem import Problem
 from .timing import Timer
@@ -71,13 +71,10 @@ class System:
         self.problem, self.frames = problem, frames.build(problem)
         self.terms, self.bounds = problem.terms, problem.bounds
         with timer("assembly"):
-            conditions = list(problem.conditions)
-            self.matrix = assemble_matrix(compiled.bilinear, conditions)
-            self.matrix.assemble()
+            self.forces = {name: _assembled(form) for name, form in compiled.linear.items()}
+            self.matrix, self.load = self._constrained(compiled)
             self.matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
             self.matrix.setOption(PETSc.Mat.Option.SPD, True)
-            self.forces = {name: _assembled(form) for name, form in compiled.linear.items()}
-            self.load = self._lifted(compiled)
             self.rotation = self._rotate()
             self.near_null = rigid_modes(problem, self.rotation)
             self.matrix.setNearNullSpace(self.near_null)
@@ -132,17 +129,19 @@ class System:
             self.rotation.multTranspose(cartesian, x)
         return x
 
-    def _lifted(self, compiled: Compiled) -> PETSc.Vec:
-        load = new_vector(self.problem.space)
+    def _constrained(self, compiled: Compiled) -> tuple[PETSc.Mat, PETSc.Vec]:
+        """Stiffness and load with the prescribed values: rows and columns of the identity, the load lifted."""
+        matrix = assemble_matrix(compiled.bilinear)
+        matrix.assemble()
+        matrix = dilatation.add(matrix, dilatation.assemble(self.problem.averaged))
+        load, prescribed = new_vector(self.problem.space), new_vector(self.problem.space)
         for force in self.forces.values():
             load.axpy(1.0, force)
-        conditions = list(self.problem.conditions)
-        with load.localForm() as local:
-            local.array_w[load.local_size :] = 0.0
-        apply_lifting(load, [compiled.bilinear], [conditions])
-        load.ghostUpdate(addv=_ADD, mode=_REVERSE)
-        set_bc(load, conditions)
-        return load
+        set_bc(prescribed, list(self.problem.conditions))
+        owned = self.problem.fixed[self.problem.fixed < load.local_size]
+        rows = (owned + load.owner_range[0]).astype(PETSc.IntType)
+        matrix.zeroRowsColumns(rows, 1.0, prescribed, load)
+        return matrix, load
 
     def _box(self) -> tuple[PETSc.Vec, PETSc.Vec]:
         lower, upper = self.load.duplicate(), self.load.duplicate()

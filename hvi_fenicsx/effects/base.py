@@ -99,10 +99,24 @@ class BoundaryLaw:
 
 
 @dataclass(frozen=True, slots=True)
+class Averaged:
+    """A volumetric energy ½ modulus Σ_i (∫ φ_i div u dx)² / ∫ φ_i dx over a region's vertices, nondimensional.
+
+    Attributes:
+        divergence: UFL form of the scalar test function and the trial function. volume: of the scalar test function.
+    """
+
+    modulus: float
+    divergence: Any
+    volume: Any
+
+
+@dataclass(frozen=True, slots=True)
 class Contribution:
     """What one effect adds to the problem; forms are nondimensional UFL in the stage's arguments."""
 
     bilinear: tuple[Any, ...] = ()
+    averaged: tuple[Averaged, ...] = ()
     linear: tuple[Any, ...] = ()
     conditions: tuple[Condition, ...] = ()
     bounds: tuple[NormalBounds, ...] = ()
@@ -115,6 +129,7 @@ class Stage(Protocol):
     dimension: int
     trial: Any
     test: Any
+    scalar_test: Any
     normal: Any
 
     @property

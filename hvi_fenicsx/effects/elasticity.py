@@ -7,7 +7,10 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import Field
 
 from ..errors import InputError
-from .base import Contribution, Effect, Place, Stage
+from .base import Averaged, Contribution, Effect, Place, Stage
+
+_LOCKING = 0.45
+"""Poisson's ratio above which P1 cells answer too stiffly (docs/methods.md)."""
 
 
 def strain(v: Any) -> Any:
@@ -44,14 +47,24 @@ class IsotropicElasticity(Effect):
         lam, two_mu = (number(value / modulus) for value in self.lame())
         return lam * ufl.tr(deformation) * ufl.Identity(len(deformation[0, :])) + two_mu * deformation
 
+    @property
+    def locks(self) -> bool:
+        """Whether P1 cells would lock: nearly incompressible, and not free to change thickness."""
+        return self.model != "plane_stress" and self.poisson_ratio > _LOCKING
+
     def contribute(self, stage: Stage, where: str | None) -> Contribution:
-        """The bilinear form, with strains multiplied by L: nondimensional."""
+        """The bilinear form, strains multiplied by L: nondimensional. Where P1 locks, div u is averaged by vertex."""
         import ufl
 
-        length = stage.number(stage.length)
-        sigma = self.stress(length * strain(stage.trial), stage.number, stage.modulus)
-        form = ufl.inner(sigma, length * strain(stage.test)) * stage.cells(where)
-        return Contribution(bilinear=(form,))
+        length, cells = stage.number(stage.length), stage.cells(where)
+        deformation, virtual = length * strain(stage.trial), length * strain(stage.test)
+        if not self.locks:
+            sigma = self.stress(deformation, stage.number, stage.modulus)
+            return Contribution(bilinear=(ufl.inner(sigma, virtual) * cells,))
+        lam, two_mu = (value / stage.modulus for value in self.lame())
+        shear = stage.number(two_mu) * ufl.inner(deformation, virtual) * cells
+        divergence = stage.scalar_test * length * ufl.div(stage.trial) * cells
+        return Contribution(bilinear=(shear,), averaged=(Averaged(lam, divergence, stage.scalar_test * cells),))
 
     def modulus_scale(self) -> float:
         """E."""

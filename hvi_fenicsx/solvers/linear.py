@@ -43,10 +43,11 @@ class LinearSettings:
 
     @classmethod
     def choose(cls, system: System, wanted: Literal["auto", "lu", "gamg"] = "auto") -> LinearSettings:
-        """By the number of unknowns, unless the user wants one."""
+        """By the number of unknowns, unless the user wants one; a nearly incompressible body goes to the direct one."""
         if wanted != "auto":
             return cls(wanted)
-        return cls("lu" if system.dofs <= _LARGEST_DIRECT[system.problem.scales.dimension] else "gamg")
+        small = system.dofs <= _LARGEST_DIRECT[system.problem.scales.dimension]
+        return cls("lu" if small or system.problem.averaged else "gamg")
 
     @property
     def ksp(self) -> dict[str, str]:
