@@ -11,8 +11,11 @@ from ..timing import Timer
 from .activeset import ActiveSetSolver
 from .base import Progress, Settings, Solved
 from .branch import BranchIteration
+from .condensed import Condensation
 from .continuation import Continuation
 from .linear import LinearSettings
+from .ssls import SemismoothNewton
+from .tao import BoundedNewton
 
 if TYPE_CHECKING:
     from ..scene import Solver
@@ -29,7 +32,14 @@ class Method(Protocol):
         """A stationary point, or what was reached. Collective."""
 
 
-METHODS: Mapping[str, type[Method]] = {"auto": BranchIteration, "branch": BranchIteration, "snes_vi": Continuation}
+METHODS: Mapping[str, type[Method]] = {
+    "auto": BranchIteration,
+    "branch": BranchIteration,
+    "snes_vi": Continuation,
+    "tao": BoundedNewton,
+    "ssls": SemismoothNewton,
+    "condensed": Condensation,
+}
 
 
 def relative_width(wanted: Solver, system: System) -> float | None:

@@ -1,0 +1,265 @@
+"""The paper's own procedure (Ovcharova and Gwinner, section 5.2): what every other method is compared with.
+
+The stiffness is condensed to the contact displacements, a dense Schur complement. The variational inequality there is
+written as a mixed complementarity problem, that as a system of equations by the Fischer-Burmeister function
+f(a, b) = √(a² + b²) - (a + b), and ½‖Φ‖² is minimised by a trust-region method from zero in at most 100 iterations:
+``lsqnonlin`` in the paper, here ``scipy.optimize.least_squares`` of the same family. One process only.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from petsc4py import PETSc
+from scipy.optimize import least_squares
+from scipy.sparse import csr_matrix
+
+from ..errors import InputError, SolverError
+from ..laws import Superpotential
+from ..system import Model, System
+from .activeset import ActiveSetSolver
+from .base import Counts, Settings, Solved
+from .ssls import onto_bounds
+
+Array = npt.NDArray[np.float64]
+Indices = npt.NDArray[np.int64]
+_EVALUATIONS = 100
+"""The paper's limit of lsqnonlin's iterations, each of which evaluates the functions once."""
+_COLUMNS = 64
+"""Right-hand sides that are solved at once."""
+_STOP = {"ftol": 1e-10, "xtol": 1e-14, "gtol": None}
+"""A decrease so small is a merit function that is stuck; a small gradient says nothing, as Φ itself is small."""
+_WORDS = {
+    0: "the evaluations are used up",
+    2: "the merit function falls no more",
+    3: "the steps vanish",
+    4: "the merit function falls no more and the steps vanish",
+}
+"""scipy's status in words."""
+
+
+@dataclass(frozen=True)
+class MeanDerivative:
+    """The law as the paper's formula has it in MATLAB: at a kink the mean of both sides, sign(0) being 0."""
+
+    law: Superpotential
+
+    def value(self, x: Array) -> Array:
+        """Energy per area."""
+        return self.law.value(x)
+
+    def derivative(self, x: Array) -> Array:
+        """The mean of the one-sided derivatives."""
+        return (self.law.left(x) + self.law.right(x)) / 2
+
+    def second(self, x: Array) -> Array:
+        """H'' - G''."""
+        return self.law.convex.second(x) - self.law.concave.second(x)
+
+
+class Condensation:
+    """The procedure on one system; call :meth:`solve` once.
+
+    Raises:
+        InputError: there are several processes.
+    """
+
+    name = "condensed"
+
+    def __init__(self, solver: ActiveSetSolver, settings: Settings) -> None:
+        if solver.system.comm.size > 1:
+            raise InputError(
+                f'solver.method = "{self.name}" is dense and runs in one process, not in {solver.system.comm.size}: '
+                'leave out --np (mpirun), or use method = "auto"'
+            )
+        self.solver, self.settings, self.system = solver, settings, solver.system
+        self.models = [MeanDerivative(t.law) for t in self.system.terms]
+        self.stopped = False
+
+    def solve(self) -> Solved:
+        """A stationary point of the smoothed energy, or what was reached.
+
+        Raises:
+            SolverError: the stiffness without its contact displacements is singular.
+        """
+        with self.solver.timer("setup"):
+            schur = _Schur(self.system)
+        with self.solver.timer("solve"):
+            mixed = _Complementarity(schur, self.models)
+            values, reason, counts = self._minimise(mixed)
+            found, measure = self._judge(schur.expand(values))
+        converged = measure <= self.settings.tolerance
+        words = "stationary" if converged else f"least squares stopped: {reason}, residual {measure:.1e}"
+        energies = (self.system.energy(found, self.models),)
+        return Solved(self.system.displacement(found), self.name, converged, words, counts, energies, self.stopped)
+
+    def _minimise(self, mixed: _Complementarity) -> tuple[Array, str, Counts]:
+        """Contact displacements, why it ended there, and evaluations."""
+        counts, limit = Counts(), min(_EVALUATIONS, self.settings.max_newton)
+        if not mixed.schur.kept.size:
+            return np.empty(0), "there is nothing to minimise over", counts
+        points: list[Array] = []
+
+        def function(x: Array) -> Array:
+            counts.newton += 1
+            return mixed.function(x)
+
+        def jacobian(x: Array) -> Array:
+            self._watch(mixed, x, points)
+            return mixed.jacobian(x)
+
+        try:
+            found = least_squares(function, np.zeros(mixed.schur.kept.size), jacobian, max_nfev=limit, **_STOP)
+        except _Stop:
+            return points[-1], "interrupted", counts
+        return found.x, f"{_WORDS.get(found.status, found.message)}, merit {found.cost:.1e}", counts
+
+    def _watch(self, mixed: _Complementarity, x: Array, points: list[Array]) -> None:
+        """Called at each accepted point."""
+        points.append(x.copy())
+        size = float(np.linalg.norm(mixed.function(x))) / self.system.scale
+        self.settings.progress(self.name, self.settings.epsilon, len(points) - 1, size, mixed.in_contact(x))
+        self.stopped = self.solver.interrupted()
+        if self.stopped:
+            raise _Stop
+
+    def _judge(self, x: PETSc.Vec) -> tuple[PETSc.Vec, float]:
+        """The candidate that x stands for, and its residual of the inequality in the full space."""
+        residual = x.duplicate()
+        self.system.residual(x, residual, self.models)
+        found = onto_bounds(self.system, x, residual)
+        self.system.residual(found, residual, self.models)
+        return found, self.solver.measure(found, residual, self.system.lower, self.system.upper)
+
+
+class _Stop(Exception):
+    """The user wants it to end."""
+
+
+class _Schur:
+    """The stiffness condensed to the contact displacements: S = A_cc - G and q = b_c - g take the place of A and b.
+
+    Attributes:
+        kept: the dofs of Γc's vertices that are not prescribed, ascending (n,).
+        G, g: what the rest of the body makes of the contact displacements and of its loads, (n, n) and (n,).
+        lower, upper: bounds (n,).
+    """
+
+    def __init__(self, system: System) -> None:
+        self.system = system
+        system.set_rates([np.zeros_like(k) for k in system.rates])
+        self.kept, self.rest = _partition(system)
+        self._factor = self._factorised()
+        self._coupling = _sparse(system.matrix)[self.rest][:, self.kept].tocsc()
+        self.G = np.empty((self.kept.size, self.kept.size))
+        for start in range(0, self.kept.size, _COLUMNS):
+            block = slice(start, start + _COLUMNS)
+            self.G[:, block] = self._coupling.T @ self._solve(self._coupling[:, block].toarray())
+        self.g = self._coupling.T @ self._solve(system.load.array_r[self.rest])
+        self.lower, self.upper = system.lower.array_r[self.kept], system.upper.array_r[self.kept]
+
+    def _factorised(self) -> PETSc.PC:
+        rows = PETSc.IS().createGeneral(self.rest.astype(PETSc.IntType), comm=self.system.comm)
+        pc = PETSc.PC().create(self.system.comm)
+        pc.setOperators(self.system.matrix.createSubMatrix(rows, rows))
+        pc.setType(PETSc.PC.Type.LU)
+        pc.setFactorSolverType(PETSc.Mat.SolverType.MUMPS)
+        pc.setUp()
+        if pc.getFailedReason():
+            raise SolverError("the stiffness without its contact displacements is singular: MUMPS met a zero pivot")
+        return pc
+
+    def _solve(self, right: Array) -> Array:
+        """The solutions for right-hand sides (n,) or (n, k)."""
+        columns = np.asfortranarray(right.reshape(len(right), -1))
+        b = PETSc.Mat().createDense(columns.shape, array=columns, comm=self.system.comm)
+        x = PETSc.Mat().createDense(columns.shape, comm=self.system.comm)
+        x.assemble()
+        self._factor.getFactorMatrix().matSolve(b, x)
+        return np.array(x.getDenseArray()).reshape(right.shape)
+
+    def spread(self, values: Array) -> PETSc.Vec:
+        """A displacement of the whole body that is right on Γc, and zero elsewhere."""
+        x, fixed = self.system.load.duplicate(), self.system.problem.fixed
+        x.set(0.0)
+        x.array[fixed] = self.system.load.array_r[fixed]
+        x.array[self.kept] = values
+        return x
+
+    def expand(self, values: Array) -> PETSc.Vec:
+        """The displacement of the whole body in equilibrium with these contact displacements."""
+        x = self.spread(values)
+        x.array[self.rest] = self._solve(self.system.load.array_r[self.rest] - self._coupling @ values)
+        return x
+
+
+def _sparse(matrix: PETSc.Mat) -> Any:
+    return csr_matrix(matrix.getValuesCSR()[::-1], shape=matrix.getSize())
+
+
+def _partition(system: System) -> tuple[Indices, Indices]:
+    """The free dofs of Γc's vertices, and all others; prescribed ones have rows of the identity."""
+    d = system.problem.scales.dimension
+    blocks = [s.blocks for s in system.problem.surfaces]
+    vertices = np.unique(np.concatenate([np.empty(0, np.int32), *blocks])).astype(np.int64)
+    kept = np.setdiff1d((vertices[:, None] * d + np.arange(d)).ravel(), system.problem.fixed)
+    return kept, np.setdiff1d(np.arange(system.dofs), kept)
+
+
+class _Complementarity:
+    """lower ≤ x ≤ upper ⟂ F(x) = S x - q + law, as Φ(x) = 0."""
+
+    def __init__(self, schur: _Schur, models: Sequence[Model]) -> None:
+        self.schur, self.models, self.system = schur, models, schur.system
+        self._residual = self.system.load.duplicate()
+
+    def force(self, x: Array) -> Array:
+        """F, shape (n,): the residual on Γc of a body at rest inside, corrected by what it does inside."""
+        self.system.residual(self.schur.spread(x), self._residual, self.models)
+        return np.asarray(self._residual.array_r[self.schur.kept] - self.schur.G @ x + self.schur.g)
+
+    def tangent(self, x: Array) -> Array:
+        """F', shape (n, n)."""
+        self.system.set_rates(self.system.tangents(self.schur.spread(x), self.models))
+        kept = self.schur.kept
+        return np.asarray(_sparse(self.system.matrix)[kept][:, kept].toarray() - self.schur.G)
+
+    def function(self, x: Array) -> Array:
+        """Φ, shape (n,)."""
+        return _mixed(x, self.force(x), self.schur.lower, self.schur.upper)[0]
+
+    def jacobian(self, x: Array) -> Array:
+        """An element of Φ's B-subdifferential, shape (n, n)."""
+        _, by_x, by_force = _mixed(x, self.force(x), self.schur.lower, self.schur.upper)
+        return np.asarray(np.diag(by_x) + by_force[:, None] * self.tangent(x))
+
+    def in_contact(self, x: Array) -> int:
+        """How many dofs are nearer to a bound than their force is large."""
+        force, low, high = self.force(x), self.schur.lower, self.schur.upper
+        return int(np.count_nonzero((x - low <= force) | (high - x <= -force)))
+
+
+def fischer_burmeister(a: Array, b: Array) -> tuple[Array, Array, Array]:
+    """f(a, b) = √(a² + b²) - (a + b) and its derivatives; at the origin, where f has none, those along a = b > 0."""
+    root = np.hypot(a, b)
+    cos, sin = (np.divide(v, root, out=np.full_like(root, np.sqrt(0.5)), where=root > 0) for v in (a, b))
+    return root - (a + b), cos - 1.0, sin - 1.0
+
+
+def _mixed(x: Array, force: Array, lower: Array, upper: Array) -> tuple[Array, Array, Array]:
+    """Φ and its derivatives by x and F: Billups' f(x - l, f(u - x, -F)), of which an infinite bound drops its f."""
+    capped, bounded = np.isfinite(upper), np.isfinite(lower)
+    value, by_distance, by_force = fischer_burmeister(np.where(capped, upper - x, 0.0), -force)
+    inner = np.where(capped, value, force)
+    inner_x, inner_f = np.where(capped, -by_distance, 0.0), np.where(capped, -by_force, 1.0)
+    value, by_distance, by_inner = fischer_burmeister(np.where(bounded, x - lower, 0.0), inner)
+    outer = np.where(bounded, by_inner, 1.0)
+    return (
+        np.where(bounded, value, inner),
+        np.where(bounded, by_distance, 0.0) + outer * inner_x,
+        outer * inner_f,
+    )

@@ -1,0 +1,185 @@
+"""PETSc TAO's bound-constrained Newton line search (``bnls``) on the smoothed energy: a method to compare with.
+
+It sees the true gradient and the true, perhaps indefinite Hessian; its truncated conjugate gradients follow negative
+curvature to the edge of a trust region. The preconditioner is that of the law's convex part: positive definite.
+Any option may be overridden under the prefix ``hvi_`` (``-hvi_tao_type bntr``).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+from petsc4py import PETSc
+
+from ..errors import InputError
+from ..system import System
+from .activeset import ActiveSetSolver
+from .base import Counts, Settings, Solved, resting_start
+from .linear import HeldPreconditioner
+from .models import Cells, Full
+from .options import configure
+
+Array = npt.NDArray[np.float64]
+_FOUNDATION = 1e-3
+"""Stiffness per area, in units of E0/L, that keeps the preconditioner regular where the body is free to move."""
+_REASON = {v: k for k, v in vars(PETSc.TAO.ConvergedReason).items() if isinstance(v, int) and "_" in k}
+_Reason = PETSc.TAO.ConvergedReason
+
+
+def refuse_kinks(system: System, method: str) -> None:
+    """Methods that differentiate a law cannot solve one with kinks.
+
+    Raises:
+        InputError: on all ranks alike.
+    """
+    for term in system.terms:
+        if len(term.law.kinks):
+            at = float(np.min(np.abs(term.law.kinks))) * system.problem.scales.displacement
+            raise InputError(
+                f'solver.method = "{method}" needs laws without kinks; that on boundary.{term.surface.part} has one at '
+                f'{at:.3g} m: add smoothing = "quadratic" and epsilon = 0.01 to [solver] ("paper" keeps a kink at '
+                'zero slip), or use method = "auto", which solves the law itself'
+            )
+
+
+def smooth_models(system: System) -> list[Full]:
+    """The laws with their true curvature; they have no kinks, so each has one cell."""
+    return [Full(t.law, Cells.around(t.law.convex, np.zeros(len(t.surface.blocks)))) for t in system.terms]
+
+
+class BoundedNewton:
+    """``bnls`` on one system, from the resting start; call :meth:`solve` once.
+
+    Raises:
+        InputError: a law has kinks.
+    """
+
+    name = "tao"
+
+    def __init__(self, solver: ActiveSetSolver, settings: Settings) -> None:
+        refuse_kinks(solver.system, self.name)
+        self.solver, self.settings = solver, settings
+
+    def solve(self) -> Solved:
+        """A stationary point of the smoothed energy, or what was reached. Collective."""
+        system = self.solver.system
+        x, linear = resting_start(self.solver, [t.law for t in system.terms], min(1e-4, self.settings.tolerance))
+        with self.solver.timer("solve"):
+            run = _Run(self.solver, self.settings, x)
+            reason = run.execute(x)
+            measure = run.judge(x)
+        converged = measure <= self.settings.tolerance
+        run.counts.linear += linear
+        words = "stationary" if converged else f"TAO stopped: {reason}, residual {measure:.1e}"
+        energies = (system.energy(x, run.models),)
+        return Solved(system.displacement(x), self.name, converged, words, run.counts, energies, run.stopped)
+
+
+class _Run:
+    """The callbacks of one TAO solve."""
+
+    def __init__(self, solver: ActiveSetSolver, settings: Settings, x: PETSc.Vec) -> None:
+        self.solver, self.settings, self.system = solver, settings, solver.system
+        self.models = smooth_models(self.system)
+        self.counts, self.stopped = Counts(), False
+        self._residual = x.duplicate()
+        self._hessian = self.system.matrix.copy()  # not the system's own: TAO shifts it
+        self._hessian.setOption(PETSc.Mat.Option.SPD, False)
+
+    def execute(self, x: PETSc.Vec) -> str:
+        """Run TAO from and into x; PETSc's name of its reason. Collective."""
+        tao = self._create()
+        try:
+            tao.solve(x)
+            reason = _REASON.get(int(tao.getConvergedReason()), str(tao.getConvergedReason()))
+        except PETSc.Error as error:
+            reason = f"PETSc error {error.ierr}"
+        self.counts.newton = tao.getIterationNumber()
+        for thing in (tao, self._hessian):
+            thing.destroy()
+        return "interrupted" if self.stopped else reason
+
+    def _create(self) -> PETSc.TAO:
+        tao = PETSc.TAO().create(self.system.comm)
+        tao.setType("bnls")
+        tao.setObjective(lambda _, x: self.system.energy(x, self.models))
+        tao.setGradient(lambda _, x, g: self.system.residual(x, g, self.models), None)
+        rows = _numbered_rows(self.system)
+        tao.setHessian(self._tangent, self._hessian, rows)
+        tao.setVariableBounds((self.system.lower, self.system.upper))
+        tao.setConvergenceTest(self._converged)
+        tao.setMaximumIterations(self.settings.max_newton)
+        configure(tao, {})
+        pc = tao.getKSP().getPC()
+        if pc.getType() == PETSc.PC.Type.LMVM:  # the default of bnls: the user set none
+            pc.setType(PETSc.PC.Type.PYTHON)
+            pc.setPythonContext(_ReducedPC(self.solver.held, self.counts))
+        return tao
+
+    def _tangent(self, tao: PETSc.TAO, x: PETSc.Vec, h: PETSc.Mat, rows: PETSc.Mat) -> None:
+        """The true Hessian for TAO; the system is left with the tangent of the preconditioner."""
+        self.system.set_rates(self.system.tangents(x, self.models))
+        self.system.matrix.copy(h, structure=PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
+        self.system.set_rates(self._convex(x))
+
+    def _convex(self, x: PETSc.Vec) -> list[Array]:
+        rates = []
+        for term in self.system.terms:
+            argument = term.argument(x.array_r)
+            part = term.law.convex
+            rate = term.rate(x.array_r, part.right(argument), part.second(argument))
+            rates.append(rate + _FOUNDATION * term.free[:, :, None] * np.eye(term.free.shape[1]))
+        return rates
+
+    def judge(self, x: PETSc.Vec) -> float:
+        """The residual of the inequality (:meth:`ActiveSetSolver.measure`). Collective."""
+        self.system.residual(x, self._residual, self.models)
+        return self.solver.measure(x, self._residual, self.system.lower, self.system.upper)
+
+    def _converged(self, tao: PETSc.TAO) -> int | None:
+        x, iteration = tao.getSolution(), tao.getIterationNumber()
+        measure = self.judge(x)
+        self.settings.progress("tao", self.settings.epsilon, iteration, measure, self.solver.in_contact(x))
+        self.stopped = self.solver.interrupted()
+        if self.stopped:
+            return _Reason.DIVERGED_USER
+        if not np.isfinite(measure):
+            return _Reason.DIVERGED_NAN
+        if measure <= self.settings.tolerance:
+            return _Reason.CONVERGED_USER
+        return _Reason.DIVERGED_MAXITS if iteration >= tao.getMaximumIterations() else _Reason.CONTINUE_ITERATING
+
+
+def _numbered_rows(system: System) -> PETSc.Mat:
+    """A diagonal matrix that holds each row's number.
+
+    TAO offers its active set to nobody, but it does hand the preconditioner the inactive rows of this matrix.
+    """
+    numbers = system.load.duplicate()
+    numbers.array[:] = np.arange(*numbers.owner_range)
+    sizes = system.matrix.getSizes()
+    rows = PETSc.Mat().createAIJ(sizes, nnz=1, comm=system.comm)
+    rows.setDiagonal(numbers)
+    rows.assemble()
+    return rows
+
+
+class _ReducedPC:
+    """PETSc's view of :class:`HeldPreconditioner` on the inactive rows of a TAO step."""
+
+    def __init__(self, held: HeldPreconditioner, counts: Counts) -> None:
+        self._held, self._counts = held, counts
+        self._inactive: PETSc.IS | None = None
+
+    def setUp(self, pc: PETSc.PC) -> None:
+        """Read off the inactive rows and prepare for them."""
+        rows = np.round(pc.getOperators()[1].getDiagonal().array_r).astype(PETSc.IntType)
+        self._inactive = PETSc.IS().createGeneral(rows, comm=pc.comm)
+        start, end = self._held.system.load.owner_range
+        active = np.setdiff1d(np.arange(start, end), rows, assume_unique=True)
+        self._held.prepare((active - start).astype(np.int32))
+
+    def apply(self, pc: PETSc.PC, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        """Y = P^-1 x on the inactive rows."""
+        self._counts.linear += 1  # one a conjugate gradient step; TAO tells those of the last solve only
+        self._held.apply_reduced(self._inactive, x, y)
