@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import shutil
 import signal
@@ -33,6 +34,7 @@ class ResultFolder:
         self.comm, self.target = comm, Path(os.path.abspath(target))
         self.work = self.target.parent / f".{self.target.name}.partial"
         self._old = self.target.parent / f".{self.target.name}.old"
+        self._made: list[Path] = []
         on_root(comm, lambda: self._open(existing))
 
     def _open(self, existing: Existing) -> None:
@@ -40,6 +42,7 @@ class ResultFolder:
             self._recover()
             self._check(existing)
             shutil.rmtree(self.work, ignore_errors=True)
+            self._made = [folder for folder in self.target.parents if not folder.exists()]
             self.work.mkdir(parents=True)
         except OSError as error:
             raise InputError(
@@ -102,6 +105,9 @@ class ResultFolder:
         self.work.rmdir()
 
     def discard(self) -> None:
-        """Remove what was written. Rank 0 acts; not collective."""
+        """Remove what was written, with the folders around it that were made for it. Rank 0 acts; not collective."""
         if self.comm.rank == 0:
             shutil.rmtree(self.work, ignore_errors=True)
+            for folder in self._made:
+                with contextlib.suppress(OSError):  # not empty: something else is there by now
+                    folder.rmdir()

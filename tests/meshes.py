@@ -1,0 +1,80 @@
+"""Gmsh files for the tests, made by gmsh in a process of its own: good ones, and those that must be refused."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+_START = """
+import sys, gmsh
+path = sys.argv[1]
+gmsh.initialize(["-noenv"], interruptible=False)
+gmsh.option.setNumber("General.Terminal", 0)
+occ, mesh = gmsh.model.occ, gmsh.model.mesh
+SIDES = {"left": (0, 0, 0, 1), "right": (1, 0, 1, 1), "bottom": (0, 0, 1, 0), "top": (0, 1, 1, 1)}
+
+def groups(names):
+    near = 1e-6
+    for name in names:
+        a, b, c, d = SIDES[name]
+        found = gmsh.model.getEntitiesInBoundingBox(a - near, b - near, -near, c + near, d + near, near, 1)
+        gmsh.model.addPhysicalGroup(1, [tag for _, tag in found], name=name)
+
+def body():
+    gmsh.model.addPhysicalGroup(2, [tag for _, tag in gmsh.model.getEntities(2)], name="body")
+
+def square(size):
+    gmsh.option.setNumber("Mesh.MeshSizeMax", size)
+    occ.addRectangle(0, 0, 0, 1, 1)
+    occ.synchronize()
+    groups(SIDES)
+    body()
+"""
+_END = "\ngmsh.write(path)\ngmsh.finalize()\n"
+GOOD = "square(0.2)\nmesh.generate(2)"
+HALVES = """
+gmsh.option.setNumber("Mesh.MeshSizeMax", 0.2)
+parts = [(2, occ.addRectangle(0, 0, 0, 0.5, 1)), (2, occ.addRectangle(0.5, 0, 0, 0.5, 1))]
+occ.fragment(parts[:1], parts[1:])
+occ.synchronize()
+groups(SIDES)
+for name, at in (("soft", 0.0), ("hard", 0.5)):
+    found = gmsh.model.getEntitiesInBoundingBox(at - 1e-6, -1e-6, -1e-6, at + 0.5 + 1e-6, 1 + 1e-6, 1e-6, 2)
+    gmsh.model.addPhysicalGroup(2, [tag for _, tag in found], name=name)
+mesh.generate(2)
+"""
+BAD = {
+    "second order": "square(0.3)\nmesh.generate(2)\nmesh.setOrder(2)",
+    "quadrilaterals": "square(0.3)\nmesh.generate(2)\nmesh.recombine()",
+    "lines only": "occ.addLine(occ.addPoint(0, 0, 0), occ.addPoint(1, 0, 0))\nocc.synchronize()\n"
+    'gmsh.model.addPhysicalGroup(1, [1], name="bottom")\nmesh.generate(1)',
+    "a solid": 'occ.addBox(0, 0, 0, 1, 1, 1)\nocc.synchronize()\ngmsh.model.addPhysicalGroup(3, [1], name="body")\n'
+    'gmsh.model.addPhysicalGroup(2, [1], name="left")\nmesh.generate(3)',
+    "no groups": "occ.addRectangle(0, 0, 0, 1, 1)\nocc.synchronize()\nmesh.generate(2)",
+    "not in a plane": "square(0.3)\nmesh.generate(2)\nmesh.affineTransform([1, 0, 0, 0, 0, 1, 0, 0, 0.5, 0, 1, 0])",
+}
+SLANTED = """
+gmsh.option.setNumber("Mesh.MeshSizeMax", 0.3)
+p = [occ.addPoint(*x, 0) for x in ((0, 0), (1, 0.4), (1, 1), (0, 1))]
+lines = [occ.addLine(p[i], p[(i + 1) % 4]) for i in range(4)]
+occ.addPlaneSurface([occ.addCurveLoop(lines)])
+occ.synchronize()
+for name, line in zip(("bottom", "right", "top", "left"), lines):
+    gmsh.model.addPhysicalGroup(1, [line], name=name)
+body()
+mesh.generate(2)
+"""
+
+
+def make(path: Path, body: str) -> Path:
+    """A file by gmsh; ``body`` is run in its API, with a few helpers."""
+    script = _START + body + _END
+    subprocess.run([sys.executable, "-c", script, str(path)], check=True, capture_output=True, timeout=60)
+    return path
+
+
+def transformed(path: Path, source: Path, matrix: list[float]) -> Path:
+    """The same mesh with its points moved by a 3 x 4 affine matrix, row by row."""
+    script = f"gmsh.open({str(source)!r})\nmesh.affineTransform({matrix!r})"
+    return make(path, script)

@@ -1,0 +1,198 @@
+"""Wrong scenes: exit code 2, one clear message, no traceback, nothing written; serial and on two ranks alike.
+
+A rank that stops alone hangs the others, so each case runs under mpirun too, with a time limit.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import meshes
+import pytest
+from runs import hvi, write_scene
+from scenes import STEEL, model, quadratic_linear
+
+from hvi_fenicsx import InputError, Scene, prepare
+from hvi_fenicsx.cli import main
+
+LAW = quadratic_linear(1e3)
+TABLE: dict[str, tuple[str, str]] = {
+    "unknown key": ("domain.sell=[4, 4]", "sell: unknown key"),
+    "unknown table": ("boundry.x.on='left'", "boundry"),
+    "misspelt side": ("boundary.wall.on='lefft'", 'did you mean "left"'),
+    "negative modulus": ("material.youngs_modulus=-1.0", "greater than 0"),
+    "incompressible": ("material.poisson_ratio=0.5", "less than 0.5"),
+    "wrong type": ("domain.cells='many'", "domain.cells"),
+    "no cells": ("domain.cells=[0, 4]", "domain.cells"),
+    "NaN": ("material.youngs_modulus=nan", "youngs_modulus"),
+    "infinite load": ("boundary.pull.traction=[inf, 0.0]", "traction"),
+    "foreign name": ("boundary.pull.traction=['1e6*open', 0.0]", "open"),
+    "a call into Python": ('boundary.pull.traction=[\'__import__("os").system("id")\', 0.0]', "traction"),
+    "too few components": ("boundary.pull.traction=[1e6]", "2D"),
+    "a load that is not finite": ("boundary.press.traction=[0.0, '-1e6/x']", "is not finite everywhere there"),
+    "a force that is not finite": ("body.force=['sqrt(y - 0.5)', 0.0]", "is not finite everywhere there"),
+    "a gap that is not finite": ("boundary.floor.contact.gap='sqrt(x - 0.5)'", "is not finite everywhere there"),
+    "a displacement that is not finite": ("boundary.wall.displacement=['log(y)', 'free']", "is not finite"),
+    "contact excludes a support": ("boundary.wall.displacement=[0.0, -1e-5]", "violates the contact bound"),
+    "contact on a support": ("boundary.floor.displacement=[0.0, 0.0]", "prescribed"),
+    "unknown law": ("boundary.floor.friction.law='coulomb'", "coulomb"),
+    "a law against its formula": ("boundary.floor.friction.gamma2=1e3", "2 gamma2"),
+    "negative epsilon": ("solver.epsilon=-0.1", "epsilon"),
+    "two widths": ("solver={epsilon=0.1, epsilon_absolute=0.1}", "leave one of them out"),
+    "no such mesh": ("domain={shape='file', file='absent.msh'}", "does not exist"),
+    "too many unknowns": ("domain.cells=[100000, 100000]", "fewer cells"),
+}
+
+
+@pytest.fixture
+def scene(tmp_path: Path) -> Path:
+    return write_scene(tmp_path / "scene.toml", model(4, friction=LAW))
+
+
+def assert_refused(done: subprocess.CompletedProcess[str], words: str, folder: Path, before: set[str]) -> None:
+    assert done.returncode == 2, done.stdout + done.stderr
+    assert words in done.stderr
+    assert "Traceback" not in done.stderr
+    assert done.stderr.startswith("hvi: ")
+    assert done.stderr.count("hvi: ") == 1
+    assert done.stdout == ""
+    assert {f.name for f in folder.iterdir()} == before
+
+
+def called(capsys: pytest.CaptureFixture[str], *words: object) -> subprocess.CompletedProcess[str]:
+    """The command line within this process: a traceback would be an error of the test itself."""
+    code = main(list(map(str, words)))
+    out, err = capsys.readouterr()
+    return subprocess.CompletedProcess([], code, out, err)
+
+
+@pytest.mark.parametrize("case", TABLE)
+def test_a_wrong_scene_is_refused_in_words(
+    case: str, scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    override, words = TABLE[case]
+    monkeypatch.chdir(tmp_path)
+    assert_refused(called(capsys, "run", scene, "--set", override), words, tmp_path, {"scene.toml"})
+
+
+def test_a_wrong_scene_is_refused_by_the_process_too(scene: Path, tmp_path: Path) -> None:
+    done = hvi("run", scene, "--set", "boundary.press.traction=[0.0, '-1e6/x']", cwd=tmp_path)
+    assert_refused(done, "is not finite everywhere there", tmp_path, {"scene.toml"})
+
+
+ALL_RANKS = """
+import sys
+from mpi4py import MPI
+from hvi_fenicsx.cli import main
+codes = [main(["run", sys.argv[1], "--set", override]) for override in sys.argv[3:]]
+every = MPI.COMM_WORLD.gather(codes)
+if every:
+    with open(sys.argv[2], "w") as file:
+        file.write(repr(every))
+"""
+
+
+def test_all_of_it_on_two_ranks(scene: Path, tmp_path: Path) -> None:
+    """One start of MPI for the whole table; each message is printed once."""
+    codes = tmp_path / "codes"
+    words = [sys.executable, "-m", "mpi4py", "-c", ALL_RANKS, str(scene), str(codes), *(o for o, _ in TABLE.values())]
+    done = subprocess.run(
+        ["mpirun", "-n", "2", *words], cwd=tmp_path, capture_output=True, text=True, check=False, timeout=200
+    )
+    assert done.returncode == 0, done.stderr
+    assert codes.read_text() == repr([[2] * len(TABLE)] * 2)
+    assert done.stderr.count("hvi: ") == len(TABLE)
+    assert all(words in done.stderr for _, words in TABLE.values())
+    assert {f.name for f in tmp_path.iterdir()} == {"scene.toml", "codes"}
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+@pytest.mark.parametrize("out", ["/proc/nowhere/result", "{folder}/scene.toml/result", "{folder}/scene.toml"])
+def test_a_folder_that_cannot_be_written_is_refused(out: str, ranks: int, scene: Path, tmp_path: Path) -> None:
+    """As root, too: /proc takes no folders and a file holds none."""
+    done = hvi("run", scene, "--out", out.format(folder=tmp_path), ranks=ranks, cwd=tmp_path)
+    assert_refused(done, "--out", tmp_path, {"scene.toml"})
+
+
+@pytest.mark.parametrize(
+    "words", [[], ["fly"], ["run"], ["run", "a.toml", "--speed", "9"], ["run", "a.toml", "--np", "x"]]
+)
+def test_a_wrong_command_line_is_refused_like_a_wrong_scene(
+    words: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert_refused(called(capsys, *words), "--help", tmp_path, set())
+
+
+def test_a_missing_scene_names_those_that_are_there(scene: Path, tmp_path: Path) -> None:
+    done = hvi("run", tmp_path / "scne.toml", cwd=tmp_path)
+    assert_refused(done, "scene.toml", tmp_path, {"scene.toml"})
+
+
+def file_scene(file: Path, **boundary: Any) -> dict[str, Any]:
+    table = model(4)
+    table["domain"] = {"shape": "file", "file": str(file)}
+    table["boundary"] |= boundary
+    return table
+
+
+WORDS = {
+    "second order": "linear triangles only",
+    "quadrilaterals": "linear triangles only",
+    "lines only": "dimension",
+    "a solid": "its cells have dimension 3",
+    "no groups": "no physical group",
+    "not in a plane": "must lie in a plane",
+}
+
+
+@pytest.mark.parametrize("kind", WORDS)
+def test_a_mesh_file_that_is_none_of_ours_is_refused(kind: str, tmp_path: Path) -> None:
+    file = meshes.make(tmp_path / "m.msh", meshes.BAD[kind])
+    with pytest.raises(InputError, match=WORDS[kind]) as refused:
+        prepare(Scene.model_validate(file_scene(file)))
+    assert str(file) in str(refused.value)
+
+
+BROKEN = {
+    "cut off": (lambda text: text[: len(text) // 2], "mesh file"),
+    "no mesh at all": (lambda _: "Hello, this is a letter.\n", "mesh file"),
+    "nothing": (lambda _: "", "mesh file"),
+    "an empty group": (lambda text: text.replace('1 1 "left"', '1 9 "left"'), "left"),
+    "a coordinate that is none": (lambda text: text.replace("\n1 1 0\n", "\n1 nan 0\n"), "mesh file"),
+}
+
+
+@pytest.mark.parametrize("kind", BROKEN)
+def test_a_damaged_mesh_file_is_refused(kind: str, tmp_path: Path) -> None:
+    damage, words = BROKEN[kind]
+    file = meshes.make(tmp_path / "m.msh", meshes.GOOD)
+    whole = file.read_text(encoding="utf-8")
+    file.write_text(damage(whole), encoding="utf-8")
+    assert file.read_text(encoding="utf-8") != whole
+    with pytest.raises(InputError, match=words):
+        prepare(Scene.model_validate(file_scene(file)))
+
+
+def test_a_damaged_mesh_file_stops_two_ranks_with_one_message(tmp_path: Path) -> None:
+    file = meshes.make(tmp_path / "m.msh", meshes.BAD["second order"])
+    scene = write_scene(tmp_path / "scene.toml", file_scene(file))
+    done = hvi("run", scene, ranks=2, cwd=tmp_path)
+    assert_refused(done, "linear triangles only", tmp_path, {"scene.toml", "m.msh"})
+
+
+def test_a_group_that_the_mesh_does_not_have_is_told_with_those_it_has(tmp_path: Path) -> None:
+    file = meshes.make(tmp_path / "m.msh", meshes.GOOD)
+    scene = write_scene(tmp_path / "scene.toml", file_scene(file, wall={"on": "lleft", "displacement": [0.0, "free"]}))
+    done = hvi("run", scene, ranks=2, cwd=tmp_path)
+    assert_refused(done, "bottom, left, right, top", tmp_path, {"scene.toml", "m.msh"})
+
+
+def test_a_region_that_the_mesh_does_not_have_is_told(tmp_path: Path) -> None:
+    file = meshes.make(tmp_path / "m.msh", meshes.HALVES)
+    table = file_scene(file)
+    table["material"] = {"a": STEEL | {"region": "soft"}, "b": STEEL | {"region": "hart"}}
+    with pytest.raises(InputError, match="'hart'; it has hard, soft"):
+        prepare(Scene.model_validate(table))
