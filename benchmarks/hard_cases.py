@@ -86,7 +86,8 @@ def _command(ranks: int) -> list[str]:
 
 def _watched(command: list[str], out: Path, silence: float) -> int:
     """Run a worker; kill it when the results do not grow any more."""
-    worker = subprocess.Popen(command, start_new_session=True)
+    # Ranks that wait would otherwise take the processors from those that work, where there are fewer of them.
+    worker = subprocess.Popen(command, start_new_session=True, env={"OMPI_MCA_mpi_yield_when_idle": "1", **os.environ})
     while worker.poll() is None:
         time.sleep(1.0)
         if time.time() - max(out.stat().st_mtime, _started_at(worker.pid)) > silence:
