@@ -13,7 +13,7 @@ import numpy.typing as npt
 from dolfinx import fem
 from mpi4py import MPI
 
-from . import boundary
+from . import boundary, stability
 from .boundary import Forces, State
 from .ledger import NEAR
 from .parallel import agree, largest, total
@@ -36,7 +36,7 @@ class Certificate:
             a thousandth of the load's stress), for the law that was solved.
         inclusion_true: the same for the unsmoothed law.
         second_order: ``local minimiser``, ``not a minimiser`` (a vertex on a concave kink: moving it off lowers the
-            energy) or ``undecided`` (a law with negative curvature).
+            energy) or ``undecided`` (a law with negative curvature, unless the inertia of its Hessian was asked for).
         tolerance, passed: what was asked for, and whether all but ``inclusion_true`` are within it.
     """
 
@@ -71,11 +71,13 @@ class Examined:
     smoothing_error: float
 
 
-def examine(problem: Problem, u: fem.Function, tolerance: float) -> Examined:
+def examine(problem: Problem, u: fem.Function, tolerance: float, *, inertia: bool = False) -> Examined:
     """Certify u. Collective.
 
     Args:
         problem: what was solved. u: nondimensional, ghosts updated. tolerance: relative.
+        inertia: whether to factorise the Hessian where the states leave the second order undecided (it costs a
+            direct solve or two).
     """
     comm = problem.domain.mesh.comm
     forces = boundary.forces(problem, u)
@@ -90,8 +92,11 @@ def examine(problem: Problem, u: fem.Function, tolerance: float) -> Examined:
     }
     passed = all(np.isfinite(v) and v <= tolerance for v in entries.values())
     true, error = (largest(comm, value) for value in _inclusion_true(states))
+    second_order = _second_order(comm, states)
+    if inertia and passed and second_order == stability.UNDECIDED:
+        second_order = stability.by_inertia(problem, u, states, tolerance)
     certificate = Certificate(
-        **entries, inclusion_true=true, second_order=_second_order(comm, states), tolerance=tolerance, passed=passed
+        **entries, inclusion_true=true, second_order=second_order, tolerance=tolerance, passed=passed
     )
     return Examined(certificate, _energy(problem, u, forces, states), forces, states, error)
 
@@ -170,5 +175,5 @@ def _second_order(comm: MPI.Comm, states: Sequence[State]) -> str:
             curved |= bool(np.any(concave.second(x) > term.law.convex.second(x)))
     found = agree(comm, (kink, curved))
     if any(k for k, _ in found):
-        return "not a minimiser"
-    return "undecided" if any(c for _, c in found) else "local minimiser"
+        return stability.NO_MINIMISER
+    return stability.UNDECIDED if any(c for _, c in found) else stability.LOCAL_MINIMISER

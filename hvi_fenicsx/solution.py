@@ -127,8 +127,8 @@ def finish(
     if prepared.solvability.state != "escapes":
         found = _solved(prepared, progress, interrupted)
         with prepared.timer("certificate"):
-            tolerance = prepared.scene.solver.tolerance
-            examined = certificate.examine(prepared.problem, found.u, tolerance)
+            wanted = prepared.scene.solver
+            examined = certificate.examine(prepared.problem, found.u, wanted.tolerance, inertia=wanted.second_order)
     return Solution(
         prepared.scene,
         prepared.problem,

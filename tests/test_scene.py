@@ -334,7 +334,7 @@ WRONG_OVERRIDES = {
     "solver": "--set solver: must be KEY=VALUE, like --set solver.tolerance=1e-10",
     "solver.tolerence=1e-3": '--set solver.tolerence: unknown key "tolerence"; did you mean "tolerance"? '
     "allowed: method, "
-    "smoothing, epsilon, epsilon_absolute, tolerance, linear_solver, max_iterations",
+    "smoothing, epsilon, epsilon_absolute, tolerance, linear_solver, second_order, max_iterations",
 }
 
 

@@ -26,6 +26,8 @@ class Solver(Table):
     """relative residual of the inequality at which the iteration ends"""
     linear_solver: Literal["auto", "lu", "gamg"] = "auto"
     """auto chooses by size; any PETSc option overrides it"""
+    second_order: bool = False
+    """whether to factorise the Hessian where a falling law leaves open if the solution is a local minimum"""
     max_iterations: Count = 100
     """Newton iterations at most"""
 
