@@ -14,11 +14,15 @@ mpl.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 from covering import Case, Table
+from matplotlib.colors import BoundaryNorm, ListedColormap
 
 Record = dict[str, Any]
 SOLVED = ("certified", "escapes", "no_equilibrium")
 COMMAND = "./hvi exec python3 benchmarks/hard_cases.py"
 COLUMNS = 3
+LEVELS = [0, 25, 50, 75, 90, 100, 101]
+"""Shares that look alike; all of them solved is a colour of its own."""
+COLOURS = ["#a50026", "#d73027", "#f46d43", "#fdae61", "#fee8a8", "#4575b4"]
 
 
 class Results:
@@ -144,7 +148,8 @@ def _draw(table: Table, results: Results, path: Path) -> None:
     image = None
     for axis, column in zip(axes, columns, strict=True):
         image = _block(axis, column, results, tallest)
-    figure.colorbar(image, ax=axes, shrink=0.4, label="cases solved, %")
+    bar = figure.colorbar(image, ax=axes, shrink=0.4, label="cases solved, %", ticks=LEVELS[:-1])
+    bar.ax.text(1.4, 100.5, "all", transform=bar.ax.get_yaxis_transform(), va="center", fontsize=9)
     figure.suptitle("Hard cases: share solved, by value of each axis and method")
     figure.savefig(path, dpi=130)
     plt.close(figure)
@@ -163,16 +168,23 @@ def _block(axis: Any, column: Sequence[tuple[str, Sequence[Any]]], results: Resu
     labels: list[str] = []
     rows: list[list[float]] = []
     for name, values in column:
-        labels += [name.upper(), *map(str, values)]
-        rows += [[np.nan] * len(results.methods), *(_shares(results, name, v) for v in values)]
+        ordered = _ordered(values)
+        labels += [name.upper(), *(v if isinstance(v, str) else f"{v:g}" for v in ordered)]
+        rows += [[np.nan] * len(results.methods), *(_shares(results, name, v) for v in ordered)]
     shares = np.array(rows + [[np.nan] * len(results.methods)] * (height - len(rows)))
-    image = axis.imshow(shares, vmin=0.0, vmax=100.0, cmap="RdYlBu", aspect="auto")
+    norm = BoundaryNorm(LEVELS, len(COLOURS))
+    image = axis.imshow(shares, norm=norm, cmap=ListedColormap(COLOURS), aspect="auto")
     axis.set_yticks(range(len(labels)), labels, fontsize=8)
     axis.set_xticks(range(len(results.methods)), results.methods, fontsize=8, rotation=30)
     axis.xaxis.tick_top()
     axis.tick_params(length=0)
     _decorate(axis, shares, labels, [name.upper() for name, _ in column])
     return image
+
+
+def _ordered(values: Sequence[Any]) -> list[Any]:
+    """The table has the plain value first; a reader wants numbers in order."""
+    return sorted(values, key=lambda v: (not isinstance(v, str), 0.0 if isinstance(v, str) else v))
 
 
 def _decorate(axis: Any, shares: Any, labels: Sequence[str], heads: Sequence[str]) -> None:
@@ -182,7 +194,7 @@ def _decorate(axis: Any, shares: Any, labels: Sequence[str], heads: Sequence[str
         spine.set_visible(False)
     for (row, column), share in np.ndenumerate(shares):
         if np.isfinite(share):
-            colour = "white" if share < 20 or share > 85 else "black"
+            colour = "white" if share < 50 or share == 100 else "black"
             axis.text(column, row, f"{share:.0f}", ha="center", va="center", fontsize=7, color=colour)
 
 
