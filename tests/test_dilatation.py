@@ -40,10 +40,10 @@ def energy(cells: int) -> float:
     return solution.examined.energy * solution.problem.scales.energy
 
 
-def quadratic_energy(cells: int) -> float:
-    """The same body with P2, written out by hand."""
+def plain_energy(cells: int, degree: int) -> float:
+    """The same body with plain elements of a degree, written out by hand."""
     mesh = create_rectangle(MPI.COMM_WORLD, [[0.0, 0.0], [1.0, 1.0]], [cells, cells], CellType.triangle)
-    space = fem.functionspace(mesh, ("Lagrange", 2, (2,)))
+    space = fem.functionspace(mesh, ("Lagrange", degree, (2,)))
     u, v = ufl.TrialFunction(space), ufl.TestFunction(space)
     lam, two_mu = NU / ((1 + NU) * (1 - 2 * NU)), 1 / (1 + NU)
     strain = lambda w: ufl.sym(ufl.grad(w))  # noqa: E731
@@ -68,10 +68,11 @@ def _half_work(matrix: PETSc.Mat, load: PETSc.Vec, clamp: Any) -> float:
 
 
 def test_no_locking_beside_quadratic_elements() -> None:
-    truth = quadratic_energy(48)
+    truth = plain_energy(48, degree=2)
     errors = [abs(energy(n) / truth - 1) for n in (16, 32)]
     assert errors[0] < 0.06
     assert errors[1] < 0.6 * errors[0]
+    assert abs(plain_energy(32, degree=1) / truth - 1) > 0.35  # what would be certified without it
 
 
 def test_plain_p1_is_kept_where_it_does_not_lock() -> None:
