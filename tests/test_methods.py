@@ -1,0 +1,232 @@
+"""The methods to compare with: they agree with the branch iteration, or say that they did not get there."""
+
+from __future__ import annotations
+
+import contextlib
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from petsc4py import PETSc
+from scenes import P, Table, displacement, energy, far, model, quadratic_linear, solved
+
+from hvi_fenicsx import Scene, Solution, prepare
+from hvi_fenicsx.errors import InputError
+from hvi_fenicsx.solution import finish
+from hvi_fenicsx.solvers.condensed import fischer_burmeister
+
+METHODS = ["tao", "ssls", "condensed"]
+LIFTING = [0.0, "-1e6*(1 - 1.8*x)"]
+
+
+def strong(cells: int, pull: float, gamma1: float, lift: bool = False, **solver: Any) -> Table:
+    """A law of the order of the load; a press that turns round lifts the free end off the floor."""
+    table = model(cells, pull, friction=quadratic_linear(gamma1), **solver)
+    if lift:
+        table["boundary"]["press"]["traction"] = list(LIFTING)
+    return table
+
+
+def paper(**solver: Any) -> Table:
+    """The paper's own data."""
+    return strong(16, P, 1.0e3, **solver)
+
+
+def lifted(solution: Solution) -> int:
+    assert solution.examined is not None
+    return int(np.count_nonzero(~solution.examined.states[0].contact))
+
+
+def assert_alike(found: Solution, wanted: Solution) -> None:
+    assert found.exit_code == wanted.exit_code == 0
+    assert found.solved is not None
+    assert found.solved.converged
+    assert energy(found) == pytest.approx(energy(wanted), rel=1e-8)
+    assert far(displacement(found), displacement(wanted)) < 1e-6
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("linear_solver", ["lu", "gamg"])
+def test_on_the_papers_data_all_methods_agree(method: str, linear_solver: str) -> None:
+    """The smoothed law through `auto`, which is the branch iteration."""
+    wanted = solved(paper(epsilon=0.01))
+    assert_alike(solved(paper(epsilon=0.01, method=method, linear_solver=linear_solver)), wanted)
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize(("pull", "gamma1"), [(P, 1.0e3), (3 * P, 1.0e6)])
+def test_where_the_body_lifts_off_all_methods_agree(method: str, pull: float, gamma1: float) -> None:
+    wanted = solved(strong(16, pull, gamma1, lift=True, epsilon=0.1))
+    found = solved(strong(16, pull, gamma1, lift=True, epsilon=0.1, method=method))
+    assert 0 < lifted(wanted) < 17
+    assert lifted(found) == lifted(wanted)
+    assert_alike(found, wanted)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_without_friction_they_solve_the_convex_programme(method: str) -> None:
+    found = solved(model(8, method=method))
+    assert found.exit_code == 0
+    assert energy(found) == pytest.approx(-6.0, rel=1e-9)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_bounds_on_both_sides_and_an_upper_one_alone(method: str) -> None:
+    """-1e-7 ≤ -u·n ≤ 2e-7: the first bound carries the body, as a gap of 1e-7 does. On top, u2 is bounded above."""
+    both = strong(8, 3 * P, 1.0e6, epsilon=0.1, method=method)
+    both["boundary"]["floor"]["contact"] = {"lower": -1.0e-7, "upper": 2.0e-7}
+    single = strong(8, 3 * P, 1.0e6, epsilon=0.1)
+    single["boundary"]["floor"]["contact"] = {"gap": 1.0e-7}
+    turned = strong(8, 3 * P, 1.0e6, epsilon=0.1, method=method)
+    turned["boundary"]["floor"]["on"], turned["boundary"]["press"]["on"] = "top", "bottom"
+    turned["boundary"]["press"]["traction"] = [0.0, P]
+    assert_alike(solved(both), solved(single))
+    assert solved(turned).exit_code == 0
+
+
+CASES = [(6.0e6, 3.0e6, 0.1), (6.0e6, 3.0e6, 1.0e-3), (1.0e7, 8.0e6, 1.0e-2), (4.0e6, 3.0e6, 1.0e-4)]
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("lift", [False, True])
+@pytest.mark.parametrize(("pull", "gamma1", "epsilon"), CASES)
+def test_what_a_method_claims_the_certificate_confirms(
+    method: str, lift: bool, pull: float, gamma1: float, epsilon: float
+) -> None:
+    """A method may fail on a hard case, but then it says so, with a reason in words."""
+    found = solved(strong(16, pull, gamma1, lift, epsilon=epsilon, method=method))
+    assert found.solved is not None
+    assert found.solved.converged == found.converged
+    assert found.exit_code == (0 if found.converged else 4)
+    if not found.converged:
+        assert "stopped: " in found.solved.reason
+
+
+def test_the_papers_procedure_gets_stuck_where_the_law_is_strong() -> None:
+    """At P = 6e6, γ1 = 3e6 its merit function has a local minimum that is no solution (solver-notes.md)."""
+    found = solved(strong(16, 6 * P, 3.0e6, epsilon=0.1, method="condensed"))
+    assert found.exit_code == 4
+    assert "merit" in found.reason
+
+
+@contextlib.contextmanager
+def petsc_options(**options: Any) -> Iterator[None]:
+    """As a user gives them by --petsc."""
+    database = PETSc.Options("hvi_")
+    for name, value in options.items():
+        database[name] = value
+    try:
+        yield
+    finally:
+        for name in options:
+            database.delValue(name)
+
+
+def test_petscs_own_convergence_test_of_vinewtonssls_is_not_believed() -> None:
+    """A user may bring it back; where it ends with CONVERGED_... too early the method does not pass that on."""
+    with petsc_options(snes_convergence_test="default", snes_rtol=1e-2):
+        found = solved(strong(16, 6 * P, 3.0e6, epsilon=1.0, method="ssls"))
+    assert found.exit_code == 4
+    assert found.solved is not None
+    assert not found.solved.converged
+    assert "CONVERGED_FNORM" in found.solved.reason
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_iterations_that_run_out_are_said_to(method: str) -> None:
+    found = solved(strong(16, 6 * P, 3.0e6, epsilon=1.0, method=method, max_iterations=2))
+    assert found.exit_code == 4
+    assert found.solved is not None
+    assert {"tao": "DIVERGED_MAXITS", "ssls": "DIVERGED_MAX_IT", "condensed": "used up"}[method] in found.solved.reason
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_an_interrupt_ends_the_iteration(method: str) -> None:
+    prepared = prepare(Scene.model_validate(strong(8, 6 * P, 3.0e6, epsilon=0.1, method=method)))
+    found = finish(prepared, interrupted=lambda: True)
+    assert found.exit_code == 130
+    assert found.solved is not None
+    assert "interrupted" in found.solved.reason
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_progress_is_told(method: str) -> None:
+    told: list[tuple[Any, ...]] = []
+    prepared = prepare(Scene.model_validate(strong(8, 3 * P, 1.0e6, epsilon=0.1, method=method)))
+    finish(prepared, progress=lambda *args: told.append(args))
+    assert {stage for stage, *_ in told} == {method}
+    assert [iteration for _, _, iteration, _, _ in told] == sorted(iteration for _, _, iteration, _, _ in told)
+    assert all(epsilon == 0.1 for _, epsilon, *_ in told)
+    assert told[-1][-1] > 0
+
+
+@pytest.mark.parametrize("method", ["tao", "ssls"])
+@pytest.mark.parametrize(
+    "wanted", [{}, {"smoothing": "paper", "epsilon_absolute": 0.1}], ids=["the law itself", "the paper's S"]
+)
+def test_laws_with_kinks_are_refused_with_the_mend(method: str, wanted: Table) -> None:
+    with pytest.raises(InputError, match=r'"quadratic" and epsilon = 0\.01'):
+        solved(paper(method=method, **wanted))
+
+
+@pytest.mark.parametrize("wanted", [{}, {"smoothing": "paper", "epsilon_absolute": 0.1}], ids=["the law itself", "S"])
+def test_the_papers_procedure_takes_the_papers_law(wanted: Table) -> None:
+    """No vertex ends on a kink but the wall's corner, where the slip is prescribed."""
+    assert_alike(solved(paper(method="condensed", **wanted)), solved(paper(**wanted)))
+
+
+def test_users_options_reach_tao() -> None:
+    with petsc_options(tao_type="bntr", tao_max_it=1):
+        found = solved(strong(16, 6 * P, 3.0e6, epsilon=1.0, method="tao"))
+    assert found.solved is not None
+    assert found.solved.counts.newton == 1
+
+
+def test_the_fischer_burmeister_function_is_zero_on_complementary_pairs_only() -> None:
+    a, b = np.array([0.0, 2.0, 0.0, -1.0, 3.0]), np.array([5.0, 0.0, 0.0, 1.0, 4.0])
+    value, by_a, by_b = fischer_burmeister(a, b)
+    assert value == pytest.approx([0.0, 0.0, 0.0, np.sqrt(2.0), -2.0])
+    assert by_a[4] == pytest.approx(3 / 5 - 1)
+    assert by_b[4] == pytest.approx(4 / 5 - 1)
+    assert np.all(np.isfinite(by_a + by_b))
+
+
+_TWO_RANKS = """
+import sys
+sys.path.insert(0, {tests!r})
+from test_methods import strong
+from hvi_fenicsx import Scene, solve
+from hvi_fenicsx.errors import InputError
+from mpi4py import MPI
+try:
+    found = solve(Scene.model_validate(strong(8, 3e6, 1e6, True, epsilon=0.1, method={method!r})))
+    text = f"{{found.exit_code}} {{found.examined.energy * found.problem.scales.energy:.12e}}"
+except InputError as error:
+    text = str(error)
+if MPI.COMM_WORLD.rank == 0:
+    print(text)
+"""
+
+
+def on_two_ranks(method: str) -> str:
+    code = _TWO_RANKS.format(tests=str(Path(__file__).parent), method=method)
+    run = subprocess.run(
+        ["mpirun", "-n", "2", sys.executable, "-c", code], capture_output=True, text=True, timeout=300, check=True
+    )
+    return run.stdout.strip()
+
+
+@pytest.mark.parametrize("method", ["tao", "ssls"])
+def test_on_two_ranks_they_find_the_same(method: str) -> None:
+    wanted = solved(strong(8, 3 * P, 1.0e6, True, epsilon=0.1))
+    code, joules = on_two_ranks(method).split()
+    assert code == "0"
+    assert float(joules) == pytest.approx(energy(wanted), rel=1e-8)
+
+
+def test_the_papers_procedure_is_for_one_process() -> None:
+    assert "one process, not in 2" in on_two_ranks("condensed")
