@@ -173,23 +173,32 @@ def compose(
 
 def _largest(domain: Domain, parts: Mapping[str, Sequence[str]], placed: Placed, formula: Formula) -> float:
     where, effect = placed
-    values = formula.at(_points(domain, parts[where] if where and effect.place is Place.BOUNDARY else None))
+    values = formula.at(_points(domain, _entities(domain, parts, placed)))
     finite = bool(np.all(np.isfinite(values)))
     gathered = agree(domain.mesh.comm, (finite, float(np.max(np.abs(values), initial=0.0))))
     if not all(ok for ok, _ in gathered):
-        place = f"boundary.{where}" if where else "body"
+        place = effect.place.value if where is None else f"{effect.place.value}.{where}"
         raise InputError(f"{place}.{effect.key}: the formula {formula.source!r} is not finite everywhere there")
     return max(value for _, value in gathered)
 
 
-def _points(domain: Domain, sides: Sequence[str] | None) -> Array:
-    mesh = domain.mesh
-    if sides is None:
-        return mesh.geometry.x
-    facets = domain.facets(sides)
-    if not len(facets):
+def _entities(domain: Domain, parts: Mapping[str, Sequence[str]], placed: Placed) -> tuple[int, Any]:
+    """Dimension and local entities of where an effect acts; None: the whole body."""
+    where, effect = placed
+    if where is None:
+        return domain.dimension, None
+    if effect.place is Place.BOUNDARY:
+        return domain.dimension - 1, domain.facets(parts[where])
+    return domain.dimension, domain.cells([where])
+
+
+def _points(domain: Domain, entities: tuple[int, Any]) -> Array:
+    dimension, found = entities
+    if found is None:
+        return domain.mesh.geometry.x
+    if not len(found):
         return np.empty((0, 3))  # dolfinx divides by their number
-    return mesh.geometry.x[np.unique(dolfinx.mesh.entities_to_geometry(mesh, domain.dimension - 1, facets))]
+    return domain.mesh.geometry.x[np.unique(dolfinx.mesh.entities_to_geometry(domain.mesh, dimension, found))]
 
 
 Made = tuple[str | None, Effect, Contribution]
