@@ -1,0 +1,151 @@
+"""The certificate takes nobody's word: each of its entries must see the one fault it is there for, and no other.
+
+That it accepts what is stationary and refuses what is near is shown by enumeration (test_enumeration.py).
+"""
+
+from __future__ import annotations
+
+import copy
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from dolfinx import fem
+from scenes import P, Q, Table, displacement, far, model, quadratic_linear, solved
+
+from hvi_fenicsx import Scene, Solution, prepare, solve
+from hvi_fenicsx.certificate import Certificate, examine
+
+Array = npt.NDArray[np.float64]
+STRONG = quadratic_linear(3e6)
+CELLS = 6
+ENTRIES = ("equilibrium", "penetration", "tension", "complementarity", "inclusion")
+
+
+@pytest.fixture(scope="module")
+def found() -> Solution:
+    """A solution with slips on both branches, closed and lifted vertices."""
+    return solved(model(CELLS, 6e6, Q, STRONG))
+
+
+def certified(solution: Solution, u: Array) -> Certificate:
+    """Of a displacement in m, shape (n, 2)."""
+    function = fem.Function(solution.problem.space)
+    function.x.array[:] = (u / solution.problem.scales.displacement).ravel()
+    return examine(solution.problem, function, 1e-8).certificate
+
+
+def vertex(solution: Solution, x: float, y: float) -> int:
+    at = solution.problem.space.tabulate_dof_coordinates()[:, :2]
+    return int(np.argmin(np.linalg.norm(at - [x, y], axis=1)))
+
+
+def on_floor(solution: Solution, closed: bool) -> int:
+    """A vertex of the floor's interior, in contact or not."""
+    assert solution.examined is not None
+    state = solution.examined.states[0]
+    inside = (state.surface.points[:, 0] > 0.01) & (state.surface.points[:, 0] < 0.99)
+    return int(state.surface.blocks[np.flatnonzero(inside & (state.contact == closed))[0]])
+
+
+def pushed(solution: Solution, block: int, step: tuple[float, float]) -> Certificate:
+    u = displacement(solution).copy()
+    u[block] += step
+    return certified(solution, u)
+
+
+def test_the_solution_passes_with_a_wide_margin(found: Solution) -> None:
+    verdict = certified(found, displacement(found))
+    assert verdict.passed
+    assert all(getattr(verdict, entry) < 1e-12 for entry in ENTRIES)
+
+
+def test_a_vertex_inside_that_is_moved_breaks_equilibrium(found: Solution) -> None:
+    verdict = pushed(found, vertex(found, 0.5, 0.5), (0.0, 1e-10))
+    assert verdict.equilibrium > 1e-6
+    assert not verdict.passed
+
+
+def test_a_vertex_pushed_into_the_floor_is_penetration_of_that_size(found: Solution) -> None:
+    verdict = pushed(found, on_floor(found, True), (0.0, -1e-9))
+    assert verdict.penetration == pytest.approx(1e-9 / np.max(np.abs(displacement(found))), rel=1e-6)
+
+
+def test_a_floor_that_pulls_is_tension(found: Solution) -> None:
+    """The lifted vertex is put down: what then holds it is a pull."""
+    block = on_floor(found, False)
+    u = displacement(found).copy()
+    lifted = np.flatnonzero(u[:, 1] > 0)
+    u[block, 1] = 0.0
+    verdict = certified(found, u)
+    assert block in lifted
+    assert verdict.tension > 1e-3
+
+
+def test_a_pressure_on_a_lifted_vertex_is_complementarity(found: Solution) -> None:
+    verdict = pushed(found, on_floor(found, True), (0.0, 1e-8))
+    assert verdict.complementarity > 1e-4
+    assert verdict.penetration == 0.0
+
+
+def test_a_slip_that_the_law_does_not_allow_is_inclusion(found: Solution) -> None:
+    verdict = pushed(found, on_floor(found, True), (1e-9, 0.0))
+    assert verdict.inclusion > 1e-5
+    assert verdict.penetration == verdict.tension == 0.0
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_what_is_no_number_is_refused(found: Solution, value: float) -> None:
+    assert not pushed(found, vertex(found, 0.5, 0.5), (value, 0.0)).passed
+
+
+def test_it_judges_the_displacement_not_the_word_of_the_solver(found: Solution) -> None:
+    """The solution of one law is refused under another."""
+    other = prepare(Scene.model_validate(model(CELLS, 6e6, Q, quadratic_linear(2.9e6))))
+    u = fem.Function(other.problem.space)
+    u.x.array[:] = displacement(found).ravel() / other.problem.scales.displacement
+    verdict = examine(other.problem, u, 1e-8).certificate
+    assert not verdict.passed
+    assert verdict.inclusion > 1e-3
+
+
+def test_the_papers_smoothing_is_told_to_be_a_quarter_of_gamma1_off() -> None:
+    """physics.md: at no slip S gives γ2/2 = 250 N/m² where the law gives 0; the first vertex off the wall has less."""
+    found = solved(model(16, P, Q, quadratic_linear(1e3), smoothing="paper", epsilon_absolute=0.1))
+    assert found.examined is not None
+    assert found.exit_code == 0
+    assert found.examined.certificate.inclusion < 1e-8
+    error = found.examined.smoothing_error * found.problem.scales.stress
+    assert 200 < error < 250
+    assert found.examined.certificate.inclusion_true == pytest.approx(error / (1e-3 * P), rel=1e-6)
+
+
+def test_an_exact_run_is_off_by_nothing(found: Solution) -> None:
+    assert found.examined is not None
+    assert found.examined.certificate.inclusion_true == found.examined.certificate.inclusion
+    assert found.examined.smoothing_error < 1e-12
+
+
+def test_smoothed_solutions_approach_the_exact_one(found: Solution) -> None:
+    """Far from the kink the default smoothing is exact, near it the difference falls with ε."""
+    differences = []
+    for epsilon in (1e-1, 1e-2, 1e-3):
+        smooth = solved(model(CELLS, 3e6, Q, quadratic_linear(1e6), smoothing="chks", epsilon=epsilon))
+        exact = solved(model(CELLS, 3e6, Q, quadratic_linear(1e6)))
+        assert smooth.exit_code == 0
+        differences.append(far(displacement(smooth), displacement(exact)))
+    assert differences[0] > 5 * differences[1] > 25 * differences[2]
+
+
+def bearing(wall: Table) -> Solution:
+    """A body pressed against a wall at its left, on a floor with friction."""
+    table = copy.deepcopy(model(5, -3e6, Q, quadratic_linear(1e6)))
+    table["boundary"]["wall"] = {"on": "left", **wall}
+    return solve(Scene.model_validate(table))
+
+
+def test_a_corner_of_two_contact_parts_is_certified() -> None:
+    """Pressed on, a smooth wall is a support: the corner bears the wall's contact and the floor's friction at once."""
+    supported, touching = bearing({"displacement": [0.0, "free"]}), bearing({"contact": {"gap": 0.0}})
+    assert supported.exit_code == touching.exit_code == 0
+    assert far(displacement(touching), displacement(supported)) < 1e-9
