@@ -50,6 +50,7 @@ class Problem:
     Attributes:
         domain, scales: as they are. space: P1 vectors.
         bilinear, linear: UFL forms a(u, v) and <g, v>, the latter by name of its part.
+        strains: names of linear forms that no rigid motion feels (thermal strain).
         averaged: volumetric parts of a(u, v) that are averaged by vertex.
         conditions: Dirichlet conditions, nondimensional values.
         fixed: local scalar dofs (owned and ghost) that they prescribe.
@@ -63,6 +64,7 @@ class Problem:
     bilinear: Any
     averaged: tuple[Averaged, ...]
     linear: dict[str, Any]
+    strains: frozenset[str]
     conditions: tuple[fem.DirichletBC, ...]
     fixed: npt.NDArray[np.int32]
     bounds: tuple[Bounds, ...]
@@ -73,13 +75,16 @@ class Problem:
 class Stage:
     """What effects see of the problem while it is composed (:class:`.effects.base.Stage`)."""
 
-    def __init__(self, domain: Domain, parts: Mapping[str, Sequence[str]], scales: Scales) -> None:
+    def __init__(
+        self, domain: Domain, parts: Mapping[str, Sequence[str]], scales: Scales, effects: Sequence[Placed]
+    ) -> None:
         self.domain, self.dimension = domain, domain.dimension
         self.length, self.stress, self.modulus = scales.length, scales.stress, scales.modulus
         self.space = fem.functionspace(domain.mesh, ("Lagrange", 1, (self.dimension,)))
         self.trial, self.test = ufl.TrialFunction(self.space), ufl.TestFunction(self.space)
         self.scalar_test = ufl.TestFunction(fem.functionspace(domain.mesh, ("Lagrange", 1)))
         self.normal = ufl.FacetNormal(domain.mesh)
+        self.materials = [placed for placed in effects if placed[1].place is Place.MATERIAL]
         self.part_facets = {name: domain.facets(on) for name, on in parts.items()}
 
     def number(self, value: float) -> Any:
@@ -98,14 +103,17 @@ class Stage:
     def _cell_tags(self) -> tuple[Any, dict[str, tuple[int, ...]]]:
         return _tags(self.domain.mesh, self.dimension, dict(self.domain.regions))
 
-    def cells(self, region: str | None) -> Any:
-        """dx/L^d."""
+    def cells(self, *regions: str | None) -> Any:
+        """dx/L^d over what the regions share; None where that is nothing."""
         scale = self.number(self.length**-self.dimension)
-        if region is None:
+        named = [region for region in regions if region is not None]
+        if not named:
             return _Scaled(scale, ufl.dx(domain=self.domain.mesh))
-        self.domain.cells([region])
+        self.domain.cells(named)
         tags, ids = self._cell_tags
-        return _Scaled(scale, ufl.Measure("dx", domain=self.domain.mesh, subdomain_data=tags)(ids[region]))
+        shared = tuple(sorted(set.intersection(*(set(ids[region]) for region in named))))
+        measure = ufl.Measure("dx", domain=self.domain.mesh, subdomain_data=tags)
+        return _Scaled(scale, measure(shared)) if shared else None
 
     def facets(self, part: str) -> Any:
         """ds/L^(d-1)."""
@@ -167,7 +175,7 @@ def compose(
     scales = scaling.choose(
         domain.length, domain.dimension, effects, lambda placed: functools.partial(_largest, domain, parts, placed)
     )
-    stage = Stage(domain, parts, scales)
+    stage = Stage(domain, parts, scales, effects)
     return _sum(stage, scales, [(where, e, e.contribute(stage, where)) for where, e in effects], modify)
 
 
@@ -227,24 +235,31 @@ def _sum(
         _term(stage, surfaces[w], law, modify, scales, fixed) for w, _, c in made if w is not None for law in c.laws
     ]
     bilinear = [form for _, _, c in made for form in c.bilinear]
-    linear: dict[str, Any] = {}
-    for where, effect, c in made:
-        for form in c.linear:  # several tables may load one place
-            name = f"{where or 'body'}.{effect.key}"
-            linear[name] = linear[name] + form if name in linear else form
+    linear, strains = (_by_name(made, kind) for kind in ("linear", "strains"))
     return Problem(
         stage.domain,
         scales,
         stage.space,
         sum(bilinear),
         tuple(a for _, _, c in made for a in c.averaged),
-        linear,
+        {**linear, **strains},
+        frozenset(strains),
         conditions,
         fixed,
         tuple(bounds),
         tuple(terms),
         tuple(surfaces.values()),
     )
+
+
+def _by_name(made: Sequence[Made], kind: str) -> dict[str, Any]:
+    """Forms of one kind by the name of their place and effect; several tables may load one place."""
+    found: dict[str, Any] = {}
+    for where, effect, contribution in made:
+        for form in getattr(contribution, kind):
+            name = f"{where or 'body'}.{effect.key}"
+            found[name] = found[name] + form if name in found else form
+    return found
 
 
 def _check_normal_laws(made: Sequence[Made]) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from .effects.base import Drive, Effect, Evaluate
+from .effects.base import Drive, Effect, Evaluate, Sizes
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,10 +48,11 @@ def choose(length: float, dimension: int, effects: Sequence[Placed], evaluate: C
     displacement, thermal strain); without that either, the largest law's: the solution is then zero and any will do.
     """
     modulus = max((e.modulus_scale() for _, e in effects), default=0.0) or 1.0
+    sizes = Sizes(length, modulus, max((e.expansion_scale() for _, e in effects), default=0.0))
     stress = dict.fromkeys(Drive, 0.0)
     for placed in effects:
         effect = placed[1]
-        size = effect.stress_scale(evaluate(placed), length, modulus)
+        size = effect.stress_scale(evaluate(placed), sizes)
         stress[effect.drive] = max(stress[effect.drive], size)
     chosen = next((stress[kind] for kind in Drive if stress[kind] > 0), 1.0)
     return Scales(length, chosen, modulus, dimension)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -10,10 +9,9 @@ from typing import TYPE_CHECKING
 from dolfinx import fem
 from mpi4py import MPI
 
-from . import certificate, domain, existence, problem, smoothing, solvers, system
+from . import building, certificate, existence, nested, solvers, system
 from .certificate import Examined
 from .errors import SolverError
-from .laws import Superpotential
 from .problem import Problem
 from .rigid import Solvability
 from .solvers.base import Progress, Solved, silent
@@ -92,16 +90,10 @@ def prepare(scene: Scene, comm: MPI.Comm = MPI.COMM_WORLD, timer: Timer | None =
         InputError: on all ranks alike.
     """
     timer = timer or Timer()
-    with timer("mesh"):
-        body = domain.build(comm, scene.domain, scene.dimension)
-    with timer("jit"):
-        placed = [(p.where, p.effect) for p in scene.effects()]
-        composed = problem.compose(body, scene.parts, placed, _modification(scene))
-        compiled = system.compile_forms(composed)
-    assembled = system.System(composed, compiled, timer)
+    assembled = building.assemble(scene, comm, timer)
     with timer("assembly"):
-        verdict = existence.solvability(composed, assembled.forces)
-    return Prepared(scene, composed, assembled, verdict, timer)
+        verdict = existence.solvability(assembled.problem, assembled.forces)
+    return Prepared(scene, assembled.problem, assembled, verdict, timer)
 
 
 def solve(
@@ -142,19 +134,8 @@ def finish(
 
 
 def _solved(prepared: Prepared, progress: Progress, interrupted: Callable[[], bool]) -> Solved:
-    method = solvers.create(prepared.scene.solver, prepared.system, prepared.timer, progress, interrupted)
     try:
-        return method.solve()
+        return nested.solve(prepared.scene, prepared.system, prepared.timer, progress, interrupted)
     except SolverError as error:
         u = fem.Function(prepared.problem.space, name="displacement")
-        return Solved(u, method.name, False, str(error))
-
-
-def _modification(scene: Scene) -> Callable[[Superpotential], Superpotential]:
-    """What the scene's solver table does to a law: smooth it, or nothing."""
-    wanted = scene.solver
-    if wanted.smoothing is None:
-        return lambda law: law
-    return functools.partial(
-        smoothing.create, wanted.smoothing, epsilon=wanted.epsilon, epsilon_absolute=wanted.epsilon_absolute
-    )
+        return Solved(u, prepared.scene.solver.method, False, str(error))

@@ -64,11 +64,13 @@ class System:
         load: b, lifted; the prescribed values stand in the Dirichlet rows.
         lower, upper: bounds of u; infinite on Dirichlet rows.
         scale: norm of the load, what residuals are relative to.
+        prolongations: to this system's mesh from the next coarser one, and so on down; empty without a ladder.
         forces: the assembled load vectors by name, unlifted (for the virtual work of rigid motions).
     """
 
     def __init__(self, problem: Problem, compiled: Compiled, timer: Timer) -> None:
         self.problem, self.frames = problem, frames.build(problem)
+        self.prolongations: tuple[PETSc.Mat, ...] = ()
         self.terms, self.bounds = problem.terms, problem.bounds
         with timer("assembly"):
             self.forces = {name: _assembled(form) for name, form in compiled.linear.items()}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 from ..errors import InputError
 from ..system import System
@@ -28,7 +28,7 @@ class Method(Protocol):
 
     def __init__(self, solver: ActiveSetSolver, settings: Settings) -> None: ...
 
-    def solve(self) -> Solved:
+    def solve(self, *args: Any) -> Solved:
         """A stationary point, or what was reached. Collective."""
 
 

@@ -24,8 +24,10 @@ Array = npt.NDArray[np.float64]
 Progress = Callable[[int, float, int], None]
 """Called with iteration, residual, and vertices in contact (of all ranks)."""
 _ON_BOUND = 1e-12
-_ROUNDING, _PATIENCE = 1e-7, 4
-"""Below the first, so many steps without halving the residual mean that rounding allows no more."""
+_STILL, _PATIENCE = 1e-3, 2
+"""So many steps that change the residual by less than this fraction: the line search no longer sees the energy fall."""
+_ROUNDING = 1e-7
+"""Below this, twice as many steps without halving the residual mean that rounding allows no more."""
 _RUNAWAY = 1e8
 """A displacement of so many times p0 L / E0 is a body that slides away."""
 _REASON = {v: k for k, v in vars(PETSc.SNES.ConvergedReason).items() if isinstance(v, int) and not k.startswith("_")}
@@ -144,7 +146,8 @@ class _Run:
         self.owner, self.models, self.tolerance = owner, models, tolerance
         self.lower, self.upper = lower, upper
         self.last, self.linear, self.iterations, self.reason = float("inf"), 0, 0, 0
-        self._stalled, self.stopped = 0, False
+        self._stalled = self._slow = 0
+        self.stopped = False
 
     def create(self, line_search: str, max_iterations: int) -> PETSc.SNES:
         """The configured SNES."""
@@ -196,8 +199,9 @@ class _Run:
             return PETSc.SNES.ConvergedReason.DIVERGED_FNORM_NAN
         if self.last <= self.tolerance:
             return PETSc.SNES.ConvergedReason.CONVERGED_FNORM_RELATIVE
-        self._stalled = self._stalled + 1 if self.last > 0.5 * previous else 0
-        if self.last < _ROUNDING and self._stalled >= _PATIENCE:
+        self._stalled = self._stalled + 1 if abs(self.last - previous) < _STILL * previous else 0
+        self._slow = self._slow + 1 if self.last > 0.5 * previous else 0
+        if self._stalled >= _PATIENCE or (self.last < _ROUNDING and self._slow >= 2 * _PATIENCE):
             return PETSc.SNES.ConvergedReason.DIVERGED_DTOL
         return PETSc.SNES.ConvergedReason.CONVERGED_ITERATING
 

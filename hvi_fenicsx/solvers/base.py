@@ -12,7 +12,7 @@ from petsc4py import PETSc
 
 from .. import existence
 from ..laws import Superpotential
-from ..system import System, normal_dofs
+from ..system import Model, System, normal_dofs
 from .activeset import ActiveSetSolver
 from .models import Resting
 
@@ -62,7 +62,7 @@ class Solved:
     Attributes:
         u: the displacement in units of u0, ghosts updated. method: its name. converged: by the method's own test.
         reason: in words. counts: iterations. energies: after each convex step, nondimensional.
-        interrupted: whether it ended because it was told to.
+        interrupted: whether it ended because it was told to. levels: rungs of the ladder that it went up.
     """
 
     u: fem.Function
@@ -72,6 +72,7 @@ class Solved:
     counts: Counts = field(default_factory=Counts)
     energies: tuple[float, ...] = ()
     interrupted: bool = False
+    levels: int = 1
 
 
 def held_dofs(system: System, laws: Sequence[Superpotential]) -> npt.NDArray[np.int32]:
@@ -106,8 +107,27 @@ def resting_start(solver: ActiveSetSolver, laws: Sequence[Superpotential], rtol:
     x.array[contact] = closed(low[contact], high[contact])
     owned = system.problem.fixed[system.problem.fixed < x.local_size]
     x.array[owned] = system.load.array_r[owned]
-    outcome = solver.newton_step(x, held_dofs(system, laws), [Resting(law) for law in laws], rtol)
-    return x, outcome.linear
+    held, models = held_dofs(system, laws), [Resting(law) for law in laws]
+    linear = solver.newton_step(x, held, models, rtol).linear
+    if _pushed(solver, x, contact, models):
+        linear += solver.newton_step(x, held, models, rtol).linear
+    return x, linear
+
+
+def _pushed(solver: ActiveSetSolver, x: PETSc.Vec, contact: npt.NDArray[np.int64], models: Sequence[Model]) -> bool:
+    """Bilateral contact: put vertices between their bounds on the one that the reaction points to. Collective.
+
+    Between its bounds a vertex is held by nothing, and the body could drift. Whether any vertex was moved.
+    """
+    system = solver.system
+    residual = system.load.duplicate()
+    system.residual(x, residual, models)
+    low, high = system.lower.array_r[contact], system.upper.array_r[contact]
+    between = np.isfinite(low) & np.isfinite(high) & (low < high)
+    target = np.where(residual.array_r[contact] >= 0.0, low, high)
+    x.array[contact[between]] = target[between]
+    residual.destroy()
+    return bool(system.comm.allreduce(bool(np.any(between))))
 
 
 def closed(lower: npt.NDArray[np.float64], upper: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:

@@ -17,22 +17,33 @@ from petsc4py import PETSc
 
 from ..system import System
 from ..timing import Timer
+from . import multigrid
 from .options import PREFIX, configure
 
 Indices = npt.NDArray[np.int32]
-Kind = Literal["lu", "gamg"]
+Kind = Literal["lu", "gamg", "mg"]
 _LARGEST_DIRECT = {2: 60_000, 3: 15_000}
 """Unknowns up to which a direct solve is the faster one, by dimension (docs/benchmarks.md)."""
 _DRIFT = 0.3
 """Change of a law's nodal stiffness, relative to an elastic one (about 1), that a Krylov method takes lightly."""
-_GAMG = {
+_GAMG: dict[str, object] = {
     "pc_type": "gamg",
     "pc_gamg_threshold": 0.01,
     "mg_levels_ksp_type": "chebyshev",
     "mg_levels_pc_type": "jacobi",
     "pc_gamg_coarse_eq_limit": 200,
 }
-_LU = {"pc_type": "cholesky", "pc_factor_mat_solver_type": "mumps"}
+_MG: dict[str, object] = {
+    "pc_type": "mg",
+    "mg_levels_ksp_type": "richardson",
+    "mg_levels_ksp_max_it": 1,
+    "mg_levels_ksp_norm_type": "none",
+    "mg_levels_pc_type": "sor",
+    "mg_levels_pc_sor_local_symmetric": None,
+    "mg_coarse_ksp_type": "preonly",
+    "mg_coarse_pc_type": "redundant",
+}
+_LU: dict[str, object] = {"pc_type": "cholesky", "pc_factor_mat_solver_type": "mumps"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,8 +57,9 @@ class LinearSettings:
         """By the number of unknowns, unless the user wants one; a nearly incompressible body goes to the direct one."""
         if wanted != "auto":
             return cls(wanted)
-        small = system.dofs <= _LARGEST_DIRECT[system.problem.scales.dimension]
-        return cls("lu" if small or system.problem.averaged else "gamg")
+        if system.dofs <= _LARGEST_DIRECT[system.problem.scales.dimension] or system.problem.averaged:
+            return cls("lu")
+        return cls("mg" if system.prolongations else "gamg")
 
     @property
     def ksp(self) -> dict[str, str]:
@@ -57,7 +69,7 @@ class LinearSettings:
     @property
     def pc(self) -> dict[str, object]:
         """The preconditioner's options."""
-        return dict(_LU if self.kind == "lu" else _GAMG)
+        return {"lu": _LU, "gamg": _GAMG, "mg": _MG}[self.kind]
 
 
 class HeldPreconditioner:
@@ -108,11 +120,22 @@ class HeldPreconditioner:
         self._matrix.setBlockSize(self.system.problem.scales.dimension)
         self._matrix.setNearNullSpace(self.system.near_null)
         self._matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
-        self._matrix.setOption(PETSc.Mat.Option.SPD, self.settings.kind == "gamg")
+        self._matrix.setOption(PETSc.Mat.Option.SPD, self.settings.kind != "lu")
         self._pc = PETSc.PC().create(self.system.comm)
         self._pc.setOperators(self._matrix)
+        if self.settings.kind == "mg":
+            multigrid.hang(self._pc, self._matrix, self.system.prolongations, self._untouched(held))
         configure(self._pc, self.settings.pc)
         self._pc.setUp()
+
+    def _untouched(self, held: Indices) -> PETSc.Vec:
+        """1 for the unknowns that are neither held nor prescribed, else 0."""
+        mask = self.system.load.duplicate()
+        mask.set(1.0)
+        fixed = self.system.problem.fixed
+        mask.array[held] = 0.0
+        mask.array[fixed[fixed < mask.local_size]] = 0.0
+        return mask
 
     def destroy(self) -> None:
         """Free the PETSc objects."""
