@@ -1,0 +1,160 @@
+"""``contact.png`` in the plane: slip, -σ_t and contact pressure along a part."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+from matplotlib.axes import Axes
+from matplotlib.ticker import MaxNLocator
+
+from .inputs import Array, Part, Result
+from .style import BLUE, GREEN, GREY, HEADING, INK, ORANGE, VERMILION, area, figure, heading, save
+from .units import Unit, quantity, unit_for
+
+PANEL, GAP, FOOT = 1.75, 0.62, 0.72
+"""Inches: a panel, the room for its title, the axis below the last."""
+MARKED = 80
+"""Vertices up to which each is marked."""
+IN_RANGE = 1.6
+"""A kink of the law is drawn if it lies within this many times the largest slip."""
+
+
+def draw(path: Path, result: Result, part: Part) -> None:
+    """Draw the three curves of a part, with what the law says of them."""
+    made = figure(HEADING + 3 * (PANEL + GAP) + FOOT)
+    heading(made, result, f"on “{part.name}”")
+    length = unit_for(float(np.max(part["s"])), "m")
+    panels = [area(made, 0.95, FOOT + i * (PANEL + GAP), 6.75, PANEL) for i in (2, 1, 0)]
+    lifted = _lifted_spans(part)
+    _slip(panels[0], part, result, length)
+    _friction(panels[1], part, result, length)
+    _pressure(panels[2], part, length)
+    for axes in panels:
+        for start, end in lifted:
+            axes.axvspan(start / length.size, end / length.size, color=ORANGE, alpha=0.16, lw=0)
+        _finish(axes, part, length)
+    _say_lifted(panels[2], lifted, part, length)
+    panels[2].set_xlabel(f"s along “{part.name}” in {length.name}")
+    for axes in panels[:2]:
+        axes.tick_params(labelbottom=False)
+    save(made, path)
+
+
+def _slip(axes: Axes, part: Part, result: Result, length: Unit) -> None:
+    values, law = part.slip, result.law(part.name)
+    unit = unit_for(_largest(values), "m")
+    _line(axes, part, values, length, unit, BLUE)
+    kinks = law.concave.kinks if law is not None else np.empty(0)
+    shown, beyond = _within(kinks, values)
+    for kink in shown:
+        axes.axhline(kink / unit.size, color=INK, ls=(0, (4, 3)), lw=1.4)
+    note = ""
+    if len(shown):
+        note = f"dashed: the law drops at {_listed(shown)}"
+    elif len(beyond):
+        note = f"the law drops at {_listed(beyond)}, not reached"
+    _title(axes, f"slip $u_t$ in {unit.name}", note)
+
+
+def _within(kinks: Array, values: Array) -> tuple[Array, Array]:
+    """The kinks worth drawing, and those too far away; on the side of the slips, of an even law's two."""
+    low, high = min(float(np.nanmin(values)), 0.0), max(float(np.nanmax(values)), 0.0)
+    near = (kinks <= IN_RANGE * high) & (kinks >= IN_RANGE * low)
+    near &= ((kinks > 0.0) & (high > -0.1 * low)) | ((kinks < 0.0) & (low < -0.1 * high)) | (kinks == 0.0)
+    return kinks[near], kinks[~near]
+
+
+def _listed(kinks: Array) -> str:
+    """An even law's two kinks are said as one."""
+    return " and ".join(
+        ("±" if -k in kinks and k else "") + quantity(k, "m") for k in kinks if k >= 0 or -k not in kinks
+    )
+
+
+def _friction(axes: Axes, part: Part, result: Result, length: Unit) -> None:
+    values = part.friction
+    unit = unit_for(_largest(values), "Pa")
+    law = result.law(part.name) if result.summary.get("smoothing") else None
+    note = ""
+    if law is not None:
+        low, high = law.interval(part.slip.astype(np.float64))
+        note = "dashed: the law itself, unsmoothed"
+        for bound in (low, high) if np.any(high > low) else (low,):
+            axes.plot(part["s"] / length.size, bound / unit.size, color=INK, ls=(0, (4, 3)), lw=1.4, zorder=4)
+    _line(axes, part, values, length, unit, GREEN)
+    _title(axes, f"friction $-\\sigma_t$ in {unit.name}", note or _pieces(axes, part, length, unit))
+
+
+def _pieces(axes: Axes, part: Part, length: Unit, unit: Unit) -> str:
+    """Mark the vertices that have left the law's first piece; says what the mark means."""
+    fallen = part["branch_t"] > 0
+    if not fallen.any():
+        return ""
+    axes.plot(part["s"][fallen] / length.size, part.friction[fallen] / unit.size, "o", mfc="white", mec=GREEN, ms=6)
+    return f"hollow: past the drop ({np.count_nonzero(fallen)} of {len(fallen)} vertices)"
+
+
+def _pressure(axes: Axes, part: Part, length: Unit) -> None:
+    values = part.pressure
+    unit = unit_for(_largest(values), "Pa")
+    _line(axes, part, values, length, unit, VERMILION)
+    axes.fill_between(part["s"] / length.size, values / unit.size, color=VERMILION, alpha=0.15, lw=0)
+    off = part.lifted
+    axes.plot(part["s"][off] / length.size, values[off] / unit.size, "o", mfc="white", mec=VERMILION, ms=6, zorder=5)
+    _title(axes, f"contact pressure $-\\sigma_n$ in {unit.name}", f"largest {unit.text(float(np.nanmax(values)))}")
+
+
+def _line(axes: Axes, part: Part, values: Array, length: Unit, unit: Unit, colour: str) -> None:
+    marker = "o" if len(values) <= MARKED else ""
+    size = 4.5 if len(values) <= MARKED // 2 else 3.0
+    axes.plot(part["s"] / length.size, values / unit.size, color=colour, marker=marker, ms=size)
+
+
+def _title(axes: Axes, words: str, note: str) -> None:
+    axes.set_title(words, loc="left", size=14, parse_math=True)
+    axes.set_title(note, loc="right", size=11.5, color=GREY)
+
+
+def _finish(axes: Axes, part: Part, length: Unit) -> None:
+    """Zero is always in sight: a pressure that is uniform to a thousandth should look so."""
+    bottom, top = axes.get_ylim()
+    low, high = min(0.0, *axes.dataLim.intervaly), max(0.0, *axes.dataLim.intervaly)
+    low, high = min(low, *(bottom,) if bottom < 0 and low < 0 else (low,)), max(high, top if high > 0 else high)
+    room = 0.06 * (high - low or 1.0)
+    axes.set_ylim(low - room, high + room)
+    axes.axhline(0.0, color=GREY, lw=0.8, zorder=1)
+    end = float(np.max(part["s"])) / length.size
+    axes.set_xlim(-0.015 * end, 1.015 * end)
+    axes.yaxis.set_major_locator(MaxNLocator(nbins=4, min_n_ticks=3, steps=[1, 2, 2.5, 5, 10]))
+    axes.grid(axis="y", color="#e6e6e6", lw=0.8)
+    axes.set_axisbelow(True)
+
+
+def _lifted_spans(part: Part) -> list[tuple[float, float]]:
+    """Stretches of s whose vertices are lifted; each vertex stands for half the way to its neighbours."""
+    s = part["s"]
+    middles = np.concatenate([s[:1], (s[1:] + s[:-1]) / 2, s[-1:]])
+    return [(float(middles[a]), float(middles[b])) for a, b in _runs(part.lifted)]
+
+
+def _runs(flags: npt.NDArray[np.bool_]) -> Iterator[tuple[int, int]]:
+    """Where flags are set, as half-open ranges."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(int), [0]])))
+    yield from zip(map(int, edges[::2]), map(int, edges[1::2]), strict=True)
+
+
+def _say_lifted(axes: Axes, spans: list[tuple[float, float]], part: Part, length: Unit) -> None:
+    if not spans:
+        return
+    start, end = max(spans, key=lambda span: span[1] - span[0])
+    gap = quantity(float(np.nanmax(part["gap"])), "m")
+    middle = (start + end) / 2 / length.size
+    words = f"lifted\nup to {gap}"
+    axes.text(middle, 0.93, words, transform=axes.get_xaxis_transform(), ha="center", va="top", size=12, color=INK)
+
+
+def _largest(values: Array) -> float:
+    return float(np.nanmax(np.abs(values), initial=0.0))

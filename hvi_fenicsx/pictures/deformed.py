@@ -1,0 +1,71 @@
+"""The deformed body, magnified, and what acts on its contact parts, as points: the same in the plane and in space."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from .inputs import Part, Result
+from .mesh import Array, Body, Ints
+from .units import round_below
+
+VISIBLE = 0.08
+"""How large the largest displacement is drawn, of the body's size."""
+
+
+@dataclass(frozen=True)
+class Deformed:
+    """A body with its displacement (n, 3), m, and the factor it is drawn with."""
+
+    body: Body
+    displacement: Array
+    factor: float
+
+    @cached_property
+    def points(self) -> Array:
+        """Where the vertices are drawn."""
+        return self.body.points + self.factor * self.displacement
+
+    @cached_property
+    def amount(self) -> Array:
+        """|u|, m."""
+        return np.asarray(np.linalg.norm(self.displacement, axis=1))
+
+
+def deform(body: Body) -> Deformed:
+    """The body with a round factor that makes its displacement seen."""
+    u = np.nan_to_num(body.fields["displacement"])
+    largest = float(np.linalg.norm(u, axis=1).max(initial=0.0))
+    return Deformed(body, u, round_below(VISIBLE * body.size / largest * 1.25) if largest > 0.0 else 1.0)
+
+
+@dataclass(frozen=True)
+class Footing:
+    """A contact part on the body: its vertices (m,), its facets (k, 2|3), and the row of the table by vertex."""
+
+    part: Part
+    vertices: Ints
+    facets: Ints
+    row: Ints
+
+    def values(self, column: Array, vertices: Ints) -> Array:
+        """A column of the table at some of its vertices."""
+        return np.asarray(column[self.row[vertices]])
+
+
+def footings(result: Result, body: Body) -> list[Footing]:
+    """All contact parts, placed on the body."""
+    found = []
+    for part in result.parts:
+        vertices = body.vertices(part.points)
+        row = np.zeros(len(body.points), dtype=np.int64)
+        row[vertices] = np.arange(len(vertices))
+        found.append(Footing(part, vertices, body.facets_of(vertices), row))
+    return found
+
+
+def largest_stress(parts: list[Footing]) -> float:
+    """The largest |σ_n| on any of them, N/m²."""
+    return max((float(np.nanmax(np.abs(f.part.pressure), initial=0.0)) for f in parts), default=0.0)

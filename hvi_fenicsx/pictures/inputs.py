@@ -1,0 +1,140 @@
+"""What a result folder tells: the scene, the summary, Γc as a table. Read from its files alone."""
+
+from __future__ import annotations
+
+import csv
+import json
+import tomllib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from itertools import groupby
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import numpy as np
+import numpy.typing as npt
+
+from ..errors import HviError
+from . import PictureError
+
+if TYPE_CHECKING:
+    from ..laws import Superpotential
+
+Array = npt.NDArray[np.floating[Any]]
+T = TypeVar("T")
+NUMBERS = ("s", "x", "y", "z", "u_n", "u_t1", "u_t2", "gap", "sigma_n", "friction_t1", "friction_t2")
+STATES = ("contact", "branch_t", "branch_n")
+
+
+@dataclass(frozen=True)
+class Part:
+    """A part of Γc: its name and the columns of ``contact.csv`` by name, each (m,), NaN where the file has nothing."""
+
+    name: str
+    columns: Mapping[str, Array]
+
+    def __getitem__(self, column: str) -> Array:
+        return self.columns[column]
+
+    def has(self, column: str) -> bool:
+        """Whether the file has any value in it."""
+        return bool(np.isfinite(self.columns[column]).any())
+
+    @property
+    def points(self) -> Array:
+        """The vertices (m, 3), in the file's order."""
+        return np.nan_to_num(np.column_stack([self["x"], self["y"], self["z"]]))
+
+    @property
+    def spatial(self) -> bool:
+        """Whether it is a surface in space rather than a line in the plane."""
+        return self.has("z")
+
+    @property
+    def slip(self) -> Array:
+        """Signed slip in the plane, length of the slip in space."""
+        return _tangential(self["u_t1"], self["u_t2"])
+
+    @property
+    def friction(self) -> Array:
+        """-σ_t in the plane, its length in space."""
+        return _tangential(self["friction_t1"], self["friction_t2"])
+
+    @property
+    def pressure(self) -> Array:
+        """-σ_n: positive where the part is pressed."""
+        return -self["sigma_n"]
+
+    @property
+    def lifted(self) -> npt.NDArray[np.bool_]:
+        """Vertices off the obstacle; none where the part has no contact."""
+        return self["contact"] == 0.0
+
+
+def _tangential(first: Array, second: Array) -> Array:
+    return np.hypot(first, second) if np.isfinite(second).any() else first
+
+
+@dataclass(frozen=True)
+class Result:
+    """A folder's tables. ``scene`` and ``summary`` are as the files have them."""
+
+    folder: Path
+    scene: Mapping[str, Any]
+    summary: Mapping[str, Any]
+    parts: tuple[Part, ...]
+
+    @property
+    def solvability(self) -> Mapping[str, Any]:
+        """The summary's entry, empty if there is none."""
+        return self.summary.get("solvability") or {}
+
+    @property
+    def solved(self) -> bool:
+        """Whether there was a solution to look for."""
+        return self.solvability.get("state") != "escapes"
+
+    @property
+    def certified(self) -> bool:
+        """Whether the certificate was passed."""
+        return bool((self.summary.get("certificate") or {}).get("passed"))
+
+    def law(self, part: str, key: str = "friction") -> Superpotential | None:
+        """The law of a part, not smoothed; None if it has none, or one that only its author's program knows."""
+        from .. import laws  # a tenth of a second, for the picture that asks
+
+        table = dict(((self.scene.get("boundary") or {}).get(part) or {}).get(key) or {})
+        try:
+            return laws.create(table.pop("law"), table)
+        except (HviError, KeyError):
+            return None
+
+
+def read(folder: Path) -> Result:
+    """Read a folder's tables; ``contact.csv`` may be missing.
+
+    Raises:
+        PictureError: no result is there, or its files are damaged.
+    """
+    scene = _read(folder / "scene.toml", lambda text: dict(tomllib.loads(text)))
+    summary = _read(folder / "summary.json", lambda text: dict(json.loads(text)))
+    table = folder / "contact.csv"
+    return Result(folder, scene, summary, _read(table, _parts) if table.exists() else ())
+
+
+def _read(path: Path, parse: Callable[[str], T]) -> T:
+    try:
+        return parse(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise PictureError(f"{path}: {error.strerror or error}; pictures need a finished result folder") from None
+    except (ValueError, KeyError, TypeError) as error:
+        raise PictureError(f"{path}: damaged ({error})") from None
+
+
+def _parts(text: str) -> tuple[Part, ...]:
+    rows = csv.DictReader(text.splitlines())
+    return tuple(_part(name, list(own)) for name, own in groupby(rows, key=lambda row: row["part"]))
+
+
+def _part(name: str, rows: list[dict[str, str]]) -> Part:
+    return Part(name, {c: np.array([float(row[c]) if row[c] else np.nan for row in rows]) for c in (*NUMBERS, *STATES)})

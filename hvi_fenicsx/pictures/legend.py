@@ -1,0 +1,47 @@
+"""The foot of a picture of a body: a colour bar on the left, what the marks mean on the right."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.colors import Colormap
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from .style import GREY, WIDTH, area
+
+FOOT = 1.55
+"""Height of the foot, inches."""
+_BAR, _START = 3.2, 0.42
+
+
+def colour_bar(
+    made: Figure, colours: Colormap, scale: tuple[float, float], words: str, remark: str = "", *, at: float = 0.0
+) -> None:
+    """A bar of a scale from its lowest to its largest value, ``at`` inches from its usual place; below it a remark."""
+    axes = area(made, _START + at, 0.82, _BAR, 0.2)
+    low, high = scale if scale[1] > scale[0] else (0.0, 1.0)
+    axes.imshow(np.linspace(0, 1, 256)[None], cmap=colours, aspect="auto", extent=(low, high, 0.0, 1.0))
+    axes.yaxis.set_visible(False)
+    axes.xaxis.set_major_locator(MaxNLocator(nbins=4, steps=[1, 2, 2.5, 5, 10]))
+    axes.tick_params(labelsize=12)
+    axes.set_title(words, loc="left", size=12.5)
+    for spine in axes.spines.values():
+        spine.set_visible(False)
+    made.text((_START + at) / WIDTH, 0.2 / made.get_figheight(), remark, size=12.5, weight="bold", color=GREY)
+
+
+def legend(made: Figure, keys: Sequence[Artist]) -> None:
+    """What the marks mean, one in a line."""
+    made.legend(
+        handles=list(keys),
+        loc="center left",
+        bbox_to_anchor=(4.05 / WIDTH, 0.74 / made.get_figheight()),
+        frameon=False,
+        fontsize=12,
+        handlelength=1.8,
+        labelspacing=0.38,
+        borderpad=0.0,
+    )

@@ -1,0 +1,177 @@
+"""``body.png`` of a body in space: deformed over its edges, |u| on it, contact pressure on its parts.
+
+A part that looks away from the eye, as the underside does, is drawn a second time beside the body, moved along its
+normal: its footprint.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import Colormap, LinearSegmentedColormap
+from matplotlib.figure import Figure
+
+from . import space_loads
+from .deformed import Deformed, Footing, deform, footings, largest_stress
+from .inputs import Result
+from .legend import colour_bar
+from .mesh import Array, Body
+from .plane import canvas
+from .sides import loads
+from .space import View, area_vectors, best_view, creases, render, surface
+from .style import GREY, INK, PALE, PURPLE, SLATE, VERMILION, heading, save, shades
+from .units import quantity, times, unit_for
+
+if TYPE_CHECKING:
+    import pyvista
+
+FACING = 0.15
+"""Cosine from which a part is drawn where it is."""
+LEGIBLE = 5000
+"""Facets up to which their edges are drawn."""
+PRESSED = shades(VERMILION, "#fdf3ec")
+BOTH = LinearSegmentedColormap.from_list("both", [PURPLE, "#fdfaf7", VERMILION])
+NOTHING = 1e-6
+
+
+@dataclass(frozen=True)
+class Patched:
+    """A contact part as drawn: its facets at the points (n, 3), and -σ_n, NaN where it is lifted, by vertex."""
+
+    foot: Footing
+    points: Array
+    away: Array
+    """How far it is moved, (3,); zero for one that is drawn where it is."""
+
+    @property
+    def pressure(self) -> Array:
+        """-σ_n by vertex of the body, NaN where lifted and off the part."""
+        values = np.full(len(self.points), np.nan)
+        part = self.foot.part
+        values[self.foot.vertices] = np.where(part.lifted, np.nan, part.pressure)
+        return values
+
+
+def draw(path: Path, result: Result, body: Body) -> None:
+    """Draw the body with its loads and contact parts."""
+    shape, parts, pulled = deform(body), footings(result, body), loads(result, body)
+    normals = [area_vectors(body.points, foot.facets).sum(axis=0) for foot in parts]
+    view = best_view(normals)
+    shown = [_placed(shape, view, foot, normal) for foot, normal in zip(parts, normals, strict=True)]
+    arrows = [space_loads.arrows(shape, load) for load in pulled]
+    reached = [shape.points, body.points, *(s.points[s.foot.vertices] for s in shown)]
+    reached += [end for tails, ways in arrows for end in (tails, tails + ways)]
+    everything = np.concatenate(reached)
+    made, axes = canvas(view.project(everything))
+    heading(made, result, "deformed body")
+    stress, colours = largest_stress(parts), _colours(parts)
+    depths = (float(view.depth(everything).min()), float(view.depth(everything).max()))
+    render(axes, view, depths, partial(_fill, shape=shape, shown=shown, arrows=arrows, stress=stress, colours=colours))
+    space_loads.labels(axes, view, shape, pulled)
+    for placed in shown:
+        _guides(axes, view, shape, placed)
+    _foot(made, shape, shown, stress, colours)
+    save(made, path)
+
+
+def _placed(shape: Deformed, view: View, foot: Footing, normal: Array) -> Patched:
+    """A part where it is if it is seen there, else so far out along its normal that the body does not hide it."""
+    unit = normal / (float(np.linalg.norm(normal)) or 1.0)
+    if float(unit @ view.toward) > FACING:
+        return Patched(foot, shape.points + 1e-3 * shape.body.size * view.toward, np.zeros(3))
+    seen = view.project(unit[None])[0]
+    across = seen / float(np.linalg.norm(seen))
+    everything = view.project(np.concatenate([shape.points, shape.body.points])) @ across
+    own = view.project(shape.points[foot.vertices]) @ across
+    way = (everything.max() - own.min() + 0.05 * shape.body.size) / float(np.linalg.norm(seen)) * unit
+    return Patched(foot, shape.points + way, way)
+
+
+def _colours(parts: list[Footing]) -> tuple[Colormap, float]:
+    """The scale of -σ_n and its lower end in units of the largest: there is tension only where something adheres."""
+    lowest = min((float(np.nanmin(foot.part.pressure)) for foot in parts), default=0.0)
+    return (BOTH, -1.0) if lowest < -NOTHING * largest_stress(parts) else (PRESSED, 0.0)
+
+
+def _fill(
+    plotter: pyvista.Plotter,
+    *,
+    shape: Deformed,
+    shown: list[Patched],
+    arrows: list[tuple[Array, Array]],
+    stress: float,
+    colours: tuple[Colormap, float],
+) -> None:
+    facets = shape.body.boundary
+    skin = surface(shape.points, facets)
+    skin.point_data["amount"] = shape.amount[skin.point_data["vertex"]]
+    plotter.add_mesh(
+        skin,
+        scalars="amount",
+        cmap=SLATE,
+        clim=(0.0, float(shape.amount.max()) or 1.0),
+        show_edges=len(facets) <= LEGIBLE,
+        edge_color="white",
+        edge_opacity=0.4,
+        line_width=1,
+        ambient=0.6,
+        diffuse=0.45,
+        show_scalar_bar=False,
+    )
+    plotter.add_mesh(creases(shape.points, facets), color=INK, line_width=3)
+    plotter.add_mesh(creases(shape.body.points, facets), color=GREY, line_width=2)
+    for placed in shown:
+        _fill_part(plotter, placed, stress, colours)
+    for tails, ways in arrows:
+        space_loads.fill(plotter, tails, ways)
+
+
+def _fill_part(plotter: pyvista.Plotter, placed: Patched, stress: float, colours: tuple[Colormap, float]) -> None:
+    patch = surface(placed.points, placed.foot.facets)
+    patch.point_data["pressure"] = placed.pressure[patch.point_data["vertex"]]
+    plotter.add_mesh(
+        patch,
+        scalars="pressure",
+        cmap=colours[0],
+        clim=(colours[1] * stress, stress or 1.0),
+        nan_color=PALE,
+        show_scalar_bar=False,
+        lighting=False,
+    )
+    plotter.add_mesh(creases(placed.points, placed.foot.facets), color=INK, line_width=3)
+
+
+def _guides(axes: Axes, view: View, shape: Deformed, placed: Patched) -> None:
+    """Thin lines from a part on the body to its footprint, at its outermost points."""
+    if not placed.away.any():
+        return
+    start = view.project(shape.points[placed.foot.vertices])
+    end = view.project(placed.points[placed.foot.vertices])
+    across = np.array([-(end - start)[0, 1], (end - start)[0, 0]])
+    for i in (int(np.argmin(start @ across)), int(np.argmax(start @ across))):
+        axes.plot(*np.array([start[i], end[i]]).T, color=GREY, lw=1.1, ls=(0, (2, 3)), zorder=0.5)
+
+
+def _foot(made: Figure, shape: Deformed, shown: list[Patched], stress: float, colours: tuple[Colormap, float]) -> None:
+    most = float(shape.amount.max())
+    unit = unit_for(most, "m")
+    words = f"displacement |u|, up to {unit.text(most)}"
+    colour_bar(made, SLATE, (0.0, most / unit.size), words, times(shape.factor))
+    if shown:
+        unit = unit_for(stress, "Pa")
+        scale = (colours[1] * stress / unit.size, stress / unit.size)
+        words = f"contact pressure, up to {unit.text(stress)}"
+        colour_bar(made, colours[0], scale, words, _remark(shown), at=3.75)
+
+
+def _remark(shown: list[Patched]) -> str:
+    """Where the footprints are, and what grey means on them."""
+    gaps = [float(np.max(s.foot.part["gap"][s.foot.part.lifted])) for s in shown if s.foot.part.lifted.any()]
+    lifted = [f"grey: lifted, up to {quantity(max(gaps), 'm')}"] if gaps else []
+    away = [s.foot.part.name for s in shown if s.away.any()]
+    return lifted[0] if lifted else f"“{'”, “'.join(away)}” drawn apart" if away else ""

@@ -1,0 +1,55 @@
+"""``escape.png`` of a body in space: the body, its ghost moved along the motion, and the motion in words."""
+
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from . import space_loads
+from .deformed import Deformed
+from .escape import WAY, arrow, keys, say
+from .inputs import Result
+from .mesh import Array, Body
+from .motion import fitted, followed
+from .plane import canvas
+from .sides import loads
+from .space import best_view, creases, render, surface
+from .style import INK, PALE, VERMILION, heading, save
+
+if TYPE_CHECKING:
+    import pyvista
+
+
+def draw(path: Path, result: Result, body: Body) -> None:
+    """Draw a body in space and its ghost."""
+    motion, view = fitted(body, body.fields["escape_mode"]), best_view([])
+    rest, pulled = Deformed(body, np.zeros_like(body.points), 1.0), loads(result, body)
+    arrows = [space_loads.arrows(rest, load) for load in pulled]
+    ghost, posts = motion.at(body.points), followed(body, motion)
+    posts = posts[view.depth(posts) >= np.quantile(view.depth(posts), 0.15)]  # not the one behind the body
+    ways = np.stack([motion.at(posts, part) for part in WAY], axis=1)
+    reached = [end for tails, along in arrows for end in (tails, tails + along)]
+    everything = np.concatenate([body.points, ghost, ways.reshape(-1, 3), *reached])
+    made, axes = canvas(view.project(everything))
+    heading(made, result, "rigid motion")
+    depths = (float(view.depth(everything).min()), float(view.depth(everything).max()))
+    nearer = ghost + 1e-3 * body.size * view.toward  # where the two share a face, the ghost's is seen
+    render(axes, view, depths, partial(_fill, body=body, ghost=nearer, arrows=arrows))
+    space_loads.labels(axes, view, rest, pulled)
+    for way in ways:
+        arrow(axes, view.project(way))
+    say(made, result, keys())
+    save(made, path)
+
+
+def _fill(plotter: pyvista.Plotter, *, body: Body, ghost: Array, arrows: list[tuple[Array, Array]]) -> None:
+    facets = body.boundary
+    plotter.add_mesh(surface(body.points, facets), color=PALE, ambient=0.75, diffuse=0.3)
+    plotter.add_mesh(creases(body.points, facets), color=INK, line_width=3)
+    plotter.add_mesh(surface(ghost, facets), color=VERMILION, opacity=0.16, lighting=False)
+    plotter.add_mesh(creases(ghost, facets), color=VERMILION, line_width=4)
+    for tails, ways in arrows:
+        space_loads.fill(plotter, tails, ways)

@@ -1,0 +1,64 @@
+"""Numbers as people read them: SI prefixes, round factors, thin spaces between thousands."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+_PREFIXES = {-12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G", 12: "T"}
+_NARROW = "\N{NARROW NO-BREAK SPACE}"
+
+
+@dataclass(frozen=True)
+class Unit:
+    """A unit with its prefix: ``value / size`` is the number to write before ``name``."""
+
+    size: float
+    name: str
+
+    def text(self, value: float) -> str:
+        """A value in this unit, to three digits."""
+        return f"{_digits(value / self.size)}{_NARROW}{self.name}"
+
+
+def unit_for(largest: float, name: str) -> Unit:
+    """The prefix that brings the largest value between 1 and 1000; none for zero."""
+    if not (math.isfinite(largest) and largest != 0.0):
+        return Unit(1.0, name)
+    exponent = 3 * math.floor(math.log10(abs(largest) * (1.0 + 1e-9)) / 3)
+    most = 0 if name == "m" else 12  # nobody says megametre
+    exponent = min(max(exponent, -12), most)
+    return Unit(10.0**exponent, _PREFIXES[exponent] + name)
+
+
+def quantity(value: float, name: str) -> str:
+    """A value with the prefix that suits it."""
+    return unit_for(value, name).text(value)
+
+
+def round_below(value: float) -> float:
+    """The largest of 1, 2, 5, 10, 20, ... (and their fractions) that is not above a positive value."""
+    if not (math.isfinite(value) and value > 0.0):
+        return 1.0
+    power = 10.0 ** math.floor(math.log10(value))
+    return max(step for step in (0.5, 1.0, 2.0, 5.0) if step * power <= value * (1.0 + 1e-9)) * power
+
+
+def times(factor: float) -> str:
+    """A magnification in words."""
+    return "displacements to scale" if factor == 1.0 else f"displacements × {_digits(factor)}"
+
+
+def thousands(number: int) -> str:
+    """A whole number, its thousands apart."""
+    return f"{number:,}".replace(",", _NARROW)
+
+
+def _digits(value: float) -> str:
+    if value == 0.0:
+        return "0"
+    if not 1e-4 <= abs(value) < 1e9:
+        return f"{value:.3g}"
+    decimals = max(0, 2 - math.floor(math.log10(abs(value))))
+    text = f"{value:,.{decimals}f}".replace(",", _NARROW)
+    return text.rstrip("0").rstrip(".") if "." in text else text
