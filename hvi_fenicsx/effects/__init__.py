@@ -1,6 +1,6 @@
 """The box of effects: importing it registers those that come with the program."""
 
-from . import contact, elasticity, friction, loads, normal
+from . import anisotropic, contact, elasticity, friction, loads, normal, thermal
 from .base import Effect, Place
 
-__all__ = ["Effect", "Place", "contact", "elasticity", "friction", "loads", "normal"]
+__all__ = ["Effect", "Place", "anisotropic", "contact", "elasticity", "friction", "loads", "normal", "thermal"]

@@ -7,7 +7,7 @@ its ``key``, which is then a key of the scene file at its ``place``. Nothing els
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from typing import Annotated, Any, ClassVar, Protocol
@@ -118,6 +118,8 @@ class Contribution:
     bilinear: tuple[Any, ...] = ()
     averaged: tuple[Averaged, ...] = ()
     linear: tuple[Any, ...] = ()
+    strains: tuple[Any, ...] = ()
+    """Linear forms of ε(v): no rigid motion feels them."""
     conditions: tuple[Condition, ...] = ()
     bounds: tuple[NormalBounds, ...] = ()
     laws: tuple[BoundaryLaw, ...] = ()
@@ -150,11 +152,28 @@ class Stage(Protocol):
     def render(self, formula: Formula) -> Any:
         """A formula in UFL, in the SI coordinates of the mesh."""
 
-    def cells(self, region: str | None) -> Any:
-        """The measure dx/L^d of a region (None: the whole body)."""
+    @property
+    def materials(self) -> Sequence[tuple[str | None, Effect]]:
+        """The elasticities, each with its region (None: the whole body)."""
+
+    def cells(self, *regions: str | None) -> Any:
+        """The measure dx/L^d of what regions share (None: the whole body); None where that is nothing."""
 
     def facets(self, part: str) -> Any:
         """The measure ds/L^(d-1) of a boundary part."""
+
+
+@dataclass(frozen=True, slots=True)
+class Sizes:
+    """What an effect's scale may depend on.
+
+    Attributes:
+        length: of the body, m. modulus: the largest Young's modulus, N/m². expansion: the largest |α|, 1/K.
+    """
+
+    length: float
+    modulus: float
+    expansion: float
 
 
 Evaluate = Callable[[Formula], float]
@@ -192,12 +211,16 @@ class Effect(BaseModel):
     def contribute(self, stage: Stage, where: str | None) -> Contribution:
         """What it adds on ``where`` (a boundary part, a region, or None for the whole body)."""
 
-    def stress_scale(self, largest: Evaluate, length: float, modulus: float) -> float:
-        """The largest stress (N/m²) it brings, from the body's length (m) and Young's modulus (N/m²)."""
+    def stress_scale(self, largest: Evaluate, sizes: Sizes) -> float:
+        """The largest stress (N/m²) it brings."""
         return 0.0
 
     def modulus_scale(self) -> float:
         """The largest Young's modulus (N/m²) it brings."""
+        return 0.0
+
+    def expansion_scale(self) -> float:
+        """The largest |α| (1/K) it brings."""
         return 0.0
 
     def dimension(self) -> int | None:

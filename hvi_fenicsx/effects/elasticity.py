@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from typing import Annotated, Any, ClassVar, Literal
 
+import numpy as np
 from pydantic import Field
 
 from ..errors import InputError
-from .base import Averaged, Contribution, Effect, Place, Stage
+from .base import Array, Averaged, Contribution, Effect, Place, Stage
 
 _LOCKING = 0.45
 """Poisson's ratio above which P1 cells answer too stiffly (docs/methods.md)."""
@@ -20,15 +22,44 @@ def strain(v: Any) -> Any:
     return ufl.sym(ufl.grad(v))
 
 
-class IsotropicElasticity(Effect):
-    """Isotropic elasticity; plane stress is the paper's own Hooke law (equation (tau))."""
+class Elasticity(Effect):
+    """What every elastic material has, whatever its symmetry.
 
-    key: ClassVar[str] = "isotropic"
+    Stresses and strains are in Voigt's order 11, 22, 12 or 11, 22, 33, 23, 13, 12, shear strains doubled.
+    """
+
     place: ClassVar[Place] = Place.MATERIAL
-    term: ClassVar[str] = "a(u, v) = ∫ σ(u):ε(v) dx, isotropic"
 
     model: Literal["plane_stress", "plane_strain", "three_dimensional"]
     """plane_stress (the paper's), plane_strain, three_dimensional"""
+    thermal_expansion: Annotated[float, Field(allow_inf_nan=False)] = 0.0
+    """α in 1/K, for `temperature` in a body table"""
+
+    @abstractmethod
+    def thermal_stress(self) -> Array:
+        """Stress that holds the material back from expanding by 1 K, N/m²; shape (3,) or (6,)."""
+
+    def expansion_scale(self) -> float:
+        """|α|."""
+        return abs(self.thermal_expansion)
+
+    def dimension(self) -> int | None:
+        """2 for the plane models."""
+        return 3 if self.model == "three_dimensional" else 2
+
+    def check(self, dimension: int) -> None:
+        """Plane models are for 2D, the other for 3D."""
+        if self.dimension() != dimension:
+            allowed = "three_dimensional" if dimension == 3 else "plane_stress or plane_strain"
+            raise InputError(f'model = "{self.model}" in a {dimension}D scene; use {allowed}')
+
+
+class IsotropicElasticity(Elasticity):
+    """Isotropic elasticity; plane stress is the paper's own Hooke law (equation (tau))."""
+
+    key: ClassVar[str] = "isotropic"
+    term: ClassVar[str] = "a(u, v) = ∫ σ(u):ε(v) dx, isotropic"
+
     youngs_modulus: Annotated[float, Field(gt=0, allow_inf_nan=False)]
     """E in N/m²"""
     poisson_ratio: Annotated[float, Field(gt=-1, lt=0.5, allow_inf_nan=False)]
@@ -66,16 +97,13 @@ class IsotropicElasticity(Effect):
         divergence = stage.scalar_test * length * ufl.div(stage.trial) * cells
         return Contribution(bilinear=(shear,), averaged=(Averaged(lam, divergence, stage.scalar_test * cells),))
 
+    def thermal_stress(self) -> Array:
+        """Eα/(1-2ν), in plane stress Eα/(1-ν): there the thickness is free."""
+        plane = self.model == "plane_stress"
+        held = self.youngs_modulus / (1 - (1 if plane else 2) * self.poisson_ratio)
+        normal, shear = (2, 1) if self.dimension() == 2 else (3, 3)
+        return self.thermal_expansion * held * np.repeat([1.0, 0.0], [normal, shear])
+
     def modulus_scale(self) -> float:
         """E."""
         return self.youngs_modulus
-
-    def dimension(self) -> int | None:
-        """2 for the plane models."""
-        return 3 if self.model == "three_dimensional" else 2
-
-    def check(self, dimension: int) -> None:
-        """Plane models are for 2D, the other for 3D."""
-        if self.dimension() != dimension:
-            allowed = "three_dimensional" if dimension == 3 else "plane_stress or plane_strain"
-            raise InputError(f'model = "{self.model}" in a {dimension}D scene; use {allowed}')

@@ -15,7 +15,7 @@ from pydantic import (
 
 from .. import laws
 from ..errors import InputError
-from .base import BoundaryLaw, Contribution, Direction, Effect, Evaluate, Place, Stage, refusal
+from .base import BoundaryLaw, Contribution, Direction, Effect, Evaluate, Place, Sizes, Stage, refusal
 
 
 def _law(value: Any) -> laws.Superpotential:
@@ -72,6 +72,6 @@ class LawEffect(Effect):
         """The law, acting on its displacement."""
         return Contribution(laws=(BoundaryLaw(self.direction, self.law),))
 
-    def stress_scale(self, largest: Evaluate, length: float, modulus: float) -> float:
+    def stress_scale(self, largest: Evaluate, sizes: Sizes) -> float:
         """The law's own."""
         return self.law.traction_scale

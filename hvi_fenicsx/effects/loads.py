@@ -22,6 +22,7 @@ from .base import (
     Evaluate,
     FormulaField,
     Place,
+    Sizes,
     Stage,
     components,
     refusal,
@@ -70,7 +71,7 @@ class Traction(_Listed):
         vector = ufl.as_vector([stage.render(f) for f in self.values]) / stage.number(stage.stress)
         return Contribution(linear=(ufl.inner(vector, stage.test) * stage.facets(where),))
 
-    def stress_scale(self, largest: Evaluate, length: float, modulus: float) -> float:
+    def stress_scale(self, largest: Evaluate, sizes: Sizes) -> float:
         """The largest component."""
         return max(largest(f) for f in self.values)
 
@@ -93,9 +94,9 @@ class BodyForce(_Listed):
         vector = factor * ufl.as_vector([stage.render(f) for f in self.values])
         return Contribution(linear=(ufl.inner(vector, stage.test) * stage.cells(where),))
 
-    def stress_scale(self, largest: Evaluate, length: float, modulus: float) -> float:
+    def stress_scale(self, largest: Evaluate, sizes: Sizes) -> float:
         """The largest component times the body's length."""
-        return max(largest(f) for f in self.values) * length
+        return max(largest(f) for f in self.values) * sizes.length
 
 
 def _component(value: Any) -> Any:
@@ -131,6 +132,6 @@ class PrescribedDisplacement(_Listed):
         """Indices of the components that are not free."""
         return tuple(i for i, f in enumerate(self.values) if f != "free")
 
-    def stress_scale(self, largest: Evaluate, length: float, modulus: float) -> float:
+    def stress_scale(self, largest: Evaluate, sizes: Sizes) -> float:
         """The stress of the largest component, as a strain over the body's length."""
-        return max((largest(f) for f in self.values if f != "free"), default=0.0) * modulus / length
+        return max((largest(f) for f in self.values if f != "free"), default=0.0) * sizes.modulus / sizes.length
