@@ -71,6 +71,7 @@ class System:
     def __init__(self, problem: Problem, compiled: Compiled, timer: Timer) -> None:
         self.problem, self.frames = problem, frames.build(problem)
         self.prolongations: tuple[PETSc.Mat, ...] = ()
+        self._size: float | None = None
         self.terms, self.bounds = problem.terms, problem.bounds
         with timer("assembly"):
             self.forces = {name: _assembled(form) for name, form in compiled.linear.items()}
@@ -220,6 +221,20 @@ class System:
         for term, model in zip(self.terms, models, strict=True):
             local += float(np.sum(term.surface.weights * model.value(term.argument(u))))
         return 0.5 * float(x.dot(self._work)) - float(self.load.dot(x)) + float(self.comm.allreduce(local))
+
+    def energy_noise(self, x: PETSc.Vec) -> float:
+        """What rounding may change of the energy at u: a few ε_machine ‖A‖ ‖u‖². Collective."""
+        if self._size is None:
+            self._size = float(self.matrix.norm(PETSc.NormType.INFINITY))
+        return 4 * float(np.finfo(float).eps) * self._size * float(x.norm()) ** 2
+
+    def rounding(self, x: PETSc.Vec, out: PETSc.Vec) -> None:
+        """A sample of the rounding error of a residual at u: A times u with its last digits shuffled. Collective."""
+        shuffled = x.duplicate()
+        signs = np.random.default_rng(self.comm.rank).choice([-1.0, 1.0], x.local_size)
+        shuffled.array[:] = x.array_r * signs * np.finfo(float).eps
+        self._stiffness_times(shuffled, out)
+        shuffled.destroy()
 
     def allowed(self, tolerance: float) -> Array:
         """Largest residual a dof of Γc may keep for its traction to be right within tolerance; infinite elsewhere."""

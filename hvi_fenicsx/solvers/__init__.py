@@ -9,6 +9,7 @@ from ..errors import InputError
 from ..system import System
 from ..timing import Timer
 from .activeset import ActiveSetSolver
+from .auto import Auto
 from .base import Progress, Settings, Solved
 from .branch import BranchIteration
 from .condensed import Condensation
@@ -33,7 +34,7 @@ class Method(Protocol):
 
 
 METHODS: Mapping[str, type[Method]] = {
-    "auto": BranchIteration,
+    "auto": Auto,
     "branch": BranchIteration,
     "snes_vi": Continuation,
     "tao": BoundedNewton,

@@ -7,7 +7,7 @@ as merit function, and a preconditioner that works at full size.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -28,6 +28,8 @@ _STILL, _PATIENCE = 1e-3, 2
 """So many steps that change the residual by less than this fraction: the line search no longer sees the energy fall."""
 _ROUNDING = 1e-7
 """Below this, twice as many steps without halving the residual mean that rounding allows no more."""
+_LARGEST_ROUNDING, _SAFETY = 1e-4, 4.0
+"""A residual above the first is no rounding; the sample of the rounding error is trusted within the second."""
 _RUNAWAY = 1e8
 """A displacement of so many times p0 L / E0 is a body that slides away."""
 _REASON = {v: k for k, v in vars(PETSc.SNES.ConvergedReason).items() if isinstance(v, int) and not k.startswith("_")}
@@ -40,6 +42,7 @@ class Outcome:
     Attributes:
         converged: by our own test. newton, linear: iterations. measure: residual of the inequality, relative.
         reason: PETSc's name of the reason, or ours. interrupted: whether it was told to stop.
+        rounding: where the residual stood still, what rounding makes of it there; a residual no larger is converged.
     """
 
     converged: bool
@@ -48,6 +51,7 @@ class Outcome:
     measure: float
     reason: str
     interrupted: bool = False
+    rounding: float = 0.0
 
 
 class ActiveSetSolver:
@@ -82,7 +86,9 @@ class ActiveSetSolver:
         The larger of its norm relative to the load's, and of the largest nodal traction error on Γc relative to what is
         allowed there.
         """
-        r = projected(x.array_r, residual.array_r, lower.array_r, upper.array_r)
+        return self._size(projected(x.array_r, residual.array_r, lower.array_r, upper.array_r))
+
+    def _size(self, r: Array) -> float:
         nodal = float(np.max(np.abs(r) / self.system.allowed(1.0), initial=0.0))
         comm = self.system.comm
         norm = float(np.sqrt(comm.allreduce(float(r @ r)))) / self.system.scale
@@ -134,7 +140,20 @@ class ActiveSetSolver:
             reason = _REASON.get(int(run.reason), str(run.reason))
             if run.stopped:
                 reason = "interrupted"
-            return Outcome(run.last <= tolerance, run.iterations, run.linear, run.last, reason, run.stopped)
+            found = Outcome(run.last <= tolerance, run.iterations, run.linear, run.last, reason, run.stopped)
+            return found if found.converged or run.stopped else self._to_rounding(found, x)
+
+    def _to_rounding(self, found: Outcome, x: PETSc.Vec) -> Outcome:
+        """A residual that is but rounding can fall no further: the solve has converged as far as numbers go."""
+        if not np.isfinite(found.measure) or not np.isfinite(x.norm()) or found.measure > _LARGEST_ROUNDING:
+            return found
+        noise = self.system.load.duplicate()
+        self.system.rounding(x, noise)
+        floor = _SAFETY * self._size(noise.array_r)
+        noise.destroy()
+        if found.measure > floor:
+            return found
+        return replace(found, converged=True, rounding=floor, reason="as small as rounding allows")
 
 
 class _Run:

@@ -18,11 +18,10 @@ from petsc4py import PETSc
 
 from ..errors import SolverError
 from ..laws import Superpotential
-from ..system import Model
 from . import kinks
 from .activeset import ActiveSetSolver, Outcome
 from .base import Counts, Settings, Solved, resting_start
-from .models import Cells, Full, Majorant
+from .models import Cells, Full, Majorant, Softened
 
 Array = npt.NDArray[np.float64]
 _LOOSE = 1e-4
@@ -30,7 +29,15 @@ _LOOSE = 1e-4
 _NEAR = 1e-11
 """Distance (of u0) from a kink that counts as being on it."""
 _CELL_CHANGES = 200
-_LINE_SEARCHES = ("bt", "basic", "l2")
+_ATTEMPTS = (
+    (False, "basic", 30),
+    (False, "bt", 60),
+    (True, "bt", 40),
+    (False, "basic", 30),
+    (True, "bt", 200),
+    (False, "bt", 60),
+)
+"""Of a convex step, until one converges: whether softened, PETSc's line search, most iterations."""
 
 
 class BranchIteration:
@@ -114,7 +121,7 @@ class BranchIteration:
         for side in (-_NEAR, _NEAR):
             trial = x.copy()
             outcome = self._descend(trial, self._cells(trial), self._subgradients(trial, side))
-            if outcome.converged and self._energy(trial) < energy - self._rounding(energy):
+            if outcome.converged and self._energy(trial) < energy - self._rounding(energy, x):
                 return trial
         return None
 
@@ -127,10 +134,11 @@ class BranchIteration:
         """One convex step, first to a loose tolerance, then, if ξ stands, to the wanted one."""
         for tolerance in (max(_LOOSE, self.settings.tolerance), self.settings.tolerance):
             cells, outcome = self._convex(x, cells, xi, tolerance)
-            if not outcome.converged or self._measure(x, cells, xi) > tolerance:
+            if not outcome.converged or self._measure(x, cells, xi) > max(tolerance, outcome.rounding):
                 break
         self.counts.branch += 1
-        stationary = outcome.converged and self._measure(x, cells, xi) <= self.settings.tolerance
+        allowed = max(self.settings.tolerance, outcome.rounding)
+        stationary = outcome.converged and self._measure(x, cells, xi) <= allowed
         if stationary or not outcome.converged:
             return cells, outcome, True
         return cells, *self._accelerated(x, cells, outcome)
@@ -149,27 +157,33 @@ class BranchIteration:
             cells = [c.moved(m) for c, m in zip(cells, moves, strict=True)]
         return cells, replace(outcome, converged=False, reason="the states of the convex kinks keep changing")
 
-    def _bounded(self, x: PETSc.Vec, models: Sequence[Model], cells: list[Cells], tolerance: float) -> Outcome:
+    def _bounded(self, x: PETSc.Vec, models: Sequence[Majorant], cells: list[Cells], tolerance: float) -> Outcome:
         lower, upper = kinks.boxes(self.system, cells)
-        outcome = Outcome(False, 0, 0, float("inf"), "not started")
-        kept = x.copy()
-        for search in _LINE_SEARCHES:
-            outcome = self.solver.solve(
-                x,
-                models,
-                tolerance,
-                lower=lower,
-                upper=upper,
-                line_search=search,
-                max_iterations=self.settings.max_newton,
+        best, outcome = x.copy(), Outcome(False, 0, 0, float("inf"), "not started")
+        begin = x.copy()
+        for softened, search, most in _ATTEMPTS:
+            used = [Softened(m, m.law.length_scale) for m in models] if softened else models
+            found = self.solver.solve(
+                x, used, tolerance, lower=lower, upper=upper, line_search=search, max_iterations=self._most(most)
             )
-            self.counts.newton += outcome.newton
-            self.counts.linear += outcome.linear
-            if outcome.converged or outcome.interrupted:
+            self.counts.newton += found.newton
+            self.counts.linear += found.linear
+            if found.measure < outcome.measure or found.converged:
+                outcome = found
+                x.copy(best)
+            if outcome.converged or found.interrupted:
                 break
-            kept.copy(x)
-        kept.destroy()
-        return outcome
+            if softened and np.isfinite(found.measure):
+                x.copy(begin)  # softened steps lower the energy, whatever they left undone
+            else:
+                begin.copy(x)
+        best.copy(x)
+        best.destroy()
+        begin.destroy()
+        return replace(outcome, interrupted=found.interrupted)
+
+    def _most(self, wanted: int) -> int:
+        return min(wanted, self.settings.max_newton)
 
     def _accelerated(self, x: PETSc.Vec, cells: list[Cells], outcome: Outcome) -> tuple[Outcome, bool]:
         """Newton with the true curvature where G is curved; dropped unless it ends lower and solves the inequality."""
@@ -186,7 +200,7 @@ class BranchIteration:
         )
         self.counts.newton += found.newton
         self.counts.linear += found.linear
-        if not found.converged or self._energy(trial) > self._energy(x) + self._rounding(self._energy(x)):
+        if not found.converged or self._energy(trial) > self._energy(x) + self._rounding(self._energy(x), x):
             return outcome, False
         trial.copy(x)
         self.system.residual(x, self._residual, full)
@@ -216,13 +230,14 @@ class BranchIteration:
     def _energy(self, x: PETSc.Vec) -> float:
         return self.system.energy(x, self._laws)  # type: ignore[arg-type]
 
-    def _rounding(self, energy: float) -> float:
-        return 1e-10 * max(abs(energy), 1e-300)
+    def _rounding(self, energy: float, x: PETSc.Vec) -> float:
+        """What rounding may change of an energy: it is a difference of much larger numbers on stretched meshes."""
+        return max(1e-10 * abs(energy), self.system.energy_noise(x), 1e-300)
 
     def _check_fall(self, before: float, outcome: Outcome, x: PETSc.Vec) -> None:
         after = self._energy(x)
         self.energies.append(after)
-        if outcome.converged and math.isfinite(before) and after > before + self._rounding(before):
+        if outcome.converged and math.isfinite(before) and after > before + self._rounding(before, x):
             raise SolverError(f"a convex step raised the energy from {before:.12g} to {after:.12g}")
 
     def _any(self, flags: Sequence[npt.NDArray[np.generic]]) -> bool:

@@ -95,6 +95,31 @@ class Majorant:
 
 
 @dataclass(frozen=True)
+class Softened:
+    """A majorant with the secant stiffness H'/x where it exceeds H'': a step that cannot run away on a flat law.
+
+    Where H'/x falls with |x| (friction, adhesion) the secant parabola lies above H, so that full steps lower the energy
+    (iteratively reweighted least squares; Kačanov). ``reach``: slip below which the secant is not taken.
+    """
+
+    model: Majorant
+    reach: float
+
+    def value(self, x: Array) -> Array:
+        """Energy per area."""
+        return self.model.value(x)
+
+    def derivative(self, x: Array) -> Array:
+        """H' - ξ."""
+        return self.model.derivative(x)
+
+    def second(self, x: Array) -> Array:
+        """The larger of tangent and secant stiffness."""
+        traction = np.abs(_inside(self.model.law.convex, self.model.cells, x))
+        return np.maximum(self.model.second(x), traction / np.maximum(np.abs(x), self.reach))
+
+
+@dataclass(frozen=True)
 class Full:
     """j itself, with its true (perhaps negative) curvature."""
 

@@ -1,0 +1,53 @@
+"""What a scene gets that names no method: the branch iteration, begun again elsewhere where it finds no equilibrium.
+
+The unbroken branch comes first. In the metastable state it may slide off while an equilibrium exists on other pieces of
+the laws; a start on the pieces of the resting slips, one with every bond broken, and a continuation in the smoothing look
+for it there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+from petsc4py import PETSc
+
+from ..errors import SolverError
+from .base import Counts, Solved, resting_start
+from .branch import BranchIteration
+from .continuation import Continuation
+
+_BROKEN = 1e6
+"""Times the resting slip: beyond every kink."""
+
+
+class Auto(BranchIteration):
+    """The branch iteration with further starts where the first finds nothing."""
+
+    def solve(self, start: PETSc.Vec | None = None, branches: PETSc.Vec | None = None) -> Solved:
+        """A stationary point; that of the first start that finds one, else what the first start left. Collective."""
+        first = super().solve(start, branches)
+        if first.converged or first.interrupted or not self.system.terms:
+            return first
+        counts = Counts()
+        counts.add(first.counts)
+        for other in self._others():
+            counts.add(other.counts)
+            if other.converged or other.interrupted:
+                return replace(other, counts=counts)
+        return first
+
+    def _others(self) -> Iterator[Solved]:
+        resting, _ = resting_start(self.solver, self._laws, 1e-4)
+        for factor in (1.0, _BROKEN, -_BROKEN):
+            pieces = resting.copy()
+            pieces.scale(factor)
+            yield from self._tried(BranchIteration(self.solver, self.settings, self._laws, self._epsilon), pieces)
+        yield from self._tried(Continuation(self.solver, self.settings))
+
+    def _tried(self, method: BranchIteration | Continuation, *pieces: PETSc.Vec) -> Iterator[Solved]:
+        """One attempt; a breakdown is no result."""
+        try:
+            yield method.solve(None, *pieces) if isinstance(method, BranchIteration) else method.solve()
+        except SolverError:
+            return
