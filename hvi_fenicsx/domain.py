@@ -12,12 +12,12 @@ import numpy.typing as npt
 from dolfinx import mesh as dmesh
 from mpi4py import MPI
 
-from . import meshfile
+from . import domain_shapes, meshfile
 from .errors import InputError
 from .parallel import agree
 
 if TYPE_CHECKING:
-    from .scene import Box, MeshFile, Rectangle
+    from .scene.shapes import Shape
 
 Facets = npt.NDArray[np.int32]
 _AXIS_OF_SIDE = {"left": (0, 0), "right": (0, 1), "bottom": (-1, 0), "top": (-1, 1), "front": (1, 0), "back": (1, 1)}
@@ -100,7 +100,7 @@ def box(comm: MPI.Comm, size: Sequence[float], cells: Sequence[int]) -> Domain:
     return _box_domain(mesh, np.asarray(size, dtype=float))
 
 
-def build(comm: MPI.Comm, shape: Rectangle | Box | MeshFile, dimension: int) -> Domain:
+def build(comm: MPI.Comm, shape: Shape, dimension: int) -> Domain:
     """The domain that a scene's ``[domain]`` table describes. Collective.
 
     Raises:
@@ -108,7 +108,12 @@ def build(comm: MPI.Comm, shape: Rectangle | Box | MeshFile, dimension: int) -> 
     """
     if shape.shape == "file":
         return from_file(comm, shape.file, dimension, shape.scale)
-    return {"rectangle": rectangle, "box": box}[shape.shape](comm, shape.size, shape.cells)
+    if shape.shape == "rectangle":
+        return rectangle(comm, shape.size, shape.cells)
+    if shape.shape == "box":
+        return box(comm, shape.size, shape.cells)
+    mesh, sides = domain_shapes.build(comm, shape)
+    return Domain(mesh, sides, {}, *_bounding_box(mesh))
 
 
 def from_file(comm: MPI.Comm, path: Path, dimension: int, scale: float = 1.0) -> Domain:

@@ -30,17 +30,29 @@ def read(
         InputError: on all ranks alike: not readable, no named groups, wrong dimension, not linear simplices,
             inverted or degenerate cells.
     """
-    with _gmsh(comm) as gmsh:
+    with session(comm) as gmsh:
         names = on_root(comm, lambda: _open(gmsh, path, dimension))
-        model = gmsh.model if comm.rank == 0 else None
-        mesh, cell_tags, facet_tags = compat.mesh_from_gmsh(model, comm, 0, dimension)
+        return distribute(comm, gmsh, dimension, names)
+
+
+def distribute(
+    comm: MPI.Comm, gmsh: Any, dimension: int, names: Mapping[int, Mapping[str, int]]
+) -> tuple[dmesh.Mesh, Mapping[str, Entities], Mapping[str, Entities]]:
+    """The mesh open in rank 0's gmsh, as :func:`read` gives it. Collective.
+
+    Args:
+        comm: all ranks. gmsh: see :func:`session`. dimension: of the cells.
+        names: of physical groups of facets and of cells with their tags, by dimension; on all ranks.
+    """
+    model = gmsh.model if comm.rank == 0 else None
+    mesh, cell_tags, facet_tags = compat.mesh_from_gmsh(model, comm, 0, dimension)
     mesh.topology.create_connectivity(dimension - 1, dimension)
     return mesh, _by_name(facet_tags, names[dimension - 1]), _by_name(cell_tags, names[dimension])
 
 
 @contextmanager
-def _gmsh(comm: MPI.Comm) -> Iterator[Any]:
-    """Gmsh, started on rank 0 only and always finalised."""
+def session(comm: MPI.Comm) -> Iterator[Any]:
+    """Gmsh, started on rank 0 only (None elsewhere) and always finalised."""
     if comm.rank != 0:
         yield None
         return

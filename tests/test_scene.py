@@ -92,8 +92,8 @@ REFUSED = {
     "unknown key": (
         "poisson_ratio",
         "colour = 3\npoisson_ratio",
-        's.toml:9: material.colour: unknown key "colour"; allowed: model, youngs_modulus, '
-        "poisson_ratio, region, "
+        's.toml:9: material.colour: unknown key "colour"; allowed: model, thermal_expansion, '
+        "youngs_modulus, poisson_ratio, region, "
         "elasticity",
     ),
     "misspelt key": (
@@ -101,7 +101,7 @@ REFUSED = {
         "young_modulus",
         's.toml:8: material.young_modulus: unknown key "young_modulus"; did you mean '
         '"youngs_modulus"? allowed: '
-        "model, youngs_modulus, poisson_ratio, region, elasticity",
+        "model, thermal_expansion, youngs_modulus, poisson_ratio, region, elasticity",
     ),
     "misspelt side": (
         '"bottom"',

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -14,6 +16,9 @@ from .inputs import Array, Part, Result
 from .style import BLUE, GREEN, GREY, HEADING, INK, ORANGE, VERMILION, area, figure, heading, save
 from .units import Unit, quantity, unit_for
 
+if TYPE_CHECKING:
+    from ..laws import Superpotential
+
 PANEL, GAP, FOOT = 1.75, 0.62, 0.72
 """Inches: a panel, the room for its title, the axis below the last."""
 MARKED = 80
@@ -23,28 +28,44 @@ IN_RANGE = 1.6
 
 
 def draw(path: Path, result: Result, part: Part) -> None:
-    """Draw the three curves of a part, with what the law says of them."""
-    made = figure(HEADING + 3 * (PANEL + GAP) + FOOT)
-    heading(made, result, f"on “{part.name}”")
+    """Draw the curves of a part, with what the laws say of them; a law that it does not have has no curve."""
     length = unit_for(float(np.max(part["s"])), "m")
-    panels = [area(made, 0.95, FOOT + i * (PANEL + GAP), 6.75, PANEL) for i in (2, 1, 0)]
+    panels = list(_panels(result, part, length))
+    made = figure(HEADING + len(panels) * (PANEL + GAP) + FOOT)
+    heading(made, result, f"on “{part.name}”")
     lifted = _lifted_spans(part)
-    _slip(panels[0], part, result, length)
-    _friction(panels[1], part, result, length)
-    _pressure(panels[2], part, length)
-    for axes in panels:
+    for above, panel in enumerate(reversed(panels)):
+        axes = area(made, 0.95, FOOT + above * (PANEL + GAP), 6.75, PANEL)
+        panel(axes)
         for start, end in lifted:
             axes.axvspan(start / length.size, end / length.size, color=ORANGE, alpha=0.16, lw=0)
         _finish(axes, part, length)
-    _say_lifted(panels[2], lifted, part, length)
-    panels[2].set_xlabel(f"s along “{part.name}” in {length.name}")
-    for axes in panels[:2]:
-        axes.tick_params(labelbottom=False)
+        axes.tick_params(labelbottom=above == 0)
+    _say_lifted(made.axes[0], lifted, part, length)
+    made.axes[0].set_xlabel(f"s along “{part.name}” in {length.name}")
     save(made, path)
 
 
-def _slip(axes: Axes, part: Part, result: Result, length: Unit) -> None:
-    values, law = part.slip, result.law(part.name)
+def _panels(result: Result, part: Part, length: Unit) -> Iterator[Callable[[Axes], None]]:
+    """From the top: slip and friction, what a normal law acts on, the pressure."""
+
+    def displacement(values: Array, words: str, key: str) -> Callable[[Axes], None]:
+        return partial(
+            _displacement, part=part, values=values, law=result.law(part.name, key), words=words, length=length
+        )
+
+    yield displacement(part.slip, "slip $u_t$", "friction")
+    if result.acts(part.name, "friction"):
+        yield partial(_friction, part=part, result=result, length=length)
+    if result.acts(part.name, "adhesion"):
+        yield displacement(-part["u_n"], "opening $-u_n$", "adhesion")
+    if result.acts(part.name, "support"):
+        yield displacement(part["u_n"], "penetration $u_n$", "support")
+    yield partial(_pressure, part=part, length=length)
+
+
+def _displacement(axes: Axes, part: Part, values: Array, law: Superpotential | None, words: str, length: Unit) -> None:
+    """What a law acts on, and the values at which the law drops."""
     unit = unit_for(_largest(values), "m")
     _line(axes, part, values, length, unit, BLUE)
     kinks = law.concave.kinks if law is not None else np.empty(0)
@@ -56,7 +77,7 @@ def _slip(axes: Axes, part: Part, result: Result, length: Unit) -> None:
         note = f"dashed: the law drops at {_listed(shown)}"
     elif len(beyond):
         note = f"the law drops at {_listed(beyond)}, not reached"
-    _title(axes, f"slip $u_t$ in {unit.name}", note)
+    _title(axes, f"{words} in {unit.name}", note)
 
 
 def _within(kinks: Array, values: Array) -> tuple[Array, Array]:
@@ -74,7 +95,7 @@ def _listed(kinks: Array) -> str:
     )
 
 
-def _friction(axes: Axes, part: Part, result: Result, length: Unit) -> None:
+def _friction(axes: Axes, *, part: Part, result: Result, length: Unit) -> None:
     values = part.friction
     unit = unit_for(_largest(values), "Pa")
     law = result.law(part.name) if result.summary.get("smoothing") else None
@@ -97,14 +118,16 @@ def _pieces(axes: Axes, part: Part, length: Unit, unit: Unit) -> str:
     return f"hollow: past the drop ({np.count_nonzero(fallen)} of {len(fallen)} vertices)"
 
 
-def _pressure(axes: Axes, part: Part, length: Unit) -> None:
+def _pressure(axes: Axes, *, part: Part, length: Unit) -> None:
     values = part.pressure
     unit = unit_for(_largest(values), "Pa")
     _line(axes, part, values, length, unit, VERMILION)
     axes.fill_between(part["s"] / length.size, values / unit.size, color=VERMILION, alpha=0.15, lw=0)
     off = part.lifted
     axes.plot(part["s"][off] / length.size, values[off] / unit.size, "o", mfc="white", mec=VERMILION, ms=6, zorder=5)
-    _title(axes, f"contact pressure $-\\sigma_n$ in {unit.name}", f"largest {unit.text(float(np.nanmax(values)))}")
+    extreme = float(values[np.nanargmax(np.abs(values))]) if np.isfinite(values).any() else 0.0
+    note = f"largest {'tension ' if extreme < 0.0 else ''}{unit.text(abs(extreme))}"
+    _title(axes, f"contact pressure $-\\sigma_n$ in {unit.name}", note)
 
 
 def _line(axes: Axes, part: Part, values: Array, length: Unit, unit: Unit, colour: str) -> None:

@@ -99,11 +99,18 @@ class Result:
         """Whether the certificate was passed."""
         return bool((self.summary.get("certificate") or {}).get("passed"))
 
+    def _on(self, part: str) -> Mapping[str, Any]:
+        return (self.scene.get("boundary") or {}).get(part) or {}
+
+    def acts(self, part: str, key: str) -> bool:
+        """Whether an effect is in force on a part."""
+        return key in self._on(part)
+
     def law(self, part: str, key: str = "friction") -> Superpotential | None:
         """The law of a part, not smoothed; None if it has none, or one that only its author's program knows."""
         from .. import laws  # a tenth of a second, for the picture that asks
 
-        table = dict(((self.scene.get("boundary") or {}).get(part) or {}).get(key) or {})
+        table = dict(self._on(part).get(key) or {})
         try:
             return laws.create(table.pop("law"), table)
         except (HviError, KeyError):

@@ -41,23 +41,23 @@ def draw(path: Path, result: Result, part: Part, body: Body) -> None:
     """Draw the three maps of a part."""
     foot = next(foot for foot in footings(result, body) if foot.part.name == part.name)
     flat, normal = laid_flat(foot, body)
-    slip, friction = _vectors(part, flat, normal, "u_t"), _vectors(part, flat, normal, "friction_t")
-    width, height = _map_size(flat)
-    made = figure(HEADING + 3 * (height + GAP) + FOOT)
-    heading(made, result, f"on “{part.name}”")
-    rows = [
-        ("slip", "m", part.slip, slip, shades(BLUE)),
-        ("friction", "Pa", part.friction, friction, shades(GREEN)),
-        ("contact pressure", "Pa", part.pressure, None, shades(VERMILION)),
+    rows: list[tuple[str, str, Array, Array | None, Colormap]] = [
+        ("slip", "m", part.slip, _vectors(part, flat, normal, "u_t"), shades(BLUE))
     ]
-    for i, (words, name, values, arrows, colours) in enumerate(rows):
-        axes = area(made, LEFT, FOOT + (2 - i) * (height + GAP), width, height)
+    if result.acts(part.name, "friction"):
+        rows.append(("friction", "Pa", part.friction, _vectors(part, flat, normal, "friction_t"), shades(GREEN)))
+    rows.append(("contact pressure", "Pa", part.pressure, None, shades(VERMILION)))
+    width, height = _map_size(flat)
+    made = figure(HEADING + len(rows) * (height + GAP) + FOOT)
+    heading(made, result, f"on “{part.name}”")
+    for above, (words, name, values, arrows, colours) in enumerate(reversed(rows)):
+        axes = area(made, LEFT, FOOT + above * (height + GAP), width, height)
         unit = unit_for(float(np.nanmax(np.abs(values), initial=0.0)), name)
         _map(made, axes, flat, values / unit.size, colours, _symbol(words, unit))
         _grey_where_lifted(axes, flat, part)
         if arrows is not None:
             _arrows(axes, flat, arrows)
-        _frame(axes, flat, last=i == 2)
+        _frame(axes, flat, last=above == 0)
     _notes(made, result, part, flat)
     save(made, path)
 
@@ -159,7 +159,7 @@ def _frame(axes: Axes, flat: Flat, *, last: bool) -> None:
 def _notes(made: Figure, result: Result, part: Part, flat: Flat) -> None:
     """Where the law drops, as a line on the map of the slip, and what grey means; both said there."""
     law, said = result.law(part.name), []
-    axes = made.axes[0]
+    axes = made.axes[-2]  # the map on top, which was drawn last, before its bar
     kinks = law.concave.kinks if law is not None else np.empty(0)
     for kink in kinks[kinks > 0.0]:
         if np.nanmin(part.slip) < kink < np.nanmax(part.slip):

@@ -183,14 +183,17 @@ def _profile(base: Array, outward: Array, pressure: Array, largest: float, size:
         if part.max() <= NOTHING * largest:
             continue
         tips = base + PRESSURE * size / largest * part[:, None] * outward
+        tips[part <= NOTHING * largest] = np.nan  # no line where there is no stress
         yield _filled(base, tips, colour, f"{words}, up to {quantity(float(part.max()), 'Pa')}")
+        tips = np.where(np.isnan(tips), base, tips)
         feet, ends = _along(base, base, at), _along(base, tips, at)
         yield _arrows(ends if sign > 0 else feet, sign * (feet - ends), colour, "", size)
 
 
 def _filled(base: Array, tips: Array, colour: str, words: str) -> Mark:
     def draw(axes: Axes) -> None:
-        axes.fill(*np.concatenate([base, tips[::-1]]).T, color=colour, alpha=0.16, lw=0, clip_on=False, zorder=2)
+        ends = np.where(np.isnan(tips), base, tips)
+        axes.fill(*np.concatenate([base, ends[::-1]]).T, color=colour, alpha=0.16, lw=0, clip_on=False, zorder=2)
         axes.plot(*tips.T, color=colour, lw=1.8, clip_on=False, zorder=5)
 
-    return Mark(tips, draw, lambda: Patch(fc=colour, alpha=0.5, ec=colour, label=words), words)
+    return Mark(tips[np.isfinite(tips[:, 0])], draw, lambda: Patch(fc=colour, alpha=0.5, ec=colour, label=words), words)

@@ -50,7 +50,7 @@ def _iterations(solution: Solution) -> dict[str, int] | None:
     if solution.solved is None:
         return None
     counts = solution.solved.counts
-    return {"newton": counts.newton, "linear": counts.linear, "levels": 1, "branch": counts.branch}
+    return {"newton": counts.newton, "linear": counts.linear, "levels": solution.solved.levels, "branch": counts.branch}
 
 
 def _contact(solution: Solution) -> dict[str, Any] | None:

@@ -11,6 +11,7 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import BeforeValidator, PlainSerializer, ValidationInfo, model_validator
 from pydantic_core import PydanticCustomError
 
+from .curved import Disk, HalfDisk, LShape, NotchedStrip
 from .tables import Count, Positive, Problem, Table, choose, refuse, vector
 
 _MOST_UNKNOWNS = 2**31 - 1  # PETSc's default integers
@@ -20,7 +21,7 @@ class _Block(Table):
     """A built-in shape: an axis-parallel block from the origin."""
 
     dimension: ClassVar[int]
-    normals: ClassVar[Mapping[str, int]]
+    normals: ClassVar[Mapping[str, int | None]]
     """The axis normal to each named side."""
 
     @model_validator(mode="after")
@@ -37,7 +38,7 @@ class Rectangle(_Block):
     """[0, size] cut into right-diagonal triangles."""
 
     dimension: ClassVar[int] = 2
-    normals: ClassVar[Mapping[str, int]] = {"left": 0, "right": 0, "bottom": 1, "top": 1}
+    normals: ClassVar[Mapping[str, int | None]] = {"left": 0, "right": 0, "bottom": 1, "top": 1}
 
     shape: Literal["rectangle"] = "rectangle"
     """a rectangle with its lower left corner at the origin"""
@@ -51,7 +52,7 @@ class Box(_Block):
     """[0, size] cut into tetrahedra; z is upwards: bottom and top are its ends, front and back those of y."""
 
     dimension: ClassVar[int] = 3
-    normals: ClassVar[Mapping[str, int]] = {
+    normals: ClassVar[Mapping[str, int | None]] = {
         "left": 0,
         "right": 0,
         "front": 1,
@@ -85,14 +86,19 @@ class MeshFile(Table):
     shape: Literal["file"] = "file"
     """a gmsh file"""
     file: Annotated[Path, BeforeValidator(_mesh_path), PlainSerializer(str)]
-    """name of the gmsh file (.msh), relative to the scene file"""
+    """name of the gmsh file (.msh, or .geo, which is meshed then), relative to the scene file"""
     scale: Positive = 1.0
     """m per unit of the file's coordinates: 1e-3 for a mesh in mm"""
 
 
-SHAPES: Mapping[str, type[Rectangle] | type[Box] | type[MeshFile]] = {
+Shape = Rectangle | Box | LShape | Disk | HalfDisk | NotchedStrip | MeshFile
+SHAPES: Mapping[str, type[Shape]] = {
     "rectangle": Rectangle,
     "box": Box,
+    "l_shape": LShape,
+    "disk": Disk,
+    "half_disk": HalfDisk,
+    "notched_strip": NotchedStrip,
     "file": MeshFile,
 }
 
@@ -101,5 +107,5 @@ def _domain(value: Any, info: ValidationInfo) -> Any:
     return choose(value, "shape", SHAPES, info.context)
 
 
-Domain = Annotated[Rectangle | Box | MeshFile, BeforeValidator(_domain)]
+Domain = Annotated[Shape, BeforeValidator(_domain)]
 """The ``[domain]`` table: the class follows from ``shape``."""

@@ -1,7 +1,7 @@
 """What a scene gets that names no method: the branch iteration, begun again elsewhere where it finds no equilibrium.
 
 The unbroken branch comes first. In the metastable state it may slide off while an equilibrium exists on other pieces of
-the laws; a start on the pieces of the resting slips, one with every bond broken, and a continuation in the smoothing look
+the laws; starts on the pieces of the resting slips, with every bond broken, and a continuation in the smoothing look
 for it there.
 """
 
