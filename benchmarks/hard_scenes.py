@@ -12,7 +12,7 @@ from covering import Case
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from hvi_fenicsx import Scene, domain, existence, problem, solution, system
+from hvi_fenicsx import Scene, building, domain, existence, problem, solution, system
 from hvi_fenicsx.timing import Timer
 
 Array = npt.NDArray[np.float64]
@@ -149,7 +149,7 @@ def prepare(case: Case, data: Mapping[str, Any], method: str, comm: MPI.Comm) ->
     body = domain.build(comm, made.domain, made.dimension)
     distort(body, case)
     placed = [(p.where, p.effect) for p in made.effects()]
-    composed = problem.compose(body, made.parts, placed, solution._modification(made))
+    composed = problem.compose(body, made.parts, placed, building.modification(made))
     assembled = system.System(composed, system.compile_forms(composed), timer)
     verdict = existence.solvability(composed, assembled.forces)
     return solution.Prepared(made, composed, assembled, verdict, timer)

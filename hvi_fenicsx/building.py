@@ -26,12 +26,12 @@ def assemble(scene: Scene, comm: MPI.Comm, timer: Timer) -> system.System:
         body = domain.build(comm, scene.domain, scene.dimension)
     with timer("jit"):
         placed = [(p.where, p.effect) for p in scene.effects()]
-        composed = problem.compose(body, scene.parts, placed, _modification(scene))
+        composed = problem.compose(body, scene.parts, placed, modification(scene))
         compiled = system.compile_forms(composed)
     return system.System(composed, compiled, timer)
 
 
-def _modification(scene: Scene) -> Callable[[Superpotential], Superpotential]:
+def modification(scene: Scene) -> Callable[[Superpotential], Superpotential]:
     """What the scene's solver table does to a law: smooth it, or nothing."""
     wanted = scene.solver
     if wanted.smoothing is None:
