@@ -122,7 +122,9 @@ def _pieces(path: Path) -> list[str]:
 
 def _piece(path: Path) -> tuple[Ints, Body]:
     """A rank's own cells, and the mesh-wide numbers of its points."""
-    piece = next(ElementTree.parse(path).getroot().iter("Piece"))
+    piece = ElementTree.parse(path).getroot().find("UnstructuredGrid/Piece")
+    if piece is None:
+        raise ValueError(f"{path.name} has no mesh")
     points = _array(piece.find("Points/DataArray")).reshape(-1, 3)
     kind = _array(piece.find("Cells/DataArray[@Name='types']"))
     corners = {_CORNERS.get(int(k), 0) for k in np.unique(kind)} or {0}

@@ -183,7 +183,7 @@ def _profile(base: Array, outward: Array, pressure: Array, largest: float, size:
         if part.max() <= NOTHING * largest:
             continue
         tips = base + PRESSURE * size / largest * part[:, None] * outward
-        tips[part <= NOTHING * largest] = np.nan  # no line where there is no stress
+        tips[np.convolve(part > NOTHING * largest, [1, 1, 1], "same") == 0] = np.nan  # no line where there is no stress
         yield _filled(base, tips, colour, f"{words}, up to {quantity(float(part.max()), 'Pa')}")
         tips = np.where(np.isnan(tips), base, tips)
         feet, ends = _along(base, base, at), _along(base, tips, at)

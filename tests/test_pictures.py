@@ -1,0 +1,328 @@
+"""Pictures are drawn from a folder alone, whatever is in it; and what cannot be drawn harms nobody.
+
+Synthetic folders, written as the solver writes them, so that this fails for reasons of drawing only.
+"""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import subprocess
+import sys
+import time
+import uuid
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+import tomli_w
+from dolfinx import fem, mesh
+from dolfinx.io import VTKFile
+from mpi4py import MPI
+
+from hvi_fenicsx import pictures
+from hvi_fenicsx.errors import HviError
+from hvi_fenicsx.pictures import inputs, units
+from hvi_fenicsx.pictures.mesh import read_body
+from hvi_fenicsx.pictures.raster import shade
+from hvi_fenicsx.results.table import COLUMNS
+
+Array = npt.NDArray[np.float64]
+E, NU, LOAD = 2.15e11, 0.29, 1.0e6
+LAW = {"law": "quadratic_linear", "gamma1": 1.0e3, "gamma2": 0.5e3, "delta": 9.0e-6}
+HELD = {"state": "held", "direction": None}
+ESCAPES = {"state": "escapes", "direction": "translation along +y"}
+
+
+def square(cells: int = 16) -> mesh.Mesh:
+    return mesh.create_unit_square(MPI.COMM_SELF, cells, cells)
+
+
+def box() -> mesh.Mesh:
+    return mesh.create_box(MPI.COMM_SELF, [[0, 0, 0], [1, 0.6, 0.4]], [6, 4, 3])
+
+
+def pressed(x: Array) -> Array:
+    """The closed form of the model problem without friction."""
+    up = x.shape[0] - 1
+    u = np.zeros_like(x)
+    u[0], u[up] = LOAD * (1 + NU) / E * x[0], -LOAD * (1 + NU) / E * x[up]
+    return u
+
+
+def peeled(x: Array) -> Array:
+    """The left half of the floor is lifted."""
+    u = pressed(x)
+    u[-1] += 4e-6 * np.maximum(0.5 - x[0], 0.0)
+    return u
+
+
+def write_field(folder: Path, body: mesh.Mesh, name: str, value: Callable[[Array], Array]) -> None:
+    d = body.geometry.dim
+    field = fem.Function(fem.functionspace(body, ("Lagrange", 1, (d,))), name=name)
+    field.interpolate(lambda x: value(x[:d]))
+    with VTKFile(body.comm, str(folder / "displacement.pvd"), "w") as file:
+        file.write_function([field], 0.0)
+
+
+def floor_rows(body: mesh.Mesh, value: Callable[[Array], Array], part: str = "floor") -> Iterator[dict[str, object]]:
+    d = body.geometry.dim
+    x = body.geometry.x
+    x = x[np.isclose(x[:, d - 1], 0.0)]
+    x = x[np.lexsort(x.T)]
+    u = value(x[:, :d].T).T
+    for point, v in zip(x, u, strict=True):
+        lifted = bool(v[-1] > 1e-12)
+        row: dict[str, object] = {"part": part, "x": point[0], "y": point[1], "u_n": -v[-1], "u_t1": v[0], "gap": v[-1]}
+        row |= {"sigma_n": 0.0 if lifted else -LOAD, "friction_t1": 1e3 * v[0] / 9e-6, "contact": int(not lifted)}
+        row |= {"s": point[0], "branch_t": 0} if d == 2 else {"z": point[2], "u_t2": 0.0, "friction_t2": 0.0}
+        yield row
+
+
+def write_table(folder: Path, rows: list[dict[str, object]]) -> None:
+    with (folder / "contact.csv").open("w", newline="", encoding="utf-8") as stream:
+        writer = csv.DictWriter(stream, COLUMNS, lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(rows)
+
+
+def write_words(folder: Path, d: int, solvability: Mapping[str, object] = HELD, **summary: Any) -> None:
+    loaded = {"on": "right", "traction": ["1e6*(1 - y)", *[0.0] * (d - 1)]}
+    floor = {"on": "bottom", "contact": {"gap": 0.0}, "friction": LAW}
+    scene = {
+        "title": "A synthetic result with $ and _ in its title",
+        "domain": {"shape": "rectangle" if d == 2 else "box"},
+        "boundary": {
+            "wall": {"on": "left", "displacement": [0.0, *["free"] * (d - 1)]},
+            "pull": loaded,
+            "floor": floor,
+        },
+    }
+    record = {"dofs": 578, "smoothing": None, "solvability": solvability, "certificate": {"passed": True}} | summary
+    (folder / "scene.toml").write_text(tomli_w.dumps(scene), encoding="utf-8")
+    (folder / "summary.json").write_text(json.dumps(record), encoding="utf-8")
+
+
+def result(folder: Path, body: mesh.Mesh, value: Callable[[Array], Array], **summary: Any) -> Path:
+    folder.mkdir(exist_ok=True)
+    write_field(folder, body, "displacement", value)
+    write_table(folder, list(floor_rows(body, value)))
+    write_words(folder, body.geometry.dim, **summary)
+    return folder
+
+
+def escaping(folder: Path, body: mesh.Mesh, value: Callable[[Array], Array]) -> Path:
+    folder.mkdir(exist_ok=True)
+    write_field(folder, body, "escape_mode", value)
+    write_words(folder, body.geometry.dim, ESCAPES, certificate=None)
+    return folder
+
+
+def assert_drawn(paths: list[Path], *names: str) -> None:
+    """PNGs of these names, as wide as stated, with something on them, and no half-written one beside them."""
+    from matplotlib.image import imread
+
+    assert sorted(p.name for p in paths) == sorted(names)
+    for path in paths:
+        image = imread(path)
+        assert image.shape[1] == 1200
+        assert 500 <= image.shape[0] <= 2000
+        assert image[..., :3].std() > 0.05
+        assert not list(path.parent.glob(f".*{pictures.UNFINISHED}"))
+
+
+@pytest.fixture
+def left_running(monkeypatch: pytest.MonkeyPatch) -> Callable[[], list[str]]:
+    """The processes that this test started and that still run: they carry its mark in their environment."""
+    mark = uuid.uuid4().hex
+    monkeypatch.setenv("HVI_TEST_MARK", mark)
+
+    def found() -> list[str]:
+        names = []
+        for process in Path("/proc").glob("[0-9]*"):
+            try:
+                if mark.encode() in (process / "environ").read_bytes():
+                    names.append((process / "comm").read_text().strip())
+            except OSError:
+                continue
+        return names
+
+    return found
+
+
+@pytest.mark.parametrize("value", [pressed, peeled, np.zeros_like], ids=lambda f: f.__name__)
+@pytest.mark.parametrize("summary", [{}, {"smoothing": "paper", "certificate": None}], ids=["exact", "smoothed"])
+def test_a_plane_result_has_its_body_and_its_contact(
+    tmp_path: Path, value: Callable[[Array], Array], summary: dict[str, Any]
+) -> None:
+    folder = result(tmp_path / "r", square(), value, **summary)
+    assert_drawn(pictures.draw(folder), "body.png", "contact.png")
+
+
+@pytest.mark.parametrize("value", [pressed, peeled], ids=lambda f: f.__name__)
+def test_so_has_a_result_in_space_and_no_x_server_remains(
+    tmp_path: Path, value: Callable[[Array], Array], left_running: Callable[[], list[str]]
+) -> None:
+    assert_drawn(pictures.draw(result(tmp_path / "r", box(), value)), "body.png", "contact.png")
+    assert left_running() == []
+
+
+@pytest.mark.parametrize(
+    "value",
+    [lambda x: np.stack([0 * x[0], *[1 + 0 * c for c in x[1:]]]), lambda x: np.stack([-x[1], x[0] - 1, *(0 * x[2:])])],
+    ids=["translation", "rotation"],
+)
+@pytest.mark.parametrize("body", [square, box], ids=["plane", "space"])
+def test_an_escape_is_drawn_as_a_motion(
+    tmp_path: Path, body: Callable[[], mesh.Mesh], value: Callable[[Array], Array]
+) -> None:
+    assert_drawn(pictures.draw(escaping(tmp_path / "r", body(), value)), "escape.png")
+
+
+def test_each_part_has_its_picture_and_a_scene_without_contact_has_its_body(tmp_path: Path) -> None:
+    folder = result(tmp_path / "r", square(), peeled)
+    write_table(folder, [*floor_rows(square(), peeled, "a.b"), *floor_rows(square(), pressed, "floor")])
+    assert_drawn(pictures.draw(folder), "body.png", "contact_a.b.png", "contact_floor.png")
+    bare = result(tmp_path / "bare", square(), pressed)
+    (bare / "contact.csv").unlink()
+    assert_drawn(pictures.draw(bare), "body.png")
+
+
+@pytest.mark.parametrize(
+    ("damage", "words"),
+    [
+        (lambda f: (f / "summary.json").unlink(), "summary.json: No such file"),
+        (lambda f: (f / "summary.json").write_text("{"), "summary.json: damaged"),
+        (lambda f: (f / "displacement_p0_000000.vtu").unlink(), "displacement_p0_000000.vtu: No such file"),
+        (lambda f: (f / "displacement_p0_000000.vtu").write_text("<x/>"), "damaged, or not written by dolfinx"),
+        (lambda f: write_table(f, list(floor_rows(box(), pressed))), "do not belong together"),
+        (lambda f: [file.unlink() for file in (f / "displacement.pvd", f / "contact.csv")], "nothing to draw"),
+    ],
+)
+def test_what_cannot_be_drawn_is_said_in_one_line(tmp_path: Path, damage: Callable[[Path], object], words: str) -> None:
+    folder = result(tmp_path / "r", square(4), pressed)
+    damage(folder)
+    with pytest.raises(HviError, match=words) as caught:
+        pictures.draw(folder)
+    assert "\n" not in str(caught.value)
+    assert "Traceback" not in str(caught.value)
+
+
+def test_one_picture_that_fails_takes_no_other_with_it(tmp_path: Path) -> None:
+    folder = result(tmp_path / "r", square(4), pressed)
+    write_table(folder, [{**row, "x": float(str(row["x"])) + 7.0} for row in floor_rows(square(4), pressed)])
+    with pytest.raises(HviError, match=r"body\.png"):
+        pictures.draw(folder)
+    assert (folder / "contact.png").exists()
+    assert not (folder / "body.png").exists()
+
+
+def test_a_library_that_aborts_is_an_error_like_any_other(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As VTK does, where it believes in a display that is not there."""
+    monkeypatch.setenv("DISPLAY", ":99999")
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    folder = result(tmp_path / "r", box(), pressed)
+    failure = "body.png: none, this VTK needs no display"
+    try:
+        pictures.draw(folder)
+    except HviError as error:
+        failure = str(error)
+    assert failure.startswith("body.png: ")
+    assert "display" in failure
+    assert (folder / "contact.png").exists()
+    assert (folder / "body.png").exists() == ("none" in failure)
+
+
+def test_a_child_that_takes_too_long_is_ended_with_its_server(
+    tmp_path: Path, left_running: Callable[[], list[str]]
+) -> None:
+    folder = result(tmp_path / "r", box(), pressed)
+    with pytest.raises(HviError, match="not drawn within"):
+        pictures.draw(folder, timeout=0.8)
+    deadline = time.monotonic() + 5.0
+    while left_running() and time.monotonic() < deadline:
+        time.sleep(0.1)
+    assert left_running() == []
+    assert not list(folder.glob(f".*{pictures.UNFINISHED}"))
+
+
+def test_the_child_is_no_rank_and_the_package_loads_no_plotting(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("OMPI_COMM_WORLD_SIZE", "2")
+    monkeypatch.setenv("PMIX_RANK", "1")
+    assert_drawn(pictures.draw(result(tmp_path / "r", square(4), pressed)), "body.png", "contact.png")
+    code = (
+        "import sys, hvi_fenicsx.pictures; print([m for m in ('pyvista', 'matplotlib', 'mpi4py') if m in sys.modules])"
+    )
+    told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, env=os.environ)
+    assert told.stdout.strip() == "[]"
+
+
+def test_the_pieces_of_several_ranks_are_one_body(tmp_path: Path) -> None:
+    code = f"""
+import numpy as np
+from dolfinx import fem, mesh
+from dolfinx.io import VTKFile
+from mpi4py import MPI
+body = mesh.create_unit_square(MPI.COMM_WORLD, 8, 8)
+u = fem.Function(fem.functionspace(body, ("Lagrange", 1, (2,))), name="displacement")
+u.interpolate(lambda x: x[:2])
+with VTKFile(body.comm, {str(tmp_path / "displacement.pvd")!r}, "w") as file:
+    file.write_function([u], 0.0)
+"""
+    subprocess.run(["mpirun", "-n", "3", sys.executable, "-m", "mpi4py", "-c", code], check=True, timeout=120)
+    body = read_body(tmp_path / "displacement.pvd")
+    assert body.points.shape == (81, 3)
+    assert body.cells.shape == (128, 3)
+    assert np.allclose(body.fields["displacement"], body.points)
+    a, b = (body.points[body.boundary[:, i]] for i in (0, 1))
+    assert len(body.boundary) == 32
+    assert np.isclose(np.sum(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]) / 2, 1.0)  # the body is on the left of its edges
+
+
+def test_the_surface_of_a_body_in_space_looks_outwards(tmp_path: Path) -> None:
+    write_field(tmp_path, box(), "displacement", pressed)
+    body = read_body(tmp_path / "displacement.pvd")
+    a, b, c = (body.points[body.boundary[:, i]] for i in range(3))
+    assert np.isclose(np.einsum("ki,ki->", a, np.cross(b, c)) / 6, 0.24)
+
+
+@pytest.mark.parametrize("cells", [1, 7, 150])
+def test_shading_is_linear_and_has_no_holes(cells: int) -> None:
+    x = np.linspace(0.0, 1.0, cells + 1)
+    points = np.stack(np.meshgrid(x, x), axis=-1).reshape(-1, 2) * [90.0, 70.0] + [5.0, 10.0]
+    corner = (np.arange(cells) + (cells + 1) * np.arange(cells)[:, None]).ravel()
+    up, right = cells + 1, 1
+    triangles = np.concatenate(
+        [
+            np.column_stack([corner, corner + right, corner + up + right]),
+            np.column_stack([corner, corner + up + right, corner + up]),
+        ]
+    )
+    image = shade(points, triangles, points[:, 0] - 2 * points[:, 1], (90, 100))
+    rows, columns = np.mgrid[:90, :100] + 0.5
+    inside = (columns > 5) & (columns < 95) & (rows > 10) & (rows < 80)
+    assert np.array_equal(np.isfinite(image), inside)
+    assert np.allclose(image[inside], (columns - 2 * rows)[inside])
+
+
+def test_numbers_are_said_as_people_say_them() -> None:
+    said = {units.quantity(value, unit).replace("\N{NARROW NO-BREAK SPACE}", " ") for value, unit in SAID}
+    assert said == {"1 MPa", "999 kPa", "9 µm", "126 nm", "1.5 m", "2 500 m", "0 Pa"}
+    assert [units.round_below(v) for v in (1.0, 1.99, 4.9, 5.0, 23456.0, 0.3)] == [1.0, 1.0, 2.0, 5.0, 20000.0, 0.2]
+
+
+SAID = [(1e6, "Pa"), (0.999e6, "Pa"), (9e-6, "m"), (1.26e-7, "m"), (1.5, "m"), (2500.0, "m"), (0.0, "Pa")]
+
+
+def test_an_empty_cell_is_nothing_and_not_zero(tmp_path: Path) -> None:
+    folder = result(tmp_path / "r", square(4), peeled)
+    part = inputs.read(folder).parts[0]
+    assert not part.has("u_t2")
+    assert part.has("gap")
+    assert np.count_nonzero(part.lifted) == 2
