@@ -29,6 +29,8 @@ _LOOSE = 1e-4
 _NEAR = 1e-11
 """Distance (of u0) from a kink that counts as being on it."""
 _CELL_CHANGES = 200
+_FAR = 1e3
+"""Times the start (or p0 L/E0): a softened step, which lowers the energy, that leads so far is a body that slides away."""
 _ATTEMPTS = (
     (False, "basic", 30),
     (False, "bt", 60),
@@ -160,7 +162,7 @@ class BranchIteration:
     def _bounded(self, x: PETSc.Vec, models: Sequence[Majorant], cells: list[Cells], tolerance: float) -> Outcome:
         lower, upper = kinks.boxes(self.system, cells)
         best, outcome = x.copy(), Outcome(False, 0, 0, float("inf"), "not started")
-        begin = x.copy()
+        begin, far = x.copy(), _FAR * max(1.0, float(x.norm(PETSc.NormType.INFINITY)))
         for softened, search, most in _ATTEMPTS:
             used = [Softened(m, m.law.length_scale) for m in models] if softened else models
             found = self.solver.solve(
@@ -172,6 +174,9 @@ class BranchIteration:
                 outcome = found
                 x.copy(best)
             if outcome.converged or found.interrupted:
+                break
+            if softened and x.norm(PETSc.NormType.INFINITY) > far:
+                outcome = replace(outcome, reason="the body slides away on what is left of its bond")
                 break
             if softened and np.isfinite(found.measure):
                 x.copy(begin)  # softened steps lower the energy, whatever they left undone

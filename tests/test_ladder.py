@@ -1,0 +1,117 @@
+"""Why: a wrong prolongation, or a multigrid that moves a held vertex, would still converge, only elsewhere or slowly.
+
+And a nested start must not decide what is certified.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from dolfinx import fem
+from mpi4py import MPI
+
+from hvi_fenicsx import Scene, domain, ladder, nested, read_scene, solution
+from hvi_fenicsx.solvers.activeset import ActiveSetSolver
+from hvi_fenicsx.solvers.base import held_dofs, silent
+from hvi_fenicsx.solvers.linear import LinearSettings
+from hvi_fenicsx.timing import Timer
+
+DEMOS = Path(__file__).parents[1] / "demos"
+SHAPES: list[tuple[list[str], int]] = [
+    (["domain.cells=[16, 32]", "domain.size=[1.0, 3.0]"], 2),
+    (
+        [
+            'domain={shape="box", size=[1.0, 2.0, 0.5], cells=[16, 16, 16]}',
+            'material.model="three_dimensional"',
+            "boundary={}",
+        ],
+        3,
+    ),
+]
+
+
+def rough(x: np.ndarray) -> np.ndarray:
+    """A field that is not in the coarse space."""
+    rows = [np.abs(x[0] - 0.3) + x[1] ** 2, np.sin(3 * x[0] * x[1]), x[2] ** 2 + np.abs(x[0] - x[1])]
+    return np.array(rows)
+
+
+@pytest.mark.parametrize(("overrides", "dimension"), SHAPES)
+def test_prolongation_keeps_a_coarse_field(overrides: list[str], dimension: int) -> None:
+    """Against dolfinx's own interpolation between meshes that do not match."""
+    scene = read_scene(DEMOS / "strong_law.toml", overrides)
+    below = ladder.coarser(scene)
+    assert below is not None
+    fine, coarse = (space(s, dimension) for s in (scene, below))
+    known = fem.Function(coarse)
+    known.interpolate(lambda x: rough(x)[:dimension])
+    step = ladder.prolongation(fine, coarse, scene)
+    column = step.createVecRight()
+    column.array[:] = known.x.array[: column.local_size]
+    assert np.max(np.abs((step * column).array - interpolated(fine, known))) < 1e-13
+
+
+def space(scene: Scene, dimension: int) -> fem.FunctionSpace:
+    mesh = domain.build(MPI.COMM_WORLD, scene.domain, dimension).mesh
+    return fem.functionspace(mesh, ("Lagrange", 1, (dimension,)))
+
+
+def interpolated(fine: fem.FunctionSpace, known: fem.Function) -> Any:
+    cells = np.arange(fine.mesh.topology.index_map(fine.mesh.topology.dim).size_local, dtype=np.int32)
+    data = fem.create_interpolation_data(fine, known.function_space, cells, padding=1e-10)
+    result = fem.Function(fine)
+    result.interpolate_nonmatching(known, cells, data)
+    return result.x.array[: fine.dofmap.index_map.size_local * fine.dofmap.index_map_bs]
+
+
+def test_odd_and_small_meshes_have_no_ladder() -> None:
+    for cells in ([9, 16], [8, 8], [15, 15]):
+        assert ladder.coarser(read_scene(DEMOS / "strong_law.toml", [f"domain.cells={cells}"])) is None
+
+
+@pytest.fixture
+def everything_nested(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Small meshes go up the ladder too, and take its multigrid."""
+    monkeypatch.setattr(nested, "_WORTHWHILE", 1_000)
+    monkeypatch.setattr("hvi_fenicsx.solvers.linear._LARGEST_DIRECT", {2: 1_000, 3: 1_000})
+
+
+@pytest.mark.parametrize("demo", ["wall_left", "strong_law"])
+@pytest.mark.usefixtures("everything_nested")
+def test_nested_solutions_are_certified(demo: str) -> None:
+    found = solution.solve(read_scene(DEMOS / f"{demo}.toml", ["domain.cells=[64, 64]"]))
+    assert found.converged
+    assert found.solved is not None
+    assert found.solved.levels == 3
+
+
+@pytest.mark.usefixtures("everything_nested")
+def test_a_convex_scene_ends_where_the_direct_solve_ends() -> None:
+    """Without friction the minimiser is unique, whatever the start and the linear solver."""
+    overrides = ["domain.cells=[64, 64]", 'boundary.press.traction=[0.0, "-1e6*(1 - 1.5*x)"]']
+    scene = read_scene(DEMOS / "strong_law.toml", [*overrides, 'boundary.floor={on="bottom", contact={gap=0.0}}'])
+    direct = scene.model_copy(update={"solver": scene.solver.model_copy(update={"linear_solver": "lu"})})
+    energies = [solution.solve(s).examined.energy for s in (scene, direct)]  # type: ignore[union-attr]
+    assert energies[0] == pytest.approx(energies[1], rel=1e-9)
+
+
+@pytest.mark.usefixtures("everything_nested")
+def test_multigrid_iterations_do_not_grow_with_the_mesh() -> None:
+    assert [iterations(n) for n in (32, 64, 128)] == pytest.approx([iterations(32)] * 3, abs=2)
+
+
+def iterations(cells: int) -> int:
+    """Of a solve with contact closed, to 1e-8."""
+    scene = read_scene(DEMOS / "wall_left.toml", [f"domain.cells=[{cells}, {cells}]", "solver={}"])
+    prepared = solution.prepare(scene)
+    nested.solve(scene, prepared.system, Timer(), silent, lambda: False)
+    solver = ActiveSetSolver(prepared.system, LinearSettings("mg"), Timer())
+    laws = [t.law for t in prepared.system.terms]
+    solver.held.prepare(held_dofs(prepared.system, laws))
+    load, x = prepared.system.load.copy(), prepared.system.load.duplicate()
+    load.array[held_dofs(prepared.system, laws)] = 0.0
+    x.set(0.0)
+    return solver.held.solve(load, x, 1e-8)[0]
