@@ -147,7 +147,7 @@ def _reason(code: int | None) -> str:
 
 
 def _advice(job: Job) -> str:
-    return "; VTK needs a display to draw: install Xvfb, or a VTK from 9.4 on" if job.rendered else ""
+    return "; VTK draws on a display: unset DISPLAY and install Xvfb, or use a VTK from 9.4 on" if job.rendered else ""
 
 
 if __name__ == "__main__":

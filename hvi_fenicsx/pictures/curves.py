@@ -23,12 +23,15 @@ PANEL, GAP, FOOT = 1.75, 0.62, 0.72
 """Inches: a panel, the room for its title, the axis below the last."""
 MARKED = 80
 """Vertices up to which each is marked."""
+SHORT = 0.2
+"""Of a part's length: a closed stretch shorter than this is shown alone."""
 IN_RANGE = 1.6
 """A kink of the law is drawn if it lies within this many times the largest slip."""
 
 
 def draw(path: Path, result: Result, part: Part) -> None:
     """Draw the curves of a part, with what the laws say of them; a law that it does not have has no curve."""
+    part = _worth_seeing(part)
     length = unit_for(float(np.max(part["s"])), "m")
     panels = list(_panels(result, part, length))
     made = figure(HEADING + len(panels) * (PANEL + GAP) + FOOT)
@@ -44,6 +47,16 @@ def draw(path: Path, result: Result, part: Part) -> None:
     _say_lifted(made.axes[0], lifted, part, length)
     made.axes[0].set_xlabel(f"s along “{part.name}” in {length.name}")
     save(made, path)
+
+
+def _worth_seeing(part: Part) -> Part:
+    """Of a part that is closed on a short stretch only, that stretch and its neighbourhood."""
+    s, closed = part["s"], part["s"][part["contact"] == 1.0]
+    if len(closed) < 2 or np.ptp(closed) > SHORT * np.ptp(s):
+        return part
+    room = np.ptp(closed)
+    near = (s >= closed.min() - room) & (s <= closed.max() + room)
+    return Part(part.name, {name: values[near] for name, values in part.columns.items()})
 
 
 def _panels(result: Result, part: Part, length: Unit) -> Iterator[Callable[[Axes], None]]:
@@ -149,8 +162,8 @@ def _finish(axes: Axes, part: Part, length: Unit) -> None:
     room = 0.06 * (high - low or 1.0)
     axes.set_ylim(low - room, high + room)
     axes.axhline(0.0, color=GREY, lw=0.8, zorder=1)
-    end = float(np.max(part["s"])) / length.size
-    axes.set_xlim(-0.015 * end, 1.015 * end)
+    start, end = float(np.min(part["s"])) / length.size, float(np.max(part["s"])) / length.size
+    axes.set_xlim(start - 0.015 * (end - start), end + 0.015 * (end - start))
     axes.yaxis.set_major_locator(MaxNLocator(nbins=4, min_n_ticks=3, steps=[1, 2, 2.5, 5, 10]))
     axes.grid(axis="y", color="#e6e6e6", lw=0.8)
     axes.set_axisbelow(True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -13,6 +14,8 @@ from .units import round_below
 
 VISIBLE = 0.08
 """How large the largest displacement is drawn, of the body's size."""
+NEAR = 0.3
+"""Gaps larger than this, magnified, of the body's size, are the body's own shape."""
 
 
 @dataclass(frozen=True)
@@ -34,21 +37,18 @@ class Deformed:
         return np.asarray(np.linalg.norm(self.displacement, axis=1))
 
 
-def deform(body: Body) -> Deformed:
-    """The body with a round factor that makes its displacement seen."""
-    u = np.nan_to_num(body.fields["displacement"])
-    largest = float(np.linalg.norm(u, axis=1).max(initial=0.0))
-    return Deformed(body, u, round_below(VISIBLE * body.size / largest * 1.25) if largest > 0.0 else 1.0)
-
-
 @dataclass(frozen=True)
 class Footing:
-    """A contact part on the body: its vertices (m,), its facets (k, 2|3), and the row of the table by vertex."""
+    """A contact part on the body: its vertices (m,), its facets (k, 2|3), and the row of the table by vertex.
+
+    ``obstacle`` is the unit vector (3,) towards it where that is flat, None where its gap is along the part's normals.
+    """
 
     part: Part
     vertices: Ints
     facets: Ints
     row: Ints
+    obstacle: Array | None
 
     def values(self, column: Array, vertices: Ints) -> Array:
         """A column of the table at some of its vertices."""
@@ -62,8 +62,23 @@ def footings(result: Result, body: Body) -> list[Footing]:
         vertices = body.vertices(part.points)
         row = np.zeros(len(body.points), dtype=np.int64)
         row[vertices] = np.arange(len(vertices))
-        found.append(Footing(part, vertices, body.facets_of(vertices), row))
+        found.append(Footing(part, vertices, body.facets_of(vertices), row, result.obstacle(part.name)))
     return found
+
+
+def deform(body: Body, parts: Sequence[Footing]) -> Deformed:
+    """The body with a round factor that makes its displacement seen.
+
+    Where a part leaves its obstacle by its own shape, as a disk does a floor, the factor is 1: magnified, displacements
+    would push the body through the obstacle.
+    """
+    u = np.nan_to_num(body.fields["displacement"])
+    largest = float(np.linalg.norm(u, axis=1).max(initial=0.0))
+    if largest == 0.0:
+        return Deformed(body, u, 1.0)
+    factor = round_below(VISIBLE * body.size / largest * 1.25)
+    gap = max((float(np.nanmax(foot.part["gap"], initial=0.0)) for foot in parts), default=0.0)
+    return Deformed(body, u, factor if factor * gap < NEAR * body.size else min(factor, 1.0))
 
 
 def largest_stress(parts: list[Footing]) -> float:

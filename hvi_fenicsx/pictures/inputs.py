@@ -102,6 +102,12 @@ class Result:
     def _on(self, part: str) -> Mapping[str, Any]:
         return (self.scene.get("boundary") or {}).get(part) or {}
 
+    def obstacle(self, part: str) -> Array | None:
+        """The unit vector (3,) from a part towards its flat obstacle, if it has one."""
+        contact = self._on(part).get("contact") or {}
+        normal = np.array((contact.get("obstacle") or {}).get("normal") or [], dtype=np.float64)
+        return np.pad(-normal / np.linalg.norm(normal), (0, 3 - len(normal))) if normal.any() else None
+
     def acts(self, part: str, key: str) -> bool:
         """Whether an effect is in force on a part."""
         return key in self._on(part)

@@ -31,8 +31,8 @@ FEWEST_PIXELS = 13
 
 def draw(path: Path, result: Result, body: Body) -> None:
     """Draw the body with its loads, supports and contact parts."""
-    shape = deform(body)
     parts = footings(result, body)
+    shape = deform(body, parts)
     drawn = [
         *marks.supports(shape, supports(result, body)),
         *marks.loads(shape, loads(result, body)),

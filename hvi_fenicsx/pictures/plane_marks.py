@@ -147,6 +147,8 @@ def footing(shape: Deformed, foot: Footing, largest: float) -> Iterator[Mark]:
     """The obstacle of a part, where the part is off it, and the pressure on it as arrows that end there."""
     for chain in chains(foot.facets):
         outward = normals(shape.body.points, chain)
+        if foot.obstacle is not None:
+            outward = np.broadcast_to(foot.obstacle[:2], outward.shape)
         gap = np.nan_to_num(foot.values(foot.part["gap"], chain))
         base = shape.points[chain, :2] + (shape.factor * gap)[:, None] * outward
         pressure = np.nan_to_num(foot.values(foot.part.pressure, chain))

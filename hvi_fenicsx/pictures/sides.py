@@ -66,7 +66,7 @@ def supports(result: Result, body: Body) -> list[Support]:
 
 
 def _tables(result: Result, body: Body) -> Iterator[tuple[Side, Mapping[str, Any]]]:
-    if (result.scene.get("domain") or {}).get("shape", "rectangle") not in ("rectangle", "box"):
+    if (result.scene.get("domain") or {}).get("shape") == "file":
         return
     for table in (result.scene.get("boundary") or {}).values():
         names = table.get("on", ())

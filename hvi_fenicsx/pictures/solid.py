@@ -59,7 +59,8 @@ class Patched:
 
 def draw(path: Path, result: Result, body: Body) -> None:
     """Draw the body with its loads and contact parts."""
-    shape, parts, pulled = deform(body), footings(result, body), loads(result, body)
+    parts, pulled = footings(result, body), loads(result, body)
+    shape = deform(body, parts)
     normals = [area_vectors(body.points, foot.facets).sum(axis=0) for foot in parts]
     view = best_view(normals)
     shown = [_placed(shape, view, foot, normal) for foot, normal in zip(parts, normals, strict=True)]

@@ -30,7 +30,7 @@ _NEAR = 1e-11
 """Distance (of u0) from a kink that counts as being on it."""
 _CELL_CHANGES = 200
 _FAR = 1e3
-"""Times the start (or p0 L/E0): a softened step, which lowers the energy, that leads so far is a body that slides away."""
+"""Times the start (or p0 L/E0): where softened steps, which lower the energy, lead so far, the body slides away."""
 _ATTEMPTS = (
     (False, "basic", 30),
     (False, "bt", 60),
