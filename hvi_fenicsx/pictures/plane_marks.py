@@ -75,15 +75,20 @@ def _label(feet: Array, normal: Array, words: str, size: float) -> Mark:
     return Mark(np.array([at, room]), draw, Artist, "")
 
 
-def _spread(points: Array, size: float) -> Array:
+def _lengths(points: Array) -> Array:
+    """The way along a line to each of its points."""
+    return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+
+
+def _spread(points: Array, size: float, fewest: int = 2) -> Array:
     """Where to put arrows on a line, as lengths along it."""
-    length = float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
-    return np.linspace(0.0, length, max(2, round(ARROWS * length / size)))
+    length = float(_lengths(points)[-1])
+    return np.linspace(0.0, length, max(fewest, round(ARROWS * length / size)))
 
 
 def _along(points: Array, values: Array, at: Array) -> Array:
     """Values (m, k) at points on a line, interpolated at lengths along it."""
-    s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+    s = _lengths(points)
     return np.column_stack([np.interp(at, s, column) for column in values.T])
 
 
@@ -136,7 +141,7 @@ def _support(wall: Array, rollers: Array, normal: Array, size: float) -> Mark:
 def _hatched(axes: Axes, line: Array, normal: Array, size: float) -> None:
     """A line with the short strokes behind it by which drawings tell a wall."""
     axes.plot(*line.T, color=INK, lw=2.2, solid_capstyle="butt", clip_on=False, zorder=3)
-    at = _along(line, line, np.arange(0.0, float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum()), 0.02 * size))
+    at = _along(line, line, np.arange(0.0, float(_lengths(line)[-1]), 0.02 * size))
     along = np.array([-normal[1], normal[0]])
     tips = at + 0.02 * size * (normal + along)
     strokes = np.stack([at, tips, np.full_like(at, np.nan)], axis=1).reshape(-1, 2)
@@ -179,7 +184,6 @@ def _lifted(points: Array, off: npt.NDArray[np.bool_], gap: float) -> Mark:
 
 
 def _profile(base: Array, outward: Array, pressure: Array, largest: float, size: float) -> Iterator[Mark]:
-    at = _spread(base, size / 2)
     for sign, colour, words in ((1, VERMILION, "contact pressure"), (-1, PURPLE, "contact tension")):
         part = np.maximum(sign * pressure, 0.0)
         if part.max() <= NOTHING * largest:
@@ -188,6 +192,8 @@ def _profile(base: Array, outward: Array, pressure: Array, largest: float, size:
         tips[np.convolve(part > NOTHING * largest, [1, 1, 1], "same") == 0] = np.nan  # no line where there is no stress
         yield _filled(base, tips, colour, f"{words}, up to {quantity(float(part.max()), 'Pa')}")
         tips = np.where(np.isnan(tips), base, tips)
+        first, last = np.flatnonzero(part > NOTHING * largest)[[0, -1]]
+        at = _lengths(base)[first] + _spread(base[first : last + 1], size / 2, fewest=5)
         feet, ends = _along(base, base, at), _along(base, tips, at)
         yield _arrows(ends if sign > 0 else feet, sign * (feet - ends), colour, "", size)
 
