@@ -1,0 +1,186 @@
+"""Every demo says in its header what to expect: here it is held to it, by statics, closed forms and conservation laws.
+
+A demo that nobody checks drifts from its own text, and readers copy demos first.
+"""
+
+from __future__ import annotations
+
+import functools
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from runs import ROOT, hvi, summary
+from scenes import displacement, energy, points
+
+from hvi_fenicsx import Solution, certificate, existence, prepare, read_scene, solve, solvers
+from hvi_fenicsx.boundary import State
+from hvi_fenicsx.rigid import load_factors
+from hvi_fenicsx.solvers.base import silent
+
+Array = npt.NDArray[np.float64]
+DEMOS = ROOT / "demos"
+ESCAPES = 3
+
+
+@functools.cache
+def demo(name: str, *overrides: str) -> Solution:
+    return solve(read_scene(DEMOS / f"{name}.toml", list(overrides)))
+
+
+def state(solution: Solution, part: str) -> State:
+    assert solution.exit_code == 0
+    assert solution.examined is not None
+    return next(s for s in solution.examined.states if s.surface.part == part)
+
+
+def mean(where: State, values: Array) -> Array:
+    """The mean of nodal values over a part."""
+    weights = where.surface.weights
+    return np.asarray(weights @ values / weights.sum())
+
+
+@pytest.mark.parametrize("name", sorted(p.stem for p in DEMOS.glob("*.toml")))
+def test_every_demo_is_read_and_says_what_it_shows(name: str) -> None:
+    text = (DEMOS / f"{name}.toml").read_text(encoding="utf-8")
+    assert text.startswith("# ")
+    assert read_scene(DEMOS / f"{name}.toml").title
+
+
+def test_the_pushed_block_sticks_with_the_slip_that_its_friction_needs() -> None:
+    found = demo("pushed_block")
+    floor = state(found, "floor")
+    assert found.solvability.state == "metastable"
+    slip = mean(floor, floor.slip)[0] * found.problem.scales.displacement
+    assert slip == pytest.approx(0.6e6 * 9e-6 / 1e6, rel=1e-9)
+
+
+def test_the_pushed_block_goes_where_its_header_says() -> None:
+    assert demo("pushed_block", "boundary.push.traction=[0.4e6, 0]").solvability.state == "held"
+    assert demo("pushed_block", "boundary.push.traction=[1.1e6, 0]").exit_code == ESCAPES
+
+
+def test_the_tower_tips_about_its_front_edge() -> None:
+    """Weight times b/2 over wind times h/2."""
+    assert state(demo("tipping_tower"), "floor").contact.any()
+    ready = prepare(read_scene(DEMOS / "tipping_tower.toml"))
+    problem = existence.rigid_problem(ready.problem, ready.system.forces)
+    found = load_factors(ready.system.comm, problem, "wind.traction")
+    assert found.held == pytest.approx(1e5 * 0.5 / (2e4 * 2.0), rel=1e-8)
+    tipped = demo("tipping_tower", "boundary.wind.traction=[6.3e3, 0]")
+    assert tipped.exit_code == ESCAPES
+    assert tipped.solvability.direction is not None
+    assert "rotation about (1, 0), clockwise" in tipped.solvability.direction.words
+
+
+def test_the_lifted_floor_bears_the_press_and_drags_where_it_has_lifted() -> None:
+    found = demo("lift_off")
+    floor, p = state(found, "floor"), found.problem.scales.stress
+    lifted = floor.gap * found.problem.scales.displacement > 1e-12
+    assert np.count_nonzero(lifted) == 10
+    assert mean(floor, -floor.pressure) * p == pytest.approx(1e6, rel=1e-9)
+    wanted = 3e6 / 9e-6 * floor.slip[lifted, 0] * found.problem.scales.displacement
+    assert wanted.max() > 1e5
+    np.testing.assert_allclose(floor.friction[lifted, 0] * p, wanted, rtol=1e-7)
+
+
+def test_the_block_in_the_slot_rises_to_its_upper_side_and_stretches() -> None:
+    found = demo("slot")
+    u2 = 2e-6 + 1e6 * (1 - 0.29**2) / 2.15e11 * points(found)[:, 1]
+    np.testing.assert_allclose(displacement(found)[:, 1], u2, rtol=1e-9)
+    sunk = demo("slot", "boundary.pull.traction=[0, -1e6]")
+    assert displacement(sunk)[:, 1].max() == pytest.approx(-1e-6, rel=1e-9)
+
+
+def test_the_slender_bar_has_the_stress_of_a_slender_bar() -> None:
+    found = demo("thermal_bar")
+    stop = state(found, "stop")
+    grown = (23e-6 * 0.4 + 12e-6 * 0.6) * 60
+    stress = (grown - 0.5e-3) / (0.4 / 7e10 + 0.6 / 2.1e11)
+    assert mean(stop, -stop.pressure) * found.problem.scales.stress == pytest.approx(stress, rel=5e-3)
+    free = demo("thermal_bar", "body.temperature=30.0")
+    assert not state(free, "stop").contact.any()
+    assert displacement(free)[:, 0].max() == pytest.approx(grown / 2, rel=1e-2)
+
+
+def hertz(*overrides: str) -> tuple[float, float]:
+    """Largest pressure and half-width of the ellipse that fits the computed pressures, over Hertz's."""
+    found = demo("hertz", *overrides)
+    floor = state(found, "floor")
+    x, p = floor.surface.points[:, 0], -floor.pressure * found.problem.scales.stress
+    width = np.sqrt(4 * 4e3 * 0.1 * (1 - 0.3**2) / (np.pi * 1e7))
+    largest = 2 * 4e3 / (np.pi * width)
+    inside = p > 0.3 * largest
+    slope, top = np.polyfit(x[inside] ** 2, p[inside] ** 2, 1)
+    return float(np.sqrt(top) / largest), float(np.sqrt(-top / slope) / width)
+
+
+def test_hertz_pressure_and_half_width_converge() -> None:
+    """With 7, 14 and 28 cells to a half-width; what remains is that the disk is no half-space."""
+    sizes = [1e-3, 0.5e-3, 0.25e-3]
+    found = [hertz(f"domain.mesh_size_below={h}", f"domain.mesh_size={20 * h}") for h in sizes]
+    errors = [max(abs(p - 1), abs(a - 1)) for p, a in found]
+    assert errors[0] < 0.04
+    assert errors[-1] < 3e-3
+    assert np.log2(errors[0] / errors[-1]) / 2 > 1.0
+
+
+def test_the_peeled_strip_obeys_the_j_integral() -> None:
+    """F θ, as the work of the end's tractions on ∂u2/∂x, is the glue's fracture energy (Rice 1968)."""
+    found = demo("peeling")
+    assert found.examined is not None
+    glue, x, u = state(found, "glue"), points(found), displacement(found)
+    force = found.examined.forces.reaction[:, 1] * found.problem.scales.force
+    end = np.flatnonzero(x[:, 0] < 1e-9)
+    beside = [int(np.argmin(np.hypot(x[:, 0] - 1e-3, x[:, 1] - x[i, 1]))) for i in end]
+    slope = -(u[beside, 1] - u[end, 1]) / 1e-3
+    assert float(force[end] @ slope) == pytest.approx(0.5 * 5e6 * 20e-6, rel=0.01)
+    opening = -glue.normal * found.problem.scales.displacement
+    assert glue.surface.points[opening > 20e-6, 0].max() == pytest.approx(0.084, abs=1.5e-3)
+
+
+def test_the_3d_block_slips_along_its_load() -> None:
+    found = demo("block_3d")
+    wall = state(found, "wall")
+    slip = mean(wall, wall.slip) * found.problem.scales.displacement
+    along = wall.surface.tangents[0] @ np.array([0.0, 1e4, -2.5e4])
+    np.testing.assert_allclose(slip, along * 1e-4 / 4e4, rtol=1e-9)
+    assert found.solvability.lambda_held == pytest.approx(2e4 / np.hypot(1e4, 2.5e4), rel=1e-8)
+    assert found.solvability.lambda_peak == pytest.approx(4e4 / np.hypot(1e4, 2.5e4), rel=1e-8)
+
+
+def test_the_anchor_opens_as_far_as_its_pull_needs() -> None:
+    found = demo("anchor_3d")
+    base = state(found, "base")
+    opening = -base.normal * found.problem.scales.displacement
+    assert mean(base, opening) == pytest.approx(24e3 * 20e-6 / (1e6 * 0.04), rel=1e-9)
+    assert (opening.min(), opening.max()) == pytest.approx((8e-6, 16e-6), rel=0.02)
+    assert found.solvability.lambda_held == pytest.approx(0.6, rel=1e-8)
+    assert found.solvability.lambda_peak == pytest.approx(1.5, rel=1e-8)
+
+
+def test_the_giving_support_has_the_solutions_that_its_header_tells() -> None:
+    """Unbroken by default: the solution of the convex law that never drops. The other by its pieces."""
+    found = demo("jureczka_ochal")
+    assert energy(found) == pytest.approx(-0.2041340, rel=1e-6)
+    convex = demo("jureczka_ochal", "boundary.ground.support.points=[[0, 0], [1, 20]]")
+    assert energy(found) == pytest.approx(energy(convex), rel=1e-10)
+    ready = prepare(found.scene)
+    pieces = ready.system.load.duplicate()
+    pieces.set(-1.0 / ready.problem.scales.displacement)
+    method = solvers.create(found.scene.solver, ready.system, ready.timer, silent, lambda: False)
+    other = certificate.examine(ready.problem, method.solve(None, pieces).u, 1e-8)  # type: ignore[call-arg]
+    assert other.certificate.passed
+    assert other.energy * ready.problem.scales.energy == pytest.approx(-0.9988350, rel=1e-6)
+    broken = other.states[0].normal * ready.problem.scales.displacement > 0.1
+    assert np.count_nonzero(broken) == 31
+
+
+def test_a_demo_runs_on_two_ranks_as_on_one(tmp_path: Path) -> None:
+    """A gmsh shape, meshed on rank 0, and nodal values gathered from both."""
+    done = [hvi("run", DEMOS / "hertz.toml", "--out", tmp_path / str(n), "--no-pictures", ranks=n) for n in (1, 2)]
+    assert [d.returncode for d in done] == [0, 0]
+    one, two = (summary(tmp_path / str(n)) for n in (1, 2))
+    assert two["energy"] == pytest.approx(one["energy"], rel=1e-9)
+    assert two["contact"]["active"] == one["contact"]["active"]
