@@ -22,22 +22,11 @@ LISTED = cases(TABLE)
 SMALL = [c for c in LISTED if c["cells"] <= 8 and c["ranks"] == 1]
 FAST = SMALL[:: max(1, len(SMALL) // 30)]
 REST = [c for c in LISTED if c["cells"] <= 32 and c["ranks"] == 1 and c not in FAST]
-OPEN = {
-    "9206d05c90": "a smoothed step law is flat off its kinks: Newton's matrix lets the body slide",
-    "0203f03985": "the energy line search jams at the steep layers of a narrowly smoothed law",
-    "c6524aa302": "rounding of the energy is taken for a rise",
-    "fd185fbff2": "rounding of the residual is above what the certificate allows",
-    "515e79c2d3": "rounding of the residual is above what the certificate allows",
-}
-"""Cases that `auto` does not solve yet, and why. Not strict: rounding differs between machines."""
 SOLVED = ("certified", "escapes", "no_equilibrium")
 
 
 def parameters(chosen: list[Case]) -> list[Any]:
-    def marks(case: Case) -> list[pytest.MarkDecorator]:
-        return [pytest.mark.xfail(reason=OPEN[case.key])] if case.key in OPEN else []
-
-    return [pytest.param(case, id=case.key, marks=marks(case)) for case in chosen]
+    return [pytest.param(case, id=case.key) for case in chosen]
 
 
 def solve_and_judge(case: Case) -> None:

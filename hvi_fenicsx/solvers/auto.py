@@ -1,8 +1,8 @@
 """What a scene gets that names no method: the branch iteration, begun again elsewhere where it finds no equilibrium.
 
-The unbroken branch comes first. In the metastable state it may slide off while an equilibrium exists on other pieces of
-the laws; starts on the pieces of the resting slips, with every bond broken, and a continuation in the smoothing look
-for it there.
+The unbroken branch comes first. A narrowly smoothed law is then approached from the solution of the unsmoothed one. In
+the metastable state the iteration may slide off while an equilibrium exists on other pieces of the laws: starts on the
+pieces of the resting slips, with every bond broken, and a continuation in the smoothing look for it there.
 """
 
 from __future__ import annotations
@@ -38,12 +38,25 @@ class Auto(BranchIteration):
         return first
 
     def _others(self) -> Iterator[Solved]:
+        exact = [term.exact for term in self.system.terms]
+        if any(law is not true for law, true in zip(self._laws, exact, strict=True)):
+            for found in self._tried(BranchIteration(self.solver, self.settings, exact)):
+                yield from self._beside(found)
         resting, _ = resting_start(self.solver, self._laws, 1e-4)
         for factor in (1.0, _BROKEN, -_BROKEN):
             pieces = resting.copy()
             pieces.scale(factor)
             yield from self._tried(BranchIteration(self.solver, self.settings, self._laws, self._epsilon), pieces)
         yield from self._tried(Continuation(self.solver, self.settings))
+
+    def _beside(self, exact: Solved) -> Iterator[Solved]:
+        """From the unsmoothed law's solution: what sticks there is within the narrow band that smoothing leaves."""
+        if exact.converged:
+            method = BranchIteration(self.solver, self.settings, self._laws, self._epsilon)
+            try:
+                yield method.solve(self.system.unknowns(exact.u))
+            except SolverError:
+                return
 
     def _tried(self, method: BranchIteration | Continuation, *pieces: PETSc.Vec) -> Iterator[Solved]:
         """One attempt; a breakdown is no result."""
