@@ -18,6 +18,8 @@ from ..errors import HviError
 
 UNFINISHED = ".part.png"
 """How the name of a picture ends that is being written."""
+PATIENCE = 3.0
+"""Seconds for a child to end by itself."""
 COMPLAINT = "pictures: "
 """How the child's message to its caller begins."""
 _MPI = ("OMPI_", "PMIX_", "PRTE_", "PMI_", "HYDRA_", "MPI_LOCAL")
@@ -67,11 +69,18 @@ def _ended(child: subprocess.Popen[str], folder: Path) -> Iterator[None]:
         yield
     finally:
         if child.returncode != 0:
-            with contextlib.suppress(OSError):
-                os.killpg(child.pid, signal.SIGKILL)
-            child.communicate()
+            _end(child)
             for file in folder.glob(f".*{UNFINISHED}"):
                 file.unlink(missing_ok=True)
+
+
+def _end(child: subprocess.Popen[str]) -> None:
+    """Politely first, so that an X server takes its socket with it."""
+    for order in (signal.SIGTERM, signal.SIGKILL):
+        with contextlib.suppress(OSError):
+            os.killpg(child.pid, order)
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            child.communicate(timeout=PATIENCE)
 
 
 def _message(errors: str, code: int) -> str:

@@ -79,6 +79,7 @@ def _panels(result: Result, part: Part, length: Unit) -> Iterator[Callable[[Axes
 
 def _displacement(axes: Axes, part: Part, values: Array, law: Superpotential | None, words: str, length: Unit) -> None:
     """What a law acts on, and the values at which the law drops."""
+    values = _without_noise(values, part)
     unit = unit_for(_largest(values), "m")
     _line(axes, part, values, length, unit, BLUE)
     kinks = law.concave.kinks if law is not None else np.empty(0)
@@ -194,3 +195,9 @@ def _say_lifted(axes: Axes, spans: list[tuple[float, float]], part: Part, length
 
 def _largest(values: Array) -> float:
     return float(np.nanmax(np.abs(values), initial=0.0))
+
+
+def _without_noise(values: Array, part: Part) -> Array:
+    """Displacements that are rounding beside the part's others are zero, and are drawn so."""
+    whole = max(_largest(part[name]) for name in ("u_n", "u_t1", "gap") if part.has(name))
+    return values if _largest(values) > 1e-9 * whole else 0.0 * values

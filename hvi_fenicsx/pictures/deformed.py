@@ -76,9 +76,9 @@ def deform(body: Body, parts: Sequence[Footing]) -> Deformed:
     largest = float(np.linalg.norm(u, axis=1).max(initial=0.0))
     if largest == 0.0:
         return Deformed(body, u, 1.0)
-    factor = round_below(VISIBLE * body.size / largest * 1.25)
+    factor = 1.0 if largest > 0.5 * VISIBLE * body.size else round_below(VISIBLE * body.size / largest * 1.25)
     gap = max((float(np.nanmax(foot.part["gap"], initial=0.0)) for foot in parts), default=0.0)
-    return Deformed(body, u, factor if factor * gap < NEAR * body.size else min(factor, 1.0))
+    return Deformed(body, u, factor if factor * gap < NEAR * body.size else 1.0)
 
 
 def largest_stress(parts: list[Footing]) -> float:

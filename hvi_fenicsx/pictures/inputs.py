@@ -66,6 +66,12 @@ class Part:
         return -self["sigma_n"]
 
     @property
+    def idle(self) -> npt.NDArray[np.bool_]:
+        """Vertices that are lifted and carry nothing; where something adheres, a lifted one may."""
+        stress = np.nan_to_num(np.abs(self["sigma_n"]))
+        return self.lifted & (stress <= 1e-6 * stress.max(initial=0.0))
+
+    @property
     def lifted(self) -> npt.NDArray[np.bool_]:
         """Vertices off the obstacle; none where the part has no contact."""
         return self["contact"] == 0.0

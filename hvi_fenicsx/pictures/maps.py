@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,12 +18,14 @@ from .inputs import Part, Result
 from .mesh import Array, Body, Ints
 from .raster import shade
 from .space import area_vectors
-from .style import BLUE, GREEN, GREY, HEADING, INK, VERMILION, area, figure, heading, save, shades
+from .style import BLUE, GREEN, GREY, HEADING, INK, WIDTH, area, figure, heading, pressure_scale, save, shades
 from .units import Unit, quantity, unit_for
 
 WIDEST, TALLEST = 5.8, 2.75
 """Inches: a map."""
 LEFT, GAP, FOOT = 0.95, 0.62, 0.75
+ROOMY = 0.55
+"""Of the width: where a map ends that leaves room for words beside it."""
 ARROWS = 13
 """Along the longer side of a map."""
 
@@ -41,12 +44,12 @@ def draw(path: Path, result: Result, part: Part, body: Body) -> None:
     """Draw the three maps of a part."""
     foot = next(foot for foot in footings(result, body) if foot.part.name == part.name)
     flat, normal = laid_flat(foot, body)
-    rows: list[tuple[str, str, Array, Array | None, Colormap]] = [
+    rows: list[tuple[str, str, Array, Array | None, Colormap | None]] = [
         ("slip", "m", part.slip, _vectors(part, flat, normal, "u_t"), shades(BLUE))
     ]
     if result.acts(part.name, "friction"):
         rows.append(("friction", "Pa", part.friction, _vectors(part, flat, normal, "friction_t"), shades(GREEN)))
-    rows.append(("contact pressure", "Pa", part.pressure, None, shades(VERMILION)))
+    rows.append(("contact pressure", "Pa", part.pressure, None, None))
     width, height = _map_size(flat)
     made = figure(HEADING + len(rows) * (height + GAP) + FOOT)
     heading(made, result, f"on “{part.name}”")
@@ -92,12 +95,18 @@ def _symbol(words: str, unit: Unit) -> str:
     return f"{words} {symbols[words]} in {unit.name}"
 
 
-def _map(made: Figure, axes: Axes, flat: Flat, values: Array, colours: Colormap, words: str) -> None:
-    """Values as an image of the picture's own pixels, with a bar beside it; from zero, or from the lowest if below."""
-    low, high = min(0.0, float(np.nanmin(values))), max(0.0, float(np.nanmax(values)))
-    image = _image(axes, flat, values)
+def _map(made: Figure, axes: Axes, flat: Flat, values: Array, colours: Colormap | None, words: str) -> None:
+    """Values as an image of the picture's own pixels, with a bar beside it, from zero; without colours, a pressure."""
+    low, high = float(np.nanmin(values)), float(np.nanmax(np.abs(values)))
+    scale = pressure_scale(low, high) if colours is None else (colours, 0.0, high or 1.0)
     drawn = axes.imshow(
-        image, cmap=colours, vmin=low, vmax=high or 1.0, origin="lower", aspect="auto", extent=_extent(flat)
+        _image(axes, flat, values),
+        cmap=scale[0],
+        vmin=scale[1],
+        vmax=scale[2],
+        origin="lower",
+        aspect="auto",
+        extent=_extent(flat),
     )
     box = axes.get_position()
     bar = made.add_axes((box.x1 + 0.02, box.y0, 0.02, box.height))
@@ -121,8 +130,8 @@ def _image(axes: Axes, flat: Flat, values: Array) -> Array:
 
 
 def _grey_where_lifted(axes: Axes, flat: Flat, part: Part) -> None:
-    if part.lifted.any():
-        image = _image(axes, flat, part.lifted.astype(float))
+    if part.idle.any():
+        image = _image(axes, flat, part.idle.astype(float))
         veil = np.zeros((*image.shape, 4))
         veil[...] = (0.55, 0.55, 0.55, 0.0)
         veil[..., 3] = np.where(image > 0.5, 0.45, 0.0)
@@ -168,7 +177,17 @@ def _notes(made: Figure, result: Result, part: Part, flat: Flat) -> None:
             said.append(f"dashed: the law drops at {quantity(float(kink), 'm')}")
         else:
             said.append(f"the law drops at {quantity(float(kink), 'm')}, not reached")
-    if part.lifted.any():
+    if part.idle.any():
         said.append(f"grey: lifted, up to {quantity(float(np.nanmax(part['gap'])), 'm')}")
+    _say(made, axes, said[-2:])
+
+
+def _say(made: Figure, axes: Axes, said: list[str]) -> None:
+    """Beside the map and its bar if there is room, else above it."""
     box = axes.get_position()
-    made.text(0.965, box.y1 + 0.007, "; ".join(said[-2:]), size=11.5, color=GREY, ha="right", va="bottom")
+    style: dict[str, Any] = {"size": 12, "color": GREY}
+    if box.x1 < ROOMY:
+        lines = [line for words in said for line in textwrap.wrap(words, 24)]
+        made.text(box.x1 + 0.13, box.y1, "\n".join(lines), va="top", linespacing=1.4, **style)
+    else:
+        made.text(1 - 0.3 / WIDTH, box.y1 + 0.007, "; ".join(said), ha="right", va="bottom", **style)

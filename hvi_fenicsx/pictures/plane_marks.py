@@ -192,7 +192,7 @@ def _profile(base: Array, outward: Array, pressure: Array, largest: float, size:
         tips[np.convolve(part > NOTHING * largest, [1, 1, 1], "same") == 0] = np.nan  # no line where there is no stress
         yield _filled(base, tips, colour, f"{words}, up to {quantity(float(part.max()), 'Pa')}")
         tips = np.where(np.isnan(tips), base, tips)
-        first, last = np.flatnonzero(part > NOTHING * largest)[[0, -1]]
+        first, last = np.flatnonzero(part > 0.02 * part.max())[[0, -1]]
         at = _lengths(base)[first] + _spread(base[first : last + 1], size / 2, fewest=5)
         feet, ends = _along(base, base, at), _along(base, tips, at)
         yield _arrows(ends if sign > 0 else feet, sign * (feet - ends), colour, "", size)

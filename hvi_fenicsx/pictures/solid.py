@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.colors import Colormap, LinearSegmentedColormap
+from matplotlib.colors import Colormap
 from matplotlib.figure import Figure
 
 from . import space_loads
@@ -24,7 +24,7 @@ from .mesh import Array, Body
 from .plane import canvas
 from .sides import loads
 from .space import View, area_vectors, best_view, creases, render, surface
-from .style import GREY, INK, PALE, PURPLE, SLATE, VERMILION, heading, save, shades
+from .style import GREY, INK, PALE, SLATE, heading, pressure_scale, save
 from .units import quantity, times, unit_for
 
 if TYPE_CHECKING:
@@ -34,14 +34,11 @@ FACING = 0.15
 """Cosine from which a part is drawn where it is."""
 LEGIBLE = 5000
 """Facets up to which their edges are drawn."""
-PRESSED = shades(VERMILION, "#fdf3ec")
-BOTH = LinearSegmentedColormap.from_list("both", [PURPLE, "#fdfaf7", VERMILION])
-NOTHING = 1e-6
 
 
 @dataclass(frozen=True)
 class Patched:
-    """A contact part as drawn: its facets at the points (n, 3), and -σ_n, NaN where it is lifted, by vertex."""
+    """A contact part as drawn: its facets at the points (n, 3), and -σ_n by vertex, NaN where it is lifted."""
 
     foot: Footing
     points: Array
@@ -50,10 +47,10 @@ class Patched:
 
     @property
     def pressure(self) -> Array:
-        """-σ_n by vertex of the body, NaN where lifted and off the part."""
+        """-σ_n by vertex of the body, NaN where it is lifted and off the part."""
         values = np.full(len(self.points), np.nan)
         part = self.foot.part
-        values[self.foot.vertices] = np.where(part.lifted, np.nan, part.pressure)
+        values[self.foot.vertices] = np.where(part.idle, np.nan, part.pressure)
         return values
 
 
@@ -70,13 +67,13 @@ def draw(path: Path, result: Result, body: Body) -> None:
     everything = np.concatenate(reached)
     made, axes = canvas(view.project(everything))
     heading(made, result, "deformed body")
-    stress, colours = largest_stress(parts), _colours(parts)
+    scale = pressure_scale(_lowest(parts), largest_stress(parts))
     depths = (float(view.depth(everything).min()), float(view.depth(everything).max()))
-    render(axes, view, depths, partial(_fill, shape=shape, shown=shown, arrows=arrows, stress=stress, colours=colours))
+    render(axes, view, depths, partial(_fill, shape=shape, shown=shown, arrows=arrows, scale=scale))
     space_loads.labels(axes, view, shape, pulled)
     for placed in shown:
         _guides(axes, view, shape, placed)
-    _foot(made, shape, shown, stress, colours)
+    _foot(made, shape, shown, scale)
     save(made, path)
 
 
@@ -93,20 +90,13 @@ def _placed(shape: Deformed, view: View, foot: Footing, normal: Array) -> Patche
     return Patched(foot, shape.points + way, way)
 
 
-def _colours(parts: list[Footing]) -> tuple[Colormap, float]:
-    """The scale of -σ_n and its lower end in units of the largest: there is tension only where something adheres."""
-    lowest = min((float(np.nanmin(foot.part.pressure)) for foot in parts), default=0.0)
-    return (BOTH, -1.0) if lowest < -NOTHING * largest_stress(parts) else (PRESSED, 0.0)
-
-
 def _fill(
     plotter: pyvista.Plotter,
     *,
     shape: Deformed,
     shown: list[Patched],
     arrows: list[tuple[Array, Array]],
-    stress: float,
-    colours: tuple[Colormap, float],
+    scale: tuple[Colormap, float, float],
 ) -> None:
     facets = shape.body.boundary
     skin = surface(shape.points, facets)
@@ -127,19 +117,19 @@ def _fill(
     plotter.add_mesh(creases(shape.points, facets), color=INK, line_width=3)
     plotter.add_mesh(creases(shape.body.points, facets), color=GREY, line_width=2)
     for placed in shown:
-        _fill_part(plotter, placed, stress, colours)
+        _fill_part(plotter, placed, scale)
     for tails, ways in arrows:
         space_loads.fill(plotter, tails, ways)
 
 
-def _fill_part(plotter: pyvista.Plotter, placed: Patched, stress: float, colours: tuple[Colormap, float]) -> None:
+def _fill_part(plotter: pyvista.Plotter, placed: Patched, scale: tuple[Colormap, float, float]) -> None:
     patch = surface(placed.points, placed.foot.facets)
     patch.point_data["pressure"] = placed.pressure[patch.point_data["vertex"]]
     plotter.add_mesh(
         patch,
         scalars="pressure",
-        cmap=colours[0],
-        clim=(colours[1] * stress, stress or 1.0),
+        cmap=scale[0],
+        clim=scale[1:],
         nan_color=PALE,
         show_scalar_bar=False,
         lighting=False,
@@ -158,21 +148,25 @@ def _guides(axes: Axes, view: View, shape: Deformed, placed: Patched) -> None:
         axes.plot(*np.array([start[i], end[i]]).T, color=GREY, lw=1.1, ls=(0, (2, 3)), zorder=0.5)
 
 
-def _foot(made: Figure, shape: Deformed, shown: list[Patched], stress: float, colours: tuple[Colormap, float]) -> None:
+def _lowest(parts: list[Footing]) -> float:
+    return min((float(np.nanmin(foot.part.pressure)) for foot in parts), default=0.0)
+
+
+def _foot(made: Figure, shape: Deformed, shown: list[Patched], scale: tuple[Colormap, float, float]) -> None:
     most = float(shape.amount.max())
     unit = unit_for(most, "m")
     words = f"displacement |u|, up to {unit.text(most)}"
     colour_bar(made, SLATE, (0.0, most / unit.size), words, times(shape.factor))
     if shown:
-        unit = unit_for(stress, "Pa")
-        scale = (colours[1] * stress / unit.size, stress / unit.size)
-        words = f"contact pressure, up to {unit.text(stress)}"
-        colour_bar(made, colours[0], scale, words, _remark(shown), at=3.75)
+        colours, low, high = scale
+        unit = unit_for(high, "Pa")
+        words = f"contact pressure, up to {unit.text(high)}" if low == 0.0 else f"contact pressure in {unit.name}"
+        colour_bar(made, colours, (low / unit.size, high / unit.size), words, _remark(shown), at=3.75)
 
 
 def _remark(shown: list[Patched]) -> str:
     """Where the footprints are, and what grey means on them."""
-    gaps = [float(np.max(s.foot.part["gap"][s.foot.part.lifted])) for s in shown if s.foot.part.lifted.any()]
+    gaps = [float(np.max(s.foot.part["gap"][s.foot.part.idle])) for s in shown if s.foot.part.idle.any()]
     lifted = [f"grey: lifted, up to {quantity(max(gaps), 'm')}"] if gaps else []
     away = [s.foot.part.name for s in shown if s.away.any()]
     return lifted[0] if lifted else f"“{'”, “'.join(away)}” drawn apart" if away else ""

@@ -58,6 +58,15 @@ def shades(dark: str, light: str = "#f4f4f1") -> LinearSegmentedColormap:
 
 SLATE = shades("#54799a", "#eef2f5")
 """For |u|: quiet, so that what acts on the boundary stands out."""
+_PRESSED = shades(VERMILION, "#fdf3ec")
+_BOTH = LinearSegmentedColormap.from_list("both", [PURPLE, "#fdfaf7", VERMILION])
+
+
+def pressure_scale(lowest: float, largest: float) -> tuple[LinearSegmentedColormap, float, float]:
+    """Colours for -σ_n and their range; there is tension only where something adheres."""
+    if lowest < -1e-6 * largest:
+        return _BOTH, -largest, largest
+    return _PRESSED, 0.0, largest or 1.0
 
 
 def figure(height: float) -> Figure:

@@ -1,12 +1,14 @@
 """An X server for a VTK that draws through one: Xvfb, started while other things load, and always ended.
 
-VTK before 9.4 aborts where it finds no display. Xvfb says by itself when it is ready, and on which display
-(``-displayfd``); so nothing sleeps, and no number is guessed.
+VTK before 9.4 aborts where it finds no display. Xvfb says by itself when it is ready (``-displayfd``): nothing sleeps.
+The number of its display is drawn by lot. Xvfb itself would take the first free one; but a server that ends removes the
+socket of its number, and that may by then be the socket of another, just started.
 """
 
 from __future__ import annotations
 
 import os
+import random
 import select
 import shutil
 import socket
@@ -15,6 +17,8 @@ import sys
 
 READY_WITHIN = 15.0
 """Seconds."""
+DISPLAYS = range(1000, 50000)
+"""Far from those that people use."""
 DRAWS_WITHOUT = (9, 4)
 """The VTK that renders through EGL or in memory by itself."""
 _HELLO = b"l\0\x0b\0" + bytes(8)
@@ -34,9 +38,10 @@ class XServer:
 
     def _start(self) -> subprocess.Popen[bytes]:
         self._told, writing = os.pipe()
+        display = f":{random.SystemRandom().choice(DISPLAYS)}"
         size = ["-screen", "0", "640x480x24"]  # pictures are drawn beside the screen, whatever its size
         process = subprocess.Popen(
-            ["Xvfb", "-displayfd", str(writing), *size, "-nolisten", "tcp", "-terminate"],
+            ["Xvfb", display, "-displayfd", str(writing), *size, "-nolisten", "tcp", "-terminate"],
             pass_fds=[writing],
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
@@ -73,23 +78,17 @@ class XServer:
 
 
 def _connected(number: str) -> socket.socket | None:
-    """A client that does nothing. Without one, the server would end when VTK has looked at it for the first time.
-
-    Servers that start at the same time take each other's file away, so the name that is no file comes first.
-    """
-    path = f"/tmp/.X11-unix/X{number}"
-    for address in (f"\0{path}", path):
-        client = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
-        client.settimeout(READY_WITHIN)
-        try:
-            client.connect(address)
-            client.sendall(_HELLO)
-            client.recv(8)
-        except OSError:
-            client.close()
-        else:
-            return client
-    return None
+    """A client that does nothing. Without one, the server would end when VTK has looked at it for the first time."""
+    client = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+    client.settimeout(READY_WITHIN)
+    try:
+        client.connect(f"/tmp/.X11-unix/X{number}")
+        client.sendall(_HELLO)
+        client.recv(8)
+    except OSError:
+        client.close()
+        return None
+    return client
 
 
 def _line(pipe: int) -> str:
