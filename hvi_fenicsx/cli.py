@@ -92,7 +92,8 @@ def _dispatch(options: argparse.Namespace, words: Sequence[str]) -> int:
         _become_mpirun(options.np, words)
     from . import commands
 
-    return commands.run(options) if options.command == "run" else commands.check(options)
+    with commands.ended_together():
+        return commands.run(options) if options.command == "run" else commands.check(options)
 
 
 def _version() -> int:

@@ -5,6 +5,9 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+import traceback
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +25,21 @@ from .solvers import options as petsc_options
 from .timing import Timer
 
 COMM = MPI.COMM_WORLD
+
+
+@contextmanager
+def ended_together() -> Iterator[None]:
+    """An error that was not foreseen on one rank ends all of them: the others would wait for it for ever."""
+    try:
+        yield
+    except (HviError, KeyboardInterrupt):
+        raise  # all ranks alike
+    except Exception:
+        if COMM.size > 1:
+            traceback.print_exc()
+            sys.stderr.flush()
+            COMM.Abort(1)
+        raise
 
 
 def run(options: argparse.Namespace) -> int:
