@@ -326,3 +326,23 @@ def test_an_empty_cell_is_nothing_and_not_zero(tmp_path: Path) -> None:
     assert not part.has("u_t2")
     assert part.has("gap")
     assert np.count_nonzero(part.lifted) == 2
+
+
+def paper_figures(out: Path, ranks: int) -> tuple[list[Path], list[str]]:
+    """Run the demo; its pictures, and the norms that it prints."""
+    script = [sys.executable, "-m", "mpi4py", "demos/paper_figures.py", "--out", str(out)]
+    parallel = ["mpirun", "-n", str(ranks)] if ranks > 1 else []
+    root = Path(__file__).parent.parent
+    told = subprocess.run([*parallel, *script], cwd=root, capture_output=True, text=True, check=True, timeout=300)
+    return sorted(out.iterdir()), [line for line in told.stdout.splitlines() if line.startswith("norm")]
+
+
+def test_the_papers_figures_are_drawn_and_their_captions_tell_what_epsilon_does(tmp_path: Path) -> None:
+    found, norms = paper_figures(tmp_path / "p", 1)
+    assert_drawn(found, "figure_3a.png", "figure_3b.png", "figure_4.png", "figure_5.png")
+    assert len(norms) == 2
+
+
+@pytest.mark.long
+def test_the_papers_figures_are_the_same_on_two_ranks(tmp_path: Path) -> None:
+    assert paper_figures(tmp_path / "p", 2)[1] == paper_figures(tmp_path / "q", 1)[1]
