@@ -375,11 +375,15 @@ def test_byte_order_mark_and_windows_line_ends(tmp_path: Path) -> None:
     assert read_scene(path).title == "Wall left"
 
 
-@pytest.mark.parametrize(
-    "text", [PAPER, BOX, *(d.read_text() for d in DEMOS)], ids=["paper", "box", *(d.stem for d in DEMOS)]
-)
+@pytest.mark.parametrize("text", [PAPER, BOX], ids=["paper", "box"])
 def test_round_trip(text: str, write: Callable[..., Path]) -> None:
     scene = read_scene(write(text))
+    assert read_scene(write(dump_scene(scene), "again.toml")) == scene
+
+
+@pytest.mark.parametrize("demo", DEMOS, ids=lambda d: d.stem)
+def test_round_trip_of_a_demo(demo: Path, write: Callable[..., Path]) -> None:
+    scene = read_scene(demo)
     assert read_scene(write(dump_scene(scene), "again.toml")) == scene
 
 
