@@ -56,10 +56,13 @@ def draw(folder: Path, *, timeout: float = 120) -> list[Path]:
 
 
 def _environment() -> dict[str, str]:
-    """Ours, without what would make the child believe that it is a rank, and with this package on its path."""
+    """Ours, without what would make the child believe that it is a rank, and with this package on its path.
+
+    One thread for linear algebra: the child forks, and what it draws needs none.
+    """
     kept = {name: value for name, value in os.environ.items() if not name.startswith(_MPI)}
     paths = [str(Path(__file__).parents[2]), kept.get("PYTHONPATH", "")]
-    return {**kept, "PYTHONPATH": os.pathsep.join(filter(None, paths))}
+    return {**kept, "OMP_NUM_THREADS": "1", "PYTHONPATH": os.pathsep.join(filter(None, paths))}
 
 
 @contextlib.contextmanager

@@ -20,6 +20,8 @@ from . import PictureError
 
 Array = npt.NDArray[np.floating[Any]]
 Ints = npt.NDArray[np.int64]
+AT_ONCE = 2_000_000
+"""Pairs of points whose distances are simply all computed."""
 _CORNERS = {5: 3, 69: 3, 10: 4, 71: 4}
 """Vertices of VTK's triangles and tetrahedra, plain and Lagrange."""
 
@@ -62,10 +64,8 @@ class Body:
         Raises:
             PictureError: there is none within rounding at one of them.
         """
-        from scipy.spatial import cKDTree
-
         candidates = np.unique(self.boundary)
-        distance, nearest = cKDTree(self.points[candidates]).query(points)
+        distance, nearest = _nearest(self.points[candidates], points)
         if np.max(distance, initial=0.0) > 1e-6 * self.size:
             raise PictureError("contact.csv and displacement.pvd do not belong together: a vertex is not on the body")
         return np.asarray(candidates[nearest])
@@ -75,6 +75,17 @@ class Body:
         among = np.zeros(len(self.points), dtype=bool)
         among[vertices] = True
         return np.asarray(self.boundary[among[self.boundary].all(axis=1)])
+
+
+def _nearest(candidates: Array, points: Array) -> tuple[Array, Ints]:
+    """How far the nearest candidate is from each point, and which it is."""
+    if len(candidates) * len(points) <= AT_ONCE:
+        squares = np.sum((points[:, None] - candidates[None]) ** 2, axis=2)
+        return np.sqrt(squares.min(axis=1)), squares.argmin(axis=1)
+    from scipy.spatial import cKDTree  # to load it takes as long as a small picture
+
+    distance, nearest = cKDTree(candidates).query(points)
+    return distance, nearest
 
 
 def _outward(points: Array, facets: Ints, opposite: Ints) -> Ints:

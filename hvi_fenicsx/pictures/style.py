@@ -124,4 +124,4 @@ def unfinished(path: Path) -> Iterator[Path]:
 def save(made: Figure, path: Path) -> None:
     """Write a picture, whole or not at all."""
     with unfinished(path) as aside:
-        made.savefig(aside, dpi=DPI)
+        made.savefig(aside, dpi=DPI, pil_kwargs={"compress_level": 3})  # thrice as fast, a tenth larger
