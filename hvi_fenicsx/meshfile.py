@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import tempfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -17,6 +19,7 @@ from .errors import InputError
 from .parallel import on_root
 
 Entities = npt.NDArray[np.int32]
+_MOST_REMNANTS = 100
 _SIMPLEX = {2: 2, 3: 4}
 """Gmsh's element type of the linear simplex, by dimension."""
 
@@ -75,9 +78,21 @@ def _open(gmsh: Any, path: Path, dimension: int) -> dict[int, dict[str, int]]:
             gmsh.model.mesh.generate(dimension)
     except Exception as error:
         # gmsh raises bare Exceptions, whatever is wrong with a file
+        _drain(gmsh)
         raise InputError(f"mesh file {path}: gmsh cannot read it: {error}") from None
     _check_cells(gmsh, path, dimension)
     return {d: _names(gmsh, path, d) for d in (dimension - 1, dimension)}
+
+
+def _drain(gmsh: Any) -> None:
+    """Empty gmsh's parser: the rest of a broken file stays in it, and the next file would stumble over that."""
+    with tempfile.NamedTemporaryFile(mode="w", suffix=".geo") as nothing:
+        nothing.write("\n")
+        nothing.flush()
+        for _ in range(_MOST_REMNANTS):
+            with contextlib.suppress(Exception):
+                gmsh.open(nothing.name)
+                return
 
 
 def _names(gmsh: Any, path: Path, dimension: int) -> dict[str, int]:

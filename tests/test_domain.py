@@ -8,10 +8,11 @@ from typing import Any
 import meshes
 import numpy as np
 import pytest
+from mpi4py import MPI
 from runs import contact, hvi, summary, write_scene
 from scenes import NU, STEEL, E, P, Q, Table, displacement, energy, far, model, points, quadratic_linear, solved
 
-from hvi_fenicsx import InputError
+from hvi_fenicsx import InputError, domain
 
 
 def on_file(file: Path, table: Table, **domain: Any) -> Table:
@@ -121,3 +122,13 @@ for name, at in (("first", 0.0), ("second", 0.5)):
 whole = [t for _, t in gmsh.model.getPhysicalGroups(1) if gmsh.model.getPhysicalName(1, t) == "bottom"]
 gmsh.model.removePhysicalGroups([(1, t) for t in whole])
 """
+
+
+def test_a_broken_file_does_not_spoil_the_next(tmp_path: Path) -> None:
+    """What gmsh's parser has left of a broken file is emptied out."""
+    broken = tmp_path / "broken.geo"
+    broken.write_text("Point(1) = {0, 0, 0 this is broken; letters\nfoo bar {")
+    good = Path(__file__).parents[1] / "demos" / "thermal_bar.geo"
+    with pytest.raises(InputError, match="gmsh cannot read it"):
+        domain.from_file(MPI.COMM_WORLD, broken, 2)
+    assert domain.from_file(MPI.COMM_WORLD, good, 2).regions

@@ -76,7 +76,8 @@ def _effects(place: Place, title: str) -> Iterator[str]:
 
 def _laws() -> Iterator[str]:
     yield from ("## Laws", "", "| `law =` | parameters | |", "|---|---|---|")
-    for name, law in registered().items():
+    own = {name: law for name, law in registered().items() if law.__module__.startswith(__package__.split(".")[0])}
+    for name, law in own.items():
         parameters = (_parameter(p) for p in inspect.signature(law).parameters.values())
         yield f"| `{name}` | {', '.join(parameters)} | {_escaped(_summary(law))} |"
     yield ""
