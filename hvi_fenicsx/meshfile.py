@@ -61,12 +61,16 @@ def session(comm: MPI.Comm) -> Iterator[Any]:
         return
     import gmsh
 
-    gmsh.initialize(["-noenv"], readConfigFiles=False, interruptible=False)
-    gmsh.option.setNumber("General.Terminal", 0)
+    _start(gmsh)
     try:
         yield gmsh
     finally:
         gmsh.finalize()
+
+
+def _start(gmsh: Any) -> None:
+    gmsh.initialize(["-noenv"], readConfigFiles=False, interruptible=False)
+    gmsh.option.setNumber("General.Terminal", 0)
 
 
 def _open(gmsh: Any, path: Path, dimension: int) -> dict[int, dict[str, int]]:
@@ -87,9 +91,11 @@ def _open(gmsh: Any, path: Path, dimension: int) -> dict[int, dict[str, int]]:
 def _drain(gmsh: Any) -> None:
     """Empty gmsh's parser: the rest of a broken file stays in it, and the next file would stumble over that."""
     with tempfile.NamedTemporaryFile(mode="w", suffix=".geo") as nothing:
-        nothing.write("\n")
+        nothing.write("nothing = 0;\n")  # a statement, which makes the parser read on
         nothing.flush()
         for _ in range(_MOST_REMNANTS):
+            gmsh.finalize()  # without this, gmsh does not even look at the file
+            _start(gmsh)
             with contextlib.suppress(Exception):
                 gmsh.open(nothing.name)
                 return
