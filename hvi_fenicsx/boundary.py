@@ -164,13 +164,14 @@ def _state(
     traction = reaction[surface.blocks] / surface.weights[:, None]
     normal = np.sum(surface.values(u) * surface.normals, axis=1)
     own = contact.get(id(surface), np.zeros(len(normal)))
-    pressure, friction = _tractions(terms, read, bounds, surface, traction, own)
+    slip = np.einsum("mkd,md->mk", surface.tangents, surface.values(u))
+    pressure, friction = _tractions(terms, read, bounds, surface, traction, own, slip)
     return State(
         surface,
         bounds,
         terms,
         normal,
-        np.einsum("mkd,md->mk", surface.tangents, surface.values(u)),
+        slip,
         np.full(len(normal), np.inf) if bounds is None else bounds.upper - normal,
         pressure,
         own,
@@ -190,6 +191,7 @@ def _tractions(
     surface: Surface,
     traction: Array,
     contact: Array,
+    slip: Array,
 ) -> tuple[Array, Array]:
     """σ_n and -σ_t: of what acts on the part where something does, else the residual."""
     pressure = contact.copy() if bounds is not None else np.sum(traction * surface.normals, axis=1)
@@ -200,9 +202,18 @@ def _tractions(
     for term, law in normal_laws:
         pressure = pressure - np.sum(term.directions[:, 0] * surface.normals, axis=1) * law.traction
     for term, law in zip(terms, read, strict=True):
-        if term.direction is Direction.SLIP and friction.shape[1] == 1:
-            friction = law.traction[:, None]
+        if term.direction is Direction.SLIP:
+            alone = law.hidden if term.radial else np.ones(len(friction), dtype=bool)
+            friction = np.where(alone[:, None], _along(slip, law), friction)
     return pressure, friction
+
+
+def _along(slip: Array, law: _Law) -> Array:
+    """The law's traction as a vector: along a signed slip, or in the direction of a slip vector."""
+    if slip.shape[1] == 1:
+        return law.traction[:, None]
+    moving = law.argument[:, None] > NEAR
+    return law.traction[:, None] * np.divide(slip, law.argument[:, None], out=np.zeros_like(slip), where=moving)
 
 
 def _touching(bounds: Bounds | None, normal: Array) -> npt.NDArray[np.bool_]:

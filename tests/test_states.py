@@ -9,6 +9,8 @@ import pytest
 from runs import hvi, summary, write_scene
 from scenes import DELTA, P, Q, Table, block, displacement, model, points, quadratic_linear, solved
 
+from hvi_fenicsx import Scene, solve
+
 GAMMA = 1.0e6
 LAW = quadratic_linear(GAMMA)
 
@@ -104,3 +106,31 @@ def test_the_margin_is_what_the_load_has_left() -> None:
     """Only y = e_y: the margin of the model problem is Q over the stress scale."""
     for press in (1e3, 1e6):
         assert solved(model(3, P, press)).solvability.margin == pytest.approx(press / P, rel=1e-9)
+
+
+def test_in_space_too_a_support_does_not_show_in_the_friction() -> None:
+    """Where a wall prescribes a component, the residual holds its reaction; the law's own traction stands there."""
+    found = solve(
+        Scene.model_validate(
+            {
+                "domain": {"shape": "box", "size": [1.0, 1.0, 0.5], "cells": [4, 4, 2]},
+                "material": {"model": "three_dimensional", "youngs_modulus": 2.15e11, "poisson_ratio": 0.29},
+                "boundary": {
+                    "wall": {"on": "left", "displacement": [0.0, "free", "free"]},
+                    "pull": {"on": "right", "traction": [1e6, 2e5, 0.0]},
+                    "press": {"on": "top", "traction": [0.0, 0.0, -1e6]},
+                    "floor": {
+                        "on": "bottom",
+                        "contact": {"gap": 0.0},
+                        "friction": {"law": "quadratic_linear", "gamma1": 1e6, "gamma2": 5e5, "delta": 9e-6},
+                    },
+                },
+            }
+        )
+    )
+    assert found.converged
+    assert found.examined is not None
+    state, scales = found.examined.states[0], found.problem.scales
+    held = state.surface.points[:, 0] < 1e-9
+    wanted = 1e6 / 9e-6 * state.slip[held] * scales.displacement / scales.stress
+    assert np.allclose(state.friction[held], wanted, rtol=1e-9, atol=1e-12)
