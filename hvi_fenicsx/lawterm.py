@@ -57,10 +57,6 @@ class LawTerm:
         slip = self.slip(u)
         return slip[:, 0] if slip.shape[1] == 1 else np.linalg.norm(slip, axis=1)
 
-    def energy(self, u: Array) -> float:
-        """Σ w j over this rank's vertices."""
-        return float(np.sum(self.surface.weights * self.law.value(self.argument(u))))
-
     def set_traction(self, u: Array, derivative: Array) -> None:
         """τ from the law's derivative (m,) at u; ghosts are updated. Collective."""
         tau = self._vector(u, derivative) * self.free

@@ -16,6 +16,7 @@ import numpy.typing as npt
 from . import frames
 from .lawterm import LawTerm
 from .problem import Bounds, Problem
+from .surface import component_dofs
 
 Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
@@ -98,7 +99,7 @@ def _enter_law(ledger: Ledger, term: LawTerm, u: Array) -> None:
 
 
 def _enter_bound(ledger: Ledger, bounds: Bounds, u: Array) -> None:
-    dofs, sign = along(bounds.surface.blocks, bounds.surface.normals)
+    dofs, sign = component_dofs(bounds.surface.blocks, bounds.surface.normals)
     normal = sign * u.ravel()[dofs]
     reached = (normal >= bounds.upper - NEAR) | (normal <= bounds.lower + NEAR)
     ledger.contact[dofs] |= reached
@@ -108,10 +109,4 @@ def _enter_bound(ledger: Ledger, bounds: Bounds, u: Array) -> None:
 def components(term: LawTerm) -> Iterator[tuple[npt.NDArray[np.int64], Array]]:
     """For each of a law's directions the scalar dof at every vertex and the direction's sign."""
     for i in range(term.directions.shape[1]):
-        yield along(term.surface.blocks, term.directions[:, i])
-
-
-def along(blocks: npt.NDArray[np.int32], directions: Array) -> tuple[npt.NDArray[np.int64], Array]:
-    """The scalar dof of a component direction (m, d), in local components, and its sign."""
-    axis = np.argmax(np.abs(directions), axis=1)
-    return blocks.astype(np.int64) * directions.shape[1] + axis, np.sign(directions[np.arange(len(axis)), axis])
+        yield component_dofs(term.surface.blocks, term.directions[:, i])

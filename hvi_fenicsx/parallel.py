@@ -17,22 +17,6 @@ def agree(comm: MPI.Comm, value: T) -> list[T]:
     return comm.allgather(value)
 
 
-def together(comm: MPI.Comm, action: Callable[[], T]) -> T:
-    """Run a local action on all ranks; if it fails anywhere, all ranks raise the first rank's error. Collective.
-
-    Raises:
-        HviError: the error of the lowest rank that failed.
-    """
-    error: HviError | None = None
-    result: Any = None
-    try:
-        result = action()
-    except HviError as caught:
-        error = caught
-    _raise_first(agree(comm, error))
-    return result
-
-
 def on_root(comm: MPI.Comm, action: Callable[[], T]) -> T:
     """Run an action on rank 0 only; all ranks get its result, or raise its error. Collective.
 

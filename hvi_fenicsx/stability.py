@@ -20,7 +20,8 @@ from .lawterm import LawTerm
 from .ledger import NEAR
 from .problem import Problem
 from .solvers.models import Cells, Full
-from .system import System, compile_forms, normal_dofs, traction_scale
+from .surface import component_dofs
+from .system import System, compile_forms, traction_scale
 from .timing import Timer
 
 Indices = npt.NDArray[np.int64]
@@ -56,7 +57,7 @@ def _active(system: System, states: Sequence[State], tolerance: float) -> tuple[
     by_part = {s.surface.part: s for s in states}
     for bounds in system.bounds:
         state = by_part[bounds.surface.part]
-        dofs, _ = normal_dofs(bounds.surface.blocks, bounds.surface.normals)
+        dofs, _ = component_dofs(bounds.surface.blocks, bounds.surface.normals)
         loaded = np.abs(state.contact_pressure) > tolerance
         strong.append(dofs[state.contact & loaded])
         weak.append(dofs[state.contact & ~loaded])

@@ -99,3 +99,9 @@ def tangents(normals: Array) -> Array:
     t1 = axis - np.sum(axis * normals, axis=1)[:, None] * normals
     t1 /= np.linalg.norm(t1, axis=1)[:, None]
     return np.stack([t1, np.cross(normals, t1)], axis=1) + 0.0
+
+
+def component_dofs(blocks: Indices, directions: Array) -> tuple[npt.NDArray[np.int64], Array]:
+    """The scalar dof (m,) of a direction (m, d) along an axis of its vertex's frame, and its sign (m,)."""
+    axis = np.argmax(np.abs(directions), axis=1)
+    return blocks.astype(np.int64) * directions.shape[1] + axis, np.sign(directions[np.arange(len(axis)), axis])

@@ -21,6 +21,7 @@ from petsc4py import PETSc
 from . import dilatation, frames
 from .lawterm import LawTerm
 from .problem import Problem
+from .surface import component_dofs
 from .timing import Timer
 
 Array = npt.NDArray[np.float64]
@@ -151,7 +152,7 @@ class System:
         lower.set(-np.inf)
         upper.set(np.inf)
         for bounds in self.bounds:
-            dofs, sign = normal_dofs(bounds.surface.blocks, bounds.surface.normals)
+            dofs, sign = component_dofs(bounds.surface.blocks, bounds.surface.normals)
             positive = sign > 0
             low = np.where(positive, bounds.lower, -bounds.upper)
             high = np.where(positive, bounds.upper, -bounds.lower)
@@ -241,7 +242,7 @@ class System:
         allowed = np.full(self.load.local_size, np.inf)
         d = self.problem.scales.dimension
         for bounds in self.bounds:
-            dofs, _ = normal_dofs(bounds.surface.blocks, bounds.surface.normals)
+            dofs, _ = component_dofs(bounds.surface.blocks, bounds.surface.normals)
             allowed[dofs] = np.minimum(allowed[dofs], tolerance * bounds.surface.weights)
         for term in self.terms:
             dofs = term.surface.blocks[:, None] * d + np.arange(d)
@@ -285,12 +286,6 @@ class _BulkRows:
 def traction_scale(term: LawTerm) -> float:
     """What a law's traction is judged by: its own scale, but nothing finer than a thousandth of the load's."""
     return max(term.exact.traction_scale, 1e-3)
-
-
-def normal_dofs(blocks: npt.NDArray[np.int32], normals: Array) -> tuple[npt.NDArray[np.int64], Array]:
-    """The scalar dof of u·n at vertices with axis-parallel normals, and the sign of n."""
-    axis = np.argmax(np.abs(normals), axis=1)
-    return blocks.astype(np.int64) * normals.shape[1] + axis, normals[np.arange(len(axis)), axis]
 
 
 def new_vector(space: fem.FunctionSpace) -> PETSc.Vec:

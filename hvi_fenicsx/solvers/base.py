@@ -12,7 +12,8 @@ from petsc4py import PETSc
 
 from .. import existence
 from ..laws import Superpotential
-from ..system import Model, System, normal_dofs
+from ..surface import component_dofs
+from ..system import Model, System
 from .activeset import ActiveSetSolver
 from .models import Resting
 
@@ -81,7 +82,7 @@ def held_dofs(system: System, laws: Sequence[Superpotential]) -> npt.NDArray[np.
     The normal ones of contact parts; where these leave a rigid motion, also slips at which a law has a convex kink.
     """
     d = system.problem.scales.dimension
-    dofs = [normal_dofs(b.surface.blocks, b.surface.normals)[0] for b in system.bounds]
+    dofs = [component_dofs(b.surface.blocks, b.surface.normals)[0] for b in system.bounds]
     loose = existence.moves_with_contact_closed(system.problem)
     for term, law in zip(system.terms, laws, strict=True):
         if loose and np.any(law.convex.kinks == 0.0):
@@ -102,7 +103,7 @@ def resting_start(solver: ActiveSetSolver, laws: Sequence[Superpotential], rtol:
     x.set(0.0)
     low, high = system.lower.array_r, system.upper.array_r
     contact = np.concatenate(
-        [np.empty(0, np.int64), *(normal_dofs(b.surface.blocks, b.surface.normals)[0] for b in system.bounds)]
+        [np.empty(0, np.int64), *(component_dofs(b.surface.blocks, b.surface.normals)[0] for b in system.bounds)]
     )
     x.array[contact] = closed(low[contact], high[contact])
     owned = system.problem.fixed[system.problem.fixed < x.local_size]

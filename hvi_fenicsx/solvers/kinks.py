@@ -10,6 +10,7 @@ from petsc4py import PETSc
 
 from ..laws import ConvexPart
 from ..lawterm import LawTerm
+from ..surface import component_dofs
 from ..system import System, traction_scale
 from .models import Cells, Full, Majorant
 
@@ -84,11 +85,8 @@ def _radial_moves(
 
 def _slip_dofs(term: LawTerm) -> tuple[npt.NDArray[np.int64], Array, npt.NDArray[np.bool_]]:
     """The scalar dof of each slip, the sign of its direction, and whether it is not prescribed."""
-    direction = term.directions[:, 0, :]
-    axis = np.argmax(np.abs(direction), axis=1)
-    rows = np.arange(len(axis))
-    dofs = term.surface.blocks.astype(np.int64) * direction.shape[1] + axis
-    return dofs, direction[rows, axis], term.free[rows, axis] > 0
+    dofs, sign = component_dofs(term.surface.blocks, term.directions[:, 0, :])
+    return dofs, sign, term.free[np.arange(len(dofs)), dofs % term.free.shape[1]] > 0
 
 
 def _jump(part: ConvexPart, at: Array) -> Array:

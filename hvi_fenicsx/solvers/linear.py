@@ -81,7 +81,6 @@ class HeldPreconditioner:
 
     def __init__(self, system: System, settings: LinearSettings, timer: Timer) -> None:
         self.system, self.settings, self._timer = system, settings, timer
-        self.setups = 0
         self._held: Indices | None = None
         self._rates: list[npt.NDArray[np.float64]] = []
         self._fresh, self._worn = 0, False
@@ -97,7 +96,6 @@ class HeldPreconditioner:
             self._build(held)
         self._held, self._rates = held.copy(), self.system.rates
         self._fresh, self._worn = 0, False
-        self.setups += 1
 
     def _fits(self, held: Indices) -> bool:
         if self._held is None or self._worn:
