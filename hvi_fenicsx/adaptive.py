@@ -1,0 +1,150 @@
+"""Adaptivity: solve, estimate, mark, refine, transfer, and again: a scene climbs a ladder of meshes made to measure.
+
+Cells are marked by Dörfler's bulk criterion (Dörfler 1996) on the estimated error by cell.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from . import ladder, refinement
+from .domain import Domain
+from .estimate import Estimate
+from .parallel import agree
+from .refinement import Refinement
+from .scene import Scene
+from .solution import Prepared, Solution, finish, prepare
+from .solvers.base import Progress, silent
+from .timing import Timer
+
+Array = npt.NDArray[np.float64]
+_FEWEST = 3
+"""Cells each way that the coarsest block has at least."""
+_LARGEST_PART = 1 / 6
+"""Of a shape's extent, that the cells of the coarsest mesh of it have at most."""
+
+
+@dataclass(frozen=True)
+class Rung:
+    """One mesh of the ladder, solved.
+
+    Attributes:
+        prepared, solution: what was solved on it, and what was found. step: the prolongation from the rung below to
+            its unknowns, None on the first.
+    """
+
+    prepared: Prepared
+    solution: Solution
+    step: PETSc.Mat | None
+
+    @property
+    def comm(self) -> MPI.Comm:
+        """The communicator."""
+        return self.prepared.system.comm
+
+    @property
+    def dofs(self) -> int:
+        """Global number of unknowns."""
+        return self.prepared.system.dofs
+
+
+@dataclass(frozen=True)
+class Climber:
+    """What all rungs share.
+
+    Attributes:
+        timer: where time goes. progress, interrupted: see :mod:`.solvers.base`.
+        existence: whether it is asked for on each mesh anew, not on the first only.
+    """
+
+    timer: Timer
+    progress: Progress = silent
+    interrupted: Callable[[], bool] = lambda: False
+    existence: bool = False
+
+    def begin(self, scene: Scene, comm: MPI.Comm) -> Rung:
+        """A scene solved on its own mesh, without a coarser one. Collective.
+
+        Raises:
+            InputError: the scene does not fit its mesh, on all ranks alike.
+        """
+        prepared = prepare(scene, comm, self.timer)
+        return Rung(prepared, finish(prepared, self.progress, self.interrupted), None)
+
+    def up(self, rung: Rung, nesting: Refinement, scene: Scene) -> Rung:
+        """The next rung: its scene solved on the refined mesh, from the solution on the rung below. Collective."""
+        prepared, below = self._prepared(rung, scene, nesting.domain), rung.prepared.system
+        with self.timer("setup"):
+            step = ladder.between(prepared.system, below, nesting)
+            prepared.system.below = ladder.stacked(step, below)
+        return self._solved(rung, prepared, step)
+
+    def again(self, rung: Rung, scene: Scene) -> Rung:
+        """The same mesh with another solver table. Collective."""
+        prepared, below = self._prepared(rung, scene, rung.prepared.problem.domain), rung.prepared.system
+        prepared.system.below = below.below
+        return self._solved(rung, prepared, _identity(below.load))
+
+    def _prepared(self, rung: Rung, scene: Scene, body: Domain) -> Prepared:
+        return prepare(scene, rung.comm, self.timer, body, None if self.existence else rung.solution.solvability)
+
+    def _solved(self, rung: Rung, prepared: Prepared, step: PETSc.Mat) -> Rung:
+        found = rung.solution.solved
+        start = (rung.prepared.system, found, step) if found is not None else None
+        return Rung(prepared, finish(prepared, self.progress, self.interrupted, start), step)
+
+
+def _identity(like: PETSc.Vec) -> PETSc.Mat:
+    sizes = like.getSizes()
+    return PETSc.Mat().createConstantDiagonal((sizes, sizes), 1.0, comm=like.comm)
+
+
+def refined(rung: Rung, bulk: float) -> Refinement:
+    """The mesh with so much of the squared error refined; the whole mesh where nothing was estimated. Collective."""
+    domain, estimate = rung.prepared.problem.domain, rung.solution.estimate
+    with rung.prepared.timer("mesh"):
+        if estimate is None or bulk >= 1.0 or estimate.discretisation == 0.0:
+            return refinement.uniform(domain)
+        return refinement.marked(domain, marked(rung.comm, estimate, bulk))
+
+
+def marked(comm: MPI.Comm, estimate: Estimate, bulk: float) -> npt.NDArray[np.int32]:
+    """The cells (local, owned) of the largest errors, which make up this share of the squared error. Collective.
+
+    The threshold is one for all ranks; cells that tie with the last one are marked too, so symmetry stays.
+    """
+    squares = estimate.cells**2
+    everything = np.sort(np.concatenate(agree(comm, squares)))[::-1]
+    running = np.cumsum(everything)
+    last = min(int(np.searchsorted(running, bulk * running[-1])), len(everything) - 1)
+    return np.flatnonzero(squares >= everything[last] * (1 - 1e-9)).astype(np.int32)
+
+
+def coarsest(scene: Scene) -> Scene:
+    """The scene on the mesh to begin with: its own, made coarser as far as its shape allows.
+
+    Blocks keep at least three cells each way, gmsh's shapes cells of a sixth of their extent; a file stays as it is.
+    """
+    cells = getattr(scene.domain, "cells", None)
+    if cells is not None:
+        while min(halved := tuple(math.ceil(n / 2) for n in cells)) >= _FEWEST:
+            cells = halved
+        return _with(scene, cells=cells)
+    size = getattr(scene.domain, "mesh_size", None)
+    if size is None:
+        return scene
+    largest = math.sqrt(scene.domain.area()) * _LARGEST_PART  # type: ignore[union-attr]
+    factor = 2.0 ** max(0, math.floor(math.log2(largest / size)))
+    below = getattr(scene.domain, "mesh_size_below", None)
+    return _with(scene, mesh_size=factor * size, **({"mesh_size_below": factor * below} if below else {}))
+
+
+def _with(scene: Scene, **domain: object) -> Scene:
+    return scene.model_copy(update={"domain": scene.domain.model_copy(update=domain)})

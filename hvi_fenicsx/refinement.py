@@ -1,0 +1,116 @@
+"""A domain refined, uniformly or where it is marked, with its named sides and regions.
+
+Edges are bisected by Plaza's rule (Plaza and Carey 2000): the longest edge of a cell goes first, so that angles stay
+bounded from below. Children stay on their parent's rank. New vertices of a side whose curve is known move onto it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+from dolfinx import la
+from dolfinx import mesh as dmesh
+
+from . import compat
+from .domain import Domain
+from .domain_shapes import Arc
+
+Array = npt.NDArray[np.float64]
+Indices = npt.NDArray[np.int32]
+Halves = npt.NDArray[np.int8]
+
+
+@dataclass(frozen=True)
+class Refinement:
+    """A refined domain and how it came from the one before.
+
+    Attributes:
+        domain: the refined one.
+        parents: local parent cell of each local cell, shape (cells,).
+        halves: twice the barycentric coordinates of each cell's vertices in the parent cell, shape (cells, d+1, d+1):
+            a 2 for a vertex of the parent, two 1s for the middle of one of its edges.
+    """
+
+    domain: Domain
+    parents: Indices
+    halves: Halves
+
+
+def uniform(domain: Domain) -> Refinement:
+    """Each cell cut into 2^d. Collective."""
+    return _refined(domain, None)
+
+
+def marked(domain: Domain, cells: Indices) -> Refinement:
+    """All edges of the marked cells (local indices) bisected, and others as far as the mesh asks for it. Collective."""
+    d = domain.dimension
+    domain.mesh.topology.create_entities(1)
+    domain.mesh.topology.create_connectivity(d, 1)
+    return _refined(domain, dmesh.compute_incident_entities(domain.mesh.topology, cells, d, 1))
+
+
+def _refined(domain: Domain, edges: Indices | None) -> Refinement:
+    mesh, parents = compat.refine(domain.mesh, edges)
+    halves = _halves(domain.mesh, mesh, parents)
+    sides = _sides(domain, mesh, parents, halves)
+    regions = {name: np.flatnonzero(np.isin(parents, cells)).astype(np.int32) for name, cells in domain.regions.items()}
+    _bend(mesh, sides, domain.curves)
+    return Refinement(replace(domain, mesh=mesh, sides=sides, regions=regions), parents, halves)
+
+
+def _corners(mesh: dmesh.Mesh) -> Array:
+    """Vertices of each local cell, shape (cells, d+1, d)."""
+    return np.asarray(mesh.geometry.x[compat.geometry_dofmap(mesh)][:, :, : mesh.geometry.dim])
+
+
+def _halves(coarse: dmesh.Mesh, fine: dmesh.Mesh, parents: Indices) -> Halves:
+    """Twice the barycentric coordinates of the children's vertices. Before anything is bent they are whole numbers."""
+    corners = _corners(coarse)[parents]
+    edges = corners[:, 1:] - corners[:, :1]
+    inner = np.linalg.solve(edges.transpose(0, 2, 1), (_corners(fine) - corners[:, :1]).transpose(0, 2, 1))
+    inner = inner.transpose(0, 2, 1)
+    both = np.concatenate([1.0 - inner.sum(axis=2, keepdims=True), inner], axis=2)
+    return np.rint(2.0 * both).astype(np.int8)
+
+
+def _cell_facets(mesh: dmesh.Mesh) -> Indices:
+    """Local facets of each local cell, shape (cells, d+1); the i-th lies opposite to the i-th vertex."""
+    d = mesh.topology.dim
+    mesh.topology.create_entities(d - 1)
+    mesh.topology.create_connectivity(d, d - 1)
+    mesh.topology.create_connectivity(d - 1, d)
+    return np.asarray(mesh.topology.connectivity(d, d - 1).array).reshape(-1, d + 1)
+
+
+def _sides(domain: Domain, fine: dmesh.Mesh, parents: Indices, halves: Halves) -> dict[str, Indices]:
+    """The children's facets that lie in those of the domain's sides."""
+    coarse, own = _cell_facets(domain.mesh), _cell_facets(fine)
+    # A child's facet i lies in its parent's facet j when none of its vertices (all but i) has a part in vertex j.
+    cell, i, j = np.nonzero(halves.sum(axis=1, dtype=np.int8)[:, None, :] == halves)
+    above = coarse[parents[cell], j]
+    found = {}
+    for name, facets in domain.sides.items():
+        mask = np.zeros(coarse.max(initial=-1) + 1, dtype=bool)
+        mask[facets] = True
+        found[name] = np.unique(own[cell, i][mask[above]]).astype(np.int32)
+    return found
+
+
+def _bend(mesh: dmesh.Mesh, sides: Mapping[str, Indices], curves: Mapping[str, Arc]) -> None:
+    """Move the vertices of curved sides onto their curves, on all ranks that have them. Collective."""
+    for name, curve in curves.items():
+        nodes = np.empty(0, dtype=np.int32)
+        if len(sides[name]):  # dolfinx divides by their number
+            nodes = np.unique(dmesh.entities_to_geometry(mesh, mesh.topology.dim - 1, sides[name]))
+        x = mesh.geometry.x[nodes, :2]
+        shifts = np.column_stack([curve.nearest(x) - x, np.ones(len(nodes))])
+        shared = la.vector(mesh.geometry.index_map(), 3)
+        shared.array[:] = 0.0
+        shared.array.reshape(-1, 3)[nodes] = shifts
+        shared.scatter_reverse(la.InsertMode.add)
+        shared.scatter_forward()
+        total = shared.array.reshape(-1, 3)
+        mesh.geometry.x[:, :2] += total[:, :2] / np.maximum(total[:, 2:], 1.0)

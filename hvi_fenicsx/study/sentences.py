@@ -1,0 +1,196 @@
+"""What a study says in words a person can act on, all of it derived from its rows."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+
+from .reference import Certainty
+from .table import Row, front, told
+
+TARGETS = (0.1, 0.01, 0.001)
+NAMES: Mapping[str, str] = {
+    "energy_norm": "the energy norm",
+    "u_t_l2": "u_t (L2)",
+    "u_t_max": "u_t (largest)",
+    "friction_l1": "-σ_t (L1)",
+    "friction_l2": "-σ_t (L2)",
+    "friction_max": "-σ_t (largest, away from jumps)",
+    "pressure_l1": "-σ_n (L1)",
+    "pressure_l2": "-σ_n (L2)",
+    "contact_set": "the contact set",
+    "resultant": "the contact resultant",
+    "friction_force": "the friction force",
+}
+_HEADLINES = ("energy_norm", "u_t_l2", "friction_l1", "pressure_l1")
+_NEARLY, _MOSTLY = 0.9, 0.65
+ROUNDING = 1e-9
+"""Relative errors below this are no errors of h or ε."""
+_CLEAR = 2.0
+"""Times the reference's own error, an error tells an order."""
+_REFUSED = 2
+"""The exit code of a point whose method does not take the scene."""
+Certain = Mapping[str, Certainty]
+
+
+def headlines(rows: Sequence[Row]) -> list[str]:
+    """The quantities that are told and drawn: energy norm, slip, and -σ_t (-σ_n where there is no friction)."""
+    known = [q for q in _HEADLINES if any(r.error(q) is not None for r in rows)]
+    return [q for q in known if q != "pressure_l1" or "friction_l1" not in known]
+
+
+def told_first(quantities: Sequence[str]) -> str:
+    """The quantity that a study is most about: the traction on Γc, where there is one."""
+    return quantities[-1] if quantities else "energy_norm"
+
+
+def all_of_them(rows: Sequence[Row], own: Row, exact: Row, certain: Certain) -> list[str]:
+    """The sentences, the most useful first."""
+    quantities = headlines(rows)
+    found = [_own(own, exact, told_first(quantities))]
+    found += [_targets(rows, q, certain) for q in reversed(quantities)]
+    found += [
+        *_orders(rows, own, quantities, certain),
+        *_adaptive(rows, certain),
+        *_methods(rows, own),
+        *_failures(rows),
+    ]
+    return found
+
+
+def _own(own: Row, exact: Row, quantity: str) -> str:
+    setting = f"The scene's own setting ({own.words})"
+    error = own.error(quantity)
+    if error is None:
+        return f"{setting} was not measured: {own.reason}."
+    text = f"{setting} takes {seconds(own.seconds)} and is {percent(error)} off in {NAMES[quantity]}"
+    bare = exact.error(quantity)
+    if own.smoothing is None or bare is None:
+        return f"{text}."
+    share = share_of_epsilon(own, exact, quantity)
+    text += f", {_how_much(share)}" if share is not None else ""
+    return f"{text}. The exact law on the same mesh takes {seconds(exact.seconds)} and is {percent(bare)} off."
+
+
+def share_of_epsilon(own: Row, exact: Row, quantity: str) -> float | None:
+    """ε's part of the error: the distance from the exact law on the same mesh, beside that law's error in h."""
+    part, bare = (own.epsilon_part or {}).get(quantity), exact.error(quantity)
+    if part is None or bare is None or part + bare < ROUNDING:
+        return None
+    return part / (part + bare)
+
+
+def _how_much(share: float) -> str:
+    for limit, words in ((_NEARLY, "nearly all of it ε"), (_MOSTLY, "most of it ε"), (1 - _MOSTLY, "half of it ε")):
+        if share > limit:
+            return words
+    return "most of it h" if share > 1 - _NEARLY else "nearly all of it h"
+
+
+def _targets(rows: Sequence[Row], quantity: str, certain: Certain) -> str:
+    """What each accuracy costs; one sentence a quantity."""
+    best = front(rows, quantity, certain)
+    reached: dict[str, tuple[Row, list[str]]] = {}
+    missed = []
+    for target in TARGETS:
+        cheapest = next((r for r in best if (told(r, quantity, certain) or 0.0) <= target), None)
+        if cheapest is None:
+            missed = [_missed(rows, quantity, target, certain)]
+            break
+        reached.setdefault(cheapest.point, (cheapest, []))[1].append(percent(target))
+    parts = [f"{', '.join(t)} for {seconds(r.seconds)} ({r.words})" for r, t in reached.values()]
+    return f"In {NAMES[quantity]}: {'; '.join([*parts, *missed])}."
+
+
+def _missed(rows: Sequence[Row], quantity: str, target: float, certain: Certain) -> str:
+    own = certain[quantity].error
+    if own is not None and own > target:
+        return f"{percent(target)} cannot be told: the reference itself is uncertain by {percent(own)}"
+    errors = [(r.error(quantity), r) for r in rows]
+    best, at = min(((e, r) for e, r in errors if e is not None), key=lambda pair: pair[0])
+    return f"{percent(target)} is not reached here: the best is {percent(best)} for {seconds(at.seconds)} ({at.words})"
+
+
+def slope(points: Sequence[tuple[float, float]]) -> float | None:
+    """The order of y = C xᵖ through the two smallest x; None where there are no two positive y."""
+    known = sorted((x, y) for x, y in points if x > 0.0 and y > ROUNDING)
+    if len(known) < 2 or known[0][0] == known[1][0]:
+        return None
+    (x0, y0), (x1, y1) = known[:2]
+    return math.log(y1 / y0) / math.log(x1 / x0)
+
+
+def over_h(rows: Sequence[Row], own: Row, quantity: str, *, like: Row | None = None) -> list[tuple[float, float]]:
+    """(h, error) of the points with the own method and the law of ``like`` (exact without it), coarse to fine."""
+    law = like.law if like else "exact law"
+    found: dict[float, float] = {}
+    for r in rows:
+        error = r.error(quantity)
+        same = (r.method, r.tolerance, r.linear_solver) == (own.method, own.tolerance, own.linear_solver)
+        if same and r.law == law and r.h is not None and error is not None:
+            found[r.h] = error
+    return sorted(found.items(), reverse=True)
+
+
+def order(rows: Sequence[Row], own: Row, quantity: str, certain: Certain) -> float | None:
+    """In h of the exact law's error, from the two finest meshes whose error stands clear of the reference's own."""
+    least = _CLEAR * (certain[quantity].error or 0.0)
+    return slope([(h, error) for h, error in over_h(rows, own, quantity) if error >= least])
+
+
+def _orders(rows: Sequence[Row], own: Row, quantities: Sequence[str], certain: Certain) -> Iterator[str]:
+    found = [(q, order(rows, own, q, certain)) for q in quantities]
+    parts = [f"h^{value:.2f} in {NAMES[q]}" for q, value in found if value is not None]
+    if parts:
+        yield f"With the exact law the error falls as {', '.join(parts)} (two finest meshes, clear of the reference)."
+
+
+def _adaptive(rows: Sequence[Row], certain: Certain) -> Iterator[str]:
+    """What the adaptive meshes reached, as far as it can be told, and which uniform one does as well."""
+    known = [(e, r) for r in rows if r.law == "exact law" and (e := told(r, "energy_norm", certain)) is not None]
+    found = sorted(((e, r) for e, r in known if r.adaptive), key=lambda pair: -pair[0])
+    if not found:
+        return
+    parts = [f"{percent(e)} with {r.dofs:,} unknowns ({seconds(r.seconds)})" for e, r in found]
+    best = found[-1][0]
+    uniform = [(r.dofs or 0, r) for e, r in known if not r.adaptive and e <= best]
+    fewest = min(uniform, key=lambda pair: (pair[0], pair[1].seconds or 0.0), default=None)
+    like = f"{fewest[0]:,} ({seconds(fewest[1].seconds)})" if fewest else "more than any measured here has"
+    yield f"Adaptive meshes: {', '.join(parts)} in the energy norm; a uniform mesh needs {like} for {percent(best)}."
+
+
+def _methods(rows: Sequence[Row], own: Row) -> Iterator[str]:
+    def rest(r: Row) -> tuple[object, ...]:
+        return (r.mesh, r.law, r.tolerance, r.linear_solver)
+
+    same = [r for r in rows if rest(r) == rest(own)]
+    if len({r.method for r in same}) > 1:
+        ordered = sorted(same, key=lambda r: (not r.converged, r.seconds or math.inf))
+        tried = [r for r in ordered if r.exit_code != _REFUSED]
+        parts = [f"{r.method} {seconds(r.seconds) if r.converged else 'not certified'}" for r in tried]
+        refused = [r.method for r in ordered if r.exit_code == _REFUSED]
+        rest_of_them = f"; {', '.join(refused)} not for this scene" if refused else ""
+        yield f"Methods, at the scene's own setting: {', '.join(parts)}{rest_of_them}."
+
+
+def _failures(rows: Sequence[Row]) -> Iterator[str]:
+    bad = [r for r in rows if not r.converged and r.exit_code != _REFUSED]
+    if bad:
+        yield f"{len(bad)} of {len(rows)} points ended without a certified solution; study.csv tells why."
+
+
+def percent(value: float) -> str:
+    """A relative error as a percentage, to two digits."""
+    scaled = 100.0 * value
+    if scaled < 1e-3:
+        return "below 0.001 %"
+    return f"{scaled:.0f} %" if scaled >= 10.0 else f"{scaled:.2g} %"
+
+
+def seconds(value: float | None) -> str:
+    """A time, to two digits."""
+    if value is None:
+        return "an unknown time"
+    if value < 0.1:
+        return f"{1e3 * value:.2g} ms"
+    return f"{value:.2g} s" if value < 9.95 else f"{value:.0f} s"
