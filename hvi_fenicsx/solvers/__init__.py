@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, Protocol
 
-from ..errors import InputError
+from .. import methods
 from ..system import System
 from ..timing import Timer
 from .activeset import ActiveSetSolver
@@ -15,6 +15,7 @@ from .branch import BranchIteration
 from .condensed import Condensation
 from .continuation import Continuation
 from .linear import LinearSettings
+from .single import ConvexProgramme, LinearSolve, is_equation, is_quadratic
 from .ssls import SemismoothNewton
 from .tao import BoundedNewton
 
@@ -23,9 +24,16 @@ if TYPE_CHECKING:
 
 
 class Method(Protocol):
-    """A way to solve the inequality on a system."""
+    """A way to solve the inequality on a system.
+
+    Attributes:
+        name: in ``summary.json``. words: what it is.
+        takes_start: whether ``solve`` takes a displacement to begin at, and so goes up the ladder.
+    """
 
     name: str
+    words: str
+    takes_start: bool
 
     def __init__(self, solver: ActiveSetSolver, settings: Settings) -> None: ...
 
@@ -51,17 +59,23 @@ def relative_width(wanted: Solver, system: System) -> float | None:
     return wanted.epsilon_absolute / (system.terms[0].exact.energy_scale * scales.stress * scales.displacement)
 
 
-def create(wanted: Solver, system: System, timer: Timer, progress: Progress, interrupted: Callable[[], bool]) -> Method:
-    """The method of a scene's solver table, ready to solve.
+def choose(wanted: Solver, system: System) -> type[Method]:
+    """The class that solves a system: the one that the scene names, or the simplest that what it holds allows."""
+    if wanted.method == "auto" and is_quadratic(system):
+        return LinearSolve if is_equation(system) else ConvexProgramme
+    return METHODS[wanted.method] if wanted.method in METHODS else methods.own()[wanted.method]
 
-    Raises:
-        InputError: the method is not there.
-    """
-    if wanted.method not in METHODS:
-        raise InputError(f'solver.method = "{wanted.method}" is not available; use {", ".join(METHODS)}')
+
+def create(wanted: Solver, system: System, timer: Timer, progress: Progress, interrupted: Callable[[], bool]) -> Method:
+    """The method of a scene's solver table, ready to solve."""
+    method = choose(wanted, system)
     linear = LinearSettings.choose(system, wanted.linear_solver)
     epsilon = relative_width(wanted, system)
     settings = Settings(
-        tolerance=wanted.tolerance, max_newton=wanted.max_iterations, progress=progress, epsilon=epsilon
+        tolerance=wanted.tolerance,
+        max_newton=wanted.max_iterations,
+        progress=progress,
+        epsilon=epsilon,
+        start=wanted.start,
     )
-    return METHODS[wanted.method](ActiveSetSolver(system, linear, timer, interrupted), settings)
+    return method(ActiveSetSolver(system, linear, timer, interrupted), settings)

@@ -6,7 +6,8 @@ as merit function, and a preconditioner that works at full size.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -23,6 +24,8 @@ from .options import configure
 Array = npt.NDArray[np.float64]
 Progress = Callable[[int, float, int], None]
 """Called with iteration, residual, and vertices in contact (of all ranks)."""
+Sizes = tuple[float, float]
+"""Of a residual: its norm relative to the load's; its largest nodal traction relative to what is allowed on Γc."""
 _ON_BOUND = 1e-12
 _STILL, _PATIENCE = 1e-3, 2
 """So many steps that change the residual by less than this fraction: the line search no longer sees the energy fall."""
@@ -30,6 +33,8 @@ _ROUNDING = 1e-7
 """Below this, twice as many steps without halving the residual mean that rounding allows no more."""
 _LARGEST_ROUNDING, _SAFETY = 1e-4, 4.0
 """A residual above the first is no rounding; the sample of the rounding error is trusted within the second."""
+_INEXACT, _FORCING, _FINEST = 1e-2, 0.5, 1e-4
+"""Relative tolerance of a step's linear solve: while the active set moves; as a part of what is left; the least."""
 _RUNAWAY = 1e8
 """A displacement of so many times p0 L / E0 is a body that slides away."""
 _REASON = {v: k for k, v in vars(PETSc.SNES.ConvergedReason).items() if isinstance(v, int) and not k.startswith("_")}
@@ -69,6 +74,16 @@ class ActiveSetSolver:
         self.interrupted = interrupted
         self.progress: Progress | None = None
         self._residual = system.load.duplicate()
+        self._allowed = system.allowed(1.0)[system.rows.dofs]
+
+    @contextmanager
+    def reporting(self, progress: Progress) -> Iterator[None]:
+        """Report to this as long as it lasts; then no more: a reporter holds the solver, and both would stay."""
+        before, self.progress = self.progress, progress
+        try:
+            yield
+        finally:
+            self.progress = before
 
     def destroy(self) -> None:
         """Free the PETSc objects."""
@@ -77,7 +92,8 @@ class ActiveSetSolver:
 
     def in_contact(self, x: PETSc.Vec) -> int:
         """Vertices on a bound of the scene. Collective."""
-        u, lower, upper = x.array_r, self.system.lower.array_r, self.system.upper.array_r
+        at = self.system.rows.dofs
+        u, lower, upper = x.array_r[at], self.system.lower.array_r[at], self.system.upper.array_r[at]
         return int(self.system.comm.allreduce(int(np.count_nonzero((u <= lower) | (u >= upper)))))
 
     def measure(self, x: PETSc.Vec, residual: PETSc.Vec, lower: PETSc.Vec, upper: PETSc.Vec) -> float:
@@ -86,13 +102,19 @@ class ActiveSetSolver:
         The larger of its norm relative to the load's, and of the largest nodal traction error on Γc relative to what is
         allowed there.
         """
-        return self._size(projected(x.array_r, residual.array_r, lower.array_r, upper.array_r))
+        return max(self.sizes(x, residual, lower, upper))
 
-    def _size(self, r: Array) -> float:
-        nodal = float(np.max(np.abs(r) / self.system.allowed(1.0), initial=0.0))
+    def sizes(self, x: PETSc.Vec, residual: PETSc.Vec, lower: PETSc.Vec, upper: PETSc.Vec) -> Sizes:
+        """The two of which :meth:`measure` is the larger. Collective."""
+        at, r = self.system.rows.dofs, residual.array_r.copy()
+        r[at] = projected(x.array_r[at], r[at], lower.array_r[at], upper.array_r[at])
+        return self._sizes(r)
+
+    def _sizes(self, r: Array) -> Sizes:
+        nodal = float(np.max(np.abs(r[self.system.rows.dofs]) / self._allowed, initial=0.0))
         comm = self.system.comm
         norm = float(np.sqrt(comm.allreduce(float(r @ r)))) / self.system.scale
-        return max(norm, comm.allreduce(nodal, op=MPI.MAX))
+        return norm, float(comm.allreduce(nodal, op=MPI.MAX))
 
     def newton_step(self, x: PETSc.Vec, held: npt.NDArray[np.int32], models: Sequence[Model], rtol: float) -> Outcome:
         """One Newton step with some dofs (local, owned) kept at their values in x. Collective."""
@@ -141,19 +163,29 @@ class ActiveSetSolver:
             if run.stopped:
                 reason = "interrupted"
             found = Outcome(run.last <= tolerance, run.iterations, run.linear, run.last, reason, run.stopped)
-            return found if found.converged or run.stopped else self._to_rounding(found, x)
+            return found if found.converged or run.stopped else self._to_rounding(found, run.sizes, x)
 
-    def _to_rounding(self, found: Outcome, x: PETSc.Vec) -> Outcome:
-        """A residual that is but rounding can fall no further: the solve has converged as far as numbers go."""
+    def judged(self, step: Outcome, x: PETSc.Vec, models: Sequence[Model], tolerance: float) -> Outcome:
+        """The outcome of a step without bounds: converged if the residual at x is small enough. Collective."""
+        self.system.residual(x, self._residual, models)
+        sizes = self._sizes(self._residual.array_r)
+        found = replace(step, converged=max(sizes) <= tolerance, measure=max(sizes))
+        return found if found.converged else self._to_rounding(found, sizes, x)
+
+    def _to_rounding(self, found: Outcome, sizes: Sizes, x: PETSc.Vec) -> Outcome:
+        """A residual that is but rounding can fall no further: the solve has converged as far as numbers go.
+
+        Rounding of the body's forces is no excuse for a wrong traction on Γc: each of the two has its own floor.
+        """
         if not np.isfinite(found.measure) or not np.isfinite(x.norm()) or found.measure > _LARGEST_ROUNDING:
             return found
         noise = self.system.load.duplicate()
         self.system.rounding(x, noise)
-        floor = _SAFETY * self._size(noise.array_r)
+        floors = [_SAFETY * size for size in self._sizes(noise.array_r)]
         noise.destroy()
-        if found.measure > floor:
+        if any(size > floor for size, floor in zip(sizes, floors, strict=True)):
             return found
-        return replace(found, converged=True, rounding=floor, reason="as small as rounding allows")
+        return replace(found, converged=True, rounding=max(floors), reason="as small as rounding allows")
 
 
 class _Run:
@@ -165,6 +197,7 @@ class _Run:
         self.owner, self.models, self.tolerance = owner, models, tolerance
         self.lower, self.upper = lower, upper
         self.last, self.linear, self.iterations, self.reason = float("inf"), 0, 0, 0
+        self.sizes: Sizes = (float("inf"), float("inf"))
         self._stalled = self._slow = 0
         self.stopped = False
 
@@ -174,7 +207,7 @@ class _Run:
         snes = PETSc.SNES().create(system.comm)
         snes.setType("vinewtonrsls")
         snes.setFunction(self._function, system.load.duplicate())
-        snes.setJacobian(self._jacobian, system.matrix)
+        snes.setJacobian(self._jacobian, _unextracted(self.owner.held))
         snes.setVariableBounds(self.lower, self.upper)
         snes.setObjective(lambda _, x: system.energy(x, self.models))
         snes.setConvergenceTest(self._converged)
@@ -188,13 +221,19 @@ class _Run:
     def _preconditioner(self, snes: PETSc.SNES) -> PETSc.PC:
         pc = snes.getKSP().getPC()
         pc.setType(PETSc.PC.Type.PYTHON)
-        pc.setPythonContext(_ReducedPC(snes, self.owner.held))
+        pc.setPythonContext(_ReducedPC(snes, self.owner.held, self._accuracy))
         return pc
+
+    def _accuracy(self, *, moved: bool) -> float:
+        """How far a linear solve goes: to the tolerance, but not for an active set that is still on the move."""
+        return max(_INEXACT if moved else _FORCING * self.tolerance / self.last, _FINEST)
 
     def forget(self, snes: PETSc.SNES) -> None:
         """Read off what is needed and free the SNES."""
         self.iterations, self.reason = snes.getIterationNumber(), snes.getConvergedReason()
         self.linear = snes.getLinearSolveIterations()
+        if self.reason == PETSc.SNES.ConvergedReason.DIVERGED_LINEAR_SOLVE:
+            self.owner.held.report(snes.getKSP().getIterationNumber())
         snes.destroy()
 
     def _function(self, snes: PETSc.SNES, x: PETSc.Vec, f: PETSc.Vec) -> None:
@@ -208,7 +247,8 @@ class _Run:
         x, (f, _) = snes.getSolution(), snes.getFunction()[:2]
         if iteration:
             self.owner.held.report(snes.getKSP().getIterationNumber())
-        previous, self.last = self.last, self.owner.measure(x, f, self.lower, self.upper)
+        self.sizes = self.owner.sizes(x, f, self.lower, self.upper)
+        previous, self.last = self.last, max(self.sizes)
         if self.owner.progress:
             self.owner.progress(iteration, self.last, self.owner.in_contact(x))
         self.stopped = self.owner.interrupted()
@@ -225,23 +265,68 @@ class _Run:
         return PETSc.SNES.ConvergedReason.CONVERGED_ITERATING
 
 
+def _unextracted(held: HeldPreconditioner) -> PETSc.Mat:
+    """J as SNES VI sees it: its inactive part is multiplied at full size instead of being copied out."""
+    sizes = held.system.matrix.getSizes()
+    matrix = PETSc.Mat().createPython(sizes, _Whole(held), comm=held.system.comm)
+    matrix.setUp()
+    return matrix
+
+
+class _Whole:
+    """PETSc's view of J, which is symmetric."""
+
+    def __init__(self, held: HeldPreconditioner) -> None:
+        self._held = held
+
+    def mult(self, _: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        """Y = J x, where a line search that fails looks for a stationary point of the residual's norm. Collective."""
+        self._held.system.matrix.mult(x, y)
+
+    multTranspose = mult
+
+    def createSubMatrix(self, _: PETSc.Mat, rows: PETSc.IS, columns: PETSc.IS, into: PETSc.Mat | None) -> PETSc.Mat:
+        """The rows and columns of the inactive dofs. Collective."""
+        self._held.select(rows)
+        sizes = (rows.getLocalSize(), rows.getSize())
+        matrix = PETSc.Mat().createPython((sizes, sizes), _Reduced(self._held), comm=rows.comm)
+        matrix.setUp()
+        return matrix
+
+
+class _Reduced:
+    """PETSc's view of J on the inactive dofs of a step."""
+
+    def __init__(self, held: HeldPreconditioner) -> None:
+        self._held = held
+
+    def mult(self, _: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        """Y = J x. Collective."""
+        self._held.multiply_reduced(x, y)
+
+
 class _ReducedPC:
     """PETSc's view of :class:`HeldPreconditioner` on the inactive dofs of a SNES VI step."""
 
-    def __init__(self, snes: PETSc.SNES, held: HeldPreconditioner) -> None:
-        self._snes, self._held = snes, held
-        self._inactive: PETSc.IS | None = None
+    def __init__(self, snes: PETSc.SNES, held: HeldPreconditioner, accuracy: Callable[..., float]) -> None:
+        self._snes, self._held, self._accuracy = snes, held, accuracy
+        self._active: npt.NDArray[np.int32] | None = None
 
     def setUp(self, pc: PETSc.PC) -> None:
         """Take the active dofs of this step and prepare for them."""
-        self._inactive = self._snes.getVIInactiveSet()
         start, end = self._held.system.load.owner_range
-        active = np.setdiff1d(np.arange(start, end), self._inactive.getIndices(), assume_unique=True)
-        self._held.prepare((active - start).astype(np.int32))
+        active = np.ones(end - start, dtype=bool)
+        active[self._snes.getVIInactiveSet().getIndices() - start] = False
+        found = np.flatnonzero(active).astype(np.int32)
+        moved = self._active is not None and not np.array_equal(found, self._active)
+        moved = bool(self._held.system.comm.allreduce(moved))
+        self._snes.getKSP().setTolerances(rtol=self._accuracy(moved=moved))
+        self._active = found
+        self._held.prepare(found)
 
     def apply(self, pc: PETSc.PC, x: PETSc.Vec, y: PETSc.Vec) -> None:
         """Y = P^-1 x on the inactive dofs."""
-        self._held.apply_reduced(self._inactive, x, y)
+        self._held.apply_reduced(x, y)
 
 
 def projected(x: Array, residual: Array, lower: Array, upper: Array) -> Array:

@@ -1,31 +1,61 @@
 """What a scene gets that names no method: the branch iteration, begun again elsewhere where it finds no equilibrium.
 
-The unbroken branch comes first. A narrowly smoothed law is then approached from the solution of the unsmoothed one. In
-the metastable state the iteration may slide off while an equilibrium exists on other pieces of the laws: starts on the
-pieces of the resting slips, with every bond broken, and a continuation in the smoothing look for it there.
+The unbroken branch comes first. A narrowly smoothed law is then approached from the solution of the unsmoothed one. A
+body that rolls or tips on its way to rest is put down as a rigid one first (:mod:`.settling`). In the metastable
+state the iteration may slide off while an equilibrium exists on other pieces of the laws: starts on the pieces of the
+resting slips, with every bond broken, and a continuation in the smoothing look for it there. Where no equilibrium need
+exist, the search ends after so many Newton steps.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import cached_property
 
 from petsc4py import PETSc
 
+from .. import existence
 from ..errors import SolverError
 from .base import Counts, Solved, resting_start
 from .branch import BranchIteration
 from .continuation import Continuation
+from .models import Majorant
+from .settling import settled
 
 _BROKEN = 1e6
 """Times the resting slip: beyond every kink."""
+_BUDGET = 1000
+"""Newton steps of all starts together, unless the body is held; those of the hard cases took at most 589."""
 
 
 class Auto(BranchIteration):
     """The branch iteration with further starts where the first finds nothing."""
 
+    _steps, _spent = 0, False
+
     def solve(self, start: PETSc.Vec | None = None, branches: PETSc.Vec | None = None) -> Solved:
         """A stationary point; that of the first start that finds one, else what the first start left. Collective."""
+        told, self.solver.interrupted = self.solver.interrupted, lambda: told() or self._over()
+        try:
+            found = self._search(start, branches)
+        finally:
+            self.solver.interrupted = told
+        if not self._spent:
+            return found
+        return replace(found, interrupted=False, reason=f"no equilibrium found in {_BUDGET} Newton steps")
+
+    def _over(self) -> bool:
+        """Asked once a Newton step: whether the search has gone on for long enough. Collective."""
+        self._steps += 1
+        self._spent = self._spent or (self._steps > _BUDGET and not self._held)
+        return self._spent
+
+    @cached_property
+    def _held(self) -> bool:
+        return existence.solvability(self.system.problem, self.system.forces).state == "held"
+
+    def _search(self, start: PETSc.Vec | None, branches: PETSc.Vec | None) -> Solved:
         first = super().solve(start, branches)
         if first.converged or first.interrupted or not self.system.terms:
             return first
@@ -40,27 +70,48 @@ class Auto(BranchIteration):
     def _others(self) -> Iterator[Solved]:
         exact = [term.exact for term in self.system.terms]
         if any(law is not true for law, true in zip(self._laws, exact, strict=True)):
-            for found in self._tried(BranchIteration(self.solver, self.settings, exact)):
+            for found in self._tried(BranchIteration(self.solver, self.settings, exact, wary=True)):
                 yield from self._beside(found)
+        yield from self._settled()
         resting, _ = resting_start(self.solver, self._laws, 1e-4)
         for factor in (1.0, _BROKEN, -_BROKEN):
             pieces = resting.copy()
             pieces.scale(factor)
-            yield from self._tried(BranchIteration(self.solver, self.settings, self._laws, self._epsilon), pieces)
+            yield from self._tried(
+                BranchIteration(self.solver, self.settings, self._laws, self._epsilon, wary=True), None, pieces
+            )
         yield from self._tried(Continuation(self.solver, self.settings))
+
+    def _settled(self) -> Iterator[Solved]:
+        """From bodies at rest on their supports, bonds as they are there, or unbroken.
+
+        Where bodies roll, closed contact is no start.
+        """
+        rested = settled(self.solver, self._majorants, 1e-4)
+        if rested is None:
+            return
+        unbroken = rested[0].duplicate()
+        unbroken.set(0.0)
+        for bonds in (rested[0], unbroken):
+            method = BranchIteration(self.solver, self.settings, self._laws, self._epsilon, wary=True)
+            yield from self._tried(method, rested[0], bonds)
+
+    def _majorants(self, x: PETSc.Vec) -> list[Majorant]:
+        parts = zip(self._laws, self._cells(x), self._subgradients(x, 0.0), strict=True)
+        return [Majorant(law, cells, xi) for law, cells, xi in parts]
 
     def _beside(self, exact: Solved) -> Iterator[Solved]:
         """From the unsmoothed law's solution: what sticks there is within the narrow band that smoothing leaves."""
         if exact.converged:
-            method = BranchIteration(self.solver, self.settings, self._laws, self._epsilon)
+            method = BranchIteration(self.solver, self.settings, self._laws, self._epsilon, wary=True)
             try:
                 yield method.solve(self.system.unknowns(exact.u))
             except SolverError:
                 return
 
-    def _tried(self, method: BranchIteration | Continuation, *pieces: PETSc.Vec) -> Iterator[Solved]:
+    def _tried(self, method: BranchIteration | Continuation, *start: PETSc.Vec | None) -> Iterator[Solved]:
         """One attempt; a breakdown is no result."""
         try:
-            yield method.solve(None, *pieces) if isinstance(method, BranchIteration) else method.solve()
+            yield method.solve(*start) if isinstance(method, BranchIteration) else method.solve()
         except SolverError:
             return

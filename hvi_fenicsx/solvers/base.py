@@ -16,6 +16,7 @@ from ..surface import component_dofs
 from ..system import Model, System
 from .activeset import ActiveSetSolver
 from .models import Resting
+from .pieces import Start
 
 Progress = Callable[[str, float | None, int, float, int], None]
 """Called with the stage's name, ε, iteration, residual and vertices in contact."""
@@ -32,6 +33,7 @@ class Settings:
     Attributes:
         tolerance: of the residual of the inequality, relative. max_branches: convex steps of the branch iteration.
         max_newton: Newton steps of one solve. epsilon: relative width of the laws' smoothing, None for exact laws.
+        start: the pieces of the laws that the branch iteration begins on.
     """
 
     tolerance: float = 1e-8
@@ -39,6 +41,7 @@ class Settings:
     max_newton: int = 60
     epsilon: float | None = None
     progress: Progress = silent
+    start: Start = "unbroken"
 
 
 @dataclass

@@ -16,9 +16,10 @@ import numpy as np
 import numpy.typing as npt
 from petsc4py import PETSc
 
+from .. import sliding
 from ..errors import SolverError
 from ..laws import Superpotential
-from . import kinks
+from . import kinks, pieces
 from .activeset import ActiveSetSolver, Outcome
 from .base import Counts, Settings, Solved, resting_start
 from .models import Cells, Full, Majorant, Softened
@@ -29,8 +30,7 @@ _LOOSE = 1e-4
 _NEAR = 1e-11
 """Distance (of u0) from a kink that counts as being on it."""
 _CELL_CHANGES = 200
-_FAR = 1e3
-"""Times the start (or p0 L/E0): where softened steps, which lower the energy, lead so far, the body slides away."""
+_SLIDES = "the body slides away on what is left of its bonds"
 _ATTEMPTS = (
     (False, "basic", 30),
     (False, "bt", 60),
@@ -38,6 +38,7 @@ _ATTEMPTS = (
     (False, "basic", 30),
     (True, "bt", 200),
     (False, "bt", 60),
+    (False, "basic", 30),
 )
 """Of a convex step, until one converges: whether softened, PETSc's line search, most iterations."""
 
@@ -48,10 +49,13 @@ class BranchIteration:
     Args:
         solver: of the convex steps. settings: tolerance and limits.
         laws: what stands for the system's laws (nondimensional), by default they themselves. epsilon: their width,
-            for the progress display.
+            for the progress display. wary: whether to ask of each convex step first if it has a solution; else that is
+            asked where a step fails.
     """
 
     name = "branch"
+    words = "a branch iteration (DC) over SNES VI (reduced space)"
+    takes_start = True
 
     def __init__(
         self,
@@ -59,7 +63,10 @@ class BranchIteration:
         settings: Settings,
         laws: Sequence[Superpotential] | None = None,
         epsilon: float | None = None,
+        *,
+        wary: bool = False,
     ) -> None:
+        self._wary = wary
         self.solver, self.settings, self.system = solver, settings, solver.system
         self.counts = Counts()
         self.energies: list[float] = []
@@ -73,21 +80,23 @@ class BranchIteration:
         Args:
             start: where to begin; by default the resting start, which holds every rigid motion. A start of one's own
                 must hold them too.
-            branches: a displacement whose pieces of the laws to begin on; by default those of no slip, an
-                unbroken bond, so that a vertex passes a drop only when the load drives it there.
+            branches: a displacement whose pieces of the laws to begin on; by default those of the settings, which
+                unless the scene says otherwise are those of no slip, an unbroken bond, so that a vertex passes a drop
+                only when the load drives it there.
 
         Raises:
             SolverError: a convex step did not lower the energy.
         """
         x = start.copy() if start is not None else self._resting()
-        self.solver.progress = self._progress
         if branches is not None or start is not None:
             xi = self._subgradients(start if branches is None else branches, 0.0)
         else:
-            xi = [law.concave.left(np.zeros_like(a)) for law, a in zip(self._laws, self._arguments(x), strict=True)]
-        outcome = self._descend(x, self._cells(x), xi)
-        while outcome.converged and (better := self._off_kinks(x)) is not None:
-            better.copy(x)
+            first = pieces.arguments(self.system, x, self.settings.start)
+            xi = [law.concave.left(a) for law, a in zip(self._laws, first, strict=True)]
+        with self.solver.reporting(self._progress):
+            outcome = self._descend(x, self._cells(x), xi)
+            while outcome.converged and (better := self._off_kinks(x)) is not None:
+                better.copy(x)
         return self._result(x, outcome)
 
     def _resting(self) -> PETSc.Vec:
@@ -134,12 +143,15 @@ class BranchIteration:
 
     def _step(self, x: PETSc.Vec, cells: list[Cells], xi: list[Array]) -> tuple[list[Cells], Outcome, bool]:
         """One convex step, first to a loose tolerance, then, if ξ stands, to the wanted one."""
-        for tolerance in (max(_LOOSE, self.settings.tolerance), self.settings.tolerance):
+        if self._wary and self._slides(xi):
+            return cells, Outcome(False, 0, 0, math.inf, _SLIDES), True
+        for tolerance in sorted({max(_LOOSE, self.settings.tolerance), self.settings.tolerance}, reverse=True):
             cells, outcome = self._convex(x, cells, xi, tolerance)
             if not outcome.converged or self._measure(x, cells, xi) > max(tolerance, outcome.rounding):
                 break
         self.counts.branch += 1
-        allowed = max(self.settings.tolerance, outcome.rounding)
+        # where rounding ends a step, a ξ that lags behind may leave no more than rounding did
+        allowed = max(self.settings.tolerance, min(outcome.rounding, 2.0 * outcome.measure))
         stationary = outcome.converged and self._measure(x, cells, xi) <= allowed
         if stationary or not outcome.converged:
             return cells, outcome, True
@@ -159,10 +171,14 @@ class BranchIteration:
             cells = [c.moved(m) for c, m in zip(cells, moves, strict=True)]
         return cells, replace(outcome, converged=False, reason="the states of the convex kinks keep changing")
 
+    def _slides(self, xi: list[Array]) -> bool:
+        """Whether the convex step has no solution."""
+        return sliding.slides(self.system.problem, self.system.forces, self._laws, xi)
+
     def _bounded(self, x: PETSc.Vec, models: Sequence[Majorant], cells: list[Cells], tolerance: float) -> Outcome:
         lower, upper = kinks.boxes(self.system, cells)
         best, outcome = x.copy(), Outcome(False, 0, 0, float("inf"), "not started")
-        begin, far = x.copy(), _FAR * max(1.0, float(x.norm(PETSc.NormType.INFINITY)))
+        begin = x.copy()
         for softened, search, most in _ATTEMPTS:
             used = [Softened(m, m.law.length_scale) for m in models] if softened else models
             found = self.solver.solve(
@@ -175,9 +191,11 @@ class BranchIteration:
                 x.copy(best)
             if outcome.converged or found.interrupted:
                 break
-            if softened and x.norm(PETSc.NormType.INFINITY) > far:
-                outcome = replace(outcome, reason="the body slides away on what is left of its bond")
-                break
+            if not self._wary:
+                self._wary = True
+                if self._slides([m.xi for m in models]):
+                    outcome = replace(outcome, reason=_SLIDES)
+                    break
             if softened and np.isfinite(found.measure):
                 x.copy(begin)  # softened steps lower the energy, whatever they left undone
             else:

@@ -69,6 +69,8 @@ class Condensation:
     """
 
     name = "condensed"
+    words = "the paper's procedure: condensation and least squares"
+    takes_start = False
 
     def __init__(self, solver: ActiveSetSolver, settings: Settings) -> None:
         if solver.system.comm.size > 1:

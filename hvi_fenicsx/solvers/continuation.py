@@ -20,6 +20,8 @@ class Continuation:
     """The continuation on one system; call :meth:`solve` once."""
 
     name = "snes_vi"
+    words = "a continuation in the smoothing over branch iterations"
+    takes_start = False
 
     def __init__(self, solver: ActiveSetSolver, settings: Settings) -> None:
         self.solver, self.settings = solver, settings
@@ -30,10 +32,10 @@ class Continuation:
         loose = replace(self.settings, tolerance=max(1e-4, self.settings.tolerance))
         for width in (w for w in _WIDTHS if w > (self.settings.epsilon or 0.0)):
             laws = [SmoothedLaw.relative(t.exact, width) for t in self.solver.system.terms]
-            found = BranchIteration(self.solver, loose, laws, width).solve(start)
+            found = BranchIteration(self.solver, loose, laws, width, wary=True).solve(start)
             counts.add(found.counts)
             if found.converged:
                 start = self.solver.system.unknowns(found.u)
-        last = BranchIteration(self.solver, self.settings).solve(start)
+        last = BranchIteration(self.solver, self.settings, wary=True).solve(start)
         counts.add(last.counts)
         return replace(last, method=self.name, counts=counts)

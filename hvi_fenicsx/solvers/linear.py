@@ -1,12 +1,15 @@
-"""Linear solves in which some dofs are held: the full-size matrix with those rows and columns replaced by the identity.
+"""Linear solves in which some dofs are held, at full size.
 
 SNES VI extracts the inactive rows and columns into a matrix without block size and near-null space, and algebraic
 multigrid then fails. Here the full size is kept, whatever is held (solver-notes.md): one preconditioner serves the
-start and every Newton step with the same active set.
+start and every Newton step with the same active set. Algebraic multigrid and the direct solver get a copy of the
+matrix with those rows and columns replaced by the identity; geometric multigrid gets the matrix itself, in which they
+are held by their diagonals (:meth:`.System.hold`).
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
@@ -17,8 +20,8 @@ from petsc4py import PETSc
 
 from ..system import System
 from ..timing import Timer
-from . import multigrid
-from .options import PREFIX, configure
+from . import multigrid, schur
+from .options import PREFIX, below_the_users, configure
 
 Indices = npt.NDArray[np.int32]
 Kind = Literal["lu", "gamg", "mg"]
@@ -26,6 +29,8 @@ _LARGEST_DIRECT = {2: 60_000, 3: 15_000}
 """Unknowns up to which a direct solve is the faster one, by dimension (docs/benchmarks.md)."""
 _DRIFT = 0.3
 """Change of a law's nodal stiffness, relative to an elastic one (about 1), that a Krylov method takes lightly."""
+_SLOW = 50
+"""Iterations from which a direct solver takes over where it can: at 65 a Newton step costs twice as much as with it."""
 _GAMG: dict[str, object] = {
     "pc_type": "gamg",
     "pc_gamg_threshold": 0.01,
@@ -53,13 +58,20 @@ class LinearSettings:
     kind: Kind
 
     @classmethod
-    def choose(cls, system: System, wanted: Literal["auto", "lu", "gamg"] = "auto") -> LinearSettings:
-        """By the number of unknowns, unless the user wants one; a nearly incompressible body goes to the direct one."""
+    def choose(
+        cls, system: System, wanted: Literal["auto", "lu", "gamg"] = "auto", *, ladder: bool = False
+    ) -> LinearSettings:
+        """By the number of unknowns, unless the user wants one; a nearly incompressible body goes to the direct one.
+
+        ``ladder`` tells that the system will stand on one when it is solved (``System.below``).
+        """
         if wanted != "auto":
             return cls(wanted)
-        if system.dofs <= _LARGEST_DIRECT[system.problem.scales.dimension] or system.problem.averaged:
+        if system.problem.averaged:
             return cls("lu")
-        return cls("mg" if system.prolongations else "gamg")
+        if (ladder or system.below is not None) and system.freedom is None:
+            return cls("mg")
+        return cls("lu" if system.dofs <= _LARGEST_DIRECT[system.problem.scales.dimension] else "gamg")
 
     @property
     def ksp(self) -> dict[str, str]:
@@ -84,12 +96,16 @@ class HeldPreconditioner:
         self._held: Indices | None = None
         self._rates: list[npt.NDArray[np.float64]] = []
         self._fresh, self._worn = 0, False
-        self._matrix: PETSc.Mat | None = None
+        self._copy: PETSc.Mat | None = None
         self._pc: PETSc.PC | None = None
+        self._schur: schur.SchurDirect | None = None
+        self._factorised = 0
         self._in, self._out = system.load.duplicate(), system.load.duplicate()
+        self._chosen = np.empty(0, np.intp)
 
     def prepare(self, held: Indices) -> None:
         """Make it fit for these held dofs (local, owned, sorted). Collective."""
+        self.system.hold(held if self.settings.kind == "mg" else held[:0])
         if self.system.comm.allreduce(self._fits(held), op=MPI.LAND):
             return
         with self._timer("setup"):
@@ -100,74 +116,115 @@ class HeldPreconditioner:
     def _fits(self, held: Indices) -> bool:
         if self._held is None or self._worn:
             return False
-        changed = len(np.setxor1d(held, self._held, assume_unique=True))
+        changed, drift = len(np.setxor1d(held, self._held, assume_unique=True)), self.system.drift(self._rates)
         if self.settings.kind == "lu":
-            return changed == 0 and self.system.drift(self._rates) == 0.0
-        return changed <= max(2, 0.1 * len(held)) and self.system.drift(self._rates) <= _DRIFT
+            return changed == 0 and drift == 0.0
+        return changed <= (0 if self.settings.kind == "mg" else max(2, 0.1 * len(held))) and drift <= _DRIFT
 
     def report(self, iterations: int) -> None:
         """Tell what a solve took (the same on all ranks): a preconditioner that serves badly is not used again."""
         self._fresh = self._fresh or iterations
         self._worn = iterations > 1.5 * self._fresh + 5
+        small = self.system.dofs <= _LARGEST_DIRECT[self.system.problem.scales.dimension]
+        if iterations > _SLOW and small:
+            self.settings, self._worn = LinearSettings("lu"), True
 
     def _build(self, held: Indices) -> None:
-        self.destroy()
-        start = self.system.load.owner_range[0]
-        self._matrix = self.system.matrix.copy()
-        self._matrix.zeroRowsColumns((held + start).astype(PETSc.IntType), diag=1.0)
-        self._matrix.setBlockSize(self.system.problem.scales.dimension)
-        self._matrix.setNearNullSpace(self.system.near_null)
-        self._matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
-        self._matrix.setOption(PETSc.Mat.Option.SPD, self.settings.kind != "lu")
+        self._forget()
         self._pc = PETSc.PC().create(self.system.comm)
-        self._pc.setOperators(self._matrix)
-        if self.settings.kind == "mg":
-            multigrid.hang(self._pc, self._matrix, self.system.prolongations, self._untouched(held))
-        configure(self._pc, self.settings.pc)
-        self._pc.setUp()
+        if self.settings.kind == "lu" and self._condensed(held):
+            self._pc.setType(PETSc.PC.Type.PYTHON)
+            self._pc.setPythonContext(self._schur)
+            self._pc.setOperators(self.system.matrix)
+            return
+        self._factorised += 1
+        self._pc.setOptionsPrefix(PREFIX)
+        with below_the_users(self.settings.pc):
+            if self.settings.kind == "mg":
+                multigrid.hang(self._pc, self.system)
+            else:
+                self._copy = self._identity_at(held)
+                self._pc.setOperators(self._copy)
+            self._pc.setFromOptions()
+            self._pc.setUp()
 
-    def _untouched(self, held: Indices) -> PETSc.Vec:
-        """1 for the unknowns that are neither held nor prescribed, else 0."""
-        mask = self.system.load.duplicate()
-        mask.set(1.0)
-        fixed = self.system.problem.fixed
-        mask.array[held] = 0.0
-        mask.array[fixed[fixed < mask.local_size]] = 0.0
-        return mask
+    def _condensed(self, held: Indices) -> bool:
+        """Whether the body's own factorisation, made once, serves a matrix that has changed on Γc alone."""
+        if self._schur is None and schur.pays(self.system, self._factorised):
+            self._schur = schur.SchurDirect(self.system, _LU)
+        if self._schur is not None:
+            self._schur.prepare(held)
+        return self._schur is not None
+
+    @property
+    def _pins(self) -> Indices:
+        """Dofs at which free motions are pinned: where all other equations hold, theirs do too."""
+        return self.system.freedom.pins if self.system.freedom else np.empty(0, np.int32)
+
+    def _identity_at(self, held: Indices) -> PETSc.Mat:
+        """A copy of the matrix with these rows and columns, and those of pinned dofs, replaced by the identity."""
+        held = np.union1d(held, self._pins).astype(np.int32)
+        matrix = self.system.matrix.copy()
+        matrix.zeroRowsColumns((held + self.system.load.owner_range[0]).astype(PETSc.IntType), diag=1.0)
+        matrix.setBlockSize(self.system.problem.scales.dimension)
+        matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+        matrix.setOption(PETSc.Mat.Option.SPD, self.settings.kind != "lu")
+        if self.settings.kind == "gamg":
+            matrix.setNearNullSpace(self.system.near_null)
+        return matrix
 
     def destroy(self) -> None:
         """Free the PETSc objects."""
-        for thing in (self._matrix, self._pc):
+        self._forget()
+        if self._schur is not None:
+            self._schur.free()
+            self._schur = None
+
+    def _forget(self) -> None:
+        for thing in (self._copy, self._pc):
             if thing is not None:
                 thing.destroy()
-        self._matrix = self._pc = None
+        self._copy = self._pc = None
         self._held = None
 
-    def apply_full(self, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        """Y = P^-1 x, full size. Collective."""
+    def select(self, inactive: PETSc.IS) -> None:
+        """Reduced vectors hold these dofs from now on."""
+        self._chosen = inactive.getIndices().astype(np.intp) - self.system.load.owner_range[0]
+        self._in.set(0.0)
+
+    def multiply_reduced(self, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        """Y = J x on the selected dofs, all others being zero. Collective."""
+        self._reduced(self.system.matrix.mult, x, y)
+
+    def apply_reduced(self, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        """Y = P^-1 x on the selected dofs. Collective."""
+        self._reduced(self._unpinned, x, y)
+
+    def _unpinned(self, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        x.array[self._pins] = 0.0
         self._pc.apply(x, y)  # type: ignore[union-attr]
 
-    def apply_reduced(self, inactive: PETSc.IS, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        """The same for vectors that hold the inactive dofs only. Collective."""
-        self._in.set(0.0)
-        part = self._in.getSubVector(inactive)
-        x.copy(part)
-        self._in.restoreSubVector(inactive, part)
-        self.apply_full(self._in, self._out)
-        part = self._out.getSubVector(inactive)
-        part.copy(y)
-        self._out.restoreSubVector(inactive, part)
+    def _reduced(self, operation: Callable[[PETSc.Vec, PETSc.Vec], None], x: PETSc.Vec, y: PETSc.Vec) -> None:
+        self._in.array[self._chosen] = x.array_r
+        operation(self._in, self._out)
+        np.take(self._out.array_r, self._chosen, out=y.array, mode="clip")
 
     def solve(self, load: PETSc.Vec, x: PETSc.Vec, rtol: float) -> tuple[int, int]:
-        """Solve with the held matrix, from the guess in x; iterations and PETSc's reason. Collective."""
+        """Solve with the held matrix, from the guess in x; iterations and PETSc's reason. Collective.
+
+        Where motions are free, the load may be changed at pinned dofs, and of all solutions x is the shortest.
+        """
+        load.array[self._pins] = 0.0
         ksp = PETSc.KSP().create(self.system.comm)
-        ksp.setOperators(self._matrix)
+        ksp.setOperators(self.system.matrix if self._copy is None else self._copy)
         ksp.setPC(self._pc)
         ksp.setTolerances(rtol=rtol, max_it=2000)
         ksp.setInitialGuessNonzero(self.settings.kind != "lu")
         configure(ksp, self.settings.ksp, PREFIX)
         with self._timer("solve"):
             ksp.solve(load, x)
+        if self.system.freedom is not None:
+            self.system.freedom.null_space.remove(x)
         result = int(ksp.getIterationNumber()), int(ksp.getConvergedReason())
         ksp.destroy()
         self.report(result[0])

@@ -1,47 +1,50 @@
-"""Geometric multigrid on the ladder, truncated at what is held (Kornhuber 1994, truncated monotone multigrid).
+"""Geometric multigrid on the ladder, in which what is held on the finest rung is held on all of them.
 
-Held and prescribed unknowns are cut out of the prolongation, so that no coarse correction moves them; coarse operators
-are Galerkin products with the prolongations so cut.
+The coarse operators are the rungs' own stiffness matrices, which nested iteration has assembled: no Galerkin product is
+formed. An active set or a tangent of the laws touches only the rows of Γc, on every rung (:meth:`.System.follow`). A
+coarse unknown that would move a held one is held too (Hackbusch and Mittelmann 1983), so that the matrices remain the
+Galerkin products of the prolongations so cut: the cycle converges whatever the active set is.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator
 
-import numpy as np
 from petsc4py import PETSc
 
-_EMPTY = 1e-14
-"""A diagonal entry (an elastic one is about 1) that no fine unknown contributes to."""
+from ..system import System
 
 
-def hang(pc: PETSc.PC, matrix: PETSc.Mat, prolongations: Sequence[PETSc.Mat], untouched: PETSc.Vec) -> None:
-    """Make a PC the multigrid of a matrix. Collective.
+def ladder(system: System) -> list[System]:
+    """The system and the rungs below it, finest first."""
+    return [system, *(ladder(system.below.system) if system.below else [])]
 
-    Args:
-        pc: what to configure. matrix: the finest one, identity rows where unknowns are held.
-        prolongations: to the finest mesh first, then on downwards. untouched: 1 where an unknown is free, else 0.
-    """
-    levels = len(prolongations) + 1
+
+def hang(pc: PETSc.PC, system: System) -> None:
+    """Make a PC the multigrid of a system as it stands, with what it holds. Collective."""
     pc.setType(PETSc.PC.Type.MG)
-    pc.setMGLevels(levels)
-    mask = untouched
-    for below in range(levels - 2, -1, -1):
-        cut = prolongations[levels - 2 - below].copy()
-        cut.diagonalScale(mask, None)
-        matrix = matrix.ptap(cut)
-        mask = _filled(matrix)
-        pc.setMGInterpolation(below + 1, cut)
-        smoother = pc.getMGCoarseSolve() if below == 0 else pc.getMGSmoother(below)
-        smoother.setOperators(matrix, matrix)
+    pc.setMGLevels(len(ladder(system)))
+    pc.setOperators(system.matrix)
+    for level, (coarse, cut) in enumerate(reversed(list(_followed(system)))):
+        pc.setMGInterpolation(level + 1, cut)
+        smoother = pc.getMGSmoother(level) if level else pc.getMGCoarseSolve()
+        smoother.setOperators(coarse.matrix, coarse.matrix)
 
 
-def _filled(matrix: PETSc.Mat) -> PETSc.Vec:
-    """Put 1 on the diagonal of rows that nothing contributes to; 1 for the others, 0 for these."""
-    diagonal = matrix.getDiagonal()
-    empty = np.abs(diagonal.array_r) < _EMPTY
-    mask = diagonal.duplicate()
-    mask.array[:] = np.where(empty, 0.0, 1.0)
-    diagonal.array[:] = np.where(empty, 1.0, diagonal.array_r)
-    matrix.setDiagonal(diagonal)
+def _followed(system: System) -> Iterator[tuple[System, PETSc.Mat]]:
+    """The rungs below, each made to follow the one above, with the prolongation from it; finest first. Collective."""
+    while system.below is not None:
+        coarse, step = system.below.system, system.below.prolongation
+        coarse.follow(system, step)
+        cut = step.copy()
+        cut.diagonalScale(_movable(system), _movable(coarse))
+        yield coarse, cut
+        system = coarse
+
+
+def _movable(system: System) -> PETSc.Vec:
+    """1 for the unknowns that are neither held nor prescribed, else 0."""
+    mask = system.load.duplicate()
+    mask.set(1.0)
+    mask.array[system.immovable] = 0.0
     return mask

@@ -5,7 +5,8 @@ Precedence: command line (``--petsc``, PETSC_OPTIONS), then the program's defaul
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from typing import Any
 
 from petsc4py import PETSc
@@ -13,16 +14,25 @@ from petsc4py import PETSc
 PREFIX = "hvi_"
 
 
-def configure(target: Any, defaults: Mapping[str, Any], prefix: str = PREFIX) -> None:
-    """Call ``target.setFromOptions()`` under a prefix with these defaults below the user's own options. Collective."""
+@contextmanager
+def below_the_users(defaults: Mapping[str, Any], prefix: str = PREFIX) -> Iterator[None]:
+    """Defaults in force within a block. Levels of multigrid read theirs as late as in ``setUp``. Collective."""
     database = PETSc.Options()
     unset = {f"{prefix}{k}": v for k, v in defaults.items() if not database.hasName(f"{prefix}{k}")}
     for name, value in unset.items():
         database.setValue(name, value)
-    target.setOptionsPrefix(prefix)
-    target.setFromOptions()
-    for name in unset:
-        database.delValue(name)
+    try:
+        yield
+    finally:
+        for name in unset:
+            database.delValue(name)
+
+
+def configure(target: Any, defaults: Mapping[str, Any], prefix: str = PREFIX) -> None:
+    """Call ``target.setFromOptions()`` under a prefix with these defaults below the user's own options. Collective."""
+    with below_the_users(defaults, prefix):
+        target.setOptionsPrefix(prefix)
+        target.setFromOptions()
 
 
 def insert(text: str) -> None:

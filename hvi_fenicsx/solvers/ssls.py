@@ -15,9 +15,9 @@ from petsc4py import PETSc
 
 from ..system import System
 from .activeset import ActiveSetSolver
-from .base import Counts, Settings, Solved, resting_start
+from .base import Counts, Settings
 from .options import configure
-from .tao import refuse_kinks, smooth_models
+from .smooth import SmoothMethod, smooth_models
 
 _DIRECT = {"ksp_type": "preonly", "pc_type": "lu", "pc_factor_mat_solver_type": "mumps"}
 _KRYLOV = {
@@ -44,34 +44,6 @@ def onto_bounds(system: System, x: PETSc.Vec, residual: PETSc.Vec) -> PETSc.Vec:
     found.array[:] = np.where(value - lower <= force, lower, np.where(upper - value <= -force, upper, value))
     found.array[:] = np.clip(found.array_r, lower, upper)
     return found
-
-
-class SemismoothNewton:
-    """``vinewtonssls`` on one system, from the resting start; call :meth:`solve` once.
-
-    Raises:
-        InputError: a law has kinks.
-    """
-
-    name = "ssls"
-
-    def __init__(self, solver: ActiveSetSolver, settings: Settings) -> None:
-        refuse_kinks(solver.system, self.name)
-        self.solver, self.settings = solver, settings
-
-    def solve(self) -> Solved:
-        """A stationary point of the smoothed energy, or what was reached. Collective."""
-        system = self.solver.system
-        x, linear = resting_start(self.solver, [t.law for t in system.terms], min(1e-4, self.settings.tolerance))
-        run = _Run(self.solver, self.settings, x)
-        with self.solver.timer("solve"):
-            reason = run.execute(x)
-            found, measure = run.judge(x)
-        run.counts.linear += linear
-        converged = measure <= self.settings.tolerance
-        words = "stationary" if converged else f"vinewtonssls stopped: {reason}, residual {measure:.1e}"
-        energies = (system.energy(found, run.models),)
-        return Solved(system.displacement(found), self.name, converged, words, run.counts, energies, run.stopped)
 
 
 class _Run:
@@ -132,3 +104,12 @@ class _Run:
         if not np.isfinite(measure):
             return _Reason.DIVERGED_FNORM_NAN
         return _Reason.CONVERGED_FNORM_RELATIVE if measure <= self.settings.tolerance else _Reason.CONVERGED_ITERATING
+
+
+class SemismoothNewton(SmoothMethod):
+    """``vinewtonssls``."""
+
+    name = "ssls"
+    words = "a semismooth Newton method on the Fischer-Burmeister function"
+    run = _Run
+    solver_words = "vinewtonssls"

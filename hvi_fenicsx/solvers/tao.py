@@ -11,68 +11,18 @@ import numpy as np
 import numpy.typing as npt
 from petsc4py import PETSc
 
-from ..errors import InputError
 from ..system import System
 from .activeset import ActiveSetSolver
-from .base import Counts, Settings, Solved, resting_start
+from .base import Counts, Settings
 from .linear import HeldPreconditioner
-from .models import Cells, Full
 from .options import configure
+from .smooth import SmoothMethod, smooth_models
 
 Array = npt.NDArray[np.float64]
 _FOUNDATION = 1e-3
 """Stiffness per area, in units of E0/L, that keeps the preconditioner regular where the body is free to move."""
 _REASON = {v: k for k, v in vars(PETSc.TAO.ConvergedReason).items() if isinstance(v, int) and "_" in k}
 _Reason = PETSc.TAO.ConvergedReason
-
-
-def refuse_kinks(system: System, method: str) -> None:
-    """Methods that differentiate a law cannot solve one with kinks.
-
-    Raises:
-        InputError: on all ranks alike.
-    """
-    for term in system.terms:
-        if len(term.law.kinks):
-            at = float(np.min(np.abs(term.law.kinks))) * system.problem.scales.displacement
-            raise InputError(
-                f'solver.method = "{method}" needs laws without kinks; that on boundary.{term.surface.part} has one at '
-                f'{at:.3g} m: add smoothing = "quadratic" and epsilon = 0.01 to [solver] ("paper" keeps a kink at '
-                'zero slip), or use method = "auto", which solves the law itself'
-            )
-
-
-def smooth_models(system: System) -> list[Full]:
-    """The laws with their true curvature; they have no kinks, so each has one cell."""
-    return [Full(t.law, Cells.around(t.law.convex, np.zeros(len(t.surface.blocks)))) for t in system.terms]
-
-
-class BoundedNewton:
-    """``bnls`` on one system, from the resting start; call :meth:`solve` once.
-
-    Raises:
-        InputError: a law has kinks.
-    """
-
-    name = "tao"
-
-    def __init__(self, solver: ActiveSetSolver, settings: Settings) -> None:
-        refuse_kinks(solver.system, self.name)
-        self.solver, self.settings = solver, settings
-
-    def solve(self) -> Solved:
-        """A stationary point of the smoothed energy, or what was reached. Collective."""
-        system = self.solver.system
-        x, linear = resting_start(self.solver, [t.law for t in system.terms], min(1e-4, self.settings.tolerance))
-        with self.solver.timer("solve"):
-            run = _Run(self.solver, self.settings, x)
-            reason = run.execute(x)
-            measure = run.judge(x)
-        converged = measure <= self.settings.tolerance
-        run.counts.linear += linear
-        words = "stationary" if converged else f"TAO stopped: {reason}, residual {measure:.1e}"
-        energies = (system.energy(x, run.models),)
-        return Solved(system.displacement(x), self.name, converged, words, run.counts, energies, run.stopped)
 
 
 class _Run:
@@ -131,14 +81,14 @@ class _Run:
             rates.append(rate + _FOUNDATION * term.free[:, :, None] * np.eye(term.free.shape[1]))
         return rates
 
-    def judge(self, x: PETSc.Vec) -> float:
-        """The residual of the inequality (:meth:`ActiveSetSolver.measure`). Collective."""
+    def judge(self, x: PETSc.Vec) -> tuple[PETSc.Vec, float]:
+        """X and its residual of the inequality (:meth:`ActiveSetSolver.measure`). Collective."""
         self.system.residual(x, self._residual, self.models)
-        return self.solver.measure(x, self._residual, self.system.lower, self.system.upper)
+        return x, self.solver.measure(x, self._residual, self.system.lower, self.system.upper)
 
     def _converged(self, tao: PETSc.TAO) -> int | None:
         x, iteration = tao.getSolution(), tao.getIterationNumber()
-        measure = self.judge(x)
+        _, measure = self.judge(x)
         self.settings.progress("tao", self.settings.epsilon, iteration, measure, self.solver.in_contact(x))
         self.stopped = self.solver.interrupted()
         if self.stopped:
@@ -169,12 +119,11 @@ class _ReducedPC:
 
     def __init__(self, held: HeldPreconditioner, counts: Counts) -> None:
         self._held, self._counts = held, counts
-        self._inactive: PETSc.IS | None = None
 
     def setUp(self, pc: PETSc.PC) -> None:
         """Read off the inactive rows and prepare for them."""
         rows = np.round(pc.getOperators()[1].getDiagonal().array_r).astype(PETSc.IntType)
-        self._inactive = PETSc.IS().createGeneral(rows, comm=pc.comm)
+        self._held.select(PETSc.IS().createGeneral(rows, comm=pc.comm))
         start, end = self._held.system.load.owner_range
         active = np.setdiff1d(np.arange(start, end), rows, assume_unique=True)
         self._held.prepare((active - start).astype(np.int32))
@@ -182,4 +131,13 @@ class _ReducedPC:
     def apply(self, pc: PETSc.PC, x: PETSc.Vec, y: PETSc.Vec) -> None:
         """Y = P^-1 x on the inactive rows."""
         self._counts.linear += 1  # one a conjugate gradient step; TAO tells those of the last solve only
-        self._held.apply_reduced(self._inactive, x, y)
+        self._held.apply_reduced(x, y)
+
+
+class BoundedNewton(SmoothMethod):
+    """``bnls``."""
+
+    name = "tao"
+    words = "PETSc TAO's bound-constrained Newton line search"
+    run = _Run
+    solver_words = "TAO"

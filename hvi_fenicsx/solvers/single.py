@@ -1,0 +1,146 @@
+"""What needs no iteration over branches: one linear solve, or one convex quadratic programme.
+
+Without contact and with laws that are linear springs at most, the inequality is an equation: one KSP solve, no SNES.
+With contact it is a convex quadratic programme with bounds on u·n: one SNES VI solve.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from petsc4py import PETSc
+
+from ..system import System
+from .activeset import ActiveSetSolver, Outcome
+from .base import Counts, Settings, Solved, resting_start
+from .models import Cells, Full
+from .settling import settled
+
+_MARGIN = 0.5
+"""Of the tolerance, for Krylov's recursive residual to stay below it."""
+_REFINEMENTS = 3
+"""Linear solves at most: further ones only where rounding, or the traction of a spring, is coarser than the norm."""
+_ATTEMPTS = (("basic", 30), ("basic", 30), ("bt", 60), ("basic", 60), ("bt", 200))
+"""Of a programme, until one converges: PETSc's line search, most iterations."""
+
+
+def is_equation(system: System) -> bool:
+    """Whether nothing nonsmooth acts: no bounds, and laws that are linear springs at most. The same on all ranks."""
+    return not system.bounds and is_quadratic(system)
+
+
+def is_quadratic(system: System) -> bool:
+    """Whether the energy is quadratic: laws that are linear springs at most. The same on all ranks."""
+    return all(term.law.is_linear for term in system.terms)
+
+
+def springs(system: System) -> list[Full]:
+    """The laws, which have no kinks: one cell each."""
+    return [Full(t.law, Cells.around(t.law.convex, np.zeros(len(t.surface.blocks)))) for t in system.terms]
+
+
+class LinearSolve:
+    """The equation on one system; call :meth:`solve` once."""
+
+    name = "linear"
+    words = "one linear solve"
+    takes_start = False
+
+    def __init__(self, solver: ActiveSetSolver, settings: Settings) -> None:
+        self.solver, self.settings, self.system = solver, settings, solver.system
+
+    def solve(self) -> Solved:
+        """The solution of the equation, or what was reached. Collective."""
+        x, models, counts = self._prescribed(), springs(self.system), Counts()
+        outcome = Outcome(False, 0, 0, float("inf"), "not started")
+        for _ in range(_REFINEMENTS):
+            outcome = self._step(x, models)
+            counts.linear += outcome.linear
+            if outcome.converged:
+                break
+        self.settings.progress(self.name, None, 1, outcome.measure, 0)
+        reason = "stationary" if outcome.converged else outcome.reason
+        return Solved(self.system.displacement(x), self.name, outcome.converged, reason, counts)
+
+    def _prescribed(self) -> PETSc.Vec:
+        """Zero but for the prescribed values."""
+        x = self.system.load.duplicate()
+        x.set(0.0)
+        owned = self.system.problem.fixed[self.system.problem.fixed < x.local_size]
+        x.array[owned] = self.system.load.array_r[owned]
+        return x
+
+    def _step(self, x: PETSc.Vec, models: Sequence[Full]) -> Outcome:
+        """One solve of the residual equation, and how far x is then from the solution. Collective."""
+        step = self.solver.newton_step(x, np.empty(0, np.int32), models, _MARGIN * self.settings.tolerance)
+        return self.solver.judged(step, x, models, self.settings.tolerance)
+
+
+class ConvexProgramme:
+    """The quadratic programme on one system; call :meth:`solve` once."""
+
+    name = "convex"
+    words = "one convex quadratic programme by SNES VI (reduced space)"
+    takes_start = True
+
+    def __init__(self, solver: ActiveSetSolver, settings: Settings) -> None:
+        self.solver, self.settings, self.system = solver, settings, solver.system
+
+    def solve(self, start: PETSc.Vec | None = None) -> Solved:
+        """The minimiser, or what was reached; from the start with contact closed by default. Collective."""
+        counts, system = Counts(), self.system
+        laws = [term.law for term in system.terms]
+        if start is None:
+            x, counts.linear = resting_start(self.solver, laws, min(1e-4, self.settings.tolerance))
+        else:
+            x = start.copy()
+        with self.solver.reporting(self._progress):
+            outcome = self._minimise(x, counts)
+        reason = "stationary" if outcome.converged else outcome.reason
+        return Solved(
+            system.displacement(x), self.name, outcome.converged, reason, counts, interrupted=outcome.interrupted
+        )
+
+    def _progress(self, iteration: int, residual: float, contact: int) -> None:
+        self.settings.progress(self.name, None, iteration, residual, contact)
+
+    def _settle(self, x: PETSc.Vec, begin: PETSc.Vec, models: list[Full], counts: Counts) -> None:
+        rested = settled(self.solver, lambda _: models, min(1e-4, self.settings.tolerance))
+        if rested is not None:
+            counts.linear += rested[1]
+            for vector in (x, begin):
+                rested[0].copy(vector)
+
+    def _minimise(self, x: PETSc.Vec, counts: Counts) -> Outcome:
+        """Attempts until one converges: from x, then from bodies at rest; the best one's outcome, in x. Collective."""
+        models, system = springs(self.system), self.system
+        begin, best, outcome = x.copy(), x.copy(), Outcome(False, 0, 0, float("inf"), "not started")
+        for number, (search, most) in enumerate(_ATTEMPTS):
+            if number == 1:
+                self._settle(x, begin, models, counts)
+            found = self.solver.solve(
+                x,
+                models,
+                self.settings.tolerance,
+                lower=system.lower,
+                upper=system.upper,
+                line_search=search,
+                max_iterations=min(most, self.settings.max_newton),
+            )
+            counts.newton += found.newton
+            counts.linear += found.linear
+            if found.measure < outcome.measure or found.converged:
+                outcome = found
+                x.copy(best)
+            if found.converged or found.interrupted:
+                break
+            if search == "bt" and np.isfinite(found.measure):
+                x.copy(begin)  # a search along the energy has lowered it, whatever it left undone
+            else:
+                begin.copy(x)
+        best.copy(x)
+        for vector in (begin, best):
+            vector.destroy()
+        return replace(outcome, interrupted=found.interrupted)

@@ -1,0 +1,90 @@
+"""What methods that differentiate the law share: they refuse kinks, begin at rest, and are judged by the inequality."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+from petsc4py import PETSc
+
+from ..errors import InputError
+from ..system import System
+from .activeset import ActiveSetSolver
+from .base import Counts, Settings, Solved, resting_start
+from .models import Cells, Full
+
+
+class Run(Protocol):
+    """One solve by a method.
+
+    Attributes:
+        models: what stands for the laws. counts: iterations. stopped: whether it was told to end.
+    """
+
+    models: list[Full]
+    counts: Counts
+    stopped: bool
+
+    def __init__(self, solver: ActiveSetSolver, settings: Settings, x: PETSc.Vec) -> None: ...
+
+    def execute(self, x: PETSc.Vec) -> str:
+        """Iterate from and into x; PETSc's name of its reason to end. Collective."""
+
+    def judge(self, x: PETSc.Vec) -> tuple[PETSc.Vec, float]:
+        """The candidate that x stands for, and its residual of the inequality. Collective."""
+
+
+class SmoothMethod:
+    """A method on one system with smooth laws, from the resting start; call :meth:`solve` once.
+
+    Attributes:
+        run: the class of its solve. solver_words: what it calls itself where it failed.
+
+    Raises:
+        InputError: a law has kinks.
+    """
+
+    name: str
+    words: str
+    takes_start = False
+    run: type[Run]
+    solver_words: str
+
+    def __init__(self, solver: ActiveSetSolver, settings: Settings) -> None:
+        refuse_kinks(solver.system, self.name)
+        self.solver, self.settings = solver, settings
+
+    def solve(self) -> Solved:
+        """A stationary point of the smoothed energy, or what was reached. Collective."""
+        system = self.solver.system
+        x, linear = resting_start(self.solver, [t.law for t in system.terms], min(1e-4, self.settings.tolerance))
+        run = self.run(self.solver, self.settings, x)
+        with self.solver.timer("solve"):
+            reason = run.execute(x)
+            found, measure = run.judge(x)
+        run.counts.linear += linear
+        converged = measure <= self.settings.tolerance
+        words = "stationary" if converged else f"{self.solver_words} stopped: {reason}, residual {measure:.1e}"
+        energies = (system.energy(found, run.models),)
+        return Solved(system.displacement(found), self.name, converged, words, run.counts, energies, run.stopped)
+
+
+def refuse_kinks(system: System, method: str) -> None:
+    """Methods that differentiate a law cannot solve one with kinks.
+
+    Raises:
+        InputError: on all ranks alike.
+    """
+    for term in system.terms:
+        if len(term.law.kinks):
+            at = float(np.min(np.abs(term.law.kinks))) * system.problem.scales.displacement
+            raise InputError(
+                f'solver.method = "{method}" needs laws without kinks; that on boundary.{term.surface.part} has one at '
+                f'{at:.3g} m: add smoothing = "quadratic" and epsilon = 0.01 to [solver] ("paper" keeps a kink at '
+                'zero slip), or use method = "auto", which solves the law itself'
+            )
+
+
+def smooth_models(system: System) -> list[Full]:
+    """The laws with their true curvature; they have no kinks, so each has one cell."""
+    return [Full(t.law, Cells.around(t.law.convex, np.zeros(len(t.surface.blocks)))) for t in system.terms]
