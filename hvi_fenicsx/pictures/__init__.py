@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import contextlib
 import os
-import signal
 import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
 
+from .. import children
 from ..errors import HviError
 
 UNFINISHED = ".part.png"
@@ -22,7 +22,6 @@ PATIENCE = 3.0
 """Seconds for a child to end by itself."""
 COMPLAINT = "pictures: "
 """How the child's message to its caller begins."""
-_MPI = ("OMPI_", "PMIX_", "PRTE_", "PMI_", "HYDRA_", "MPI_LOCAL")
 
 
 class PictureError(HviError):
@@ -42,8 +41,10 @@ def draw(folder: Path, *, timeout: float = 120) -> list[Path]:
         PictureError: the child failed; its message says which picture and why.
     """
     command = [sys.executable, "-m", __name__, os.fspath(folder)]
+    # One thread for linear algebra: the child forks, and what it draws needs none.
+    alone = {**children.environment(), "OMP_NUM_THREADS": "1"}
     child = subprocess.Popen(
-        command, env=_environment(), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
+        command, env=alone, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
     )
     with _ended(child, Path(folder)):
         try:
@@ -55,16 +56,6 @@ def draw(folder: Path, *, timeout: float = 120) -> list[Path]:
     return [Path(folder) / name for name in names.splitlines()]
 
 
-def _environment() -> dict[str, str]:
-    """Ours, without what would make the child believe that it is a rank, and with this package on its path.
-
-    One thread for linear algebra: the child forks, and what it draws needs none.
-    """
-    kept = {name: value for name, value in os.environ.items() if not name.startswith(_MPI)}
-    paths = [str(Path(__file__).parents[2]), kept.get("PYTHONPATH", "")]
-    return {**kept, "OMP_NUM_THREADS": "1", "PYTHONPATH": os.pathsep.join(filter(None, paths))}
-
-
 @contextlib.contextmanager
 def _ended(child: subprocess.Popen[str], folder: Path) -> Iterator[None]:
     """Whatever happens, of the child nothing remains: no process (it leads a group), no half-written file."""
@@ -72,18 +63,9 @@ def _ended(child: subprocess.Popen[str], folder: Path) -> Iterator[None]:
         yield
     finally:
         if child.returncode != 0:
-            _end(child)
+            children.end(child, PATIENCE)
             for file in folder.glob(f".*{UNFINISHED}"):
                 file.unlink(missing_ok=True)
-
-
-def _end(child: subprocess.Popen[str]) -> None:
-    """Politely first, so that an X server takes its socket with it."""
-    for order in (signal.SIGTERM, signal.SIGKILL):
-        with contextlib.suppress(OSError):
-            os.killpg(child.pid, order)
-        with contextlib.suppress(subprocess.TimeoutExpired):
-            child.communicate(timeout=PATIENCE)
 
 
 def _message(errors: str, code: int) -> str:

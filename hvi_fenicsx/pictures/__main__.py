@@ -81,6 +81,12 @@ def jobs(folder: Path) -> Iterator[Job]:
         raise PictureError(f"{folder}: there is nothing to draw, neither displacement.pvd nor contact.csv")
     if body is not None:
         yield _of_body(result, body)
+    if body is not None and "von_mises" in body.by_cell:
+        solid = body.dimension == 3
+        yield Job(folder / "stress.png", "solid_stress" if solid else "stress", (result, body), solid)
+    if body is not None and result.sides:
+        solid = body.dimension == 3
+        yield Job(folder / "scene.png", "solid_setting" if solid else "setting", (result, body), solid)
     for part in result.parts:
         path = folder / ("contact.png" if len(result.parts) == 1 else f"contact_{part.name}.png")
         if not part.spatial:
@@ -124,6 +130,8 @@ def _drawn(job: Job, connection: Connection) -> None:
     try:
         job.run()
         connection.send("")
+    except ModuleNotFoundError as error:
+        connection.send(f"needs the package {error.name}, which is not installed here")
     except Exception as error:  # whatever it is, it is told in one line
         connection.send(str(error) if isinstance(error, HviError) else f"{type(error).__name__}: {error}")
 

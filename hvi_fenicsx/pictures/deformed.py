@@ -14,6 +14,8 @@ from .units import round_below
 
 VISIBLE = 0.08
 """How large the largest displacement is drawn, of the body's size."""
+PEAK, SPOILS = 0.005, 1.25
+"""Of the body's volume, left beyond the end of a scale; how many times its end the peak must be."""
 NEAR = 0.3
 """Gaps larger than this, magnified, of the body's size, are the body's own shape."""
 
@@ -79,6 +81,29 @@ def deform(body: Body, parts: Sequence[Footing]) -> Deformed:
     factor = 1.0 if largest > 0.5 * VISIBLE * body.size else round_below(VISIBLE * body.size / largest * 1.25)
     gap = max((float(np.nanmax(foot.part["gap"], initial=0.0)) for foot in parts), default=0.0)
     return Deformed(body, u, factor if factor * gap < NEAR * body.size else 1.0)
+
+
+@dataclass(frozen=True)
+class Scale:
+    """A scale for numbers of the cells, from zero; ``cut`` where it ends below the largest of them."""
+
+    end: float
+    largest: float
+
+    @property
+    def cut(self) -> bool:
+        """Whether some cells have more."""
+        return self.end < self.largest
+
+
+def scale_of(body: Body, values: Array) -> Scale:
+    """A scale that a peak in a corner does not spoil: it ends where a share ``PEAK`` of the body has more."""
+    sides = body.points[body.cells[:, 1:]] - body.points[body.cells[:, :1]]
+    volume = np.sqrt(np.linalg.det(sides @ sides.transpose(0, 2, 1)))
+    order = np.argsort(values)
+    share = np.cumsum(volume[order]) / volume.sum()
+    end, largest = float(values[order][np.searchsorted(share, 1.0 - PEAK)]), float(values.max())
+    return Scale(end if 0.0 < end < largest / SPOILS else largest, largest)
 
 
 def largest_stress(parts: list[Footing]) -> float:

@@ -28,15 +28,16 @@ WAY = np.linspace(0.0, 1.0, 25)
 
 def draw(path: Path, result: Result, body: Body) -> None:
     """Draw a plane body and its ghost."""
-    motion = fitted(body, body.fields["escape_mode"])
+    mover = body.moving("escape_mode")
+    motion = fitted(mover, mover.fields["escape_mode"])
     rest = Deformed(body, np.zeros_like(body.points), 1.0)
     drawn = [*marks.supports(rest, supports(result, body)), *marks.loads(rest, loads(result, body))]
-    ghost, posts = motion.at(body.points), followed(body, motion)
+    ghost, posts = motion.at(mover.points), followed(mover, motion)
     ways = np.stack([motion.at(posts, part)[:, :2] for part in WAY], axis=1)
     reached = [body.points[:, :2], ghost[:, :2], ways.reshape(-1, 2), *(mark.extent for mark in drawn)]
     made, axes = canvas(np.concatenate(reached))
     heading(made, result, "rigid motion")
-    _bodies(axes, body, ghost)
+    _bodies(axes, body, mover, ghost)
     for mark in drawn:
         mark.draw(axes)
     for way in ways:
@@ -45,9 +46,9 @@ def draw(path: Path, result: Result, body: Body) -> None:
     save(made, path)
 
 
-def _bodies(axes: Axes, body: Body, ghost: Array) -> None:
-    loops = chains(body.boundary)
-    axes.add_patch(PathPatch(closed_path(body.points, loops), fc=PALE, ec=INK, lw=1.6, zorder=1))
+def _bodies(axes: Axes, body: Body, mover: Body, ghost: Array) -> None:
+    axes.add_patch(PathPatch(closed_path(body.points, chains(body.boundary)), fc=PALE, ec=INK, lw=1.6, zorder=1))
+    loops = chains(mover.boundary)
     axes.add_patch(PathPatch(closed_path(ghost, loops), fc="none", ec=VERMILION, lw=2, ls=(0, (5, 3)), zorder=4))
     axes.add_patch(PathPatch(closed_path(ghost, loops), fc=VERMILION, alpha=0.12, lw=0, zorder=3))
 

@@ -6,7 +6,7 @@ import csv
 import json
 import tomllib
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -83,12 +83,17 @@ def _tangential(first: Array, second: Array) -> Array:
 
 @dataclass(frozen=True)
 class Result:
-    """A folder's tables. ``scene`` and ``summary`` are as the files have them."""
+    """A folder's tables.
+
+    Attributes:
+        scene, summary: as the files have them. parts: Γc. sides: vertices (m, 3) of the boundary tables, by name.
+    """
 
     folder: Path
     scene: Mapping[str, Any]
     summary: Mapping[str, Any]
     parts: tuple[Part, ...]
+    sides: Mapping[str, Array] = field(default_factory=dict)
 
     @property
     def solvability(self) -> Mapping[str, Any]:
@@ -107,6 +112,14 @@ class Result:
 
     def _on(self, part: str) -> Mapping[str, Any]:
         return (self.scene.get("boundary") or {}).get(part) or {}
+
+    @property
+    def within(self) -> list[str]:
+        """What acts inside of the body, in words."""
+        body = self.scene.get("body") or {}
+        named = {key for name, value in body.items() for key in (value if isinstance(value, dict) else [name])}
+        words = {"force": "a force on the body itself", "temperature": "a change of temperature"}
+        return [said for key, said in words.items() if key in named]
 
     def obstacle(self, part: str) -> Array | None:
         """The unit vector (3,) from a part towards its flat obstacle, if it has one."""
@@ -130,15 +143,16 @@ class Result:
 
 
 def read(folder: Path) -> Result:
-    """Read a folder's tables; ``contact.csv`` may be missing.
+    """Read a folder's tables; ``contact.csv`` and ``boundary.csv`` may be missing.
 
     Raises:
         PictureError: no result is there, or its files are damaged.
     """
     scene = _read(folder / "scene.toml", lambda text: dict(tomllib.loads(text)))
     summary = _read(folder / "summary.json", lambda text: dict(json.loads(text)))
-    table = folder / "contact.csv"
-    return Result(folder, scene, summary, _read(table, _parts) if table.exists() else ())
+    table, sides = folder / "contact.csv", folder / "boundary.csv"
+    parts = _read(table, _parts) if table.exists() else ()
+    return Result(folder, scene, summary, parts, _read(sides, _sides) if sides.exists() else {})
 
 
 def _read(path: Path, parse: Callable[[str], T]) -> T:
@@ -157,3 +171,8 @@ def _parts(text: str) -> tuple[Part, ...]:
 
 def _part(name: str, rows: list[dict[str, str]]) -> Part:
     return Part(name, {c: np.array([float(row[c]) if row[c] else np.nan for row in rows]) for c in (*NUMBERS, *STATES)})
+
+
+def _sides(text: str) -> dict[str, Array]:
+    rows = [(row["part"], [float(row[c] or 0.0) for c in "xyz"]) for row in csv.DictReader(text.splitlines())]
+    return {name: np.array([point for _, point in own]) for name, own in groupby(rows, key=lambda row: row[0])}

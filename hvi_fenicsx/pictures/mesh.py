@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -22,6 +22,8 @@ Array = npt.NDArray[np.floating[Any]]
 Ints = npt.NDArray[np.int64]
 AT_ONCE = 2_000_000
 """Pairs of points whose distances are simply all computed."""
+CELL_FIELDS = ("von_mises",)
+"""What is read of the cells' fields: only what a picture shows."""
 _CORNERS = {5: 3, 69: 3, 10: 4, 71: 4}
 """Vertices of VTK's triangles and tetrahedra, plain and Lagrange."""
 
@@ -32,11 +34,13 @@ class Body:
 
     Attributes:
         points: (n, 3), m. cells: (m, 3|4). fields: vector fields at the points by name, (n, 3).
+        by_cell: numbers of the cells by name, (m,).
     """
 
     points: Array
     cells: Ints
     fields: Mapping[str, Array]
+    by_cell: Mapping[str, Array] = field(default_factory=dict)
 
     @property
     def dimension(self) -> int:
@@ -48,15 +52,32 @@ class Body:
         """The largest extent, m."""
         return float(np.max(np.ptp(self.points, axis=0)))
 
-    @cached_property
+    @property
     def boundary(self) -> Ints:
         """Facets of one cell only (k, 2|3); counterclockwise seen from outside, in the plane the body on their left."""
+        return self._skin[0]
+
+    @property
+    def behind(self) -> Ints:
+        """The cell of each facet of the boundary, (k,)."""
+        return self._skin[1]
+
+    @cached_property
+    def _skin(self) -> tuple[Ints, Ints]:
         d = self.dimension
         facets = np.concatenate([np.delete(self.cells, i, axis=1) for i in range(d + 1)])
         _, first, count = np.unique(_keys(facets, len(self.points)), return_index=True, return_counts=True)
         lone = np.sort(first[count == 1])
         opposite = self.cells.T.ravel()[lone]
-        return _outward(self.points, facets[lone], opposite)
+        return _outward(self.points, facets[lone], opposite), lone % len(self.cells)
+
+    def moving(self, name: str) -> Body:
+        """The body that a rigid motion moves, one of several: it leaves a point or an axis at rest, but no cell."""
+        moves = np.any(self.fields[name] != 0.0, axis=1)
+        cells = self.cells[np.any(moves[self.cells], axis=1)]
+        kept, numbered = np.unique(cells, return_inverse=True)
+        fields = {name: values[kept] for name, values in self.fields.items()}
+        return Body(self.points[kept], numbered.reshape(cells.shape), fields)
 
     def vertices(self, points: Array) -> Ints:
         """The body's vertices at given points (m, 3).
@@ -72,9 +93,13 @@ class Body:
 
     def facets_of(self, vertices: Ints) -> Ints:
         """The boundary facets all of whose corners are among the vertices."""
-        among = np.zeros(len(self.points), dtype=bool)
-        among[vertices] = True
-        return np.asarray(self.boundary[among[self.boundary].all(axis=1)])
+        return np.asarray(self.boundary[self.among(vertices)])
+
+    def among(self, vertices: Ints) -> npt.NDArray[np.bool_]:
+        """Which facets of the boundary these are, (k,)."""
+        chosen = np.zeros(len(self.points), dtype=bool)
+        chosen[vertices] = True
+        return np.asarray(chosen[self.boundary].all(axis=1))
 
 
 def _nearest(candidates: Array, points: Array) -> tuple[Array, Ints]:
@@ -146,12 +171,18 @@ def _piece(path: Path) -> tuple[Ints, Body]:
     owned = slice(None) if ghost is None else _array(ghost) == 0
     number = piece.find("PointData/DataArray[@Name='vtkOriginalPointIds']")
     numbers = np.arange(len(points)) if number is None else _array(number).astype(np.int64)
-    return numbers, Body(points, cells[owned, : corners.pop()], _fields(piece))
+    by_cell = {name: values[owned] for name, values in _numbers(piece).items()}
+    return numbers, Body(points, cells[owned, : corners.pop()], _fields(piece), by_cell)
 
 
 def _fields(piece: ElementTree.Element) -> dict[str, Array]:
     found = piece.iterfind("PointData/DataArray[@NumberOfComponents='3']")
     return {array.attrib["Name"]: _array(array).reshape(-1, 3) for array in found}
+
+
+def _numbers(piece: ElementTree.Element) -> dict[str, Array]:
+    found = {array.attrib["Name"]: array for array in piece.iterfind("CellData/DataArray")}
+    return {name: _array(found[name]) for name in CELL_FIELDS if name in found}
 
 
 def _array(element: ElementTree.Element | None) -> Array:
@@ -173,4 +204,5 @@ def _joined(pieces: Sequence[tuple[Ints, Body]]) -> Body:
     cells = np.concatenate([index[body.cells + start] for (_, body), start in zip(pieces, starts, strict=False)])
     names = pieces[0][1].fields
     fields = {name: np.concatenate([body.fields[name] for _, body in pieces])[first] for name in names}
-    return Body(np.concatenate([body.points for _, body in pieces])[first], cells, fields)
+    by_cell = {name: np.concatenate([body.by_cell[name] for _, body in pieces]) for name in pieces[0][1].by_cell}
+    return Body(np.concatenate([body.points for _, body in pieces])[first], cells, fields, by_cell)

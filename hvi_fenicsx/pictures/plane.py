@@ -7,15 +7,16 @@ from pathlib import Path
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
+from matplotlib.colors import Colormap
 from matplotlib.figure import Figure
+from matplotlib.image import AxesImage
 from matplotlib.patches import PathPatch
-from matplotlib.path import Path as DrawnPath
 
 from . import plane_marks as marks
 from .deformed import Deformed, deform, footings, largest_stress
 from .inputs import Result
 from .legend import FOOT, colour_bar, legend
-from .mesh import Array, Body
+from .mesh import Array, Body, Ints
 from .outline import chains, closed_path
 from .raster import shade
 from .sides import loads, supports
@@ -40,7 +41,7 @@ def draw(path: Path, result: Result, body: Body) -> None:
     ]
     made, axes = canvas(np.concatenate([shape.points[:, :2], body.points[:, :2], *(m.extent for m in drawn)]))
     heading(made, result, "deformed body")
-    _body(axes, shape)
+    paint(axes, shape, shape.body.cells, shape.points, shape.amount, SLATE, float(shape.amount.max()))
     for mark in drawn:
         mark.draw(axes)
     most = float(shape.amount.max())
@@ -66,11 +67,16 @@ def canvas(points: Array) -> tuple[Figure, Axes]:
     return made, axes
 
 
-def _body(axes: Axes, shape: Deformed) -> None:
+def paint(
+    axes: Axes, shape: Deformed, triangles: Ints, corners: Array, values: Array, colours: Colormap, end: float
+) -> None:
+    """The body over its undeformed outline, in the colours of values at the corners of triangles, from zero."""
     body, points = shape.body, shape.points
     loops = chains(body.boundary)
     outline = closed_path(points, loops)
-    _shading(axes, shape, outline)
+    drawn = _shading(axes, corners, triangles, values)
+    drawn.set(cmap=colours, clim=(0.0, end or 1.0))
+    drawn.set_clip_path(outline, axes.transData)
     for patch, style in (
         (closed_path(body.points, loops), {"ec": GREY, "ls": (0, (5, 4)), "lw": 1.3, "zorder": 3}),
         (outline, {"ec": INK, "lw": 1.6, "zorder": 4}),
@@ -86,22 +92,12 @@ def _pixels_between_lines(axes: Axes, body: Body) -> float:
     return per_metre * float(np.sqrt(np.prod(np.ptp(body.points[:, :2], axis=0)) / len(body.cells)))
 
 
-def _shading(axes: Axes, shape: Deformed, outline: DrawnPath) -> None:
-    """|u| as an image of the picture's own pixels."""
+def _shading(axes: Axes, corners: Array, triangles: Ints, values: Array) -> AxesImage:
+    """Values as an image of the picture's own pixels."""
     (left, right), (bottom, top) = axes.get_xlim(), axes.get_ylim()
     wide = round(SIDE * DPI)
     tall = round(wide * (top - bottom) / (right - left))
-    pixels = (shape.points[:, :2] - [left, bottom]) * [wide / (right - left), tall / (top - bottom)]
-    image = shade(pixels, shape.body.cells, shape.amount, (tall, wide))
-    drawn = axes.imshow(
-        image,
-        cmap=SLATE,
-        vmin=0.0,
-        vmax=float(shape.amount.max()) or 1.0,
-        origin="lower",
-        extent=(left, right, bottom, top),
-        interpolation="nearest",
-        aspect="auto",
-        zorder=1,
-    )
-    drawn.set_clip_path(outline, axes.transData)
+    pixels = (corners[:, :2] - [left, bottom]) * [wide / (right - left), tall / (top - bottom)]
+    image = shade(pixels, triangles, values, (tall, wide))
+    extent = (left, right, bottom, top)
+    return axes.imshow(image, origin="lower", extent=extent, interpolation="nearest", aspect="auto", zorder=1)

@@ -52,19 +52,22 @@ def loads(shape: Deformed, found: list[Load]) -> Iterator[Mark]:
     """Arrows onto a side where it is pushed, from it where it is pulled; each load with its own scale and value."""
     size = shape.body.size
     for load in found:
-        points, normal = shape.points[load.side.vertices, :2], load.side.normal[:2]
+        points = shape.points[load.side.vertices, :2]
         largest = float(np.linalg.norm(load.traction, axis=1).max())
         at = _spread(points, size)
         arrows = _along(points, load.traction[:, :2], at) * LOAD * size / largest
-        feet = _along(points, points, at)
-        tails = feet - np.where((arrows @ normal < 0.0)[:, None], arrows, 0.0)
+        feet, outward = _along(points, points, at), _along(points, load.side.normals[:, :2], at)
+        pushed = np.einsum("ki,ki->k", arrows, outward) < -1e-6 * LOAD * size
+        tails = feet - np.where(pushed[:, None], arrows, 0.0)
         yield _arrows(tails, arrows, INK, "load", size)
-        yield _label(feet, normal, quantity(largest, "Pa"), size)
+        yield _label(feet, outward, quantity(largest, "Pa"), size)
 
 
-def _label(feet: Array, normal: Array, words: str, size: float) -> Mark:
+def _label(feet: Array, outward: Array, words: str, size: float) -> Mark:
     """A load's largest value beyond its arrows, where the middle of the side is."""
-    at = (feet[0] + feet[-1]) / 2 + (LOAD + 0.015) * size * normal
+    normal = outward[len(outward) // 2]
+    middle = (feet[(len(feet) - 1) // 2] + feet[len(feet) // 2]) / 2
+    at = middle + (LOAD + 0.015) * size * normal
     room = at + size * normal * np.where(np.abs(normal) > 0.5, [0.12, 0.045], 0.0)
 
     def draw(axes: Axes) -> None:
@@ -117,33 +120,32 @@ _ARROW: dict[str, Any] = {
 def supports(shape: Deformed, found: list[Support]) -> Iterator[Mark]:
     """A wall along the side, with rollers where the side may move along it."""
     for support in found:
-        points, normal = shape.points[support.side.vertices, :2], support.side.normal[:2]
+        points, outward = shape.points[support.side.vertices, :2], support.side.normals[:, :2]
         radius = ROLLER * shape.body.size if support.rolling else 0.0
-        rollers = _along(points, points, _spread(points, shape.body.size)) + radius * normal
+        rollers = _along(points, points + radius * outward, _spread(points, shape.body.size))
         shown = rollers if support.rolling else rollers[:0]
-        yield _support(points + 2 * radius * normal, shown, normal, shape.body.size)
+        yield _support(points + 2 * radius * outward, shown, outward, shape.body.size)
 
 
-def _support(wall: Array, rollers: Array, normal: Array, size: float) -> Mark:
+def _support(wall: Array, rollers: Array, outward: Array, size: float) -> Mark:
     words = "support, free to slide" if len(rollers) else "support"
-    ends = np.array([wall.min(axis=0), wall.max(axis=0)])
 
     def draw(axes: Axes) -> None:
-        _hatched(axes, ends, normal, size)
+        _hatched(axes, wall, outward, size)
         per_metre = axes.get_window_extent().width / float(np.ptp(axes.get_xlim())) * 72 / axes.figure.dpi
         style: dict[str, Any] = {"mfc": "white", "mec": INK, "mew": 1.2, "clip_on": False, "zorder": 5}
         axes.plot(*rollers.T, "o", ms=2 * ROLLER * size * per_metre, **style)
 
     key = Line2D([], [], color=INK, lw=2.2, marker="o" if len(rollers) else "", mfc="white", ms=7, label=words)
-    return Mark(np.concatenate([ends, ends + 0.03 * size * normal]), draw, lambda: key, words)
+    return Mark(np.concatenate([wall, wall + 0.03 * size * outward]), draw, lambda: key, words)
 
 
-def _hatched(axes: Axes, line: Array, normal: Array, size: float) -> None:
+def _hatched(axes: Axes, line: Array, outward: Array, size: float) -> None:
     """A line with the short strokes behind it by which drawings tell a wall."""
     axes.plot(*line.T, color=INK, lw=2.2, solid_capstyle="butt", clip_on=False, zorder=3)
-    at = _along(line, line, np.arange(0.0, float(_lengths(line)[-1]), 0.02 * size))
-    along = np.array([-normal[1], normal[0]])
-    tips = at + 0.02 * size * (normal + along)
+    places = np.arange(0.0, float(_lengths(line)[-1]), 0.02 * size)
+    at, normal = _along(line, line, places), _along(line, outward, places)
+    tips = at + 0.02 * size * (normal + np.column_stack([-normal[:, 1], normal[:, 0]]))
     strokes = np.stack([at, tips, np.full_like(at, np.nan)], axis=1).reshape(-1, 2)
     axes.plot(*strokes.T, color=GREY, lw=0.9, clip_on=False, zorder=2)
 

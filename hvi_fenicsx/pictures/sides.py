@@ -1,7 +1,4 @@
-"""What acts on the sides of a built-in shape, from the scene: loads and supports, where they can be drawn.
-
-A mesh file's parts are not in the result folder; there, nothing is drawn.
-"""
+"""What acts on the body's sides, from the scene and ``boundary.csv``: loads and supports, on any shape or mesh."""
 
 from __future__ import annotations
 
@@ -15,17 +12,28 @@ from ..errors import HviError
 from ..expressions import Formula
 from .inputs import Result
 from .mesh import Array, Body, Ints
-
-_NORMALS = {"left": (0, -1), "right": (0, 1), "bottom": (-1, -1), "top": (-1, 1), "front": (1, -1), "back": (1, 1)}
-"""Axis (the last one is upwards) and sense."""
+from .outline import chains, normals
+from .space import area_vectors
 
 
 @dataclass(frozen=True)
 class Side:
-    """Vertices (m,) of a side, along it, and its outward normal (3,)."""
+    """A piece of a boundary part: in the plane a line, in space all of it.
 
+    Attributes:
+        part: its name. vertices: (m,), in the plane along the line. facets: (k, 2|3). normals: outward unit, (m, 3).
+    """
+
+    part: str
     vertices: Ints
-    normal: Array
+    facets: Ints
+    normals: Array
+
+    @property
+    def normal(self) -> Array:
+        """The mean outward normal (3,), of unit length; zero for a side that closes on itself."""
+        mean = self.normals.mean(axis=0)
+        return np.asarray(mean / (float(np.linalg.norm(mean)) or 1.0))
 
 
 @dataclass(frozen=True)
@@ -45,9 +53,9 @@ class Support:
 
 
 def loads(result: Result, body: Body) -> list[Load]:
-    """The tractions on sides of a built-in shape that are not zero."""
+    """The tractions that are not zero."""
     found = []
-    for side, table in _tables(result, body):
+    for side, table in tables(result, body):
         traction = _traction(table.get("traction"), body.points[side.vertices])
         if traction is not None and np.any(traction):
             found.append(Load(side, traction))
@@ -55,9 +63,9 @@ def loads(result: Result, body: Body) -> list[Load]:
 
 
 def supports(result: Result, body: Body) -> list[Support]:
-    """The sides of a built-in shape that are held along their normal."""
+    """The sides that are held along the axis nearest to their normal."""
     found = []
-    for side, table in _tables(result, body):
+    for side, table in tables(result, body):
         given = table.get("displacement")
         axis = int(np.argmax(np.abs(side.normal)))
         if isinstance(given, list) and len(given) == body.dimension and given[axis] != "free":
@@ -65,26 +73,30 @@ def supports(result: Result, body: Body) -> list[Support]:
     return found
 
 
-def _tables(result: Result, body: Body) -> Iterator[tuple[Side, Mapping[str, Any]]]:
-    if (result.scene.get("domain") or {}).get("shape") == "file":
+def tables(result: Result, body: Body) -> Iterator[tuple[Side, Mapping[str, Any]]]:
+    """The pieces of each boundary part, with what the scene says of it."""
+    for name, points in result.sides.items():
+        table = (result.scene.get("boundary") or {}).get(name) or {}
+        facets = body.facets_of(body.vertices(points))
+        for side in _lines(name, body, facets) if body.dimension == 2 else _faces(name, body, facets):
+            yield side, table
+
+
+def _lines(name: str, body: Body, facets: Ints) -> Iterator[Side]:
+    for chain in chains(facets):
+        edges = np.column_stack([chain[:-1], chain[1:]])
+        outward = np.pad(normals(body.points, chain), ((0, 0), (0, 1)))
+        yield Side(name, chain, edges, outward)
+
+
+def _faces(name: str, body: Body, facets: Ints) -> Iterator[Side]:
+    if not len(facets):
         return
-    for table in (result.scene.get("boundary") or {}).values():
-        names = table.get("on", ())
-        for name in [names] if isinstance(names, str) else names:
-            if name in _NORMALS:
-                yield _side(body, *_NORMALS[name]), table
-
-
-def _side(body: Body, axis: int, sense: int) -> Side:
-    axis %= body.dimension
-    candidates = np.unique(body.boundary)
-    along = body.points[candidates]
-    level = along[:, axis].max() if sense > 0 else along[:, axis].min()
-    on = np.abs(along[:, axis] - level) <= 1e-9 * body.size
-    order = np.lexsort(np.round(along[on] / body.size, 9).T)  # along the side, whatever rounding says across it
-    normal = np.zeros(3)
-    normal[axis] = sense
-    return Side(candidates[on][order], normal)
+    vertices, index = np.unique(facets, return_inverse=True)
+    outward = np.zeros((len(vertices), 3))
+    for corner in index.reshape(facets.shape).T:
+        np.add.at(outward, corner, area_vectors(body.points, facets))
+    yield Side(name, vertices, facets, outward / np.linalg.norm(outward, axis=1)[:, None])
 
 
 def _traction(given: Any, points: Array) -> Array | None:

@@ -60,7 +60,7 @@ def draw(path: Path, result: Result, body: Body) -> None:
     shape = deform(body, parts)
     normals = [area_vectors(body.points, foot.facets).sum(axis=0) for foot in parts]
     view = best_view(normals)
-    shown = [_placed(shape, view, foot, normal) for foot, normal in zip(parts, normals, strict=True)]
+    shown = [placed(shape, view, foot, normal) for foot, normal in zip(parts, normals, strict=True)]
     arrows = [space_loads.arrows(shape, load) for load in pulled]
     reached = [shape.points, body.points, *(s.points[s.foot.vertices] for s in shown)]
     reached += [end for tails, ways in arrows for end in (tails, tails + ways)]
@@ -71,13 +71,13 @@ def draw(path: Path, result: Result, body: Body) -> None:
     depths = (float(view.depth(everything).min()), float(view.depth(everything).max()))
     render(axes, view, depths, partial(_fill, shape=shape, shown=shown, arrows=arrows, scale=scale))
     space_loads.labels(axes, view, shape, pulled)
-    for placed in shown:
-        _guides(axes, view, shape, placed)
+    for patch in shown:
+        guides(axes, view, shape, patch)
     _foot(made, shape, shown, scale)
     save(made, path)
 
 
-def _placed(shape: Deformed, view: View, foot: Footing, normal: Array) -> Patched:
+def placed(shape: Deformed, view: View, foot: Footing, normal: Array) -> Patched:
     """A part where it is if it is seen there, else so far out along its normal that the body does not hide it."""
     unit = normal / (float(np.linalg.norm(normal)) or 1.0)
     if float(unit @ view.toward) > FACING:
@@ -116,15 +116,15 @@ def _fill(
     )
     plotter.add_mesh(creases(shape.points, facets), color=INK, line_width=3)
     plotter.add_mesh(creases(shape.body.points, facets), color=GREY, line_width=2)
-    for placed in shown:
-        _fill_part(plotter, placed, scale)
+    for part in shown:
+        _fill_part(plotter, part, scale)
     for tails, ways in arrows:
         space_loads.fill(plotter, tails, ways)
 
 
-def _fill_part(plotter: pyvista.Plotter, placed: Patched, scale: tuple[Colormap, float, float]) -> None:
-    patch = surface(placed.points, placed.foot.facets)
-    patch.point_data["pressure"] = placed.pressure[patch.point_data["vertex"]]
+def _fill_part(plotter: pyvista.Plotter, part: Patched, scale: tuple[Colormap, float, float]) -> None:
+    patch = surface(part.points, part.foot.facets)
+    patch.point_data["pressure"] = part.pressure[patch.point_data["vertex"]]
     plotter.add_mesh(
         patch,
         scalars="pressure",
@@ -134,15 +134,15 @@ def _fill_part(plotter: pyvista.Plotter, placed: Patched, scale: tuple[Colormap,
         show_scalar_bar=False,
         lighting=False,
     )
-    plotter.add_mesh(creases(placed.points, placed.foot.facets), color=INK, line_width=3)
+    plotter.add_mesh(creases(part.points, part.foot.facets), color=INK, line_width=3)
 
 
-def _guides(axes: Axes, view: View, shape: Deformed, placed: Patched) -> None:
+def guides(axes: Axes, view: View, shape: Deformed, patch: Patched) -> None:
     """Thin lines from a part on the body to its footprint, at its outermost points."""
-    if not placed.away.any():
+    if not patch.away.any():
         return
-    start = view.project(shape.points[placed.foot.vertices])
-    end = view.project(placed.points[placed.foot.vertices])
+    start = view.project(shape.points[patch.foot.vertices])
+    end = view.project(patch.points[patch.foot.vertices])
     across = np.array([-(end - start)[0, 1], (end - start)[0, 0]])
     for i in (int(np.argmin(start @ across)), int(np.argmax(start @ across))):
         axes.plot(*np.array([start[i], end[i]]).T, color=GREY, lw=1.1, ls=(0, (2, 3)), zorder=0.5)

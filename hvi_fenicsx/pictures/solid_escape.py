@@ -25,10 +25,11 @@ if TYPE_CHECKING:
 
 def draw(path: Path, result: Result, body: Body) -> None:
     """Draw a body in space and its ghost."""
-    motion, view = fitted(body, body.fields["escape_mode"]), best_view([])
+    mover, view = body.moving("escape_mode"), best_view([])
+    motion = fitted(mover, mover.fields["escape_mode"])
     rest, pulled = Deformed(body, np.zeros_like(body.points), 1.0), loads(result, body)
     arrows = [space_loads.arrows(rest, load) for load in pulled]
-    ghost, posts = motion.at(body.points), followed(body, motion)
+    ghost, posts = motion.at(mover.points), followed(mover, motion)
     posts = posts[view.depth(posts) >= np.quantile(view.depth(posts), 0.15)]  # not the one behind the body
     ways = np.stack([motion.at(posts, part) for part in WAY], axis=1)
     reached = [end for tails, along in arrows for end in (tails, tails + along)]
@@ -37,7 +38,7 @@ def draw(path: Path, result: Result, body: Body) -> None:
     heading(made, result, "rigid motion")
     depths = (float(view.depth(everything).min()), float(view.depth(everything).max()))
     nearer = ghost + 1e-3 * body.size * view.toward  # where the two share a face, the ghost's is seen
-    render(axes, view, depths, partial(_fill, body=body, ghost=nearer, arrows=arrows))
+    render(axes, view, depths, partial(_fill, body=body, mover=mover, ghost=nearer, arrows=arrows))
     space_loads.labels(axes, view, rest, pulled)
     for way in ways:
         arrow(axes, view.project(way))
@@ -45,10 +46,13 @@ def draw(path: Path, result: Result, body: Body) -> None:
     save(made, path)
 
 
-def _fill(plotter: pyvista.Plotter, *, body: Body, ghost: Array, arrows: list[tuple[Array, Array]]) -> None:
+def _fill(
+    plotter: pyvista.Plotter, *, body: Body, mover: Body, ghost: Array, arrows: list[tuple[Array, Array]]
+) -> None:
     facets = body.boundary
     plotter.add_mesh(surface(body.points, facets), color=PALE, ambient=0.75, diffuse=0.3)
     plotter.add_mesh(creases(body.points, facets), color=INK, line_width=3)
+    facets = mover.boundary
     plotter.add_mesh(surface(ghost, facets), color=VERMILION, opacity=0.16, lighting=False)
     plotter.add_mesh(creases(ghost, facets), color=VERMILION, line_width=4)
     for tails, ways in arrows:

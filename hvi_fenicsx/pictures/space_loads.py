@@ -38,7 +38,8 @@ def arrows(shape: Deformed, load: Load) -> tuple[Array, Array]:
     ways = traction * ARROW * shape.body.size / float(np.linalg.norm(load.traction, axis=1).max())
     feet = shape.points[load.side.vertices[chosen]]
     visible = np.linalg.norm(ways, axis=1) > 0.02 * shape.body.size
-    tails = feet - np.where((ways @ load.side.normal < 0.0)[:, None], ways, 0.0)
+    pushed = np.einsum("ki,ki->k", ways, load.side.normals[chosen]) < 0.0
+    tails = feet - np.where(pushed[:, None], ways, 0.0)
     return tails[visible], ways[visible]
 
 

@@ -14,10 +14,12 @@ from pathlib import Path
 from typing import Any
 
 import matplotlib
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
+from PIL import Image
 
 from . import UNFINISHED
 from .inputs import Result
@@ -58,6 +60,8 @@ def shades(dark: str, light: str = "#f4f4f1") -> LinearSegmentedColormap:
 
 SLATE = shades("#54799a", "#eef2f5")
 """For |u|: quiet, so that what acts on the boundary stands out."""
+EMBER = LinearSegmentedColormap.from_list("ember", ["#f8f6ee", "#f2c46d", VERMILION, "#55170a"])
+"""For the stress inside the body."""
 _PRESSED = shades(VERMILION, "#fdf3ec")
 _BOTH = LinearSegmentedColormap.from_list("both", [PURPLE, "#fdfaf7", VERMILION])
 
@@ -84,14 +88,21 @@ def area(made: Figure, left: float, bottom: float, width: float, height: float, 
 
 def heading(made: Figure, result: Result, subject: str) -> None:
     """The scene's title; below it what is shown, how large the problem was, its state, and whether to trust it."""
+    title = str(result.scene.get("title") or "") or result.folder.name
+    titled(made, title, f"{subject} · {_facts(result)}", *_verdict(result))
+
+
+def titled(made: Figure, title: str, below: str, words: str = "", colour: str = INK) -> None:
+    """A title in bold; on the line below it what is shown and, at the right, coloured words."""
     tall = made.get_figheight()
-    title = textwrap.shorten(str(result.scene.get("title") or "") or result.folder.name, 2 * _LINE, placeholder=" …")
+    title = textwrap.shorten(title, 2 * _LINE, placeholder=" …")
     lines = textwrap.wrap(title, _LINE) if len(title) > _LINE else [title]
-    size, top, below = (17, 0.19, 0.76) if len(lines) == 1 else (13.5, 0.12, 0.85)
+    size, top, second = (17, 0.19, 0.76) if len(lines) == 1 else (13.5, 0.12, 0.85)
     made.text(0.3 / WIDTH, 1 - top / tall, "\n".join(lines), size=size, weight="bold", va="top", linespacing=1.1)
-    made.text(0.3 / WIDTH, 1 - below / tall, f"{subject} · {_facts(result)}", size=12, color=GREY, va="baseline")
-    words, colour = _verdict(result)
-    made.text(1 - 0.3 / WIDTH, 1 - below / tall, words, size=12, weight="bold", color=colour, ha="right", va="baseline")
+    made.text(0.3 / WIDTH, 1 - second / tall, below, size=12, color=GREY, va="baseline")
+    made.text(
+        1 - 0.3 / WIDTH, 1 - second / tall, words, size=12, weight="bold", color=colour, ha="right", va="baseline"
+    )
 
 
 def _facts(result: Result) -> str:
@@ -122,6 +133,9 @@ def unfinished(path: Path) -> Iterator[Path]:
 
 
 def save(made: Figure, path: Path) -> None:
-    """Write a picture, whole or not at all."""
+    """Write a picture, whole or not at all; without an alpha channel, which nothing needs, it is a quarter smaller."""
+    canvas = FigureCanvasAgg(made)
+    canvas.draw()
+    image = Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")
     with unfinished(path) as aside:
-        made.savefig(aside, dpi=DPI, pil_kwargs={"compress_level": 3})  # thrice as fast, a tenth larger
+        image.save(aside, dpi=(DPI, DPI), compress_level=6)

@@ -22,12 +22,13 @@ class Unit:
 
 
 def unit_for(largest: float, name: str) -> Unit:
-    """The prefix that brings the largest value between 1 and 1000; none for zero."""
+    """The prefix that brings the largest value between 1 and 1000, if it may; none for zero."""
     if not (math.isfinite(largest) and largest != 0.0):
         return Unit(1.0, name)
     exponent = 3 * math.floor(math.log10(abs(largest) * (1.0 + 1e-9)) / 3)
+    least = 0 if name == "Pa" else -12  # mPa would be read as MPa
     most = 0 if name == "m" else 12  # nobody says megametre
-    exponent = min(max(exponent, -12), most)
+    exponent = min(max(exponent, least), most)
     return Unit(10.0**exponent, _PREFIXES[exponent] + name)
 
 

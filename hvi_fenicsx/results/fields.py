@@ -13,26 +13,44 @@ from dolfinx.io import VTKFile
 
 from .. import compat
 from ..boundary import State
-from ..existence import body_of
+from ..errors import InputError
+from ..estimate import Estimate
+from ..parallel import agree
 from ..problem import Problem
-from ..rigid import Mode, rigid_fields
+from ..rigid import Mode
+from ..surface import dof_of_node
+from . import stress
 
 Array = npt.NDArray[np.float64]
 
 
-def write_body(path: Path, problem: Problem, u: fem.Function) -> None:
-    """The displacement, m."""
+def write_body(path: Path, problem: Problem, u: fem.Function, estimate: Estimate | None) -> None:
+    """The displacement, m; by cell the von Mises stress, N/m², and the estimated error, over the energy norm of u."""
     field = fem.Function(problem.space, name="displacement")
     field.x.array[:] = u.x.array * problem.scales.displacement
-    _write(path, problem.domain.mesh, [field])
+    by_cell: dict[str, Array] = {"von_mises": stress.von_mises(stress.by_cell(problem, u))}
+    if estimate is not None:
+        by_cell["error"] = np.asarray(estimate.cells / (estimate.energy_norm or 1.0), dtype=np.float64)
+    space = fem.functionspace(problem.domain.mesh, ("Discontinuous Lagrange", 0))
+    _write(path, problem.domain.mesh, [field, *(_constant(space, name, values) for name, values in by_cell.items())])
+
+
+def _constant(space: fem.FunctionSpace, name: str, values: Array) -> fem.Function:
+    """A field that is constant in each cell, of values at the owned cells. Collective.
+
+    Of its digits the first seven are kept: more say nothing, and their text takes twice as long to write.
+    """
+    field = fem.Function(space, name=name)
+    field.x.array[: len(values)] = values.astype(np.float32)
+    field.x.scatter_forward()
+    return field
 
 
 def write_escape(path: Path, problem: Problem, mode: Mode) -> None:
     """The rigid motion along which the body escapes, dimensionless."""
     field = fem.Function(problem.space, name="escape_mode")
     points = problem.space.tabulate_dof_coordinates() / problem.scales.length
-    motion = np.einsum("n,vnd->vd", np.asarray(mode.coefficients), rigid_fields(points, body_of(problem)))
-    field.x.array[:] = motion.ravel()
+    field.x.array[:] = problem.bodies.motion(points, mode).ravel()
     _write(path, problem.domain.mesh, [field])
 
 
@@ -41,9 +59,9 @@ def write_contact(path: Path, problem: Problem, states: Sequence[State]) -> None
     mesh, d = problem.domain.mesh, problem.scales.dimension
     facets = np.unique(np.concatenate([s.facets for s in (state.surface for state in states)])).astype(np.int32)
     surface, nodes = compat.submesh_nodes(mesh, d - 1, facets)
-    parent = _dof_of_node(problem.space)[nodes]
+    parent = dof_of_node(problem.space)[nodes]
     space = fem.functionspace(surface, ("Lagrange", 1))
-    target = _dof_of_node(space)
+    target = dof_of_node(space)
     fields = []
     for name, values in _nodal(problem, states).items():
         field = fem.Function(space, name=name)
@@ -79,17 +97,16 @@ def _nodal(problem: Problem, states: Sequence[State]) -> dict[str, Array]:
     return {name: field.x.array for name, field in found.items()}
 
 
-def _dof_of_node(space: fem.FunctionSpace) -> npt.NDArray[np.int32]:
-    """The (block) dof at each geometry node of a P1 space on simplices."""
-    mesh = space.mesh
-    result = np.zeros(mesh.geometry.x.shape[0], dtype=np.int32)
-    cells = (
-        mesh.topology.index_map(mesh.topology.dim).size_local + mesh.topology.index_map(mesh.topology.dim).num_ghosts
-    )
-    result[compat.geometry_dofmap(mesh)[:cells]] = space.dofmap.list[:cells]
-    return result
-
-
 def _write(path: Path, mesh: dmesh.Mesh, fields: Sequence[fem.Function]) -> None:
-    with VTKFile(mesh.comm, str(path), "w") as file:
-        file.write_function(list(fields), 0.0)
+    if faults := [fault for fault in agree(mesh.comm, _fault(path, mesh, fields)) if fault]:
+        raise InputError(f"{path.name}: {faults[0]} Is the disk full?")
+
+
+def _fault(path: Path, mesh: dmesh.Mesh, fields: Sequence[fem.Function]) -> str | None:
+    """Write a file; what went wrong. The writer dies with this frame: it would write again when it is collected."""
+    try:
+        with VTKFile(mesh.comm, str(path), "w") as file:
+            file.write_function(list(fields), 0.0)
+    except RuntimeError as error:
+        return str(error)
+    return None

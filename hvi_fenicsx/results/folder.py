@@ -12,10 +12,14 @@ from typing import Literal
 from mpi4py import MPI
 
 from ..errors import InputError
+from ..interrupt import SIGNALS
 from ..parallel import on_root
 
 MARK = "summary.json"
 """The file that says that a folder holds a finished result; always moved last."""
+_XML, _PNG = b"</VTKFile>", b"IEND\xaeB`\x82"
+_ENDS = {".pvd": _XML, ".vtu": _XML, ".pvtu": _XML, ".png": _PNG, ".html": b"</html>"}
+_LONGEST_END = 64
 Existing = Literal["refuse", "replace"]
 
 
@@ -80,13 +84,20 @@ class ResultFolder:
         on_root(self.comm, self._commit)
 
     def _commit(self) -> None:
-        held = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
+        held = signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)
         try:
+            self._refuse_torn()
             self._swap()
         except OSError as error:
             raise InputError(f"--out {self.target}: {error.strerror or error}; the result is in {self.work}") from None
         finally:
             signal.pthread_sigmask(signal.SIG_SETMASK, held)
+
+    def _refuse_torn(self) -> None:
+        """VTK's writers do not tell that a disk was full."""
+        for file in sorted(self.work.iterdir()):
+            if not _is_whole(file):
+                raise InputError(f"--out {self.target}: {file.name} could not be written whole; is the disk full?")
 
     def _swap(self) -> None:
         if os.path.ismount(self.target):
@@ -111,3 +122,9 @@ class ResultFolder:
             for folder in self._made:
                 with contextlib.suppress(OSError):  # not empty: something else is there by now
                     folder.rmdir()
+
+
+def _is_whole(file: Path) -> bool:
+    """Whether a file ends as files of its kind do."""
+    end = _ENDS.get(file.suffix)
+    return end is None or file.read_bytes()[-_LONGEST_END:].rstrip().endswith(end)

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import math
-import resource
-import sys
 from typing import Any
 
 import numpy as np
 
-from .. import versions
-from ..parallel import agree, largest, total
+from .. import memory, shares, versions
+from ..parallel import agree, largest
 from ..problem import Problem
 from ..solution import Solution
 
@@ -20,7 +18,7 @@ def summary(solution: Solution) -> dict[str, Any]:
     problem, solved, examined = solution.problem, solution.solved, solution.examined
     comm = problem.domain.mesh.comm
     wanted = solution.scene.solver
-    return _plain(
+    return plain(
         {
             "scene": solution.scene.title,
             "dofs": solution.dofs,
@@ -36,11 +34,13 @@ def summary(solution: Solution) -> dict[str, Any]:
             "contact": _contact(solution),
             "solvability": solution.solvability.summary(),
             "certificate": examined.certificate.as_dict() if examined else None,
-            "estimate": None,
-            "effects": [_effect(p) for p in solution.scene.effects()],
+            "estimate": _estimate(solution),
+            "accuracy": None,
+            "warnings": list(solution.warnings),
+            "effects": [share.as_dict() for share in shares.shares(problem)],
             "scales": _scales(problem),
             "time": {name: largest(comm, value) for name, value in solution.timer.report().items()},
-            "peak_memory_mb": total(comm, _peak_memory()),
+            "peak_memory_mb": memory.peak(comm),
             "versions": versions.versions(),
         }
     )
@@ -51,6 +51,14 @@ def _iterations(solution: Solution) -> dict[str, int] | None:
         return None
     counts = solution.solved.counts
     return {"newton": counts.newton, "linear": counts.linear, "levels": solution.solved.levels, "branch": counts.branch}
+
+
+def _estimate(solution: Solution) -> dict[str, float] | None:
+    """Norms in (J/m)^½ or J^½; ``relative`` is the total over the energy norm."""
+    if solution.estimate is None:
+        return None
+    unit = math.sqrt(solution.problem.scales.energy)
+    return {k: v if k == "relative" else v * unit for k, v in solution.estimate.as_dict().items()}
 
 
 def _contact(solution: Solution) -> dict[str, Any] | None:
@@ -73,27 +81,17 @@ def _contact(solution: Solution) -> dict[str, Any] | None:
     }
 
 
-def _effect(placed: Any) -> dict[str, str | None]:
-    return {"effect": placed.effect.key, "where": placed.where, "adds": placed.effect.term}
-
-
 def _scales(problem: Problem) -> dict[str, float]:
     s = problem.scales
     return {"length": s.length, "stress": s.stress, "displacement": s.displacement, "energy": s.energy}
 
 
-def _peak_memory() -> float:
-    """Of this rank, MB."""
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    return peak / 2**20 if sys.platform == "darwin" else peak / 2**10
-
-
-def _plain(value: Any) -> Any:
+def plain(value: Any) -> Any:
     """What JSON can say: no infinities, no NumPy."""
     if isinstance(value, dict):
-        return {k: _plain(v) for k, v in value.items()}
+        return {k: plain(v) for k, v in value.items()}
     if isinstance(value, list | tuple):
-        return [_plain(v) for v in value]
+        return [plain(v) for v in value]
     if isinstance(value, np.generic):
         value = value.item()
     return None if isinstance(value, float) and not math.isfinite(value) else value

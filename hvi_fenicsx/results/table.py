@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -13,8 +14,10 @@ from mpi4py import MPI
 from ..boundary import State
 from ..effects.base import Direction
 from ..problem import Problem
+from . import arc
 
 Array = npt.NDArray[np.float64]
+Indices = npt.NDArray[np.int64]
 COLUMNS = (
     "part",
     "s",
@@ -40,8 +43,13 @@ def rows(problem: Problem, states: Sequence[State]) -> list[tuple[str, dict[str,
     found = []
     for state in sorted(states, key=lambda s: s.surface.part):
         columns = _gathered(comm, _columns(problem, state))
-        if columns:
-            found.append((state.surface.part, _sorted(columns, problem.scales.dimension)))
+        if problem.scales.dimension == 2:
+            chained = {"number": arc.vertices(problem, state.surface)}, {"pair": arc.edges(problem, state.surface)}
+            numbers, pairs = (_gathered(comm, pieces) for pieces in chained)
+            if columns:
+                found.append((state.surface.part, _along(columns, numbers["number"], pairs["pair"])))
+        elif columns:
+            found.append((state.surface.part, _sorted(columns)))
     return found
 
 
@@ -69,29 +77,25 @@ def _columns(problem: Problem, state: State) -> dict[str, Array]:
     return columns
 
 
-def _gathered(comm: MPI.Comm, columns: dict[str, Array]) -> dict[str, Array]:
+def _gathered(comm: MPI.Comm, columns: dict[str, Any]) -> dict[str, Any]:
     pieces = comm.gather(columns, root=0)
     if pieces is None:
         return {}
     return {name: np.concatenate([piece[name] for piece in pieces]) for name in columns}
 
 
-def _sorted(columns: dict[str, Array], dimension: int) -> dict[str, Array]:
-    """In 2D along the part, with the arc length s; in 3D lexicographically.
+def _along(columns: dict[str, Array], numbers: Indices, pairs: Indices) -> dict[str, Array]:
+    """In 2D along the part, with the arc length s."""
+    order, s = arc.along(np.column_stack([columns["x"], columns["y"]]), numbers, pairs)
+    return {name: values[order] for name, values in columns.items()} | {"s": s}
 
-    The parts accepted so far are parallel to an axis, so that their lexicographic order is the order along them. Points
-    are rounded for sorting only: coordinates that should be equal may differ in the last digit.
-    """
-    axes = ["x", "y", "z"][:dimension]
-    points = np.column_stack([columns[a] for a in axes])
+
+def _sorted(columns: dict[str, Array]) -> dict[str, Array]:
+    """In 3D lexicographically. Points are rounded for it: coordinates that should be equal may differ a little."""
+    points = np.column_stack([columns[a] for a in "xyz"])
     size = float(np.max(np.ptp(points, axis=0), initial=0.0)) or 1.0
-    keys = np.round(points / size, 9)
-    order = np.lexsort(keys.T[::-1])
-    found = {name: values[order] for name, values in columns.items()}
-    if dimension == 2:
-        steps = np.linalg.norm(np.diff(points[order], axis=0), axis=1)
-        found["s"] = np.concatenate([[0.0], np.cumsum(steps)])
-    return found
+    order = np.lexsort(np.round(points / size, 9).T[::-1])
+    return {name: values[order] for name, values in columns.items()}
 
 
 def write_csv(path: Path, table: Sequence[tuple[str, dict[str, Array]]]) -> None:

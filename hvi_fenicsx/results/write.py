@@ -10,7 +10,7 @@ from ..journal import Journal
 from ..parallel import on_root
 from ..scene import dump_scene
 from ..solution import Solution
-from . import fields, table
+from . import fields, sides, table
 from .summary import summary
 
 
@@ -22,13 +22,15 @@ def write(folder: Path, solution: Solution) -> dict[str, Any]:
     problem, examined, solved = solution.problem, solution.examined, solution.solved
     comm = problem.domain.mesh.comm
     if solved is not None and examined is not None:
-        fields.write_body(folder / "displacement.pvd", problem, solved.u)
+        fields.write_body(folder / "displacement.pvd", problem, solved.u, solution.estimate)
         if examined.states:
             fields.write_contact(folder / "contact.pvd", problem, examined.states)
         rows = table.rows(problem, examined.states)
         on_root(comm, lambda: table.write_csv(folder / "contact.csv", rows) if examined.states else None)
     elif solution.solvability.direction is not None:
         fields.write_escape(folder / "displacement.pvd", problem, solution.solvability.direction)
+    lying = sides.rows(problem, solution.scene.parts)
+    on_root(comm, lambda: sides.write_csv(folder / "boundary.csv", lying, problem.scales.dimension))
     on_root(comm, lambda: _text(folder / "scene.toml", dump_scene(solution.scene)))
     return summary(solution)
 
