@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from mpi4py import MPI
 
 from . import domain, problem, smoothing, system
+from .domain import Domain
 from .laws import Superpotential
 from .timing import Timer
 
@@ -16,14 +17,14 @@ if TYPE_CHECKING:
     from .scene import Scene
 
 
-def assemble(scene: Scene, comm: MPI.Comm, timer: Timer) -> system.System:
-    """Mesh, forms and assembly of a scene. Collective.
+def assemble(scene: Scene, comm: MPI.Comm, timer: Timer, body: Domain | None = None) -> system.System:
+    """Mesh (unless a refined body is given), forms and assembly of a scene. Collective.
 
     Raises:
         InputError: the scene does not fit its mesh, on all ranks alike.
     """
     with timer("mesh"):
-        body = domain.build(comm, scene.domain, scene.dimension)
+        body = body or domain.build(comm, scene.domain, scene.dimension)
     with timer("jit"):
         placed = [(p.where, p.effect) for p in scene.effects()]
         composed = problem.compose(body, scene.parts, placed, modification(scene))

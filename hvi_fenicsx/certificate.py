@@ -30,7 +30,8 @@ class Certificate:
     """How far u is from a solution.
 
     Attributes:
-        equilibrium: residual force that nothing carries, over the load's, Euclidean norms.
+        equilibrium: residual force that nothing carries, over the load's or the supports' (over one unit where there is
+            no force at all), Euclidean norms.
         penetration: largest violation of a bound, over the largest displacement.
         tension: largest contact traction of the wrong sign, over the load's stress.
         complementarity: largest min(gap over the largest displacement, contact traction over the load's stress).
@@ -88,8 +89,9 @@ def examine(problem: Problem, u: fem.Function, tolerance: float, *, inertia: boo
     forces = boundary.forces(problem, u)
     states = boundary.states(problem, u, forces.reaction)
     size = largest(comm, float(np.max(np.abs(u.x.array), initial=0.0))) or 1.0
+    scale = _force_scale(problem, u, forces)
     entries = {
-        "equilibrium": _equilibrium(problem, forces, states),
+        "equilibrium": _unbalanced(problem, forces, states) / scale,
         "penetration": largest(comm, _worst(states, _penetration)) / size,
         "tension": largest(comm, _worst(states, _tension)),
         "complementarity": largest(comm, _worst(states, lambda s: _complementarity(s, size))),
@@ -97,7 +99,7 @@ def examine(problem: Problem, u: fem.Function, tolerance: float, *, inertia: boo
     }
     passed, rounding = _within(entries, tolerance), None
     if not passed and _within(entries, _LARGEST_ROUNDING):
-        rounding = _rounding(problem, u, forces, states)
+        rounding = _rounding(problem, u, states, scale)
         passed = _within(entries, max(tolerance, rounding))
     true, error = (largest(comm, value) for value in _inclusion_true(states))
     second_order = _second_order(comm, states)
@@ -118,21 +120,41 @@ def _within(entries: Mapping[str, float], limit: float) -> bool:
     return all(np.isfinite(v) and v <= limit for v in entries.values())
 
 
-def _rounding(problem: Problem, u: fem.Function, forces: Forces, states: Sequence[State]) -> float:
-    """By how much the entries change when the last digits of u are shuffled. Collective."""
+def _force_scale(problem: Problem, u: fem.Function, forces: Forces) -> float:
+    """Norm of the loads, or of the supports' reactions where these are larger; 1 where all forces are rounding.
+
+    Collective.
+    """
+    load, reaction = (_norm(problem, v) for v in (forces.load, forces.reaction))
+    if load > 0.0 or reaction > _SAFETY * _norm(problem, _noise(problem, u)):
+        return max(load, reaction)
+    return 1.0
+
+
+def _norm(problem: Problem, values: Array) -> float:
+    return float(np.sqrt(total(problem.domain.mesh.comm, float(np.sum(values**2)))))
+
+
+def _noise(problem: Problem, u: fem.Function) -> Array:
+    """Forces of u's last digits, shuffled: a sample of what rounding makes of its forces, (blocks, d). Collective."""
     comm = problem.domain.mesh.comm
     shuffled = fem.Function(problem.space)
     signs = np.random.default_rng(comm.rank).choice([-1.0, 1.0], len(u.x.array))
     shuffled.x.array[:] = u.x.array * signs * np.finfo(float).eps
     shuffled.x.scatter_forward()
     moved = boundary.forces(problem, shuffled)
-    force = moved.reaction + moved.load
-    norms = [np.sqrt(total(comm, float(np.sum(v**2)))) for v in (force, forces.load, forces.reaction)]
+    return moved.reaction + moved.load
+
+
+def _rounding(problem: Problem, u: fem.Function, states: Sequence[State], scale: float) -> float:
+    """By how much the entries change when the last digits of u are shuffled. Collective."""
+    force = _noise(problem, u)
     tractions = [
         float(np.max(np.abs(force[s.surface.blocks]) / s.surface.weights[:, None] / _finest(s), initial=0.0))
         for s in states
     ]
-    return _SAFETY * max(norms[0] / (max(norms[1:]) or 1.0), largest(comm, max(tractions, default=0.0)))
+    worst = largest(problem.domain.mesh.comm, max(tractions, default=0.0))
+    return _SAFETY * max(_norm(problem, force) / scale, worst)
 
 
 def _finest(state: State) -> float:
@@ -151,12 +173,9 @@ def _energy(problem: Problem, u: fem.Function, forces: Forces, states: Sequence[
     return total(problem.domain.mesh.comm, elastic + laws)
 
 
-def _equilibrium(problem: Problem, forces: Forces, states: Sequence[State]) -> float:
-    """Relative to the loads, or to the supports' reactions where these are larger. Collective."""
-    comm = problem.domain.mesh.comm
-    rest = boundary.balanced(problem, forces.reaction, states)
-    norms = [np.sqrt(total(comm, float(np.sum(v**2)))) for v in (rest, forces.load, forces.reaction)]
-    return float(norms[0] / (max(norms[1:]) or 1.0))
+def _unbalanced(problem: Problem, forces: Forces, states: Sequence[State]) -> float:
+    """Norm of the residual force that nothing carries. Collective."""
+    return _norm(problem, boundary.balanced(problem, forces.reaction, states))
 
 
 def _worst(states: Sequence[State], measure: object) -> float:

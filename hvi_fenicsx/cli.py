@@ -1,18 +1,24 @@
-"""The command line: ``hvi run | check | version``. Only what a command needs is imported, so that help is instant."""
+"""The command line: ``hvi run | check | study | version``. A command imports what it needs: help is instant."""
 
 from __future__ import annotations
 
 import argparse
+import math
 import os
-import shutil
+import shlex
+import signal
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import NoReturn
 
+from . import children
 from .errors import HviError, InputError
 
 INTERRUPTED = 130
+QUANTITIES = ("energy", "u_t", "sigma_t", "resultant", "lambda_held", "lambda_peak")
+"""What an accuracy may be asked of (docs/accuracy.md)."""
 
 
 class _Parser(argparse.ArgumentParser):
@@ -35,12 +41,26 @@ def parser() -> argparse.ArgumentParser:
     run.add_argument("--out", type=Path, metavar="DIR", help="where the result goes")
     run.add_argument("--force", action="store_true", help="replace a result that is there")
     run.add_argument("--resume", action="store_true", help="keep a finished result of the same scene, else run it")
+    run.add_argument(
+        "--accuracy", type=_share, metavar="REL", help="choose mesh, ε and tolerances for this error: 1e-2"
+    )
+    run.add_argument("--quantity", choices=QUANTITIES, help="what --accuracy is of: energy norm (default), ...")
+    run.add_argument("--time-budget", type=_duration, metavar="S", help="the most accurate solution within S seconds")
     run.add_argument("--np", type=_ranks, metavar="N", help="run on N MPI ranks")
     run.add_argument("--petsc", default="", metavar="OPTIONS", help='PETSc options, like "-hvi_ksp_monitor"')
     run.add_argument("--no-pictures", action="store_true", help="write no pictures")
     check = commands.add_parser("check", help="validate a scene and say whether a solution exists; solves nothing")
     _scene_arguments(check)
+    check.add_argument(
+        "--load",
+        action="append",
+        default=[],
+        dest="loads",
+        metavar="NAME",
+        help="load factors of one load, the others constant: the part (or region) it is on, or part.traction",
+    )
     check.add_argument("--json", action="store_true", help="print the report as JSON")
+    _study_arguments(commands.add_parser("study", help="what accuracy costs in time: a scene along several axes"))
     commands.add_parser("version", help="versions of everything")
     return main_parser
 
@@ -57,6 +77,48 @@ def _scene_arguments(command: argparse.ArgumentParser) -> None:
     )
 
 
+def _share(text: str) -> float:
+    return _number(text, 1.0, "a relative error between 0 and 1, like 1e-2,")
+
+
+def _duration(text: str) -> float:
+    return _number(text, math.inf, "a number of seconds above 0")
+
+
+def _number(text: str, below: float, wanted: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not 0 < value < below:
+        raise argparse.ArgumentTypeError(f"{wanted} is wanted, not {text!r}")
+    return value
+
+
+def _study_arguments(study: argparse.ArgumentParser) -> None:
+    _scene_arguments(study)
+    study.add_argument(
+        "--axis",
+        action="append",
+        default=[],
+        metavar="NAME=VALUE,...",
+        help="vary mesh, epsilon, epsilon_absolute, smoothing, method, tolerance, linear_solver or accuracy; several: "
+        "all combinations; none: a plan of the program's own",
+    )
+    study.add_argument("--out", type=Path, metavar="DIR", help="where the study goes; else results/SCENE-study")
+    study.add_argument("--force", action="store_true", help="replace a study that is there")
+    study.add_argument("--resume", action="store_true", help="keep the points that are finished")
+    study.add_argument("--repeat", type=_repetitions, metavar="N", help="repetitions of a point at most")
+    study.add_argument("--limit", type=_duration, metavar="SECONDS", help="of a point, after which it is given up")
+    study.add_argument("--np", type=_ranks, metavar="N", help="run each point on N MPI ranks")
+
+
+def _repetitions(text: str) -> int:
+    if not text.isdigit() or not 1 <= int(text) <= 1000:
+        raise argparse.ArgumentTypeError(f"a number from 1 to 1000 is wanted, not {text!r}")
+    return int(text)
+
+
 def _ranks(text: str) -> int:
     if not text.isdigit() or not 1 <= int(text) <= 4096:
         raise argparse.ArgumentTypeError(f"a number of ranks from 1 to 4096 is wanted, not {text!r}")
@@ -67,7 +129,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command; the exit code by the contract. Collective under mpirun."""
     words = _joined(sys.argv[1:] if arguments is None else arguments)
     try:
-        return _dispatch(parser().parse_args(words), words)
+        options = parser().parse_args(words)
+        options.given = shlex.join(["hvi", *words])
+        return _dispatch(options, words)
     except HviError as error:
         _complain(f"hvi: {error}")
         return error.exit_code
@@ -88,12 +152,29 @@ def _joined(words: Sequence[str]) -> list[str]:
 def _dispatch(options: argparse.Namespace, words: Sequence[str]) -> int:
     if options.command == "version":
         return _version()
+    if options.command == "study":
+        return _study(options, words)
     if getattr(options, "np", None) and not _under_mpi():
-        _become_mpirun(options.np, words)
-    from . import commands
+        from . import mpirun
+
+        return mpirun.run(options.np, words, INTERRUPTED)
+    if _under_mpi():
+        children.die_with_parent(signal.SIGKILL)
+    with _undisturbed():
+        from . import commands
 
     with commands.ended_together():
         return commands.run(options) if options.command == "run" else commands.check(options)
+
+
+@contextmanager
+def _undisturbed() -> Iterator[None]:
+    """Let Ctrl-C wait for the end of an import, which it would end in some library's own words."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _version() -> int:
@@ -104,6 +185,26 @@ def _version() -> int:
     return 0
 
 
+def _study(options: argparse.Namespace, words: Sequence[str]) -> int:
+    """A study is one process that starts its points; under mpirun rank 0 becomes that process, the others have no part.
+
+    None of them has started MPI yet, so that they may end as they like.
+    """
+    if _under_mpi():
+        if not _first():
+            return 0
+        from . import mpirun
+
+        ranks = options.np or next((int(os.environ[n]) for n in _SIZE_VARIABLES if n in os.environ), 1)
+        alone = [sys.executable, "-m", "hvi_fenicsx", *mpirun.without_ranks(words), f"--np={ranks}"]
+        os.execve(sys.executable, alone, children.environment())
+    with _undisturbed():
+        from . import study
+
+    return study.run(options)
+
+
+_SIZE_VARIABLES = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE")
 _RANK_VARIABLES = ("OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK")
 
 
@@ -119,14 +220,3 @@ def _first() -> bool:
 def _complain(message: str) -> None:
     if _first():
         print(message, file=sys.stderr, flush=True)
-
-
-def _become_mpirun(ranks: int, words: Sequence[str]) -> NoReturn:
-    """The same command under mpirun; `-m mpi4py` ends all ranks when one fails."""
-    mpirun = shutil.which("mpirun")
-    if mpirun is None:
-        raise InputError("--np: there is no mpirun on the PATH; install Open MPI or MPICH, or leave --np out")
-    at = words.index("--np") if "--np" in words else None
-    rest = [w for w in words if not w.startswith("--np=")] if at is None else [*words[:at], *words[at + 2 :]]
-    module = [sys.executable, "-m", "mpi4py", "-m", "hvi_fenicsx"]
-    os.execv(mpirun, [mpirun, "-n", str(ranks), *module, *rest])

@@ -6,21 +6,23 @@ import argparse
 import json
 import sys
 import traceback
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 from mpi4py import MPI
 
-from . import pictures, report, results
-from .errors import HviError
+from . import accuracy, htmlreport, pictures, report, results
+from .accuracy import Goal, Reached
+from .adaptive import Climber
+from .errors import HviError, InputError
 from .interrupt import Interrupt
 from .journal import Journal
 from .parallel import on_root
 from .results.write import write_record
 from .scene import Scene, dump_scene, read_scene
-from .solution import NO_SOLUTION, Prepared, Solution, finish, prepare
+from .solution import NO_SOLUTION, NOT_CONVERGED, Prepared, Solution, finish, prepare
 from .solvers import options as petsc_options
 from .timing import Timer
 
@@ -50,55 +52,100 @@ def run(options: argparse.Namespace) -> int:
     """
     timer = Timer()
     petsc_options.insert(options.petsc)
+    goal = _goal(options)
     scene = on_root(COMM, lambda: read_scene(options.scene, options.overrides))
     target = options.out or Path("results") / options.scene.stem
-    if options.resume and (code := on_root(COMM, lambda: _finished(target, scene))) is not None:
+    if options.resume and (code := on_root(COMM, lambda: _finished(target, scene, goal))) is not None:
         return code
     folder = results.ResultFolder(COMM, target, "replace" if options.force or options.resume else "refuse")
     try:
         with Journal(COMM.rank == 0) as journal:
-            return _run(scene, folder, journal, timer, draw=not options.no_pictures)
+            given = {"command": options.given, "petsc": options.petsc}
+            return _run(scene, goal, folder, journal, timer, given, draw=not options.no_pictures)
     except BaseException:
         folder.discard()
         raise
 
 
-def _run(scene: Scene, folder: results.ResultFolder, journal: Journal, timer: Timer, *, draw: bool) -> int:
+def _goal(options: argparse.Namespace) -> Goal | None:
+    """What accuracy is asked for, if one is."""
+    if options.accuracy is None and options.time_budget is None:
+        if options.quantity is not None:
+            raise InputError("--quantity: says what --accuracy or --time-budget is of; give one of them too")
+        return None
+    return Goal(options.accuracy, options.quantity or "energy", options.time_budget)
+
+
+def _run(
+    scene: Scene,
+    goal: Goal | None,
+    folder: results.ResultFolder,
+    journal: Journal,
+    timer: Timer,
+    given: dict[str, str],
+    *,
+    draw: bool,
+) -> int:
     interrupt = Interrupt(COMM)
     interrupt.watch()
-    prepared = prepare(scene, COMM, timer)
-    for line in report.heading(prepared, COMM.size):
-        journal.say(line)
-    solution = finish(prepared, journal.progress, interrupt.requested)
-    for line in report.outcome(solution):
+    reached: Reached | None = None
+    said: tuple[str, ...] = ()
+    if goal is not None:
+        climber = Climber(timer, journal.progress, interrupt.requested)
+        reached = accuracy.reach(scene, COMM, goal, climber, journal.say)
+        solution = reached.solution
+    else:
+        prepared = prepare(scene, COMM, timer)
+        said = prepared.warnings
+        for line in report.heading(prepared, COMM.size):
+            journal.say(line)
+        solution = finish(prepared, journal.progress, interrupt.requested)
+    odd = report.odd(warning for warning in solution.warnings if warning not in said)
+    for line in [*report.outcome(solution), *odd, *(report.bought(reached) if reached else [])]:
         journal.say(line)
     with timer("output"):
-        record = results.write(folder.work, solution)
+        record = {**results.write(folder.work, solution), **given, **(_bought(reached) if reached else {})}
         if draw:
-            on_root(COMM, lambda: _draw(folder.work, record, journal))
+            on_root(COMM, lambda: _from_files("pictures", pictures.draw, folder.work, record, journal))
+    with timer("output"):
+        record["time"] = timer.report()
+        on_root(COMM, lambda: _from_files("report", htmlreport.write, folder.work, record, journal))
     record["time"] = timer.report()
     on_root(COMM, lambda: write_record(folder.work, record, journal))
     folder.commit()
-    journal.say(f"{folder.target}: {timer.total:.1f} s in all")
-    return solution.exit_code
+    journal.say(f"{folder.target}: {timer.total:.1f} s in all; open report.html there")
+    return int(record["exit_code"])
 
 
-def _draw(folder: Path, record: dict[str, Any], journal: Journal) -> None:
-    """Pictures are drawn from the files; a picture that fails costs a line in the log, not the run."""
+def _bought(reached: Reached) -> dict[str, Any]:
+    """What of ``summary.json`` differs where an accuracy was asked for."""
+    return {"accuracy": results.plain(reached.as_dict()), "exit_code": reached.exit_code}
+
+
+def _from_files(
+    what: str, make: Callable[[Path], object], folder: Path, record: dict[str, Any], journal: Journal
+) -> None:
+    """Pictures and report are made from the other files; one that fails costs a line in the log, not the run."""
     write_record(folder, record, journal)
     try:
-        pictures.draw(folder)
+        make(folder)
     except HviError as error:
-        journal.say(f"pictures: {error}")
+        journal.say(f"{what}: {error}")
 
 
-def _finished(target: Path, scene: Scene) -> int | None:
-    """The exit code of a finished result of the same scene; None where there is none. Rank 0 only."""
+def _finished(target: Path, scene: Scene, goal: Goal | None) -> int | None:
+    """The exit code of a finished result of the same scene and goal; None where there is none. Rank 0 only."""
     try:
         same = (target / "scene.toml").read_text(encoding="utf-8") == dump_scene(scene)
         record = json.loads((target / results.folder.MARK).read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return None
+    bought = record["accuracy"]
+    same = (
+        same
+        and (bought is not None) == (goal is not None)
+        and (goal is None or goal.as_dict().items() <= bought.items())
+    )
     if not same or record["exit_code"] not in (0, NO_SOLUTION):
         return None
     print(f"{target}: finished already ({record['reason']})")
@@ -106,24 +153,26 @@ def _finished(target: Path, scene: Scene) -> int | None:
 
 
 def check(options: argparse.Namespace) -> int:
-    """Validate a scene, tell its effects, kernel and existence; 3 when no solution exists.
+    """Validate a scene, tell its effects, kernel and existence; 3 when no solution exists, 4 when none can tell.
 
     Raises:
         InputError: on all ranks alike.
     """
     scene = on_root(COMM, lambda: read_scene(options.scene, options.overrides))
     prepared = prepare(scene, COMM)
+    text = _report(prepared, options.loads, as_json=options.json)
     if COMM.rank == 0:
-        _print_check(prepared, as_json=options.json)
-    return NO_SOLUTION if prepared.solvability.state == "escapes" else 0
+        print(text)
+    return {"escapes": NO_SOLUTION, "undecided": NOT_CONVERGED}.get(prepared.solvability.state, 0)
 
 
-def _print_check(prepared: Prepared, *, as_json: bool) -> None:
+def _report(prepared: Prepared, loads: Sequence[str], *, as_json: bool) -> str:
+    """What ``check`` prints. Collective."""
+    factors = {name: prepared.load_factors(name) for name in loads}
     if as_json:
-        json.dump(report.as_data(prepared), sys.stdout, indent=2, ensure_ascii=False)
-        print()
-    else:
-        print("\n".join([*report.heading(prepared, COMM.size), *report.effects(prepared)]))
+        return json.dumps(report.as_data(prepared, factors), indent=2, ensure_ascii=False)
+    lines = [*report.heading(prepared, COMM.size), *report.load_factors(factors), *report.effects(prepared)]
+    return "\n".join(lines)
 
 
 __all__ = ["Solution", "check", "run"]

@@ -35,6 +35,26 @@ def submesh_nodes(mesh: _mesh.Mesh, dimension: int, entities: npt.NDArray[np.int
     return result[0], np.asarray(result[3])
 
 
+def refine(mesh: _mesh.Mesh, edges: npt.NDArray[np.int32] | None) -> tuple[_mesh.Mesh, npt.NDArray[np.int32]]:
+    """Bisect the edges (None: all) by Plaza's rule; the fine mesh, its cells on the ranks of their parents.
+
+    Returns:
+        The fine mesh, without ghost cells, and the local parent cell of each local cell. Collective.
+    """
+    mesh.topology.create_entities(1)
+    fine, parents = _mesh.refine(mesh, edges, None, _mesh.RefinementOption.parent_cell)[:2]
+    offset = mesh.comm.exscan(len(parents)) or 0  # parents come in input order
+    return fine, np.asarray(parents[fine.topology.original_cell_index - offset], dtype=np.int32)
+
+
+def simplex_mesh(comm: Any, cells: npt.NDArray[Any], points: npt.NDArray[np.float64], kind: str) -> _mesh.Mesh:
+    """Mesh of the simplices (c, d+1) over points (n, d); ``kind`` is triangle or tetrahedron. Collective."""
+    import basix.ufl
+
+    element = basix.ufl.element("Lagrange", kind, 1, shape=(points.shape[1],))
+    return _mesh.create_mesh(comm, cells=np.asarray(cells, dtype=np.int64), x=np.ascontiguousarray(points), e=element)
+
+
 def petsc_version() -> str:
     """PETSc's version, as text."""
     return ".".join(str(n) for n in PETSc.Sys.getVersion())

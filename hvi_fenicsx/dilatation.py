@@ -36,12 +36,20 @@ class Dilatation:
         weighted.diagonalScale(self.stiffness, None)
         return self.divergence.transposeMatMult(weighted)
 
-    def force(self, u: fem.Function) -> npt.NDArray[np.float64]:
-        """Dᵀ (λ/V) D u at the unknowns that this rank owns. Collective."""
-        average, force = self.divergence.createVecLeft(), self.divergence.createVecRight()
+    def _pressure(self, u: fem.Function) -> PETSc.Vec:
+        average = self.divergence.createVecLeft()
         self.divergence.mult(u.x.petsc_vec, average)
         average.pointwiseMult(average, self.stiffness)
-        self.divergence.multTranspose(average, force)
+        return average
+
+    def pressure(self, u: fem.Function) -> npt.NDArray[np.float64]:
+        """(λ/V) D u at the vertices that this rank owns. Collective."""
+        return np.array(self._pressure(u).array_r)
+
+    def force(self, u: fem.Function) -> npt.NDArray[np.float64]:
+        """Dᵀ (λ/V) D u at the unknowns that this rank owns. Collective."""
+        force = self.divergence.createVecRight()
+        self.divergence.multTranspose(self._pressure(u), force)
         return np.array(force.array_r)
 
 

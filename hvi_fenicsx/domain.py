@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,13 +13,16 @@ import numpy.typing as npt
 from dolfinx import mesh as dmesh
 from mpi4py import MPI
 
-from . import domain_shapes, meshfile
+from . import domain_shapes, memory, meshfile
+from .domain_shapes import Arc
 from .errors import InputError
 from .parallel import agree
 
 if TYPE_CHECKING:
     from .scene.shapes import Shape
 
+_LEAST_MEMORY = 300.0
+"""Bytes for one unknown: its row of the matrix and its share of the mesh, without any solver."""
 Facets = npt.NDArray[np.int32]
 _AXIS_OF_SIDE = {"left": (0, 0), "right": (0, 1), "bottom": (-1, 0), "top": (-1, 1), "front": (1, 0), "back": (1, 1)}
 """Axis (-1: the last, the vertical one) and end of each named side."""
@@ -33,6 +37,9 @@ class Domain:
         sides: local facet indices by name (built-in sides, or physical groups of a file).
         regions: local cell indices by name (physical groups of a file).
         lower, upper: corners of the bounding box, shape (d,), the same on all ranks.
+        curves: the true curve of a side by its name, where that is known and not straight; the facets of all other
+            sides, those of mesh files among them, are taken for the geometry itself.
+        one_piece: whether the mesh is known to be connected; else one has to look (:mod:`.bodies`).
     """
 
     mesh: dmesh.Mesh
@@ -40,6 +47,8 @@ class Domain:
     regions: Mapping[str, Facets]
     lower: npt.NDArray[np.float64]
     upper: npt.NDArray[np.float64]
+    curves: Mapping[str, Arc] = field(default_factory=dict)
+    one_piece: bool = False
 
     @property
     def dimension(self) -> int:
@@ -104,16 +113,29 @@ def build(comm: MPI.Comm, shape: Shape, dimension: int) -> Domain:
     """The domain that a scene's ``[domain]`` table describes. Collective.
 
     Raises:
-        InputError: on all ranks alike, when a file cannot be read or is no usable mesh.
+        InputError: on all ranks alike, when a file cannot be read or is no usable mesh, or memory cannot suffice.
     """
     if shape.shape == "file":
         return from_file(comm, shape.file, dimension, shape.scale)
     if shape.shape == "rectangle":
+        _check_affordable(comm, dimension, shape.cells)
         return rectangle(comm, shape.size, shape.cells)
     if shape.shape == "box":
+        _check_affordable(comm, dimension, shape.cells)
         return box(comm, shape.size, shape.cells)
     mesh, sides = domain_shapes.build(comm, shape)
-    return Domain(mesh, sides, {}, *_bounding_box(mesh))
+    return Domain(mesh, sides, {}, *_bounding_box(mesh), domain_shapes.curves(shape), one_piece=True)
+
+
+def _check_affordable(comm: MPI.Comm, dimension: int, cells: Sequence[int]) -> None:
+    """Refuse what would be killed for want of memory, half an hour later. Collective."""
+    unknowns = dimension * math.prod(n + 1 for n in cells)
+    least, room = unknowns * _LEAST_MEMORY / 2**20, memory.room(comm)
+    if least > room:
+        raise InputError(
+            f"domain.cells: make {unknowns:.1e} unknowns, which need {least / 1024:.3g} GB at least; there are "
+            f"{room / 1024:.3g} GB: use fewer cells"
+        )
 
 
 def from_file(comm: MPI.Comm, path: Path, dimension: int, scale: float = 1.0) -> Domain:
@@ -130,7 +152,7 @@ def from_file(comm: MPI.Comm, path: Path, dimension: int, scale: float = 1.0) ->
 def _box_domain(mesh: dmesh.Mesh, size: npt.NDArray[np.float64]) -> Domain:
     names = [n for n in _AXIS_OF_SIDE if mesh.geometry.dim == 3 or n not in ("front", "back")]
     sides = {name: _side(mesh, name, size) for name in names}
-    return Domain(mesh, sides, {}, np.zeros(len(size)), size)
+    return Domain(mesh, sides, {}, np.zeros(len(size)), size, one_piece=True)
 
 
 def _side(mesh: dmesh.Mesh, name: str, size: npt.NDArray[np.float64]) -> Facets:

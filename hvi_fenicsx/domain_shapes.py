@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TypeAlias
 
+import numpy as np
 import numpy.typing as npt
 from dolfinx import mesh as dmesh
 from mpi4py import MPI
@@ -37,6 +38,19 @@ class Outline:
     sizes: Sequence[float]
 
 
+@dataclass(frozen=True, slots=True)
+class Arc:
+    """A circle that a side lies on: centre and radius, m."""
+
+    centre: Point
+    radius: float
+
+    def nearest(self, x: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+        """The points of the circle nearest to x, shape (n, 2)."""
+        away = x - np.asarray(self.centre)
+        return np.asarray(self.centre + self.radius * away / np.linalg.norm(away, axis=1, keepdims=True))
+
+
 def build(comm: MPI.Comm, shape: Plane) -> tuple[dmesh.Mesh, Mapping[str, npt.NDArray[Any]]]:
     """Mesh and local facets by side. Rank 0 meshes. Collective.
 
@@ -56,6 +70,13 @@ def outline(shape: Plane) -> Outline:
     if shape.shape == "notched_strip":
         return _notched_strip(shape)
     return _round(shape, whole=shape.shape == "disk")
+
+
+def curves(shape: Plane) -> dict[str, Arc]:
+    """The curved sides of a shape."""
+    boundary = outline(shape)
+    starts = zip(boundary.points, boundary.sides, strict=True)
+    return {name: Arc(c, float(np.hypot(p[0] - c[0], p[1] - c[1]))) for p, (name, c) in starts if c is not None}
 
 
 def _l_shape(shape: LShape) -> Outline:

@@ -104,7 +104,7 @@ def build(problem: Problem) -> Frames | None:
         frame = _axes(normals, [i for i in range(d) if block * d + i in fixed], d)
         axes.append(np.eye(d) if frame is None else frame)
         if frame is None:
-            bad.append(tuple(float(c) for c in problem.space.tabulate_dof_coordinates()[block]))
+            bad.append(tuple(float(c) for c in problem.points[block]))
     found = [point for rank in agree(comm, bad) for point in rank]
     if found:
         raise InputError(

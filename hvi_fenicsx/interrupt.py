@@ -1,4 +1,7 @@
-"""Ctrl-C and SIGTERM as a request that the solvers heed at the next iteration, so that what was found is written."""
+"""Ctrl-C, SIGTERM and SIGUSR1 as a request that the solvers heed at the next iteration: what was found is written.
+
+SIGUSR1 is what mpirun hands on to its ranks, and what a batch system may send ahead of a job's end.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +9,8 @@ import signal
 from types import FrameType
 
 from mpi4py import MPI
+
+SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGUSR1)
 
 
 class Interrupt:
@@ -15,8 +20,8 @@ class Interrupt:
         self._comm, self._seen = comm, False
 
     def watch(self) -> None:
-        """Take over SIGINT and SIGTERM."""
-        for number in (signal.SIGINT, signal.SIGTERM):
+        """Take over the signals."""
+        for number in SIGNALS:
             signal.signal(number, self._note)
 
     def _note(self, number: int, frame: FrameType | None) -> None:

@@ -1,8 +1,9 @@
-"""The ladder: nested meshes of the built-in blocks, and P1 prolongation between neighbouring rungs.
+"""The ladder: nested meshes, and P1 prolongation between neighbouring rungs.
 
-A rung below has half the cells each way. It serves as start for the finer one, and its prolongation builds the
-geometric multigrid. ``create_rectangle``'s right-diagonal pattern (and ``create_box``'s of tetrahedra) is nested in
-itself: each fine vertex is a coarse one or the midpoint of a coarse edge.
+A rung serves as start for the finer one, and the prolongation builds the geometric multigrid. Each vertex of the finer
+one is a vertex of the coarser one or the midpoint of an edge: between a mesh and its refinement (:mod:`.refinement`),
+and between built-in blocks of which one has half the cells each way, ``create_rectangle``'s right-diagonal pattern (and
+``create_box``'s of tetrahedra) being nested in itself.
 """
 
 from __future__ import annotations
@@ -14,13 +15,18 @@ import numpy.typing as npt
 from dolfinx import fem
 from petsc4py import PETSc
 
+from .refinement import Refinement
+from .system import Below, System
+
 if TYPE_CHECKING:
     from .scene import Scene
 
 Array = npt.NDArray[np.float64]
-Indices = npt.NDArray[np.int64]
+Indices = npt.NDArray[np.integer]
 _COARSEST = 8
 """Cells each way below which no coarser rung helps."""
+_GROWTH = 3.0
+"""Of the unknowns, from one level of a multigrid to the next."""
 
 
 def coarser(scene: Scene) -> Scene | None:
@@ -32,31 +38,90 @@ def coarser(scene: Scene) -> Scene | None:
     return scene.model_copy(update={"domain": domain})
 
 
-def prolongation(fine: fem.FunctionSpace, coarse: fem.FunctionSpace, scene: Scene) -> PETSc.Mat:
-    """P1 prolongation of vector fields between neighbouring rungs of a scene's block (its ``scene`` is the fine one).
+def prolongation(
+    fine: fem.FunctionSpace,
+    coarse: fem.FunctionSpace,
+    nesting: Scene | Refinement,
+    points: tuple[Array, Array] | None = None,
+) -> PETSc.Mat:
+    """P1 prolongation of vector fields between neighbouring rungs, in Cartesian components. Collective.
 
-    Rows are the fine unknowns, columns the coarse ones. Collective.
+    Args:
+        fine, coarse: the P1 vector spaces.
+        nesting: how the fine mesh came from the coarse one: by refinement, or as the block of this (fine) scene.
+        points: the local vertices of both, m, (n, 3), where they are at hand.
+
+    Returns:
+        Rows are the fine unknowns, columns the coarse ones.
     """
-    cells = np.array(scene.domain.cells)  # type: ignore[union-attr]
-    place = _grid(fine, cells, scene)
-    parents, weights = _parents(place)
-    numbers = _numbers(coarse, cells // 2, scene)
-    pairs = numbers.app2petsc(_flat(parents, cells // 2).astype(PETSc.IntType).ravel()).reshape(-1, 2)
-    rows = _rows(pairs, weights, fine.dofmap.index_map_bs)
-    matrix = PETSc.Mat().createAIJ((_sizes(fine), _sizes(coarse)), csr=rows, comm=fine.mesh.comm)
+    if isinstance(nesting, Refinement):
+        pairs = _parents_by_cell(fine, coarse, nesting)
+    else:
+        near, far = points or (fine.tabulate_dof_coordinates(), coarse.tabulate_dof_coordinates())
+        pairs = _parents_on_grid(near[: fine.dofmap.index_map.size_local], coarse, far, nesting)
+    matrix = PETSc.Mat().createAIJ(
+        (_sizes(fine), _sizes(coarse)), csr=_rows(pairs, fine.dofmap.index_map_bs), comm=fine.mesh.comm
+    )
     matrix.assemble()
     return matrix
 
 
-def _rows(pairs: Indices, weights: Array, d: int) -> tuple[Indices, Indices, Array]:
-    """Compressed rows of the matrix that takes the weighted pair of block columns, component by component."""
-    entries = np.where(weights == 1.0, 1, 2).repeat(d)
-    columns = np.sort(pairs, axis=1)[:, None, :] * d + np.arange(d)[:, None]
-    kept = np.ones((len(pairs), d, 2), dtype=bool)
-    kept[weights == 1.0, :, 1] = False
-    values = np.broadcast_to(weights[:, None, None], columns.shape)
-    start = np.concatenate([[0], np.cumsum(entries)])
-    return start.astype(PETSc.IntType), columns[kept].astype(PETSc.IntType), np.ascontiguousarray(values[kept])
+def between(fine: System, coarse: System, nesting: Scene | Refinement) -> PETSc.Mat:
+    """The prolongation between the unknowns of two systems, local ones where normals are slanted. Collective."""
+    points = fine.problem.points, coarse.problem.points
+    step = prolongation(fine.problem.space, coarse.problem.space, nesting, points)
+    if coarse.rotation is not None:
+        step = step.matMult(coarse.rotation)
+    return step if fine.rotation is None else fine.rotation.transposeMatMult(step)
+
+
+def stacked(step: PETSc.Mat, below: System) -> Below:
+    """A hierarchy with one more rung; one of nearly the same size is passed over. Collective.
+
+    Multigrid wants levels that grow by a factor, or a cycle costs more than a few sweeps of the finest.
+    """
+    if below.below is None or step.size[0] >= _GROWTH * below.below.prolongation.size[1]:
+        return Below(below, step)
+    return Below(below.below.system, step.matMult(below.below.prolongation))
+
+
+def _parents_by_cell(fine: fem.FunctionSpace, coarse: fem.FunctionSpace, nesting: Refinement) -> Indices:
+    """The two coarse vertices (global numbers) whose mean each owned fine vertex is; one twice for a coarse one."""
+    corners = nesting.halves.shape[1]
+    halves = nesting.halves.reshape(-1, corners)
+    ends = np.argmax(halves > 0, axis=1), corners - 1 - np.argmax(halves[:, ::-1] > 0, axis=1)
+    above = coarse.dofmap.list[nesting.parents].repeat(corners, axis=0)
+    row = np.arange(len(above))
+    found = np.column_stack([above[row, end] for end in ends]).astype(np.int32)
+    vertices, owned = fine.dofmap.list[: len(nesting.parents)].ravel(), fine.dofmap.index_map.size_local
+    local = np.empty((owned, 2), dtype=np.int32)
+    local[vertices[vertices < owned]] = found[vertices < owned]
+    return np.asarray(coarse.dofmap.index_map.local_to_global(local.ravel()), dtype=PETSc.IntType).reshape(-1, 2)
+
+
+def _parents_on_grid(points: Array, coarse: fem.FunctionSpace, far: Array, scene: Scene) -> Indices:
+    """The same for a block, of the fine vertices at these points.
+
+    Odd coordinates run along a coarse edge from its lower to its upper end: an axis, or the diagonal of a face or cell.
+    """
+    cells = np.array(scene.domain.cells, dtype=PETSc.IntType)  # type: ignore[union-attr]
+    place = _grid(points, cells, scene)
+    parents = np.stack([_flat(end, cells // 2) for end in (place // 2, (place + 1) // 2)], axis=1)
+    return np.asarray(_numbers(coarse, far, cells // 2, scene).app2petsc(parents.ravel()).reshape(-1, 2))
+
+
+def _rows(pairs: Indices, d: int) -> tuple[Indices, Indices, Array]:
+    """Compressed rows of the matrix that takes the mean of each pair of block columns, component by component."""
+    low, high = np.minimum(pairs[:, 0], pairs[:, 1]), np.maximum(pairs[:, 0], pairs[:, 1])
+    double = low < high
+    start = np.concatenate([[0], np.cumsum((1 + double).repeat(d))]).astype(PETSc.IntType)
+    columns, values = np.empty(start[-1], PETSc.IntType), np.full(start[-1], 0.5)
+    first = start[:-1].reshape(-1, d)
+    for i in range(d):
+        columns[first[:, i]] = low * d + i
+        columns[first[double, i] + 1] = high[double] * d + i
+    values[first[~double]] = 1.0
+    return start, columns, values
 
 
 def _sizes(space: fem.FunctionSpace) -> tuple[int, int]:
@@ -64,33 +129,21 @@ def _sizes(space: fem.FunctionSpace) -> tuple[int, int]:
     return space.dofmap.index_map.size_local * d, space.dofmap.index_map.size_global * d
 
 
-def _grid(space: fem.FunctionSpace, cells: npt.NDArray[np.int64], scene: Scene) -> Indices:
-    """Integer grid coordinates of the vertices that this rank owns, (n, dim)."""
-    owned = space.dofmap.index_map.size_local
+def _grid(points: Array, cells: Indices, scene: Scene) -> Indices:
+    """Integer grid coordinates of vertices, (n, dim)."""
     size = np.array(scene.domain.size)  # type: ignore[union-attr]
-    points = space.tabulate_dof_coordinates()[:owned, : len(size)]
-    return np.asarray(np.rint(points / size * cells), dtype=np.int64)
+    return np.rint(points[:, : len(size)] * (cells / size)).astype(PETSc.IntType)
 
 
-def _parents(place: Indices) -> tuple[Indices, Array]:
-    """The two coarse vertices (n, 2, dim) whose mean a fine vertex is, and the weight of each (1 where they coincide).
-
-    Odd coordinates run along a coarse edge from its lower to its upper end: an axis, or the diagonal of a face or cell.
-    """
-    low, high = place // 2, (place + 1) // 2
-    weight = np.where(np.all(low == high, axis=1), 1.0, 0.5)
-    return np.stack([low, high], axis=1), weight
+def _flat(place: Indices, cells: Indices) -> Indices:
+    strides = np.concatenate([[1], np.cumprod(cells[:-1] + 1)]).astype(PETSc.IntType)
+    return sum((place[:, i] * step for i, step in enumerate(strides)), start=np.zeros(len(place), PETSc.IntType))
 
 
-def _flat(place: Indices, cells: npt.NDArray[np.int64]) -> Indices:
-    strides = np.concatenate([[1], np.cumprod(cells[:-1] + 1)])
-    return np.asarray(place @ strides)
-
-
-def _numbers(space: fem.FunctionSpace, cells: npt.NDArray[np.int64], scene: Scene) -> PETSc.AO:
+def _numbers(space: fem.FunctionSpace, points: Array, cells: Indices, scene: Scene) -> PETSc.AO:
     """From grid numbers to PETSc's (block) numbers. Collective."""
-    application = _flat(_grid(space, cells, scene), cells).astype(PETSc.IntType)
     start, end = space.dofmap.index_map.local_range
+    application = _flat(_grid(points[: end - start], cells, scene), cells)
     return PETSc.AO().createMemoryScalable(
         application, np.arange(start, end, dtype=PETSc.IntType), comm=space.mesh.comm
     )

@@ -1,7 +1,7 @@
-"""A superpotential at the vertices of Γc, and the UFL boundary terms through which it enters the equations.
+"""A superpotential at the vertices of Γc, and the UFL boundary term through which it enters the equations.
 
-The regularised (or selected) Clarke derivative is a P1 field τ on Γc; its weak form ∫ τ·v ds and the tangent
-∫ (K du)·v ds, both with vertex quadrature, are compiled once and serve every law.
+The regularised (or selected) Clarke derivative is a P1 field τ on Γc; its weak form ∫ τ·v ds, with vertex quadrature,
+is compiled once and serves every law. The tangent ∫ (K du)·v ds is then block-diagonal (:mod:`.contactrows`).
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ class LawTerm:
         law: the j that is solved. exact: the unsmoothed one (the same where nothing is smoothed).
         directions: what the displacement is multiplied with, shape (m, k, d); k = 2 for |u_t| in 3D.
         free: 1 where a component is not prescribed, shape (m, d).
-        density, rates: the P1 fields τ and K. residual, tangent: the compiled forms ∫ τ·v ds and ∫ (K du)·v ds.
+        density: the P1 field τ. residual: the compiled form ∫ τ·v ds.
     """
 
     surface: Surface
@@ -39,9 +39,7 @@ class LawTerm:
     directions: Array
     free: Array
     density: fem.Function
-    rates: fem.Function
     residual: Any
-    tangent: Any
 
     @property
     def radial(self) -> bool:
@@ -62,12 +60,6 @@ class LawTerm:
         tau = self._vector(u, derivative) * self.free
         self.density.x.array.reshape(-1, tau.shape[1])[self.surface.blocks] = tau
         self.density.x.scatter_forward()
-
-    def set_rates(self, rates: Array) -> None:
-        """K (m, d, d); ghosts are updated. Collective."""
-        d = rates.shape[1]
-        self.rates.x.array.reshape(-1, d, d)[self.surface.blocks] = rates
-        self.rates.x.scatter_forward()
 
     def _vector(self, u: Array, derivative: Array) -> Array:
         return np.einsum("mk,mkd->md", self._unit(u) * derivative[:, None], self.directions)

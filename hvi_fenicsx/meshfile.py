@@ -14,12 +14,16 @@ import numpy.typing as npt
 from dolfinx import mesh as dmesh
 from mpi4py import MPI
 
-from . import compat
+from . import compat, meshtopology
 from .errors import InputError
 from .parallel import on_root
 
 Entities = npt.NDArray[np.int32]
 _MOST_REMNANTS = 100
+_FLAT = 1e-9
+"""Ratio of a cell's inscribed to its circumscribed sphere (1 for an equilateral one), below which it has no volume."""
+_LARGEST = 1e12
+"""Of a coordinate, in the file's unit."""
 _SIMPLEX = {2: 2, 3: 4}
 """Gmsh's element type of the linear simplex, by dimension."""
 
@@ -80,11 +84,13 @@ def _open(gmsh: Any, path: Path, dimension: int) -> dict[int, dict[str, int]]:
         gmsh.open(str(path))
         if not len(gmsh.model.mesh.getNodes()[0]):
             gmsh.model.mesh.generate(dimension)
+        _close_ranks(gmsh)
     except Exception as error:
         # gmsh raises bare Exceptions, whatever is wrong with a file
         _drain(gmsh)
         raise InputError(f"mesh file {path}: gmsh cannot read it: {error}") from None
     _check_cells(gmsh, path, dimension)
+    meshtopology.check(gmsh, path, dimension)
     return {d: _names(gmsh, path, d) for d in (dimension - 1, dimension)}
 
 
@@ -99,6 +105,13 @@ def _drain(gmsh: Any) -> None:
             with contextlib.suppress(Exception):
                 gmsh.open(nothing.name)
                 return
+
+
+def _close_ranks(gmsh: Any) -> None:
+    """Number the nodes from 1 without gaps, which dolfinx demands: a file may have lost some with their cells."""
+    tags = gmsh.model.mesh.getNodes()[0]
+    if len(tags) and np.max(tags) != len(tags):
+        gmsh.model.mesh.renumberNodes()
 
 
 def _names(gmsh: Any, path: Path, dimension: int) -> dict[str, int]:
@@ -120,17 +133,19 @@ def _check_cells(gmsh: Any, path: Path, dimension: int) -> None:
     if list(types) != [_SIMPLEX[dimension]]:
         shape = "triangles" if dimension == 2 else "tetrahedra"
         raise InputError(f"mesh file {path}: linear {shape} only; remesh with order 1 and without recombination")
-    quality = np.asarray(gmsh.model.mesh.getElementQualities(tags[0], "volume"))
-    if not np.all(np.abs(quality) > 0):
-        bad = int(np.argmin(np.abs(quality)))
+    _check_points(gmsh, path, dimension)
+    quality = np.abs(gmsh.model.mesh.getElementQualities(tags[0], "gamma"))
+    if not np.all(quality > _FLAT):
+        bad = int(np.argmin(quality))
         raise InputError(f"mesh file {path}: cell {tags[0][bad]} has no volume; remesh")
-    _check_plane(gmsh, path, dimension)
 
 
-def _check_plane(gmsh: Any, path: Path, dimension: int) -> None:
+def _check_points(gmsh: Any, path: Path, dimension: int) -> None:
     points = np.asarray(gmsh.model.mesh.getNodes()[1]).reshape(-1, 3)
     if not np.all(np.isfinite(points)):
         raise InputError(f"mesh file {path}: a node's coordinates are not finite numbers")
+    if np.max(np.abs(points)) > _LARGEST:
+        raise InputError(f"mesh file {path}: a node's coordinate is beyond ±{_LARGEST:g}; remesh near the origin")
     if dimension == 2 and np.ptp(points[:, 2]) > 1e-12 * np.ptp(points[:, :2]):
         raise InputError(f"mesh file {path}: a 2D mesh must lie in a plane z = constant")
 

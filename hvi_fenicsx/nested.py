@@ -14,13 +14,26 @@ from petsc4py import PETSc
 from . import building, ladder, solvers
 from .scene import Scene
 from .solvers.base import Counts, Progress, Solved
-from .solvers.branch import BranchIteration
-from .system import System
+from .solvers.linear import LinearSettings
+from .solvers.single import LinearSolve
+from .system import Below, System
 from .timing import Timer
 
-_WORTHWHILE = 20_000
+_WORTHWHILE = 5_000
 """Unknowns from which a coarser rung pays."""
 _COARSE_TOLERANCE = 1e-4
+
+
+def coarser(scene: Scene, system: System) -> Scene | None:
+    """The scene one rung below; None where there is none, or where it would not pay."""
+    return ladder.coarser(scene) if system.dofs >= _WORTHWHILE else None
+
+
+def linear(scene: Scene, system: System) -> LinearSettings:
+    """How the scene's linear systems will be solved: by multigrid where a ladder is climbed."""
+    kind = solvers.choose(scene.solver, system)
+    climbed = coarser(scene, system) is not None and (kind.takes_start or kind is LinearSolve)
+    return LinearSettings.choose(system, scene.solver.linear_solver, ladder=climbed)
 
 
 def solve(scene: Scene, system: System, timer: Timer, progress: Progress, interrupted: Callable[[], bool]) -> Solved:
@@ -29,23 +42,54 @@ def solve(scene: Scene, system: System, timer: Timer, progress: Progress, interr
     Raises:
         SolverError: a convex step raised the energy.
     """
-    coarse = ladder.coarser(scene) if system.dofs >= _WORTHWHILE else None
-    if coarse is None or not issubclass(solvers.METHODS[scene.solver.method], BranchIteration):
+    coarse = coarser(scene, system)
+    kind = solvers.choose(scene.solver, system)
+    if coarse is not None and kind is LinearSolve:
+        system.below = hierarchy(scene, system, timer)
+    if coarse is None or not kind.takes_start:
         return solvers.create(scene.solver, system, timer, progress, interrupted).solve()
     below = building.assemble(_loosened(coarse), system.comm, timer)
+    below.release(system.freedom.modes if system.freedom else ())
     found = solve(_loosened(coarse), below, timer, progress, interrupted)
     with timer("setup"):
-        step = ladder.prolongation(system.problem.space, below.problem.space, scene)
-    system.prolongations = (step, *below.prolongations)
-    start = _prolonged(step, below, found, system) if found.converged else None
+        system.below = Below(below, ladder.between(system, below, scene))
+    return ascend(scene, system, (below, found, system.below.prolongation), timer, progress, interrupted)
+
+
+Rung = tuple[System, Solved, PETSc.Mat]
+"""The next coarser rung, its solution, and the prolongation from its unknowns (:func:`.ladder.between`)."""
+
+
+def ascend(
+    scene: Scene, system: System, rung: Rung, timer: Timer, progress: Progress, interrupted: Callable[[], bool]
+) -> Solved:
+    """Solve a scene's system from the solution on the rung below. Collective.
+
+    Raises:
+        SolverError: a convex step raised the energy.
+    """
+    below, found, step = rung
+    wanted = found.converged and solvers.choose(scene.solver, system).takes_start
+    start = _prolonged(step, below, found, system) if wanted else None
     method = solvers.create(scene.solver, system, timer, progress, interrupted)
-    result = method.solve(start)
+    result = method.solve() if start is None else method.solve(start)
     if start is not None and not result.converged and not result.interrupted:
         result = solvers.create(scene.solver, system, timer, progress, interrupted).solve()
     counts = Counts()
     counts.add(found.counts)
     counts.add(result.counts)
     return replace(result, counts=counts, levels=found.levels + 1)
+
+
+def hierarchy(scene: Scene, system: System, timer: Timer) -> Below | None:
+    """The rungs below for the multigrid of an equation, which needs no start. Collective."""
+    coarse = coarser(scene, system)
+    if coarse is None:
+        return None
+    below = building.assemble(coarse, system.comm, timer)
+    below.below = hierarchy(coarse, below, timer)
+    with timer("setup"):
+        return Below(below, ladder.between(system, below, scene))
 
 
 def _loosened(scene: Scene) -> Scene:
@@ -58,6 +102,7 @@ def _prolonged(step: PETSc.Mat, below: System, found: Solved, system: System) ->
     """The coarse solution on the finer mesh, within its bounds and with its prescribed values. Collective."""
     x = system.load.duplicate()
     step.mult(below.unknowns(found.u), x)
+    x.scale(below.problem.scales.displacement / system.problem.scales.displacement)
     x.pointwiseMax(x, system.lower)
     x.pointwiseMin(x, system.upper)
     owned = system.problem.fixed[system.problem.fixed < x.local_size]

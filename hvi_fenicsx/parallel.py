@@ -7,7 +7,7 @@ from typing import Any, TypeVar
 
 from mpi4py import MPI
 
-from .errors import HviError
+from .errors import HviError, InputError
 
 T = TypeVar("T")
 
@@ -21,7 +21,7 @@ def on_root(comm: MPI.Comm, action: Callable[[], T]) -> T:
     """Run an action on rank 0 only; all ranks get its result, or raise its error. Collective.
 
     Raises:
-        HviError: what the action raised.
+        HviError: what the action raised; of a file that cannot be read or written, which one and why.
     """
     error: HviError | None = None
     result: Any = None
@@ -30,6 +30,8 @@ def on_root(comm: MPI.Comm, action: Callable[[], T]) -> T:
             result = action()
         except HviError as caught:
             error = caught
+        except OSError as caught:
+            error = InputError(f"{caught.filename or 'a file could not be written'}: {caught.strerror or caught}")
     error, result = comm.bcast((error, result), root=0)
     _raise_first([error])
     return result

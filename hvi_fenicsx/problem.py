@@ -16,12 +16,12 @@ import numpy as np
 import numpy.typing as npt
 import ufl
 from dolfinx import fem
-from petsc4py import PETSc
 
+from . import bodies, conditions, surface
 from . import scales as scaling
-from . import surface
+from .bodies import Bodies
 from .domain import Domain
-from .effects.base import Averaged, BoundaryLaw, Condition, Contribution, Direction, Effect, NormalBounds, Place
+from .effects.base import Averaged, BoundaryLaw, Contribution, Direction, Effect, NormalBounds, Place
 from .errors import InputError
 from .expressions import Formula
 from .laws import Superpotential
@@ -32,6 +32,9 @@ from .stage import Scaled, Stage
 from .surface import Surface
 
 Array = npt.NDArray[np.float64]
+Indices = npt.NDArray[np.int32]
+Made = tuple[str | None, Effect, Contribution]
+"""An effect with its place and what it contributed."""
 _VERTEX = {"quadrature_rule": "vertex", "quadrature_degree": 1}
 
 
@@ -45,6 +48,15 @@ class Bounds:
 
 
 @dataclass(frozen=True)
+class Prescribed:
+    """A displacement component that is prescribed on facets (local), its value in SI."""
+
+    component: int
+    facets: npt.NDArray[np.int32]
+    value: Formula
+
+
+@dataclass(frozen=True)
 class Problem:
     """Minimise ½a(u, u) - <g, u> + Σ laws over the admissible u, nondimensional.
 
@@ -54,9 +66,10 @@ class Problem:
         strains: names of linear forms that no rigid motion feels (thermal strain).
         averaged: volumetric parts of a(u, v) that are averaged by vertex.
         conditions: Dirichlet conditions, nondimensional values.
-        fixed: local scalar dofs (owned and ghost) that they prescribe.
+        fixed: local scalar dofs (owned and ghost) that they prescribe. prescribed: where and what they prescribe.
         bounds: by part. terms: the laws at their vertices.
         surfaces: of the parts with bounds or laws, in the scene's order.
+        made: what each effect contributed. held: the dofs of each condition, with its part.
     """
 
     domain: Domain
@@ -68,9 +81,22 @@ class Problem:
     strains: frozenset[str]
     conditions: tuple[fem.DirichletBC, ...]
     fixed: npt.NDArray[np.int32]
+    prescribed: tuple[Prescribed, ...]
     bounds: tuple[Bounds, ...]
     terms: tuple[LawTerm, ...]
     surfaces: tuple[Surface, ...]
+    made: tuple[Made, ...]
+    held: tuple[tuple[str, Indices], ...]
+
+    @functools.cached_property
+    def points(self) -> Array:
+        """The local vertices (owned and ghost), m, (n, 3); kept, since making them takes longer than most uses."""
+        return np.asarray(self.space.tabulate_dof_coordinates(), np.float64)
+
+    @functools.cached_property
+    def bodies(self) -> Bodies:
+        """The connected parts of the mesh. Collective when first used."""
+        return bodies.find(self.domain, self.space)
 
 
 def compose(
@@ -131,13 +157,13 @@ def _points(domain: Domain, entities: tuple[int, Any]) -> Array:
     return domain.mesh.geometry.x[np.unique(dolfinx.mesh.entities_to_geometry(domain.mesh, dimension, found))]
 
 
-Made = tuple[str | None, Effect, Contribution]
-
-
 def _sum(
     stage: Stage, scales: Scales, made: Sequence[Made], modify: Callable[[Superpotential], Superpotential]
 ) -> Problem:
-    conditions, fixed = _conditions(stage, scales, made)
+    wanted = [(str(where), c) for where, _, contribution in made for c in contribution.conditions]
+    prescribed = conditions.build(stage, scales, wanted)
+    held = tuple((where, bc.dof_indices()[0]) for (where, _), bc in zip(wanted, prescribed, strict=True))
+    fixed = np.unique(np.concatenate([np.empty(0, np.int32), *(dofs for _, dofs in held)])).astype(np.int32)
     surfaces = {
         where: surface.build(
             where,
@@ -147,11 +173,10 @@ def _sum(
             stage.length ** (stage.dimension - 1),
             next((b.direction for w, _, other in made if w == where for b in other.bounds), None),
         )
-        for where, _, c in made
-        if where is not None and (c.bounds or c.laws)
+        for where in dict.fromkeys(w for w, _, c in made if w is not None and (c.bounds or c.laws))
     }
     bounds = [_bounds(stage, surfaces[w], b, scales) for w, _, c in made if w is not None for b in c.bounds]
-    _check_compatible(stage, bounds, conditions, fixed)
+    _check_compatible(stage, bounds, prescribed, fixed)
     _check_normal_laws(made)
     terms = [
         _term(stage, surfaces[w], law, modify, scales, fixed) for w, _, c in made if w is not None for law in c.laws
@@ -166,11 +191,14 @@ def _sum(
         tuple(a for _, _, c in made for a in c.averaged),
         {**linear, **strains},
         frozenset(strains),
-        conditions,
+        prescribed,
         fixed,
+        _prescribed(stage, made),
         tuple(bounds),
         tuple(terms),
         tuple(surfaces.values()),
+        tuple(made),
+        held,
     )
 
 
@@ -195,25 +223,12 @@ def _check_normal_laws(made: Sequence[Made]) -> None:
             )
 
 
-def _conditions(
-    stage: Stage, scales: Scales, made: Sequence[Made]
-) -> tuple[tuple[fem.DirichletBC, ...], npt.NDArray[np.int32]]:
-    pairs = [(where, c) for where, _, contribution in made for c in contribution.conditions]
-    found = [_condition(stage, scales, str(where), c) for where, c in pairs]
-    dofs = [bc.dof_indices()[0] for bc in found]
-    return tuple(found), np.unique(np.concatenate([np.empty(0, np.int32), *dofs])).astype(np.int32)
-
-
-def _condition(stage: Stage, scales: Scales, part: str, condition: Condition) -> fem.DirichletBC:
-    facets, dim = stage.part_facets[part], stage.dimension - 1
-    component = stage.space.sub(condition.component)
-    if condition.value.is_number:
-        value = PETSc.ScalarType(condition.value.source / scales.displacement)  # type: ignore[operator]
-        return fem.dirichletbc(value, fem.locate_dofs_topological(component, dim, facets), component)
-    collapsed, _ = component.collapse()
-    function = fem.Function(collapsed)
-    function.interpolate(lambda x: condition.value.at(x.T) / scales.displacement)
-    return fem.dirichletbc(function, fem.locate_dofs_topological((component, collapsed), dim, facets), component)
+def _prescribed(stage: Stage, made: Sequence[Made]) -> tuple[Prescribed, ...]:
+    return tuple(
+        Prescribed(c.component, stage.part_facets[str(where)], c.value)
+        for where, _, contribution in made
+        for c in contribution.conditions
+    )
 
 
 def _bounds(stage: Stage, where: Surface, bounds: NormalBounds, scales: Scales) -> Bounds:
@@ -274,15 +289,9 @@ def _term(
     dofs = where.blocks[:, None] * stage.dimension + np.arange(stage.dimension)
     free = (~np.isin(dofs, fixed)).astype(np.float64)
     density = fem.Function(stage.space, name="clarke_derivative")
-    rates = fem.Function(
-        fem.functionspace(stage.domain.mesh, ("Lagrange", 1, (stage.dimension, stage.dimension))), name="clarke_rate"
-    )
     ds = Scaled(stage.number(stage.length ** (1 - stage.dimension)), stage.boundary(where.part, **_VERTEX))
     residual = ufl.inner(density, stage.test) * ds
-    tangent = ufl.inner(ufl.dot(rates, stage.trial), stage.test) * ds
-    return LawTerm(
-        where, law.direction, solved, exact, directions, free, density, rates, fem.form(residual), fem.form(tangent)
-    )
+    return LawTerm(where, law.direction, solved, exact, directions, free, density, fem.form(residual))
 
 
 __all__ = ["Bounds", "Place", "Problem", "compose"]

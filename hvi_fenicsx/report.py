@@ -3,11 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
+from . import nested, shares, solvers
+from .accuracy import Reached
+from .estimate import Estimate
+from .quantities import NAMES
+from .rigid import Body, LoadFactors, Mode
 from .solution import Prepared, Solution
-from .solvers.linear import LinearSettings
+
+_LISTED = 3
+"""Rigid motions that are told one by one."""
 
 
 def heading(prepared: Prepared, ranks: int) -> Iterator[str]:
@@ -15,39 +22,71 @@ def heading(prepared: Prepared, ranks: int) -> Iterator[str]:
     title = prepared.scene.title or "untitled"
     yield f"{title}: {prepared.system.dofs:,} unknowns on {ranks} rank{'s'[: ranks - 1]}"
     yield f"existence: {existence(prepared)}"
+    yield from odd(prepared.warnings)
+
+
+def odd(warnings: Iterable[str]) -> Iterator[str]:
+    """What looks odd, a line each."""
+    return (f"odd: {warning}" for warning in warnings)
 
 
 def existence(prepared: Prepared) -> str:
     """One line on kernel, state, margin and load factors."""
     s = prepared.solvability
-    kernel = ", ".join(mode.words for mode in s.kernel) or "none"
-    parts = [f"{s.state}; rigid motions that the supports leave: {kernel}"]
+    bodies = prepared.problem.bodies.bodies
+    trouble = f" ({s.trouble})" if s.trouble else ""
+    parts = [f"{s.state}{trouble}; rigid motions that the supports leave: {motions(s.kernel, bodies)}"]
     if s.direction is not None:
         parts.append(f"escape by {s.direction.words}")
     if s.margin is not None:
         parts.append(f"margin {s.margin:.3g}")
+    if s.free:
+        free = motions(s.free, bodies)
+        parts.append(f"free, held by nothing and in balance: {free} (what is returned moves least that way)")
     for name, factor in (("held up to load factor", s.lambda_held), ("peak at load factor", s.lambda_peak)):
         if math.isfinite(factor):
             parts.append(f"{name} {factor:.6g}")
     return "; ".join(parts)
 
 
+def motions(found: Sequence[Mode], bodies: Sequence[Body]) -> str:
+    """Rigid motions of some bodies: a few in words, more by their number."""
+    if len(found) <= _LISTED:
+        return ", ".join(mode.words for mode in found) or "none"
+    if len(found) == sum(body.motions for body in bodies):
+        return f"all {len(found)}" + (f" of {len(bodies)} bodies" if len(bodies) > 1 else "")
+    return f"{len(found)} (`hvi check --json` lists them)"
+
+
+def load_factors(factors: Mapping[str, LoadFactors]) -> Iterator[str]:
+    """One line on each load: between which factors of it the body is held, the others as they are."""
+    for name, f in factors.items():
+        if f.held_from < f.held:
+            ends = [f"above {f.held_from:.6g}"] if math.isfinite(f.held_from) else []
+            ends += [f"up to {f.held:.6g}"] if math.isfinite(f.held) else []
+            held = f"held at factors {' and '.join(ends)}" if ends else "held at any factor"
+        else:
+            held = "held at no factor"
+        words = f" ({f.mode.words})" if f.mode else ""
+        peak = f"peak at {f.peak:.6g}" if math.isfinite(f.peak) else "no peak" if f.peak > 0 else "beyond every peak"
+        yield f"load {name} alone: {held}{words}; {peak}" + (f" ({f.peak_mode.words})" if f.peak_mode else "")
+
+
 def effects(prepared: Prepared) -> Iterator[str]:
-    """Each effect in force with what it adds, and the solver that follows."""
-    for placed in prepared.scene.effects():
-        yield f"effect: {placed.effect.key} on {placed.where or 'the body'}: {placed.effect.term}"
+    """The effects in force with what each adds, and the solver that follows. Collective."""
+    found = shares.shares(prepared.problem)
+    yield from (f"effect: {share.effect} on {share.where or 'the body'}: {share.adds}" for share in found)
+    yield from shares.table(found)
     yield f"solver: {solver(prepared)}"
 
 
 def solver(prepared: Prepared) -> str:
     """Which solver the effects call for."""
-    problem, kind = prepared.problem, LinearSettings.choose(prepared.system, prepared.scene.solver.linear_solver).kind
-    linear = {"lu": "MUMPS", "gamg": "CG with GAMG"}[kind]
-    if problem.terms and problem.bounds:
-        return f"branch iteration over SNES VI (reduced space), {linear}"
-    if problem.terms:
-        return f"branch iteration over Newton, no bounds, {linear}"
-    return f"SNES VI (reduced space), a convex programme, {linear}" if problem.bounds else f"one linear solve, {linear}"
+    wanted = prepared.scene.solver
+    kind = nested.linear(prepared.scene, prepared.system).kind
+    linear = {"lu": "MUMPS", "gamg": "CG with GAMG", "mg": "CG with geometric multigrid on the ladder"}[kind]
+    bounds = "" if prepared.problem.bounds else ", no bounds"
+    return f"{solvers.choose(wanted, prepared.system).words}{bounds}, {linear}"
 
 
 def outcome(solution: Solution) -> Iterator[str]:
@@ -63,6 +102,8 @@ def outcome(solution: Solution) -> Iterator[str]:
     if solution.scene.solver.smoothing is not None:
         away = solution.examined.smoothing_error * solution.problem.scales.stress
         yield f"smoothing: -σ_t is up to {away:.3g} N/m² from what the unsmoothed law gives there"
+    if solution.estimate is not None:
+        yield error(solution.estimate)
     energy = solution.examined.energy * solution.problem.scales.energy
     unit = "J/m" if solution.problem.scales.dimension == 2 else "J"
     yield (
@@ -71,14 +112,50 @@ def outcome(solution: Solution) -> Iterator[str]:
     )
 
 
-def as_data(prepared: Prepared) -> dict[str, Any]:
-    """The report of ``check --json``."""
+def error(estimate: Estimate) -> str:
+    """One line on the estimated error and its parts."""
+    norm = estimate.energy_norm or 1.0
+    parts = {name: getattr(estimate, name) / norm for name in ("discretisation", "smoothing", "algebraic")}
+    split = ", ".join(f"{name} {percent(value)}" for name, value in parts.items())
+    return f"estimated error {percent(estimate.total / norm)} in the energy norm ({split})"
+
+
+def percent(value: float) -> str:
+    """A share as a person reads it."""
+    if not math.isfinite(value):
+        return "unknown"
+    return f"{100 * value:.2g} %" if value >= 1e-5 or value == 0 else f"{value:.0e}"
+
+
+def bought(reached: Reached) -> Iterator[str]:
+    """What was chosen for an accuracy, what it cost, and what a tenth of the error would cost."""
+    goal, steps = reached.goal, reached.steps
+    if reached.why is not None:
+        yield f"accuracy not reached: {reached.why}"
+    if not steps:
+        return
+    last, asked = steps[-1], "" if goal.accuracy is None else f" ({percent(goal.accuracy)} was asked for)"
+    epsilon = "" if last.epsilon is None else f", ε {last.epsilon:.2g}"
+    yield (
+        f"accuracy: {percent(last.error)}{asked} of {NAMES[goal.quantity]}, by {len(steps)} meshes up to {last.dofs:,} "
+        f"unknowns, tolerance {last.tolerance:.0e}{epsilon}, {sum(s.seconds for s in steps):.1f} s"
+    )
+    if reached.more is not None:
+        more = reached.more
+        yield (
+            f"{percent(more.accuracy)} would take about {more.dofs:.1e} unknowns, {more.seconds:.3g} s and "
+            f"{more.memory / 1024:.2g} GB"
+        )
+
+
+def as_data(prepared: Prepared, factors: Mapping[str, LoadFactors]) -> dict[str, Any]:
+    """The report of ``check --json``. Collective."""
     return {
         "scene": prepared.scene.title,
         "dofs": prepared.system.dofs,
         "solvability": prepared.solvability.summary(),
-        "effects": [
-            {"effect": p.effect.key, "where": p.where, "adds": p.effect.term} for p in prepared.scene.effects()
-        ],
+        "load_factors": {name: found.summary() for name, found in factors.items()},
+        "effects": [share.as_dict() for share in shares.shares(prepared.problem)],
         "solver": solver(prepared),
+        "warnings": list(prepared.warnings),
     }

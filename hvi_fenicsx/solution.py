@@ -9,11 +9,13 @@ from typing import TYPE_CHECKING
 from dolfinx import fem
 from mpi4py import MPI
 
-from . import building, certificate, existence, nested, solvers, system
+from . import building, certificate, existence, freedom, nested, oddities, solvers, system
 from .certificate import Examined
+from .domain import Domain
 from .errors import SolverError
+from .estimate import Estimate, estimate
 from .problem import Problem
-from .rigid import Solvability
+from .rigid import LoadFactors, Solvability
 from .solvers.base import Progress, Solved, silent
 from .timing import Timer
 
@@ -33,7 +35,9 @@ class Solution:
         solvability: whether a solution can exist.
         solved: what the method found, None when the state is *escapes* (nothing was solved).
         examined: the certificate and the state of Γc, None likewise.
+        estimate: of the error; None where nothing was certified.
         dofs: unknowns. epsilon: relative width of the smoothing, None for exact laws. timer: wall time by phase.
+        warnings: what looks odd, see :mod:`.oddities`.
     """
 
     scene: Scene
@@ -41,9 +45,11 @@ class Solution:
     solvability: Solvability
     solved: Solved | None
     examined: Examined | None
+    estimate: Estimate | None
     dofs: int
     epsilon: float | None
     timer: Timer
+    warnings: tuple[str, ...] = ()
 
     @property
     def converged(self) -> bool:
@@ -66,34 +72,62 @@ class Solution:
             return "no solution exists: the load moves the body away"
         if self.converged:
             local = " (a local equilibrium: the state is metastable)" if self.solvability.state == "metastable" else ""
-            return f"certified{local}"
+            free = ", ".join(mode.words for mode in self.solvability.free)
+            return f"certified{local}" + (f"; determined up to {free}" if free else "")
         if self.solvability.state == "metastable" and not self.solved.interrupted:
             return f"metastable, and no equilibrium found ({self.solved.reason})"
-        return f"not certified ({self.solved.reason})"
+        unknown = "; whether a solution exists could not be decided" if self.solvability.state == "undecided" else ""
+        return f"not certified ({self.solved.reason}){unknown}"
 
 
 @dataclass(frozen=True)
 class Prepared:
-    """A scene made into a problem, assembled, its existence known."""
+    """A scene made into a problem, assembled, its existence known; ``warnings``: what looks odd so far."""
 
     scene: Scene
     problem: Problem
     system: system.System
     solvability: Solvability
     timer: Timer
+    warnings: tuple[str, ...] = ()
+
+    def load_factors(self, load: str | None = None) -> LoadFactors:
+        """Between which factors of a load the body is held, the other loads constant. Collective.
+
+        Args:
+            load: None for the whole load; else ``part.traction`` or ``region.force`` (``body.force``), or just the part
+                or region.
+
+        Raises:
+            InputError: on all ranks alike: there is no such load.
+        """
+        return existence.load_factors(self.problem, self.system.forces, load)
 
 
-def prepare(scene: Scene, comm: MPI.Comm = MPI.COMM_WORLD, timer: Timer | None = None) -> Prepared:
+def prepare(
+    scene: Scene,
+    comm: MPI.Comm = MPI.COMM_WORLD,
+    timer: Timer | None = None,
+    body: Domain | None = None,
+    verdict: Solvability | None = None,
+) -> Prepared:
     """Everything before the solve: mesh, forms, assembly, existence. Collective.
+
+    Args:
+        scene: what to solve. comm: the ranks. timer: to go on with.
+        body: the domain where it is there already, refined. verdict: on existence, where it is known.
 
     Raises:
         InputError: on all ranks alike.
     """
     timer = timer or Timer()
-    assembled = building.assemble(scene, comm, timer)
+    assembled = building.assemble(scene, comm, timer, body)
+    with timer("existence"):
+        verdict = verdict or existence.solvability(assembled.problem, assembled.forces)
     with timer("assembly"):
-        verdict = existence.solvability(assembled.problem, assembled.forces)
-    return Prepared(scene, assembled.problem, assembled, verdict, timer)
+        assembled.release(verdict.free)
+        odd = oddities.foreseen(assembled.problem, assembled.forces)
+    return Prepared(scene, assembled.problem, assembled, verdict, timer, odd)
 
 
 def solve(
@@ -108,34 +142,54 @@ def solve(
 
 
 def finish(
-    prepared: Prepared, progress: Progress = silent, interrupted: Callable[[], bool] = lambda: False
+    prepared: Prepared,
+    progress: Progress = silent,
+    interrupted: Callable[[], bool] = lambda: False,
+    below: nested.Rung | None = None,
 ) -> Solution:
-    """The solve and the certificate of a prepared scene; nothing is solved when no solution exists. Collective.
+    """Solve, certificate and estimate of a prepared scene; nothing is solved when no solution exists. Collective.
 
     Args:
         prepared: the scene. progress: see :mod:`.solvers.base`. interrupted: whether to stop (collective, asked often).
+        below: a coarser rung to start from, where the mesh was refined.
     """
-    found = examined = None
+    found = examined = errors = None
+    odd = prepared.warnings
     if prepared.solvability.state != "escapes":
-        found = _solved(prepared, progress, interrupted)
+        found = _solved(prepared, progress, interrupted, below)
         with prepared.timer("certificate"):
             wanted = prepared.scene.solver
             examined = certificate.examine(prepared.problem, found.u, wanted.tolerance, inertia=wanted.second_order)
+            odd += oddities.found(prepared.problem, examined, found.u)
+        if examined.certificate.passed:
+            with prepared.timer("estimate"):
+                errors = estimate(prepared.system, found.u, examined)
     return Solution(
         prepared.scene,
         prepared.problem,
         prepared.solvability,
         found,
         examined,
+        errors,
         prepared.system.dofs,
         solvers.relative_width(prepared.scene.solver, prepared.system),
         prepared.timer,
+        odd,
     )
 
 
-def _solved(prepared: Prepared, progress: Progress, interrupted: Callable[[], bool]) -> Solved:
+def _solved(
+    prepared: Prepared, progress: Progress, interrupted: Callable[[], bool], below: nested.Rung | None
+) -> Solved:
+    scene, assembled, timer = prepared.scene, prepared.system, prepared.timer
     try:
-        return nested.solve(prepared.scene, prepared.system, prepared.timer, progress, interrupted)
+        if below is not None:
+            found = nested.ascend(scene, assembled, below, timer, progress, interrupted)
+        else:
+            found = nested.solve(scene, assembled, timer, progress, interrupted)
+        if assembled.freedom is not None:
+            freedom.settle(prepared.problem, prepared.solvability.free, found.u)
+        return found
     except SolverError as error:
         u = fem.Function(prepared.problem.space, name="displacement")
         return Solved(u, prepared.scene.solver.method, False, str(error))

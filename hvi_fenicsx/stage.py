@@ -29,10 +29,14 @@ class Stage:
         self.length, self.stress, self.modulus = scales.length, scales.stress, scales.modulus
         self.space = fem.functionspace(domain.mesh, ("Lagrange", 1, (self.dimension,)))
         self.trial, self.test = ufl.TrialFunction(self.space), ufl.TestFunction(self.space)
-        self.scalar_test = ufl.TestFunction(fem.functionspace(domain.mesh, ("Lagrange", 1)))
         self.normal = ufl.FacetNormal(domain.mesh)
         self.materials = [placed for placed in effects if placed[1].place is Place.MATERIAL]
         self.part_facets = {name: domain.facets(on) for name, on in parts.items()}
+
+    @functools.cached_property
+    def scalar_test(self) -> Any:
+        """A test function of scalar P1; few effects want it, and its space takes time."""
+        return ufl.TestFunction(fem.functionspace(self.domain.mesh, ("Lagrange", 1)))
 
     def number(self, value: float) -> Any:
         """A constant that is not compiled into the form."""

@@ -13,7 +13,11 @@ import numpy as np
 import numpy.typing as npt
 import ufl
 from dolfinx import fem
+from mpi4py import MPI
 from petsc4py import PETSc
+
+from . import compat
+from .errors import InputError
 
 Array = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.int32]
@@ -59,6 +63,9 @@ def build(
         measure: ds with vertex quadrature over the part, SI.
         area: L^(d-1), what the weights are divided by.
         direction: a constant unit vector that stands for the normal (that towards a flat obstacle).
+
+    Raises:
+        InputError: on all ranks alike: a vertex is on none but facets inside the body, which have no outward normal.
     """
     dimension = space.mesh.geometry.dim
     dofs = fem.locate_dofs_topological(space, dimension - 1, facets)
@@ -66,6 +73,8 @@ def build(
     normal = _assembled(ufl.FacetNormal(space.mesh), space, measure)[blocks]
     ones = ufl.as_vector([fem.Constant(space.mesh, 1.0)] * dimension)
     weights = _assembled(ones, space, measure)[blocks, 0] / area
+    if space.mesh.comm.allreduce(bool(np.any(weights == 0.0)), op=MPI.LOR):
+        raise InputError(f"boundary.{part}: contact and laws act on the body's surface, and facets of it lie inside")
     if direction is not None:
         normal = np.broadcast_to(np.asarray(direction, dtype=np.float64), normal.shape)
     normals = normal / np.linalg.norm(normal, axis=1, keepdims=True)
@@ -105,3 +114,14 @@ def component_dofs(blocks: Indices, directions: Array) -> tuple[npt.NDArray[np.i
     """The scalar dof (m,) of a direction (m, d) along an axis of its vertex's frame, and its sign (m,)."""
     axis = np.argmax(np.abs(directions), axis=1)
     return blocks.astype(np.int64) * directions.shape[1] + axis, np.sign(directions[np.arange(len(axis)), axis])
+
+
+def dof_of_node(space: fem.FunctionSpace) -> Indices:
+    """The (block) dof at each geometry node of a P1 space on simplices."""
+    mesh = space.mesh
+    result = np.zeros(mesh.geometry.x.shape[0], dtype=np.int32)
+    cells = (
+        mesh.topology.index_map(mesh.topology.dim).size_local + mesh.topology.index_map(mesh.topology.dim).num_ghosts
+    )
+    result[compat.geometry_dofmap(mesh)[:cells]] = space.dofmap.list[:cells]
+    return result

@@ -1,14 +1,14 @@
 """A problem assembled: PETSc matrix, load, bounds, and the law terms' residual, tangent and energy on top of them.
 
-The bulk matrix A is assembled once. Laws touch only the diagonal blocks of Γc's vertices: for a new tangent K these
-blocks of J = A + W K are reset and assembled again, nothing else. Where a law acts, residuals are computed from the
-rows of A itself: K may be larger than A by any factor, and a difference of the two would leave rounding only.
+The bulk matrix A is assembled once. Laws and active sets touch only the diagonal blocks of Γc's vertices
+(:mod:`.contactrows`); residuals are computed from the rows of A itself there.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -18,9 +18,12 @@ from dolfinx.fem.petsc import assemble_matrix, assemble_vector, set_bc
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from . import dilatation, frames
+from . import dilatation, frames, freedom
+from .contactrows import ContactRows
+from .freedom import Freedom, orthonormalise
 from .lawterm import LawTerm
 from .problem import Problem
+from .rigid import Mode
 from .surface import component_dofs
 from .timing import Timer
 
@@ -61,17 +64,20 @@ class System:
     Attributes:
         problem: what was assembled. frames, rotation: of vertices with slanted normals; None where there are none.
         terms, bounds: the problem's, in the unknowns' components.
-        matrix: J = A + W K, symmetric, Dirichlet rows and columns replaced by the identity; block size d.
+        matrix: J = A + W K (+ H, see :meth:`hold`), symmetric, Dirichlet rows and columns replaced by the identity;
+            block size d. rows: those of Γc.
         load: b, lifted; the prescribed values stand in the Dirichlet rows.
         lower, upper: bounds of u; infinite on Dirichlet rows.
         scale: norm of the load, what residuals are relative to.
-        prolongations: to this system's mesh from the next coarser one, and so on down; empty without a ladder.
+        below: the next coarser rung of the ladder; None where there is none.
         forces: the assembled load vectors by name, unlifted (for the virtual work of rigid motions).
+        freedom: the rigid motions that nothing holds and no load moves; None where there are none (:meth:`release`).
     """
 
     def __init__(self, problem: Problem, compiled: Compiled, timer: Timer) -> None:
         self.problem, self.frames = problem, frames.build(problem)
-        self.prolongations: tuple[PETSc.Mat, ...] = ()
+        self.below: Below | None = None
+        self.freedom: Freedom | None = None
         self._size: float | None = None
         self.terms, self.bounds = problem.terms, problem.bounds
         with timer("assembly"):
@@ -80,10 +86,9 @@ class System:
             self.matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
             self.matrix.setOption(PETSc.Mat.Option.SPD, True)
             self.rotation = self._rotate()
-            self.near_null = rigid_modes(problem, self.rotation)
-            self.matrix.setNearNullSpace(self.near_null)
+            self.rows = ContactRows(self.matrix, [*(t.surface for t in self.terms), *(b.surface for b in self.bounds)])
         self._rates = [np.zeros((*t.free.shape, t.free.shape[1])) for t in self.terms]
-        self._bulk = _BulkRows(self.matrix, self.terms) if self.terms else None
+        self._held: npt.NDArray[np.int32] = np.empty(0, np.int32)
         self._work = self.load.duplicate()
         self.lower, self.upper = self._box()
         free = self.load.copy()
@@ -99,6 +104,20 @@ class System:
     def dofs(self) -> int:
         """Global number of unknowns."""
         return int(self.load.size)
+
+    def release(self, modes: Sequence[Mode]) -> None:
+        """Attach free motions as the null space, and take out of the load what rounding left of them. Collective."""
+        if not modes:
+            return
+        vectors = [self.unknowns(field) for field in freedom.fields(self.problem, modes)]
+        self.freedom = freedom.build(vectors, modes)
+        self.matrix.setNullSpace(self.freedom.null_space)
+        self.freedom.null_space.remove(self.load)
+
+    @cached_property
+    def near_null(self) -> PETSc.NullSpace:
+        """The rigid motions of the free body, orthonormal, which algebraic multigrid must keep. Collective."""
+        return rigid_modes(self.problem, self.rotation)
 
     def _rotate(self) -> PETSc.Mat | None:
         """Go over to local components where normals are slanted; the matrix Q with u = Q û, or None."""
@@ -163,16 +182,49 @@ class System:
         return lower, upper
 
     def set_rates(self, rates: Sequence[Array]) -> None:
-        """Make K the tangent in force: J changes in Γc's rows only. Collective."""
+        """Make K the tangent in force, nothing held: J changes in Γc's rows only. Collective."""
         changed = any(bool(np.any(new != old)) for new, old in zip(rates, self._rates, strict=True))
-        if self._bulk is None or not self.comm.allreduce(changed, op=MPI.LOR):
-            return
-        self._bulk.restore_blocks(self.matrix)
-        for term, new, old in zip(self.terms, rates, self._rates, strict=True):
-            term.set_rates(new)
-            assemble_matrix(self.matrix, term.tangent)
-            old[...] = new
-        self.matrix.assemble()
+        if self.comm.allreduce(changed, op=MPI.LOR):
+            self._rates = [k.copy() for k in rates]
+            self.rows.set_tangent(self.terms, rates)
+            self._write(np.empty(0, np.int32))
+        else:
+            self.hold(np.empty(0, np.int32))
+
+    def hold(self, held: npt.NDArray[np.int32]) -> None:
+        """Hold some unknowns of Γc (local, owned, sorted) in J where a solve finds them, and no others. Collective."""
+        if self.comm.allreduce(not np.array_equal(held, self._held), op=MPI.LOR):
+            self._write(held)
+
+    def follow(self, finer: System, step: PETSc.Mat) -> None:
+        """Take the tangent and the held unknowns of the next finer system, prolonged to by ``step``. Collective.
+
+        W K is restricted and lumped; an unknown is held when one that it moves is, so that J stays the finer one's
+        Galerkin product (off a curved boundary).
+        """
+        value, sum_ = finer.load.duplicate(), self.load.duplicate()
+        d = finer.rows.tangent.shape[1]
+        for column in range(d):
+            value.set(0.0)
+            value.array[finer.rows.dofs] = finer.rows.tangent[:, :, column].ravel()
+            step.multTranspose(value, sum_)
+            self.rows.tangent[:, :, column] = sum_.array_r[self.rows.dofs].reshape(-1, d)
+        value.set(0.0)
+        value.array[finer._held] = 1.0
+        step.multTranspose(value, sum_)
+        self._rates = [np.full_like(k, np.nan) for k in self._rates]  # its own are no longer in force
+        self._write(self.rows.dofs[sum_.array_r[self.rows.dofs] > 0.0].astype(np.int32))
+        value.destroy()
+        sum_.destroy()
+
+    def _write(self, held: npt.NDArray[np.int32]) -> None:
+        self.rows.write(self.matrix, held)
+        self._held = held.copy()
+
+    @property
+    def immovable(self) -> npt.NDArray[np.int32]:
+        """Unknowns (local, owned) that are held or prescribed."""
+        return np.concatenate([self._held, self.problem.fixed[self.problem.fixed < self.load.local_size]])
 
     @property
     def rates(self) -> list[Array]:
@@ -202,8 +254,7 @@ class System:
     def _stiffness_times(self, x: PETSc.Vec, out: PETSc.Vec) -> None:
         """A u: by J, but by A's own rows where they differ."""
         self.matrix.mult(x, out)
-        if self._bulk is not None:
-            self._bulk.overwrite(x, out)
+        self.rows.overwrite(x, out)
 
     def tangents(self, x: PETSc.Vec, models: Sequence[Model]) -> list[Array]:
         """K of the models at u, by term."""
@@ -226,6 +277,7 @@ class System:
     def energy_noise(self, x: PETSc.Vec) -> float:
         """What rounding may change of the energy at u: a few ε_machine ‖A‖ ‖u‖². Collective."""
         if self._size is None:
+            self.hold(np.empty(0, np.int32))
             self._size = float(self.matrix.norm(PETSc.NormType.INFINITY))
         return 4 * float(np.finfo(float).eps) * self._size * float(x.norm()) ** 2
 
@@ -252,35 +304,12 @@ class System:
         return allowed
 
 
-class _BulkRows:
-    """The rows of the bulk matrix at the vertices where laws act."""
+@dataclass(frozen=True)
+class Below:
+    """The next coarser rung, and the prolongation from its unknowns."""
 
-    def __init__(self, matrix: PETSc.Mat, terms: Sequence[LawTerm]) -> None:
-        d = matrix.getBlockSize()
-        blocks = np.unique(np.concatenate([t.surface.blocks for t in terms]))
-        self._dofs = (blocks[:, None] * d + np.arange(d)).ravel()
-        start = matrix.getOwnershipRange()[0]
-        rows = PETSc.IS().createGeneral((self._dofs + start).astype(PETSc.IntType), comm=matrix.comm)
-        self._matrix = matrix.createSubMatrix(rows, None)
-        self._product = self._matrix.createVecLeft()
-        self._blocks = (blocks + start // d).astype(PETSc.IntType)
-        self._values = self._diagonal_blocks(matrix, d)
-
-    def _diagonal_blocks(self, matrix: PETSc.Mat, d: int) -> Array:
-        dofs = self._blocks[:, None] * d + np.arange(d, dtype=PETSc.IntType)
-        return np.array([matrix.getValues(i, i) for i in dofs], dtype=np.float64).reshape(-1, d, d)
-
-    def restore_blocks(self, matrix: PETSc.Mat) -> None:
-        """Put the bulk's diagonal blocks back into J. Collective."""
-        for block, values in zip(self._blocks, self._values, strict=True):
-            matrix.setValuesBlocked([block], [block], values)
-        matrix.assemblyBegin(PETSc.Mat.AssemblyType.FLUSH)
-        matrix.assemblyEnd(PETSc.Mat.AssemblyType.FLUSH)
-
-    def overwrite(self, x: PETSc.Vec, out: PETSc.Vec) -> None:
-        """Replace these rows of a product with J by those of the product with A. Collective."""
-        self._matrix.mult(x, self._product)
-        out.array[self._dofs] = self._product.array_r
+    system: System
+    prolongation: PETSc.Mat
 
 
 def traction_scale(term: LawTerm) -> float:
@@ -320,12 +349,5 @@ def rigid_modes(problem: Problem, rotation: PETSc.Mat | None = None) -> PETSc.Nu
             cartesian = vector.copy()
             rotation.multTranspose(cartesian, vector)
         vectors.append(vector)
-    _orthonormalise(vectors)
+    orthonormalise(vectors)
     return PETSc.NullSpace().create(vectors=vectors, comm=space.mesh.comm)
-
-
-def _orthonormalise(vectors: list[PETSc.Vec]) -> None:
-    for i, vector in enumerate(vectors):
-        for other in vectors[:i]:
-            vector.axpy(-vector.dot(other), other)
-        vector.normalize()

@@ -6,7 +6,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-PHASES = ("jit", "mesh", "assembly", "setup", "solve", "certificate", "output")
+PHASES = ("jit", "mesh", "assembly", "existence", "setup", "solve", "certificate", "estimate", "output")
 
 
 class Timer:

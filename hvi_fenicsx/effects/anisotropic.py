@@ -34,11 +34,11 @@ class _ByMatrix(Elasticity):
 
     def contribute(self, stage: Stage, where: str | None) -> Contribution:
         """The bilinear form, strains multiplied by L. The pattern of zeros of C is compiled, its values are not."""
-        length = stage.number(stage.length)
+        length, cells = stage.number(stage.length), stage.cells(where)
         given, virtual = (_voigt(length * strain(v), stage.dimension) for v in (stage.trial, stage.test))
         c = self.stiffness() / stage.modulus
         density = sum(stage.number(c[i, j]) * given[j] * virtual[i] for i, j in np.argwhere(c != 0.0))
-        return Contribution(bilinear=(density * stage.cells(where),))
+        return Contribution(bilinear=(density * cells,), across=self.across(stage, cells))
 
     def thermal_stress(self) -> Array:
         """C : αI."""
@@ -113,6 +113,13 @@ class OrthotropicElasticity(_ByMatrix):
         normal = self._held()
         return np.append(self.thermal_expansion * normal[:2].sum(axis=1), 0.0)
 
+    def out_of_plane(self) -> Array:
+        """The third row of what is held in plane strain."""
+        if self.model != "plane_strain":
+            return super().out_of_plane()
+        row = self._held()[2]
+        return np.array([row[0], row[1], self.thermal_expansion * row.sum()])
+
 
 def _blocks(normal: Array, shear: Array) -> Array:
     n = len(normal)
@@ -124,7 +131,8 @@ def _blocks(normal: Array, shear: Array) -> Array:
 class TensorElasticity(_ByMatrix):
     """Elasticity by its whole tensor, as Voigt's matrix: σ = C ε, shear strains doubled.
 
-    In 2D it is what the plane model leaves of it: the model's name then changes nothing.
+    In 2D it is what the plane model leaves of it: the model's name then changes nothing, and σ_33, which it does not
+    tell, is written as zero.
     """
 
     key: ClassVar[str] = "tensor"

@@ -103,10 +103,12 @@ class Averaged:
     """A volumetric energy ½ modulus Σ_i (∫ φ_i div u dx)² / ∫ φ_i dx over a region's vertices, nondimensional.
 
     Attributes:
+        modulus: λ. shear: 2μ of the same material.
         divergence: UFL form of the scalar test function and the trial function. volume: of the scalar test function.
     """
 
     modulus: float
+    shear: float
     divergence: Any
     volume: Any
 
@@ -120,6 +122,8 @@ class Contribution:
     linear: tuple[Any, ...] = ()
     strains: tuple[Any, ...] = ()
     """Linear forms of ε(v): no rigid motion feels them."""
+    across: tuple[Any, ...] = ()
+    """Parts of ∫ σ_33 q dx in a plane body, over p0: forms of the scalar test function q and, where they need it, u."""
     conditions: tuple[Condition, ...] = ()
     bounds: tuple[NormalBounds, ...] = ()
     laws: tuple[BoundaryLaw, ...] = ()
@@ -131,8 +135,11 @@ class Stage(Protocol):
     dimension: int
     trial: Any
     test: Any
-    scalar_test: Any
     normal: Any
+
+    @property
+    def scalar_test(self) -> Any:
+        """A test function of scalar P1."""
 
     @property
     def length(self) -> float:

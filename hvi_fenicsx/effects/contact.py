@@ -8,7 +8,19 @@ from typing import Annotated, Any, ClassVar
 from pydantic import BaseModel, ConfigDict, Field, model_serializer, model_validator
 
 from ..expressions import COORDINATES, Formula
-from .base import Contribution, Effect, FormulaField, NormalBounds, Place, Stage, components, refusal
+from .base import (
+    Contribution,
+    Drive,
+    Effect,
+    Evaluate,
+    FormulaField,
+    NormalBounds,
+    Place,
+    Sizes,
+    Stage,
+    components,
+    refusal,
+)
 
 Coordinate = Annotated[float, Field(allow_inf_nan=False)]
 
@@ -33,6 +45,7 @@ class Contact(Effect):
     key: ClassVar[str] = "contact"
     place: ClassVar[Place] = Place.BOUNDARY
     exclusive: ClassVar[bool] = True
+    drive: ClassVar[Drive] = Drive.KINEMATIC
     term: ClassVar[str] = "K: gap - u·n ≥ 0 on Γc, or lower ≤ -u·n ≤ upper"
 
     gap: FormulaField | None = None
@@ -64,12 +77,21 @@ class Contact(Effect):
         found = {k: f.source for k in ("gap", "lower", "upper") if (f := getattr(self, k)) is not None}
         return found if self.obstacle is None else {"obstacle": self.obstacle.model_dump(mode="json")}
 
+    def stress_scale(self, largest: Evaluate, sizes: Sizes) -> float:
+        """The stress of the largest displacement that the bounds demand, as a strain over the body's length."""
+        bounds = self._bounds()
+        demanded = [f"max(0, {f.source})" for f in (bounds.lower,) if f is not None]
+        demanded += [f"max(0, -({f.source}))" for f in (bounds.upper,) if f is not None]
+        return max(largest(Formula(formula)) for formula in demanded) * sizes.modulus / sizes.length
+
     def contribute(self, stage: Stage, where: str | None) -> Contribution:
         """The bounds on the normal displacement."""
+        return Contribution(bounds=(self._bounds(),))
+
+    def _bounds(self) -> NormalBounds:
         if self.obstacle is not None:
-            return Contribution(bounds=(_towards(self.obstacle),))
-        lower = self.lower if self.gap is None else _negative(self.gap)
-        return Contribution(bounds=(NormalBounds(lower=lower, upper=self.upper),))
+            return _towards(self.obstacle)
+        return NormalBounds(lower=self.lower if self.gap is None else _negative(self.gap), upper=self.upper)
 
     def check(self, dimension: int) -> None:
         """An obstacle has as many components as the scene has dimensions."""

@@ -39,6 +39,17 @@ class Elasticity(Effect):
     def thermal_stress(self) -> Array:
         """Stress that holds the material back from expanding by 1 K, N/m²; shape (3,) or (6,)."""
 
+    def out_of_plane(self) -> Array:
+        """σ_33 of a plane body by unit ε_11, ε_22 and ΔT = -1 K, N/m²; shape (3,). Zero in plane stress."""
+        return np.zeros(3)
+
+    def across(self, stage: Stage, cells: Any) -> tuple[Any, ...]:
+        """∫ σ_33(u) q dx over cells, nondimensional; nothing where it is zero."""
+        deformation = stage.number(stage.length) * strain(stage.trial)
+        found = [(i, float(c)) for i, c in enumerate(self.out_of_plane()[:2] / stage.modulus) if c]
+        sigma = sum(stage.number(c) * deformation[i, i] for i, c in found)
+        return (sigma * stage.scalar_test * cells,) if found else ()
+
     def expansion_scale(self) -> float:
         """|α|."""
         return abs(self.thermal_expansion)
@@ -91,11 +102,17 @@ class IsotropicElasticity(Elasticity):
         deformation, virtual = length * strain(stage.trial), length * strain(stage.test)
         if not self.locks:
             sigma = self.stress(deformation, stage.number, stage.modulus)
-            return Contribution(bilinear=(ufl.inner(sigma, virtual) * cells,))
+            return Contribution(bilinear=(ufl.inner(sigma, virtual) * cells,), across=self.across(stage, cells))
         lam, two_mu = (value / stage.modulus for value in self.lame())
         shear = stage.number(two_mu) * ufl.inner(deformation, virtual) * cells
         divergence = stage.scalar_test * length * ufl.div(stage.trial) * cells
-        return Contribution(bilinear=(shear,), averaged=(Averaged(lam, divergence, stage.scalar_test * cells),))
+        return Contribution(bilinear=(shear,), averaged=(Averaged(lam, two_mu, divergence, stage.scalar_test * cells),))
+
+    def out_of_plane(self) -> Array:
+        """λ, λ, Eα/(1-2ν)."""
+        if self.model != "plane_strain":
+            return super().out_of_plane()
+        return np.array([self.lame()[0], self.lame()[0], self.thermal_stress()[0]])
 
     def thermal_stress(self) -> Array:
         """Eα/(1-2ν), in plane stress Eα/(1-ν): there the thickness is free."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any, ClassVar
 
 from pydantic import SerializerFunctionWrapHandler, model_serializer, model_validator
@@ -39,7 +40,14 @@ class Temperature(Effect):
         if not pairs:
             place = f" of {where}" if where else ""
             raise InputError(f"body.temperature does nothing: give the material{place} thermal_expansion = α (1/K)")
-        return Contribution(strains=tuple(self._load(stage, m) * cells for m, cells in pairs))
+        loads = tuple(self._load(stage, m) * cells for m, cells in pairs)
+        return Contribution(strains=loads, across=tuple(self._across(stage, pairs)))
+
+    def _across(self, stage: Stage, heated: list[tuple[Elasticity, Any]]) -> Iterator[Any]:
+        """What holds the thickness of a plane body back from expanding."""
+        for material, cells in heated:
+            if held := float(material.out_of_plane()[2]):
+                yield -stage.number(held / stage.stress) * stage.render(self.value) * stage.scalar_test * cells
 
     def _load(self, stage: Stage, material: Elasticity) -> Any:
         """(C : αI) : ε(v) ΔT, nondimensional."""

@@ -123,6 +123,11 @@ class Superpotential(ABC):
         """Whether j(-x) = j(x), so that the law can act on the length of a slip in 3D."""
 
     @property
+    def is_linear(self) -> bool:
+        """Whether the traction is proportional to the displacement, so that j adds nothing nonsmooth."""
+        return False
+
+    @property
     def traction_scale(self) -> float:
         """energy_scale / length_scale, N/m²."""
         return self.energy_scale / self.length_scale

@@ -114,6 +114,12 @@ class PolylineLaw(Superpotential):
 
     @override
     @cached_property
+    def is_linear(self) -> bool:
+        g = self.graph
+        return bool(np.all(g.left == g.right) and np.all(g.slopes == g.slopes[0]) and g.left[g.zero] == 0.0)
+
+    @override
+    @cached_property
     def growth(self) -> Directional:
         g = self.graph
         return Directional(_limit(-g.left[0], g.slopes[0]), _limit(g.right[-1], g.slopes[-1]))

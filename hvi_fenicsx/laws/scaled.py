@@ -101,6 +101,11 @@ class ScaledLaw(Superpotential, register=False):
         return self.law.even
 
     @override
+    @property
+    def is_linear(self) -> bool:
+        return self.law.is_linear
+
+    @override
     def piece(self, x: FloatArray) -> IntArray:
         return self.law.piece(x * self.length)
 

@@ -5,7 +5,7 @@ from .kernel import Fixed, kernel, modes
 from .motions import Body, Mode, describe, motion_at, rigid_fields
 from .parts import ContactCone, Resistance, RigidProblem
 from .solvability import analyse, load_factors
-from .verdict import LoadFactors, Paper, Solvability, State, combine
+from .verdict import LoadFactors, Paper, Solvability, State, combine, combine_factors
 
 __all__ = [
     "Body",
@@ -21,6 +21,7 @@ __all__ = [
     "State",
     "analyse",
     "combine",
+    "combine_factors",
     "describe",
     "kernel",
     "load_factors",

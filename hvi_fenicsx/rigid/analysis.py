@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..laws.base import Directional
 from .kernel import modes, natural_basis, null_space, triangle
-from .motions import Mode, describe
+from .motions import Mode, named
 from .parts import Reduced, RigidProblem
 from .programme import Functional, Minimum, Programme, Region, ball, cross
 from .verdict import LoadFactors, Paper, Solvability, State
@@ -168,8 +168,7 @@ class Analysis:
 
     def _mode(self, f: Functional, y: Array) -> Mode:
         """The motion y in words, in its simplest form among those with the same value of f."""
-        z = self._simplest(f, y)
-        return Mode(describe(z, self.problem.body, signed=True), tuple(float(c) for c in z))
+        return named(self._simplest(f, y), self.problem.body, signed=True)
 
     def _simplest(self, f: Functional, y: Array) -> Array:
         """Unit rigid coefficients (3|6,) of y, small ones dropped if f stays as low and y in the cone."""

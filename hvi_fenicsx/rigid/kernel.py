@@ -10,7 +10,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from .motions import Body, Mode, describe, rigid_fields
+from .motions import Body, Mode, named, rigid_fields
 
 Array = NDArray[np.float64]
 
@@ -44,7 +44,7 @@ def kernel(comm: MPI.Comm, body: Body, fixed: Sequence[Fixed]) -> Array:
 
 def modes(basis: Array, body: Body) -> tuple[Mode, ...]:
     """The columns of a kernel's basis with their names. Local."""
-    return tuple(Mode(describe(column, body, signed=False), tuple(column.tolist())) for column in basis.T)
+    return tuple(named(column, body, signed=False) for column in basis.T)
 
 
 def triangle(rows: Array) -> Array:

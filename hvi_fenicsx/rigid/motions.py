@@ -21,11 +21,16 @@ AXES = "xyz"
 
 @dataclass(frozen=True)
 class Body:
-    """Dimension d (2 or 3), centre (3,), nondimensional, and metres per unit of length (for words only)."""
+    """Dimension d (2 or 3) and centre (3,), nondimensional.
+
+    For words only: metres per unit of `length`, and where there are several bodies its `name` and `index` among them.
+    """
 
     dimension: int
     centre: Array
     length: float = 1.0
+    name: str = ""
+    index: int = 0
 
     def __post_init__(self) -> None:
         if self.dimension not in (2, 3):
@@ -41,10 +46,16 @@ class Body:
 
 @dataclass(frozen=True)
 class Mode:
-    """A rigid motion: in words, and as coefficients (3 or 6) on the basis of this module."""
+    """A rigid motion of one body: in words, as coefficients (3 or 6) on the basis of this module, the body's index."""
 
     words: str
     coefficients: tuple[float, ...]
+    body: int = 0
+
+
+def named(coefficients: Array, body: Body, *, signed: bool) -> Mode:
+    """The motion with these coefficients (3|6,), described."""
+    return Mode(describe(coefficients, body, signed=signed), tuple(float(c) for c in coefficients), body.index)
 
 
 def rigid_fields(points: Array, body: Body) -> Array:
@@ -71,10 +82,11 @@ def describe(coefficients: Array, body: Body, *, signed: bool) -> str:
     """
     z = np.where(np.abs(coefficients) <= TINY * np.abs(coefficients).max(), 0.0, coefficients)
     shift, spin = z[: body.dimension], z[body.dimension :]
+    whose = f" of {body.name}" if body.name else ""
     if not spin.any():
-        return f"translation along {_direction(shift, signed)}"
+        return f"translation along {_direction(shift, signed)}{whose}"
     rotation = _rotation_2d if body.dimension == 2 else _rotation_3d
-    return rotation(shift, spin, body, signed)
+    return rotation(shift, spin, body, signed) + whose
 
 
 def _rotation_2d(shift: Array, spin: Array, body: Body, signed: bool) -> str:

@@ -83,13 +83,17 @@ class Resistance:
 
 @dataclass(frozen=True)
 class RigidProblem:
-    """One body, its conditions, contact, laws, and the work <g, y> (3|6,) of each named load on the basis."""
+    """One body, its conditions, contact, laws, and the work <g, y> (3|6,) of each named load on the basis.
+
+    `force` is the sum of the absolute nodal forces: beside it a work is rounding or not, however well loads balance.
+    """
 
     body: Body
     loads: Mapping[str, Array]
     fixed: tuple[Fixed, ...] = ()
     contact: tuple[ContactCone, ...] = ()
     resistances: tuple[Resistance, ...] = ()
+    force: float = 0.0
 
     def __post_init__(self) -> None:
         for name, work in self.loads.items():
@@ -108,7 +112,7 @@ class Reduced:
     """The problem in the k coefficients of the kernel's basis; on the root rank only.
 
     frame (3|6, k), contact (c, k) unit rows, slips one per resistance, moments (p, k) = ∫ direction·y,
-    areas (p,), load name -> (k,), load_scale the largest work of the loads on any basis motion.
+    areas (p,), load name -> (k,), load_scale the largest work of the loads on any basis motion, or their absolute sum.
     """
 
     frame: Array
@@ -157,7 +161,7 @@ def reduce(comm: MPI.Comm, problem: RigidProblem) -> tuple[Array, Reduced | None
         moments=np.array(moments).reshape(len(integrals), basis.shape[1]),
         areas=np.sum([piece[2] for piece in pieces], axis=0) if integrals else np.zeros(0),
         loads=works,
-        load_scale=sum(float(np.abs(work).max()) for work in problem.loads.values()),
+        load_scale=max(problem.force, sum(float(np.abs(work).max()) for work in problem.loads.values())),
     )
 
 

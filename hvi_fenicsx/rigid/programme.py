@@ -31,7 +31,11 @@ TIGHT, LOOSE, PATIENCE = (
     1e-9,
     4,
 )  # gaps relative to the scale; a loose one will do if it shrinks no more
-HIGHS = {"presolve": False, "primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance": 1e-10}
+HIGHS = tuple(
+    {"presolve": presolve, "primal_feasibility_tolerance": tolerance, "dual_feasibility_tolerance": tolerance}
+    for presolve, tolerance in ((False, 1e-10), (True, 1e-10), (False, 1e-9), (True, 1e-9))
+)
+"""The narrowest first; where rounding leaves HiGHS without a verdict, the next."""
 
 
 @dataclass(frozen=True)
@@ -221,12 +225,13 @@ class Programme:
         k, a_eq = len(f.linear), np.zeros((len(region.equal), len(c)))
         a_eq[:, :k] = region.equal
         bounds = [(None, None)] * k + [(0.0, None)] * (len(c) - k)
-        result = linprog(c / size, a_ub, b_ub, a_eq, region.value, bounds, "highs-ds", options=HIGHS)
-        if result.status == 2:
-            return None
-        if result.status != 0:
-            raise SolverError(f"HiGHS on the rigid motions: {result.message}")
-        return Minimum(result.fun * size, np.asarray(result.x[:k]), result.fun * size)
+        for options in HIGHS:
+            result = linprog(c / size, a_ub, b_ub, a_eq, region.value, bounds, "highs-ds", options=options)
+            if result.status == 2:
+                return None
+            if result.status == 0:
+                return Minimum(result.fun * size, np.asarray(result.x[:k]), result.fun * size)
+        raise SolverError(f"HiGHS on the rigid motions: {result.message}")
 
     def _rows(self, f: Functional, region: Region, active: list[int]) -> tuple[Array, Array, Array]:
         """Cost and inequality rows of the cut model in (y, one height for each part with factor > 0)."""

@@ -2,7 +2,8 @@
 
 With C = Y ∩ K∞ the rigid motions that the contact admits, j^∞ the growth and ĵ the peak of the laws:
 held if <g,y> < ∫ j^∞(y) for all y ≠ 0 in C, escapes if <g,y> > ∫ ĵ(y) for some y in C, metastable in between,
-borderline where one of these is an equality. The theory and the closed forms are in docs/solvability.md.
+borderline where one of these is an equality, undecided where rounding lets no programme end. The theory and the closed
+forms are in docs/solvability.md.
 """
 
 from __future__ import annotations
@@ -13,10 +14,11 @@ from typing import TypeVar, cast
 import numpy as np
 from mpi4py import MPI
 
-from ..errors import HviError, InputError
+from ..errors import HviError, InputError, SolverError
 from .analysis import Analysis
+from .kernel import modes
 from .parts import Reduced, RigidProblem, reduce
-from .verdict import LoadFactors, Solvability, unmovable
+from .verdict import LoadFactors, Solvability, undecided, unmovable
 
 Result = TypeVar("Result")
 
@@ -24,9 +26,17 @@ Result = TypeVar("Result")
 def analyse(comm: MPI.Comm, problem: RigidProblem) -> Solvability:
     """The state of a scene and its margins, before anything is solved. Collective; the same on all ranks."""
     basis, reduced = reduce(comm, problem)
+    c = _paper_c(comm, problem)
     if basis.shape[1] == 0:
-        return unmovable(_paper_c(comm, problem))
-    return _on_root(comm, reduced, lambda found: Analysis(problem, found).solvability())
+        return unmovable(c)
+    return _on_root(comm, reduced, lambda found: _verdict(problem, found, c))
+
+
+def _verdict(problem: RigidProblem, reduced: Reduced, c: float) -> Solvability:
+    try:
+        return Analysis(problem, reduced).solvability()
+    except SolverError as error:
+        return undecided(modes(reduced.frame, problem.body), c, str(error))
 
 
 def load_factors(comm: MPI.Comm, problem: RigidProblem, load: str | None = None) -> LoadFactors:

@@ -10,8 +10,8 @@ import numpy as np
 
 from .motions import Mode
 
-State = Literal["held", "metastable", "escapes", "borderline"]
-WORST_FIRST: tuple[State, ...] = ("escapes", "metastable", "borderline", "held")
+State = Literal["held", "metastable", "escapes", "borderline", "undecided"]
+WORST_FIRST: tuple[State, ...] = ("escapes", "undecided", "metastable", "borderline", "held")
 
 
 @dataclass(frozen=True)
@@ -41,8 +41,8 @@ class LoadFactors:
     """The factors of a load, the others constant, between which a body is held, and where the peak ends.
 
     For λ in (held_from, held) the state is `held`; for λ > peak it is `escapes`. held = inf: no factor is too
-    large; held = -inf (held_from = inf) or held_from = held: none is held. `mode` and `peak_mode` are the
-    motions that limit the load, None where nothing does.
+    large; held_from >= held: none is held. `mode` and `peak_mode` are the motions that limit the load, None where
+    nothing does.
     """
 
     held_from: float
@@ -51,13 +51,26 @@ class LoadFactors:
     mode: Mode | None
     peak_mode: Mode | None
 
+    def summary(self) -> dict[str, object]:
+        """For JSON: null for infinite. Where no factor is held, or every factor escapes, a flag says so."""
+        some = self.held_from < self.held
+        return {
+            "never_held": not some,
+            "always_escapes": self.peak == -np.inf,
+            "held_from": _finite(self.held_from) if some else None,
+            "held": _finite(self.held) if some else None,
+            "peak": _finite(self.peak),
+            "direction": self.mode.words if self.mode else None,
+            "peak_direction": self.peak_mode.words if self.peak_mode else None,
+        }
+
 
 @dataclass(frozen=True)
 class Solvability:
     """What the rigid motions say about a scene; nondimensional, |y| is the largest rigid coefficient.
 
     Attributes:
-        state: held, metastable, escapes or borderline.
+        state: held, metastable, escapes or borderline; undecided where the programmes broke down.
         margin: min over y in C with |y| = 1 of ∫ j^∞(y_t) - <g,y>, None (infinite) if C = {0}.
         lambda_held: see LoadFactors.held, for the whole load; ±inf where there is no limit.
         lambda_peak: see LoadFactors.peak.
@@ -68,6 +81,7 @@ class Solvability:
         paper: the paper's own conditions.
         exact: False if a growth is not convex; margin and lambda_held are then upper bounds, and `held` is
             not claimed (`metastable` without a direction: only solving tells).
+        trouble: what broke down in the state undecided, in which margin and factors are unknown (None, nan).
     """
 
     state: State
@@ -80,18 +94,19 @@ class Solvability:
     free: tuple[Mode, ...]
     paper: Paper
     exact: bool = True
+    trouble: str = ""
 
     def summary(self) -> dict[str, object]:
         """The `solvability` entry of summary.json: null for infinite or absent."""
         return {
             "state": self.state,
             "margin": self.margin,
-            "lambda_held": self.lambda_held if np.isfinite(self.lambda_held) else None,
-            "lambda_peak": self.lambda_peak if np.isfinite(self.lambda_peak) else None,
+            "lambda_held": _finite(self.lambda_held),
+            "lambda_peak": _finite(self.lambda_peak),
             "direction": self.direction.words if self.direction else None,
             "kernel": [mode.words for mode in self.kernel],
             "free": [mode.words for mode in self.free],
-            "paper": {"c": self.paper.c, "satisfied": self.paper.satisfied},
+            "paper": {"c": self.paper.c, "satisfied": self.paper.satisfied if self.state != "undecided" else None},
         }
 
 
@@ -100,25 +115,43 @@ def unmovable(c: float) -> Solvability:
     return Solvability("held", None, np.inf, np.inf, None, None, (), (), Paper(c, None))
 
 
+def undecided(kernel: tuple[Mode, ...], c: float, trouble: str) -> Solvability:
+    """No verdict: what could be known is the kernel. Solving may tell more, since a certificate needs no verdict."""
+    return Solvability(
+        "undecided", None, np.nan, np.nan, None, None, kernel, (), Paper(c, np.nan), exact=False, trouble=trouble
+    )
+
+
 def combine(bodies: Sequence[Solvability]) -> Solvability:
     """The verdict on several bodies that do not touch each other: worst state, smallest margins. Local.
 
     The direction is that of the body in the worst state; the other bodies rest.
     """
     worst = min(bodies, key=lambda body: (WORST_FIRST.index(body.state), _number(body.margin)))
-    first = min(bodies, key=lambda body: body.lambda_held)
+    kernel = tuple(mode for body in bodies for mode in body.kernel)
     c = float(np.linalg.norm([body.paper.c for body in bodies]))
+    if worst.state == "undecided":
+        return undecided(kernel, c, worst.trouble)
+    known = [body for body in bodies if body.state != "undecided"]
+    first = min(known, key=lambda body: body.lambda_held)
     return replace(
         worst,
-        margin=_combined_margin([body.margin for body in bodies]),
+        margin=_combined_margin([body.margin for body in known]),
         lambda_held=first.lambda_held,
-        lambda_peak=min(body.lambda_peak for body in bodies),
+        lambda_peak=min(body.lambda_peak for body in known),
         critical=first.critical,
-        kernel=tuple(mode for body in bodies for mode in body.kernel),
-        free=tuple(mode for body in bodies for mode in body.free),
-        paper=Paper(c, _combined_margin([body.paper.margin for body in bodies])),
+        kernel=kernel,
+        free=tuple(mode for body in known for mode in body.free),
+        paper=Paper(c, _combined_margin([body.paper.margin for body in known])),
         exact=all(body.exact for body in bodies),
     )
+
+
+def combine_factors(bodies: Sequence[LoadFactors]) -> LoadFactors:
+    """The factors of a load on several bodies: the scene is held where all of them are. Local."""
+    last, peak = min(bodies, key=lambda one: one.held), min(bodies, key=lambda one: one.peak)
+    start = max(one.held_from for one in bodies)
+    return LoadFactors(start, last.held, peak.peak, last.mode, peak.peak_mode)
 
 
 def _combined_margin(margins: Sequence[float | None]) -> float | None:
@@ -128,6 +161,10 @@ def _combined_margin(margins: Sequence[float | None]) -> float | None:
     if not known:
         return None
     return lost if lost < 0.0 else min(known)
+
+
+def _finite(value: float) -> float | None:
+    return value if np.isfinite(value) else None
 
 
 def _number(margin: float | None) -> float:

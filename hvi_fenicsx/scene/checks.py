@@ -32,6 +32,7 @@ def _coarse(scene: Scene) -> Iterator[Problem]:
     yield from _unknown_sides(scene)
     yield from _regions(scene)
     yield from _one_by_one(scene)
+    yield from _start(scene)
 
 
 def _fine(scene: Scene) -> Iterator[Problem]:
@@ -86,6 +87,13 @@ def _one_by_one(scene: Scene) -> Iterator[Problem]:
             effect.check(scene.dimension)
         except InputError as error:
             yield Problem(key, str(error))
+
+
+def _start(scene: Scene) -> Iterator[Problem]:
+    start = scene.solver.start
+    if not isinstance(start, str) and len(start) != scene.dimension:
+        text = f"has {len(start)} components; a {scene.dimension}D scene wants {scene.dimension}"
+        yield Problem(("solver", "start"), text)
 
 
 def _on_boundary(boundary: Mapping[str, Boundary]) -> Iterator[_Item]:

@@ -7,7 +7,7 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import model_validator
 
-from .tables import Positive, Problem, Table, refuse, vector
+from .tables import Length, Problem, Table, refuse, vector
 
 _MOST_CELLS = 2e8
 """Beyond this gmsh, which meshes on one rank, needs more memory than machines have."""
@@ -42,11 +42,11 @@ class LShape(Meshed):
 
     shape: Literal["l_shape"] = "l_shape"
     """an L; sides left, right, bottom, top, and at the re-entrant corner inner_right and inner_top"""
-    size: Annotated[tuple[Positive, Positive], vector(2)]
+    size: Annotated[tuple[Length, Length], vector(2)]
     """width and height in m, a list of 2; the lower left corner is the origin"""
-    cut: Annotated[tuple[Positive, Positive], vector(2)]
+    cut: Annotated[tuple[Length, Length], vector(2)]
     """width and height in m of what is cut off at the upper right, a list of 2"""
-    mesh_size: Positive
+    mesh_size: Length
     """edge length of the triangles, m"""
 
     def area(self) -> float:
@@ -75,11 +75,11 @@ class Disk(_Round):
 
     shape: Literal["disk"] = "disk"
     """a disk around (0, radius); sides lower_arc and upper_arc"""
-    radius: Positive
+    radius: Length
     """m"""
-    mesh_size: Positive
+    mesh_size: Length
     """edge length of the triangles, m"""
-    mesh_size_below: Positive | None = None
+    mesh_size_below: Length | None = None
     """edge length at the lowest point, m, growing with the distance from there; mesh_size if it is left out"""
 
 
@@ -90,11 +90,11 @@ class HalfDisk(_Round):
 
     shape: Literal["half_disk"] = "half_disk"
     """the lower half of a disk around (0, radius); sides arc and top, the flat one"""
-    radius: Positive
+    radius: Length
     """m"""
-    mesh_size: Positive
+    mesh_size: Length
     """edge length of the triangles, m"""
-    mesh_size_below: Positive | None = None
+    mesh_size_below: Length | None = None
     """edge length at the lowest point, m, growing with the distance from there; mesh_size if it is left out"""
 
 
@@ -105,11 +105,11 @@ class NotchedStrip(Meshed):
 
     shape: Literal["notched_strip"] = "notched_strip"
     """a strip with a notch; sides left, right, bottom, top (both pieces), notch"""
-    size: Annotated[tuple[Positive, Positive], vector(2)]
+    size: Annotated[tuple[Length, Length], vector(2)]
     """width and height in m, a list of 2; the lower left corner is the origin"""
-    notch: Annotated[tuple[Positive, Positive], vector(2)]
+    notch: Annotated[tuple[Length, Length], vector(2)]
     """width and depth in m of the notch, a list of 2"""
-    mesh_size: Positive
+    mesh_size: Length
     """edge length of the triangles, m"""
 
     def area(self) -> float:

@@ -6,15 +6,16 @@ import re
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import AfterValidator, Field, ValidationInfo, model_validator
 from pydantic_core import PydanticCustomError
 
 from ..effects import Effect, Place
+from . import plugins
 from .checks import contradictions
 from .parts import Bodies, Boundary, Materials
 from .settings import Solver
 from .shapes import Domain, MeshFile
-from .tables import Problem, Table, refuse
+from .tables import Names, Problem, Table, refuse
 
 _NAME = re.compile(r"\w[\w.-]{0,99}")
 
@@ -43,6 +44,8 @@ class Scene(Table):
 
     title: Annotated[str, Field(max_length=200), AfterValidator(_title)] = ""
     """one line that says what this is"""
+    plugins: Names | None = None
+    """Python files with laws, effects and methods of one's own, relative to the scene file; see docs/extending.md"""
     domain: Domain
     """the body's shape"""
     material: Materials
@@ -58,6 +61,21 @@ class Scene(Table):
 
         def __init__(self, **keys: Any) -> None:
             """The keys of the scene file; tables as objects or as the scene file writes them."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _load_plugins(cls, data: Any, info: ValidationInfo) -> Any:
+        """First of all, since the tables below may need them."""
+        if not isinstance(data, dict) or not data.get("plugins"):
+            return data
+        try:
+            return {**data, "plugins": plugins.load(data["plugins"], (info.context or {}).get("folder", "."))}
+        except PydanticCustomError as error:
+            raise refuse([Problem(("plugins",), error.message())]) from None
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickled as its tables: another rank must load the plugins before it can know their classes."""
+        return _again, (self.model_dump(exclude_none=True),)
 
     @model_validator(mode="after")
     def _consistent(self) -> Scene:
@@ -89,6 +107,10 @@ class Scene(Table):
                 yield from (Placed(Place.BODY, region, effect) for effect in body.effects)
         for name, boundary in self.boundary.items():
             yield from (Placed(Place.BOUNDARY, name, effect) for effect in boundary.effects)
+
+
+def _again(tables: dict[str, Any]) -> Scene:
+    return Scene.model_validate(tables)
 
 
 def _bad_names(boundary: Mapping[str, Any]) -> Iterator[Problem]:

@@ -44,7 +44,7 @@ def reference() -> str:
 
 def _document() -> Iterator[str]:
     yield _INTRODUCTION
-    yield from _table("Top level", Scene, ["title"])
+    yield from _table("Top level", Scene, ["title", "plugins"])
     for name, shape in SHAPES.items():
         yield from _table(f'`[domain]` with `shape = "{name}"`', shape)
     yield from _table("`[material]`, or `[material.NAME]` where there are several", Material)

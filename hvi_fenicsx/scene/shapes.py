@@ -12,7 +12,7 @@ from pydantic import BeforeValidator, PlainSerializer, ValidationInfo, model_val
 from pydantic_core import PydanticCustomError
 
 from .curved import Disk, HalfDisk, LShape, NotchedStrip
-from .tables import Count, Positive, Problem, Table, choose, refuse, vector
+from .tables import Count, Length, Positive, Problem, Table, choose, refuse, vector
 
 _MOST_UNKNOWNS = 2**31 - 1  # PETSc's default integers
 
@@ -42,7 +42,7 @@ class Rectangle(_Block):
 
     shape: Literal["rectangle"] = "rectangle"
     """a rectangle with its lower left corner at the origin"""
-    size: Annotated[tuple[Positive, Positive], vector(2)]
+    size: Annotated[tuple[Length, Length], vector(2)]
     """width and height in m, a list of 2"""
     cells: Annotated[tuple[Count, Count], vector(2)]
     """cells along width and height, a list of 2 whole numbers"""
@@ -63,7 +63,7 @@ class Box(_Block):
 
     shape: Literal["box"] = "box"
     """a box with a corner at the origin"""
-    size: Annotated[tuple[Positive, Positive, Positive], vector(3)]
+    size: Annotated[tuple[Length, Length, Length], vector(3)]
     """lengths along x, y, z in m, a list of 3"""
     cells: Annotated[tuple[Count, Count, Count], vector(3)]
     """cells along x, y, z, a list of 3 whole numbers"""

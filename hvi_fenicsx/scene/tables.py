@@ -144,4 +144,6 @@ Names = Annotated[
 ]
 """One name or a list of names."""
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+Length = Annotated[float, Field(ge=1e-9, le=1e9)]
+"""Of a body, m: beyond these, squares and cubes of lengths leave what double precision can tell apart."""
 Count = Annotated[int, Field(gt=0)]

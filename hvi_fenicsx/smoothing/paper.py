@@ -16,14 +16,14 @@ import numpy as np
 from typing_extensions import override
 
 from ..errors import InputError
-from ..laws.base import ConvexPart, Directional, FloatArray, IntArray, Superpotential
+from ..laws.base import ConvexPart, FloatArray, Superpotential
 from ..laws.catalogue import QuadraticLinear
-from .checks import require_epsilon
 from .plus import QUADRATIC
+from .smoothed import Smoothing
 
 
 @dataclass(frozen=True)
-class PaperSmoothing(Superpotential, register=False):
+class PaperSmoothing(Smoothing, register=False):
     """j ≈ -S(x, ε) for the quadratic-linear law, even, ε in N/m.
 
     Split: -S'' = s (1 - p'(d)) - d'² p''(d) with s = γ1/δ; G'' is the second term, H the rest, with the kink.
@@ -32,7 +32,6 @@ class PaperSmoothing(Superpotential, register=False):
 
     name = "paper_smoothing"
     law: QuadraticLinear
-    epsilon_absolute: float
 
     def __post_init__(self) -> None:
         if not isinstance(self.law, QuadraticLinear):
@@ -40,12 +39,7 @@ class PaperSmoothing(Superpotential, register=False):
                 f'smoothing = "paper" is defined for the law "quadratic_linear" only, not for '
                 f'{self.law.name!r}; take "quadratic" (the same plus function), "chks" or "log_exp"'
             )
-        require_epsilon("epsilon_absolute", self.epsilon_absolute)
-
-    @property
-    def epsilon(self) -> float:
-        """ε relative to the law's energy scale."""
-        return self.epsilon_absolute / self.law.energy_scale
+        super().__post_init__()
 
     @property
     def bound(self) -> float:
@@ -90,30 +84,6 @@ class PaperSmoothing(Superpotential, register=False):
         with np.errstate(over="ignore"):
             rising = np.where(share < 1.0, (1.0 - share) * self.slope * y, 0.0)
         return rising + share * self.law.gamma2
-
-    @property
-    @override
-    def growth(self) -> Directional:
-        return self.law.growth
-
-    @property
-    @override
-    def energy_scale(self) -> float:
-        return self.law.energy_scale
-
-    @property
-    @override
-    def length_scale(self) -> float:
-        return self.law.length_scale
-
-    @property
-    @override
-    def even(self) -> bool:
-        return True
-
-    @override
-    def piece(self, x: FloatArray) -> IntArray:
-        return self.law.piece(x)
 
     @override
     def scaled(self, length: float, traction: float) -> Superpotential:

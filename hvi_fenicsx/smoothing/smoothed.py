@@ -84,7 +84,47 @@ class SmoothedPart(ConvexPart):
 
 
 @dataclass(frozen=True)
-class SmoothedLaw(Superpotential, register=False):
+class Smoothing(Superpotential, register=False):
+    """A law smoothed with a width ε (N/m): what all smoothings leave as the law has it."""
+
+    law: Superpotential
+    epsilon_absolute: float
+
+    def __post_init__(self) -> None:
+        require_epsilon("epsilon_absolute", self.epsilon_absolute)
+
+    @property
+    def epsilon(self) -> float:
+        """ε relative to the law's energy scale."""
+        return self.epsilon_absolute / self.law.energy_scale
+
+    @property
+    @override
+    def growth(self) -> Directional:
+        return self.law.growth
+
+    @property
+    @override
+    def energy_scale(self) -> float:
+        return self.law.energy_scale
+
+    @property
+    @override
+    def length_scale(self) -> float:
+        return self.law.length_scale
+
+    @property
+    @override
+    def even(self) -> bool:
+        return self.law.even
+
+    @override
+    def piece(self, x: FloatArray) -> IntArray:
+        return self.law.piece(x)
+
+
+@dataclass(frozen=True)
+class SmoothedLaw(Smoothing, register=False):
     """A law smoothed at its kinks by one plus function, with ε (N/m) the same for every kink.
 
     An even law stays even, with traction exactly 0 at zero slip; a kink at zero slip is smoothed like any.
@@ -92,23 +132,13 @@ class SmoothedLaw(Superpotential, register=False):
     """
 
     name = "smoothed"
-    law: Superpotential
-    epsilon_absolute: float
     plus: PlusFunction = QUADRATIC
-
-    def __post_init__(self) -> None:
-        require_epsilon("epsilon_absolute", self.epsilon_absolute)
 
     @classmethod
     def relative(cls, law: Superpotential, epsilon: float, plus: PlusFunction = QUADRATIC) -> SmoothedLaw:
         """With ε = epsilon times the law's energy scale."""
         require_epsilon("epsilon", epsilon)
         return cls(law, epsilon * law.energy_scale, plus)
-
-    @property
-    def epsilon(self) -> float:
-        """ε relative to the law's energy scale."""
-        return self.epsilon_absolute / self.law.energy_scale
 
     @property
     def bound(self) -> float:
@@ -141,30 +171,6 @@ class SmoothedLaw(Superpotential, register=False):
     @cached_property
     def _smooth_concave(self) -> SmoothedPart:
         return SmoothedPart(self.law.concave, self.plus, self.epsilon_absolute, self.law.even)
-
-    @property
-    @override
-    def growth(self) -> Directional:
-        return self.law.growth
-
-    @property
-    @override
-    def energy_scale(self) -> float:
-        return self.law.energy_scale
-
-    @property
-    @override
-    def length_scale(self) -> float:
-        return self.law.length_scale
-
-    @property
-    @override
-    def even(self) -> bool:
-        return self.law.even
-
-    @override
-    def piece(self, x: FloatArray) -> IntArray:
-        return self.law.piece(x)
 
     @override
     def scaled(self, length: float, traction: float) -> Superpotential:

@@ -1,0 +1,70 @@
+"""Prescribed displacements as Dirichlet conditions, which must agree where their parts meet."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+from dolfinx import fem
+from petsc4py import PETSc
+
+from .effects.base import Condition
+from .errors import InputError
+from .parallel import agree
+from .scales import Scales
+from .stage import Stage
+
+Array = npt.NDArray[np.float64]
+_SAME = 1e-9
+"""Difference of two prescribed displacements, relative to the largest, that is rounding."""
+
+
+def build(stage: Stage, scales: Scales, wanted: Sequence[tuple[str, Condition]]) -> tuple[fem.DirichletBC, ...]:
+    """The conditions, each with the part it stands on, nondimensional. Collective.
+
+    Raises:
+        InputError: on all ranks alike: two parts prescribe different values where they meet.
+    """
+    found = tuple(_condition(stage, scales, part, condition) for part, condition in wanted)
+    _check_agreement(stage, scales, [(part, bc) for (part, _), bc in zip(wanted, found, strict=True)])
+    return found
+
+
+def _condition(stage: Stage, scales: Scales, part: str, condition: Condition) -> fem.DirichletBC:
+    facets, dim = stage.part_facets[part], stage.dimension - 1
+    component = stage.space.sub(condition.component)
+    if condition.value.is_number:
+        value = PETSc.ScalarType(condition.value.source / scales.displacement)  # type: ignore[operator]
+        return fem.dirichletbc(value, fem.locate_dofs_topological(component, dim, facets), component)
+    collapsed, _ = component.collapse()
+    function = fem.Function(collapsed)
+    function.interpolate(lambda x: condition.value.at(x.T) / scales.displacement)
+    return fem.dirichletbc(function, fem.locate_dofs_topological((component, collapsed), dim, facets), component)
+
+
+def _check_agreement(stage: Stage, scales: Scales, named: Sequence[tuple[str, fem.DirichletBC]]) -> None:
+    """Where two parts meet they must prescribe the same: else the order of the tables would decide."""
+    known = fem.Function(stage.space)
+    values, owner = known.x.array, np.full(len(known.x.array), -1)
+    bad: list[str] = []
+    for i, (_, condition) in enumerate(named):
+        dofs, before = condition.dof_indices()[0], values.copy()
+        condition.set(values)
+        size = float(np.max(np.abs(values), initial=0.0))
+        apart = dofs[(owner[dofs] >= 0) & (np.abs(values[dofs] - before[dofs]) > _SAME * size)]
+        bad += [_disagreement(stage, dof, (named[owner[dof]][0], named[i][0]), before, values, scales) for dof in apart]
+        owner[dofs] = i
+    found = [text for rank in agree(stage.domain.mesh.comm, bad[:1]) for text in rank]
+    if found:
+        raise InputError(found[0])
+
+
+def _disagreement(stage: Stage, dof: int, parts: tuple[str, str], before: Array, after: Array, scales: Scales) -> str:
+    block, component = divmod(int(dof), stage.dimension)
+    at = ", ".join(f"{c:.6g}" for c in stage.space.tabulate_dof_coordinates()[block][: stage.dimension])
+    one, other = (float(v[dof]) * scales.displacement for v in (before, after))
+    return (
+        f"boundary.{parts[0]} and boundary.{parts[1]} meet at ({at}) and prescribe displacements along "
+        f'{"xyz"[component]} that differ, {one:.6g} and {other:.6g} m; make them equal there, or write "free" in one'
+    )

@@ -1,0 +1,75 @@
+"""``plugins = "my_laws.py"``: a scene's own laws, effects and methods, loaded before its tables are read."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import sys
+from pathlib import Path
+from typing import Any
+
+from pydantic_core import PydanticCustomError
+
+from .words import shown
+
+
+def load(names: Any, folder: str | os.PathLike[str]) -> tuple[str, ...]:
+    """Load Python files, each once in a process; their absolute paths.
+
+    Args:
+        names: one or a list, of files relative to the folder (that of the scene file).
+
+    Raises:
+        PydanticCustomError: a file that is not there, no Python file, or raises an error of its own.
+    """
+    names = [names] if isinstance(names, str) else names
+    if not isinstance(names, list | tuple):
+        raise _named_wrongly(names)
+    return tuple(_load(name, Path(folder)) for name in names)
+
+
+def _load(name: Any, folder: Path) -> str:
+    if not isinstance(name, str) or not name.endswith(".py"):
+        raise _named_wrongly(name)
+    path = Path(os.path.abspath(folder / name))
+    if not path.is_file():
+        raise _refusal(f"{path} does not exist; it is looked for beside the scene file")
+    module = f"hvi_plugin_{path.stem}"
+    known = sys.modules.get(module)
+    if known is None:
+        _execute(module, path)
+    elif known.__file__ != str(path):
+        raise _refusal(f"{path}: another file of this name is loaded already, {known.__file__}; rename one of them")
+    return str(path)
+
+
+def _execute(module: str, path: Path) -> None:
+    spec = importlib.util.spec_from_file_location(module, path)
+    if spec is None or spec.loader is None:
+        raise _refusal(f"{path} cannot be loaded")
+    made = importlib.util.module_from_spec(spec)
+    sys.modules[module] = made  # dataclasses and pydantic look their own module up
+    try:
+        spec.loader.exec_module(made)
+    except Exception as error:
+        del sys.modules[module]
+        raise _refusal(f"{path}{_line(error, path)}: {type(error).__name__}: {error}") from None
+
+
+def _line(error: Exception, path: Path) -> str:
+    """The last line of the file that the error passed through."""
+    lines = [error.lineno] if isinstance(error, SyntaxError) else []
+    trace = error.__traceback__
+    while trace is not None:
+        if trace.tb_frame.f_code.co_filename == str(path):
+            lines.append(trace.tb_lineno)
+        trace = trace.tb_next
+    return f":{lines[-1]}" if lines else ""
+
+
+def _named_wrongly(value: Any) -> PydanticCustomError:
+    return _refusal(f'must name Python files, like "my_laws.py" (is {shown(value)})')
+
+
+def _refusal(text: str) -> PydanticCustomError:
+    return PydanticCustomError("scene", "{text}", {"text": text})
