@@ -1,14 +1,28 @@
-"""The environment of all tests: MPI runs as any user and with more ranks than cores."""
+"""The environment of all tests: MPI runs as any user and with more ranks than cores; drawn examples repeat.
+
+The examples that hypothesis draws are the same in each run, so that no unchanged program fails by chance. A search with
+new ones: ``./hvi test --hypothesis-profile=search``; what it finds belongs into a test by name.
+"""
 
 from __future__ import annotations
 
 import os
 
+from hypothesis import settings
+
 for name, value in {
     "OMPI_ALLOW_RUN_AS_ROOT": "1",
     "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
     "PRTE_MCA_rmaps_default_mapping_policy": ":oversubscribe",
+    "PRTE_MCA_mapby": ":oversubscribe",
     "OMPI_MCA_rmaps_base_oversubscribe": "1",
+    # Ranks that wait beside another test's would take its core.
+    "OMPI_MCA_mpi_yield_when_idle": "1",
     "OMP_NUM_THREADS": "1",
 }.items():
     os.environ.setdefault(name, value)
+
+# No deadline for one example: the first one compiles or imports what the others find ready.
+settings.register_profile("repeatable", derandomize=True, deadline=None)
+settings.register_profile("search", derandomize=False, deadline=None)
+settings.load_profile("repeatable")

@@ -78,3 +78,38 @@ def transformed(path: Path, source: Path, matrix: list[float]) -> Path:
     """The same mesh with its points moved by a 3 x 4 affine matrix, row by row."""
     script = f"gmsh.open({str(source)!r})\nmesh.affineTransform({matrix!r})"
     return make(path, script)
+
+
+BLOCKS = """
+gmsh.option.setNumber("Mesh.MeshSizeMax", {size})
+d, named = {dimension}, {named}
+for x in (0, 2):
+    occ.addRectangle(x, 0, 0, 1, 1) if d == 2 else occ.addBox(x, 0, 0, 1, 1, 1)
+occ.synchronize()
+for x, name in ((0, "a"), (2, "b")):
+    ends = {{"left": (0, x), "right": (0, x + 1), "bottom": (d - 1, 0), "top": (d - 1, 1)}}
+    low, high = [x, 0, 0][:d], [x + 1, 1, 1][:d]
+    for side, (axis, at) in ends.items():
+        a, b = list(low), list(high)
+        a[axis] = b[axis] = at
+        box = [c - 1e-6 for c in (a + [0])[:3]] + [c + 1e-6 for c in (b + [0])[:3]]
+        found = gmsh.model.getEntitiesInBoundingBox(*box, d - 1)
+        gmsh.model.addPhysicalGroup(d - 1, [tag for _, tag in found], name=f"{{side}}_{{name}}")
+    if named:
+        box = [c - 1e-6 for c in (low + [0])[:3]] + [c + 1e-6 for c in (high + [0])[:3]]
+        found = gmsh.model.getEntitiesInBoundingBox(*box, d)
+        gmsh.model.addPhysicalGroup(d, [tag for _, tag in found], name=name)
+if not named:
+    gmsh.model.addPhysicalGroup(d, [tag for _, tag in gmsh.model.getEntities(d)], name="both")
+mesh.generate(d)
+"""
+"""Two unit blocks, at x = 0 and x = 2: to be formatted with size, dimension, and whether each is a region (a, b)."""
+HINGE = """
+gmsh.option.setNumber("Mesh.MeshSizeMax", 0.5)
+parts = [(2, occ.addRectangle(0, 0, 0, 1, 1)), (2, occ.addRectangle(1, 1, 0, 1, 1))]
+occ.fragment(parts[:1], parts[1:])
+occ.synchronize()
+groups(["left", "bottom"])
+body()
+mesh.generate(2)
+"""

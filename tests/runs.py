@@ -30,6 +30,34 @@ def hvi(*words: object, ranks: int = 1, cwd: Path = ROOT) -> subprocess.Complete
     )
 
 
+def on_ranks(ranks: int, script: str, *words: object) -> Any:
+    """What a script under mpirun prints in its last line, as JSON."""
+    python = [sys.executable, "-m", "mpi4py", script, *map(str, words)]
+    done = subprocess.run(
+        ["mpirun", "-n", str(ranks), *python], cwd=ROOT, capture_output=True, text=True, check=False, timeout=300
+    )
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout.splitlines()[-1])
+
+
+_RUN_ALL = """
+import sys
+from hvi_fenicsx.cli import main
+folder, ranks = sys.argv[1:3]
+for name in sys.argv[3:]:
+    main(["run", f"{folder}/{name}.toml", "--out", f"{folder}/{name}-{ranks}", "--no-pictures"])
+"""
+
+
+def run_all(folder: Path, scenes: dict[str, dict[str, Any]], ranks: int) -> None:
+    """Results FOLDER/NAME-RANKS of all scenes; one start of MPI serves them, since starting it is what takes time."""
+    for name, table in scenes.items():
+        write_scene(folder / f"{name}.toml", table)
+    start = ["mpirun", "-n", str(ranks)] if ranks > 1 else []
+    python = [sys.executable, "-m", "mpi4py", "-c", _RUN_ALL, str(folder), str(ranks), *scenes]
+    subprocess.run([*start, *python], check=True, capture_output=True, timeout=300)
+
+
 def write_scene(path: Path, table: dict[str, Any]) -> Path:
     """A scene file of these tables."""
     path.write_text(dump_scene(Scene.model_validate(table)), encoding="utf-8")

@@ -5,11 +5,13 @@ A rank that stops alone hangs the others, so each case runs under mpirun too, wi
 
 from __future__ import annotations
 
+import json
 import subprocess
 import sys
 from pathlib import Path
 from typing import Any
 
+import damage
 import meshes
 import pytest
 from runs import hvi, write_scene
@@ -38,11 +40,17 @@ TABLE: dict[str, tuple[str, str]] = {
     "a displacement that is not finite": ("boundary.wall.displacement=['log(y)', 'free']", "is not finite"),
     "contact excludes a support": ("boundary.wall.displacement=[0.0, -1e-5]", "violates the contact bound"),
     "contact on a support": ("boundary.floor.displacement=[0.0, 0.0]", "prescribed"),
+    "supports that differ where they meet": (
+        "boundary.press={on='top', displacement=[1e-3, 'free']}",
+        "boundary.wall and boundary.press meet at (0, 1) and prescribe displacements along x that differ",
+    ),
     "unknown law": ("boundary.floor.friction.law='coulomb'", "coulomb"),
     "a law against its formula": ("boundary.floor.friction.gamma2=1e3", "2 gamma2"),
     "negative epsilon": ("solver.epsilon=-0.1", "epsilon"),
     "two widths": ("solver={epsilon=0.1, epsilon_absolute=0.1}", "leave one of them out"),
     "no such mesh": ("domain={shape='file', file='absent.msh'}", "does not exist"),
+    "more memory than there is": ("domain.cells=[32000, 32000]", "use fewer cells"),
+    "a size of no body": ("domain.size=[1.0, 1e-12]", "must be 1e-09 or more"),
     "too many unknowns": ("domain.cells=[100000, 100000]", "fewer cells"),
 }
 
@@ -83,11 +91,21 @@ def test_a_wrong_scene_is_refused_by_the_process_too(scene: Path, tmp_path: Path
     assert_refused(done, "is not finite everywhere there", tmp_path, {"scene.toml"})
 
 
+PLACES = ["/proc/nowhere/result", "{folder}/scene.toml/result", "{folder}/scene.toml"]
+"""As root, too: /proc takes no folders and a file holds none."""
+
+
+@pytest.mark.parametrize("out", PLACES)
+def test_a_folder_that_cannot_be_written_is_refused(out: str, scene: Path, tmp_path: Path) -> None:
+    done = hvi("run", scene, "--out", out.format(folder=tmp_path), cwd=tmp_path)
+    assert_refused(done, "--out", tmp_path, {"scene.toml"})
+
+
 ALL_RANKS = """
-import sys
+import json, sys
 from mpi4py import MPI
 from hvi_fenicsx.cli import main
-codes = [main(["run", sys.argv[1], "--set", override]) for override in sys.argv[3:]]
+codes = [main(["run", sys.argv[1], *words]) for words in json.loads(sys.argv[3])]
 every = MPI.COMM_WORLD.gather(codes)
 if every:
     with open(sys.argv[2], "w") as file:
@@ -96,25 +114,19 @@ if every:
 
 
 def test_all_of_it_on_two_ranks(scene: Path, tmp_path: Path) -> None:
-    """One start of MPI for the whole table; each message is printed once."""
-    codes = tmp_path / "codes"
-    words = [sys.executable, "-m", "mpi4py", "-c", ALL_RANKS, str(scene), str(codes), *(o for o, _ in TABLE.values())]
+    """One start of MPI for the whole table and all places; each message is printed once."""
+    codes, outs = tmp_path / "codes", [out.format(folder=tmp_path) for out in PLACES]
+    calls = [*(["--set", override] for override, _ in TABLE.values()), *(["--out", out] for out in outs)]
+    words = [sys.executable, "-m", "mpi4py", "-c", ALL_RANKS, str(scene), str(codes), json.dumps(calls)]
     done = subprocess.run(
         ["mpirun", "-n", "2", *words], cwd=tmp_path, capture_output=True, text=True, check=False, timeout=200
     )
     assert done.returncode == 0, done.stderr
-    assert codes.read_text() == repr([[2] * len(TABLE)] * 2)
-    assert done.stderr.count("hvi: ") == len(TABLE)
+    assert codes.read_text() == repr([[2] * len(calls)] * 2)
+    assert done.stderr.count("hvi: ") == len(calls)
     assert all(words in done.stderr for _, words in TABLE.values())
+    assert all(f"hvi: --out {out}: " in done.stderr for out in outs)
     assert {f.name for f in tmp_path.iterdir()} == {"scene.toml", "codes"}
-
-
-@pytest.mark.parametrize("ranks", [1, 2])
-@pytest.mark.parametrize("out", ["/proc/nowhere/result", "{folder}/scene.toml/result", "{folder}/scene.toml"])
-def test_a_folder_that_cannot_be_written_is_refused(out: str, ranks: int, scene: Path, tmp_path: Path) -> None:
-    """As root, too: /proc takes no folders and a file holds none."""
-    done = hvi("run", scene, "--out", out.format(folder=tmp_path), ranks=ranks, cwd=tmp_path)
-    assert_refused(done, "--out", tmp_path, {"scene.toml"})
 
 
 @pytest.mark.parametrize(
@@ -161,6 +173,7 @@ BROKEN = {
     "no mesh at all": (lambda _: "Hello, this is a letter.\n", "mesh file"),
     "nothing": (lambda _: "", "mesh file"),
     "an empty group": (lambda text: text.replace('1 1 "left"', '1 9 "left"'), "left"),
+    "a coordinate out of this world": (lambda text: text.replace("\n1 1 0\n", "\n1 1e200 0\n"), "beyond"),
     "a coordinate that is none": (lambda text: text.replace("\n1 1 0\n", "\n1 nan 0\n"), "mesh file"),
 }
 
@@ -174,6 +187,17 @@ def test_a_damaged_mesh_file_is_refused(kind: str, tmp_path: Path) -> None:
     assert file.read_text(encoding="utf-8") != whole
     with pytest.raises(InputError, match=words):
         prepare(Scene.model_validate(file_scene(file)))
+
+
+def test_a_mesh_that_has_lost_cells_but_not_their_nodes_is_read(tmp_path: Path) -> None:
+    """Its nodes' numbers have gaps then, which dolfinx does not bear."""
+    found = damage.grid()
+    found["nodes"].insert(0, [5.0, 5.0, 0.0])
+    found["cells"] = [[node + 1 for node in cell] for cell in found["cells"]]
+    found["sides"] = [[side, a + 1, b + 1] for side, a, b in found["sides"]]
+    file = tmp_path / "m.msh"
+    file.write_bytes(damage.msh(found))
+    assert prepare(Scene.model_validate(file_scene(file))).system.dofs == 2 * 16
 
 
 def test_a_damaged_mesh_file_stops_two_ranks_with_one_message(tmp_path: Path) -> None:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 import os
+import resource
 import shutil
 import signal
 import subprocess
@@ -43,6 +44,7 @@ SUMMARY = {
         *("inclusion_true", "second_order", "tolerance", "passed"),
     ],
     "estimate": (dict, type(None)),
+    "warnings": list,
     "effects": list,
     "time": ["jit", "mesh", "assembly", "setup", "solve", "certificate", "output", "total"],
     "peak_memory_mb": float,
@@ -68,8 +70,9 @@ def result(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFact
 def test_the_folder_holds_what_is_promised_and_nothing_else(result: Path) -> None:
     names = {file.name for file in result.iterdir()}
     assert {"summary.json", "contact.csv", "displacement.pvd", "contact.pvd", "scene.toml", "run.log"} <= names
+    assert {"boundary.csv", "report.html"} <= names
     rest = {Path(n).suffix for n in names} - {".json", ".csv", ".pvd", ".toml", ".log", ".png", ".vtu", ".pvtu"}
-    assert not rest
+    assert rest == {".html"}
     assert [file.name for file in result.parent.iterdir()] == ["square"]
 
 
@@ -223,9 +226,9 @@ def test_a_refused_scene_leaves_the_old_result_alone(scene: Path, tmp_path: Path
 LARGE = ["--set", "domain.cells=[200, 200]", "--set", 'solver.linear_solver="gamg"', "--no-pictures"]
 
 
-def started(scene: Path, out: Path, ranks: int = 1) -> subprocess.Popen[str]:
+def started(scene: Path, out: Path, *further: str) -> subprocess.Popen[str]:
     """A run that is about to solve: it has told whether a solution exists."""
-    words = command("run", scene, "--out", out, *LARGE, ranks=ranks)
+    words = command("run", scene, "--out", out, *LARGE, *further)
     process = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True)
     assert process.stdout is not None
     while (line := process.stdout.readline()) and not line.startswith("existence"):
@@ -246,8 +249,11 @@ def test_a_killed_run_leaves_no_result_and_the_next_one_works(scene: Path, tmp_p
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_an_interrupted_run_writes_what_it_has_and_says_so(number: int, scene: Path, tmp_path: Path) -> None:
-    process = started(scene, tmp_path / "r")
+@pytest.mark.parametrize("ranks", [(), ("--np", "2")])
+def test_an_interrupted_run_writes_what_it_has_and_says_so(
+    number: int, ranks: tuple[str, ...], scene: Path, tmp_path: Path
+) -> None:
+    process = started(scene, tmp_path / "r", *ranks)
     process.send_signal(number)
     _, errors = process.communicate(timeout=120)
     assert process.returncode == 130, errors
@@ -367,3 +373,20 @@ def test_petsc_options_reach_the_solver(form: list[str], scene: Path, tmp_path: 
     assert done.returncode == 0, done.stderr
     assert "hvi_" in done.stdout
     assert "type: vinewtonrsls" in done.stdout
+
+
+@pytest.mark.parametrize("room", [100, 3_000])
+def test_a_full_disk_is_told_and_nothing_half_written_stays(room: int, scene: Path, tmp_path: Path) -> None:
+    """No file may grow beyond so many bytes: the first that would be VTK's or a table."""
+    assert hvi("run", scene, "--out", tmp_path / "r").returncode == 0
+
+    def limit() -> None:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (room, room))
+
+    done = subprocess.run(
+        command("run", scene, "--out", tmp_path / "full"), capture_output=True, text=True, check=False, preexec_fn=limit
+    )
+    assert done.returncode == 2, done.stderr
+    assert "Traceback" not in done.stderr
+    assert any(words in done.stderr for words in ("could not be written", "Is the disk full?", "is the disk full?"))
+    assert sorted(f.name for f in tmp_path.iterdir()) == ["r", "square.toml"]

@@ -9,12 +9,16 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
+from enumeration import Floor, polyline
+from scenes import DELTA, model, quadratic_linear, solved
 
 BENCHMARKS = Path(__file__).resolve().parents[1] / "benchmarks"
 sys.path.insert(0, str(BENCHMARKS))
 
-import hard_run  # noqa: E402 (a script's neighbour, not a package)
+import hard_enumeration  # noqa: E402 (a script's neighbour, not a package)
+import hard_run  # noqa: E402
 from covering import Case, Table, cases  # noqa: E402
 
 TABLE = Table.read(BENCHMARKS / "hard_cases.toml")
@@ -56,3 +60,58 @@ def test_the_list_covers_what_it_promises() -> None:
 
 def test_the_list_is_the_same_every_time() -> None:
     assert [c.key for c in cases(Table.read(BENCHMARKS / "hard_cases.toml"))] == [c.key for c in LISTED]
+
+
+AGREED = [
+    ("quadratic_linear", "peak", "exact", 4, 0),
+    ("one_sided", "peak", "quadratic", 4, 0),
+    ("graph", "peak", "exact", 8, 0),
+    ("tresca", "wall", "exact", 4, 1),
+]
+
+
+@pytest.mark.parametrize(("law", "support", "smoothing", "cells", "expected"), AGREED)
+def test_enumeration_and_auto_agree_on_whether_there_is_an_equilibrium(
+    law: str, support: str, smoothing: str, cells: int, expected: int
+) -> None:
+    """Pushed blocks that no state of their floors holds, and one at a wall that exactly one does."""
+    wanted = {"law": law, "support": support, "smoothing": smoothing, "cells": cells, "side": "under"}
+    case = next(c for c in LISTED if all(c[axis] == value for axis, value in wanted.items()))
+    assert hard_enumeration.equilibria(case, TABLE.data) == expected
+    record = hard_run.attempt(case, TABLE.data, "auto", TABLE.data["limit"])
+    assert record["outcome"] == ("certified" if expected else "no_equilibrium")
+
+
+def test_algebraic_multigrid_that_takes_too_long_goes_over_to_the_direct_solver() -> None:
+    """A nearly incompressible body on graded cells, GAMG wanted: with it alone the case ends at 6e-8."""
+    solve_and_judge(
+        next(c for c in LISTED if (c["material"], c["linear"]) == ("plane_strain 0.4999", "gamg") and c["ranks"] == 1)
+    )
+
+
+def naive_states(floor: Floor, gamma1: float, steps: int) -> list[tuple[float, ...]]:
+    """Each vertex on the signed piece of its law that its last slip lies on, contact closed; the broken one first."""
+    stiffness, load, _ = floor._condensed
+    m = len(floor.tangential)
+    weights = floor.weights[floor.tangential // 2]
+    piece, found = np.ones(m), []
+    for _ in range(steps):
+        rising = np.diag(np.where(piece == 0.0, weights * gamma1 / DELTA, 0.0))
+        slip = np.linalg.solve(stiffness[:m, :m] + rising, load[:m] - weights * gamma1 / 2 * piece)
+        piece = np.where(np.abs(slip) <= DELTA, 0.0, np.sign(slip))
+        found.append(tuple(piece))
+    return found
+
+
+def test_where_the_naive_iteration_cycles_for_ever_the_energy_falls_to_a_solution() -> None:
+    """8 x 8 cells, P = 1e6, γ1 = 1e7, begun beyond the drop."""
+    gamma1 = 1e7
+    law = polyline([(0.0, 0.0), (DELTA, gamma1), (DELTA, gamma1 / 2)])
+    states = naive_states(Floor(8, 1e6, 1e6, law), gamma1, 100)
+    assert states[-1] != states[-2]
+    assert states[-1] in states[-10:-1]
+    found = solved(model(8, 1e6, friction=quadratic_linear(gamma1), start="broken"))
+    assert found.converged
+    energies = found.solved.energies if found.solved else ()
+    assert len(energies) > 1
+    assert np.all(np.diff(energies) <= 1e-10 * np.abs(energies[:-1]))

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from hvi_fenicsx import laws
@@ -322,7 +322,6 @@ def test_sampled_law_meets_its_function_and_keeps_its_jump() -> None:
     np.testing.assert_array_equal(law.branch(np.array([-1.0, 5e-6, 1e-5, 2e-5, 1.0])), [0, 0, -1, 1, 2])
 
 
-@settings(deadline=None)
 @given(graphs(), st.lists(st.floats(-20, 20), min_size=1, max_size=20))
 def test_random_graphs(law: laws.Graph, displacements: list[float]) -> None:
     """The graph read directly (np.interp), integrated by the trapezoidal rule, split, bounded."""

@@ -26,7 +26,7 @@ from mpi4py import MPI
 
 from hvi_fenicsx import pictures
 from hvi_fenicsx.errors import HviError
-from hvi_fenicsx.pictures import inputs, units
+from hvi_fenicsx.pictures import inputs, sides, units
 from hvi_fenicsx.pictures.mesh import read_body
 from hvi_fenicsx.pictures.raster import shade
 from hvi_fenicsx.results.table import COLUMNS
@@ -183,6 +183,43 @@ def test_an_escape_is_drawn_as_a_motion(
     assert_drawn(pictures.draw(escaping(tmp_path / "r", body(), value)), "escape.png")
 
 
+def write_sides(folder: Path, body: mesh.Mesh, **on: Callable[[Array], npt.NDArray[np.bool_]]) -> None:
+    d, x = body.geometry.dim, body.geometry.x
+    lines = [f"{name},{p[0]},{p[1]},{p[2] if d == 3 else ''}" for name, where in on.items() for p in x[where(x.T)]]
+    (folder / "boundary.csv").write_text("\n".join(["part,x,y,z", *lines]) + "\n", encoding="utf-8")
+
+
+ON = {"wall": lambda x: x[0] == 0, "pull": lambda x: x[0] == 1}
+
+
+@pytest.mark.parametrize("body", [square, box], ids=["plane", "space"])
+def test_the_scene_is_drawn_where_the_folder_tells_its_sides(tmp_path: Path, body: Callable[[], mesh.Mesh]) -> None:
+    folder = result(tmp_path / "r", body(), pressed)
+    write_sides(folder, body(), **ON)
+    assert_drawn(pictures.draw(folder), "body.png", "scene.png", "contact.png")
+    found, drawn = inputs.read(folder), read_body(folder / "displacement.pvd")
+    (support,), (load,) = sides.supports(found, drawn), sides.loads(found, drawn)
+    assert support.rolling
+    assert support.side.normals == pytest.approx(np.broadcast_to([-1.0, 0.0, 0.0], support.side.normals.shape))
+    x, y, _ = drawn.points[load.side.vertices].T
+    assert x == pytest.approx(np.ones(len(x)), abs=1e-12)
+    assert load.traction == pytest.approx(np.stack([1e6 * (1 - y), 0 * y, 0 * y], axis=1))
+
+
+def test_a_slanted_side_is_held_along_its_own_normal(tmp_path: Path) -> None:
+    """The square turned by 30 degrees: what mesh files have, and no axis tells."""
+    turn = np.array([[np.cos(np.pi / 6), -0.5], [0.5, np.cos(np.pi / 6)]])
+    body = square(4)
+    upright = body.geometry.x.copy()
+    body.geometry.x[:, :2] = upright[:, :2] @ turn.T
+    folder = result(tmp_path / "r", body, np.zeros_like)
+    (folder / "contact.csv").unlink()
+    write_sides(folder, body, wall=lambda _: upright[:, 0] == 0)
+    (support,) = sides.supports(inputs.read(folder), read_body(folder / "displacement.pvd"))
+    assert support.side.normals[:, :2] == pytest.approx(np.broadcast_to(-turn[:, 0], (5, 2)))
+    assert len(support.side.facets) == 4
+
+
 def test_each_part_has_its_picture_and_a_scene_without_contact_has_its_body(tmp_path: Path) -> None:
     folder = result(tmp_path / "r", square(), peeled)
     write_table(folder, [*floor_rows(square(), peeled, "a.b"), *floor_rows(square(), pressed, "floor")])
@@ -261,6 +298,13 @@ def test_the_child_is_no_rank_and_the_package_loads_no_plotting(
     )
     told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, env=os.environ)
     assert told.stdout.strip() == "[]"
+
+
+def test_a_package_that_is_not_there_is_named(tmp_path: Path) -> None:
+    result(tmp_path / "r", box(), pressed)
+    code = "import sys; sys.modules['pyvista'] = None; from hvi_fenicsx.pictures.__main__ import main; main(['r'])"
+    told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=tmp_path, check=False)
+    assert "needs the package pyvista, which is not installed here" in told.stderr
 
 
 def test_the_pieces_of_several_ranks_are_one_body(tmp_path: Path) -> None:

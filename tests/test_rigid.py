@@ -6,14 +6,14 @@ Run as a script under mpirun this file prints the verdicts of `scenes()` with th
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from mpi4py import MPI
 from numpy.typing import NDArray
+from runs import on_ranks
 from scipy.optimize import linprog
 
 from hvi_fenicsx.errors import InputError
@@ -34,6 +34,7 @@ from hvi_fenicsx.rigid import (
     motion_at,
     rigid_fields,
 )
+from hvi_fenicsx.rigid.verdict import undecided
 
 Array = NDArray[np.float64]
 ALONE = MPI.COMM_SELF
@@ -626,6 +627,17 @@ def test_the_example_in_the_documents_prints_what_they_say(capsys: pytest.Captur
     assert capsys.readouterr().out.strip() == printed.split("```")[1].strip()
 
 
+def test_of_several_bodies_the_worst_that_is_known_counts() -> None:
+    """One that escapes decides, whatever is not known of others; else what is not known of one is not of all."""
+    unknown = undecided((), 0.0, "broke down")
+    alone = analyse(ALONE, block(0.8))
+    gone = replace(alone, state="escapes", margin=-1.0, lambda_held=0.25, lambda_peak=0.5)
+    assert combine([unknown, gone]).lambda_peak == 0.5
+    assert combine([gone, unknown]).state == "escapes"
+    assert combine([replace(alone, state="held"), unknown]).state == "undecided"
+    assert combine([unknown, alone]).kernel == alone.kernel
+
+
 def scenes() -> dict[str, RigidProblem]:
     """What is compared between one rank and several."""
     return {
@@ -662,12 +674,7 @@ def verdicts(comm: MPI.Comm) -> dict[str, object]:
 
 @pytest.mark.parametrize("ranks", [2, 3])
 def test_the_verdict_does_not_depend_on_the_number_of_ranks(ranks: int) -> None:
-    command = ["mpirun", "-n", str(ranks), sys.executable, "-m", "mpi4py", __file__]
-    done = subprocess.run(
-        command, capture_output=True, text=True, timeout=120, check=False, cwd=Path(__file__).parents[1]
-    )
-    assert done.returncode == 0, done.stderr
-    answers = json.loads(done.stdout)
+    answers = on_ranks(ranks, __file__)
     assert len(answers) == ranks
     assert all(answer == answers[0] for answer in answers)
     alone = json.loads(json.dumps(verdicts(ALONE)))

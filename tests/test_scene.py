@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
@@ -241,6 +241,22 @@ REFUSED = {
         'law = "tresca", yield_traction = 1e3',
         's.toml:21: solver.smoothing: "paper" is made for law = "quadratic_linear", not for "tresca"; use "quadratic"',
     ),
+    "start of no name": (
+        "[solver]",
+        '[solver]\nstart = "middle"',
+        's.toml:21: solver.start: must be one of "unbroken", "resting", "broken", or a list of formulas, one for each '
+        'component (is "middle")',
+    ),
+    "start of three components": (
+        "[solver]",
+        "[solver]\nstart = [0.0, 0.0, 0.0]",
+        "s.toml:21: solver.start: has 3 components; a 2D scene wants 2",
+    ),
+    "start of another method": (
+        "[solver]",
+        '[solver]\nmethod = "tao"\nstart = "broken"',
+        's.toml:22: solver.start: is for the branch iteration; leave it out, or use method = "auto", not "tao"',
+    ),
     "exact method with smoothing": (
         "[solver]",
         '[solver]\nmethod = "branch"',
@@ -335,7 +351,7 @@ WRONG_OVERRIDES = {
     "solver": "--set solver: must be KEY=VALUE, like --set solver.tolerance=1e-10",
     "solver.tolerence=1e-3": '--set solver.tolerence: unknown key "tolerence"; did you mean "tolerance"? '
     "allowed: method, "
-    "smoothing, epsilon, epsilon_absolute, tolerance, linear_solver, second_order, max_iterations",
+    "smoothing, epsilon, epsilon_absolute, start, tolerance, linear_solver, second_order, max_iterations",
 }
 
 
@@ -539,7 +555,7 @@ _LINE = st.integers(0, len(_LINES) - 1)
 _TEXT = st.text(st.characters(codec="utf-8"), max_size=8)
 
 
-@settings(max_examples=600, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=600, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.integers(0, 5), _LINE, _LINE, st.sampled_from(_ODD) | _TEXT, st.integers(0, 99))
 def test_damaged_scenes_are_read_or_refused(
     tmp_path: Path, kind: int, line: int, other: int, odd: str, cut: int
@@ -566,14 +582,16 @@ _VALUES = st.recursive(
 )
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(st.dictionaries(st.sampled_from([*Scene.model_fields, "x"]), _VALUES))
+@example({"plugins": 1})
+@example({"plugins": {"a.py": 1}})
 def test_any_tables_are_refused_in_one_way(data: dict[str, Any]) -> None:
     with pytest.raises(ValidationError):
         Scene.model_validate(data)
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 @given(
     st.text(max_size=30)
     | st.sampled_from([f"{k}={v}" for k in ("solver.epsilon", "domain.size.0", "a.b") for v in _ODD])

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from hvi_fenicsx import laws, smoothing
@@ -51,7 +51,6 @@ def literal_plus(name: str, t: float, e: float) -> float:
 
 
 @each_plus
-@settings(deadline=None)
 @given(t=st.floats(-20, 20), e=st.floats(0.05, 20))
 def test_plus_functions_are_their_formulas(plus: PlusFunction, t: float, e: float) -> None:
     x, h = np.array([t]), 1e-4 * e
@@ -65,7 +64,6 @@ def test_plus_functions_are_their_formulas(plus: PlusFunction, t: float, e: floa
 
 
 @each_plus
-@settings(deadline=None)
 @given(t=st.floats(-1e300, 1e300), e=st.floats(1e-12, 1e3))
 def test_error_and_decay_of_the_plus_functions(plus: PlusFunction, t: float, e: float) -> None:
     with np.errstate(over="raise", invalid="raise", divide="raise"):
@@ -103,7 +101,6 @@ def test_error_bound(law: Superpotential, plus: PlusFunction, epsilon: float) ->
         assert smooth.bound >= plus.kappa * epsilon * law.energy_scale * (1 - 1e-12)
 
 
-@settings(deadline=None)
 @given(
     st.sampled_from(list(LAWS.values())),
     st.sampled_from(list(PLUS_FUNCTIONS.values())),

@@ -1,0 +1,33 @@
+"""Prints what must not depend on the number of ranks: of refined bodies and of a field taken up to them."""
+
+from __future__ import annotations
+
+import numpy as np
+from dolfinx import fem
+from petsc4py import PETSc
+from test_refinement import BODIES, COMM, measure, towards, volume
+
+from hvi_fenicsx import ladder
+
+
+def main() -> None:
+    """For each body three steps towards the origin."""
+    for make in BODIES:
+        body = make()
+        d = body.dimension
+        space = fem.functionspace(body.mesh, ("Lagrange", 1, (d,)))
+        field = fem.Function(space)
+        field.interpolate(lambda x, d=d: np.array([x[0] ** 2, np.sin(x[1]), x[2] * x[0]])[:d])
+        vector = field.x.petsc_vec.copy()
+        for step in towards(body, np.zeros(d), 3):
+            finer = fem.functionspace(step.domain.mesh, ("Lagrange", 1, (d,)))
+            vector = ladder.prolongation(finer, space, step) * vector
+            body, space = step.domain, finer
+        sizes = [vector.size, vector.norm(), vector.norm(PETSc.NormType.NORM_1), volume(body)]
+        lengths = [measure(body, name) for name in sorted(body.sides)]
+        if COMM.rank == 0:
+            print(*sizes, *lengths)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,200 @@
+"""Why: what a scene does not name must cost nothing, and the simplest solver that its effects allow must be the one.
+
+An integral that nobody needs is compiled and assembled for ever unnoticed; so is a contact solver without contact.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import dolfinx
+import numpy as np
+import pytest
+from petsc4py import PETSc
+from runs import hvi, summary, write_scene
+from scenes import STEEL, Table, displacement, energy, model, quadratic_linear, solved
+
+from hvi_fenicsx import Scene, nested, prepare
+from hvi_fenicsx.solution import Prepared, finish
+from hvi_fenicsx.solvers import choose
+from hvi_fenicsx.solvers.base import Solved, silent
+
+SPRING = {"law": "linear_spring", "stiffness": 1e12}
+LAW = quadratic_linear(1e3)
+
+
+def scene(floor: Table, **tables: Any) -> Table:
+    """A square pulled and pressed; ``floor``: what acts on its bottom."""
+    table = model(4) | tables
+    table["boundary"]["floor"] = {"on": "bottom", **floor}
+    return table
+
+
+def rolling(**floor: Any) -> Table:
+    """Held in the normal direction of its bottom by a condition."""
+    return scene({"displacement": ["free", 0.0], **floor})
+
+
+SCENES: dict[str, tuple[Table, int, str, bool]] = {
+    # scene; compiled integrals (the stiffness, the two tractions, and what else is named); method; bounds
+    "linear": (rolling(), 3, "linear", False),
+    "a force more": (rolling() | {"body": {"force": [0.0, -1e5]}}, 4, "linear", False),
+    "heat more": (
+        rolling() | {"body": {"temperature": 20.0}, "material": {**STEEL, "thermal_expansion": 1e-5}},
+        4,
+        "linear",
+        False,
+    ),
+    # with bounds or laws: normals and lumped areas of the part; for each law its traction
+    "an elastic support": (scene({"support": SPRING}), 3 + 2 + 1, "linear", False),
+    "contact": (scene({"contact": {"gap": 0.0}}), 3 + 2, "convex", True),
+    "contact on springs": (scene({"contact": {"gap": 0.0}, "friction": SPRING}), 3 + 2 + 1, "convex", True),
+    "friction": (rolling(friction=LAW), 3 + 2 + 1, "branch", False),
+    "contact and friction": (scene({"contact": {"gap": 0.0}, "friction": LAW}), 3 + 2 + 1, "branch", True),
+    "adhesion more": (
+        scene({"contact": {"gap": 0.0}, "friction": LAW, "adhesion": LAW}),
+        3 + 2 + 1 + 1,
+        "branch",
+        True,
+    ),
+}
+
+
+@dataclass
+class Compiled:
+    """The forms that were compiled."""
+
+    forms: list[Any] = field(default_factory=list)
+
+    @property
+    def integrals(self) -> int:
+        """Those in the C code, of all forms."""
+        return sum(f.ufcx_form.form_integral_offsets[3] for f in self.forms)
+
+
+@pytest.fixture
+def compiled(monkeypatch: pytest.MonkeyPatch) -> Compiled:
+    found, form = Compiled(), dolfinx.fem.form
+
+    def counted(*words: Any, **keys: Any) -> Any:
+        made = form(*words, **keys)
+        found.forms.append(made)
+        return made
+
+    monkeypatch.setattr(dolfinx.fem, "form", counted)
+    return found
+
+
+@pytest.fixture
+def events() -> None:
+    PETSc.Log.begin()
+
+
+def calls(name: str) -> int:
+    """How often PETSc entered an event."""
+    return int(PETSc.Log.Event(name).getPerfInfo()["count"])
+
+
+def found_by_solver(ready: Prepared) -> Solved:
+    """The solve alone: certificate and error estimate have systems of their own."""
+    return nested.solve(ready.scene, ready.system, ready.timer, silent, lambda: False)
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_only_what_is_named_is_compiled(name: str, compiled: Compiled) -> None:
+    table, integrals, _, _ = SCENES[name]
+    prepare(Scene.model_validate(table))
+    assert compiled.integrals == integrals
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_the_solver_follows_from_what_acts(name: str) -> None:
+    table, _, method, bounds = SCENES[name]
+    ready = prepare(Scene.model_validate(table))
+    box = np.concatenate([ready.system.lower.array, ready.system.upper.array])
+    assert bool(np.isfinite(box).any()) is bounds
+    found = finish(ready)
+    assert found.converged
+    assert found.solved is not None
+    assert found.solved.method == method
+    assert (found.solved.counts.branch > 0) is (method == "branch")
+
+
+@pytest.mark.usefixtures("events")
+@pytest.mark.parametrize("name", [n for n, case in SCENES.items() if case[2] == "linear"])
+def test_a_scene_without_nonsmooth_effects_is_one_ksp_solve(name: str) -> None:
+    """By PETSc's own count of events."""
+    ready = prepare(Scene.model_validate(SCENES[name][0]))
+    before = calls("KSPSolve"), calls("SNESSolve")
+    assert found_by_solver(ready).converged
+    assert (calls("KSPSolve") - before[0], calls("SNESSolve") - before[1]) == (1, 0)
+
+
+@pytest.mark.usefixtures("events")
+def test_contact_alone_is_one_snes_solve_after_the_start() -> None:
+    """The body comes down on an inclined floor: some vertices lift, so that there is something to iterate."""
+    ready = prepare(Scene.model_validate(scene({"contact": {"gap": "1e-6*x"}})))
+    before = calls("SNESSolve")
+    assert found_by_solver(ready).converged
+    assert calls("SNESSolve") - before == 1
+
+
+@pytest.mark.parametrize("name", [n for n, case in SCENES.items() if case[2] != "branch"])
+def test_the_simple_solvers_find_what_the_branch_iteration_finds(name: str) -> None:
+    table = SCENES[name][0]
+    one, other = solved(table), solved(table | {"solver": {"method": "branch"}})
+    assert other.solved is not None
+    assert other.solved.method == "branch"
+    assert energy(one) == pytest.approx(energy(other), rel=1e-10)
+    assert displacement(one) == pytest.approx(displacement(other), abs=1e-9 * np.abs(displacement(other)).max())
+
+
+def test_a_linear_scene_takes_the_ladder_for_its_multigrid_only(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(nested, "_WORTHWHILE", 0)
+    monkeypatch.setattr("hvi_fenicsx.solvers.linear._LARGEST_DIRECT", {2: 0, 3: 0})
+    table = rolling()
+    table["domain"]["cells"] = [64, 64]
+    found, direct = solved(table), solved(table | {"solver": {"linear_solver": "lu"}})
+    assert found.converged
+    assert found.solved is not None
+    assert (found.solved.levels, found.solved.counts.newton) == (1, 0)
+    assert 1 < found.solved.counts.linear < 15
+    assert energy(found) == pytest.approx(energy(direct), rel=1e-9)
+
+
+def test_a_method_that_is_named_is_the_one() -> None:
+    ready = prepare(Scene.model_validate(rolling() | {"solver": {"method": "tao"}}))
+    assert choose(ready.scene.solver, ready.system).name == "tao"
+
+
+def test_check_tells_effect_by_effect_what_is_added(tmp_path: Path) -> None:
+    file = write_scene(tmp_path / "square.toml", scene({"contact": {"gap": 0.0}, "friction": LAW}))
+    words = hvi("check", file).stdout
+    rows = {cells[0]: cells[1:] for line in words.splitlines() if len(cells := re.split(r" {2,}", line)) > 1}
+    assert rows["effect"] == ["terms", "bounds", "unknowns", "output", "solver"]
+    assert rows["contact on floor"] == ["none", "5", "none", "gap, sigma_n, contact", "bounds"]
+    assert rows["friction on floor"] == ["1 law", "none", "none", "friction_t, branch_t", "branch iteration"]
+    assert rows["displacement on wall"] == ["none", "none", "-5", "none", "linear"]
+    assert "solver: a branch iteration (DC) over SNES VI (reduced space), MUMPS" in words
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_check_tells_the_same_as_data_on_any_number_of_ranks(ranks: int, tmp_path: Path) -> None:
+    file = write_scene(tmp_path / "square.toml", rolling())
+    data = json.loads(hvi("check", file, "--json", ranks=ranks).stdout)
+    assert data["solver"] == "one linear solve, no bounds, MUMPS"
+    assert [(e["effect"], e["unknowns"], e["terms"]) for e in data["effects"]] == [
+        ("isotropic", 50, "1 bilinear"),
+        ("displacement", -5, "none"),
+        ("traction", 0, "1 linear"),
+        ("traction", 0, "1 linear"),
+        ("displacement", -5, "none"),
+    ]
+    done = hvi("run", file, "--out", tmp_path / "out", "--no-pictures", ranks=ranks)
+    assert done.returncode == 0
+    assert summary(tmp_path / "out")["method"] == "linear"
+    assert summary(tmp_path / "out")["effects"] == data["effects"]

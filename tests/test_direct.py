@@ -1,0 +1,69 @@
+"""The direct solver that condenses a body to Γc solves what a factorisation of the whole solves; floors of rounding."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from mpi4py import MPI
+from scenes import DELTA, displacement, model, quadratic_linear, solved
+
+from hvi_fenicsx import Scene, prepare
+from hvi_fenicsx.solvers import schur
+from hvi_fenicsx.solvers.activeset import ActiveSetSolver, Outcome
+from hvi_fenicsx.solvers.linear import HeldPreconditioner, LinearSettings
+from hvi_fenicsx.system import System
+from hvi_fenicsx.timing import Timer
+
+DIRECT = LinearSettings("lu")
+STRONG = quadratic_linear(3e6, DELTA)
+
+
+def assembled(cells: int = 8) -> System:
+    return prepare(Scene.model_validate(model(cells, friction=STRONG)), MPI.COMM_SELF).system
+
+
+@pytest.mark.parametrize("every", [1, 3, 1000])
+def test_condensed_it_solves_what_a_factorisation_of_the_whole_solves(every: int) -> None:
+    """With a tangent, and with all, some or hardly any unknowns of Γc held."""
+    system, generator = assembled(), np.random.default_rng(1)
+    system.set_rates([np.eye(k.shape[1]) * generator.random((len(k), 1, 1)) for k in system.rates])
+    held = system.rows.dofs[1::every].astype(np.int32)
+    load, expected, found = (system.load.duplicate() for _ in range(3))
+    load.array[:] = generator.standard_normal(load.local_size)
+    expected.set(0.0)
+    whole, condensed = HeldPreconditioner(system, DIRECT, Timer()), schur.SchurDirect(system, {"pc_type": "cholesky"})
+    whole.prepare(held)
+    whole.solve(load, expected, 1e-12)
+    condensed.prepare(held)
+    condensed.apply(None, load, found)
+    found.axpy(-1.0, expected)
+    assert found.norm() < 1e-10 * expected.norm()
+
+
+def test_a_run_that_condenses_ends_where_one_that_does_not_ends(monkeypatch: pytest.MonkeyPatch) -> None:
+    made: list[schur.SchurDirect] = []
+    begin = schur.SchurDirect.__init__
+    monkeypatch.setattr(schur.SchurDirect, "__init__", lambda self, *args: (made.append(self), begin(self, *args))[1])
+    found: list[npt.NDArray[np.float64]] = []
+    for worth in (0, 1_000):  # never; from the second factorisation on
+        monkeypatch.setattr(schur, "_WORTH", worth)
+        found.append(displacement(solved(model(16, 6e6, friction=STRONG, linear_solver="lu"))))
+    assert len(made) == 1
+    assert np.max(np.abs(found[1] - found[0])) < 1e-9 * np.max(np.abs(found[0]))
+
+
+def test_rounding_of_the_bodys_forces_is_no_excuse_for_a_wrong_traction() -> None:
+    """A residual under the larger floor, but over the floor of its own, has not converged."""
+    system = assembled()
+    solver = ActiveSetSolver(system, DIRECT, Timer())
+    x, noise = system.load.duplicate(), system.load.duplicate()
+    x.array[:] = np.random.default_rng(2).standard_normal(x.local_size)
+    system.rounding(x, noise)
+    norm, nodal = solver._sizes(noise.array_r)
+    between = 4.0 * float(np.sqrt(norm * nodal))
+    wrong = (between, 0.0) if norm < nodal else (0.0, between)
+    right = wrong[::-1]
+    outcome = Outcome(False, 1, 1, between, "stalled")
+    assert not solver._to_rounding(outcome, wrong, x).converged
+    assert solver._to_rounding(outcome, right, x).converged

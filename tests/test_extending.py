@@ -1,0 +1,119 @@
+"""Why: a box of effects is only open if a user can add to it without touching it, and documents that are not run rot.
+
+The files of docs/extending.md are written out as they stand and run; each is held to a scene that says the same with
+the program's own words.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from runs import ROOT, hvi, summary
+
+from hvi_fenicsx import InputError, read_scene
+
+DOCUMENT = (ROOT / "docs" / "extending.md").read_text(encoding="utf-8")
+BLOCKS = dict(re.findall(r"^```\w+\n# (\S+)\n(.*?)^```$", DOCUMENT, flags=re.MULTILINE | re.DOTALL))
+PLAIN = {
+    'law = "plateau", strength = 1.0e6, slip = 3.0e-6': 'law = "graph", points = [[0, 0], [3e-6, 1e6], [9e-6, 1e6], '
+    "[9e-6, 0.5e6]]",
+    'pressure = { value = "1e6*(1 + x)" }': 'traction = [0.0, "-1e6*(1 + x)"]',
+    'plugins = ["my_law.py", "my_effect.py", "my_method.py"]': "",
+    'method = "lowest"': 'method = "auto"',
+}
+
+
+@pytest.fixture
+def files(tmp_path: Path) -> Path:
+    """A folder with the document's files."""
+    for name, text in BLOCKS.items():
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    return tmp_path
+
+
+def package() -> dict[str, str]:
+    """The program's files, by their digests."""
+    found = (ROOT / "hvi_fenicsx").rglob("*.py")
+    return {str(f): hashlib.sha256(f.read_bytes()).hexdigest() for f in found}
+
+
+def test_the_document_has_the_files_and_counts_their_lines() -> None:
+    told = {name: int(lines) for name, lines in re.findall(r"\| `(\w+\.py)` \| (\d+) \|", DOCUMENT)}
+    assert told == {name: len([x for x in BLOCKS[name].splitlines() if x.strip()]) for name in told}
+    assert set(BLOCKS) == {*told, "pressed.toml", "pressed.py"}
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_the_users_scene_is_that_of_the_programs_own_words(ranks: int, files: Path) -> None:
+    before = package()
+    plain = BLOCKS["pressed.toml"]
+    for own, word in PLAIN.items():
+        assert own in plain
+        plain = plain.replace(own, word)
+    (files / "plain.toml").write_text(plain, encoding="utf-8")
+    done = [
+        hvi("run", f"{name}.toml", "--no-pictures", cwd=files, ranks=n)
+        for name, n in (("pressed", ranks), ("plain", 1))
+    ]
+    assert [d.returncode for d in done] == [0, 0], done[0].stderr
+    own, program = (summary(files / "results" / name) for name in ("pressed", "plain"))
+    assert own["energy"] == pytest.approx(program["energy"], rel=1e-9)
+    assert (own["method"], program["method"]) == ("lowest", "branch")
+    assert own["solvability"]["margin"] == pytest.approx(program["solvability"]["margin"])
+    assert own["solvability"]["kernel"] == program["solvability"]["kernel"]
+    assert package() == before
+
+
+def test_check_tells_what_they_add(files: Path) -> None:
+    data = json.loads(hvi("check", "pressed.toml", "--json", cwd=files).stdout)
+    pressure = next(e for e in data["effects"] if e["effect"] == "pressure")
+    assert (pressure["adds"], pressure["terms"]) == ("<g, v> += -∫ p v·n ds", "1 linear")
+    assert "the lower energy" in data["solver"]
+
+
+def test_the_result_runs_again_from_its_own_scene(files: Path) -> None:
+    assert hvi("run", "pressed.toml", "--no-pictures", cwd=files).returncode == 0
+    again = hvi("run", "results/pressed/scene.toml", "--out", "again", "--no-pictures", cwd=files)
+    assert again.returncode == 0, again.stderr
+    assert summary(files / "again")["energy"] == summary(files / "results" / "pressed")["energy"]
+
+
+def test_from_python(files: Path) -> None:
+    done = subprocess.run(
+        [sys.executable, "pressed.py"], cwd=files, capture_output=True, text=True, check=True, timeout=300
+    )
+    words = done.stdout.split()
+    assert words[0] == "certified"
+    assert hvi("run", "pressed.toml", "--no-pictures", cwd=files).returncode == 0
+    assert float(words[-2]) == pytest.approx(summary(files / "results" / "pressed")["energy"], rel=1e-7)
+
+
+WRONG = {
+    "missing.py": (None, "missing.py does not exist; it is looked for beside the scene file"),
+    "law.txt": ("", 'must name Python files, like "my_laws.py" (is "law.txt")'),
+    "broken.py": ("x = 1\ny = x +\n", "broken.py:2: SyntaxError"),
+    "raises.py": ("\n\nraise ValueError('no such steel')\n", "raises.py:3: ValueError: no such steel"),
+    "taken.py": (
+        "from hvi_fenicsx.methods import CustomMethod\nclass M(CustomMethod):\n    name = 'tao'\n",
+        "taken.py:2: InputError: method class M: the name 'tao' is taken",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_a_plugin_that_cannot_be_loaded_is_told_with_its_place(name: str, files: Path) -> None:
+    text, told = WRONG[name]
+    if text is not None:
+        (files / name).write_text(text, encoding="utf-8")
+    scene = BLOCKS["pressed.toml"].replace('["my_law.py", "my_effect.py", "my_method.py"]', f'"{name}"')
+    (files / "pressed.toml").write_text(scene, encoding="utf-8")
+    with pytest.raises(InputError) as caught:
+        read_scene(files / "pressed.toml")
+    assert told in str(caught.value)
+    assert "pressed.toml:2: plugins" in str(caught.value)

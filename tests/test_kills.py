@@ -1,0 +1,97 @@
+"""Random kills: whatever ends a run and whenever, its folder holds one whole result, and the next run works."""
+
+from __future__ import annotations
+
+import os
+import random
+import signal
+import subprocess
+import time
+import tomllib
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+import pytest
+from runs import command, contact, hvi, summary, write_scene
+from scenes import model, quadratic_linear
+
+pytestmark = pytest.mark.long
+
+ROUNDS, KILLS = 20, 5
+"""A hundred kills in all."""
+STARTUP = 0.2
+"""Seconds, or the part of a whole run where that is more, in which Python itself starts, and words its end itself."""
+CELLS = {"few": 4, "more": 8}
+"""Two scenes, told apart by their title and the length of their tables."""
+
+
+@pytest.mark.parametrize("seed", range(ROUNDS))
+def test_a_kill_leaves_a_whole_result_and_the_next_run_works(seed: int, tmp_path: Path) -> None:
+    chance = random.Random(seed)
+    scenes = {title: scene(tmp_path, title) for title in CELLS}
+    out = tmp_path / "r"
+    began = time.monotonic()
+    assert hvi("run", scenes["few"], "--out", out).returncode == 0
+    span = time.monotonic() - began
+    for _ in range(KILLS):
+        killed(chance, span, scenes[chance.choice(list(scenes))], out)
+        assert_whole(out)
+    assert hvi("run", scenes["more"], "--out", out, "--force", "--no-pictures").returncode == 0
+    assert summary(out)["scene"] == "more"
+    assert sorted(f.name for f in tmp_path.iterdir()) == ["few.toml", "more.toml", "r"]
+
+
+def scene(folder: Path, title: str) -> Path:
+    """A scene file; its title is its name."""
+    return write_scene(
+        folder / f"{title}.toml", {**model(CELLS[title], friction=quadratic_linear(1e3)), "title": title}
+    )
+
+
+def killed(chance: random.Random, span: float, file: Path, out: Path) -> None:
+    """Start a run over the result that is there and end it at a random moment, in a random way."""
+    way, ranks = chance.choice(["SIGINT", "SIGTERM", "SIGKILL", "one rank"]), chance.choice([(), ("--np", "2")])
+    words = command("run", file, "--out", out, "--force", *ranks)
+    process = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True)
+    time.sleep(chance.uniform(max(STARTUP, STARTUP * span), span))
+    if way == "SIGKILL":
+        os.killpg(process.pid, signal.SIGKILL)
+    elif way == "one rank":
+        kill_a_rank(chance, process.pid)
+    else:
+        process.send_signal(getattr(signal, way))
+    _, errors = process.communicate(timeout=120)
+    if way in ("SIGINT", "SIGTERM"):
+        # negative: before the program's own first line
+        assert process.returncode in (0, 130, -signal.SIGTERM, -signal.SIGINT), (way, ranks, errors)
+        assert "Traceback" not in errors
+
+
+def kill_a_rank(chance: random.Random, pid: int) -> None:
+    """One process at random of those that a run has started, itself included, by SIGKILL."""
+    family = [pid]
+    for parent in family:
+        family += children(parent)
+    os.kill(chance.choice(family), signal.SIGKILL)
+
+
+def children(pid: int) -> list[int]:
+    """Its child processes, while it lives."""
+    try:
+        return [int(c) for t in Path(f"/proc/{pid}/task").iterdir() for c in (t / "children").read_text().split()]
+    except OSError:
+        return []
+
+
+def assert_whole(out: Path) -> None:
+    """Every file is there and speaks of one scene, whichever it is."""
+    record = summary(out)
+    title = record["scene"]
+    assert tomllib.loads((out / "scene.toml").read_text(encoding="utf-8"))["title"] == title
+    assert len(contact(out)) == CELLS[title] + 1
+    assert record["converged"] == (record["exit_code"] == 0)
+    for index in out.glob("*.pvd"):
+        for piece in ET.parse(index).iter("DataSet"):
+            ET.parse(out / piece.attrib["file"])
+    assert len(list(out.glob("*.pvd"))) == 2
+    assert all(picture.read_bytes().endswith(b"IEND\xaeB`\x82") for picture in out.glob("*.png"))

@@ -1,0 +1,69 @@
+"""The ParaView macro names only arrays that are there; where there is a pvpython, it runs."""
+
+from __future__ import annotations
+
+import ast
+import csv
+import os
+import random
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+from runs import ROOT, hvi
+
+pyvista = pytest.importorskip("pyvista")
+MACRO = ROOT / "docs" / "open_result.py"
+RUNS = {
+    "plane": (2, "demos/strong_law.toml", "domain.cells=[8, 8]"),
+    "space": (3, "demos/anchor_3d.toml", "domain.cells=[2, 2, 2]"),
+    "escapes": (2, "demos/pushed_block.toml", "boundary.push.traction=[1.1e6, 0]"),
+}
+
+
+def constants() -> dict[str, object]:
+    """What the macro names, without running it: it imports ParaView."""
+    tree = ast.parse(MACRO.read_text(encoding="utf-8"))
+    found = [node for node in tree.body if isinstance(node, ast.Assign)]
+    return {node.targets[0].id: ast.literal_eval(node.value) for node in found if isinstance(node.targets[0], ast.Name)}
+
+
+@pytest.fixture(params=RUNS)
+def result(request: pytest.FixtureRequest, tmp_path: Path) -> tuple[int, Path]:
+    dimension, scene, change = RUNS[request.param]
+    folder = tmp_path / request.param
+    hvi("run", ROOT / scene, "--set", change, "--out", folder, "--no-pictures")
+    return dimension, folder
+
+
+def test_every_array_that_the_macro_names_is_there(result: tuple[int, Path]) -> None:
+    dimension, folder = result
+    named = constants()
+    body = pyvista.get_reader(folder / "displacement.pvd").read()[0]
+    (vector,) = [name for name in named["WARPS"] if name in body.point_data]  # type: ignore[attr-defined]
+    assert body.point_data[vector].shape == (body.n_points, 3)
+    assert (vector == "escape_mode") == (folder.name == "escapes")
+    if vector == "escape_mode":
+        return
+    assert body.cell_data[named["STRESS"]].shape == (body.n_cells,)  # type: ignore[call-overload]
+    contact = pyvista.get_reader(folder / "contact.pvd").read()[0]
+    colour, _ = named["COLOURS"][dimension]  # type: ignore[index]
+    assert contact.point_data[colour].shape == (contact.n_points,)
+    with (folder / "contact.csv").open(encoding="utf-8") as stream:
+        rows = list(csv.DictReader(stream))
+    assert {"s", *named["CURVES"]} <= set(rows[0])  # type: ignore[misc]
+    assert all(row["s"] for row in rows) == (dimension == 2)
+
+
+@pytest.mark.long
+@pytest.mark.skipif(shutil.which("pvpython") is None, reason="no ParaView here")
+def test_the_macro_runs(result: tuple[int, Path], tmp_path: Path) -> None:
+    picture = tmp_path / "picture.png"
+    server = f"--server-num={random.randint(1000, 60000)}"  # xvfb-run's own choice of a free one is a race
+    command = ["xvfb-run", server, "pvpython", str(MACRO), str(result[1]), "--picture", str(picture)]
+    kept = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=120, env=kept)
+    assert done.returncode == 0
+    assert "ERR" not in done.stdout + done.stderr
+    assert picture.stat().st_size > 10_000

@@ -1,0 +1,220 @@
+"""Why: a side lost, a vertex off its curve or a wrong parent would still give a mesh, only of another body.
+
+A refined mesh is held to the lengths and areas of the body, its prolongation to dolfinx's own interpolation.
+"""
+
+from __future__ import annotations
+
+import functools
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import meshes
+import numpy as np
+import numpy.typing as npt
+import pytest
+import ufl
+from dolfinx import fem
+from dolfinx import mesh as dmesh
+from mpi4py import MPI
+from scenes import model, quadratic_linear
+from test_ladder import interpolated, rough
+
+from hvi_fenicsx import Scene, building, domain, ladder, nested, refinement, solution
+from hvi_fenicsx.domain import Domain
+from hvi_fenicsx.refinement import Refinement
+from hvi_fenicsx.scene import HalfDisk
+from hvi_fenicsx.solvers.base import silent
+from hvi_fenicsx.timing import Timer
+
+COMM = MPI.COMM_WORLD
+
+
+def rectangle() -> Domain:
+    return domain.rectangle(COMM, [1.0, 2.0], [3, 5])
+
+
+def box() -> Domain:
+    return domain.box(COMM, [1.0, 2.0, 0.5], [2, 3, 2])
+
+
+def half_disk() -> Domain:
+    return domain.build(COMM, HalfDisk(radius=0.5, mesh_size=0.2), 2)
+
+
+BODIES: list[Callable[[], Domain]] = [rectangle, box, half_disk]
+
+
+def near(body: Domain, point: npt.NDArray[np.float64], radius: float) -> npt.NDArray[np.int32]:
+    """Local cells whose middle is so near to a point."""
+    count = body.mesh.topology.index_map(body.dimension).size_local
+    middles = dmesh.compute_midpoints(body.mesh, body.dimension, np.arange(count, dtype=np.int32))
+    return np.flatnonzero(np.linalg.norm(middles[:, : len(point)] - point, axis=1) < radius).astype(np.int32)
+
+
+def towards(body: Domain, point: npt.NDArray[np.float64], steps: int) -> list[Refinement]:
+    """Refinements around a point, each on half the radius of the one before."""
+    found: list[Refinement] = []
+    for step in range(steps):
+        found.append(refinement.marked(body, near(body, point, 0.8 * 0.6**step)))
+        body = found[-1].domain
+    return found
+
+
+def measure(body: Domain, name: str) -> float:
+    """Length or area of a side."""
+    facets = np.sort(body.sides[name])
+    tags = dmesh.meshtags(body.mesh, body.dimension - 1, facets, np.ones(len(facets), dtype=np.int32))
+    ds = ufl.Measure("ds", domain=body.mesh, subdomain_data=tags)(1)
+    return float(COMM.allreduce(fem.assemble_scalar(fem.form(fem.Constant(body.mesh, 1.0) * ds))))
+
+
+def volume(body: Domain) -> float:
+    dx = ufl.Measure("dx", domain=body.mesh)
+    return float(COMM.allreduce(fem.assemble_scalar(fem.form(fem.Constant(body.mesh, 1.0) * dx))))
+
+
+@pytest.mark.parametrize("make", BODIES[:2])
+def test_sides_and_volume_stay_those_of_the_body(make: Callable[[], Domain]) -> None:
+    body = make()
+    before = {name: measure(body, name) for name in body.sides}, volume(body)
+    for fine in (refinement.uniform(body), towards(body, np.array([1.0, 0.0, 0.0])[: body.dimension], 4)[-1]):
+        after = {name: measure(fine.domain, name) for name in body.sides}, volume(fine.domain)
+        assert after[0] == pytest.approx(before[0], rel=1e-12)
+        assert after[1] == pytest.approx(before[1], rel=1e-12)
+
+
+def test_curved_sides_approach_their_curve() -> None:
+    """A half-disk of radius ½: inscribed polygons of π/2, whose error falls by 4 when edges are halved."""
+    body, errors = half_disk(), []
+    for _ in range(3):
+        body = refinement.uniform(body).domain
+        errors.append(np.pi / 2 - measure(body, "arc"))
+        assert measure(body, "top") == pytest.approx(1.0, rel=1e-12)
+    assert errors[:-1] == pytest.approx([4 * e for e in errors[1:]], rel=2e-2)
+
+
+def test_regions_keep_their_cells(tmp_path: Path) -> None:
+    body = domain.from_file(COMM, meshes.make(tmp_path / "halves.msh", meshes.HALVES), 2)
+    fine = towards(body, np.array([0.5, 0.5]), 3)[-1].domain
+    for name, side in (("soft", -1.0), ("hard", 1.0)):
+        middles = dmesh.compute_midpoints(fine.mesh, 2, fine.cells([name]))
+        assert len(middles) > len(body.cells([name]))
+        assert np.all(side * (middles[:, 0] - 0.5) > 0)
+
+
+@pytest.mark.parametrize("make", BODIES[:2])
+def test_prolongation_from_parent_cells(make: Callable[[], Domain]) -> None:
+    """Against dolfinx's own interpolation between meshes that do not match."""
+    body = make()
+    d = body.dimension
+    for step in (refinement.uniform(body), towards(body, np.zeros(d), 1)[0]):
+        fine, coarse = (fem.functionspace(b.mesh, ("Lagrange", 1, (d,))) for b in (step.domain, body))
+        known = fem.Function(coarse)
+        known.interpolate(lambda x: rough(x)[:d])
+        matrix = ladder.prolongation(fine, coarse, step)
+        column = matrix.createVecRight()
+        column.array[:] = known.x.array[: column.local_size]
+        assert np.max(np.abs((matrix * column).array - interpolated(fine, known))) < 1e-13
+
+
+def smallest_angle(body: Domain) -> float:
+    """Of all cells (2D) or of their faces (3D), degrees."""
+    corners = refinement._corners(body.mesh)
+    worst = np.inf
+    count = corners.shape[1]
+    for i in range(count):
+        for j in range(count):
+            for k in range(j):
+                if i in (j, k):
+                    continue
+                a, b = corners[:, j] - corners[:, i], corners[:, k] - corners[:, i]
+                cosine = np.sum(a * b, axis=1) / np.linalg.norm(a, axis=1) / np.linalg.norm(b, axis=1)
+                worst = min(worst, float(np.min(np.degrees(np.arccos(cosine)))))
+    return worst
+
+
+@pytest.mark.parametrize("make", BODIES)
+def test_ten_steps_do_not_spoil_the_cells(make: Callable[[], Domain]) -> None:
+    """Plaza's bisection leaves at least half the smallest angle of a triangle (Rosenberg and Stenger 1975)."""
+    body = make()
+    before = smallest_angle(body)
+    steps = towards(body, np.zeros(body.dimension), 10)
+    angles = [smallest_angle(step.domain) for step in steps]
+    assert min(angles) > before / 2
+    assert angles[9] > 0.9 * angles[5]
+
+
+def slanted(cells: float) -> Scene:
+    """A disk in a bed of its own shape, so that frames turn, with a friction."""
+    return Scene.model_validate(
+        {
+            "domain": {"shape": "disk", "radius": 0.5, "mesh_size": cells},
+            "material": {"model": "plane_strain", "youngs_modulus": 1e7, "poisson_ratio": 0.3},
+            "boundary": {
+                "top": {"on": "upper_arc", "traction": [1e3, -2e4]},
+                "bed": {
+                    "on": "lower_arc",
+                    "contact": {"gap": 0.0},
+                    "friction": {"law": "tresca", "yield_traction": 1e4},
+                },
+            },
+        }
+    )
+
+
+def test_prolongation_turns_with_the_frames() -> None:
+    scene = slanted(0.15)
+    below = building.assemble(scene, COMM, Timer())
+    step = refinement.uniform(below.problem.domain)
+    above = building.assemble(scene, COMM, Timer(), step.domain)
+    assert below.rotation is not None
+    plain = ladder.prolongation(above.problem.space, below.problem.space, step)
+    turned = ladder.between(above, below, step)
+    known = fem.Function(below.problem.space)
+    known.interpolate(lambda x: rough(x)[:2])
+    cartesian = plain.createVecRight()
+    cartesian.array[:] = known.x.array
+    found = above.displacement(turned * below.unknowns(known))
+    assert np.max(np.abs(found.x.array - (plain * cartesian).array)) < 1e-14
+
+
+@pytest.mark.parametrize("scene", [Scene.model_validate(model(8, 3e6, friction=quadratic_linear(1e6))), slanted(0.1)])
+def test_multigrid_and_starts_on_a_refined_hierarchy(scene: Scene, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The solution of the finest mesh is that of a direct solve from rest; from below one step or two remain."""
+    below = building.assemble(scene, COMM, Timer())
+    found = nested.solve(scene, below, Timer(), silent, lambda: False)
+    monkeypatch.setattr("hvi_fenicsx.solvers.linear._LARGEST_DIRECT", {2: 500, 3: 500})
+    for k in range(3):
+        step = refinement.uniform(below.problem.domain) if k else towards(below.problem.domain, np.zeros(2), 1)[0]
+        system = building.assemble(scene, COMM, Timer(), step.domain)
+        up = ladder.between(system, below, step)
+        system.below = ladder.stacked(up, below)
+        found = nested.ascend(scene, system, (below, found, up), Timer(), silent, lambda: False)
+        below = system
+    assert found.converged
+    assert found.levels == 4
+    monkeypatch.undo()
+    direct = solution.finish(solution.prepare(scene, COMM, body=step.domain)).solved
+    assert direct is not None
+    assert np.max(np.abs(found.u.x.array - direct.u.x.array)) < 1e-6 * np.max(np.abs(direct.u.x.array))
+    assert found.counts.newton <= 4 * direct.counts.newton
+
+
+@pytest.mark.parametrize("ranks", [2, 3])
+def test_ranks_agree(ranks: int) -> None:
+    """The same lengths, vertices and transferred field, however the mesh is split."""
+    parallel = _run(ranks)
+    serial = _run(1)
+    assert parallel == pytest.approx(serial, rel=1e-10)
+
+
+@functools.cache
+def _run(ranks: int) -> list[float]:
+    mpi = ["mpirun", "-n", str(ranks)] if ranks > 1 else []
+    words = [*mpi, sys.executable, "-m", "mpi4py", "-m", "refined_ranks"]
+    root = Path(__file__).parent
+    out = subprocess.run(words, cwd=root, capture_output=True, text=True, check=True, timeout=300).stdout
+    return [float(word) for word in out.split()]

@@ -1,0 +1,135 @@
+"""Why: the stress is looked at first, and σ_33, thermal strain and averaged dilatation are easily forgotten in it.
+
+Each case against a closed form; the whole field of a run on two ranks against that on one.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from runs import ROOT, hvi
+from scenes import Table, solved
+
+from hvi_fenicsx import Solution, read_scene, solve
+from hvi_fenicsx.pictures.mesh import read_body
+from hvi_fenicsx.results import stress
+
+Array = npt.NDArray[np.float64]
+E, ALPHA, HEAT, PULL = 2.0e11, 1.2e-5, 40.0, 3.0e6
+WOOD_E, WOOD_NU = (12e9, 0.9e9, 0.6e9), (0.4, 0.45, 0.35)
+ISOTROPIC = [
+    ("plane_stress", 0.3),
+    ("plane_strain", 0.3),
+    ("three_dimensional", 0.3),
+    ("plane_strain", 0.499),
+    ("three_dimensional", 0.499),
+]
+isotropic = pytest.mark.parametrize(("model", "nu"), ISOTROPIC)
+
+
+def body(model: str, **material: Any) -> Table:
+    d = 3 if model == "three_dimensional" else 2
+    domain = {"shape": "box" if d == 3 else "rectangle", "size": [2.0, 1.0, 0.5][:d], "cells": [3, 2, 2][:d]}
+    sides = ["left", "bottom", "front"] if d == 3 else ["left", "bottom"]
+    axes = {"left": 0, "front": 1, "bottom": d - 1}
+    held = {s: {"on": s, "displacement": [0.0 if i == axes[s] else "free" for i in range(d)]} for s in sides}
+    return {"domain": domain, "material": {"model": model, **material}, "boundary": held}
+
+
+def pulled(table: Table) -> Table:
+    d = len(table["domain"]["size"])
+    table["boundary"]["pull"] = {"on": "right", "traction": [PULL, *[0.0] * (d - 1)]}
+    return table
+
+
+def held(table: Table) -> Table:
+    d = len(table["domain"]["size"])
+    sides = ["left", "right", "bottom", "top", "front", "back"][: 2 * d]
+    table["boundary"] = {"all": {"on": sides, "displacement": [0.0] * d}}
+    return table
+
+
+def wood(**more: Any) -> Table:
+    shear = {"shear_moduli": [0.7e9], "elasticity": "orthotropic"}
+    return body("plane_strain", youngs_moduli=list(WOOD_E), poisson_ratios=list(WOOD_NU), **shear, **more)
+
+
+def stresses(solution: Solution) -> Array:
+    assert solution.solved is not None
+    return stress.by_cell(solution.problem, solution.solved.u)
+
+
+def assert_uniform(found: Array, *diagonal: float) -> None:
+    wanted = np.diag(diagonal)
+    assert np.abs(found - wanted).max() < 1e-8 * np.abs(wanted).max()
+
+
+@isotropic
+def test_a_bar_that_is_pulled_has_the_stress_of_the_pull(model: str, nu: float) -> None:
+    found = stresses(solved(pulled(body(model, youngs_modulus=E, poisson_ratio=nu))))
+    across = nu * PULL if model == "plane_strain" else 0.0
+    assert_uniform(found, PULL, 0.0, across)
+    wanted = PULL * np.sqrt(1 - nu + nu**2) if model == "plane_strain" else PULL
+    np.testing.assert_allclose(stress.von_mises(found), wanted, rtol=1e-8)
+
+
+@isotropic
+def test_a_heated_body_held_on_all_sides_is_pressed(model: str, nu: float) -> None:
+    table = held(body(model, youngs_modulus=E, poisson_ratio=nu, thermal_expansion=ALPHA))
+    found = stresses(solved(table | {"body": {"temperature": HEAT}}))
+    if model == "plane_stress":
+        assert_uniform(found, *[-E * ALPHA * HEAT / (1 - nu)] * 2, 0.0)
+    else:
+        assert_uniform(found, *[-E * ALPHA * HEAT / (1 - 2 * nu)] * 3)
+
+
+@isotropic
+def test_a_heated_body_that_is_free_is_pressed_across_the_plane_only(model: str, nu: float) -> None:
+    table = body(model, youngs_modulus=E, poisson_ratio=nu, thermal_expansion=ALPHA)
+    found = stresses(solved(table | {"body": {"temperature": HEAT}}))
+    across = -E * ALPHA * HEAT if model == "plane_strain" else 0.0
+    assert np.abs(found - np.diag([0.0, 0.0, across])).max() < 1e-8 * E * ALPHA * HEAT / (1 - 2 * nu)
+
+
+def test_wood_in_plane_strain_is_held_across_by_its_own_compliance() -> None:
+    pull = stresses(solved(pulled(wood())))
+    assert_uniform(pull, PULL, 0.0, WOOD_NU[1] / WOOD_E[0] * WOOD_E[2] * PULL)
+    heat = stresses(solved(wood(thermal_expansion=ALPHA) | {"body": {"temperature": HEAT}}))
+    assert_uniform(heat, 0.0, 0.0, -WOOD_E[2] * ALPHA * HEAT)
+
+
+def test_pure_shear_and_its_von_mises_stress() -> None:
+    table = body("plane_stress", youngs_modulus=E, poisson_ratio=0.3)
+    sheared = {"on": ["left", "right", "bottom", "top"], "displacement": ["1e-5*y", "1e-5*x"]}
+    found = stresses(solved(table | {"boundary": {"all": sheared}}))
+    shear = E / 2.6 * 2e-5
+    np.testing.assert_allclose(found[:, 0, 1], shear, rtol=1e-9)
+    np.testing.assert_allclose(stress.von_mises(found), np.sqrt(3) * shear, rtol=1e-9)
+
+
+def test_two_materials_end_to_end_bear_one_stress() -> None:
+    """Without lateral contraction and with one α, the plane bar is the slender one."""
+    same = {"poisson_ratio": 0.0, "thermal_expansion": ALPHA}
+    changes = [f"material.{m}.{k}={v}" for m in ("aluminium", "steel") for k, v in same.items()]
+    found = stresses(solve(read_scene(ROOT / "demos" / "thermal_bar.toml", changes)))
+    assert_uniform(found, -(ALPHA * 60.0 - 0.5e-3) / (0.4 / 7e10 + 0.6 / 2.1e11), 0.0, 0.0)
+
+
+def field(folder: Path) -> Array:
+    """Von Mises stresses by cell, in an order that no numbering changes."""
+    body = read_body(folder / "displacement.pvd")
+    middle = np.round(body.points[body.cells].mean(axis=1), 9)
+    return np.asarray(body.by_cell["von_mises"][np.lexsort(middle.T)])
+
+
+def test_two_ranks_write_the_stress_of_one(tmp_path: Path) -> None:
+    scene, cells = ROOT / "demos" / "strong_law.toml", "domain.cells=[12, 12]"
+    for n in (1, 2):
+        hvi("run", scene, "--set", cells, "--out", tmp_path / str(n), "--no-pictures", ranks=n)
+    one, two = field(tmp_path / "1"), field(tmp_path / "2")
+    assert np.ptp(one) > 0.1 * one.max()
+    np.testing.assert_allclose(two, one, rtol=1e-6)

@@ -1,0 +1,442 @@
+"""What accuracy costs: errors against closed forms and independent norms, plans, fronts, and a folder that resumes."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+import os
+import signal
+import subprocess
+import time
+from dataclasses import replace
+from fractions import Fraction
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+from runs import command, hvi, write_scene
+from scenes import model, quadratic_linear
+
+from hvi_fenicsx import InputError, Scene, compat, domain, ladder, refinement, solve
+from hvi_fenicsx.study import cost, interpolation, meshes, plan, reference, sample, sentences, table
+from hvi_fenicsx.study.errors import QUANTITIES, Yardstick
+from hvi_fenicsx.study.reference import Certainty
+
+LAW = quadratic_linear(1.0e6)
+
+
+def scene(cells: int = 4, **keys: Any) -> Scene:
+    return Scene.model_validate(model(cells, **keys))
+
+
+def taken(found: Scene) -> sample.Sample:
+    result = sample.take(solve(found, MPI.COMM_SELF))
+    assert result is not None
+    return result
+
+
+@pytest.fixture(scope="module")
+def yardstick() -> Yardstick:
+    solution = solve(scene(8, friction=LAW), MPI.COMM_SELF)
+    stiffness, found = sample.stiffness(solution), sample.take(solution)
+    assert stiffness is not None
+    assert found is not None
+    return Yardstick(found, stiffness)
+
+
+@pytest.mark.parametrize("shape", ["rectangle", "box"])
+def test_interpolation_between_nested_meshes_is_the_ladders_prolongation(shape: str) -> None:
+    from hvi_fenicsx import domain
+
+    size, cells = ([1.0, 2.0], [4, 6]) if shape == "rectangle" else ([1.0, 2.0, 0.5], [4, 6, 2])
+    table_of = model(4)
+    table_of["domain"] = {"shape": shape, "size": size, "cells": cells}
+    if shape == "box":
+        table_of = {
+            "domain": table_of["domain"],
+            "material": {"model": "three_dimensional", "youngs_modulus": 1.0, "poisson_ratio": 0.3},
+            "boundary": {"low": {"on": "bottom", "displacement": [0.0] * 3}},
+        }
+    fine = Scene.model_validate(table_of)
+    coarse = fine.model_copy(update={"domain": fine.domain.model_copy(update={"cells": tuple(n // 2 for n in cells)})})
+    from dolfinx import fem
+
+    spaces = [
+        fem.functionspace(domain.build(MPI.COMM_SELF, s.domain, s.dimension).mesh, ("Lagrange", 1, (s.dimension,)))
+        for s in (fine, coarse)
+    ]
+    step = ladder.prolongation(*spaces, fine)
+    d = fine.dimension
+    points = [s.tabulate_dof_coordinates()[:, :d] for s in spaces]
+    source = sample.Sample(points[1], spaces[1].dofmap.list.astype(np.int64), np.zeros_like(points[1]), {})
+    way = interpolation.body(source, points[0])
+    values = np.random.default_rng(1).normal(size=points[1].shape)
+    coarse_vector, fine_vector = step.createVecs()
+    coarse_vector.array[:] = values.ravel()
+    step.mult(coarse_vector, fine_vector)
+    np.testing.assert_allclose(way @ values, fine_vector.array.reshape(-1, d), atol=1e-12)
+
+
+def test_a_surface_in_space_is_interpolated_linearly_and_its_facets_are_found() -> None:
+    corners = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1.0], [0, 1, 1]])
+    facets = np.array([[0, 1, 2], [0, 2, 3], [0, 3, 5], [0, 4, 5]])
+    nothing = np.zeros(len(corners))
+    part = sample.PartSample(
+        facets, corners, nothing, corners, corners, corners, nothing, nothing, np.empty(0), np.array(True)
+    )
+    points = np.array([[0.3, 0.1, 0.0], [0.2, 0.7, 0.0], [0.0, 0.6, 0.2], [0.0, 0.1, 0.9]])
+    np.testing.assert_allclose(interpolation.surface(part, points) @ corners, points, atol=1e-14)
+
+
+def test_the_closed_form_is_met_on_every_mesh() -> None:
+    """Without friction P1 holds the solution: all errors are rounding, whatever the mesh."""
+    solution = solve(scene(8), MPI.COMM_SELF)
+    stiffness, found = sample.stiffness(solution), sample.take(solution)
+    assert stiffness is not None
+    assert found is not None
+    exact = Yardstick(found, stiffness)
+    errors = exact.errors(exact.move(taken(scene(4))))
+    known = {name: value for name, value in errors.items() if value is not None}
+    assert set(known) == {"energy_norm", "u_t_l2", "u_t_max", "pressure_l1", "pressure_l2", "contact_set", "resultant"}
+    assert max(known.values()) < 1e-9
+
+
+def test_every_norm_measures_a_known_difference(yardstick: Yardstick) -> None:
+    """All fields one per cent larger: one per cent in every norm; and a rigid motion has no energy."""
+    here = yardstick.sample
+    parts = {
+        name: replace(p, slip=1.01 * p.slip, friction=1.01 * p.friction, pressure=1.01 * p.pressure)
+        for name, p in here.parts.items()
+    }
+    errors = yardstick.errors(yardstick.move(replace(here, u=1.01 * here.u, parts=parts)))
+    assert errors.pop("contact_set") == 0.0
+    assert errors.pop("friction_max") == pytest.approx(0.01)
+    assert all(value == pytest.approx(0.01, rel=1e-9) for value in errors.values()), errors
+    turned = here.u + 1e-6 * np.column_stack([1.0 - here.points[:, 1], here.points[:, 0]])
+    assert yardstick.errors(yardstick.move(replace(here, u=turned)))["energy_norm"] < 1e-6  # type: ignore[operator]
+
+
+def test_the_energy_norm_is_that_of_the_closed_form() -> None:
+    """Of the model problem without friction: a(u, u) = <g, u>, and the energy is -6 J/m, so a(u, u) = 12 J/m."""
+    solution = solve(scene(4), MPI.COMM_SELF)
+    stiffness, found = sample.stiffness(solution), sample.take(solution)
+    assert stiffness is not None
+    assert found is not None
+    scales = solution.problem.scales
+    u = found.u.ravel() / scales.displacement
+    assert u @ (stiffness @ u) * scales.energy == pytest.approx(12.0, rel=1e-9)
+
+
+def test_near_a_drop_of_the_law_the_largest_error_leaves_vertices_out(yardstick: Yardstick) -> None:
+    here, (name, part) = yardstick.sample, next(iter(yardstick.sample.parts.items()))
+    slips = np.where(part.points[:, 0] < 0.5, 1.0, 3.0)[:, None]
+    dropped = Yardstick(
+        replace(here, parts={name: replace(part, slip=slips, drops=np.array([2.0]))}), yardstick.stiffness
+    )
+    near = dropped._near(name, dropped.here)
+    jump = 0.5 - 1 / 16  # the slip passes the drop between the vertices at 3/8 and 1/2
+    np.testing.assert_array_equal(near, np.abs(part.points[:, 0] - jump) <= 2 / 8)
+    assert dropped.left_out(dropped.here) == pytest.approx(float(part.weights[near].sum()))
+
+
+@pytest.mark.parametrize("order", [0.7, 1.0, 1.6])
+def test_the_references_own_error_follows_from_the_rungs_below(order: float) -> None:
+    """Errors C hᵖ, additive; in the energy norm their squares are."""
+    h, c = 0.1, 3.0
+    truth = c * h**order
+    below = [dict.fromkeys(QUANTITIES, c * (n * h) ** order - truth) for n in (2, 4)]
+    for errors, n in zip(below, (2, 4), strict=True):
+        errors["energy_norm"] = math.sqrt((c * (n * h) ** order) ** 2 - truth**2)
+    for found in reference.certainty(below).values():
+        assert found.error == pytest.approx(truth)
+        assert found.order == pytest.approx(order)
+
+
+def test_a_point_is_repeated_until_its_median_is_steady() -> None:
+    def run(seconds: float) -> dict[str, float]:
+        return dict.fromkeys(cost.PHASES, seconds / len(cost.PHASES))
+
+    steady, ragged = [run(1.0)] * 3, [run(s) for s in (1.0, 2.0, 3.0)]
+    assert not cost.wanted(steady, run(1.0), 9)
+    assert cost.wanted(ragged, run(1.0), 9)
+    assert not cost.wanted(ragged, run(1.0), 3)
+    assert not cost.wanted([], run(30.0), 9)  # a long run is not repeated
+    assert not cost.wanted([run(8.0)] * 2, run(8.0), 9)
+    # of normal values the median's standard error is 1.2533 σ/√n
+    values = np.random.default_rng(3).normal(10.0, 0.5, 4001)
+    assert cost.spread(list(values)) == pytest.approx(1.2533 * 0.05 / math.sqrt(4001), rel=0.1)
+
+
+def rows_of(pairs: list[tuple[float, float]]) -> list[table.Row]:
+    record = {"converged": True, "reason": "certified", "exit_code": 0, "dofs": 1}
+    certain = dict.fromkeys(QUANTITIES, Certainty(1e-4, None))
+    return [
+        table.row(
+            str(i),
+            meshes.Setting(scene(4)),
+            {**record, "cost": {"seconds": s, "spread": None, "runs": 1, "phases": None}},
+            dict.fromkeys(QUANTITIES, e),
+            None,
+            None,
+            certain,
+        )
+        for i, (s, e) in enumerate(pairs)
+    ]
+
+
+def test_the_front_holds_what_nothing_cheaper_is_as_accurate_as() -> None:
+    draws = np.random.default_rng(5).uniform(-3, 0, (40, 2))
+    pairs = [(10.0**s, 10.0**e) for s, e in draws]
+    rows, certain = rows_of(pairs), dict.fromkeys(QUANTITIES, Certainty(1e-4, None))
+    found = table.front(rows, "energy_norm", certain)
+    better = [not any(s < t and e < r / table.GAIN for s, e in pairs) for t, r in pairs]
+    assert {int(r.point) for r in found} <= {i for i, good in enumerate(better) if good}
+    assert all(a.errors["energy_norm"] > b.errors["energy_norm"] for a, b in pairwise(found))  # type: ignore[index, operator]
+    assert min(e for _, e in pairs) == pytest.approx(found[-1].errors["energy_norm"], rel=0.06)  # type: ignore[index]
+
+
+def test_a_sentence_names_the_cheapest_setting_for_each_accuracy() -> None:
+    rows = rows_of([(0.1, 0.05), (0.2, 0.004), (0.3, 0.006), (0.4, 0.002)])
+    certain = dict.fromkeys(QUANTITIES, Certainty(1e-4, None))
+    words = sentences._targets(rows, "energy_norm", certain)
+    assert "10 % for 0.1 s" in words
+    assert "1 % for 0.2 s" in words
+    assert "0.1 % is not reached here: the best is 0.2 % for 0.4 s" in words
+    unsure = dict.fromkeys(QUANTITIES, Certainty(0.02, None))
+    assert "1 % cannot be told: the reference itself is uncertain by 2 %" in sentences._targets(rows, "u_t_l2", unsure)
+
+
+def test_an_order_is_told_from_errors_that_the_reference_resolves() -> None:
+    """On the finest mesh half of the error is the reference's: what remains falls too fast."""
+    rows = [
+        replace(r, h=h) for h, r in zip((0.4, 0.2, 0.1), rows_of([(0.1, 0.04), (0.2, 0.02), (0.3, 0.005)]), strict=True)
+    ]
+    unsure = dict.fromkeys(QUANTITIES, Certainty(0.005, None))
+    assert sentences.order(rows, rows[0], "u_t_l2", unsure) == pytest.approx(1.0)
+    assert sentences.order(rows, rows[0], "u_t_l2", dict.fromkeys(QUANTITIES, Certainty(1e-4, None))) == pytest.approx(
+        2.0
+    )
+
+
+def test_methods_that_refuse_the_scene_did_not_fail() -> None:
+    own, other = rows_of([(0.1, 0.04), (0.2, 0.04)])
+    refused = replace(other, method="tao", converged=False, exit_code=2, seconds=None)
+    words = [*sentences._methods([own, refused], own), *sentences._failures([own, refused])]
+    assert words == ["Methods, at the scene's own setting: auto 0.1 s; tao not for this scene."]
+
+
+def test_adaptive_meshes_are_set_beside_the_uniform_one_that_does_as_well() -> None:
+    rows = rows_of([(0.1, 0.05), (0.2, 0.009), (0.5, 0.008)])
+    rows = [replace(rows[0], dofs=50), replace(rows[1], dofs=900), replace(rows[2], dofs=90, mesh="adaptive to 1 %")]
+    certain = dict.fromkeys(QUANTITIES, Certainty(1e-4, None))
+    (words,) = sentences._adaptive(rows, certain)
+    assert "0.8 % with 90 unknowns (0.5 s)" in words
+    assert "more than any" in words
+    (words,) = sentences._adaptive([rows[0], replace(rows[1], errors=rows[2].errors), rows[2]], certain)
+    assert "a uniform mesh needs 900 (0.2 s) for 0.8 %" in words
+    (words,) = sentences._adaptive(rows, dict.fromkeys(QUANTITIES, Certainty(0.02, None)))
+    assert "2 % with 90 unknowns" in words
+
+
+def test_the_share_of_epsilon_is_that_of_its_distance_from_the_exact_law() -> None:
+    own, exact = rows_of([(0.1, 0.5), (0.1, 0.01)])
+    own = replace(own, smoothing="paper", epsilon=1.0, epsilon_part=dict.fromkeys(QUANTITIES, 0.49))
+    assert sentences.share_of_epsilon(own, exact, "friction_l1") == pytest.approx(0.98)
+    assert "nearly all of it ε" in sentences._own(own, exact, "friction_l1")
+
+
+def test_a_plan_is_the_product_of_its_axes_with_the_exact_law_on_every_mesh() -> None:
+    made = plan.make(scene(4, friction=LAW), [plan.axis("mesh=2,8"), plan.axis("epsilon=1,exact")])
+    found = {(s.scene.domain.cells[0], s.scene.solver.epsilon) for s in made.points}  # type: ignore[union-attr]
+    assert found == {(2, 1.0), (2, None), (8, 1.0), (8, None), (4, None)}
+    assert [s.scene.domain.cells[0] for s in made.reference] == [32, 16, 8]  # type: ignore[union-attr]
+    assert all(s.scene.solver.smoothing is None for s in made.reference)
+
+
+@pytest.mark.parametrize(("mesh_size", "below"), [(0.02, None), (0.02, 2e-3), (0.01, 2e-3)])
+@pytest.mark.parametrize("shape", ["disk", "half_disk"])
+def test_the_unknowns_of_a_graded_mesh_are_foreseen(shape: str, mesh_size: float, below: float | None) -> None:
+    """What a plan may afford is decided on them; a mesh fine at one point only is not fine everywhere."""
+    table = {"shape": shape, "radius": 0.1, "mesh_size": mesh_size, **({"mesh_size_below": below} if below else {})}
+    made = Scene.model_validate({**model(4, 1e6), "domain": table, "boundary": {}})
+    body = domain.build(MPI.COMM_SELF, made.domain, 2)
+    true = 2 * body.mesh.topology.index_map(0).size_global
+    assert 0.6 < meshes.unknowns(meshes.Setting(made)) / true < 1.4
+
+
+@pytest.mark.parametrize("shape", ["rectangle", "box"])
+def test_the_mesh_width_halves_where_a_mesh_is_refined(shape: str) -> None:
+    """Whatever the angles of its cells: an order in h is a slope over it."""
+    size = (1.0, 0.3, 0.7)[: 2 if shape == "rectangle" else 3]
+    body = domain.build(MPI.COMM_SELF, scene_of(shape, size), len(size))
+    widths = [sample.width(cells_of(b)) for b in (body, refinement.uniform(body).domain)]
+    assert widths[1] == pytest.approx(widths[0] / 2, rel=1e-9)
+
+
+def scene_of(shape: str, size: tuple[float, ...]) -> Any:
+    table = {"shape": shape, "size": size, "cells": [3] * len(size)}
+    steel = {
+        "model": "plane_stress" if len(size) == 2 else "three_dimensional",
+        "youngs_modulus": 1.0,
+        "poisson_ratio": 0.3,
+    }
+    return Scene.model_validate({"domain": table, "material": steel, "boundary": {}}).domain
+
+
+def cells_of(body: domain.Domain) -> sample.Sample:
+    points = body.mesh.geometry.x[:, : body.dimension]
+    return sample.Sample(points, compat.geometry_dofmap(body.mesh), np.zeros_like(points), {})
+
+
+def test_adaptive_meshes_are_added_and_the_reference_stays_finer_than_the_scenes_own_mesh() -> None:
+    made = plan.make(scene(8, friction=LAW), [plan.axis("mesh=4"), plan.axis("accuracy=0.1,0.05")])
+    assert [s.accuracy for s in made.points if s.accuracy] == [0.1, 0.05]
+    assert {s.scene.domain.cells[0] for s in made.points if not s.accuracy} == {4, 8}  # type: ignore[union-attr]
+    assert made.reference[0].scene.domain.cells[0] == 32  # type: ignore[union-attr]
+    assert made.reference[0].accuracy is None
+
+
+def test_a_plan_of_the_programs_own_varies_what_the_scene_has() -> None:
+    with_law = plan.make(scene(8, friction=LAW), []).points
+    without = plan.make(scene(8), []).points
+    assert {s.scene.solver.smoothing for s in with_law} == {None, "quadratic", "chks", "log_exp", "paper"}
+    assert {s.scene.solver.smoothing for s in without} == {None}
+    for points in (with_law, without):
+        assert {s.scene.domain.cells[0] for s in points} == {2, 4, 8, 16}  # type: ignore[union-attr]
+        assert {"auto", "tao", "snes_vi"} <= {s.scene.solver.method for s in points}
+
+
+@pytest.mark.parametrize(
+    ("axes", "words"),
+    [
+        (["mash=1"], "did you mean 'mesh'"),
+        (["mesh="], "needs values"),
+        (["epsilon=-1"], "above 0"),
+        (["method=newton"], "allowed"),
+        (["mesh=0"], "number of cells"),
+        (["mesh=8", "mesh=16"], "twice"),
+        (["epsilon=1", "epsilon_absolute=1"], "leave one"),
+        (["smoothing=chks"], "epsilon"),
+    ],
+)
+def test_a_bad_plan_says_how_to_mend_it(axes: list[str], words: str) -> None:
+    with pytest.raises(InputError) as error:
+        plan.make(scene(4, friction=LAW), [plan.axis(a) for a in axes])
+    assert words in str(error.value).replace('"', "'")
+
+
+def test_cells_that_do_not_come_out_whole_are_refused_with_those_that_do() -> None:
+    tables = {"domain": {"cells": [150, 6]}}
+    with pytest.raises(InputError, match="possible: 75, 150, 300, 600"):
+        meshes.at(tables, "60")
+    assert meshes.refined(tables, Fraction(1, 2)) == {"domain": {"cells": [75, 3]}}
+    assert meshes.refined(tables, Fraction(1, 4)) is None
+
+
+def test_a_scene_without_a_law_has_no_epsilon() -> None:
+    with pytest.raises(InputError, match="no law"):
+        plan.make(scene(4), [plan.axis("epsilon=1")])
+
+
+@pytest.fixture(scope="module")
+def studied(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("study")
+    file = write_scene(folder / "square.toml", model(2, friction=LAW))
+    done = hvi("study", file, "--axis", "epsilon=1,0.1", "--out", folder / "out", "--repeat", 1)
+    assert done.returncode == 0, done.stderr
+    assert done.stderr == ""
+    return folder
+
+
+def data(folder: Path) -> dict[str, Any]:
+    found: dict[str, Any] = json.loads((folder / "study.json").read_text(encoding="utf-8"))
+    return found
+
+
+def test_a_study_leaves_numbers_and_pictures(studied: Path) -> None:
+    found = data(studied / "out")
+    lines = list(csv.DictReader((studied / "out" / "study.csv").open(encoding="utf-8")))
+    assert len(lines) == len(found["points"]) == 3
+    for line, point in zip(lines, found["points"], strict=True):
+        assert point["converged"]
+        assert float(line["error_energy_norm"]) == point["errors"]["energy_norm"]
+        assert float(line["seconds"]) == pytest.approx(sum(point["phases"].values()))
+        assert point["peak_memory_mb"] > 50
+    assert found["own"] == found["exact"]
+    assert set(found["quantities"]) == set(QUANTITIES)
+    assert {p.name for p in (studied / "out").glob("*.png")} == {"work_precision.png", "error_epsilon.png", "time.png"}
+
+
+def test_a_finished_study_is_refused_or_resumed_without_running_a_point(studied: Path) -> None:
+    words = ("study", studied / "square.toml", "--axis", "epsilon=1,0.1", "--out", studied / "out", "--repeat", 1)
+    refused = hvi(*words)
+    assert refused.returncode == 2
+    assert "--resume" in refused.stderr
+    before = {p: p.stat().st_mtime_ns for p in (studied / "out" / "points").iterdir()}
+    first = data(studied / "out")
+    assert hvi(*words, "--resume").returncode == 0
+    assert {p: p.stat().st_mtime_ns for p in (studied / "out" / "points").iterdir()} == before
+    assert data(studied / "out") == first
+
+
+@pytest.mark.long
+def test_under_mpirun_the_points_run_on_its_ranks_and_the_errors_are_the_same(studied: Path) -> None:
+    words = ("study", studied / "square.toml", "--axis", "epsilon=1,0.1", "--out", studied / "two", "--repeat", 1)
+    done = hvi(*words, ranks=2)
+    assert done.returncode == 0, done.stderr
+    one, two = data(studied / "out"), data(studied / "two")
+    assert two["ranks"] == 2
+    for a, b in zip(one["points"], two["points"], strict=True):
+        assert b["converged"]
+        for name in QUANTITIES:
+            assert a["errors"][name] == pytest.approx(b["errors"][name], rel=1e-5, abs=1e-8), name
+
+
+def test_a_scene_without_a_solution_ends_a_study(tmp_path: Path) -> None:
+    pulled = model(2)
+    pulled["boundary"]["press"]["traction"] = [0.0, 1.0e6]
+    done = hvi("study", write_scene(tmp_path / "up.toml", pulled), "--axis", "mesh=2", "--out", tmp_path / "out")
+    assert done.returncode == 3
+    assert "no solution exists" in done.stderr
+
+
+def test_a_point_that_hangs_is_given_up_and_run_again_with_a_longer_limit(tmp_path: Path) -> None:
+    """The reference, which may take five times the limit, does not end within 1 s."""
+    file = write_scene(tmp_path / "square.toml", model(2, friction=LAW))
+    words = ("study", file, "--axis", "mesh=2", "--out", tmp_path / "out", "--repeat", 1)
+    short = hvi(*words, "--limit", 0.2)
+    assert short.returncode == 4
+    assert "not finished after 1 s" in short.stderr
+    kept = [p for p in (tmp_path / "out" / "points").iterdir() if p.suffix not in (".json", ".toml")]
+    assert kept == []
+    assert hvi(*words, "--resume").returncode == 0
+    assert all(p["converged"] for p in data(tmp_path / "out")["points"])
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupted_study_keeps_its_points_and_goes_on(tmp_path: Path, number: int) -> None:
+    file = write_scene(tmp_path / "square.toml", model(4, friction=LAW))
+    words = ("study", file, "--axis", "epsilon=1,0.1,0.01,0.001", "--out", tmp_path / "out", "--repeat", 1)
+    child = subprocess.Popen(command(*words), stderr=subprocess.PIPE, text=True, start_new_session=True)
+    points = tmp_path / "out" / "points"
+    deadline = time.monotonic() + 120
+    while len(list(points.glob("*.json"))) < 3 and time.monotonic() < deadline:
+        time.sleep(0.05)
+    os.kill(child.pid, number)
+    _, errors = child.communicate(timeout=60)
+    assert child.returncode == 130
+    assert "--resume goes on" in errors
+    left = subprocess.run(["pgrep", "-f", str(points)], capture_output=True, text=True, check=False).stdout
+    assert left == ""
+    kept = {p: p.stat().st_mtime_ns for p in points.glob("*.json")}
+    assert len(kept) >= 3
+    names = {p.name.split(".")[0] for p in points.iterdir()}
+    assert names == {p.stem for p in kept}  # of the point that was running nothing is left
+    assert hvi(*words, "--resume").returncode == 0
+    assert {p: p.stat().st_mtime_ns for p in kept} == kept
+    assert len(data(tmp_path / "out")["points"]) == 5
