@@ -46,9 +46,18 @@ class Table:
     def __post_init__(self) -> None:
         self.random = random.Random(self.data["seed"])
 
+    def first(self) -> Table:
+        """The table without the values that came later."""
+        later = self.data.get("later", {})
+        kept = {a: [v for v in values if v not in later.get(a, [])] for a, values in self.axes.items()}
+        return Table({**self.data, "axes": kept, "later": {}})
+
     @classmethod
     def read(cls, path: Path) -> Table:
-        return cls(tomllib.loads(path.read_text(encoding="utf-8")))
+        data = tomllib.loads(path.read_text(encoding="utf-8"))
+        for axis, values in data.get("later", {}).items():
+            data["axes"][axis] += values
+        return cls(data)
 
     @property
     def axes(self) -> Mapping[str, Sequence[Any]]:
@@ -73,12 +82,14 @@ _NOTHING = object()
 
 
 def cases(table: Table) -> list[Case]:
-    """The list, without repetition, in the order: singles, corners, coverage."""
-    found = [*_singles(table), *_corners(table)]
-    left = table.tuples()
-    for values in found:
-        left -= _covered(values, table)
-    found += _coverage(table, left)
+    """The list, without repetition: singles, corners, coverage; then the same again with the values that came later."""
+    found: list[Values] = []
+    for stage in (table.first(), table):
+        found += [*_singles(stage), *_corners(stage)]
+        left = stage.tuples()
+        for values in found:
+            left -= _covered(values, stage)
+        found += _coverage(stage, left)
     unique = {json.dumps(v, sort_keys=True): v for v in found}
     return [Case(i, v) for i, v in enumerate(unique.values(), start=1)]
 

@@ -1,6 +1,6 @@
 """The hard-case matrix: run it, and write its table and picture.
 
-    python3 benchmarks/hard_cases.py run [--method auto ...] [--only KEY ...] [--out results/hard_cases.jsonl]
+    python3 benchmarks/hard_cases.py run [--method auto ...] [--only KEY ...] [--cells N] [--limit SECONDS] [--out FILE]
     python3 benchmarks/hard_cases.py report [--out results/hard_cases.jsonl]
     python3 benchmarks/hard_cases.py list
 
@@ -35,9 +35,11 @@ Record = dict[str, Any]
 
 def main() -> int:
     """The command line."""
-    options = _options()
     table = Table.read(AXES)
+    options = _options(table)
     listed = [c for c in cases(table) if not options.only or c.key in options.only]
+    if options.command == "run":
+        listed = [c for c in listed if c["cells"] <= options.cells]
     if options.command == "list":
         print("\n".join(f"{c.number:3} {c.key} {c.values}" for c in listed))
     elif options.command == "report":
@@ -52,12 +54,15 @@ def main() -> int:
     return 0
 
 
-def _options() -> argparse.Namespace:
+def _options(table: Table) -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("command", choices=["run", "report", "list"])
     parser.add_argument("--method", nargs="+", help="methods, by default all there are")
     parser.add_argument("--only", nargs="+", metavar="KEY", help="cases, by default all there are")
-    parser.add_argument("--out", type=Path, default=RESULTS, help="file of results")
+    parser.add_argument("--cells", type=int, default=max(table.axes["cells"]), help="run no larger cases")
+    limit = "processor time for one case and one method, by default the table's"
+    parser.add_argument("--limit", type=float, metavar="SECONDS", default=table.data["limit"], help=limit)
+    parser.add_argument("--out", type=Path, default=RESULTS, help="file of results (results/hard_cases.jsonl)")
     parser.add_argument("--worker", type=int, metavar="RANKS", help=argparse.SUPPRESS)
     return parser.parse_args()
 
@@ -73,7 +78,7 @@ def _supervise(ranks: int, table: Table, listed: list[Case], options: argparse.N
     options.out.touch()
     if not any(c["ranks"] == ranks for c in listed):
         return
-    while (code := _watched(_command(ranks), options.out, SILENCE * table.data["limit"])) != 0:
+    while (code := _watched(_command(ranks), options.out, SILENCE * options.limit)) != 0:
         if not _bury(options.out, f"the process ended with {code}"):
             raise SystemExit(f"a worker on {ranks} ranks ended with {code} before its first case")
 
@@ -122,10 +127,10 @@ def _work(table: Table, listed: list[Case], options: argparse.Namespace) -> None
     done = {(r["key"], r["method"]) for r in read(options.out) if r["outcome"] != "begun"}
     COMM.barrier()  # all ranks have read before the first one writes
     for case, method in _open(listed, options.method or methods(), done):
-        begun = {"key": case.key, "number": case.number, "method": method, "ranks": COMM.size}
+        begun = {"key": case.key, "number": case.number, "method": method, "ranks": COMM.size, "limit": options.limit}
         if COMM.rank == 0:
             _append(options.out, {**begun, "outcome": "begun"})
-        record = {**begun, **attempt(case, table.data, method, table.data["limit"])}
+        record = {**begun, **attempt(case, table.data, method, options.limit)}
         if COMM.rank == 0:
             _append(options.out, record)
             print(case.number, method, record["outcome"], f"{record['seconds']:.1f} s", record["reason"], flush=True)

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import re
 import statistics
 from collections import Counter, defaultdict
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -17,18 +18,38 @@ from covering import Case, Table
 from matplotlib.colors import BoundaryNorm, ListedColormap
 
 Record = dict[str, Any]
-SOLVED = ("certified", "escapes", "no_equilibrium")
+REFUSAL = "InputError"
+"""So begins the reason of a method that does not take a law with kinks, or several processes."""
+QUICK = 10.0
+"""Seconds of processor time within which all methods are compared."""
+SOLVED = ("certified", "no_equilibrium")
 COMMAND = "./hvi exec python3 benchmarks/hard_cases.py"
 COLUMNS = 3
+TITLES = {
+    "strength": "law's peak / press",
+    "delta": "slip at first drop",
+    "margin": "distance from limit",
+    "side": "side of limit",
+    "epsilon": "relative epsilon",
+    "cells": "cells a side",
+    "stretch": "width / height",
+    "modulus": "E, N/m²",
+    "linear": "linear solver",
+}
+"""Of axes whose names say too little in a picture."""
 LEVELS = [0, 25, 50, 75, 90, 100, 101]
 """Shares that look alike; all of them solved is a colour of its own."""
 COLOURS = ["#a50026", "#d73027", "#f46d43", "#fdae61", "#fee8a8", "#4575b4"]
 
 
 class Results:
-    """The last record of each case and method, and what it is worth beside the other methods'."""
+    """The last record of each case and method, and what it is worth beside the other methods' and an enumeration.
 
-    def __init__(self, listed: Sequence[Case], records: Iterable[Record]) -> None:
+    ``enumerated``: stationary points there are, by key, of the small ones in which no method found any; None where
+    they are too many to try.
+    """
+
+    def __init__(self, table: Table, listed: Sequence[Case], records: Iterable[Record]) -> None:
         keys = {c.key: c for c in listed}
         ended = [r for r in records if r["outcome"] != "begun" and r["key"] in keys]
         self.cases = keys
@@ -36,50 +57,85 @@ class Results:
         for record in ended:
             self.of[record["method"]][record["key"]] = record
         self.found = {r["key"] for r in ended if r["outcome"] == "certified"}
+        without = {r["key"] for r in ended if r["outcome"] == "no_equilibrium"}
+        self.enumerated = _enumerated(table, [c for c in listed if c.key in without - self.found])
+        self.found |= {key for key, number in self.enumerated.items() if number}
 
     @property
     def methods(self) -> list[str]:
         """``auto`` first."""
         return sorted(self.of, key=lambda m: (m != "auto", m))
 
+    def taken(self, method: str) -> list[Record]:
+        """The cases that the method was asked and did not refuse; that none exists is told before any is asked."""
+        return [r for r in self.of[method].values() if self.outcome(r) not in ("refused", "escapes")]
+
     def outcome(self, record: Record) -> str:
-        """That no equilibrium was found counts only where no other method found one either."""
+        """That no equilibrium was found counts only where no other method and no enumeration found one either."""
+        if record["reason"].startswith(REFUSAL):
+            return "refused"
         missed = record["outcome"] == "no_equilibrium" and record["key"] in self.found
         return "missed" if missed else str(record["outcome"])
 
     def solved(self, record: Record) -> bool:
-        """Certified, or shown to have no solution, or undecided with nobody knowing better."""
+        """Certified, or undecided with nobody knowing better."""
         return self.outcome(record) in SOLVED
 
     def unsolved(self, method: str) -> list[Record]:
         """In the order of the list."""
-        open_ones = [r for r in self.of[method].values() if not self.solved(r)]
+        open_ones = [r for r in self.taken(method) if not self.solved(r)]
         return sorted(open_ones, key=lambda r: self.cases[r["key"]].number)
 
 
 def write(table: Table, listed: Sequence[Case], records: Iterable[Record], folder: Path) -> None:
     """Both files."""
-    results = Results(listed, records)
+    results = Results(table, listed, records)
     parts = [
         _head(table, listed),
         _counts(results),
         _iterations(results),
+        _without(results),
         *(_open(results, m) for m in results.methods),
     ]
     (folder / "hard-cases.md").write_text("\n\n".join(parts) + "\n", encoding="utf-8")
     _draw(table, results, folder / "hard-cases.png")
 
 
+def _enumerated(table: Table, listed: Sequence[Case]) -> dict[str, int | None]:
+    """Numbers of stationary points of those cases that are small enough; None where there is too much to try."""
+    if not listed:
+        return {}
+    import hard_enumeration  # it imports dolfinx, which a report without such cases does not need
+
+    return {c.key: hard_enumeration.equilibria(c, table.data) for c in listed if hard_enumeration.fits(c)}
+
+
+def _without(results: Results) -> str:
+    """What brute force says of the cases that no method found an equilibrium of."""
+    ended = {r["key"] for of in results.of.values() for r in of.values() if r["outcome"] == "no_equilibrium"}
+    decided = {key: number for key, number in results.enumerated.items() if number is not None}
+    confirmed = sum(not number for number in decided.values())
+    rows = [[f"`{k}`", *_size(results.cases[k]), str(n)] for k, n in decided.items()]
+    words = f"""## No equilibrium found
+
+Of {len(ended - results.found)} metastable or borderline cases no method found an equilibrium. Where the laws' tractions
+are piecewise linear (unsmoothed laws and the quadratic smoothing) and the floor is short, all states of the floor's
+vertices are gone through by branch and bound (`benchmarks/hard_enumeration.py`): {len(results.enumerated)} cases, of
+which {len(decided)} are decided within its number of linear programmes. {confirmed} of these have no equilibrium."""
+    return f"{words}\n\n{_markdown(['case', 'law', 'cells', 'equilibria there are'], rows)}" if rows else words
+
+
+def _size(case: Case) -> list[str]:
+    return [case["law"], str(case["cells"])]
+
+
 def _head(table: Table, listed: Sequence[Case]) -> str:
-    pending = "; ".join(
-        f"{axis} = {', '.join(map(str, p['values']))} (until there is {p['until']})"
-        for axis, p in table.data["pending"].items()
-    )
     return f"""# Hard cases
 
 {len(listed)} combinations of everything that makes such a problem hard, each solved with each method and judged by the
-certificate alone. The axes and their values are in `benchmarks/hard_cases.toml`, committed before anything was run; the
-list of cases follows from it (`{COMMAND} list`): every value of an axis beside an otherwise plain case, every pair of
+certificate alone. The axes and their values are in `benchmarks/hard_cases.toml`, committed before anything was run (its
+`later` values before anything was run with them); the list of cases follows from it (`{COMMAND} list`): every
+value of an axis beside an otherwise plain case, every pair of
 values of two axes, every triple of {" and of ".join(", ".join(t) for t in table.data["triples"])}, and a few corners.
 
     {COMMAND} run       # hours for all methods; `--method auto` is minutes; resumes where it stopped
@@ -87,21 +143,54 @@ values of two axes, every triple of {" and of ".join(", ".join(t) for t in table
 
 A case counts as solved when its displacement is certified within {table.data["tolerance"]:g}, when it is proved that no
 solution exists (state *escapes*), or when, the state being metastable or borderline, no equilibrium was found by any
-method. One case with one method has {table.data["limit"]:g} s of processor time. Left out for now: {pending}.
+method. The time of one case and method is processor time.
 
-![Share of cases solved, by value of each axis and method](hard-cases.png)"""
+![Share of the cases that a method is asked which it solves, by value of each axis](hard-cases.png)"""
 
 
 def _counts(results: Results) -> str:
-    kinds = ["certified", "escapes", "no_equilibrium", "missed", "failed"]
-    words = ["certified", "no solution exists", "no equilibrium found", "missed (another method found one)", "failed"]
-    rows = []
-    for method in results.methods:
-        count = Counter(results.outcome(r) for r in results.of[method].values())
-        total, solved = sum(count.values()), sum(count[k] for k in SOLVED)
-        share = f"{100 * solved / total:.1f} %"
-        rows.append([f"`{method}`", str(total), f"**{solved}**", share, *(str(count[k]) for k in kinds)])
-    return "## Solved\n\n" + _markdown(["method", "cases", "solved", "share", *words], rows)
+    words = [
+        "method",
+        "limit, s",
+        "cases run",
+        "no solution exists",
+        "refused",
+        "asked",
+        "solved",
+        "share of those asked",
+    ]
+    words += ["held: certified", "no equilibrium found", "missed", "failed"]
+    quick = [f"`{m}` {_quick(results, m)}" for m in results.methods]
+    return f"""## Solved
+
+{_markdown(words, (_count(results, m) for m in results.methods))}
+
+There are {len(results.cases)} cases. That no solution exists is told before any method is asked. Refused: `tao` and
+`ssls` take no law with a kink (the paper's smoothing keeps one at zero slip), `condensed` runs in one process; `branch`
+was run on the unsmoothed laws, for which it is. Held: an equilibrium exists. Missed: no equilibrium found, but another
+method or the enumeration found one. Solved within {QUICK:g} s: {", ".join(quick)}."""
+
+
+def _count(results: Results, method: str) -> list[str]:
+    records, taken = results.of[method].values(), results.taken(method)
+    count = Counter(results.outcome(r) for r in records)
+    solved, held = sum(count[k] for k in SOLVED), [r for r in taken if r.get("state") == "held"]
+    certified = sum(r["outcome"] == "certified" for r in held)
+    limits = sorted({r["limit"] for r in records})
+    share = f"{100 * solved / max(1, len(taken)):.1f} %"
+    return [
+        f"`{method}`",
+        ", ".join(f"{t:g}" for t in limits),
+        *map(str, (len(records), count["escapes"], count["refused"], len(taken))),
+        f"**{solved}**",
+        share,
+        f"{certified} of {len(held)}",
+        *(str(count[k]) for k in ("no_equilibrium", "missed", "failed")),
+    ]
+
+
+def _quick(results: Results, method: str) -> int:
+    return sum(results.solved(r) and r.get("cpu", 0.0) <= QUICK for r in results.taken(method))
 
 
 def _iterations(results: Results) -> str:
@@ -119,14 +208,22 @@ def _spread(values: Sequence[float]) -> str:
 
 
 def _open(results: Results, method: str) -> str:
+    """What is left, counted by reason; for ``auto`` case by case too."""
     found = results.unsolved(method)
     if not found:
         return f"## Unsolved by `{method}`\n\nNone."
+    reasons = Counter(_reason(r) for r in found).most_common()
+    summary = f"## Unsolved by `{method}`\n\n" + "\n".join(f"- {number} × {reason}" for reason, number in reasons)
+    if method != "auto":
+        return summary
     rows = [_row(results.cases[r["key"]], r, results) for r in found]
     listing = _markdown(["case", "what is not plain about it", "state", "outcome", "reason"], rows)
-    reasons = Counter(r["reason"] for r in found).most_common()
-    summary = "\n".join(f"- {number} × {reason}" for reason, number in reasons)
-    return f"## Unsolved by `{method}`\n\n{summary}\n\n<details><summary>The list</summary>\n\n{listing}\n\n</details>"
+    return f"{summary}\n\n<details><summary>The list</summary>\n\n{listing}\n\n</details>"
+
+
+def _reason(record: Record) -> str:
+    """Without the figures, by which no two are alike."""
+    return re.split(r", (?:residual|merit)|: vertices|\d+\.\d", record["reason"])[0].strip()
 
 
 def _row(case: Case, record: Record, results: Results) -> list[str]:
@@ -150,7 +247,7 @@ def _draw(table: Table, results: Results, path: Path) -> None:
         image = _block(axis, column, results, tallest)
     bar = figure.colorbar(image, ax=axes, shrink=0.4, label="cases solved, %", ticks=LEVELS[:-1])
     bar.ax.text(1.4, 100.5, "all", transform=bar.ax.get_yaxis_transform(), va="center", fontsize=9)
-    figure.suptitle("Hard cases: share solved, by value of each axis and method")
+    figure.suptitle("Share of cases solved, % of those that a method was asked; blank: it was asked none")
     figure.savefig(path, dpi=130)
     plt.close(figure)
 
@@ -169,7 +266,7 @@ def _block(axis: Any, column: Sequence[tuple[str, Sequence[Any]]], results: Resu
     rows: list[list[float]] = []
     for name, values in column:
         ordered = _ordered(values)
-        labels += [name.upper(), *(v if isinstance(v, str) else f"{v:g}" for v in ordered)]
+        labels += [TITLES.get(name, name).upper(), *(v if isinstance(v, str) else f"{v:g}" for v in ordered)]
         rows += [[np.nan] * len(results.methods), *(_shares(results, name, v) for v in ordered)]
     shares = np.array(rows + [[np.nan] * len(results.methods)] * (height - len(rows)))
     norm = BoundaryNorm(LEVELS, len(COLOURS))
@@ -178,7 +275,7 @@ def _block(axis: Any, column: Sequence[tuple[str, Sequence[Any]]], results: Resu
     axis.set_xticks(range(len(results.methods)), results.methods, fontsize=8, rotation=30)
     axis.xaxis.tick_top()
     axis.tick_params(length=0)
-    _decorate(axis, shares, labels, [name.upper() for name, _ in column])
+    _decorate(axis, shares, labels, [TITLES.get(name, name).upper() for name, _ in column])
     return image
 
 
@@ -199,10 +296,11 @@ def _decorate(axis: Any, shares: Any, labels: Sequence[str], heads: Sequence[str
 
 
 def _shares(results: Results, axis: str, value: Any) -> list[float]:
-    return [_share(results, results.of[m], axis, value) for m in results.methods]
+    return [_share(results, results.taken(m), axis, value) for m in results.methods]
 
 
-def _share(results: Results, records: Mapping[str, Record], axis: str, value: Any) -> float:
-    """Rounded down, so that 100 means all."""
-    solved = [results.solved(r) for key, r in records.items() if results.cases[key][axis] == value]
+def _share(results: Results, records: Sequence[Record], axis: str, value: Any) -> float:
+    """Rounded down, so that 100 means all; not a number where the method takes none."""
+    taken = [r for r in records if results.cases[r["key"]][axis] == value]
+    solved = [results.solved(r) for r in taken]
     return float(np.floor(100.0 * np.mean(solved))) if solved else float("nan")

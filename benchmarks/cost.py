@@ -1,0 +1,133 @@
+"""What contact costs over one linear solve of the same mesh: time and memory, each run in a process of its own.
+
+    ./hvi exec python3 benchmarks/cost.py [--cells 512 1024] [--boxes] [--unstructured] [--algebraic gamg hypre mumps]
+
+The linear solve has contact closed and the laws at rest; algebraic ones on the one mesh, the geometric one with the
+ladder's coarser meshes. All to 1e-8, in turn, medians of the repeats.
+"""
+
+from __future__ import annotations
+
+import argparse
+import tempfile
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+from common import (
+    SCENES,
+    Figures,
+    certified,
+    document,
+    median,
+    parser,
+    picture,
+    repeated,
+    say,
+    spread,
+    square,
+    table,
+)
+
+PLANE = ("frictionless", "paper", "strong law", "lift-off")
+HEAD = (
+    "scene", "dofs", "contact / s", "with mesh / s", "best algebraic / s", "ratio", "geometric / s", "ratio",
+    "peak memory / MB", "over the algebraic one", "certified",
+)  # fmt: skip
+COUNTS = ("scene", "dofs", "levels", "branch", "Newton", "linear (all levels)")
+Runs = Mapping[str, list[Figures]]
+
+
+def measured(scene: str, overrides: Sequence[str], kinds: Sequence[str], options: argparse.Namespace) -> Runs:
+    return repeated({kind: (scene, kind, overrides) for kind in ("contact", *kinds)}, options)
+
+
+def row(scene: str, runs: Runs) -> list[object]:
+    own = runs["contact"]
+    algebraic = {k: v for k, v in runs.items() if k not in ("contact", "mg") and v}
+    best = min(algebraic, key=lambda k: median(algebraic[k]))
+    geometric = runs.get("mg", [])
+    peak = median(own, lambda r: r["peak_mb"])
+    return [
+        scene,
+        own[0]["dofs"],
+        spread(own),
+        spread(own, lambda r: r["total"]),
+        f"{spread(algebraic[best])}, {best}",
+        f"**{median(own) / median(algebraic[best]):.2f}**",
+        spread(geometric) if geometric else "",
+        f"**{median(own) / median(geometric):.2f}**" if geometric else "",
+        f"{peak:.0f}",
+        f"{peak / median(algebraic[best], lambda r: r['peak_mb']):.2f}",
+        certified(own),
+    ]
+
+
+def counts(scene: str, run: Figures) -> list[object]:
+    return [scene, *(run[k] for k in ("dofs", "levels", "branch", "newton", "linear"))]
+
+
+def draw(rows: Sequence[Sequence[object]]) -> None:
+    figure, axes = plt.subplots(figsize=(8, 0.45 * len(rows) + 1.5))
+    names = [f"{r[0]}, {float(str(r[1])) / 1e3:,.0f}k dofs" for r in rows]
+    for shift, column, label in ((0.2, 5, "best algebraic linear solve"), (-0.2, 7, "geometric multigrid solve")):
+        values = [float(str(r[column]).strip("*") or "nan") for r in rows]
+        axes.barh([i + shift for i in range(len(rows))], values, 0.38, label=f"over the {label}")
+    axes.axvline(1.0, color="black", lw=0.8)
+    axes.set_yticks(range(len(rows)), names)
+    axes.invert_yaxis()
+    axes.set_xlabel("time of the contact problem over that of a linear solve")
+    axes.legend(loc="upper center", bbox_to_anchor=(0.4, -0.22 if len(rows) < 6 else -0.12), ncol=2, frameon=False)
+    picture("cost", figure)
+
+
+def plate(folder: Path, size: float) -> list[str]:
+    """Overrides for the unit square as an unstructured gmsh mesh, of this cell size."""
+    import gmsh
+
+    gmsh.initialize()
+    gmsh.option.setNumber("General.Terminal", 0)
+    gmsh.model.occ.addRectangle(0, 0, 0, 1, 1)
+    gmsh.model.occ.synchronize()
+    for tag, name in ((1, "bottom"), (2, "right"), (3, "top"), (4, "left")):
+        gmsh.model.addPhysicalGroup(1, [tag], name=name)
+    gmsh.model.addPhysicalGroup(2, [1], name="plate")
+    gmsh.option.setNumber("Mesh.MeshSizeMax", size)
+    gmsh.model.mesh.generate(2)
+    gmsh.write(str(folder / "plate.msh"))
+    gmsh.finalize()
+    return [f'domain={{shape="file", file="{folder / "plate.msh"}"}}']
+
+
+def main() -> None:
+    made = parser(__doc__)
+    made.add_argument("--cells", type=int, nargs="*", default=[512], help="a side: 128, 256, 512, 1024 in full")
+    made.add_argument("--algebraic", nargs="*", default=["gamg"], help="of gamg, hypre, mumps")
+    made.add_argument("--boxes", type=int, nargs="*", default=[], help="cells a side in 3D: 32, 52, 68 in full")
+    made.add_argument("--unstructured", type=float, nargs="*", default=[], help="cell sizes of gmsh meshes: 0.004")
+    made.add_argument("--scenes", nargs="*", choices=[*SCENES], default=[*PLANE])
+    options = made.parse_args()
+    rows, counted = [], []
+    with tempfile.TemporaryDirectory() as folder:
+        cases = [(s, square(n), [*options.algebraic, "mg"]) for n in options.cells for s in options.scenes]
+        cases += [("block", [f"domain.cells=[{n}, {n}, {n}]"], [*options.algebraic, "mg"]) for n in options.boxes]
+        cases += [(s, plate(Path(folder), h), options.algebraic) for h in options.unstructured for s in options.scenes]
+        for scene, overrides, kinds in cases:
+            runs = measured(scene, overrides, kinds, options)
+            name = f"{scene}, gmsh" if "file" in overrides[0] else scene
+            if not runs["contact"] or not any(runs[kind] for kind in options.algebraic):
+                say(f"{name}, {overrides[0]}: left out, since its runs failed")
+                continue
+            rows.append(row(name, runs))
+            counted.append(counts(name, runs["contact"][0]))
+    draw(rows)
+    command = "./hvi exec python3 benchmarks/cost.py --cells " + " ".join(map(str, options.cells))
+    text = (
+        "Assembly (forms included), setup and solve on all levels, medians with their range; the mesh stated apart. "
+        f"Medians of {options.repeats}."
+    )
+    document("cost", "The cost of contact", command, [text, table(HEAD, rows), table(COUNTS, counted)], options)
+
+
+if __name__ == "__main__":
+    main()

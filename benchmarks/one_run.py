@@ -1,0 +1,123 @@
+"""One timed solve in a process of its own, for the benchmarks: its figures as JSON on the last line of stdout.
+
+    ./hvi exec python3 benchmarks/one_run.py '{"scene": "demos/wall_left.toml", "overrides": [], "solver": "contact"}'
+
+``solver``: ``contact`` is what a user gets; ``gamg``, ``hypre``, ``mumps`` and ``mg`` (multigrid on the ladder)
+are one linear solve of the same mesh, contact closed and laws at rest; ``plain`` is PETSc's SNES VI as it is usually
+written. A small run before it loads the libraries and fills the JIT cache.
+"""
+
+from __future__ import annotations
+
+import json
+import resource
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+from mpi4py import MPI
+
+from hvi_fenicsx import building, nested, read_scene, timing
+from hvi_fenicsx.scene import Scene
+from hvi_fenicsx.solution import finish, prepare
+from hvi_fenicsx.solvers import options
+from hvi_fenicsx.solvers.activeset import ActiveSetSolver
+from hvi_fenicsx.solvers.base import resting_start
+from hvi_fenicsx.solvers.linear import LinearSettings
+from hvi_fenicsx.system import System
+from hvi_fenicsx.timing import Timer
+
+COMM = MPI.COMM_WORLD
+HYPRE = (
+    "-hvi_pc_type hypre -hvi_pc_hypre_type boomeramg -hvi_pc_hypre_boomeramg_nodal_coarsen 6 "
+    "-hvi_pc_hypre_boomeramg_vec_interp_variant 3"
+)
+KINDS = {"gamg": "gamg", "hypre": "gamg", "mumps": "lu", "mg": "mg"}
+Figures = dict[str, Any]
+
+
+def contact(scene: Scene) -> Figures:
+    """From the scene to a certified solution."""
+    timer = Timer()
+    solution = finish(prepare(scene, COMM, timer))
+    counts = solution.solved.counts
+    return {
+        **timer.report(),
+        "certified": solution.converged,
+        "reason": solution.reason,
+        "energy": solution.examined.energy,
+        "newton": counts.newton,
+        "linear": counts.linear,
+        "branch": counts.branch,
+        "levels": solution.solved.levels,
+        "dofs": solution.dofs,
+    }
+
+
+def linear(scene: Scene, kind: str) -> Figures:
+    """The linear solve, to the scene's tolerance of the residual."""
+    if kind == "hypre":
+        options.insert(HYPRE)
+    timer = Timer()
+    system = building.assemble(scene, COMM, timer)
+    if kind == "mg":
+        system.below = nested.hierarchy(scene, system, timer)
+    solver = ActiveSetSolver(system, LinearSettings(KINDS[kind]), timer)
+    _, iterations = resting_start(solver, [t.law for t in system.terms], scene.solver.tolerance)
+    return {**timer.report(), "linear": iterations, "dofs": system.dofs, "certified": True}
+
+
+def plain(scene: Scene) -> Figures:
+    """``vinewtonrsls`` with GAMG set on the SNES, from the start with contact closed, on the scene's laws."""
+    from plain_snes import solve
+
+    timer = Timer()
+    system = building.assemble(scene, COMM, timer)
+    with timer("solve"):
+        figures = solve(system, scene.solver.tolerance)
+    return {**timer.report(), **figures, "dofs": system.dofs}
+
+
+def spmv(system: System) -> float:
+    """Seconds of one product with the system's matrix, the least of 20."""
+    x, y = system.matrix.createVecs()
+    x.set(1.0)
+    seconds = []
+    for _ in range(20):
+        start = time.perf_counter()
+        system.matrix.mult(x, y)
+        seconds.append(time.perf_counter() - start)
+    return min(seconds)
+
+
+def warm(task: Figures) -> None:
+    """The same on a small mesh."""
+    if task.get("warm", True):
+        scene = read_scene(Path(task["scene"]), task["overrides"])
+        cells = (16, 16) if scene.dimension == 2 else (4, 4, 4)
+        if scene.domain.shape != "file":
+            scene = scene.model_copy(update={"domain": scene.domain.model_copy(update={"cells": cells})})
+        contact(scene)
+
+
+def main() -> None:
+    """Run what the argument says."""
+    task = json.loads(sys.argv[1])
+    if task.get("clock") == "cpu":
+        timing.time.perf_counter = time.process_time  # type: ignore[attr-defined]
+    warm(task)
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    scene = read_scene(Path(task["scene"]), task["overrides"])
+    kind = task["solver"]
+    figures = contact(scene) if kind == "contact" else plain(scene) if kind == "plain" else linear(scene, kind)
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    figures |= {"peak_mb": COMM.allreduce(peak), "net_mb": COMM.allreduce(peak - before)}
+    if task.get("spmv"):
+        figures["spmv"] = spmv(building.assemble(scene, COMM, Timer()))
+    if COMM.rank == 0:
+        print(json.dumps(figures), flush=True)
+
+
+if __name__ == "__main__":
+    main()
