@@ -23,7 +23,8 @@ ENV PYTHONPATH=/opt/hvi_fenicsx \
     OMPI_MCA_btl=^tcp \
     OMPI_ALLOW_RUN_AS_ROOT=1 \
     OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 \
-    PRTE_MCA_rmaps_default_mapping_policy=:oversubscribe
+    PRTE_MCA_rmaps_default_mapping_policy=:oversubscribe \
+    PRTE_MCA_mapby=:oversubscribe
 
 # Whoever the caller is (--user), home and caches are writable, so that results in /work belong to the caller.
 RUN printf '#!/bin/sh\nexec python3 -m hvi_fenicsx "$@"\n' >/usr/local/bin/hvi \
