@@ -41,7 +41,8 @@ def outcome(number: int, folder: Path) -> dict[str, Any]:
     found = {"number": number, "done": done, "codes": codes, "error": err.getvalue(), "trace": trace}
     written = code in (0, 3, 4) if number < STUDY else code == 0
     lacking = (_faults if number < STUDY else _faults_of_study)(case / "out") if written and COMM.rank == 0 else []
-    return found | {"files": sorted(os.listdir(case)), "faults": lacking}
+    left = sorted(os.listdir(case)) if COMM.rank == 0 else []  # rank 0 removes the case, the others may come late
+    return found | {"files": left, "faults": lacking}
 
 
 def _made(number: int, folder: Path, case: Path) -> list[str]:
