@@ -71,14 +71,15 @@ def ascend(
     below, found, step = rung
     wanted = found.converged and solvers.choose(scene.solver, system).takes_start
     start = _prolonged(step, below, found, system) if wanted else None
-    method = solvers.create(scene.solver, system, timer, progress, interrupted)
+    method = solvers.create(scene.solver, system, timer, progress, interrupted, steady=found.steady)
     result = method.solve() if start is None else method.solve(start)
     if start is not None and not result.converged and not result.interrupted:
         result = solvers.create(scene.solver, system, timer, progress, interrupted).solve()
     counts = Counts()
     counts.add(found.counts)
     counts.add(result.counts)
-    return replace(result, counts=counts, levels=found.levels + 1)
+    steady = result.steady and (found.steady or found.levels == 1)  # one rung that was is no sign yet
+    return replace(result, counts=counts, levels=found.levels + 1, steady=steady)
 
 
 def hierarchy(scene: Scene, system: System, timer: Timer) -> Below | None:

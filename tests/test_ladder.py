@@ -14,6 +14,7 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from hvi_fenicsx import Scene, domain, ladder, nested, read_scene, solution
+from hvi_fenicsx.solvers import linear
 from hvi_fenicsx.solvers.activeset import ActiveSetSolver
 from hvi_fenicsx.solvers.base import held_dofs, silent
 from hvi_fenicsx.solvers.linear import LinearSettings
@@ -115,3 +116,21 @@ def iterations(cells: int) -> int:
     load.array[held_dofs(prepared.system, laws)] = 0.0
     x.set(0.0)
     return solver.held.solve(load, x, 1e-8)[0]
+
+
+@pytest.mark.parametrize(("demo", "steady"), [("strong_law", True), ("lift_off", False)])
+@pytest.mark.usefixtures("everything_nested")
+def test_only_what_stood_on_every_rung_is_solved_in_one_step(demo: str, steady: bool) -> None:
+    """The floor stays closed and its pieces stand, or the end of contact and the drop move from rung to rung."""
+    found = solution.solve(read_scene(DEMOS / f"{demo}.toml", ["domain.cells=[128, 128]"]))
+    assert found.converged
+    assert found.solved is not None
+    assert found.solved.steady is steady
+
+
+@pytest.mark.parametrize("chosen", [[], [0], [3, 4, 5], [0, 2, 3, 7, 8, 9, 11]])
+def test_runs_copy_what_indices_would(chosen: list[int]) -> None:
+    whole, part = np.arange(12.0), np.full(len(chosen), np.nan)
+    for at, of in linear.runs(np.array(chosen, dtype=np.int32)):
+        part[of] = whole[at]
+    assert part.tolist() == [float(i) for i in chosen]

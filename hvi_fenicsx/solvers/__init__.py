@@ -66,8 +66,16 @@ def choose(wanted: Solver, system: System) -> type[Method]:
     return METHODS[wanted.method] if wanted.method in METHODS else methods.own()[wanted.method]
 
 
-def create(wanted: Solver, system: System, timer: Timer, progress: Progress, interrupted: Callable[[], bool]) -> Method:
-    """The method of a scene's solver table, ready to solve."""
+def create(
+    wanted: Solver,
+    system: System,
+    timer: Timer,
+    progress: Progress,
+    interrupted: Callable[[], bool],
+    *,
+    steady: bool = False,
+) -> Method:
+    """The method of a scene's solver table, ready to solve; ``steady`` as in :class:`.base.Settings`."""
     method = choose(wanted, system)
     linear = LinearSettings.choose(system, wanted.linear_solver)
     epsilon = relative_width(wanted, system)
@@ -77,5 +85,6 @@ def create(wanted: Solver, system: System, timer: Timer, progress: Progress, int
         progress=progress,
         epsilon=epsilon,
         start=wanted.start,
+        steady=steady,
     )
     return method(ActiveSetSolver(system, linear, timer, interrupted), settings)

@@ -35,6 +35,8 @@ _LARGEST_ROUNDING, _SAFETY = 1e-4, 4.0
 """A residual above the first is no rounding; the sample of the rounding error is trusted within the second."""
 _INEXACT, _FORCING, _FINEST = 1e-2, 0.5, 1e-4
 """Relative tolerance of a step's linear solve: while the active set moves; as a part of what is left; the least."""
+_STRAIGHT = 0.25
+"""The second where one step shall do: nodal tractions fall by half as much as the norm, or less."""
 _RUNAWAY = 1e8
 """A displacement of so many times p0 L / E0 is a body that slides away."""
 _REASON = {v: k for k, v in vars(PETSc.SNES.ConvergedReason).items() if isinstance(v, int) and not k.startswith("_")}
@@ -142,6 +144,7 @@ class ActiveSetSolver:
         upper: PETSc.Vec,
         line_search: str = "bt",
         max_iterations: int = 60,
+        steady: bool = False,
     ) -> Outcome:
         """Minimise the energy of the models between the bounds, from and into x. Collective.
 
@@ -149,9 +152,11 @@ class ActiveSetSolver:
             x: start and result. models: what stands for the laws, by term.
             tolerance: of :meth:`measure`. lower, upper: bounds.
             line_search: PETSc's name; ``bt`` uses the energy. max_iterations: Newton steps.
+            steady: whether x's active set is expected to stand; the first linear solve then goes to the tolerance.
         """
         with self.timer("solve"):
             run = _Run(self, models, tolerance, lower, upper)
+            run.steady = steady
             snes = run.create(line_search, max_iterations)
             try:
                 snes.solve(None, x)
@@ -199,7 +204,7 @@ class _Run:
         self.last, self.linear, self.iterations, self.reason = float("inf"), 0, 0, 0
         self.sizes: Sizes = (float("inf"), float("inf"))
         self._stalled = self._slow = 0
-        self.stopped = False
+        self.stopped = self.steady = False
 
     def create(self, line_search: str, max_iterations: int) -> PETSc.SNES:
         """The configured SNES."""
@@ -226,6 +231,8 @@ class _Run:
 
     def _accuracy(self, *, moved: bool) -> float:
         """How far a linear solve goes: to the tolerance, but not for an active set that is still on the move."""
+        if self.steady and not moved:
+            return _STRAIGHT * self.tolerance / self.last
         return max(_INEXACT if moved else _FORCING * self.tolerance / self.last, _FINEST)
 
     def forget(self, snes: PETSc.SNES) -> None:

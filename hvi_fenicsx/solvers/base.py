@@ -34,6 +34,7 @@ class Settings:
         tolerance: of the residual of the inequality, relative. max_branches: convex steps of the branch iteration.
         max_newton: Newton steps of one solve. epsilon: relative width of the laws' smoothing, None for exact laws.
         start: the pieces of the laws that the branch iteration begins on.
+        steady: whether the pieces and the active set of a start from the rung below are expected to stand.
     """
 
     tolerance: float = 1e-8
@@ -42,6 +43,7 @@ class Settings:
     epsilon: float | None = None
     progress: Progress = silent
     start: Start = "unbroken"
+    steady: bool = False
 
 
 @dataclass
@@ -67,6 +69,7 @@ class Solved:
         u: the displacement in units of u0, ghosts updated. method: its name. converged: by the method's own test.
         reason: in words. counts: iterations. energies: after each convex step, nondimensional.
         interrupted: whether it ended because it was told to. levels: rungs of the ladder that it went up.
+        steady: whether the pieces and the active set that it began with stood, on every rung of the ladder.
     """
 
     u: fem.Function
@@ -77,6 +80,7 @@ class Solved:
     energies: tuple[float, ...] = ()
     interrupted: bool = False
     levels: int = 1
+    steady: bool = False
 
 
 def held_dofs(system: System, laws: Sequence[Superpotential]) -> npt.NDArray[np.int32]:

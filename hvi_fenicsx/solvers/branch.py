@@ -145,17 +145,27 @@ class BranchIteration:
         """One convex step, first to a loose tolerance, then, if ξ stands, to the wanted one."""
         if self._wary and self._slides(xi):
             return cells, Outcome(False, 0, 0, math.inf, _SLIDES), True
-        for tolerance in sorted({max(_LOOSE, self.settings.tolerance), self.settings.tolerance}, reverse=True):
+        for tolerance in self._tolerances():
             cells, outcome = self._convex(x, cells, xi, tolerance)
-            if not outcome.converged or self._measure(x, cells, xi) > max(tolerance, outcome.rounding):
+            left = self._measure(x, cells, xi) if outcome.converged else math.inf
+            if left > max(tolerance, outcome.rounding):
                 break
         self.counts.branch += 1
         # where rounding ends a step, a ξ that lags behind may leave no more than rounding did
         allowed = max(self.settings.tolerance, min(outcome.rounding, 2.0 * outcome.measure))
-        stationary = outcome.converged and self._measure(x, cells, xi) <= allowed
+        stationary = outcome.converged and left <= allowed
         if stationary or not outcome.converged:
             return cells, outcome, True
         return cells, *self._accelerated(x, cells, outcome)
+
+    def _tolerances(self) -> list[float]:
+        """Of a convex step, one after the other: loose first, unless ξ is expected to stand."""
+        wanted = self.settings.tolerance
+        return [wanted] if wanted >= _LOOSE or self._straight else [_LOOSE, wanted]
+
+    @property
+    def _straight(self) -> bool:
+        return self.settings.steady and self.counts.branch == 0
 
     def _convex(
         self, x: PETSc.Vec, cells: list[Cells], xi: list[Array], tolerance: float
@@ -182,7 +192,14 @@ class BranchIteration:
         for softened, search, most in _ATTEMPTS:
             used = [Softened(m, m.law.length_scale) for m in models] if softened else models
             found = self.solver.solve(
-                x, used, tolerance, lower=lower, upper=upper, line_search=search, max_iterations=self._most(most)
+                x,
+                used,
+                tolerance,
+                lower=lower,
+                upper=upper,
+                line_search=search,
+                max_iterations=self._most(most),
+                steady=self._straight,
             )
             self.counts.newton += found.newton
             self.counts.linear += found.linear
@@ -268,6 +285,7 @@ class BranchIteration:
 
     def _result(self, x: PETSc.Vec, outcome: Outcome) -> Solved:
         reason = "stationary" if outcome.converged else outcome.reason
+        steady = self.counts.branch <= 1 and self.counts.newton <= len(self._tolerances())
         return Solved(
             self.system.displacement(x),
             self.name,
@@ -276,4 +294,5 @@ class BranchIteration:
             self.counts,
             tuple(self.energies),
             outcome.interrupted,
+            steady=steady,
         )

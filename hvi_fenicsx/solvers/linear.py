@@ -9,7 +9,7 @@ are held by their diagonals (:meth:`.System.hold`).
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Literal
 
@@ -101,7 +101,7 @@ class HeldPreconditioner:
         self._schur: schur.SchurDirect | None = None
         self._factorised = 0
         self._in, self._out = system.load.duplicate(), system.load.duplicate()
-        self._chosen = np.empty(0, np.intp)
+        self._runs: list[tuple[slice, slice]] = []
 
     def prepare(self, held: Indices) -> None:
         """Make it fit for these held dofs (local, owned, sorted). Collective."""
@@ -189,7 +189,7 @@ class HeldPreconditioner:
 
     def select(self, inactive: PETSc.IS) -> None:
         """Reduced vectors hold these dofs from now on."""
-        self._chosen = inactive.getIndices().astype(np.intp) - self.system.load.owner_range[0]
+        self._runs = list(runs(inactive.getIndices() - self.system.load.owner_range[0]))
         self._in.set(0.0)
 
     def multiply_reduced(self, x: PETSc.Vec, y: PETSc.Vec) -> None:
@@ -205,9 +205,13 @@ class HeldPreconditioner:
         self._pc.apply(x, y)  # type: ignore[union-attr]
 
     def _reduced(self, operation: Callable[[PETSc.Vec, PETSc.Vec], None], x: PETSc.Vec, y: PETSc.Vec) -> None:
-        self._in.array[self._chosen] = x.array_r
+        whole, part = self._in.array, x.array_r
+        for at, of in self._runs:
+            whole[at] = part[of]
         operation(self._in, self._out)
-        np.take(self._out.array_r, self._chosen, out=y.array, mode="clip")
+        whole, part = self._out.array_r, y.array
+        for at, of in self._runs:
+            part[of] = whole[at]
 
     def solve(self, load: PETSc.Vec, x: PETSc.Vec, rtol: float) -> tuple[int, int]:
         """Solve with the held matrix, from the guess in x; iterations and PETSc's reason. Collective.
@@ -229,3 +233,11 @@ class HeldPreconditioner:
         ksp.destroy()
         self.report(result[0])
         return result
+
+
+def runs(chosen: Indices) -> Iterator[tuple[slice, slice]]:
+    """Runs of consecutive dofs, in the whole vector and in the reduced one: copied far faster than dof by dof."""
+    breaks = np.flatnonzero(np.diff(chosen) != 1) + 1
+    for run in np.split(np.arange(len(chosen)), breaks) if len(chosen) else []:
+        begin, end = int(run[0]), int(run[-1]) + 1
+        yield slice(int(chosen[begin]), int(chosen[end - 1]) + 1), slice(begin, end)

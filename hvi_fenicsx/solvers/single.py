@@ -100,7 +100,13 @@ class ConvexProgramme:
             outcome = self._minimise(x, counts)
         reason = "stationary" if outcome.converged else outcome.reason
         return Solved(
-            system.displacement(x), self.name, outcome.converged, reason, counts, interrupted=outcome.interrupted
+            system.displacement(x),
+            self.name,
+            outcome.converged,
+            reason,
+            counts,
+            interrupted=outcome.interrupted,
+            steady=counts.newton <= 1,
         )
 
     def _progress(self, iteration: int, residual: float, contact: int) -> None:
@@ -128,6 +134,7 @@ class ConvexProgramme:
                 upper=system.upper,
                 line_search=search,
                 max_iterations=min(most, self.settings.max_newton),
+                steady=self.settings.steady and number == 0,
             )
             counts.newton += found.newton
             counts.linear += found.linear
