@@ -59,9 +59,8 @@ def prolongation(
     else:
         near, far = points or (fine.tabulate_dof_coordinates(), coarse.tabulate_dof_coordinates())
         pairs = _parents_on_grid(near[: fine.dofmap.index_map.size_local], coarse, far, nesting)
-    matrix = PETSc.Mat().createAIJ(
-        (_sizes(fine), _sizes(coarse)), csr=_rows(pairs, fine.dofmap.index_map_bs), comm=fine.mesh.comm
-    )
+    rows = _rows(pairs, fine.dofmap.index_map_bs)  # used in place: PETSc would insert them one by one
+    matrix = PETSc.Mat().createAIJWithArrays((_sizes(fine), _sizes(coarse)), rows, comm=fine.mesh.comm)
     matrix.assemble()
     return matrix
 
