@@ -130,7 +130,7 @@ def marked(comm: MPI.Comm, estimate: Estimate, bulk: float) -> npt.NDArray[np.in
 def coarsest(scene: Scene) -> Scene:
     """The scene on the mesh to begin with: its own, made coarser as far as its shape allows.
 
-    Blocks keep at least three cells each way, gmsh's shapes cells of a sixth of their extent; a file stays as it is.
+    Blocks keep at least three cells each way, gmsh's shapes cells of a sixth of their extent; a file is taken as it is.
     """
     cells = getattr(scene.domain, "cells", None)
     if cells is not None:
@@ -139,7 +139,7 @@ def coarsest(scene: Scene) -> Scene:
         return _with(scene, cells=cells)
     size = getattr(scene.domain, "mesh_size", None)
     if size is None:
-        return scene
+        return _with(scene, refinements=0)
     largest = math.sqrt(scene.domain.area()) * _LARGEST_PART  # type: ignore[union-attr]
     factor = 2.0 ** max(0, math.floor(math.log2(largest / size)))
     below = getattr(scene.domain, "mesh_size_below", None)

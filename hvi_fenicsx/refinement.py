@@ -15,7 +15,7 @@ from dolfinx import la
 from dolfinx import mesh as dmesh
 
 from . import compat
-from .domain import Domain
+from .domain import Domain, check_affordable
 from .domain_shapes import Arc
 
 Array = npt.NDArray[np.float64]
@@ -42,6 +42,21 @@ class Refinement:
 def uniform(domain: Domain) -> Refinement:
     """Each cell cut into 2^d. Collective."""
     return _refined(domain, None)
+
+
+def repeated(domain: Domain, times: int) -> Domain:
+    """Each cell cut into 2^d so often; each of the domains knows the one that it came from. Collective.
+
+    Raises:
+        InputError: on all ranks alike: memory cannot suffice.
+    """
+    d, vertices = domain.dimension, domain.mesh.topology.index_map(0).size_global
+    if times:
+        check_affordable(domain.mesh.comm, d * vertices * 2 ** (d * times), "refinements")
+    for _ in range(times):
+        step = uniform(domain)
+        domain = replace(step.domain, origin=(domain, step))
+    return domain
 
 
 def marked(domain: Domain, cells: Indices) -> Refinement:
