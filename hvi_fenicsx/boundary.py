@@ -225,7 +225,7 @@ def _touching(bounds: Bounds | None, normal: Array) -> npt.NDArray[np.bool_]:
 def balanced(problem: Problem, reaction: Array, parts: Sequence[State]) -> Array:
     """The reaction less what supports, contact and laws may carry: zero in equilibrium; shape (blocks, d)."""
     rest = reaction.copy()
-    rest.reshape(-1)[problem.fixed[problem.fixed < rest.size]] = 0.0
+    rest.reshape(-1)[problem.fixed_here] = 0.0
     for state in parts:
         carried = [t.directions for t in state.terms]
         if state.bounds is not None:

@@ -94,6 +94,11 @@ class Problem:
         return np.asarray(self.space.tabulate_dof_coordinates(), np.float64)
 
     @functools.cached_property
+    def fixed_here(self) -> npt.NDArray[np.int32]:
+        """The scalar dofs that are prescribed and that this rank owns."""
+        return self.fixed[self.fixed < self.space.dofmap.index_map.size_local * self.space.dofmap.index_map_bs]
+
+    @functools.cached_property
     def bodies(self) -> Bodies:
         """The connected parts of the mesh. Collective when first used."""
         return bodies.find(self.domain, self.space)

@@ -92,7 +92,7 @@ class System:
         self._work = self.load.duplicate()
         self.lower, self.upper = self._box()
         free = self.load.copy()
-        free.array[problem.fixed[problem.fixed < free.local_size]] = 0.0
+        free.array[problem.fixed_here] = 0.0
         self.scale = float(free.norm()) or 1.0
 
     @property
@@ -152,6 +152,17 @@ class System:
             self.rotation.multTranspose(cartesian, x)
         return x
 
+    def prescribe(self, x: PETSc.Vec) -> None:
+        """Give the prescribed unknowns of x their values. Local."""
+        x.array[self.problem.fixed_here] = self.load.array_r[self.problem.fixed_here]
+
+    def undisplaced(self) -> PETSc.Vec:
+        """A new x: the prescribed values, and zero elsewhere. Collective."""
+        x = self.load.duplicate()
+        x.set(0.0)
+        self.prescribe(x)
+        return x
+
     def _constrained(self, compiled: Compiled) -> tuple[PETSc.Mat, PETSc.Vec]:
         """Stiffness and load with the prescribed values: rows and columns of the identity, the load lifted."""
         matrix = assemble_matrix(compiled.bilinear)
@@ -161,8 +172,7 @@ class System:
         for force in self.forces.values():
             load.axpy(1.0, force)
         set_bc(prescribed, list(self.problem.conditions))
-        owned = self.problem.fixed[self.problem.fixed < load.local_size]
-        rows = (owned + load.owner_range[0]).astype(PETSc.IntType)
+        rows = (self.problem.fixed_here + load.owner_range[0]).astype(PETSc.IntType)
         matrix.zeroRowsColumns(rows, 1.0, prescribed, load)
         return matrix, load
 
@@ -177,7 +187,7 @@ class System:
             high = np.where(positive, bounds.upper, -bounds.lower)
             lower.array[dofs] = np.maximum(lower.array[dofs], low)
             upper.array[dofs] = np.minimum(upper.array[dofs], high)
-        owned = self.problem.fixed[self.problem.fixed < lower.local_size]
+        owned = self.problem.fixed_here
         lower.array[owned], upper.array[owned] = -np.inf, np.inf
         return lower, upper
 
@@ -224,7 +234,7 @@ class System:
     @property
     def immovable(self) -> npt.NDArray[np.int32]:
         """Unknowns (local, owned) that are held or prescribed."""
-        return np.concatenate([self._held, self.problem.fixed[self.problem.fixed < self.load.local_size]])
+        return np.concatenate([self._held, self.problem.fixed_here])
 
     @property
     def rates(self) -> list[Array]:

@@ -62,8 +62,7 @@ class Dual:
             cartesian = load.copy()
             system.rotation.multTranspose(cartesian, load)
         load.array[self.held] = 0.0
-        fixed = system.problem.fixed
-        load.array[fixed[fixed < load.local_size]] = 0.0
+        load.array[system.problem.fixed_here] = 0.0
         return load
 
     def destroy(self) -> None:

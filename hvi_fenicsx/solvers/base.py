@@ -109,8 +109,7 @@ def resting_start(solver: ActiveSetSolver, laws: Sequence[Superpotential], rtol:
         [np.empty(0, np.int64), *(component_dofs(b.surface.blocks, b.surface.normals)[0] for b in system.bounds)]
     )
     x.array[contact] = closed(low[contact], high[contact])
-    owned = system.problem.fixed[system.problem.fixed < x.local_size]
-    x.array[owned] = system.load.array_r[owned]
+    system.prescribe(x)
     held, models = held_dofs(system, laws), [Resting(law) for law in laws]
     linear = solver.newton_step(x, held, models, rtol).linear
     if _pushed(solver, x, contact, models):

@@ -107,10 +107,7 @@ def settled(
     if not modes or not bounded or system.freedom is not None or not system.bounds:
         return None
     motions = [system.unknowns(field) for field in freedom.fields(system.problem, modes)]
-    x = system.load.duplicate()
-    x.set(0.0)
-    owned = system.problem.fixed[system.problem.fixed < x.local_size]
-    x.array[owned] = system.load.array_r[owned]
+    x = system.undisplaced()
     held = _rest(system, x, motions)
     return None if held is None else (x, solver.newton_step(x, held, models(x), rtol).linear)
 

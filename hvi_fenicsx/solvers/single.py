@@ -53,7 +53,7 @@ class LinearSolve:
 
     def solve(self) -> Solved:
         """The solution of the equation, or what was reached. Collective."""
-        x, models, counts = self._prescribed(), springs(self.system), Counts()
+        x, models, counts = self.system.undisplaced(), springs(self.system), Counts()
         outcome = Outcome(False, 0, 0, float("inf"), "not started")
         for _ in range(_REFINEMENTS):
             outcome = self._step(x, models)
@@ -63,14 +63,6 @@ class LinearSolve:
         self.settings.progress(self.name, None, 1, outcome.measure, 0)
         reason = "stationary" if outcome.converged else outcome.reason
         return Solved(self.system.displacement(x), self.name, outcome.converged, reason, counts)
-
-    def _prescribed(self) -> PETSc.Vec:
-        """Zero but for the prescribed values."""
-        x = self.system.load.duplicate()
-        x.set(0.0)
-        owned = self.system.problem.fixed[self.system.problem.fixed < x.local_size]
-        x.array[owned] = self.system.load.array_r[owned]
-        return x
 
     def _step(self, x: PETSc.Vec, models: Sequence[Full]) -> Outcome:
         """One solve of the residual equation, and how far x is then from the solution. Collective."""
