@@ -21,7 +21,7 @@ from .effects.base import Direction
 from .lawterm import LawTerm
 from .ledger import NEAR, Ledger
 from .problem import Bounds, Problem
-from .surface import Surface, component_dofs
+from .surface import Surface
 
 Array = npt.NDArray[np.float64]
 
@@ -150,7 +150,7 @@ def _away(traction: Array, low: Array, high: Array) -> Array:
 
 def _contact(book: Ledger, bounds: Bounds) -> Array:
     """σ_n that contact carries, (m,); off the bounds what is left there, which should be nothing."""
-    dofs, sign = component_dofs(bounds.surface.blocks, bounds.surface.normals)
+    dofs, sign = bounds.component()
     weight = np.where(book.contact[dofs], book.contact_weight[dofs], bounds.surface.weights)
     return sign * book.contact_force[dofs] / weight
 

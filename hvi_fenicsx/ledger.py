@@ -99,7 +99,7 @@ def _enter_law(ledger: Ledger, term: LawTerm, u: Array) -> None:
 
 
 def _enter_bound(ledger: Ledger, bounds: Bounds, u: Array) -> None:
-    dofs, sign = component_dofs(bounds.surface.blocks, bounds.surface.normals)
+    dofs, sign = bounds.component()
     normal = sign * u.ravel()[dofs]
     reached = (normal >= bounds.upper - NEAR) | (normal <= bounds.lower + NEAR)
     ledger.contact[dofs] |= reached

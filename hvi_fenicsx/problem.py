@@ -46,6 +46,10 @@ class Bounds:
     lower: Array
     upper: Array
 
+    def component(self) -> tuple[npt.NDArray[np.int64], Array]:
+        """The scalar dof (m,) of u·n where n is along an axis of its vertex's frame, and n's sign there (m,)."""
+        return surface.component_dofs(self.surface.blocks, self.surface.normals)
+
 
 @dataclass(frozen=True)
 class Prescribed:

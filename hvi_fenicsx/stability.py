@@ -20,7 +20,6 @@ from .lawterm import LawTerm
 from .ledger import NEAR
 from .problem import Problem
 from .solvers.models import Cells, Full
-from .surface import component_dofs
 from .system import System, compile_forms, traction_scale
 from .timing import Timer
 
@@ -57,7 +56,7 @@ def _active(system: System, states: Sequence[State], tolerance: float) -> tuple[
     by_part = {s.surface.part: s for s in states}
     for bounds in system.bounds:
         state = by_part[bounds.surface.part]
-        dofs, _ = component_dofs(bounds.surface.blocks, bounds.surface.normals)
+        dofs, _ = bounds.component()
         loaded = np.abs(state.contact_pressure) > tolerance
         strong.append(dofs[state.contact & loaded])
         weak.append(dofs[state.contact & ~loaded])

@@ -24,7 +24,6 @@ from .freedom import Freedom, orthonormalise
 from .lawterm import LawTerm
 from .problem import Problem
 from .rigid import Mode
-from .surface import component_dofs
 from .timing import Timer
 
 Array = npt.NDArray[np.float64]
@@ -181,7 +180,7 @@ class System:
         lower.set(-np.inf)
         upper.set(np.inf)
         for bounds in self.bounds:
-            dofs, sign = component_dofs(bounds.surface.blocks, bounds.surface.normals)
+            dofs, sign = bounds.component()
             positive = sign > 0
             low = np.where(positive, bounds.lower, -bounds.upper)
             high = np.where(positive, bounds.upper, -bounds.lower)
@@ -304,7 +303,7 @@ class System:
         allowed = np.full(self.load.local_size, np.inf)
         d = self.problem.scales.dimension
         for bounds in self.bounds:
-            dofs, _ = component_dofs(bounds.surface.blocks, bounds.surface.normals)
+            dofs, _ = bounds.component()
             allowed[dofs] = np.minimum(allowed[dofs], tolerance * bounds.surface.weights)
         for term in self.terms:
             dofs = term.surface.blocks[:, None] * d + np.arange(d)

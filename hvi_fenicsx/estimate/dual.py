@@ -20,7 +20,6 @@ from ..ledger import NEAR, components
 from ..parallel import total
 from ..problem import Problem
 from ..solvers.linear import HeldPreconditioner, LinearSettings
-from ..surface import component_dofs
 from ..system import System, new_vector
 from ..timing import Timer
 from .traces import nearest, on_convex_kink, tractions
@@ -76,7 +75,7 @@ def _held(system: System, x: PETSc.Vec) -> npt.NDArray[np.int32]:
     u = x.array_r
     found: list[npt.NDArray[np.int64]] = [np.empty(0, np.int64)]
     for bounds in system.bounds:
-        dofs, sign = component_dofs(bounds.surface.blocks, bounds.surface.normals)
+        dofs, sign = bounds.component()
         normal = sign * u[dofs]
         found.append(dofs[(normal >= bounds.upper - NEAR) | (normal <= bounds.lower + NEAR)])
     for term in system.terms:

@@ -12,7 +12,6 @@ from petsc4py import PETSc
 
 from .. import existence
 from ..laws import Superpotential
-from ..surface import component_dofs
 from ..system import Model, System
 from .activeset import ActiveSetSolver
 from .models import Resting
@@ -79,20 +78,25 @@ class Solved:
     levels: int = 1
 
 
+def contact_dofs(system: System) -> npt.NDArray[np.int64]:
+    """Scalar dofs (local, owned, sorted) of the normal displacements that have bounds."""
+    normal = (b.component()[0] for b in system.bounds)
+    return np.unique(np.concatenate([np.empty(0, np.int64), *normal]))
+
+
 def held_dofs(system: System, laws: Sequence[Superpotential]) -> npt.NDArray[np.int32]:
     """Scalar dofs (local, owned, sorted) that the start holds. Collective.
 
     The normal ones of contact parts; where these leave a rigid motion, also slips at which a law has a convex kink.
     """
     d = system.problem.scales.dimension
-    dofs = [component_dofs(b.surface.blocks, b.surface.normals)[0] for b in system.bounds]
+    dofs = [contact_dofs(system)]
     loose = existence.moves_with_contact_closed(system.problem)
     for term, law in zip(system.terms, laws, strict=True):
         if loose and np.any(law.convex.kinks == 0.0):
             touched = np.any(term.directions != 0, axis=1)
             dofs.append((term.surface.blocks[:, None] * d + np.arange(d))[touched])
-    joined = np.unique(np.concatenate([np.empty(0, np.int64), *dofs]))
-    return np.setdiff1d(joined, system.problem.fixed).astype(np.int32)
+    return np.setdiff1d(np.concatenate(dofs), system.problem.fixed).astype(np.int32)
 
 
 def resting_start(solver: ActiveSetSolver, laws: Sequence[Superpotential], rtol: float) -> tuple[PETSc.Vec, int]:
@@ -105,9 +109,7 @@ def resting_start(solver: ActiveSetSolver, laws: Sequence[Superpotential], rtol:
     x = system.load.duplicate()
     x.set(0.0)
     low, high = system.lower.array_r, system.upper.array_r
-    contact = np.concatenate(
-        [np.empty(0, np.int64), *(component_dofs(b.surface.blocks, b.surface.normals)[0] for b in system.bounds)]
-    )
+    contact = contact_dofs(system)
     x.array[contact] = closed(low[contact], high[contact])
     system.prescribe(x)
     held, models = held_dofs(system, laws), [Resting(law) for law in laws]
