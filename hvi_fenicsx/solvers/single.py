@@ -15,8 +15,9 @@ from petsc4py import PETSc
 from ..system import System
 from .activeset import ActiveSetSolver, Outcome
 from .base import Counts, Settings, Solved, resting_start
-from .models import Cells, Full
+from .models import Full
 from .settling import settled
+from .smooth import smooth_models
 
 _MARGIN = 0.5
 """Of the tolerance, for Krylov's recursive residual to stay below it."""
@@ -36,11 +37,6 @@ def is_quadratic(system: System) -> bool:
     return all(term.law.is_linear for term in system.terms)
 
 
-def springs(system: System) -> list[Full]:
-    """The laws, which have no kinks: one cell each."""
-    return [Full(t.law, Cells.around(t.law.convex, np.zeros(len(t.surface.blocks)))) for t in system.terms]
-
-
 class LinearSolve:
     """The equation on one system; call :meth:`solve` once."""
 
@@ -53,7 +49,7 @@ class LinearSolve:
 
     def solve(self) -> Solved:
         """The solution of the equation, or what was reached. Collective."""
-        x, models, counts = self.system.undisplaced(), springs(self.system), Counts()
+        x, models, counts = self.system.undisplaced(), smooth_models(self.system), Counts()
         outcome = Outcome(False, 0, 0, float("inf"), "not started")
         for _ in range(_REFINEMENTS):
             outcome = self._step(x, models)
@@ -107,7 +103,7 @@ class ConvexProgramme:
 
     def _minimise(self, x: PETSc.Vec, counts: Counts) -> Outcome:
         """Attempts until one converges: from x, then from bodies at rest; the best one's outcome, in x. Collective."""
-        models, system = springs(self.system), self.system
+        models, system = smooth_models(self.system), self.system
         begin, best, outcome = x.copy(), x.copy(), Outcome(False, 0, 0, float("inf"), "not started")
         for number, (search, most) in enumerate(_ATTEMPTS):
             if number == 1:
