@@ -13,7 +13,7 @@ from petsc4py import PETSc
 from .. import existence
 from ..laws import Superpotential
 from ..system import Model, System
-from .activeset import ActiveSetSolver
+from .activeset import ActiveSetSolver, Outcome
 from .models import Resting
 from .pieces import Start
 
@@ -51,8 +51,13 @@ class Counts:
     linear: int = 0
     branch: int = 0
 
+    def spend(self, step: Outcome) -> None:
+        """Count one solve of the solver's in."""
+        self.newton += step.newton
+        self.linear += step.linear
+
     def add(self, other: Counts) -> None:
-        """Count another solve in."""
+        """Count another method's in."""
         self.newton += other.newton
         self.linear += other.linear
         self.branch += other.branch

@@ -6,14 +6,14 @@ With contact it is a convex quadratic programme with bounds on u·n: one SNES VI
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from petsc4py import PETSc
 
 from ..system import System
 from .activeset import ActiveSetSolver, Outcome
+from .attempts import Attempt, first_success
 from .base import Counts, Settings, Solved, resting_start
 from .models import Full
 from .settling import settled
@@ -94,41 +94,22 @@ class ConvexProgramme:
     def _progress(self, iteration: int, residual: float, contact: int) -> None:
         self.settings.progress(self.name, None, iteration, residual, contact)
 
-    def _settle(self, x: PETSc.Vec, begin: PETSc.Vec, models: list[Full], counts: Counts) -> None:
-        rested = settled(self.solver, lambda _: models, min(1e-4, self.settings.tolerance))
-        if rested is not None:
-            counts.linear += rested[1]
-            for vector in (x, begin):
-                rested[0].copy(vector)
-
     def _minimise(self, x: PETSc.Vec, counts: Counts) -> Outcome:
-        """Attempts until one converges: from x, then from bodies at rest; the best one's outcome, in x. Collective."""
-        models, system = smooth_models(self.system), self.system
-        begin, best, outcome = x.copy(), x.copy(), Outcome(False, 0, 0, float("inf"), "not started")
+        """Attempts until one converges, into x; the best one's outcome. Collective."""
+        bounds = self.system.lower, self.system.upper
+        return first_success(self.solver, x, self._attempts(counts), self.settings.tolerance, bounds, counts)
+
+    def _attempts(self, counts: Counts) -> Iterator[Attempt]:
+        """From the start, then from bodies at rest on their supports."""
+        models = smooth_models(self.system)
         for number, (search, most) in enumerate(_ATTEMPTS):
-            if number == 1:
-                self._settle(x, begin, models, counts)
-            found = self.solver.solve(
-                x,
-                models,
-                self.settings.tolerance,
-                lower=system.lower,
-                upper=system.upper,
-                line_search=search,
-                max_iterations=min(most, self.settings.max_newton),
-            )
-            counts.newton += found.newton
-            counts.linear += found.linear
-            if found.measure < outcome.measure or found.converged:
-                outcome = found
-                x.copy(best)
-            if found.converged or found.interrupted:
-                break
-            if search == "bt" and np.isfinite(found.measure):
-                x.copy(begin)  # a search along the energy has lowered it, whatever it left undone
-            else:
-                begin.copy(x)
-        best.copy(x)
-        for vector in (begin, best):
-            vector.destroy()
-        return replace(outcome, interrupted=found.interrupted)
+            start = self._settled(models, counts) if number == 1 else None
+            limit = min(most, self.settings.max_newton)
+            yield Attempt(models, search, limit, kept=search == "bt", start=start)
+
+    def _settled(self, models: list[Full], counts: Counts) -> PETSc.Vec | None:
+        rested = settled(self.solver, lambda _: models, min(1e-4, self.settings.tolerance))
+        if rested is None:
+            return None
+        counts.linear += rested[1]
+        return rested[0]
