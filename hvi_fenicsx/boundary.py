@@ -13,8 +13,6 @@ import numpy as np
 import numpy.typing as npt
 import ufl
 from dolfinx import fem
-from dolfinx.fem.petsc import assemble_vector
-from petsc4py import PETSc
 
 from . import dilatation, ledger
 from .effects.base import Direction
@@ -22,6 +20,7 @@ from .lawterm import LawTerm
 from .ledger import NEAR, Ledger
 from .problem import Bounds, Problem
 from .surface import Surface
+from .vectors import nodal
 
 Array = npt.NDArray[np.float64]
 
@@ -77,19 +76,11 @@ class State:
 def forces(problem: Problem, u: fem.Function) -> Forces:
     """Reassembled from the forms, whatever a solver believes. Collective."""
     d = problem.scales.dimension
-    internal = _vector(ufl.action(problem.bilinear, u)).reshape(-1, d)
+    internal = nodal(ufl.action(problem.bilinear, u))
     for part in dilatation.assemble(problem.averaged):
         internal += part.force(u).reshape(-1, d)
-    load = sum((_vector(form).reshape(-1, d) for form in problem.linear.values()), np.zeros_like(internal))
+    load = sum((nodal(form) for form in problem.linear.values()), np.zeros_like(internal))
     return Forces(internal - load, load)
-
-
-def _vector(form: object) -> Array:
-    vector = assemble_vector(fem.form(form))
-    vector.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
-    values: Array = vector.array.copy()
-    vector.destroy()
-    return values
 
 
 def states(problem: Problem, u: fem.Function, reaction: Array) -> tuple[State, ...]:

@@ -18,7 +18,6 @@ from .boundary import Forces, State
 from .ledger import NEAR
 from .parallel import agree, largest, total
 from .problem import Problem
-from .system import traction_scale
 
 Array = npt.NDArray[np.float64]
 _LARGEST_ROUNDING, _SAFETY = 1e-4, 4.0
@@ -158,7 +157,7 @@ def _rounding(problem: Problem, u: fem.Function, states: Sequence[State], scale:
 
 
 def _finest(state: State) -> float:
-    return min((traction_scale(t) for t in state.terms), default=1.0)
+    return min((t.traction_scale for t in state.terms), default=1.0)
 
 
 def _energy(problem: Problem, u: fem.Function, forces: Forces, states: Sequence[State]) -> float:
@@ -203,7 +202,7 @@ def _complementarity(state: State, size: float) -> Array:
 
 
 def _inclusion(state: State) -> float:
-    pairs = [d / traction_scale(t) for t, d in zip(state.terms, state.distances, strict=True)]
+    pairs = [d / t.traction_scale for t, d in zip(state.terms, state.distances, strict=True)]
     return max((float(np.max(p, initial=0.0)) for p in pairs), default=0.0)
 
 
@@ -217,7 +216,7 @@ def _inclusion_true(states: Sequence[State]) -> tuple[float, float]:
             true = term.exact
             away = np.where(hidden, 0.0, true.distance(argument, traction, NEAR))
             size = float(np.max(away, initial=0.0))
-            worst, absolute = max(worst, size / traction_scale(term)), max(absolute, size)
+            worst, absolute = max(worst, size / term.traction_scale), max(absolute, size)
     return worst, absolute
 
 

@@ -20,7 +20,7 @@ from .lawterm import LawTerm
 from .ledger import NEAR
 from .problem import Problem
 from .solvers.models import Cells, Full
-from .system import System, compile_forms, traction_scale
+from .system import System, compile_forms
 from .timing import Timer
 
 Indices = npt.NDArray[np.int64]
@@ -81,7 +81,7 @@ def _kinks(
     for kink in law.convex.kinks:
         on |= np.abs(argument - kink) <= NEAR
     low, high = law.interval(argument, NEAR)
-    margin = tolerance * traction_scale(term)
+    margin = tolerance * term.traction_scale
     inside = (traction > low + margin) & (traction < high - margin)
     return on & inside, on & ~inside
 

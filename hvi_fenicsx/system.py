@@ -18,17 +18,15 @@ from dolfinx.fem.petsc import assemble_matrix, assemble_vector, set_bc
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from . import dilatation, frames, freedom
+from . import dilatation, frames, freedom, nearnull
 from .contactrows import ContactRows
-from .freedom import Freedom, orthonormalise
-from .lawterm import LawTerm
+from .freedom import Freedom
 from .problem import Problem
 from .rigid import Mode
 from .timing import Timer
+from .vectors import assembled, new_vector, turn
 
 Array = npt.NDArray[np.float64]
-_ADD, _INSERT = PETSc.InsertMode.ADD, PETSc.InsertMode.INSERT
-_FORWARD, _REVERSE = PETSc.ScatterMode.FORWARD, PETSc.ScatterMode.REVERSE
 
 
 class Model(Protocol):
@@ -80,7 +78,7 @@ class System:
         self._size: float | None = None
         self.terms, self.bounds = problem.terms, problem.bounds
         with timer("assembly"):
-            self.forces = {name: _assembled(form) for name, form in compiled.linear.items()}
+            self.forces = {name: assembled(form) for name, form in compiled.linear.items()}
             self.matrix, self.load = self._constrained(compiled)
             self.matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
             self.matrix.setOption(PETSc.Mat.Option.SPD, True)
@@ -115,8 +113,8 @@ class System:
 
     @cached_property
     def near_null(self) -> PETSc.NullSpace:
-        """The rigid motions of the free body, orthonormal, which algebraic multigrid must keep. Collective."""
-        return rigid_modes(self.problem, self.rotation)
+        """What algebraic multigrid must keep (:mod:`.nearnull`). Collective when first used."""
+        return nearnull.rigid_modes(self.problem, self.rotation)
 
     def _rotate(self) -> PETSc.Mat | None:
         """Go over to local components where normals are slanted; the matrix Q with u = Q û, or None."""
@@ -128,8 +126,7 @@ class System:
         rotated.setLGMap(rows, columns)
         self.matrix.destroy()
         self.matrix = rotated
-        cartesian = self.load.copy()
-        q.multTranspose(cartesian, self.load)
+        turn(self.load, q)
         self.terms = tuple(self.frames.term(t) for t in self.terms)
         self.bounds = tuple(self.frames.bounds(b) for b in self.bounds)
         return q
@@ -146,9 +143,7 @@ class System:
         """A displacement field as unknowns. Collective."""
         x = new_vector(self.problem.space)
         x.array[:] = u.x.array[: x.local_size]
-        if self.rotation is not None:
-            cartesian = x.copy()
-            self.rotation.multTranspose(cartesian, x)
+        turn(x, self.rotation)
         return x
 
     def prescribe(self, x: PETSc.Vec) -> None:
@@ -258,7 +253,7 @@ class System:
             u = x.array_r
             term.set_traction(u, model.derivative(term.argument(u)))
             assemble_vector(out, term.residual)
-        out.ghostUpdate(addv=_ADD, mode=_REVERSE)
+        out.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
 
     def _stiffness_times(self, x: PETSc.Vec, out: PETSc.Vec) -> None:
         """A u: by J, but by A's own rows where they differ."""
@@ -308,7 +303,7 @@ class System:
         for term in self.terms:
             dofs = term.surface.blocks[:, None] * d + np.arange(d)
             touched = np.any(term.directions != 0, axis=1)
-            limit = tolerance * traction_scale(term) * term.surface.weights
+            limit = tolerance * term.traction_scale * term.surface.weights
             allowed[dofs[touched]] = np.minimum(allowed[dofs], limit[:, None])[touched]
         return allowed
 
@@ -319,44 +314,3 @@ class Below:
 
     system: System
     prolongation: PETSc.Mat
-
-
-def traction_scale(term: LawTerm) -> float:
-    """What a law's traction is judged by: its own scale, but nothing finer than a thousandth of the load's."""
-    return max(term.exact.traction_scale, 1e-3)
-
-
-def new_vector(space: fem.FunctionSpace) -> PETSc.Vec:
-    """A zero vector of a space, with ghosts. Collective."""
-    function = fem.Function(space)  # must outlive the duplication: its vector does not own the memory
-    vector = function.x.petsc_vec.duplicate()
-    vector.set(0.0)
-    return vector
-
-
-def _assembled(form: fem.Form) -> PETSc.Vec:
-    vector = assemble_vector(form)
-    vector.ghostUpdate(addv=_ADD, mode=_REVERSE)
-    return vector
-
-
-def rigid_modes(problem: Problem, rotation: PETSc.Mat | None = None) -> PETSc.NullSpace:
-    """The near-null space: all rigid motions of the free body, orthonormal, in the unknowns' components. Collective."""
-    space, d = problem.space, problem.scales.dimension
-    x = (space.tabulate_dof_coordinates() - problem.domain.centre) / problem.scales.length
-    fields = [np.eye(d)[i] + np.zeros((len(x), d)) for i in range(d)]
-    pairs = [(0, 1)] if d == 2 else [(1, 2), (2, 0), (0, 1)]
-    for i, j in pairs:
-        turning = np.zeros((len(x), d))
-        turning[:, i], turning[:, j] = -x[:, j], x[:, i]
-        fields.append(turning)
-    vectors = []
-    for field in fields:
-        vector = new_vector(space)
-        vector.array[:] = field.ravel()[: vector.local_size]
-        if rotation is not None:
-            cartesian = vector.copy()
-            rotation.multTranspose(cartesian, vector)
-        vectors.append(vector)
-    orthonormalise(vectors)
-    return PETSc.NullSpace().create(vectors=vectors, comm=space.mesh.comm)

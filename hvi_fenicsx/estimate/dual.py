@@ -20,8 +20,9 @@ from ..ledger import NEAR, components
 from ..parallel import total
 from ..problem import Problem
 from ..solvers.linear import HeldPreconditioner, LinearSettings
-from ..system import System, new_vector
+from ..system import System
 from ..timing import Timer
+from ..vectors import new_vector, turn
 from .traces import nearest, on_convex_kink, tractions
 
 Array = npt.NDArray[np.float64]
@@ -57,9 +58,7 @@ class Dual:
         system = self.system
         load = new_vector(system.problem.space)
         load.array[:] = functional.ravel()
-        if system.rotation is not None:
-            cartesian = load.copy()
-            system.rotation.multTranspose(cartesian, load)
+        turn(load, system.rotation)
         load.array[self.held] = 0.0
         load.array[system.problem.fixed_here] = 0.0
         return load

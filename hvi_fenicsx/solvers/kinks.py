@@ -11,7 +11,7 @@ from petsc4py import PETSc
 from ..laws import ConvexPart
 from ..lawterm import LawTerm
 from ..surface import component_dofs
-from ..system import System, traction_scale
+from ..system import System
 from .models import Cells, Full, Majorant
 
 Array = npt.NDArray[np.float64]
@@ -50,7 +50,7 @@ def overloaded(
             continue
         force = np.einsum("md,md->m", term.directions[:, 0, :], term.surface.values(residual.array_r))
         weight = term.surface.weights
-        slack = 0.1 * tolerance * traction_scale(term) * weight
+        slack = 0.1 * tolerance * term.traction_scale * weight
         _, _, free = _slip_dofs(term)
         down = free & (argument <= c.lower) & (force - weight * _jump(part, c.lower) > slack)
         up = free & (argument >= c.upper) & (force + weight * _jump(part, c.upper) < -slack)
@@ -77,7 +77,7 @@ def _radial_moves(
     force = np.einsum("mkd,md->mk", term.directions, term.surface.values(residual.array_r) * term.free)
     weight = term.surface.weights
     disc = weight * model.law.convex.right(np.zeros_like(argument))
-    slack = 0.1 * tolerance * traction_scale(term) * weight
+    slack = 0.1 * tolerance * term.traction_scale * weight
     go = (cells.index == 0) & (np.linalg.norm(force, axis=1) > disc + slack)
     stick = (cells.index == 1) & (argument <= cells.ramp)
     return go.astype(np.int64) - stick.astype(np.int64)
