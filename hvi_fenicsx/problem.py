@@ -173,17 +173,7 @@ def _sum(
     prescribed = conditions.build(stage, scales, wanted)
     held = tuple((where, bc.dof_indices()[0]) for (where, _), bc in zip(wanted, prescribed, strict=True))
     fixed = np.unique(np.concatenate([np.empty(0, np.int32), *(dofs for _, dofs in held)])).astype(np.int32)
-    surfaces = {
-        where: surface.build(
-            where,
-            stage.space,
-            stage.part_facets[where],
-            stage.boundary(where, **_VERTEX),
-            stage.length ** (stage.dimension - 1),
-            next((b.direction for w, _, other in made if w == where for b in other.bounds), None),
-        )
-        for where in dict.fromkeys(w for w, _, c in made if w is not None and (c.bounds or c.laws))
-    }
+    surfaces = _surfaces(stage, made)
     bounds = [_bounds(stage, surfaces[w], b, scales) for w, _, c in made if w is not None for b in c.bounds]
     _check_compatible(stage, bounds, prescribed, fixed)
     _check_normal_laws(made)
@@ -209,6 +199,21 @@ def _sum(
         tuple(made),
         held,
     )
+
+
+def _surfaces(stage: Stage, made: Sequence[Made]) -> dict[str, Surface]:
+    """The parts with bounds or laws, in the scene's order. Collective."""
+    return {
+        where: surface.build(
+            where,
+            stage.space,
+            stage.part_facets[where],
+            stage.boundary(where, **_VERTEX),
+            stage.length ** (stage.dimension - 1),
+            next((b.direction for w, _, other in made if w == where for b in other.bounds), None),
+        )
+        for where in dict.fromkeys(w for w, _, c in made if w is not None and (c.bounds or c.laws))
+    }
 
 
 def _by_name(made: Sequence[Made], kind: str) -> dict[str, Any]:
