@@ -167,7 +167,7 @@ def _state(
         pressure,
         own,
         friction,
-        _touching(bounds, normal),
+        np.zeros(len(normal), dtype=bool) if bounds is None else ledger.touches(bounds, normal),
         tuple(r.argument for r in read),
         tuple(r.traction for r in read),
         tuple(r.distance for r in read),
@@ -205,12 +205,6 @@ def _along(slip: Array, law: _Law) -> Array:
         return law.traction[:, None]
     moving = law.argument[:, None] > NEAR
     return law.traction[:, None] * np.divide(slip, law.argument[:, None], out=np.zeros_like(slip), where=moving)
-
-
-def _touching(bounds: Bounds | None, normal: Array) -> npt.NDArray[np.bool_]:
-    if bounds is None:
-        return np.zeros(len(normal), dtype=bool)
-    return (normal >= bounds.upper - NEAR) | (normal <= bounds.lower + NEAR)
 
 
 def balanced(problem: Problem, reaction: Array, parts: Sequence[State]) -> Array:

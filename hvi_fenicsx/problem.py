@@ -46,6 +46,10 @@ class Bounds:
     lower: Array
     upper: Array
 
+    def beyond(self, normal: Array) -> Array:
+        """How far u·n (m,) is outside of the bounds; negative within."""
+        return np.maximum(normal - self.upper, self.lower - normal)
+
     def component(self) -> tuple[npt.NDArray[np.int64], Array]:
         """The scalar dof (m,) of u·n where n is along an axis of its vertex's frame, and n's sign there (m,)."""
         return surface.component_dofs(self.surface.blocks, self.surface.normals)
@@ -300,8 +304,7 @@ def _term(
             f'boundary.{where.part}: law = "{law.law.name}" jumps upwards at a slip > 0, which in 3D is a ring that '
             "bounds cannot follow; smooth it: [solver] smoothing and epsilon"
         )
-    dofs = where.blocks[:, None] * stage.dimension + np.arange(stage.dimension)
-    free = (~np.isin(dofs, fixed)).astype(np.float64)
+    free = (~np.isin(where.dofs, fixed)).astype(np.float64)
     density = fem.Function(stage.space, name="clarke_derivative")
     ds = Scaled(stage.number(stage.length ** (1 - stage.dimension)), stage.boundary(where.part, **_VERTEX))
     residual = ufl.inner(density, stage.test) * ds

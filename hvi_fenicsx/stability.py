@@ -17,7 +17,7 @@ from petsc4py import PETSc
 
 from .boundary import State
 from .lawterm import LawTerm
-from .ledger import NEAR
+from .ledger import NEAR, on_kink
 from .problem import Problem
 from .solvers.models import Cells, Full
 from .system import System, compile_forms
@@ -64,8 +64,7 @@ def _active(system: System, states: Sequence[State], tolerance: float) -> tuple[
         state = by_part[term.surface.part]
         position = next(i for i, t in enumerate(state.terms) if t.direction is term.direction)
         held, loose = _kinks(term, state.arguments[position], state.tractions[position], tolerance)
-        d = term.free.shape[1]
-        dofs = term.surface.blocks[:, None].astype(np.int64) * d + np.arange(d)
+        dofs = term.surface.dofs
         touched = np.any(np.abs(term.directions) > 0.5, axis=1)
         strong.append(dofs[held[:, None] & touched])
         weak.append(dofs[loose[:, None] & touched])
@@ -77,9 +76,7 @@ def _kinks(
 ) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
     """Whether a vertex sits within a convex kink, or at the edge of what it carries."""
     law = term.law
-    on = np.zeros(len(argument), dtype=bool)
-    for kink in law.convex.kinks:
-        on |= np.abs(argument - kink) <= NEAR
+    on = on_kink(law.convex, argument)
     low, high = law.interval(argument, NEAR)
     margin = tolerance * term.traction_scale
     inside = (traction > low + margin) & (traction < high - margin)

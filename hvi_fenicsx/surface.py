@@ -41,6 +41,12 @@ class Surface:
     tangents: Array
     weights: Array
 
+    @property
+    def dofs(self) -> npt.NDArray[np.int64]:
+        """The scalar dofs of these vertices, shape (m, d)."""
+        d = self.normals.shape[1]
+        return self.blocks[:, None].astype(np.int64) * d + np.arange(d)
+
     def values(self, u: Array) -> Array:
         """The vectors at these vertices of a local array of a P1 vector field; shape (m, d)."""
         return u.reshape(-1, self.normals.shape[1])[self.blocks]

@@ -296,12 +296,11 @@ class System:
     def allowed(self, tolerance: float) -> Array:
         """Largest residual a dof of Γc may keep for its traction to be right within tolerance; infinite elsewhere."""
         allowed = np.full(self.load.local_size, np.inf)
-        d = self.problem.scales.dimension
         for bounds in self.bounds:
             dofs, _ = bounds.component()
             allowed[dofs] = np.minimum(allowed[dofs], tolerance * bounds.surface.weights)
         for term in self.terms:
-            dofs = term.surface.blocks[:, None] * d + np.arange(d)
+            dofs = term.surface.dofs
             touched = np.any(term.directions != 0, axis=1)
             limit = tolerance * term.traction_scale * term.surface.weights
             allowed[dofs[touched]] = np.minimum(allowed[dofs], limit[:, None])[touched]

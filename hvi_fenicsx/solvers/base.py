@@ -94,13 +94,12 @@ def held_dofs(system: System, laws: Sequence[Superpotential]) -> npt.NDArray[np.
 
     The normal ones of contact parts; where these leave a rigid motion, also slips at which a law has a convex kink.
     """
-    d = system.problem.scales.dimension
     dofs = [contact_dofs(system)]
     loose = existence.moves_with_contact_closed(system.problem)
     for term, law in zip(system.terms, laws, strict=True):
         if loose and np.any(law.convex.kinks == 0.0):
             touched = np.any(term.directions != 0, axis=1)
-            dofs.append((term.surface.blocks[:, None] * d + np.arange(d))[touched])
+            dofs.append(term.surface.dofs[touched])
     return np.setdiff1d(np.concatenate(dofs), system.problem.fixed).astype(np.int32)
 
 

@@ -60,8 +60,7 @@ def overloaded(
 
 def _hold_stuck(term: LawTerm, cells: Cells, lower: PETSc.Vec, upper: PETSc.Vec) -> None:
     """Both components of a stuck vertex's slip are kept at zero."""
-    d = term.free.shape[1]
-    dofs = term.surface.blocks[:, None].astype(np.int64) * d + np.arange(d)
+    dofs = term.surface.dofs
     stuck = (cells.index == 0)[:, None] & np.any(np.abs(term.directions) > 0.5, axis=1) & (term.free > 0)
     if len(cells.kinks):
         lower.array[dofs[stuck]] = upper.array[dofs[stuck]] = 0.0
