@@ -113,6 +113,5 @@ def _prolonged(step: PETSc.Mat, below: System, found: Solved, system: System) ->
     x.scale(below.problem.scales.displacement / system.problem.scales.displacement)
     x.pointwiseMax(x, system.lower)
     x.pointwiseMin(x, system.upper)
-    owned = system.problem.fixed[system.problem.fixed < x.local_size]
-    x.array[owned] = system.load.array_r[owned]
+    system.prescribe(x)
     return x

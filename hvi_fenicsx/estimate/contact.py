@@ -57,10 +57,11 @@ def on_contact(system: System, u: fem.Function, examined: Examined) -> OnContact
     comm = system.comm
     apart, whole = (total(comm, sum(pair[i] for pair in slips)) for i in (0, 1))
     away, carried = (total(comm, sum(pair[i] for pair in tractions)) for i in (0, 1))
-    return OnContact(float(np.sqrt(_over(apart, whole))), _over(away, carried))
+    return OnContact(float(np.sqrt(ratio(apart, whole))), ratio(away, carried))
 
 
-def _over(part: float, whole: float) -> float:
+def ratio(part: float, whole: float) -> float:
+    """Part over whole; infinite where there is no whole, but 0 of nothing."""
     return part / whole if whole > 0 else (np.inf if part > 0 else 0.0)
 
 
@@ -68,10 +69,10 @@ def _change(system: System, u: fem.Function, examined: Examined) -> Change:
     """The defect with its influence on the vertices and, from the second time on, theirs on it. Collective."""
     problem, inverse = system.problem, Dual(system, u)
     space, moved = bubbles.space(problem.domain.mesh), fem.Function(problem.space)
-    change = None
+    change, residual = None, defect.residual(problem, u, space)
     for _ in range(_TIMES):
         edges, _ = pointwise(problem, space, u, examined.states, change)
-        load = defect.residual(problem, u, space) - edges - _internal(problem, space, moved)
+        load = residual - edges - _internal(problem, space, moved)
         change = Change(moved, defect.least(problem, u, space, load))
         _answer(problem, u, examined, inverse, change)
     inverse.destroy()
@@ -81,11 +82,10 @@ def _change(system: System, u: fem.Function, examined: Examined) -> Change:
 
 def _answer(problem: Problem, u: fem.Function, examined: Examined, inverse: Dual, change: Change) -> None:
     """Move the vertices as the bubbles ask; the laws answer that, so it takes a few rounds. Collective."""
-    size = 0.0
+    size, bubbling = 0.0, _internal(problem, problem.space, change.edges)
     for _ in range(_ROUNDS):
         _, laws = pointwise(problem, change.edges.function_space, u, examined.states, change)
-        felt = [_internal(problem, problem.space, part) for part in (change.vertices, change.edges)]
-        step, length = inverse.solve(laws - felt[0] - felt[1])
+        step, length = inverse.solve(laws - _internal(problem, problem.space, change.vertices) - bubbling)
         change.vertices.x.array[:] += step.x.array
         size = max(size, length)
         if length <= _SETTLED * size:
