@@ -32,10 +32,14 @@ _SETTLED = 0.05
 
 @dataclass(frozen=True)
 class OnContact:
-    """Estimated errors on Γc, relative: of the slip in L2, of -σ_t in L1 (0 without a law along Γc)."""
+    """Estimated errors on Γc, relative: of the slip in L2, of -σ_t in L1 (0 without a law along Γc).
+
+    ``moved`` is u_h with its estimated error at the vertices, nondimensional.
+    """
 
     slip: float
     friction: float
+    moved: fem.Function
 
 
 def on_contact(system: System, u: fem.Function, examined: Examined) -> OnContact:
@@ -57,7 +61,8 @@ def on_contact(system: System, u: fem.Function, examined: Examined) -> OnContact
     comm = system.comm
     apart, whole = (total(comm, sum(pair[i] for pair in slips)) for i in (0, 1))
     away, carried = (total(comm, sum(pair[i] for pair in tractions)) for i in (0, 1))
-    return OnContact(float(np.sqrt(_over(apart, whole))), _over(away, carried))
+    change.vertices.x.array[:] += u.x.array
+    return OnContact(float(np.sqrt(_over(apart, whole))), _over(away, carried), change.vertices)
 
 
 def _over(part: float, whole: float) -> float:
