@@ -122,9 +122,13 @@ class Along:
         self._barycentric, weights = quadrature("interval" if d == 2 else "triangle", _DEGREE)
         self.weights: Array = self._facets.areas[:, None] * weights
 
+    def at_vertices(self, values: Array) -> Array:
+        """Values at the part's owned vertices (m, k) by facet, (f, d, k). Collective."""
+        return np.asarray(spread(self._problem, self._surface, values)[self._facets.vertices])
+
     def interpolated(self, values: Array) -> Array:
         """Linear interpolation of values at the part's owned vertices (m, k); (f, q, k). Collective."""
-        return self._linear(spread(self._problem, self._surface, values)[self._facets.vertices])
+        return self._linear(self.at_vertices(values))
 
     def linear(self, u: fem.Function) -> Array:
         """Of a P1 field, (f, q, k)."""
