@@ -122,13 +122,23 @@ def true_error(reached: Reached, scene: Scene, requested: float, largest: int) -
     wanted = min(requested, rung.solution.estimate.relative) / 3  # type: ignore[union-attr]
     go = climber()
     while rung.solution.estimate.relative > wanted and rung.dofs < largest:  # type: ignore[union-attr]
-        below, rung = rung, go.up(rung, adaptive.refined(rung, 0.75), scene)
+        below, rung = rung, go.up(rung, adaptive.refined(rung, 0.75), scene, ahead(rung, quantity))
         field = quantities.carried(field, rung, below)
     own = rung.solution.estimate.relative  # type: ignore[union-attr]
     if own > 0.7 * reached.rung.solution.estimate.relative:  # type: ignore[union-attr]
         return None, own  # no reference worth the name within the largest number of unknowns
     apart = distance(rung, field, quantity)
     return (float(np.hypot(apart, own)) if quantity == "energy" else apart), own
+
+
+def ahead(rung: Rung, quantity: str) -> fem.Function | None:
+    """What `hvi run --accuracy` would start the next mesh from."""
+    if quantity == "energy":
+        return None
+    watched = quantities.watched(quantity, rung)
+    watched.add(rung)
+    watched.error()
+    return watched.ahead()
 
 
 def reader(quantity: str) -> Callable[[Rung], Any]:

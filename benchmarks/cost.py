@@ -9,6 +9,8 @@ ladder's coarser meshes. All to 1e-8, in turn, medians of the repeats.
 from __future__ import annotations
 
 import argparse
+import shlex
+import sys
 import tempfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -81,8 +83,8 @@ def draw(rows: Sequence[Sequence[object]]) -> None:
     picture("cost", figure)
 
 
-def plate(folder: Path, size: float) -> list[str]:
-    """Overrides for the unit square as an unstructured gmsh mesh, of this cell size."""
+def plate(folder: Path, size: float, refinements: int = 0) -> list[str]:
+    """Overrides for the unit square as an unstructured gmsh mesh of this cell size, refined so often."""
     import gmsh
 
     gmsh.initialize()
@@ -94,9 +96,10 @@ def plate(folder: Path, size: float) -> list[str]:
     gmsh.model.addPhysicalGroup(2, [1], name="plate")
     gmsh.option.setNumber("Mesh.MeshSizeMax", size)
     gmsh.model.mesh.generate(2)
-    gmsh.write(str(folder / "plate.msh"))
+    file = folder / f"plate_{size}.msh"
+    gmsh.write(str(file))
     gmsh.finalize()
-    return [f'domain={{shape="file", file="{folder / "plate.msh"}"}}']
+    return [f'domain={{shape="file", file="{file}", refinements={refinements}}}']
 
 
 def main() -> None:
@@ -105,23 +108,27 @@ def main() -> None:
     made.add_argument("--algebraic", nargs="*", default=["gamg"], help="of gamg, hypre, mumps")
     made.add_argument("--boxes", type=int, nargs="*", default=[], help="cells a side in 3D: 32, 52, 68 in full")
     made.add_argument("--unstructured", type=float, nargs="*", default=[], help="cell sizes of gmsh meshes: 0.004")
+    made.add_argument("--refined", type=float, nargs="*", default=[], help="such sizes, refined four times: 0.064")
     made.add_argument("--scenes", nargs="*", choices=[*SCENES], default=[*PLANE])
     options = made.parse_args()
     rows, counted = [], []
     with tempfile.TemporaryDirectory() as folder:
-        cases = [(s, square(n), [*options.algebraic, "mg"]) for n in options.cells for s in options.scenes]
-        cases += [("block", [f"domain.cells=[{n}, {n}, {n}]"], [*options.algebraic, "mg"]) for n in options.boxes]
-        cases += [(s, plate(Path(folder), h), options.algebraic) for h in options.unstructured for s in options.scenes]
-        for scene, overrides, kinds in cases:
+        both = [*options.algebraic, "mg"]
+        cases = [(s, s, square(n), both) for n in options.cells for s in options.scenes]
+        cases += [("block", "block", [f"domain.cells=[{n}, {n}, {n}]"], both) for n in options.boxes]
+        for h in options.unstructured:
+            cases += [(f"{s}, gmsh", s, plate(Path(folder), h), options.algebraic) for s in options.scenes]
+        for h in options.refined:
+            cases += [(f"{s}, gmsh refined", s, plate(Path(folder), h, refinements=4), both) for s in options.scenes]
+        for name, scene, overrides, kinds in cases:
             runs = measured(scene, overrides, kinds, options)
-            name = f"{scene}, gmsh" if "file" in overrides[0] else scene
             if not runs["contact"] or not any(runs[kind] for kind in options.algebraic):
                 say(f"{name}, {overrides[0]}: left out, since its runs failed")
                 continue
             rows.append(row(name, runs))
             counted.append(counts(name, runs["contact"][0]))
     draw(rows)
-    command = "./hvi exec python3 benchmarks/cost.py --cells " + " ".join(map(str, options.cells))
+    command = shlex.join(["./hvi", "exec", "python3", "benchmarks/cost.py", *sys.argv[1:]])
     text = (
         "Assembly (forms included), setup and solve on all levels, medians with their range; the mesh stated apart. "
         f"Medians of {options.repeats}."

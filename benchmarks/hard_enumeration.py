@@ -2,9 +2,9 @@
 
 The assembled stiffness is condensed to the unknowns of the floor (:mod:`tests.enumeration` has the same idea on its own
 assembly). Each of them is on one piece or one kink of its law or on its bound; each combination is one small linear
-system and a check of signs. Combinations are chosen unknown by unknown, and a choice is given up when no point has all
-the others in the hulls of their graphs, a small linear programme. For tractions that are piecewise linear: those of
-unsmoothed laws, and of laws smoothed by the quadratic plus function.
+system and a check of signs. A state is given up when no point has it and all other unknowns in the hulls of the states
+they have left, a small linear programme; what is left is branched on, the unknown with the fewest first. For tractions
+that are piecewise linear: those of unsmoothed laws, and of laws smoothed by the quadratic plus function.
 """
 
 from __future__ import annotations
@@ -96,6 +96,9 @@ def equilibria(case: Case, data: Mapping[str, Any]) -> int | None:
         return None
 
 
+States = list[list[State]]
+
+
 class _TooMany(Exception):
     """The search has taken more than MOST linear programmes."""
 
@@ -106,44 +109,53 @@ class _Search:
 
     stiffness: Array
     load: Array
-    states: list[list[State]]
+    states: States
     programmes: int = 0
 
     def __post_init__(self) -> None:
         self._slack = _RELAXED * max(1.0, float(np.abs(self.load).max()))
-        self._hulls = [_hull(s) for s in self.states]
 
-    def count(self, chosen: Mapping[int, State] | None = None) -> int:
-        """With the states of some unknowns chosen.
+    def count(self) -> int:
+        """Combinations that are equilibria.
 
         Raises:
             _TooMany: it takes too long.
         """
-        chosen = chosen or {}
-        if len(chosen) == len(self.states):
-            return _admissible(self.stiffness, self.load, [tuple(chosen[i] for i in range(len(chosen)))])
-        x = self._relaxed(chosen)
-        if x is None:
-            return 0
-        at = self._farthest(x, chosen)
-        return sum(self.count({**chosen, at: state}) for state in self.states[at])
+        return self._below(self.states)
 
-    def _relaxed(self, chosen: Mapping[int, State]) -> Array | None:
-        """A point with the chosen states, all other unknowns being in their hulls; None if there is none."""
+    def _below(self, states: States) -> int:
+        """Those of a branch, in which each unknown has these states left."""
+        left = self._shaved(states)
+        if left is None:
+            return 0
+        open_ones = [i for i, of in enumerate(left) if len(of) > 1]
+        if not open_ones:
+            return _admissible(self.stiffness, self.load, [tuple(of[0] for of in left)])
+        at = min(open_ones, key=lambda i: len(left[i]))
+        return sum(self._below([*left[:at], [state], *left[at + 1 :]]) for state in left[at])
+
+    def _shaved(self, states: States) -> States | None:
+        """Without the states that no point has, the others being in their hulls, which shrink; None if one has none."""
+        left, shrinks = [list(of) for of in states], True
+        while shrinks:
+            before = sum(map(len, left))
+            for i, of in enumerate(left):
+                left[i] = [s for s in of if self._possible([*left[:i], [s], *left[i + 1 :]])]
+                if not left[i]:
+                    return None
+            shrinks = sum(map(len, left)) < before
+        return left
+
+    def _possible(self, states: States) -> bool:
+        """Whether a point has all unknowns in the hulls of these states."""
         self.programmes += 1
         if self.programmes > MOST:
             raise _TooMany
-        of = [_hull([chosen[i]]) if i in chosen else hull for i, hull in enumerate(self._hulls)]
+        of = [_hull(s) for s in states]
         rows = [a * np.eye(len(of))[i] - b * self.stiffness[i] for i, hull in enumerate(of) for a, b, _ in hull]
         ends = [c - b * self.load[i] + self._slack for i, hull in enumerate(of) for _, b, c in hull]
         found = linprog(np.zeros(len(of)), np.array(rows), ends, bounds=(None, None), method="highs")
-        return None if found.status == _INFEASIBLE else found.x if found.x is not None else np.zeros(len(of))
-
-    def _farthest(self, x: Array, chosen: Mapping[int, State]) -> int:
-        """The open unknown that is farthest from all of its states there."""
-        force = self.load - self.stiffness @ x
-        open_ones = [i for i in range(len(self.states)) if i not in chosen]
-        return max(open_ones, key=lambda i: min(s.distance(float(x[i]), float(force[i])) for s in self.states[i]))
+        return bool(found.status != _INFEASIBLE)
 
 
 def _hull(states: Sequence[State]) -> list[tuple[float, float, float]]:

@@ -24,6 +24,8 @@ from .solution import NOT_CONVERGED, Solution
 
 _BULK = {2: 0.75, 3: 0.5}
 """Share of the squared error that one step refines, by dimension."""
+_BULK_ON_CONTACT = 0.5
+"""The same for errors on Γc: they fall as the square of the energy norm's, so a smaller share goes as far."""
 _SMALLEST_BULK = 0.2
 _AIM = 0.9
 """Of the accuracy asked for: where the last step aims."""
@@ -204,17 +206,15 @@ class _Climb:
         if self._mesh_will_do():
             return self.climber.again(rung, scene)
         nesting = adaptive.refined(rung, self._bulk())
-        return self._too_long(nesting) or self.climber.up(rung, nesting, scene)
+        ahead = None if self.watched is None else self.watched.ahead()
+        return self._too_long(nesting) or self.climber.up(rung, nesting, scene, ahead)
 
     def _bulk(self) -> float:
         """How much of the squared error to refine: no more than takes the estimate to where it should be."""
-        most = _BULK[self.scene.dimension]
-        if (
-            not self.steps
-            or self.failures
-            or self.goal.accuracy is None
-            or isinstance(self.watched, quantities.History)
-        ):
+        told = isinstance(self.watched, quantities.Estimated)
+        most = _BULK_ON_CONTACT if told else _BULK[self.scene.dimension]
+        known = self.watched is None or told
+        if not self.steps or self.failures or self.goal.accuracy is None or not known:
             return most
         mesh, smoothing, _ = self._parts()
         left = math.sqrt(max((_AIM * self.goal.accuracy) ** 2 - smoothing**2, 0.0)) / mesh if mesh > 0 else 1.0

@@ -7,10 +7,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
+from dolfinx import fem
 from mpi4py import MPI
 from petsc4py import PETSc
 
@@ -78,13 +79,19 @@ class Climber:
         prepared = prepare(scene, comm, self.timer)
         return Rung(prepared, finish(prepared, self.progress, self.interrupted), None)
 
-    def up(self, rung: Rung, nesting: Refinement, scene: Scene) -> Rung:
-        """The next rung: its scene solved on the refined mesh, from the solution on the rung below. Collective."""
+    def up(self, rung: Rung, nesting: Refinement, scene: Scene, ahead: fem.Function | None = None) -> Rung:
+        """The next rung: its scene solved on the refined mesh, from the solution on the rung below. Collective.
+
+        Args:
+            rung: the one below. nesting: the refined mesh. scene: to solve on it.
+            ahead: a displacement on the rung below that is nearer to the next one's than its own solution. At a drop
+                neighbouring vertices may each be the last before it, all in equilibrium; a start decides which.
+        """
         prepared, below = self._prepared(rung, scene, nesting.domain), rung.prepared.system
         with self.timer("setup"):
             step = ladder.between(prepared.system, below, nesting)
             prepared.system.below = ladder.stacked(step, below)
-        return self._solved(rung, prepared, step)
+        return self._solved(rung, prepared, step, ahead)
 
     def again(self, rung: Rung, scene: Scene) -> Rung:
         """The same mesh with another solver table. Collective."""
@@ -95,8 +102,10 @@ class Climber:
     def _prepared(self, rung: Rung, scene: Scene, body: Domain) -> Prepared:
         return prepare(scene, rung.comm, self.timer, body, None if self.existence else rung.solution.solvability)
 
-    def _solved(self, rung: Rung, prepared: Prepared, step: PETSc.Mat) -> Rung:
+    def _solved(self, rung: Rung, prepared: Prepared, step: PETSc.Mat, ahead: fem.Function | None = None) -> Rung:
         found = rung.solution.solved
+        if found is not None and ahead is not None:
+            found = replace(found, u=ahead)
         start = (rung.prepared.system, found, step) if found is not None else None
         return Rung(prepared, finish(prepared, self.progress, self.interrupted, start), step)
 
@@ -130,7 +139,7 @@ def marked(comm: MPI.Comm, estimate: Estimate, bulk: float) -> npt.NDArray[np.in
 def coarsest(scene: Scene) -> Scene:
     """The scene on the mesh to begin with: its own, made coarser as far as its shape allows.
 
-    Blocks keep at least three cells each way, gmsh's shapes cells of a sixth of their extent; a file stays as it is.
+    Blocks keep at least three cells each way, gmsh's shapes cells of a sixth of their extent; a file is taken as it is.
     """
     cells = getattr(scene.domain, "cells", None)
     if cells is not None:
@@ -139,7 +148,7 @@ def coarsest(scene: Scene) -> Scene:
         return _with(scene, cells=cells)
     size = getattr(scene.domain, "mesh_size", None)
     if size is None:
-        return scene
+        return _with(scene, refinements=0)
     largest = math.sqrt(scene.domain.area()) * _LARGEST_PART  # type: ignore[union-attr]
     factor = 2.0 ** max(0, math.floor(math.log2(largest / size)))
     below = getattr(scene.domain, "mesh_size_below", None)

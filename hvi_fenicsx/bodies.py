@@ -43,6 +43,11 @@ class Bodies:
         return np.where((self.labels == mode.body)[:, None], field, 0.0)
 
 
+def whole(domain: Domain) -> Body:
+    """All that a domain is made of, as one body."""
+    return Body(domain.dimension, np.asarray(domain.centre / domain.length), domain.length)
+
+
 def find(domain: Domain, space: fem.FunctionSpace) -> Bodies:
     """The bodies of a domain; ``space`` is P1 on its mesh. Collective.
 
@@ -50,7 +55,7 @@ def find(domain: Domain, space: fem.FunctionSpace) -> Bodies:
         InputError: on all ranks alike: two bodies meet at a vertex (in 3D perhaps along an edge) only, a hinge.
     """
     vertices = space.dofmap.index_map.size_local + space.dofmap.index_map.num_ghosts
-    one = Body(domain.dimension, np.asarray(domain.centre / domain.length), domain.length)
+    one = whole(domain)
     if domain.one_piece:
         return Bodies((one,), np.zeros(vertices, np.int64))
     cells, count = _cells(domain)

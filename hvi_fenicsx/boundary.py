@@ -13,15 +13,14 @@ import numpy as np
 import numpy.typing as npt
 import ufl
 from dolfinx import fem
-from dolfinx.fem.petsc import assemble_vector
-from petsc4py import PETSc
 
 from . import dilatation, ledger
 from .effects.base import Direction
 from .lawterm import LawTerm
 from .ledger import NEAR, Ledger
 from .problem import Bounds, Problem
-from .surface import Surface, component_dofs
+from .surface import Surface
+from .vectors import nodal
 
 Array = npt.NDArray[np.float64]
 
@@ -77,19 +76,11 @@ class State:
 def forces(problem: Problem, u: fem.Function) -> Forces:
     """Reassembled from the forms, whatever a solver believes. Collective."""
     d = problem.scales.dimension
-    internal = _vector(ufl.action(problem.bilinear, u)).reshape(-1, d)
+    internal = nodal(ufl.action(problem.bilinear, u))
     for part in dilatation.assemble(problem.averaged):
         internal += part.force(u).reshape(-1, d)
-    load = sum((_vector(form).reshape(-1, d) for form in problem.linear.values()), np.zeros_like(internal))
+    load = sum((nodal(form) for form in problem.linear.values()), np.zeros_like(internal))
     return Forces(internal - load, load)
-
-
-def _vector(form: object) -> Array:
-    vector = assemble_vector(fem.form(form))
-    vector.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
-    values: Array = vector.array.copy()
-    vector.destroy()
-    return values
 
 
 def states(problem: Problem, u: fem.Function, reaction: Array) -> tuple[State, ...]:
@@ -150,7 +141,7 @@ def _away(traction: Array, low: Array, high: Array) -> Array:
 
 def _contact(book: Ledger, bounds: Bounds) -> Array:
     """σ_n that contact carries, (m,); off the bounds what is left there, which should be nothing."""
-    dofs, sign = component_dofs(bounds.surface.blocks, bounds.surface.normals)
+    dofs, sign = bounds.component()
     weight = np.where(book.contact[dofs], book.contact_weight[dofs], bounds.surface.weights)
     return sign * book.contact_force[dofs] / weight
 
@@ -176,7 +167,7 @@ def _state(
         pressure,
         own,
         friction,
-        _touching(bounds, normal),
+        np.zeros(len(normal), dtype=bool) if bounds is None else ledger.touches(bounds, normal),
         tuple(r.argument for r in read),
         tuple(r.traction for r in read),
         tuple(r.distance for r in read),
@@ -216,16 +207,10 @@ def _along(slip: Array, law: _Law) -> Array:
     return law.traction[:, None] * np.divide(slip, law.argument[:, None], out=np.zeros_like(slip), where=moving)
 
 
-def _touching(bounds: Bounds | None, normal: Array) -> npt.NDArray[np.bool_]:
-    if bounds is None:
-        return np.zeros(len(normal), dtype=bool)
-    return (normal >= bounds.upper - NEAR) | (normal <= bounds.lower + NEAR)
-
-
 def balanced(problem: Problem, reaction: Array, parts: Sequence[State]) -> Array:
     """The reaction less what supports, contact and laws may carry: zero in equilibrium; shape (blocks, d)."""
     rest = reaction.copy()
-    rest.reshape(-1)[problem.fixed[problem.fixed < rest.size]] = 0.0
+    rest.reshape(-1)[problem.fixed_here] = 0.0
     for state in parts:
         carried = [t.directions for t in state.terms]
         if state.bounds is not None:

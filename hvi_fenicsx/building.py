@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from mpi4py import MPI
 
-from . import domain, problem, smoothing, system
+from . import domain, problem, refinement, smoothing, system
 from .domain import Domain
 from .laws import Superpotential
 from .timing import Timer
@@ -24,12 +24,22 @@ def assemble(scene: Scene, comm: MPI.Comm, timer: Timer, body: Domain | None = N
         InputError: the scene does not fit its mesh, on all ranks alike.
     """
     with timer("mesh"):
-        body = body or domain.build(comm, scene.domain, scene.dimension)
+        body = body or mesh(scene, comm)
     with timer("jit"):
         placed = [(p.where, p.effect) for p in scene.effects()]
         composed = problem.compose(body, scene.parts, placed, modification(scene))
         compiled = system.compile_forms(composed)
     return system.System(composed, compiled, timer)
+
+
+def mesh(scene: Scene, comm: MPI.Comm) -> Domain:
+    """The body of a scene; a mesh file's is refined as often as the scene says. Collective.
+
+    Raises:
+        InputError: on all ranks alike, when a file cannot be read or is no usable mesh, or memory cannot suffice.
+    """
+    whole = domain.build(comm, scene.domain, scene.dimension)
+    return refinement.repeated(whole, getattr(scene.domain, "refinements", 0))
 
 
 def modification(scene: Scene) -> Callable[[Superpotential], Superpotential]:

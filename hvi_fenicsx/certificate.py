@@ -5,7 +5,7 @@ Each entry is relative to a scale that is stated with it; ``passed`` means that 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 
 import numpy as np
@@ -15,10 +15,9 @@ from mpi4py import MPI
 
 from . import boundary, stability
 from .boundary import Forces, State
-from .ledger import NEAR
+from .ledger import NEAR, on_bounds, on_kink
 from .parallel import agree, largest, total
-from .problem import Problem
-from .system import traction_scale
+from .problem import Bounds, Problem
 
 Array = npt.NDArray[np.float64]
 _LARGEST_ROUNDING, _SAFETY = 1e-4, 4.0
@@ -94,7 +93,7 @@ def examine(problem: Problem, u: fem.Function, tolerance: float, *, inertia: boo
         "equilibrium": _unbalanced(problem, forces, states) / scale,
         "penetration": largest(comm, _worst(states, _penetration)) / size,
         "tension": largest(comm, _worst(states, _tension)),
-        "complementarity": largest(comm, _worst(states, lambda s: _complementarity(s, size))),
+        "complementarity": largest(comm, _worst(states, lambda b, s: _complementarity(b, s, size))),
         "inclusion": largest(comm, max((_inclusion(s) for s in states), default=0.0)),
     }
     passed, rounding = _within(entries, tolerance), None
@@ -158,7 +157,7 @@ def _rounding(problem: Problem, u: fem.Function, states: Sequence[State], scale:
 
 
 def _finest(state: State) -> float:
-    return min((traction_scale(t) for t in state.terms), default=1.0)
+    return min((t.traction_scale for t in state.terms), default=1.0)
 
 
 def _energy(problem: Problem, u: fem.Function, forces: Forces, states: Sequence[State]) -> float:
@@ -178,32 +177,30 @@ def _unbalanced(problem: Problem, forces: Forces, states: Sequence[State]) -> fl
     return _norm(problem, boundary.balanced(problem, forces.reaction, states))
 
 
-def _worst(states: Sequence[State], measure: object) -> float:
-    values = [measure(s) for s in states if s.bounds is not None]  # type: ignore[operator]
+def _worst(states: Sequence[State], measure: Callable[[Bounds, State], Array]) -> float:
+    values = [measure(s.bounds, s) for s in states if s.bounds is not None]
     return max((float(np.max(v, initial=0.0)) for v in values), default=0.0)
 
 
-def _penetration(state: State) -> Array:
-    return np.maximum(state.normal - state.bounds.upper, state.bounds.lower - state.normal)  # type: ignore[union-attr]
+def _penetration(bounds: Bounds, state: State) -> Array:
+    return bounds.beyond(state.normal)
 
 
-def _tension(state: State) -> Array:
+def _tension(bounds: Bounds, state: State) -> Array:
     """Pulling at the upper bound of u·n, pushing at the lower one."""
-    pressure, bounds = state.contact_pressure, state.bounds
-    upper = state.normal >= bounds.upper - NEAR  # type: ignore[union-attr]
-    lower = state.normal <= bounds.lower + NEAR  # type: ignore[union-attr]
+    pressure = state.contact_pressure
+    lower, upper = on_bounds(bounds, state.normal)
     wrong = np.where(upper & lower, 0.0, np.where(upper, pressure, np.where(lower, -pressure, 0.0)))
     return np.maximum(wrong, 0.0)
 
 
-def _complementarity(state: State, size: float) -> Array:
-    bounds = state.bounds
-    gap = np.minimum(bounds.upper - state.normal, state.normal - bounds.lower)  # type: ignore[union-attr]
-    return np.minimum(np.abs(state.contact_pressure), np.maximum(gap, 0.0) / size)
+def _complementarity(bounds: Bounds, state: State, size: float) -> Array:
+    gap = np.maximum(-bounds.beyond(state.normal), 0.0)
+    return np.minimum(np.abs(state.contact_pressure), gap / size)
 
 
 def _inclusion(state: State) -> float:
-    pairs = [d / traction_scale(t) for t, d in zip(state.terms, state.distances, strict=True)]
+    pairs = [d / t.traction_scale for t, d in zip(state.terms, state.distances, strict=True)]
     return max((float(np.max(p, initial=0.0)) for p in pairs), default=0.0)
 
 
@@ -217,7 +214,7 @@ def _inclusion_true(states: Sequence[State]) -> tuple[float, float]:
             true = term.exact
             away = np.where(hidden, 0.0, true.distance(argument, traction, NEAR))
             size = float(np.max(away, initial=0.0))
-            worst, absolute = max(worst, size / traction_scale(term)), max(absolute, size)
+            worst, absolute = max(worst, size / term.traction_scale), max(absolute, size)
     return worst, absolute
 
 
@@ -227,8 +224,7 @@ def _second_order(comm: MPI.Comm, states: Sequence[State]) -> str:
         for term, argument, hidden in zip(state.terms, state.arguments, state.hidden, strict=True):
             concave = term.law.concave
             x = argument[~hidden]
-            on = [np.abs(x - k) <= NEAR for k in concave.kinks]
-            kink |= bool(np.any(on))
+            kink |= bool(np.any(on_kink(concave, x)))
             curved |= bool(np.any(concave.second(x) > term.law.convex.second(x)))
     found = agree(comm, (kink, curved))
     if any(k for k, _ in found):

@@ -15,12 +15,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 from dolfinx import fem
-from dolfinx.fem.petsc import assemble_matrix, assemble_vector
+from dolfinx.fem.petsc import assemble_matrix
 from petsc4py import PETSc
 
 from .effects.base import Averaged
-
-_ADD, _REVERSE = PETSc.InsertMode.ADD, PETSc.ScatterMode.REVERSE
+from .vectors import assembled
 
 
 @dataclass(frozen=True)
@@ -61,8 +60,7 @@ def assemble(averaged: Sequence[Averaged]) -> list[Dilatation]:
 def _assembled(averaged: Averaged) -> Dilatation:
     divergence = assemble_matrix(fem.form(averaged.divergence))
     divergence.assemble()
-    volume = assemble_vector(fem.form(averaged.volume))
-    volume.ghostUpdate(addv=_ADD, mode=_REVERSE)
+    volume = assembled(fem.form(averaged.volume))
     stiffness = divergence.createVecLeft()
     v = volume.array_r
     # vertices outside of the region have no volume and average nothing

@@ -19,6 +19,7 @@ from .errors import InputError
 from .parallel import agree
 
 if TYPE_CHECKING:
+    from .refinement import Refinement
     from .scene.shapes import Shape
 
 _LEAST_MEMORY = 300.0
@@ -40,6 +41,7 @@ class Domain:
         curves: the true curve of a side by its name, where that is known and not straight; the facets of all other
             sides, those of mesh files among them, are taken for the geometry itself.
         one_piece: whether the mesh is known to be connected; else one has to look (:mod:`.bodies`).
+        origin: the coarser domain that serves as the rung below, and how it was refined; None where there is none.
     """
 
     mesh: dmesh.Mesh
@@ -49,6 +51,7 @@ class Domain:
     upper: npt.NDArray[np.float64]
     curves: Mapping[str, Arc] = field(default_factory=dict)
     one_piece: bool = False
+    origin: tuple[Domain, Refinement] | None = None
 
     @property
     def dimension(self) -> int:
@@ -118,23 +121,29 @@ def build(comm: MPI.Comm, shape: Shape, dimension: int) -> Domain:
     if shape.shape == "file":
         return from_file(comm, shape.file, dimension, shape.scale)
     if shape.shape == "rectangle":
-        _check_affordable(comm, dimension, shape.cells)
+        check_affordable(comm, dimension * math.prod(n + 1 for n in shape.cells), "cells")
         return rectangle(comm, shape.size, shape.cells)
     if shape.shape == "box":
-        _check_affordable(comm, dimension, shape.cells)
+        check_affordable(comm, dimension * math.prod(n + 1 for n in shape.cells), "cells")
         return box(comm, shape.size, shape.cells)
     mesh, sides = domain_shapes.build(comm, shape)
     return Domain(mesh, sides, {}, *_bounding_box(mesh), domain_shapes.curves(shape), one_piece=True)
 
 
-def _check_affordable(comm: MPI.Comm, dimension: int, cells: Sequence[int]) -> None:
-    """Refuse what would be killed for want of memory, half an hour later. Collective."""
-    unknowns = dimension * math.prod(n + 1 for n in cells)
+def check_affordable(comm: MPI.Comm, unknowns: int, key: str) -> None:
+    """Refuse what would be killed for want of memory, half an hour later. Collective.
+
+    Args:
+        comm: all ranks. unknowns: of the mesh to be made. key: of ``[domain]``, which makes them so many.
+
+    Raises:
+        InputError: on all ranks alike.
+    """
     least, room = unknowns * _LEAST_MEMORY / 2**20, memory.room(comm)
     if least > room:
         raise InputError(
-            f"domain.cells: make {unknowns:.1e} unknowns, which need {least / 1024:.3g} GB at least; there are "
-            f"{room / 1024:.3g} GB: use fewer cells"
+            f"domain.{key}: make {unknowns:.1e} unknowns, which need {least / 1024:.3g} GB at least; there are "
+            f"{room / 1024:.3g} GB: use fewer {key}"
         )
 
 

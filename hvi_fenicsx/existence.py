@@ -116,8 +116,7 @@ def _along(problem: Problem, body: Body, surface: Surface, directions: Array) ->
 
 
 def _prescribed(problem: Problem, body: Body) -> Fixed:
-    d, owned = problem.scales.dimension, problem.space.dofmap.index_map.size_local
-    dofs = problem.fixed[problem.fixed < d * owned]
+    d, dofs = problem.scales.dimension, problem.fixed_here
     dofs = dofs[inside(problem, body, dofs // d)]
     points = problem.points[dofs // d]
     return Fixed(np.asarray(points / problem.scales.length), np.asarray(np.eye(d)[dofs % d]))

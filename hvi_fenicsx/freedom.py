@@ -21,6 +21,7 @@ from petsc4py import PETSc
 from .parallel import total
 from .problem import Problem
 from .rigid import Mode
+from .vectors import null_space
 
 Array = npt.NDArray[np.float64]
 
@@ -41,24 +42,13 @@ class Freedom:
 
 def build(vectors: list[PETSc.Vec], modes: Sequence[Mode]) -> Freedom:
     """The freedom of modes whose fields (consumed) are these vectors of unknowns. Collective."""
-    orthonormalise(vectors)
-    comm = vectors[0].comm.tompi4py()
-    return Freedom(
-        tuple(modes), PETSc.NullSpace().create(vectors=vectors, comm=comm), _pins(comm, [v.array_r for v in vectors])
-    )
-
-
-def orthonormalise(vectors: list[PETSc.Vec]) -> None:
-    """Gram and Schmidt. Collective."""
-    for i, vector in enumerate(vectors):
-        for other in vectors[:i]:
-            vector.axpy(-vector.dot(other), other)
-        vector.normalize()
+    spanned = null_space(vectors)
+    return Freedom(tuple(modes), spanned, _pins(vectors[0].comm.tompi4py(), [v.array_r for v in vectors]))
 
 
 def fields(problem: Problem, modes: Sequence[Mode]) -> list[fem.Function]:
     """The modes as displacements. Collective."""
-    points = problem.space.tabulate_dof_coordinates() / problem.scales.length
+    points = np.asarray(problem.points / problem.scales.length)
     found = []
     for mode in modes:
         field = fem.Function(problem.space)

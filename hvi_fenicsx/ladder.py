@@ -31,6 +31,10 @@ _GROWTH = 3.0
 
 def coarser(scene: Scene) -> Scene | None:
     """The scene one rung below; None where the mesh has no such rung."""
+    refinements = getattr(scene.domain, "refinements", 0)
+    if refinements:
+        domain = scene.domain.model_copy(update={"refinements": refinements - 1})
+        return scene.model_copy(update={"domain": domain})
     cells = getattr(scene.domain, "cells", None)
     if cells is None or any(n % 2 or n // 2 < _COARSEST for n in cells):
         return None

@@ -46,6 +46,11 @@ class LawTerm:
         """Whether the law acts on the length of a slip vector (|u_t| in 3D)."""
         return self.directions.shape[1] > 1
 
+    @property
+    def traction_scale(self) -> float:
+        """What the law's traction is judged by: its own scale, but nothing finer than a thousandth of the load's."""
+        return max(self.exact.traction_scale, 1e-3)
+
     def slip(self, u: Array) -> Array:
         """The displacement along the directions, of a local array; shape (m, k)."""
         return np.einsum("mkd,md->mk", self.directions, self.surface.values(u))

@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import frames
+from .laws import ConvexPart
 from .lawterm import LawTerm
 from .problem import Bounds, Problem
 from .surface import component_dofs
@@ -99,11 +100,27 @@ def _enter_law(ledger: Ledger, term: LawTerm, u: Array) -> None:
 
 
 def _enter_bound(ledger: Ledger, bounds: Bounds, u: Array) -> None:
-    dofs, sign = component_dofs(bounds.surface.blocks, bounds.surface.normals)
+    dofs, sign = bounds.component()
     normal = sign * u.ravel()[dofs]
-    reached = (normal >= bounds.upper - NEAR) | (normal <= bounds.lower + NEAR)
+    reached = touches(bounds, normal)
     ledger.contact[dofs] |= reached
     np.add.at(ledger.contact_weight, dofs, np.where(reached, bounds.surface.weights, 0.0))
+
+
+def on_bounds(bounds: Bounds, normal: Array) -> tuple[Mask, Mask]:
+    """Whether u·n (m,) is on the lower and on the upper bound."""
+    return normal <= bounds.lower + NEAR, normal >= bounds.upper - NEAR
+
+
+def touches(bounds: Bounds, normal: Array) -> Mask:
+    """Whether u·n (m,) is on a bound."""
+    lower, upper = on_bounds(bounds, normal)
+    return lower | upper
+
+
+def on_kink(part: ConvexPart, argument: Array) -> Mask:
+    """Whether a law's argument (m,) is on a kink of its H or G."""
+    return np.asarray(np.any(np.abs(argument[:, None] - part.kinks) <= NEAR, axis=1))
 
 
 def components(term: LawTerm) -> Iterator[tuple[npt.NDArray[np.int64], Array]]:

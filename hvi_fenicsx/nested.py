@@ -12,6 +12,7 @@ from dataclasses import replace
 from petsc4py import PETSc
 
 from . import building, ladder, solvers
+from .refinement import Refinement
 from .scene import Scene
 from .solvers.base import Counts, Progress, Solved
 from .solvers.linear import LinearSettings
@@ -48,11 +49,11 @@ def solve(scene: Scene, system: System, timer: Timer, progress: Progress, interr
         system.below = hierarchy(scene, system, timer)
     if coarse is None or not kind.takes_start:
         return solvers.create(scene.solver, system, timer, progress, interrupted).solve()
-    below = building.assemble(_loosened(coarse), system.comm, timer)
+    below, nesting = _assembled(_loosened(coarse), scene, system, timer)
     below.release(system.freedom.modes if system.freedom else ())
     found = solve(_loosened(coarse), below, timer, progress, interrupted)
     with timer("setup"):
-        system.below = Below(below, ladder.between(system, below, scene))
+        system.below = Below(below, ladder.between(system, below, nesting))
     return ascend(scene, system, (below, found, system.below.prolongation), timer, progress, interrupted)
 
 
@@ -87,10 +88,16 @@ def hierarchy(scene: Scene, system: System, timer: Timer) -> Below | None:
     coarse = coarser(scene, system)
     if coarse is None:
         return None
-    below = building.assemble(coarse, system.comm, timer)
+    below, nesting = _assembled(coarse, scene, system, timer)
     below.below = hierarchy(coarse, below, timer)
     with timer("setup"):
-        return Below(below, ladder.between(system, below, scene))
+        return Below(below, ladder.between(system, below, nesting))
+
+
+def _assembled(coarse: Scene, scene: Scene, system: System, timer: Timer) -> tuple[System, Scene | Refinement]:
+    """The system one rung below that of a scene, and how their meshes are nested. Collective."""
+    body, nesting = system.problem.domain.origin or (None, scene)
+    return building.assemble(coarse, system.comm, timer, body), nesting
 
 
 def _loosened(scene: Scene) -> Scene:
@@ -106,6 +113,5 @@ def _prolonged(step: PETSc.Mat, below: System, found: Solved, system: System) ->
     x.scale(below.problem.scales.displacement / system.problem.scales.displacement)
     x.pointwiseMax(x, system.lower)
     x.pointwiseMin(x, system.upper)
-    owned = system.problem.fixed[system.problem.fixed < x.local_size]
-    x.array[owned] = system.load.array_r[owned]
+    system.prescribe(x)
     return x

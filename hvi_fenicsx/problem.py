@@ -46,6 +46,14 @@ class Bounds:
     lower: Array
     upper: Array
 
+    def beyond(self, normal: Array) -> Array:
+        """How far u·n (m,) is outside of the bounds; negative within."""
+        return np.maximum(normal - self.upper, self.lower - normal)
+
+    def component(self) -> tuple[npt.NDArray[np.int64], Array]:
+        """The scalar dof (m,) of u·n where n is along an axis of its vertex's frame, and n's sign there (m,)."""
+        return surface.component_dofs(self.surface.blocks, self.surface.normals)
+
 
 @dataclass(frozen=True)
 class Prescribed:
@@ -92,6 +100,11 @@ class Problem:
     def points(self) -> Array:
         """The local vertices (owned and ghost), m, (n, 3); kept, since making them takes longer than most uses."""
         return np.asarray(self.space.tabulate_dof_coordinates(), np.float64)
+
+    @functools.cached_property
+    def fixed_here(self) -> npt.NDArray[np.int32]:
+        """The scalar dofs that are prescribed and that this rank owns."""
+        return self.fixed[self.fixed < self.space.dofmap.index_map.size_local * self.space.dofmap.index_map_bs]
 
     @functools.cached_property
     def bodies(self) -> Bodies:
@@ -164,17 +177,7 @@ def _sum(
     prescribed = conditions.build(stage, scales, wanted)
     held = tuple((where, bc.dof_indices()[0]) for (where, _), bc in zip(wanted, prescribed, strict=True))
     fixed = np.unique(np.concatenate([np.empty(0, np.int32), *(dofs for _, dofs in held)])).astype(np.int32)
-    surfaces = {
-        where: surface.build(
-            where,
-            stage.space,
-            stage.part_facets[where],
-            stage.boundary(where, **_VERTEX),
-            stage.length ** (stage.dimension - 1),
-            next((b.direction for w, _, other in made if w == where for b in other.bounds), None),
-        )
-        for where in dict.fromkeys(w for w, _, c in made if w is not None and (c.bounds or c.laws))
-    }
+    surfaces = _surfaces(stage, made)
     bounds = [_bounds(stage, surfaces[w], b, scales) for w, _, c in made if w is not None for b in c.bounds]
     _check_compatible(stage, bounds, prescribed, fixed)
     _check_normal_laws(made)
@@ -200,6 +203,21 @@ def _sum(
         tuple(made),
         held,
     )
+
+
+def _surfaces(stage: Stage, made: Sequence[Made]) -> dict[str, Surface]:
+    """The parts with bounds or laws, in the scene's order. Collective."""
+    return {
+        where: surface.build(
+            where,
+            stage.space,
+            stage.part_facets[where],
+            stage.boundary(where, **_VERTEX),
+            stage.length ** (stage.dimension - 1),
+            next((b.direction for w, _, other in made if w == where for b in other.bounds), None),
+        )
+        for where in dict.fromkeys(w for w, _, c in made if w is not None and (c.bounds or c.laws))
+    }
 
 
 def _by_name(made: Sequence[Made], kind: str) -> dict[str, Any]:
@@ -286,8 +304,7 @@ def _term(
             f'boundary.{where.part}: law = "{law.law.name}" jumps upwards at a slip > 0, which in 3D is a ring that '
             "bounds cannot follow; smooth it: [solver] smoothing and epsilon"
         )
-    dofs = where.blocks[:, None] * stage.dimension + np.arange(stage.dimension)
-    free = (~np.isin(dofs, fixed)).astype(np.float64)
+    free = (~np.isin(where.dofs, fixed)).astype(np.float64)
     density = fem.Function(stage.space, name="clarke_derivative")
     ds = Scaled(stage.number(stage.length ** (1 - stage.dimension)), stage.boundary(where.part, **_VERTEX))
     residual = ufl.inner(density, stage.test) * ds

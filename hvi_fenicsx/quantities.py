@@ -73,6 +73,10 @@ class Watched(ABC):
     def error(self) -> float:
         """The estimated relative error on the last rung; infinite where none is known yet. Collective."""
 
+    def ahead(self) -> fem.Function | None:
+        """The displacement on the last rung's mesh that a finer one is expected to have; None where u_h has to do."""
+        return None
+
     def smoothing(self) -> float:
         """What smoothing changes of the quantity on the last rung, relative. Collective.
 
@@ -94,6 +98,8 @@ def watched(name: str, rung: Rung) -> Watched:
 class Estimated(Watched):
     """Slip or -σ_t, whose error follows from the defect on one mesh (:mod:`.estimate.contact`)."""
 
+    _ahead: fem.Function | None = None
+
     def add(self, rung: Rung) -> None:
         """See :meth:`Watched.add`."""
         super().add(rung)
@@ -101,11 +107,16 @@ class Estimated(Watched):
 
     def error(self) -> float:
         """See :meth:`Watched.error`; with its safety factor."""
-        found = self._last.solution
+        found, self._ahead = self._last.solution, None
         if found.solved is None or found.examined is None:
             return np.inf
         parts = estimate.on_contact(self._last.prepared.system, found.solved.u, found.examined)
+        self._ahead = parts.moved
         return _SAFETY[self.name] * (parts.slip if self.name == "u_t" else parts.friction)
+
+    def ahead(self) -> fem.Function | None:
+        """See :meth:`Watched.ahead`; known once the error is."""
+        return self._ahead
 
     def smoothing(self) -> float:
         """See :meth:`Watched.smoothing`; with the same factor."""

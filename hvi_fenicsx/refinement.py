@@ -9,18 +9,24 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
+import basix
 import numpy as np
 import numpy.typing as npt
 from dolfinx import la
 from dolfinx import mesh as dmesh
 
 from . import compat
-from .domain import Domain
+from .domain import Domain, check_affordable
 from .domain_shapes import Arc
 
 Array = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.int32]
 Halves = npt.NDArray[np.int8]
+_LONG = {2: 0.0, 3: 0.76}
+"""Of a cell's longest edge, what is bisected with it, by dimension: in space all six would make a step of 4 to 5 times
+the unknowns; the longest and, of a sixth of a cube, the diagonals of its faces make it about 2."""
+_SKEWED = np.eye(3) + 1e-6 * np.sqrt([[2.0, 3.0, 5.0], [3.0, 7.0, 11.0], [5.0, 11.0, 13.0]])
+"""Where the edges are measured: lengths that tie in the body differ here by their direction, on all ranks alike."""
 
 
 @dataclass(frozen=True)
@@ -44,21 +50,63 @@ def uniform(domain: Domain) -> Refinement:
     return _refined(domain, None)
 
 
+def repeated(domain: Domain, times: int) -> Domain:
+    """Each cell cut into 2^d so often; each of the domains knows the one that it came from. Collective.
+
+    Raises:
+        InputError: on all ranks alike: memory cannot suffice.
+    """
+    d, vertices = domain.dimension, domain.mesh.topology.index_map(0).size_global
+    if times:
+        check_affordable(domain.mesh.comm, d * vertices * 2 ** (d * times), "refinements")
+    for _ in range(times):
+        step = uniform(domain)
+        domain = replace(step.domain, origin=(domain, step))
+    return domain
+
+
 def marked(domain: Domain, cells: Indices) -> Refinement:
-    """All edges of the marked cells (local indices) bisected, and others as far as the mesh asks for it. Collective."""
-    d = domain.dimension
-    domain.mesh.topology.create_entities(1)
-    domain.mesh.topology.create_connectivity(d, 1)
-    return _refined(domain, dmesh.compute_incident_entities(domain.mesh.topology, cells, d, 1))
+    """The long edges of the marked cells (local indices) bisected, and others as far as the mesh asks for it.
+
+    In the plane all three count as long. Collective.
+    """
+    topology = domain.mesh.topology
+    topology.create_entities(1)
+    topology.create_connectivity(domain.dimension, 1)
+    lengths = _edge_lengths(domain.mesh, cells)
+    long = lengths >= _LONG[domain.dimension] * lengths.max(axis=1, keepdims=True)
+    edges = topology.connectivity(domain.dimension, 1).array.reshape(-1, lengths.shape[1])[cells]
+    return _refined(domain, np.unique(edges[long]).astype(np.int32))
+
+
+def _edge_lengths(mesh: dmesh.Mesh, cells: Indices) -> Array:
+    """Of the edges of cells in the order of their topology, shape (cells, 3 or 6)."""
+    ends = np.array(basix.topology(basix.CellType[mesh.topology.cell_name()])[1])
+    corners = _corners(mesh)[cells]
+    return np.asarray(np.linalg.norm(corners[:, ends[:, 0]] - corners[:, ends[:, 1]], axis=2))
 
 
 def _refined(domain: Domain, edges: Indices | None) -> Refinement:
-    mesh, parents = compat.refine(domain.mesh, edges)
-    halves = _halves(domain.mesh, mesh, parents)
+    mesh, parents, halves = _bisected(domain.mesh, edges)
     sides = _sides(domain, mesh, parents, halves)
     regions = {name: np.flatnonzero(np.isin(parents, cells)).astype(np.int32) for name, cells in domain.regions.items()}
     _bend(mesh, sides, domain.curves)
     return Refinement(replace(domain, mesh=mesh, sides=sides, regions=regions), parents, halves)
+
+
+def _bisected(mesh: dmesh.Mesh, edges: Indices | None) -> tuple[dmesh.Mesh, Indices, Halves]:
+    """Plaza's rule, by which the first of equally long edges in dolfinx's own numbering, that of the ranks, would go.
+
+    Returns:
+        The refined mesh, and ``parents`` and ``halves`` of a :class:`Refinement`.
+    """
+    d, straight = mesh.geometry.dim, mesh.geometry.x.copy()
+    mesh.geometry.x[:, :d] = straight[:, :d] @ _SKEWED[:d, :d]
+    fine, parents = compat.refine(mesh, edges)
+    halves = _halves(mesh, fine, parents)
+    mesh.geometry.x[:] = straight
+    fine.geometry.x[compat.geometry_dofmap(fine), :d] = 0.5 * halves @ _corners(mesh)[parents]
+    return fine, parents, halves
 
 
 def _corners(mesh: dmesh.Mesh) -> Array:

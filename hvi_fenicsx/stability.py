@@ -17,11 +17,10 @@ from petsc4py import PETSc
 
 from .boundary import State
 from .lawterm import LawTerm
-from .ledger import NEAR
+from .ledger import NEAR, on_kink
 from .problem import Problem
 from .solvers.models import Cells, Full
-from .surface import component_dofs
-from .system import System, compile_forms, traction_scale
+from .system import System, compile_forms
 from .timing import Timer
 
 Indices = npt.NDArray[np.int64]
@@ -57,7 +56,7 @@ def _active(system: System, states: Sequence[State], tolerance: float) -> tuple[
     by_part = {s.surface.part: s for s in states}
     for bounds in system.bounds:
         state = by_part[bounds.surface.part]
-        dofs, _ = component_dofs(bounds.surface.blocks, bounds.surface.normals)
+        dofs, _ = bounds.component()
         loaded = np.abs(state.contact_pressure) > tolerance
         strong.append(dofs[state.contact & loaded])
         weak.append(dofs[state.contact & ~loaded])
@@ -65,8 +64,7 @@ def _active(system: System, states: Sequence[State], tolerance: float) -> tuple[
         state = by_part[term.surface.part]
         position = next(i for i, t in enumerate(state.terms) if t.direction is term.direction)
         held, loose = _kinks(term, state.arguments[position], state.tractions[position], tolerance)
-        d = term.free.shape[1]
-        dofs = term.surface.blocks[:, None].astype(np.int64) * d + np.arange(d)
+        dofs = term.surface.dofs
         touched = np.any(np.abs(term.directions) > 0.5, axis=1)
         strong.append(dofs[held[:, None] & touched])
         weak.append(dofs[loose[:, None] & touched])
@@ -78,11 +76,9 @@ def _kinks(
 ) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
     """Whether a vertex sits within a convex kink, or at the edge of what it carries."""
     law = term.law
-    on = np.zeros(len(argument), dtype=bool)
-    for kink in law.convex.kinks:
-        on |= np.abs(argument - kink) <= NEAR
+    on = on_kink(law.convex, argument)
     low, high = law.interval(argument, NEAR)
-    margin = tolerance * traction_scale(term)
+    margin = tolerance * term.traction_scale
     inside = (traction > low + margin) & (traction < high - margin)
     return on & inside, on & ~inside
 

@@ -14,10 +14,10 @@ import numpy.typing as npt
 import ufl
 from dolfinx import fem
 from mpi4py import MPI
-from petsc4py import PETSc
 
 from . import compat
 from .errors import InputError
+from .vectors import nodal
 
 Array = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.int32]
@@ -40,6 +40,12 @@ class Surface:
     normals: Array
     tangents: Array
     weights: Array
+
+    @property
+    def dofs(self) -> npt.NDArray[np.int64]:
+        """The scalar dofs of these vertices, shape (m, d)."""
+        d = self.normals.shape[1]
+        return self.blocks[:, None].astype(np.int64) * d + np.arange(d)
 
     def values(self, u: Array) -> Array:
         """The vectors at these vertices of a local array of a P1 vector field; shape (m, d)."""
@@ -70,9 +76,10 @@ def build(
     dimension = space.mesh.geometry.dim
     dofs = fem.locate_dofs_topological(space, dimension - 1, facets)
     blocks = np.unique(dofs[dofs < space.dofmap.index_map.size_local]).astype(np.int32)
-    normal = _assembled(ufl.FacetNormal(space.mesh), space, measure)[blocks]
+    test = ufl.TestFunction(space)
+    normal = nodal(ufl.inner(ufl.FacetNormal(space.mesh), test) * measure)[blocks]
     ones = ufl.as_vector([fem.Constant(space.mesh, 1.0)] * dimension)
-    weights = _assembled(ones, space, measure)[blocks, 0] / area
+    weights = nodal(ufl.inner(ones, test) * measure)[blocks, 0] / area
     if space.mesh.comm.allreduce(bool(np.any(weights == 0.0)), op=MPI.LOR):
         raise InputError(f"boundary.{part}: contact and laws act on the body's surface, and facets of it lie inside")
     if direction is not None:
@@ -82,15 +89,6 @@ def build(
     # Rounding must not make an axis-parallel part a slanted one.
     normals = np.where(np.max(np.abs(normals), axis=1, keepdims=True) > 1 - 1e-10, np.round(normals), normals)
     return Surface(part, facets, blocks, points, normals, tangents(normals), weights)
-
-
-def _assembled(density: Any, space: fem.FunctionSpace, measure: Any) -> Array:
-    form = fem.form(ufl.inner(density, ufl.TestFunction(space)) * measure)
-    vector = fem.petsc.assemble_vector(form)
-    vector.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
-    values: Array = vector.array.reshape(-1, space.mesh.geometry.dim).copy()
-    vector.destroy()
-    return values
 
 
 def tangents(normals: Array) -> Array:

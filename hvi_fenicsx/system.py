@@ -18,18 +18,15 @@ from dolfinx.fem.petsc import assemble_matrix, assemble_vector, set_bc
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from . import dilatation, frames, freedom
+from . import dilatation, frames, freedom, nearnull
 from .contactrows import ContactRows
-from .freedom import Freedom, orthonormalise
-from .lawterm import LawTerm
+from .freedom import Freedom
 from .problem import Problem
 from .rigid import Mode
-from .surface import component_dofs
 from .timing import Timer
+from .vectors import assembled, new_vector, turn
 
 Array = npt.NDArray[np.float64]
-_ADD, _INSERT = PETSc.InsertMode.ADD, PETSc.InsertMode.INSERT
-_FORWARD, _REVERSE = PETSc.ScatterMode.FORWARD, PETSc.ScatterMode.REVERSE
 
 
 class Model(Protocol):
@@ -81,7 +78,7 @@ class System:
         self._size: float | None = None
         self.terms, self.bounds = problem.terms, problem.bounds
         with timer("assembly"):
-            self.forces = {name: _assembled(form) for name, form in compiled.linear.items()}
+            self.forces = {name: assembled(form) for name, form in compiled.linear.items()}
             self.matrix, self.load = self._constrained(compiled)
             self.matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
             self.matrix.setOption(PETSc.Mat.Option.SPD, True)
@@ -92,7 +89,7 @@ class System:
         self._work = self.load.duplicate()
         self.lower, self.upper = self._box()
         free = self.load.copy()
-        free.array[problem.fixed[problem.fixed < free.local_size]] = 0.0
+        free.array[problem.fixed_here] = 0.0
         self.scale = float(free.norm()) or 1.0
 
     @property
@@ -116,8 +113,8 @@ class System:
 
     @cached_property
     def near_null(self) -> PETSc.NullSpace:
-        """The rigid motions of the free body, orthonormal, which algebraic multigrid must keep. Collective."""
-        return rigid_modes(self.problem, self.rotation)
+        """What algebraic multigrid must keep (:mod:`.nearnull`). Collective when first used."""
+        return nearnull.rigid_modes(self.problem, self.rotation)
 
     def _rotate(self) -> PETSc.Mat | None:
         """Go over to local components where normals are slanted; the matrix Q with u = Q û, or None."""
@@ -129,8 +126,7 @@ class System:
         rotated.setLGMap(rows, columns)
         self.matrix.destroy()
         self.matrix = rotated
-        cartesian = self.load.copy()
-        q.multTranspose(cartesian, self.load)
+        turn(self.load, q)
         self.terms = tuple(self.frames.term(t) for t in self.terms)
         self.bounds = tuple(self.frames.bounds(b) for b in self.bounds)
         return q
@@ -147,9 +143,18 @@ class System:
         """A displacement field as unknowns. Collective."""
         x = new_vector(self.problem.space)
         x.array[:] = u.x.array[: x.local_size]
-        if self.rotation is not None:
-            cartesian = x.copy()
-            self.rotation.multTranspose(cartesian, x)
+        turn(x, self.rotation)
+        return x
+
+    def prescribe(self, x: PETSc.Vec) -> None:
+        """Give the prescribed unknowns of x their values. Local."""
+        x.array[self.problem.fixed_here] = self.load.array_r[self.problem.fixed_here]
+
+    def undisplaced(self) -> PETSc.Vec:
+        """A new x: the prescribed values, and zero elsewhere. Collective."""
+        x = self.load.duplicate()
+        x.set(0.0)
+        self.prescribe(x)
         return x
 
     def _constrained(self, compiled: Compiled) -> tuple[PETSc.Mat, PETSc.Vec]:
@@ -161,8 +166,7 @@ class System:
         for force in self.forces.values():
             load.axpy(1.0, force)
         set_bc(prescribed, list(self.problem.conditions))
-        owned = self.problem.fixed[self.problem.fixed < load.local_size]
-        rows = (owned + load.owner_range[0]).astype(PETSc.IntType)
+        rows = (self.problem.fixed_here + load.owner_range[0]).astype(PETSc.IntType)
         matrix.zeroRowsColumns(rows, 1.0, prescribed, load)
         return matrix, load
 
@@ -171,13 +175,13 @@ class System:
         lower.set(-np.inf)
         upper.set(np.inf)
         for bounds in self.bounds:
-            dofs, sign = component_dofs(bounds.surface.blocks, bounds.surface.normals)
+            dofs, sign = bounds.component()
             positive = sign > 0
             low = np.where(positive, bounds.lower, -bounds.upper)
             high = np.where(positive, bounds.upper, -bounds.lower)
             lower.array[dofs] = np.maximum(lower.array[dofs], low)
             upper.array[dofs] = np.minimum(upper.array[dofs], high)
-        owned = self.problem.fixed[self.problem.fixed < lower.local_size]
+        owned = self.problem.fixed_here
         lower.array[owned], upper.array[owned] = -np.inf, np.inf
         return lower, upper
 
@@ -224,7 +228,7 @@ class System:
     @property
     def immovable(self) -> npt.NDArray[np.int32]:
         """Unknowns (local, owned) that are held or prescribed."""
-        return np.concatenate([self._held, self.problem.fixed[self.problem.fixed < self.load.local_size]])
+        return np.concatenate([self._held, self.problem.fixed_here])
 
     @property
     def rates(self) -> list[Array]:
@@ -249,7 +253,7 @@ class System:
             u = x.array_r
             term.set_traction(u, model.derivative(term.argument(u)))
             assemble_vector(out, term.residual)
-        out.ghostUpdate(addv=_ADD, mode=_REVERSE)
+        out.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
 
     def _stiffness_times(self, x: PETSc.Vec, out: PETSc.Vec) -> None:
         """A u: by J, but by A's own rows where they differ."""
@@ -292,14 +296,13 @@ class System:
     def allowed(self, tolerance: float) -> Array:
         """Largest residual a dof of Γc may keep for its traction to be right within tolerance; infinite elsewhere."""
         allowed = np.full(self.load.local_size, np.inf)
-        d = self.problem.scales.dimension
         for bounds in self.bounds:
-            dofs, _ = component_dofs(bounds.surface.blocks, bounds.surface.normals)
+            dofs, _ = bounds.component()
             allowed[dofs] = np.minimum(allowed[dofs], tolerance * bounds.surface.weights)
         for term in self.terms:
-            dofs = term.surface.blocks[:, None] * d + np.arange(d)
+            dofs = term.surface.dofs
             touched = np.any(term.directions != 0, axis=1)
-            limit = tolerance * traction_scale(term) * term.surface.weights
+            limit = tolerance * term.traction_scale * term.surface.weights
             allowed[dofs[touched]] = np.minimum(allowed[dofs], limit[:, None])[touched]
         return allowed
 
@@ -310,44 +313,3 @@ class Below:
 
     system: System
     prolongation: PETSc.Mat
-
-
-def traction_scale(term: LawTerm) -> float:
-    """What a law's traction is judged by: its own scale, but nothing finer than a thousandth of the load's."""
-    return max(term.exact.traction_scale, 1e-3)
-
-
-def new_vector(space: fem.FunctionSpace) -> PETSc.Vec:
-    """A zero vector of a space, with ghosts. Collective."""
-    function = fem.Function(space)  # must outlive the duplication: its vector does not own the memory
-    vector = function.x.petsc_vec.duplicate()
-    vector.set(0.0)
-    return vector
-
-
-def _assembled(form: fem.Form) -> PETSc.Vec:
-    vector = assemble_vector(form)
-    vector.ghostUpdate(addv=_ADD, mode=_REVERSE)
-    return vector
-
-
-def rigid_modes(problem: Problem, rotation: PETSc.Mat | None = None) -> PETSc.NullSpace:
-    """The near-null space: all rigid motions of the free body, orthonormal, in the unknowns' components. Collective."""
-    space, d = problem.space, problem.scales.dimension
-    x = (space.tabulate_dof_coordinates() - problem.domain.centre) / problem.scales.length
-    fields = [np.eye(d)[i] + np.zeros((len(x), d)) for i in range(d)]
-    pairs = [(0, 1)] if d == 2 else [(1, 2), (2, 0), (0, 1)]
-    for i, j in pairs:
-        turning = np.zeros((len(x), d))
-        turning[:, i], turning[:, j] = -x[:, j], x[:, i]
-        fields.append(turning)
-    vectors = []
-    for field in fields:
-        vector = new_vector(space)
-        vector.array[:] = field.ravel()[: vector.local_size]
-        if rotation is not None:
-            cartesian = vector.copy()
-            rotation.multTranspose(cartesian, vector)
-        vectors.append(vector)
-    orthonormalise(vectors)
-    return PETSc.NullSpace().create(vectors=vectors, comm=space.mesh.comm)

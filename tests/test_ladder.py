@@ -5,15 +5,17 @@ And a nested start must not decide what is certified.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import meshes
 import numpy as np
 import pytest
 from dolfinx import fem
 from mpi4py import MPI
 
-from hvi_fenicsx import Scene, domain, ladder, nested, read_scene, solution
+from hvi_fenicsx import InputError, Scene, building, domain, ladder, nested, read_scene, solution
 from hvi_fenicsx.solvers import linear
 from hvi_fenicsx.solvers.activeset import ActiveSetSolver
 from hvi_fenicsx.solvers.base import held_dofs, silent
@@ -126,6 +128,31 @@ def test_only_what_stood_on_every_rung_is_solved_in_one_step(demo: str, steady: 
     assert found.converged
     assert found.solved is not None
     assert found.solved.steady is steady
+
+
+@pytest.mark.parametrize("body", [meshes.GOOD, meshes.SLANTED], ids=["straight", "slanted"])
+@pytest.mark.usefixtures("everything_nested")
+def test_a_refined_file_goes_up_the_ladder_of_its_meshes(body: str, tmp_path: Path) -> None:
+    """Without friction the minimiser is unique: that of the finest mesh alone, which knows of no ladder, by MUMPS."""
+    file = meshes.make(tmp_path / "m.msh", body)
+    convex = ["boundary.wall.displacement=[0.0, 0.0]", 'boundary.floor={on="bottom", contact={gap=0.0}}']
+    scene, alone = (
+        read_scene(DEMOS / "strong_law.toml", [*convex, f'domain={{shape="file", file="{file}", {more}}}', *solver])
+        for more, solver in (("refinements=3", []), ("scale=1.0", ['solver={linear_solver="lu"}']))
+    )
+    mesh = replace(building.mesh(scene, MPI.COMM_WORLD), origin=None)
+    direct, found = solution.finish(solution.prepare(alone, body=mesh)), solution.solve(scene)
+    assert found.solved is not None
+    assert found.solved.levels > 1
+    assert found.dofs == direct.dofs
+    assert found.examined.energy == pytest.approx(direct.examined.energy, rel=1e-9)  # type: ignore[union-attr]
+
+
+def test_refinements_that_memory_cannot_hold_are_refused(tmp_path: Path) -> None:
+    file = meshes.make(tmp_path / "m.msh", meshes.GOOD)
+    scene = read_scene(DEMOS / "strong_law.toml", [f'domain={{shape="file", file="{file}", refinements=10}}'])
+    with pytest.raises(InputError, match=r"domain\.refinements: make .* use fewer refinements"):
+        solution.solve(scene)
 
 
 @pytest.mark.parametrize("chosen", [[], [0], [3, 4, 5], [0, 2, 3, 7, 8, 9, 11]])

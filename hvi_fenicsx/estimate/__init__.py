@@ -18,7 +18,7 @@ from ..parallel import total
 from ..problem import Problem
 from ..system import System
 from . import bubbles, defect, dual, traces
-from .contact import OnContact, on_contact
+from .contact import OnContact, on_contact, ratio
 
 Array = npt.NDArray[np.float64]
 _ROUNDING = 1e-12
@@ -49,7 +49,7 @@ class Estimate:
     @property
     def relative(self) -> float:
         """The total over |||u_h|||; infinite where u_h is a rigid motion and the error is not 0."""
-        return self.total / self.energy_norm if self.energy_norm > 0 else (np.inf if self.total > 0 else 0.0)
+        return ratio(self.total, self.energy_norm)
 
     def as_dict(self) -> dict[str, float]:
         """The numbers by name, nondimensional."""

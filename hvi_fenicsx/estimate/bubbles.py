@@ -19,10 +19,10 @@ import ufl
 from dolfinx import fem, la
 from dolfinx import mesh as dmesh
 from mpi4py import MPI
-from petsc4py import PETSc
 from scipy import sparse
 
 from ..problem import Problem
+from ..vectors import nodal
 
 Array = npt.NDArray[np.float64]
 _MOST_STEPS = 30
@@ -132,7 +132,7 @@ class Stiffness:
 
 def assembled(form: Any) -> Array:
     """A linear form's vector at the blocks that this rank owns, (n, d). Collective."""
-    return np.asarray(sum(_vector(ufl.Form(integrals)) for integrals in _alike(form)))
+    return np.asarray(sum(nodal(ufl.Form(integrals)) for integrals in _alike(form)))
 
 
 def _alike(form: Any) -> list[list[Any]]:
@@ -146,12 +146,3 @@ def _alike(form: Any) -> list[list[Any]]:
         groups += [[]] * (place == len(groups))
         groups[place] = [*groups[place], integral]
     return groups
-
-
-def _vector(form: Any) -> Array:
-    compiled = fem.form(form)
-    vector = fem.petsc.assemble_vector(compiled)
-    vector.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
-    values: Array = vector.array_r.reshape(-1, compiled.function_spaces[0].dofmap.index_map_bs).copy()
-    vector.destroy()
-    return values

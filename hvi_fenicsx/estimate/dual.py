@@ -16,14 +16,14 @@ from .. import boundary
 from ..boundary import State
 from ..certificate import Examined
 from ..lawterm import LawTerm
-from ..ledger import NEAR, components
+from ..ledger import components, on_bounds, on_kink, touches
 from ..parallel import total
-from ..problem import Problem
+from ..problem import Bounds, Problem
 from ..solvers.linear import HeldPreconditioner, LinearSettings
-from ..surface import component_dofs
-from ..system import System, new_vector
+from ..system import System
 from ..timing import Timer
-from .traces import nearest, on_convex_kink, tractions
+from ..vectors import new_vector, turn
+from .traces import nearest, tractions
 
 Array = npt.NDArray[np.float64]
 RTOL = 0.1
@@ -58,12 +58,9 @@ class Dual:
         system = self.system
         load = new_vector(system.problem.space)
         load.array[:] = functional.ravel()
-        if system.rotation is not None:
-            cartesian = load.copy()
-            system.rotation.multTranspose(cartesian, load)
+        turn(load, system.rotation)
         load.array[self.held] = 0.0
-        fixed = system.problem.fixed
-        load.array[fixed[fixed < load.local_size]] = 0.0
+        load.array[system.problem.fixed_here] = 0.0
         return load
 
     def destroy(self) -> None:
@@ -77,12 +74,10 @@ def _held(system: System, x: PETSc.Vec) -> npt.NDArray[np.int32]:
     u = x.array_r
     found: list[npt.NDArray[np.int64]] = [np.empty(0, np.int64)]
     for bounds in system.bounds:
-        dofs, sign = component_dofs(bounds.surface.blocks, bounds.surface.normals)
-        normal = sign * u[dofs]
-        found.append(dofs[(normal >= bounds.upper - NEAR) | (normal <= bounds.lower + NEAR)])
+        dofs, sign = bounds.component()
+        found.append(dofs[touches(bounds, sign * u[dofs])])
     for term in system.terms:
-        argument = term.argument(u)
-        stuck = on_convex_kink(term, argument)
+        stuck = on_kink(term.law.convex, term.argument(u))
         found.extend(dofs[stuck] for dofs, _ in components(term))
     return np.setdiff1d(np.unique(np.concatenate(found)), system.problem.fixed).astype(np.int32)
 
@@ -106,15 +101,14 @@ def algebraic(problem: Problem, examined: Examined) -> Array:
     rest = rest - _law_forces(problem, examined.states, exact=False)  # a law's force is minus its residual
     for state in examined.states:
         if state.bounds is not None:
-            force = state.surface.weights * _unfounded(state)
+            force = state.surface.weights * _unfounded(state.bounds, state)
             rest[state.surface.blocks] += force[:, None] * state.surface.normals
     return np.asarray(rest)
 
 
-def _unfounded(state: State) -> Array:
+def _unfounded(bounds: Bounds, state: State) -> Array:
     """σ_n (m,) that contact cannot carry: at a gap, or of the wrong sign."""
-    upper = state.normal >= state.bounds.upper - NEAR  # type: ignore[union-attr]
-    lower = state.normal <= state.bounds.lower + NEAR  # type: ignore[union-attr]
+    lower, upper = on_bounds(bounds, state.normal)
     p = state.contact_pressure
     right = (upper & (p <= 0)) | (lower & (p >= 0))
     return np.where(right, 0.0, p)
@@ -125,8 +119,8 @@ def penetration_energy(problem: Problem, states: Sequence[State]) -> float:
     local = 0.0
     for state in states:
         if state.bounds is not None:
-            beyond = np.maximum(state.normal - state.bounds.upper, state.bounds.lower - state.normal)
-            local += float(np.sum(state.surface.weights * np.abs(state.contact_pressure) * np.maximum(beyond, 0.0)))
+            beyond = np.maximum(state.bounds.beyond(state.normal), 0.0)
+            local += float(np.sum(state.surface.weights * np.abs(state.contact_pressure) * beyond))
     return total(problem.domain.mesh.comm, local)
 
 

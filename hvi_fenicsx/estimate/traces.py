@@ -16,8 +16,7 @@ from dolfinx import fem, la
 
 from ..boundary import State
 from ..laws import Superpotential
-from ..lawterm import LawTerm
-from ..ledger import NEAR
+from ..ledger import NEAR, on_kink
 from ..problem import Problem
 from ..surface import Surface
 from .bubbles import quadrature
@@ -123,9 +122,13 @@ class Along:
         self._barycentric, weights = quadrature("interval" if d == 2 else "triangle", _DEGREE)
         self.weights: Array = self._facets.areas[:, None] * weights
 
+    def at_vertices(self, values: Array) -> Array:
+        """Values at the part's owned vertices (m, k) by facet, (f, d, k). Collective."""
+        return np.asarray(spread(self._problem, self._surface, values)[self._facets.vertices])
+
     def interpolated(self, values: Array) -> Array:
         """Linear interpolation of values at the part's owned vertices (m, k); (f, q, k). Collective."""
-        return self._linear(spread(self._problem, self._surface, values)[self._facets.vertices])
+        return self._linear(self.at_vertices(values))
 
     def linear(self, u: fem.Function) -> Array:
         """Of a P1 field, (f, q, k)."""
@@ -187,17 +190,11 @@ def law(
     along = Along(problem, bubbles, state.surface, term.directions)
     nodal, slip = along.interpolated(tractions(state, number)), along.linear(u)
     if change is not None:
-        sticks = along.interpolated(on_convex_kink(term, state.arguments[number])[:, None].astype(float))
+        sticks = along.interpolated(on_kink(term.law.convex, state.arguments[number])[:, None].astype(float))
         added = along.linear(change.vertices) + along.quadratic(change.edges)
         slip = slip + np.where(sticks > 1 - NEAR, 0.0, added)
     k, asked = slip.shape[2], term.law if change is None else term.exact
     return along, nodal, nearest(asked, slip.reshape(-1, k), nodal.reshape(-1, k)).reshape(slip.shape)
-
-
-def on_convex_kink(term: LawTerm, argument: Array) -> npt.NDArray[np.bool_]:
-    """Where a law holds what it acts on at a convex kink, (m,)."""
-    near = [np.abs(argument - kink) <= NEAR for kink in term.law.convex.kinks]
-    return np.asarray(np.any(near, axis=0)) if near else np.zeros(len(argument), dtype=bool)
 
 
 def pointwise(

@@ -17,6 +17,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
+from typing_extensions import override
 
 from ..errors import InputError
 from .extremes import Extremes, extremes
@@ -70,6 +71,19 @@ class ConvexPart(ABC):
     def jumps(self) -> FloatArray:
         """Heights (k,) of the jumps of the derivative at the kinks, all positive."""
         return self.right(self.kinks) - self.left(self.kinks)
+
+
+class DifferentiablePart(ConvexPart):
+    """A convex function without kinks: a subclass gives `value`, `right` and `second`."""
+
+    @property
+    @override
+    def kinks(self) -> FloatArray:
+        return np.empty(0)
+
+    @override
+    def left(self, x: FloatArray) -> FloatArray:
+        return self.right(x)
 
 
 class Superpotential(ABC):

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from typing_extensions import override
 
-from .base import ConvexPart, Directional, FloatArray, Superpotential
+from .base import ConvexPart, DifferentiablePart, Directional, FloatArray, Superpotential
 from .checks import require_ordered, require_positive
 from .extremes import Extremes
 from .polyline import PolylinePart
@@ -88,23 +88,14 @@ class WeakeningLaw(Superpotential):
 
 
 @dataclass(frozen=True, eq=False)
-class _Weakened(ConvexPart):
+class _Weakened(DifferentiablePart):
     """G of a weakening law."""
 
     law: WeakeningLaw
 
     @override
-    @property
-    def kinks(self) -> FloatArray:
-        return np.empty(0)
-
-    @override
     def value(self, x: FloatArray) -> FloatArray:
         return (self._drop * self.law.delta) * self._shape(x)[0]
-
-    @override
-    def left(self, x: FloatArray) -> FloatArray:
-        return self.right(x)
 
     @override
     def right(self, x: FloatArray) -> FloatArray:

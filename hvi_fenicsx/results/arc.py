@@ -41,6 +41,12 @@ def edges(problem: Problem, surface: Surface) -> Indices:
     return np.asarray(found, dtype=np.int64).reshape(-1, 2)
 
 
+def lexicographic(points: Array) -> npt.NDArray[np.intp]:
+    """The order of points (m, d) by their coordinates, rounded."""
+    size = float(np.max(np.ptp(points, axis=0), initial=0.0)) or 1.0
+    return np.lexsort(np.round(points / size, _DIGITS).T[::-1])
+
+
 def along(points: Array, numbers: Indices, pairs: Indices) -> tuple[Indices, Array]:
     """The order of vertices along their part and the arc length of each, in that order.
 
@@ -51,9 +57,8 @@ def along(points: Array, numbers: Indices, pairs: Indices) -> tuple[Indices, Arr
     Args:
         points: (m, 2). numbers: the vertices' numbers (m,). pairs: facets by these numbers, (k, 2), each perhaps twice.
     """
-    size = float(np.max(np.ptp(points, axis=0), initial=0.0)) or 1.0
     rank = np.empty(len(points), dtype=np.int64)
-    rank[np.lexsort(np.round(points / size, _DIGITS).T[::-1])] = np.arange(len(points))
+    rank[lexicographic(points)] = np.arange(len(points))
     place = {int(number): i for i, number in enumerate(numbers)}
     local = [(place[int(a)], place[int(b)]) for a, b in np.unique(pairs, axis=0)]
     chains = sorted(_chains(local, rank), key=lambda chain: int(np.min(rank[chain])))

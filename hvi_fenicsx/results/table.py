@@ -91,10 +91,8 @@ def _along(columns: dict[str, Array], numbers: Indices, pairs: Indices) -> dict[
 
 
 def _sorted(columns: dict[str, Array]) -> dict[str, Array]:
-    """In 3D lexicographically. Points are rounded for it: coordinates that should be equal may differ a little."""
-    points = np.column_stack([columns[a] for a in "xyz"])
-    size = float(np.max(np.ptp(points, axis=0), initial=0.0)) or 1.0
-    order = np.lexsort(np.round(points / size, 9).T[::-1])
+    """In 3D lexicographically."""
+    order = arc.lexicographic(np.column_stack([columns[a] for a in "xyz"]))
     return {name: values[order] for name, values in columns.items()}
 
 

@@ -8,13 +8,15 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import BeforeValidator, PlainSerializer, ValidationInfo, model_validator
+from pydantic import BeforeValidator, Field, PlainSerializer, ValidationInfo, model_validator
 from pydantic_core import PydanticCustomError
 
 from .curved import Disk, HalfDisk, LShape, NotchedStrip
 from .tables import Count, Length, Positive, Problem, Table, choose, refuse, vector
 
 _MOST_UNKNOWNS = 2**31 - 1  # PETSc's default integers
+MOST_REFINEMENTS = 10
+"""Of a mesh file: a million cells or more from each of its own."""
 
 
 class _Block(Table):
@@ -89,6 +91,8 @@ class MeshFile(Table):
     """name of the gmsh file (.msh, or .geo, which is meshed then), relative to the scene file"""
     scale: Positive = 1.0
     """m per unit of the file's coordinates: 1e-3 for a mesh in mm"""
+    refinements: Annotated[int, Field(ge=0, le=MOST_REFINEMENTS)] = 0
+    """how often each cell is cut, in 4 triangles or 8 tetrahedra; the coarser meshes make the fine one fast to solve"""
 
 
 Shape = Rectangle | Box | LShape | Disk | HalfDisk | NotchedStrip | MeshFile

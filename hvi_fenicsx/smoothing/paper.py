@@ -16,7 +16,7 @@ import numpy as np
 from typing_extensions import override
 
 from ..errors import InputError
-from ..laws.base import ConvexPart, FloatArray, Superpotential
+from ..laws.base import ConvexPart, DifferentiablePart, FloatArray, Superpotential
 from ..laws.catalogue import QuadraticLinear
 from .plus import QUADRATIC
 from .smoothed import Smoothing
@@ -114,15 +114,10 @@ class _Band:
 
 
 @dataclass(frozen=True, eq=False)
-class _PaperConcave(ConvexPart):
+class _PaperConcave(DifferentiablePart):
     """G: even, smooth, with the second derivative d'² p''(d)."""
 
     law: PaperSmoothing
-
-    @property
-    @override
-    def kinks(self) -> FloatArray:
-        return np.empty(0)
 
     @cached_property
     def _bands(self) -> tuple[_Band, _Band]:
@@ -143,10 +138,6 @@ class _PaperConcave(ConvexPart):
     @override
     def value(self, x: FloatArray) -> FloatArray:
         return self._integrals(x)[0]
-
-    @override
-    def left(self, x: FloatArray) -> FloatArray:
-        return self.right(x)
 
     @override
     def right(self, x: FloatArray) -> FloatArray:

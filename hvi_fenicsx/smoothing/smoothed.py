@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 from typing_extensions import override
 
-from ..laws.base import ConvexPart, Directional, FloatArray, IntArray, Superpotential
+from ..laws.base import ConvexPart, DifferentiablePart, Directional, FloatArray, IntArray, Superpotential
 from .checks import require_epsilon
 from .plus import QUADRATIC, PlusFunction
 
@@ -21,7 +21,7 @@ _LARGEST = float(np.finfo(np.float64).max)
 
 
 @dataclass(frozen=True, eq=False)
-class SmoothedPart(ConvexPart):
+class SmoothedPart(DifferentiablePart):
     """A convex part with every kink replaced by the plus function of width ε/jump.
 
     Of an even part (the split of an even law) only x ≥ 0 is computed, so that it is even to the bit.
@@ -32,18 +32,9 @@ class SmoothedPart(ConvexPart):
     epsilon: float
     even: bool
 
-    @property
-    @override
-    def kinks(self) -> FloatArray:
-        return np.empty(0)
-
     @override
     def value(self, x: FloatArray) -> FloatArray:
         return self.part.value(x) + self.correction(x)
-
-    @override
-    def left(self, x: FloatArray) -> FloatArray:
-        return self.right(x)
 
     @override
     def right(self, x: FloatArray) -> FloatArray:

@@ -9,7 +9,8 @@ exist, the search ends after so many Newton steps.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from functools import cached_property
 
@@ -17,6 +18,7 @@ from petsc4py import PETSc
 
 from .. import existence
 from ..errors import SolverError
+from ..laws import Superpotential
 from .base import Counts, Solved, resting_start
 from .branch import BranchIteration
 from .continuation import Continuation
@@ -70,17 +72,15 @@ class Auto(BranchIteration):
     def _others(self) -> Iterator[Solved]:
         exact = [term.exact for term in self.system.terms]
         if any(law is not true for law, true in zip(self._laws, exact, strict=True)):
-            for found in self._tried(BranchIteration(self.solver, self.settings, exact, wary=True)):
+            for found in self._tried(self._anew(exact).solve):
                 yield from self._beside(found)
         yield from self._settled()
         resting, _ = resting_start(self.solver, self._laws, 1e-4)
         for factor in (1.0, _BROKEN, -_BROKEN):
             pieces = resting.copy()
             pieces.scale(factor)
-            yield from self._tried(
-                BranchIteration(self.solver, self.settings, self._laws, self._epsilon, wary=True), None, pieces
-            )
-        yield from self._tried(Continuation(self.solver, self.settings))
+            yield from self._tried(self._anew().solve, None, pieces)
+        yield from self._tried(Continuation(self.solver, self.settings).solve)
 
     def _settled(self) -> Iterator[Solved]:
         """From bodies at rest on their supports, bonds as they are there, or unbroken.
@@ -93,8 +93,7 @@ class Auto(BranchIteration):
         unbroken = rested[0].duplicate()
         unbroken.set(0.0)
         for bonds in (rested[0], unbroken):
-            method = BranchIteration(self.solver, self.settings, self._laws, self._epsilon, wary=True)
-            yield from self._tried(method, rested[0], bonds)
+            yield from self._tried(self._anew().solve, rested[0], bonds)
 
     def _majorants(self, x: PETSc.Vec) -> list[Majorant]:
         parts = zip(self._laws, self._cells(x), self._subgradients(x, 0.0), strict=True)
@@ -103,15 +102,16 @@ class Auto(BranchIteration):
     def _beside(self, exact: Solved) -> Iterator[Solved]:
         """From the unsmoothed law's solution: what sticks there is within the narrow band that smoothing leaves."""
         if exact.converged:
-            method = BranchIteration(self.solver, self.settings, self._laws, self._epsilon, wary=True)
-            try:
-                yield method.solve(self.system.unknowns(exact.u))
-            except SolverError:
-                return
+            yield from self._tried(self._anew().solve, self.system.unknowns(exact.u))
 
-    def _tried(self, method: BranchIteration | Continuation, *start: PETSc.Vec | None) -> Iterator[Solved]:
+    def _anew(self, laws: Sequence[Superpotential] | None = None) -> BranchIteration:
+        """A branch iteration of the same settings, by default on the same laws."""
+        return BranchIteration(
+            self.solver, self.settings, self._laws if laws is None else laws, self._epsilon, wary=True
+        )
+
+    @staticmethod
+    def _tried(solve: Callable[..., Solved], *start: PETSc.Vec | None) -> Iterator[Solved]:
         """One attempt; a breakdown is no result."""
-        try:
-            yield method.solve(*start) if isinstance(method, BranchIteration) else method.solve()
-        except SolverError:
-            return
+        with suppress(SolverError):
+            yield solve(*start)

@@ -12,9 +12,8 @@ from petsc4py import PETSc
 
 from .. import existence
 from ..laws import Superpotential
-from ..surface import component_dofs
 from ..system import Model, System
-from .activeset import ActiveSetSolver
+from .activeset import ActiveSetSolver, Outcome
 from .models import Resting
 from .pieces import Start
 
@@ -54,8 +53,13 @@ class Counts:
     linear: int = 0
     branch: int = 0
 
+    def spend(self, step: Outcome) -> None:
+        """Count one solve of the solver's in."""
+        self.newton += step.newton
+        self.linear += step.linear
+
     def add(self, other: Counts) -> None:
-        """Count another solve in."""
+        """Count another method's in."""
         self.newton += other.newton
         self.linear += other.linear
         self.branch += other.branch
@@ -83,20 +87,24 @@ class Solved:
     steady: bool = False
 
 
+def contact_dofs(system: System) -> npt.NDArray[np.int64]:
+    """Scalar dofs (local, owned, sorted) of the normal displacements that have bounds."""
+    normal = (b.component()[0] for b in system.bounds)
+    return np.unique(np.concatenate([np.empty(0, np.int64), *normal]))
+
+
 def held_dofs(system: System, laws: Sequence[Superpotential]) -> npt.NDArray[np.int32]:
     """Scalar dofs (local, owned, sorted) that the start holds. Collective.
 
     The normal ones of contact parts; where these leave a rigid motion, also slips at which a law has a convex kink.
     """
-    d = system.problem.scales.dimension
-    dofs = [component_dofs(b.surface.blocks, b.surface.normals)[0] for b in system.bounds]
+    dofs = [contact_dofs(system)]
     loose = existence.moves_with_contact_closed(system.problem)
     for term, law in zip(system.terms, laws, strict=True):
         if loose and np.any(law.convex.kinks == 0.0):
             touched = np.any(term.directions != 0, axis=1)
-            dofs.append((term.surface.blocks[:, None] * d + np.arange(d))[touched])
-    joined = np.unique(np.concatenate([np.empty(0, np.int64), *dofs]))
-    return np.setdiff1d(joined, system.problem.fixed).astype(np.int32)
+            dofs.append(term.surface.dofs[touched])
+    return np.setdiff1d(np.concatenate(dofs), system.problem.fixed).astype(np.int32)
 
 
 def resting_start(solver: ActiveSetSolver, laws: Sequence[Superpotential], rtol: float) -> tuple[PETSc.Vec, int]:
@@ -109,12 +117,9 @@ def resting_start(solver: ActiveSetSolver, laws: Sequence[Superpotential], rtol:
     x = system.load.duplicate()
     x.set(0.0)
     low, high = system.lower.array_r, system.upper.array_r
-    contact = np.concatenate(
-        [np.empty(0, np.int64), *(component_dofs(b.surface.blocks, b.surface.normals)[0] for b in system.bounds)]
-    )
+    contact = contact_dofs(system)
     x.array[contact] = closed(low[contact], high[contact])
-    owned = system.problem.fixed[system.problem.fixed < x.local_size]
-    x.array[owned] = system.load.array_r[owned]
+    system.prescribe(x)
     held, models = held_dofs(system, laws), [Resting(law) for law in laws]
     linear = solver.newton_step(x, held, models, rtol).linear
     if _pushed(solver, x, contact, models):

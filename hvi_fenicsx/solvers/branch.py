@@ -9,7 +9,7 @@ it converges linearly, so a Newton step with the true curvature is tried and kep
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -21,6 +21,7 @@ from ..errors import SolverError
 from ..laws import Superpotential
 from . import kinks, pieces
 from .activeset import ActiveSetSolver, Outcome
+from .attempts import Attempt, first_success
 from .base import Counts, Settings, Solved, resting_start
 from .models import Cells, Full, Majorant, Softened
 
@@ -186,44 +187,19 @@ class BranchIteration:
         return sliding.slides(self.system.problem, self.system.forces, self._laws, xi)
 
     def _bounded(self, x: PETSc.Vec, models: Sequence[Majorant], cells: list[Cells], tolerance: float) -> Outcome:
-        lower, upper = kinks.boxes(self.system, cells)
-        best, outcome = x.copy(), Outcome(False, 0, 0, float("inf"), "not started")
-        begin = x.copy()
+        bounds, attempts = kinks.boxes(self.system, cells), self._attempts(models)
+        return first_success(self.solver, x, attempts, tolerance, bounds, self.counts)
+
+    def _attempts(self, models: Sequence[Majorant]) -> Iterator[Attempt | str]:
+        """Of a convex step; none after a failure, where it has no solution."""
+        soft = [Softened(m, m.law.length_scale) for m in models]
         for softened, search, most in _ATTEMPTS:
-            used = [Softened(m, m.law.length_scale) for m in models] if softened else models
-            found = self.solver.solve(
-                x,
-                used,
-                tolerance,
-                lower=lower,
-                upper=upper,
-                line_search=search,
-                max_iterations=self._most(most),
-                steady=self._straight,
-            )
-            self.counts.newton += found.newton
-            self.counts.linear += found.linear
-            if found.measure < outcome.measure or found.converged:
-                outcome = found
-                x.copy(best)
-            if outcome.converged or found.interrupted:
-                break
+            limit = min(most, self.settings.max_newton)
+            yield Attempt(soft if softened else models, search, limit, kept=softened, steady=self._straight)
             if not self._wary:
                 self._wary = True
                 if self._slides([m.xi for m in models]):
-                    outcome = replace(outcome, reason=_SLIDES)
-                    break
-            if softened and np.isfinite(found.measure):
-                x.copy(begin)  # softened steps lower the energy, whatever they left undone
-            else:
-                begin.copy(x)
-        best.copy(x)
-        best.destroy()
-        begin.destroy()
-        return replace(outcome, interrupted=found.interrupted)
-
-    def _most(self, wanted: int) -> int:
-        return min(wanted, self.settings.max_newton)
+                    yield _SLIDES
 
     def _accelerated(self, x: PETSc.Vec, cells: list[Cells], outcome: Outcome) -> tuple[Outcome, bool]:
         """Newton with the true curvature where G is curved; dropped unless it ends lower and solves the inequality."""
@@ -238,8 +214,7 @@ class BranchIteration:
         found = self.solver.solve(
             trial, full, self.settings.tolerance, lower=lower, upper=upper, line_search="bt", max_iterations=15
         )
-        self.counts.newton += found.newton
-        self.counts.linear += found.linear
+        self.counts.spend(found)
         if not found.converged or self._energy(trial) > self._energy(x) + self._rounding(self._energy(x), x):
             return outcome, False
         trial.copy(x)

@@ -186,9 +186,7 @@ class _Schur:
 
     def spread(self, values: Array) -> PETSc.Vec:
         """A displacement of the whole body that is right on Γc, and zero elsewhere."""
-        x, fixed = self.system.load.duplicate(), self.system.problem.fixed
-        x.set(0.0)
-        x.array[fixed] = self.system.load.array_r[fixed]
+        x = self.system.undisplaced()
         x.array[self.kept] = values
         return x
 

@@ -11,7 +11,7 @@ from petsc4py import PETSc
 from ..laws import ConvexPart
 from ..lawterm import LawTerm
 from ..surface import component_dofs
-from ..system import System, traction_scale
+from ..system import System
 from .models import Cells, Full, Majorant
 
 Array = npt.NDArray[np.float64]
@@ -50,7 +50,7 @@ def overloaded(
             continue
         force = np.einsum("md,md->m", term.directions[:, 0, :], term.surface.values(residual.array_r))
         weight = term.surface.weights
-        slack = 0.1 * tolerance * traction_scale(term) * weight
+        slack = 0.1 * tolerance * term.traction_scale * weight
         _, _, free = _slip_dofs(term)
         down = free & (argument <= c.lower) & (force - weight * _jump(part, c.lower) > slack)
         up = free & (argument >= c.upper) & (force + weight * _jump(part, c.upper) < -slack)
@@ -60,8 +60,7 @@ def overloaded(
 
 def _hold_stuck(term: LawTerm, cells: Cells, lower: PETSc.Vec, upper: PETSc.Vec) -> None:
     """Both components of a stuck vertex's slip are kept at zero."""
-    d = term.free.shape[1]
-    dofs = term.surface.blocks[:, None].astype(np.int64) * d + np.arange(d)
+    dofs = term.surface.dofs
     stuck = (cells.index == 0)[:, None] & np.any(np.abs(term.directions) > 0.5, axis=1) & (term.free > 0)
     if len(cells.kinks):
         lower.array[dofs[stuck]] = upper.array[dofs[stuck]] = 0.0
@@ -77,7 +76,7 @@ def _radial_moves(
     force = np.einsum("mkd,md->mk", term.directions, term.surface.values(residual.array_r) * term.free)
     weight = term.surface.weights
     disc = weight * model.law.convex.right(np.zeros_like(argument))
-    slack = 0.1 * tolerance * traction_scale(term) * weight
+    slack = 0.1 * tolerance * term.traction_scale * weight
     go = (cells.index == 0) & (np.linalg.norm(force, axis=1) > disc + slack)
     stick = (cells.index == 1) & (argument <= cells.ramp)
     return go.astype(np.int64) - stick.astype(np.int64)

@@ -18,9 +18,9 @@ from petsc4py import PETSc
 
 from .. import existence, freedom
 from ..parallel import agree, on_root
-from ..surface import component_dofs
 from ..system import Model, System
 from .activeset import ActiveSetSolver
+from .base import contact_dofs
 
 Array = npt.NDArray[np.float64]
 _TOUCHES = 1e-7
@@ -107,10 +107,7 @@ def settled(
     if not modes or not bounded or system.freedom is not None or not system.bounds:
         return None
     motions = [system.unknowns(field) for field in freedom.fields(system.problem, modes)]
-    x = system.load.duplicate()
-    x.set(0.0)
-    owned = system.problem.fixed[system.problem.fixed < x.local_size]
-    x.array[owned] = system.load.array_r[owned]
+    x = system.undisplaced()
     held = _rest(system, x, motions)
     return None if held is None else (x, solver.newton_step(x, held, models(x), rtol).linear)
 
@@ -118,7 +115,7 @@ def settled(
 def _rest(system: System, x: PETSc.Vec, motions: Sequence[PETSc.Vec]) -> npt.NDArray[np.int32] | None:
     """Move x, rigidly, to where it rests; the owned unknowns that bear the load. Collective."""
     comm = system.comm
-    dofs = np.unique(np.concatenate([component_dofs(b.surface.blocks, b.surface.normals)[0] for b in system.bounds]))
+    dofs = contact_dofs(system)
     rows = np.column_stack([motion.array_r[dofs] for motion in motions])
     bounds = [v.array_r[dofs] - x.array_r[dofs] for v in (system.lower, system.upper)]
     gathered = agree(comm, (rows, *bounds, *_slips(system, motions)))

@@ -6,17 +6,18 @@ With contact it is a convex quadratic programme with bounds on u·n: one SNES VI
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from petsc4py import PETSc
 
 from ..system import System
 from .activeset import ActiveSetSolver, Outcome
+from .attempts import Attempt, first_success
 from .base import Counts, Settings, Solved, resting_start
-from .models import Cells, Full
+from .models import Full
 from .settling import settled
+from .smooth import smooth_models
 
 _MARGIN = 0.5
 """Of the tolerance, for Krylov's recursive residual to stay below it."""
@@ -36,11 +37,6 @@ def is_quadratic(system: System) -> bool:
     return all(term.law.is_linear for term in system.terms)
 
 
-def springs(system: System) -> list[Full]:
-    """The laws, which have no kinks: one cell each."""
-    return [Full(t.law, Cells.around(t.law.convex, np.zeros(len(t.surface.blocks)))) for t in system.terms]
-
-
 class LinearSolve:
     """The equation on one system; call :meth:`solve` once."""
 
@@ -53,7 +49,7 @@ class LinearSolve:
 
     def solve(self) -> Solved:
         """The solution of the equation, or what was reached. Collective."""
-        x, models, counts = self._prescribed(), springs(self.system), Counts()
+        x, models, counts = self.system.undisplaced(), smooth_models(self.system), Counts()
         outcome = Outcome(False, 0, 0, float("inf"), "not started")
         for _ in range(_REFINEMENTS):
             outcome = self._step(x, models)
@@ -63,14 +59,6 @@ class LinearSolve:
         self.settings.progress(self.name, None, 1, outcome.measure, 0)
         reason = "stationary" if outcome.converged else outcome.reason
         return Solved(self.system.displacement(x), self.name, outcome.converged, reason, counts)
-
-    def _prescribed(self) -> PETSc.Vec:
-        """Zero but for the prescribed values."""
-        x = self.system.load.duplicate()
-        x.set(0.0)
-        owned = self.system.problem.fixed[self.system.problem.fixed < x.local_size]
-        x.array[owned] = self.system.load.array_r[owned]
-        return x
 
     def _step(self, x: PETSc.Vec, models: Sequence[Full]) -> Outcome:
         """One solve of the residual equation, and how far x is then from the solution. Collective."""
@@ -112,42 +100,23 @@ class ConvexProgramme:
     def _progress(self, iteration: int, residual: float, contact: int) -> None:
         self.settings.progress(self.name, None, iteration, residual, contact)
 
-    def _settle(self, x: PETSc.Vec, begin: PETSc.Vec, models: list[Full], counts: Counts) -> None:
-        rested = settled(self.solver, lambda _: models, min(1e-4, self.settings.tolerance))
-        if rested is not None:
-            counts.linear += rested[1]
-            for vector in (x, begin):
-                rested[0].copy(vector)
-
     def _minimise(self, x: PETSc.Vec, counts: Counts) -> Outcome:
-        """Attempts until one converges: from x, then from bodies at rest; the best one's outcome, in x. Collective."""
-        models, system = springs(self.system), self.system
-        begin, best, outcome = x.copy(), x.copy(), Outcome(False, 0, 0, float("inf"), "not started")
+        """Attempts until one converges, into x; the best one's outcome. Collective."""
+        bounds = self.system.lower, self.system.upper
+        return first_success(self.solver, x, self._attempts(counts), self.settings.tolerance, bounds, counts)
+
+    def _attempts(self, counts: Counts) -> Iterator[Attempt]:
+        """From the start, then from bodies at rest on their supports."""
+        models = smooth_models(self.system)
         for number, (search, most) in enumerate(_ATTEMPTS):
-            if number == 1:
-                self._settle(x, begin, models, counts)
-            found = self.solver.solve(
-                x,
-                models,
-                self.settings.tolerance,
-                lower=system.lower,
-                upper=system.upper,
-                line_search=search,
-                max_iterations=min(most, self.settings.max_newton),
-                steady=self.settings.steady and number == 0,
-            )
-            counts.newton += found.newton
-            counts.linear += found.linear
-            if found.measure < outcome.measure or found.converged:
-                outcome = found
-                x.copy(best)
-            if found.converged or found.interrupted:
-                break
-            if search == "bt" and np.isfinite(found.measure):
-                x.copy(begin)  # a search along the energy has lowered it, whatever it left undone
-            else:
-                begin.copy(x)
-        best.copy(x)
-        for vector in (begin, best):
-            vector.destroy()
-        return replace(outcome, interrupted=found.interrupted)
+            start = self._settled(models, counts) if number == 1 else None
+            limit = min(most, self.settings.max_newton)
+            steady = self.settings.steady and number == 0
+            yield Attempt(models, search, limit, kept=search == "bt", start=start, steady=steady)
+
+    def _settled(self, models: list[Full], counts: Counts) -> PETSc.Vec | None:
+        rested = settled(self.solver, lambda _: models, min(1e-4, self.settings.tolerance))
+        if rested is None:
+            return None
+        counts.linear += rested[1]
+        return rested[0]

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Protocol
+from abc import ABC, abstractmethod
+from typing import Any
 
 import numpy as np
 from petsc4py import PETSc
@@ -14,24 +15,58 @@ from .base import Counts, Settings, Solved, resting_start
 from .models import Cells, Full
 
 
-class Run(Protocol):
-    """One solve by a method.
+class Run(ABC):
+    """One solve by a method: a PETSc object (SNES, TAO) and what it calls back.
 
     Attributes:
         models: what stands for the laws. counts: iterations. stopped: whether it was told to end.
+        matrix: for the Hessian; a copy of the system's, which PETSc scales or shifts, and which may be indefinite.
+        reasons: PETSc's enumeration of why it ended.
     """
 
-    models: list[Full]
-    counts: Counts
-    stopped: bool
+    reasons: type
 
-    def __init__(self, solver: ActiveSetSolver, settings: Settings, x: PETSc.Vec) -> None: ...
+    def __init__(self, solver: ActiveSetSolver, settings: Settings, x: PETSc.Vec) -> None:
+        self.solver, self.settings, self.system = solver, settings, solver.system
+        self.models = smooth_models(self.system)
+        self.counts, self.stopped = Counts(), False
+        self.residual = x.duplicate()
+        self.matrix = self.system.matrix.copy()
+        self.matrix.setOption(PETSc.Mat.Option.SPD, False)
+
+    @abstractmethod
+    def create(self) -> Any:
+        """The configured PETSc object."""
+
+    @abstractmethod
+    def iterate(self, made: Any, x: PETSc.Vec) -> None:
+        """Let it solve, from and into x. Collective."""
 
     def execute(self, x: PETSc.Vec) -> str:
         """Iterate from and into x; PETSc's name of its reason to end. Collective."""
+        made = self.create()
+        try:
+            self.iterate(made, x)
+            reason = self._words(made.getConvergedReason())
+        except PETSc.Error as error:
+            reason = f"PETSc error {error.ierr}"
+        self.count(made)
+        for thing in (made, self.matrix):
+            thing.destroy()
+        return "interrupted" if self.stopped else reason
+
+    def _words(self, reason: int) -> str:
+        names = {v: k for k, v in vars(self.reasons).items() if isinstance(v, int) and "_" in k}
+        return names.get(int(reason), str(reason))
+
+    def count(self, made: Any) -> None:
+        """Read off its iterations."""
+        self.counts.newton = made.getIterationNumber()
 
     def judge(self, x: PETSc.Vec) -> tuple[PETSc.Vec, float]:
         """The candidate that x stands for, and its residual of the inequality. Collective."""
+        self.system.residual(x, self.residual, self.models)
+        return x, self.solver.measure(x, self.residual, self.system.lower, self.system.upper)
 
 
 class SmoothMethod:

@@ -14,10 +14,8 @@ import numpy as np
 from petsc4py import PETSc
 
 from ..system import System
-from .activeset import ActiveSetSolver
-from .base import Counts, Settings
 from .options import configure
-from .smooth import SmoothMethod, smooth_models
+from .smooth import Run, SmoothMethod
 
 _DIRECT = {"ksp_type": "preonly", "pc_type": "lu", "pc_factor_mat_solver_type": "mumps"}
 _KRYLOV = {
@@ -29,7 +27,6 @@ _KRYLOV = {
 }
 """The semismooth Jacobian is not symmetric: its rows, and not its columns, are scaled."""
 _Reason = PETSc.SNES.ConvergedReason
-_NAMES = {v: k for k, v in vars(_Reason).items() if isinstance(v, int) and "_" in k}
 
 
 def onto_bounds(system: System, x: PETSc.Vec, residual: PETSc.Vec) -> PETSc.Vec:
@@ -46,36 +43,27 @@ def onto_bounds(system: System, x: PETSc.Vec, residual: PETSc.Vec) -> PETSc.Vec:
     return found
 
 
-class _Run:
+class _Run(Run):
     """The callbacks of one SNES solve."""
 
-    def __init__(self, solver: ActiveSetSolver, settings: Settings, x: PETSc.Vec) -> None:
-        self.solver, self.settings, self.system = solver, settings, solver.system
-        self.models = smooth_models(self.system)
-        self.counts, self.stopped = Counts(), False
-        self._residual = x.duplicate()
-        self._jacobian = self.system.matrix.copy()  # not the system's own: PETSc scales its rows
-        self._jacobian.setOption(PETSc.Mat.Option.SPD, False)
-        self._jacobian.setOption(PETSc.Mat.Option.SYMMETRIC, False)
+    reasons = _Reason
 
-    def execute(self, x: PETSc.Vec) -> str:
-        """Run SNES from and into x; PETSc's name of its reason. Collective."""
-        snes = self._create()
-        try:
-            snes.solve(None, x)
-            reason = _NAMES.get(int(snes.getConvergedReason()), str(snes.getConvergedReason()))
-        except PETSc.Error as error:
-            reason = f"PETSc error {error.ierr}"
-        self.counts.newton, self.counts.linear = snes.getIterationNumber(), snes.getLinearSolveIterations()
-        for thing in (snes, self._jacobian):
-            thing.destroy()
-        return "interrupted" if self.stopped else reason
+    def iterate(self, made: PETSc.SNES, x: PETSc.Vec) -> None:
+        """Run SNES. Collective."""
+        made.solve(None, x)
 
-    def _create(self) -> PETSc.SNES:
+    def count(self, made: PETSc.SNES) -> None:
+        """Newton and linear iterations."""
+        super().count(made)
+        self.counts.linear = made.getLinearSolveIterations()
+
+    def create(self) -> PETSc.SNES:
+        """``vinewtonssls``, whose Jacobian is not symmetric."""
+        self.matrix.setOption(PETSc.Mat.Option.SYMMETRIC, False)
         snes = PETSc.SNES().create(self.system.comm)
         snes.setType("vinewtonssls")
         snes.setFunction(lambda _, x, f: self.system.residual(x, f, self.models), self.system.load.duplicate())
-        snes.setJacobian(self._tangent, self._jacobian)
+        snes.setJacobian(self._tangent, self.matrix)
         snes.setVariableBounds(self.system.lower, self.system.upper)
         snes.setConvergenceTest(self._converged)
         snes.setTolerances(max_it=self.settings.max_newton)
@@ -88,11 +76,9 @@ class _Run:
         self.system.matrix.copy(j, structure=PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
 
     def judge(self, x: PETSc.Vec) -> tuple[PETSc.Vec, float]:
-        """The candidate that x stands for, and its residual of the inequality. Collective."""
-        self.system.residual(x, self._residual, self.models)
-        found = onto_bounds(self.system, x, self._residual)
-        self.system.residual(found, self._residual, self.models)
-        return found, self.solver.measure(found, self._residual, self.system.lower, self.system.upper)
+        """The candidate on its bounds, and its residual of the inequality. Collective."""
+        self.system.residual(x, self.residual, self.models)
+        return super().judge(onto_bounds(self.system, x, self.residual))
 
     def _converged(self, snes: PETSc.SNES, iteration: int, norms: Any) -> int:
         found, measure = self.judge(snes.getSolution())

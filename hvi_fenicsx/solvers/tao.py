@@ -12,50 +12,34 @@ import numpy.typing as npt
 from petsc4py import PETSc
 
 from ..system import System
-from .activeset import ActiveSetSolver
-from .base import Counts, Settings
+from .base import Counts
 from .linear import HeldPreconditioner
 from .options import configure
-from .smooth import SmoothMethod, smooth_models
+from .smooth import Run, SmoothMethod
 
 Array = npt.NDArray[np.float64]
 _FOUNDATION = 1e-3
 """Stiffness per area, in units of E0/L, that keeps the preconditioner regular where the body is free to move."""
-_REASON = {v: k for k, v in vars(PETSc.TAO.ConvergedReason).items() if isinstance(v, int) and "_" in k}
 _Reason = PETSc.TAO.ConvergedReason
 
 
-class _Run:
-    """The callbacks of one TAO solve."""
+class _Run(Run):
+    """The callbacks of one TAO solve; each step of the preconditioner counts its linear iteration."""
 
-    def __init__(self, solver: ActiveSetSolver, settings: Settings, x: PETSc.Vec) -> None:
-        self.solver, self.settings, self.system = solver, settings, solver.system
-        self.models = smooth_models(self.system)
-        self.counts, self.stopped = Counts(), False
-        self._residual = x.duplicate()
-        self._hessian = self.system.matrix.copy()  # not the system's own: TAO shifts it
-        self._hessian.setOption(PETSc.Mat.Option.SPD, False)
+    reasons = _Reason
 
-    def execute(self, x: PETSc.Vec) -> str:
-        """Run TAO from and into x; PETSc's name of its reason. Collective."""
-        tao = self._create()
-        try:
-            tao.solve(x)
-            reason = _REASON.get(int(tao.getConvergedReason()), str(tao.getConvergedReason()))
-        except PETSc.Error as error:
-            reason = f"PETSc error {error.ierr}"
-        self.counts.newton = tao.getIterationNumber()
-        for thing in (tao, self._hessian):
-            thing.destroy()
-        return "interrupted" if self.stopped else reason
+    def iterate(self, made: PETSc.TAO, x: PETSc.Vec) -> None:
+        """Run TAO. Collective."""
+        made.solve(x)
 
-    def _create(self) -> PETSc.TAO:
+    def create(self) -> PETSc.TAO:
+        """``bnls`` on the true Hessian."""
         tao = PETSc.TAO().create(self.system.comm)
         tao.setType("bnls")
         tao.setObjective(lambda _, x: self.system.energy(x, self.models))
         tao.setGradient(lambda _, x, g: self.system.residual(x, g, self.models), None)
         rows = _numbered_rows(self.system)
-        tao.setHessian(self._tangent, self._hessian, rows)
+        tao.setHessian(self._tangent, self.matrix, rows)
         tao.setVariableBounds((self.system.lower, self.system.upper))
         tao.setConvergenceTest(self._converged)
         tao.setMaximumIterations(self.settings.max_newton)
@@ -80,11 +64,6 @@ class _Run:
             rate = term.rate(x.array_r, part.right(argument), part.second(argument))
             rates.append(rate + _FOUNDATION * term.free[:, :, None] * np.eye(term.free.shape[1]))
         return rates
-
-    def judge(self, x: PETSc.Vec) -> tuple[PETSc.Vec, float]:
-        """X and its residual of the inequality (:meth:`ActiveSetSolver.measure`). Collective."""
-        self.system.residual(x, self._residual, self.models)
-        return x, self.solver.measure(x, self._residual, self.system.lower, self.system.upper)
 
     def _converged(self, tao: PETSc.TAO) -> int | None:
         x, iteration = tao.getSolution(), tao.getIterationNumber()

@@ -11,6 +11,7 @@ from typing import Any
 from ..errors import InputError
 from ..pictures.units import quantity
 from ..scene import Box, Disk, HalfDisk, MeshFile, Rectangle, Scene
+from ..scene.shapes import MOST_REFINEMENTS
 
 _MOST_POINT = {2: 150_000, 3: 60_000}
 _MOST_REFERENCE = {2: 400_000, 3: 250_000}
@@ -19,15 +20,12 @@ _FEWEST_CELLS = 2
 _AREA_OF_VERTEX = math.sqrt(3.0) / 2.0
 """Of a vertex in a mesh of equilateral triangles, over h²."""
 _FILE = 5_000.0
-_MOST_REFINEMENTS = 10
 _BELOW, _ABOVE = 2, 1
 """Rungs of a plan's own making below and above the scene's mesh."""
 
 Tables = dict[str, Any]
 ADAPTIVE = "adaptive to "
 """How the words of an adaptive mesh begin."""
-REFINEMENTS = "refinements"
-"""Key beside the scene's own tables: how often each cell of a mesh file is cut into 2^d."""
 
 
 @dataclass(frozen=True)
@@ -35,12 +33,11 @@ class Setting:
     """What one point solves.
 
     Attributes:
-        scene: the scene, on its own mesh. refinements: how often that is refined uniformly.
+        scene: the scene, on its own mesh.
         accuracy: instead of that mesh, one refined adaptively until the estimate is below this (`hvi run --accuracy`).
     """
 
     scene: Scene
-    refinements: int = 0
     accuracy: float | None = None
 
 
@@ -60,11 +57,8 @@ def words(setting: Setting) -> str:
     if isinstance(domain, Rectangle | Box):
         return " × ".join(map(str, domain.cells)) + " cells"
     if isinstance(domain, MeshFile):
-        return (
-            ("file, as it is", "file, refined once")[setting.refinements]
-            if setting.refinements < 2
-            else (f"file, refined {setting.refinements} times")
-        )
+        often = domain.refinements
+        return ("file, as it is", "file, refined once")[often] if often < 2 else f"file, refined {often} times"
     return f"mesh size {quantity(domain.mesh_size, 'm')}"
 
 
@@ -74,7 +68,7 @@ def unknowns(setting: Setting) -> float:
     if isinstance(domain, Rectangle | Box):
         return float(scene.dimension * math.prod(n + 1 for n in domain.cells))
     if isinstance(domain, MeshFile):
-        return _FILE * 2.0 ** (scene.dimension * setting.refinements)
+        return _FILE * 2.0 ** (scene.dimension * domain.refinements)
     if isinstance(domain, Disk | HalfDisk):
         area = math.pi * domain.radius**2 / (1.0 if isinstance(domain, Disk) else 2.0)
         return 2.0 * _vertices(area, domain.mesh_size, domain.mesh_size_below or domain.mesh_size)
@@ -107,8 +101,10 @@ def refined(tables: Mapping[str, Any], factor: Fraction) -> Tables | None:
             if key in domain:
                 domain[key] = float(domain[key] / factor)
     else:
-        levels = tables.get(REFINEMENTS, 0) + factor.numerator.bit_length() - factor.denominator.bit_length()
-        return {**tables, REFINEMENTS: levels} if levels >= 0 else None
+        levels = domain.get("refinements", 0) + factor.numerator.bit_length() - factor.denominator.bit_length()
+        if not 0 <= levels <= MOST_REFINEMENTS:
+            return None
+        domain["refinements"] = levels
     return {**tables, "domain": domain}
 
 
@@ -125,9 +121,9 @@ def at(tables: Mapping[str, Any], text: str) -> Tables:
     if "cells" in domain:
         return _cells_at(tables, text)
     if "mesh_size" not in domain:
-        if not text.isdigit() or int(text) > _MOST_REFINEMENTS:
-            raise InputError(f"--axis mesh: {text!r}: of a mesh file, 0 to {_MOST_REFINEMENTS} refinements are wanted")
-        return {**tables, REFINEMENTS: int(text)}
+        if not text.isdigit() or int(text) > MOST_REFINEMENTS:
+            raise InputError(f"--axis mesh: {text!r}: of a mesh file, 0 to {MOST_REFINEMENTS} refinements are wanted")
+        return {**tables, "domain": {**domain, "refinements": int(text)}}
     try:
         size = float(text)
     except ValueError:

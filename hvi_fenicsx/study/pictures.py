@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from ..pictures.style import (
     BLUE,
@@ -26,8 +24,9 @@ from ..pictures.style import (
     save,
     titled,
 )
+from .axes import LEAST, apart, error_axis, plain_log, span, time_axis
 from .cost import PHASES
-from .sentences import NAMES, ROUNDING, headlines, order, over_h, seconds, told_first
+from .sentences import headlines, order, over_h, seconds, told_first
 from .table import Row, front
 
 if TYPE_CHECKING:
@@ -37,12 +36,8 @@ PANEL, GAP, FOOT = 2.6, 0.6, 0.85
 """Inches: a panel, the room for its title, the axis below the last."""
 _SMOOTHINGS = {None: GREEN, "quadratic": BLUE, "chks": PURPLE, "log_exp": ORANGE, "paper": VERMILION}
 _PHASE_COLOURS = dict(zip(PHASES, (PALE, "#8fb8d6", ORANGE, BLUE, GREEN), strict=True))
-_LEAST, _BOTTOM = 1e-6, 1e-7
-"""What is better than the first is drawn on it; no axis of errors goes below the second."""
 _BARS = 12
 """Bars of the picture of time, at most."""
-_LINE = 0.17
-"""Inches that a name takes in height: of points or lines closer than this only one is named."""
 
 
 def draw(study: Study, folder: Path) -> None:
@@ -83,10 +78,10 @@ def _work_precision(study: Study) -> Figure | None:
         here.tick_params(labelbottom=here is axes[-1])
     _legend(axes[0], _kinds(study))
     axes[-1].set_xlabel("time to solution, without compilation and output")
-    low, high = _range([r.seconds for r in study.rows if r.converged and r.seconds])
+    low, high = span([r.seconds for r in study.rows if r.converged and r.seconds])
     for here in axes:
         here.set_xlim(low / 3.0, high * 1.3)
-    _time_axis(axes[-1])
+    time_axis(axes[-1])
     return made
 
 
@@ -94,29 +89,22 @@ def _cost_panel(axes: Axes, study: Study, quantity: str) -> None:
     known = [(r.seconds, e, r) for r in study.rows if (e := r.error(quantity)) is not None and r.seconds]
     for s, e, r in known:
         here = "o" if r.method == "auto" else "D"
-        axes.plot(s, max(e, _LEAST), here, color=_SMOOTHINGS[r.smoothing], ms=6.5, alpha=0.85, mec="white", mew=0.6)
+        axes.plot(s, max(e, LEAST), here, color=_SMOOTHINGS[r.smoothing], ms=6.5, alpha=0.85, mec="white", mew=0.6)
     own = study.own
     if (error := own.error(quantity)) is not None and own.seconds:
-        axes.plot(own.seconds, max(error, _LEAST), "*", ms=19, mfc="none", mec=INK, mew=1.5, zorder=6)
-    _error_axis(axes, study, quantity, [e for _, e, _ in known])
+        axes.plot(own.seconds, max(error, LEAST), "*", ms=19, mfc="none", mec=INK, mew=1.5, zorder=6)
+    error_axis(axes, quantity, study.certain[quantity].error, [e for _, e, _ in known])
     if best := front(study.rows, quantity, study.certain):
         _front_line(axes, best, quantity)
 
 
-def _apart(axes: Axes, one: float, other: float) -> bool:
-    """Whether two errors are so far apart on the axis that both can be named."""
-    low, high = axes.get_ylim()
-    inches = axes.bbox.height / axes.figure.dpi
-    return abs(math.log(one / other)) / math.log(high / low) * inches > _LINE
-
-
 def _front_line(axes: Axes, best: Sequence[Row], quantity: str) -> None:
-    points = [(r.seconds or 0.0, max(r.error(quantity) or 0.0, _LEAST)) for r in best]
+    points = [(r.seconds or 0.0, max(r.error(quantity) or 0.0, LEAST)) for r in best]
     xs, ys = zip(*points, strict=True)
     axes.plot(xs, ys, color=INK, lw=1.6, zorder=1, drawstyle="steps-post")
     named: list[float] = []
     for r, (x, y) in list(zip(best, points, strict=True))[::-1]:
-        if all(_apart(axes, y, other) for other in named):
+        if all(apart(axes, y, other) for other in named):
             named.append(y)
             axes.annotate(_short(r), (x, y), (-8, -2), textcoords="offset points", ha="right", va="center", size=10)
 
@@ -153,21 +141,14 @@ def _against_h(study: Study) -> Figure | None:
         values, ends = _lines_over_h(here, study, quantity)
         found = order(study.rows, study.own, quantity, study.certain)
         note = "" if found is None else f"exact law: h^{found:.2f} at the fine end"
-        _error_axis(here, study, quantity, values, note)
+        error_axis(here, quantity, study.certain[quantity].error, values, note)
         _name_lines(here, ends)
         here.tick_params(labelbottom=here is axes[-1])
-        _plain_log(here)
+        plain_log(here)
         here.set_xticks(sorted({h for h, _ in over_h(study.rows, study.own, quantity)}))
         here.invert_xaxis()
     axes[-1].set_xlabel("mesh width h in m, finer to the right")
     return made
-
-
-def _plain_log(axes: Axes) -> None:
-    axes.set_xscale("log")
-    axes.xaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:.3g}"))
-    axes.xaxis.set_minor_formatter(NullFormatter())
-    axes.tick_params(axis="x", which="minor", length=0)
 
 
 End = tuple[float, float, str, str]
@@ -186,7 +167,7 @@ def _lines_over_h(axes: Axes, study: Study, quantity: str) -> tuple[list[float],
             continue
         xs, ys = zip(*points, strict=True)
         colour = _SMOOTHINGS[like.smoothing if like else None]
-        shown = [max(y, _LEAST) for y in ys]
+        shown = [max(y, LEAST) for y in ys]
         thin: dict[str, Any] = {"lw": 1.5, "alpha": 0.35 + 0.6 * i / (len(ordered) or 1)}
         style = thin if like is not None else {"lw": 2.6, "zorder": 5}
         axes.plot(xs, shown, "o-", color=colour, ms=5, **style)
@@ -199,7 +180,7 @@ def _name_lines(axes: Axes, ends: Sequence[End]) -> None:
     """At the fine end; lines that end together share a name."""
     groups: list[list[End]] = []
     for end in sorted(ends, key=lambda e: -e[1]):
-        if groups and not _apart(axes, end[1], groups[-1][-1][1]):
+        if groups and not apart(axes, end[1], groups[-1][-1][1]):
             groups[-1].append(end)
         else:
             groups.append([end])
@@ -219,18 +200,18 @@ def _against_epsilon(study: Study) -> Figure | None:
         values: list[float] = []
         for kind, colour, points in _over_epsilon(study, quantity):
             xs, ys = zip(*points, strict=True)
-            here.plot(xs, [max(y, _LEAST) for y in ys], "o-", color=colour, ms=6)
+            here.plot(xs, [max(y, LEAST) for y in ys], "o-", color=colour, ms=6)
             kinds[kind] = ("o", colour, kind)
             values += ys
         if (bare := study.exact.error(quantity)) is not None:
-            here.axhline(max(bare, _LEAST), color=GREEN, ls=(0, (4, 3)), lw=2)
+            here.axhline(max(bare, LEAST), color=GREEN, ls=(0, (4, 3)), lw=2)
             values.append(bare)
         if (own := study.own.error(quantity)) is not None and study.own.epsilon:
-            here.plot(study.own.epsilon, max(own, _LEAST), "*", ms=19, mfc="none", mec=INK, mew=1.5, zorder=6)
+            here.plot(study.own.epsilon, max(own, LEAST), "*", ms=19, mfc="none", mec=INK, mew=1.5, zorder=6)
             values.append(own)
             kinds["~own"] = ("*", INK, "the scene's own")
-        _error_axis(here, study, quantity, values)
-        _plain_log(here)
+        error_axis(here, quantity, study.certain[quantity].error, values)
+        plain_log(here)
         here.tick_params(labelbottom=here is axes[-1])
     _legend(axes[0], [kinds[k] for k in sorted(kinds)])
     axes[-1].set_xlabel("ε, relative to the law's energy at its kink")
@@ -289,43 +270,3 @@ def _bars(study: Study) -> list[Row]:
 def _bar_name(study: Study, found: Row) -> str:
     words = found.words.replace(" cells", "").replace("exact law", "exact")
     return f"★ {words}" if found.point == study.own.point else words
-
-
-def _error_axis(axes: Axes, study: Study, quantity: str, errors: Sequence[float], note: str = "") -> None:
-    """Logarithmic, in per cent; the reference's own error is a grey band from below."""
-    axes.set_yscale("log")
-    own = study.certain[quantity].error
-    low, high = _range([max(e, _LEAST) for e in errors])
-    low = min(low, own / 2 if own and own > low / 30 else low) / 1.5
-    low, high = max(_BOTTOM, 10.0 ** math.floor(math.log10(low))), 10.0 ** math.ceil(math.log10(high * 1.5))
-    axes.set_ylim(low, high)
-    if own is not None and own > low:
-        axes.axhspan(low, own, color=GREY, alpha=0.16, lw=0, zorder=0)
-        axes.text(0.995, low * 1.05, "the reference's own error ", transform=axes.get_yaxis_transform(), ha="right",
-                  va="bottom", size=10, color=GREY)  # fmt: skip
-    axes.tick_params(axis="y", which="minor", length=0)
-    axes.yaxis.set_major_locator(LogLocator(numticks=6))
-    axes.yaxis.set_major_formatter(FuncFormatter(lambda y, _: f"{100 * y:.8f}".rstrip("0").rstrip(".") + " %"))
-    axes.yaxis.set_minor_formatter(NullFormatter())
-    axes.grid(which="major", color="#e6e6e6", lw=0.8)
-    axes.set_axisbelow(True)
-    axes.set_title(f"error in {_name(quantity)}", loc="left", size=13)
-    axes.set_title(note, loc="right", size=11.5, color=GREY)
-
-
-def _name(quantity: str) -> str:
-    return NAMES[quantity].replace("_t", "ₜ").replace("_n", "ₙ")
-
-
-def _time_axis(axes: Axes) -> None:
-    figure_axes = axes.get_figure().axes  # type: ignore[union-attr]
-    for here in figure_axes:
-        here.set_xscale("log")
-        here.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0), numticks=12))
-        here.xaxis.set_major_formatter(FuncFormatter(lambda x, _: seconds(x)))
-        here.xaxis.set_minor_formatter(NullFormatter())
-
-
-def _range(values: Sequence[float]) -> tuple[float, float]:
-    known = [v for v in values if v > ROUNDING] or [_LEAST]
-    return min(known), max(known)

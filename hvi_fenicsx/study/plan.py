@@ -189,19 +189,18 @@ def _setting(tables: Tables) -> Setting:
     Raises:
         InputError: they contradict each other.
     """
-    rest = {name: table for name, table in tables.items() if name != meshes.REFINEMENTS}
     try:
-        scene = Scene.model_validate(rest)
+        scene = Scene.model_validate(tables)
     except ValidationError as error:
         raise InputError("; ".join(p.text for p in problems_of(error, Scene))) from None
     wanted = scene.solver
     for law in laws(scene) if wanted.smoothing else ():
         smoothing.create(str(wanted.smoothing), law, epsilon=wanted.epsilon, epsilon_absolute=wanted.epsilon_absolute)
-    return Setting(scene, tables.get(meshes.REFINEMENTS, 0))
+    return Setting(scene)
 
 
 def _distinct(settings: Iterable[Setting]) -> list[Setting]:
-    return list({(dump_scene(s.scene), s.refinements, s.accuracy): s for s in settings}.values())
+    return list({(dump_scene(s.scene), s.accuracy): s for s in settings}.values())
 
 
 def _default(scene: Scene, tables: Tables, left_out: list[str]) -> Iterator[Setting]:
@@ -221,7 +220,7 @@ def _default(scene: Scene, tables: Tables, left_out: list[str]) -> Iterator[Sett
 
 def _reference(finest: Setting) -> Iterator[Setting]:
     """The unsmoothed law, by the default method, on finer meshes."""
-    tables = {**_unsmoothed(tomllib.loads(dump_scene(finest.scene))), meshes.REFINEMENTS: finest.refinements}
+    tables = _unsmoothed(tomllib.loads(dump_scene(finest.scene)))
     solver = {**tables.get("solver", {}), "method": "auto", "linear_solver": "auto", "tolerance": REFERENCE_TOLERANCE}
     for rung in meshes.reference({**tables, "solver": solver}, _setting):
         yield _setting(rung)

@@ -16,7 +16,6 @@ from typing import Any
 from mpi4py import MPI
 from scipy import sparse
 
-from .. import domain, refinement
 from ..accuracy import Goal, reach
 from ..adaptive import Climber
 from ..commands import ended_together
@@ -39,7 +38,6 @@ def main() -> int:
     parser.add_argument("result", type=Path)
     parser.add_argument("--repeat", type=int, default=1, help="repetitions at most")
     parser.add_argument("--stiffness", action="store_true", help="write the stiffness too: it will be a reference")
-    parser.add_argument("--refinements", type=int, default=0, help="of the mesh, uniform")
     parser.add_argument("--accuracy", type=float, help="of an adaptive mesh, in the energy norm")
     options = parser.parse_args()
     try:
@@ -68,16 +66,12 @@ def _point(options: argparse.Namespace) -> None:
 
 
 def _solved(scene: Scene, options: argparse.Namespace, timer: Timer) -> Solution:
-    """The scene on its mesh, refined as is wanted. Collective."""
+    """The scene on its mesh, or on one made for an accuracy. Collective."""
     if options.accuracy is not None:
         found = reach(scene, COMM, Goal(options.accuracy), Climber(timer), lambda line: None).solution
         timer.seconds["solve"] += timer.seconds["estimate"]  # which steers the climb: part of what it costs
         return found
-    with timer("mesh"):
-        body = domain.build(COMM, scene.domain, scene.dimension)
-        for _ in range(options.refinements):
-            body = refinement.uniform(body).domain
-    return finish(prepare(scene, COMM, timer, body))
+    return finish(prepare(scene, COMM, timer))
 
 
 def _keep(options: argparse.Namespace, solution: Solution, record: dict[str, Any]) -> None:

@@ -136,7 +136,7 @@ class Runner:
     def _arguments(self, job: Job, path: Path) -> list[str]:
         repeat = 1 if job.stiffness else self.repeat
         words = [str(path.with_suffix(".toml")), str(path), f"--repeat={repeat}"]
-        words += [f"--refinements={job.setting.refinements}", *(["--stiffness"] if job.stiffness else [])]
+        words += ["--stiffness"] if job.stiffness else []
         return [*words, *([f"--accuracy={job.setting.accuracy}"] if job.setting.accuracy is not None else [])]
 
     def _failed(self, path: Path, code: int, errors: str) -> None:

@@ -22,6 +22,7 @@ from scipy import sparse
 from .. import dilatation
 from ..boundary import State
 from ..effects.base import Direction
+from ..scales import Scales
 from ..solution import Solution
 from ..surface import dof_of_node
 
@@ -84,19 +85,37 @@ def take(solution: Solution) -> Sample | None:
 def _part(solution: Solution, state: State) -> PartSample | None:
     """One part, gathered on rank 0. Collective."""
     space, scales = solution.problem.space, solution.problem.scales
-    comm, d = space.mesh.comm, scales.dimension
-    mesh, surface = space.mesh, state.surface
-    nodes = (
-        dolfinx.mesh.entities_to_geometry(mesh, d - 1, surface.facets)
-        if len(surface.facets)
-        else np.empty((0, d), dtype=np.int32)
-    )
-    to_global = space.dofmap.index_map.local_to_global
-    facets = _joined(comm, to_global(dof_of_node(space)[nodes].ravel()).reshape(-1, d))
+    comm, to_global = space.mesh.comm, space.dofmap.index_map.local_to_global
+    facets = _joined(comm, to_global(_corners(space, state).ravel()).reshape(-1, scales.dimension))
+    numbers = _joined(comm, to_global(state.surface.blocks))
+    gathered = {name: _joined(comm, values) for name, values in _columns(state, scales).items()}
+    if comm.rank:
+        return None
+    order = np.argsort(numbers)
+    inside = np.unique(np.sort(facets, axis=1), axis=0)
     drops = [t.exact.concave.kinks for t in state.terms if t.direction is Direction.SLIP]
+    return PartSample(
+        facets=np.searchsorted(numbers[order], inside),
+        drops=np.concatenate([np.empty(0), *drops]) * scales.displacement,
+        bounded=np.array(state.bounds is not None),
+        **{name: values[order] for name, values in gathered.items()},
+    )
+
+
+def _corners(space: fem.FunctionSpace, state: State) -> npt.NDArray[np.int32]:
+    """The local vertices of a part's facets, (f, d)."""
+    d, facets = space.mesh.geometry.dim, state.surface.facets
+    if not len(facets):
+        return np.empty((0, d), dtype=np.int32)  # dolfinx divides by their number
+    return dof_of_node(space)[dolfinx.mesh.entities_to_geometry(space.mesh, d - 1, facets)]
+
+
+def _columns(state: State, scales: Scales) -> dict[str, Array]:
+    """What a part's vertices (m) on this rank have, by the sample's names, SI."""
+    d, surface = scales.dimension, state.surface
     rubs = any(t.direction is Direction.SLIP for t in state.terms)
     presses = state.bounds is not None or any(t.direction is not Direction.SLIP for t in state.terms)
-    columns = {
+    return {
         "points": surface.points[:, :d],
         "weights": surface.weights * scales.length ** (d - 1),
         "normals": surface.normals,
@@ -105,18 +124,6 @@ def _part(solution: Solution, state: State) -> PartSample | None:
         "pressure": state.pressure * scales.stress * presses,
         "contact": state.contact.astype(float),
     }
-    numbers = _joined(comm, to_global(surface.blocks))
-    gathered = {name: _joined(comm, values) for name, values in columns.items()}
-    if comm.rank:
-        return None
-    order = np.argsort(numbers)
-    inside = np.unique(np.sort(facets, axis=1), axis=0)
-    return PartSample(
-        facets=np.searchsorted(numbers[order], inside),
-        drops=np.concatenate([np.empty(0), *drops]) * scales.displacement,
-        bounded=np.array(state.bounds is not None),
-        **{name: values[order] for name, values in gathered.items()},
-    )
 
 
 def _joined(comm: MPI.Comm, values: npt.NDArray[Any]) -> Any:

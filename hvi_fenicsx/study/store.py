@@ -38,9 +38,7 @@ class Store:
 
     def name(self, setting: Setting) -> str:
         """Of a setting's point."""
-        digest = hashlib.sha256(
-            f"{__version__} {self.ranks} {setting.refinements} {setting.accuracy}\n{dump_scene(setting.scene)}".encode()
-        )
+        digest = hashlib.sha256(f"{__version__} {self.ranks} {setting.accuracy}\n{dump_scene(setting.scene)}".encode())
         file = getattr(setting.scene.domain, "file", None)
         if file is not None:
             digest.update(Path(file).read_bytes())

@@ -1,0 +1,52 @@
+"""PETSc vectors: made, assembled, turned into local components, spanning a null space."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from dolfinx import fem
+from dolfinx.fem.petsc import assemble_vector
+from petsc4py import PETSc
+
+
+def new_vector(space: fem.FunctionSpace) -> PETSc.Vec:
+    """A zero vector of a space, with ghosts. Collective."""
+    function = fem.Function(space)  # must outlive the duplication: its vector does not own the memory
+    vector = function.x.petsc_vec.duplicate()
+    vector.set(0.0)
+    return vector
+
+
+def assembled(form: fem.Form) -> PETSc.Vec:
+    """A compiled linear form's vector. Collective."""
+    vector = assemble_vector(form)
+    vector.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
+    return vector
+
+
+def nodal(form: Any) -> npt.NDArray[np.float64]:
+    """A UFL linear form's values at the blocks that this rank owns, (n, d). Collective."""
+    compiled = fem.form(form)
+    vector = assembled(compiled)
+    values = np.array(vector.array_r).reshape(-1, compiled.function_spaces[0].dofmap.index_map_bs)
+    vector.destroy()
+    return values
+
+
+def turn(vector: PETSc.Vec, rotation: PETSc.Mat | None) -> None:
+    """Take Cartesian components over to local ones, Qᵀ v, in place; None: they are the same. Collective."""
+    if rotation is not None:
+        cartesian = vector.copy()
+        rotation.multTranspose(cartesian, vector)
+        cartesian.destroy()
+
+
+def null_space(vectors: list[PETSc.Vec]) -> PETSc.NullSpace:
+    """What these vectors span; they are made orthonormal (Gram and Schmidt), in place. Collective."""
+    for i, vector in enumerate(vectors):
+        for other in vectors[:i]:
+            vector.axpy(-vector.dot(other), other)
+        vector.normalize()
+    return PETSc.NullSpace().create(vectors=vectors, comm=vectors[0].comm)
