@@ -27,7 +27,7 @@ from hvi_fenicsx import InputError, read_scene
 pytestmark = pytest.mark.long
 
 CASES, SLICES = 600, 6
-LIMIT = 300.0
+LIMIT = 600.0
 """Seconds that the cases of a process may take."""
 OPTIONS = ("--accuracy", "--quantity", "--time-budget", "--axis", "--repeat", "--limit", "--np", "--out")
 PLACES = ("scene.toml", "the mesh", "m.msh", "boundary", "body", "load '", "material", "domain", "solver", *OPTIONS)
