@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.patheffects import withStroke
 
 from ..pictures.style import (
     BLUE,
@@ -106,7 +107,10 @@ def _front_line(axes: Axes, best: Sequence[Row], quantity: str) -> None:
     for r, (x, y) in list(zip(best, points, strict=True))[::-1]:
         if all(apart(axes, y, other) for other in named):
             named.append(y)
-            axes.annotate(_short(r), (x, y), (-8, -2), textcoords="offset points", ha="right", va="center", size=10)
+            axes.annotate(
+                _short(r), (x, y), (-8, -2), textcoords="offset points", ha="right", va="center", size=10, zorder=7,
+                path_effects=[withStroke(linewidth=3, foreground="white")],
+            )  # fmt: skip
 
 
 def _short(found: Row) -> str:
