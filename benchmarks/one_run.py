@@ -41,7 +41,7 @@ def contact(scene: Scene) -> Figures:
     """From the scene to a certified solution."""
     timer = Timer()
     solution = finish(prepare(scene, COMM, timer))
-    counts = solution.solved.counts
+    counts, errors = solution.solved.counts, solution.estimate
     return {
         **timer.report(),
         "certified": solution.converged,
@@ -51,6 +51,7 @@ def contact(scene: Scene) -> Figures:
         "linear": counts.linear,
         "branch": counts.branch,
         "levels": solution.solved.levels,
+        "unsolved": errors.algebraic / errors.discretisation if errors else float("nan"),
         "dofs": solution.dofs,
     }
 

@@ -2,18 +2,17 @@
 
     ./hvi exec python3 benchmarks/work_units.py [--cells 512]
 
-Discretisation accuracy: the algebraic error is a tenth of the discretisation error, both in the energy norm. The
-first is read off energies on the same mesh, the second off those of two meshes (Richardson, first order in h).
+Discretisation accuracy: the algebraic error is a tenth of the discretisation error, both in the energy norm, as the
+program estimates them: the first is the dual norm of what the solver left, the second is that of docs/estimator.md.
+(Energies of nearly solved systems differ by less than their rounding.)
 """
 
 from __future__ import annotations
 
-import math
-
 import matplotlib.pyplot as plt
-from common import Figures, document, median, parser, picture, repeated, run, square, table
+from common import Figures, document, median, parser, picture, repeated, square, table
 
-TOLERANCES = ("1e-2", "1e-3", "1e-4", "1e-5", "1e-6", "1e-8")
+TOLERANCES = ("1e-1", "1e-2", "1e-3", "1e-4", "1e-5", "1e-6", "1e-8")
 HEAD = ("scene", "dofs", "tolerance", "algebraic over discretisation error", "work units", "linear (all levels)")
 
 
@@ -30,17 +29,12 @@ def main() -> None:
     rows: list[list[object]] = []
     figure, axes = plt.subplots(figsize=(6, 4))
     for scene in options.scenes:
-        exact, finer = (run(scene, "contact", [*square(n), "solver.tolerance=1e-11"], options) for n in sizes(options))
-        if exact is None or finer is None:
-            raise SystemExit(f"{scene}: a reference solution failed")
-        defect = 4 / 3 * (exact["energy"] - finer["energy"])  # ½‖u - u_h‖², a quarter of it on half the mesh size
         found = repeated({t: (scene, "contact", [*square(options.cells), f"solver.tolerance={t}"]) for t in TOLERANCES},
                          options, spmv=True)  # fmt: skip
         for tolerance in TOLERANCES:
             runs = found[tolerance]
-            error = math.sqrt(max(runs[0]["energy"] - exact["energy"], 0.0) / defect)
-            wanted = f"**{median(runs, units):.0f}**"
-            rows.append([scene, runs[0]["dofs"], tolerance, f"{error:.1e}", wanted, runs[0]["linear"]])
+            wanted, left = f"**{median(runs, units):.0f}**", f"{runs[0]['unsolved']:.1e}"
+            rows.append([scene, runs[0]["dofs"], tolerance, left, wanted, runs[0]["linear"]])
         axes.semilogx([float(t) for t in TOLERANCES], [median(found[t], units) for t in TOLERANCES], "o-", label=scene)
     axes.set_xlabel("tolerance")
     axes.set_ylabel("work units (products with the finest matrix)")
@@ -51,11 +45,6 @@ def main() -> None:
     text = "Discretisation accuracy is the first row of a scene, from above, with at most 0.1 in the fourth column."
     command = f"./hvi exec python3 benchmarks/work_units.py --cells {options.cells}"
     document("work_units", "Work units", command, [text, table(HEAD, rows)], options)
-
-
-def sizes(options: object) -> tuple[int, int]:
-    cells: int = options.cells  # type: ignore[attr-defined]
-    return cells, 2 * cells
 
 
 if __name__ == "__main__":
