@@ -75,7 +75,7 @@ class Auto(BranchIteration):
             for found in self._tried(self._anew(exact).solve):
                 yield from self._beside(found)
         yield from self._settled()
-        resting, _ = resting_start(self.solver, self._laws, 1e-4)
+        resting, _ = resting_start(self.solver, self._laws)
         for factor in (1.0, _BROKEN, -_BROKEN):
             pieces = resting.copy()
             pieces.scale(factor)

@@ -19,6 +19,8 @@ from .pieces import Start
 
 Progress = Callable[[str, float | None, int, float, int], None]
 """Called with the stage's name, ε, iteration, residual and vertices in contact."""
+_START = 1e-2
+"""Relative, of a start's linear solve: what its active set needs, and laws that do not rest make it no better."""
 
 
 def silent(stage: str, epsilon: float | None, iteration: int, residual: float, contact: int) -> None:
@@ -107,7 +109,9 @@ def held_dofs(system: System, laws: Sequence[Superpotential]) -> npt.NDArray[np.
     return np.setdiff1d(np.concatenate(dofs), system.problem.fixed).astype(np.int32)
 
 
-def resting_start(solver: ActiveSetSolver, laws: Sequence[Superpotential], rtol: float) -> tuple[PETSc.Vec, int]:
+def resting_start(
+    solver: ActiveSetSolver, laws: Sequence[Superpotential], rtol: float = _START
+) -> tuple[PETSc.Vec, int]:
     """Contact closed, laws at rest: one linear solve in which no rigid motion is free. Collective.
 
     From u = 0 no vertex counts as active, the reduced matrix is singular and the first step is 1e9 (solver-notes.md);

@@ -101,7 +101,7 @@ class BranchIteration:
         return self._result(x, outcome)
 
     def _resting(self) -> PETSc.Vec:
-        x, linear = resting_start(self.solver, self._laws, min(1e-4, self.settings.tolerance))
+        x, linear = resting_start(self.solver, self._laws)
         self.counts.linear += linear
         return x
 

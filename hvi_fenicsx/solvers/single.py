@@ -81,7 +81,7 @@ class ConvexProgramme:
         counts, system = Counts(), self.system
         laws = [term.law for term in system.terms]
         if start is None:
-            x, counts.linear = resting_start(self.solver, laws, min(1e-4, self.settings.tolerance))
+            x, counts.linear = resting_start(self.solver, laws)
         else:
             x = start.copy()
         with self.solver.reporting(self._progress):

@@ -92,7 +92,7 @@ class SmoothMethod:
     def solve(self) -> Solved:
         """A stationary point of the smoothed energy, or what was reached. Collective."""
         system = self.solver.system
-        x, linear = resting_start(self.solver, [t.law for t in system.terms], min(1e-4, self.settings.tolerance))
+        x, linear = resting_start(self.solver, [t.law for t in system.terms])
         run = self.run(self.solver, self.settings, x)
         with self.solver.timer("solve"):
             reason = run.execute(x)
