@@ -31,13 +31,16 @@ def main() -> None:
         cells = {(n, m): cell(scene, smoothing, n, m, times, options) for n in options.cells for m in METHODS}
         rows = [[f"{n} x {n}", *(cells[n, m] for m in METHODS)] for n in options.cells]
         parts.append(table((scene, *METHODS), rows))
-        for method in METHODS:
-            ax.loglog(list(times[method]), list(times[method].values()), "o-", label=method)
+        for number, method in enumerate(METHODS):
+            if times[method]:
+                ax.loglog(list(times[method]), list(times[method].values()), "o-", color=f"C{number}", label=method)
+        ax.legend(frameon=False)
         ax.set_title(scene)
         ax.set_xlabel("cells a side")
+        ax.set_xticks(options.cells, [str(n) for n in options.cells])
+        ax.minorticks_off()
         ax.grid(alpha=0.3)
     axes[0].set_ylabel("assembly, setup and solve / s")
-    axes[0].legend(frameon=False)
     picture("others", figure)
     command = "./hvi exec python3 benchmarks/others.py --cells " + " ".join(map(str, options.cells))
     document("others", "Beside the paper's procedure and PETSc's methods", command, parts, options)
