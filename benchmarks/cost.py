@@ -9,8 +9,6 @@ ladder's coarser meshes. All to 1e-8, in turn, medians of the repeats.
 from __future__ import annotations
 
 import argparse
-import shlex
-import sys
 import tempfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -128,12 +126,11 @@ def main() -> None:
             rows.append(row(name, runs))
             counted.append(counts(name, runs["contact"][0]))
     draw(rows)
-    command = shlex.join(["./hvi", "exec", "python3", "benchmarks/cost.py", *sys.argv[1:]])
     text = (
         "Assembly (forms included), setup and solve on all levels, medians with their range; the mesh stated apart. "
         f"Medians of {options.repeats}."
     )
-    document("cost", "The cost of contact", command, [text, table(HEAD, rows), table(COUNTS, counted)], options)
+    document("cost", "The cost of contact", [text, table(HEAD, rows), table(COUNTS, counted)], options)
 
 
 if __name__ == "__main__":

@@ -47,10 +47,9 @@ def main() -> None:
         ax.legend(frameon=False)
         ax.grid(alpha=0.3)
     picture("growth", figure)
-    command = "./hvi exec python3 benchmarks/growth.py --cells " + " ".join(map(str, options.cells))
     text = "Memory is the peak less what the program holds before the mesh, each size in a process of its own."
     fitted = table(("scene", "exponent of time", "exponent of memory"), fits)
-    document("growth", "Growth with the mesh", command, [text, fitted, table(HEAD, rows)], options)
+    document("growth", "Growth with the mesh", [text, fitted, table(HEAD, rows)], options)
 
 
 def row(scene: str, runs: list[Figures]) -> list[object]:

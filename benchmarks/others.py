@@ -42,8 +42,7 @@ def main() -> None:
         ax.grid(alpha=0.3)
     axes[0].set_ylabel("assembly, setup and solve / s")
     picture("others", figure)
-    command = "./hvi exec python3 benchmarks/others.py --cells " + " ".join(map(str, options.cells))
-    document("others", "Beside the paper's procedure and PETSc's methods", command, parts, options)
+    document("others", "Beside the paper's procedure and PETSc's methods", parts, options)
 
 
 def cell(

@@ -214,10 +214,8 @@ def main() -> None:
     head = ["effects", "compiled integrals", "assembly / s", "solve / s", "memory / MB"]
     table = common.table(head, [row(name, m, found[BASE]) for name, m in found.items()])
     draw(found, options)
-    command = f"./hvi exec python3 benchmarks/price_of_effects.py --cells {options.cells} --repeats {options.repeats}"
-    command += " --cpu" if options.cpu else ""
     title = "The price of an effect"
-    common.document("price-of-effects", title, command, [words(options), table, absent(found)], options)
+    common.document("price-of-effects", title, [words(options), table, absent(found)], options)
 
 
 if __name__ == "__main__":

@@ -54,8 +54,7 @@ def main() -> None:
     draw(rows, loops)
     text = "Two plain processes gain " + ", ".join(f"{g:.2f} ({name})" for name, g in loops.items()) + "."
     head = ("scene", "scaling", "1 rank / s", "2 ranks / s", "gain", *(f"of the loop {name}" for name in loops))
-    command = f"./hvi exec python3 benchmarks/ranks.py --cells {n}"
-    document("ranks", "Two ranks", command, [text, table(head, rows)], options)
+    document("ranks", "Two ranks", [text, table(head, rows)], options)
 
 
 def draw(rows: list[list[object]], loops: dict[str, float]) -> None:

@@ -48,9 +48,7 @@ def main() -> None:
     axes.invert_yaxis()
     picture("startup", figure)
     text = "Processes started inside the environment, wall time; `./hvi` adds what entering it takes."
-    document(
-        "startup", "Start-up", "./hvi exec python3 benchmarks/startup.py", [text, table(("what", "s"), rows)], options
-    )
+    document("startup", "Start-up", [text, table(("what", "s"), rows)], options)
 
 
 if __name__ == "__main__":

@@ -43,8 +43,7 @@ def main() -> None:
     axes.grid(alpha=0.3)
     picture("work_units", figure)
     text = "Discretisation accuracy is the first row of a scene, from above, with at most 0.1 in the fourth column."
-    command = f"./hvi exec python3 benchmarks/work_units.py --cells {options.cells}"
-    document("work_units", "Work units", command, [text, table(HEAD, rows)], options)
+    document("work_units", "Work units", [text, table(HEAD, rows)], options)
 
 
 if __name__ == "__main__":
