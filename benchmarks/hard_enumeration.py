@@ -29,8 +29,8 @@ from hvi_fenicsx.surface import component_dofs
 from hvi_fenicsx.system import System
 
 Array = npt.NDArray[np.float64]
-MOST = 1_000
-"""Linear programmes of one case that are worth it: ten seconds."""
+MOST = 4_000
+"""Linear programmes of one case that are worth it: half a minute."""
 LARGEST = 8
 """Cells along the floor."""
 _RELAXED = 1e-7
@@ -136,14 +136,12 @@ class _Search:
 
     def _shaved(self, states: States) -> States | None:
         """Without the states that no point has, the others being in their hulls, which shrink; None if one has none."""
-        left, shrinks = [list(of) for of in states], True
-        while shrinks:
-            before = sum(map(len, left))
-            for i, of in enumerate(left):
+        left = [list(of) for of in states]
+        for i, of in enumerate(left):
+            if len(of) > 1:
                 left[i] = [s for s in of if self._possible([*left[:i], [s], *left[i + 1 :]])]
-                if not left[i]:
-                    return None
-            shrinks = sum(map(len, left)) < before
+            if not left[i]:
+                return None
         return left
 
     def _possible(self, states: States) -> bool:

@@ -19,6 +19,7 @@ from typing import Any
 from mpi4py import MPI
 
 from hvi_fenicsx import building, nested, read_scene, timing
+from hvi_fenicsx.estimate.contact import ratio
 from hvi_fenicsx.scene import Scene
 from hvi_fenicsx.solution import finish, prepare
 from hvi_fenicsx.solvers import options
@@ -51,7 +52,7 @@ def contact(scene: Scene) -> Figures:
         "linear": counts.linear,
         "branch": counts.branch,
         "levels": solution.solved.levels,
-        "unsolved": errors.algebraic / errors.discretisation if errors else float("nan"),
+        "unsolved": ratio(errors.algebraic, errors.discretisation) if errors else float("nan"),
         "dofs": solution.dofs,
     }
 
