@@ -16,9 +16,9 @@ from mpi4py import MPI
 
 from . import adaptive, forecast, memory, quantities
 from .adaptive import Climber, Rung
+from .domain import Refinement
 from .forecast import Cost, Step
 from .parallel import largest
-from .refinement import Refinement
 from .scene import Scene
 from .solution import NOT_CONVERGED, Solution
 

@@ -16,10 +16,9 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from . import ladder, refinement
-from .domain import Domain
+from .domain import Domain, Refinement
 from .estimate import Estimate
 from .parallel import agree
-from .refinement import Refinement
 from .scene import Scene
 from .solution import Prepared, Solution, finish, prepare
 from .solvers.base import Progress, silent

@@ -19,12 +19,12 @@ from .errors import InputError
 from .parallel import agree
 
 if TYPE_CHECKING:
-    from .refinement import Refinement
     from .scene.shapes import Shape
 
 _LEAST_MEMORY = 300.0
 """Bytes for one unknown: its row of the matrix and its share of the mesh, without any solver."""
 Facets = npt.NDArray[np.int32]
+Halves = npt.NDArray[np.int8]
 _AXIS_OF_SIDE = {"left": (0, 0), "right": (0, 1), "bottom": (-1, 0), "top": (-1, 1), "front": (1, 0), "back": (1, 1)}
 """Axis (-1: the last, the vertical one) and end of each named side."""
 
@@ -90,6 +90,22 @@ class Domain:
                 known = ", ".join(sorted(self.regions)) or "no named regions"
                 raise InputError(f"the domain has no region {name!r}; it has {known}")
         return np.unique(np.concatenate([self.regions[name] for name in names])).astype(np.int32)
+
+
+@dataclass(frozen=True)
+class Refinement:
+    """A refined domain and how it came from the one before.
+
+    Attributes:
+        domain: the refined one.
+        parents: local parent cell of each local cell, shape (cells,).
+        halves: twice the barycentric coordinates of each cell's vertices in the parent cell, shape (cells, d+1, d+1):
+            a 2 for a vertex of the parent, two 1s for the middle of one of its edges.
+    """
+
+    domain: Domain
+    parents: Facets
+    halves: Halves
 
 
 def rectangle(comm: MPI.Comm, size: Sequence[float], cells: Sequence[int]) -> Domain:

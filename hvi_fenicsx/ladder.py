@@ -15,7 +15,7 @@ import numpy.typing as npt
 from dolfinx import fem
 from petsc4py import PETSc
 
-from .refinement import Refinement
+from .domain import Refinement
 from .system import Below, System
 
 if TYPE_CHECKING:

@@ -12,7 +12,7 @@ from dataclasses import replace
 from petsc4py import PETSc
 
 from . import building, ladder, solvers
-from .refinement import Refinement
+from .domain import Refinement
 from .scene import Scene
 from .solvers.base import Counts, Progress, Solved
 from .solvers.linear import LinearSettings

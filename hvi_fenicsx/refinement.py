@@ -7,7 +7,7 @@ bounded from below. Children stay on their parent's rank. New vertices of a side
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import basix
 import numpy as np
@@ -16,33 +16,16 @@ from dolfinx import la
 from dolfinx import mesh as dmesh
 
 from . import compat
-from .domain import Domain, check_affordable
+from .domain import Domain, Halves, Refinement, check_affordable
 from .domain_shapes import Arc
 
 Array = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.int32]
-Halves = npt.NDArray[np.int8]
 _LONG = {2: 0.0, 3: 0.76}
 """Of a cell's longest edge, what is bisected with it, by dimension: in space all six would make a step of 4 to 5 times
 the unknowns; the longest and, of a sixth of a cube, the diagonals of its faces make it about 2."""
 _SKEWED = np.eye(3) + 1e-6 * np.sqrt([[2.0, 3.0, 5.0], [3.0, 7.0, 11.0], [5.0, 11.0, 13.0]])
 """Where the edges are measured: lengths that tie in the body differ here by their direction, on all ranks alike."""
-
-
-@dataclass(frozen=True)
-class Refinement:
-    """A refined domain and how it came from the one before.
-
-    Attributes:
-        domain: the refined one.
-        parents: local parent cell of each local cell, shape (cells,).
-        halves: twice the barycentric coordinates of each cell's vertices in the parent cell, shape (cells, d+1, d+1):
-            a 2 for a vertex of the parent, two 1s for the middle of one of its edges.
-    """
-
-    domain: Domain
-    parents: Indices
-    halves: Halves
 
 
 def uniform(domain: Domain) -> Refinement:

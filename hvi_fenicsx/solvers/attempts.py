@@ -57,16 +57,7 @@ def first_success(
         if attempt.start is not None:
             attempt.start.copy(begin)
         begin.copy(x)
-        found = solver.solve(
-            x,
-            attempt.models,
-            tolerance,
-            lower=bounds[0],
-            upper=bounds[1],
-            line_search=attempt.line_search,
-            max_iterations=attempt.max_iterations,
-            steady=attempt.steady,
-        )
+        found = _solved(solver, x, attempt, tolerance, bounds)
         counts.spend(found)
         if found.measure < outcome.measure or found.converged:
             outcome = found
@@ -79,3 +70,19 @@ def first_success(
     for vector in (begin, best):
         vector.destroy()
     return replace(outcome, interrupted=found.interrupted)
+
+
+def _solved(
+    solver: ActiveSetSolver, x: PETSc.Vec, attempt: Attempt, tolerance: float, bounds: tuple[PETSc.Vec, PETSc.Vec]
+) -> Outcome:
+    """How one attempt ends, from and into x. Collective."""
+    return solver.solve(
+        x,
+        attempt.models,
+        tolerance,
+        lower=bounds[0],
+        upper=bounds[1],
+        line_search=attempt.line_search,
+        max_iterations=attempt.max_iterations,
+        steady=attempt.steady,
+    )
