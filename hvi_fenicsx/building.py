@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from mpi4py import MPI
 
-from . import domain, problem, refinement, smoothing, system
+from . import coarsening, domain, problem, refinement, smoothing, system
 from .domain import Domain
 from .laws import Superpotential
 from .timing import Timer
@@ -35,10 +35,14 @@ def assemble(scene: Scene, comm: MPI.Comm, timer: Timer, body: Domain | None = N
 def mesh(scene: Scene, comm: MPI.Comm) -> Domain:
     """The body of a scene; a mesh file's is refined as often as the scene says. Collective.
 
+    What gmsh meshed gets coarser meshes below it; built-in blocks have their own.
+
     Raises:
         InputError: on all ranks alike, when a file cannot be read or is no usable mesh, or memory cannot suffice.
     """
     whole = domain.build(comm, scene.domain, scene.dimension)
+    if not hasattr(scene.domain, "cells"):
+        whole = coarsening.founded(whole)
     return refinement.repeated(whole, getattr(scene.domain, "refinements", 0))
 
 

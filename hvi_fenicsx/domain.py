@@ -41,7 +41,8 @@ class Domain:
         curves: the true curve of a side by its name, where that is known and not straight; the facets of all other
             sides, those of mesh files among them, are taken for the geometry itself.
         one_piece: whether the mesh is known to be connected; else one has to look (:mod:`.bodies`).
-        origin: the coarser domain that serves as the rung below, and how it was refined; None where there is none.
+        origin: the coarser domain that serves as the rung below, and how it was refined (None: it was not, but is
+            another mesh of the same body); None where there is none.
     """
 
     mesh: dmesh.Mesh
@@ -51,7 +52,7 @@ class Domain:
     upper: npt.NDArray[np.float64]
     curves: Mapping[str, Arc] = field(default_factory=dict)
     one_piece: bool = False
-    origin: tuple[Domain, Refinement] | None = None
+    origin: tuple[Domain, Refinement | None] | None = None
 
     @property
     def dimension(self) -> int:

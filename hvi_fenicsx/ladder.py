@@ -1,9 +1,10 @@
-"""The ladder: nested meshes, and P1 prolongation between neighbouring rungs.
+"""The ladder: a row of ever finer meshes, and P1 prolongation between neighbouring rungs.
 
-A rung serves as start for the finer one, and the prolongation builds the geometric multigrid. Each vertex of the finer
-one is a vertex of the coarser one or the midpoint of an edge: between a mesh and its refinement (:mod:`.refinement`),
-and between built-in blocks of which one has half the cells each way, ``create_rectangle``'s right-diagonal pattern (and
-``create_box``'s of tetrahedra) being nested in itself.
+A rung serves as start for the finer one, and the prolongation builds the geometric multigrid. Where they are nested,
+each vertex of the finer one is a vertex of the coarser one or the midpoint of an edge: between a mesh and its
+refinement (:mod:`.refinement`), and between built-in blocks of which one has half the cells each way,
+``create_rectangle``'s right-diagonal pattern (and ``create_box``'s of tetrahedra) being nested in itself. Onto a mesh
+that is not nested (:mod:`.coarsening`) it is linear interpolation.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ import numpy.typing as npt
 from dolfinx import fem
 from petsc4py import PETSc
 
+from . import placing
 from .domain import Refinement
 from .system import Below, System
 
@@ -30,11 +32,7 @@ _GROWTH = 3.0
 
 
 def coarser(scene: Scene) -> Scene | None:
-    """The scene one rung below; None where the mesh has no such rung."""
-    refinements = getattr(scene.domain, "refinements", 0)
-    if refinements:
-        domain = scene.domain.model_copy(update={"refinements": refinements - 1})
-        return scene.model_copy(update={"domain": domain})
+    """The scene of a block one rung below; None where there is no such rung."""
     cells = getattr(scene.domain, "cells", None)
     if cells is None or any(n % 2 or n // 2 < _COARSEST for n in cells):
         return None
@@ -45,31 +43,35 @@ def coarser(scene: Scene) -> Scene | None:
 def prolongation(
     fine: fem.FunctionSpace,
     coarse: fem.FunctionSpace,
-    nesting: Scene | Refinement,
+    nesting: Scene | Refinement | None,
     points: tuple[Array, Array] | None = None,
 ) -> PETSc.Mat:
     """P1 prolongation of vector fields between neighbouring rungs, in Cartesian components. Collective.
 
     Args:
         fine, coarse: the P1 vector spaces.
-        nesting: how the fine mesh came from the coarse one: by refinement, or as the block of this (fine) scene.
+        nesting: how the fine mesh came from the coarse one: by refinement, or as the block of this (fine) scene; None
+            where they are not nested.
         points: the local vertices of both, m, (n, 3), where they are at hand.
 
     Returns:
         Rows are the fine unknowns, columns the coarse ones.
     """
-    if isinstance(nesting, Refinement):
-        pairs = _parents_by_cell(fine, coarse, nesting)
+    near, far = points or (fine.tabulate_dof_coordinates(), coarse.tabulate_dof_coordinates())
+    near = near[: fine.dofmap.index_map.size_local]
+    if nesting is None:
+        rows = _interpolating(*placing.between(near, coarse, far), fine.dofmap.index_map_bs)
+    elif isinstance(nesting, Refinement):
+        rows = _rows(_parents_by_cell(fine, coarse, nesting), fine.dofmap.index_map_bs)
     else:
-        near, far = points or (fine.tabulate_dof_coordinates(), coarse.tabulate_dof_coordinates())
-        pairs = _parents_on_grid(near[: fine.dofmap.index_map.size_local], coarse, far, nesting)
-    rows = _rows(pairs, fine.dofmap.index_map_bs)  # used in place: PETSc would insert them one by one
+        rows = _rows(_parents_on_grid(near, coarse, far, nesting), fine.dofmap.index_map_bs)
+    # The rows are used in place: PETSc would insert them one by one.
     matrix = PETSc.Mat().createAIJWithArrays((_sizes(fine), _sizes(coarse)), rows, comm=fine.mesh.comm)
     matrix.assemble()
     return matrix
 
 
-def between(fine: System, coarse: System, nesting: Scene | Refinement) -> PETSc.Mat:
+def between(fine: System, coarse: System, nesting: Scene | Refinement | None) -> PETSc.Mat:
     """The prolongation between the unknowns of two systems, local ones where normals are slanted. Collective."""
     points = fine.problem.points, coarse.problem.points
     step = prolongation(fine.problem.space, coarse.problem.space, nesting, points)
@@ -125,6 +127,15 @@ def _rows(pairs: Indices, d: int) -> tuple[Indices, Indices, Array]:
         columns[first[double, i] + 1] = high[double] * d + i
     values[first[~double]] = 1.0
     return start, columns, values
+
+
+def _interpolating(corners: Indices, weights: Array, d: int) -> tuple[Indices, Indices, Array]:
+    """The same of the matrix that weighs the block columns ``corners`` (n, c)."""
+    order = np.argsort(corners, axis=1)
+    columns = np.take_along_axis(corners, order, axis=1)[:, None, :] * d + np.arange(d)[None, :, None]
+    start = np.arange(0, columns.size + 1, corners.shape[1])
+    values = np.broadcast_to(np.take_along_axis(weights, order, axis=1)[:, None, :], columns.shape).ravel()
+    return start.astype(PETSc.IntType), columns.ravel().astype(PETSc.IntType), values
 
 
 def _sizes(space: fem.FunctionSpace) -> tuple[int, int]:

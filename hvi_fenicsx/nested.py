@@ -27,7 +27,9 @@ _COARSE_TOLERANCE = 1e-4
 
 def coarser(scene: Scene, system: System) -> Scene | None:
     """The scene one rung below; None where there is none, or where it would not pay."""
-    return ladder.coarser(scene) if system.dofs >= _WORTHWHILE else None
+    if system.dofs < _WORTHWHILE:
+        return None
+    return scene if system.problem.domain.origin else ladder.coarser(scene)
 
 
 def linear(scene: Scene, system: System) -> LinearSettings:
@@ -94,7 +96,7 @@ def hierarchy(scene: Scene, system: System, timer: Timer) -> Below | None:
         return Below(below, ladder.between(system, below, nesting))
 
 
-def _assembled(coarse: Scene, scene: Scene, system: System, timer: Timer) -> tuple[System, Scene | Refinement]:
+def _assembled(coarse: Scene, scene: Scene, system: System, timer: Timer) -> tuple[System, Scene | Refinement | None]:
     """The system one rung below that of a scene, and how their meshes are nested. Collective."""
     body, nesting = system.problem.domain.origin or (None, scene)
     return building.assemble(coarse, system.comm, timer, body), nesting

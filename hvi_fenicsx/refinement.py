@@ -74,7 +74,7 @@ def _refined(domain: Domain, edges: Indices | None) -> Refinement:
     sides = _sides(domain, mesh, parents, halves)
     regions = {name: np.flatnonzero(np.isin(parents, cells)).astype(np.int32) for name, cells in domain.regions.items()}
     _bend(mesh, sides, domain.curves)
-    return Refinement(replace(domain, mesh=mesh, sides=sides, regions=regions), parents, halves)
+    return Refinement(replace(domain, mesh=mesh, sides=sides, regions=regions, origin=None), parents, halves)
 
 
 def _bisected(mesh: dmesh.Mesh, edges: Indices | None) -> tuple[dmesh.Mesh, Indices, Halves]:
@@ -107,7 +107,7 @@ def _halves(coarse: dmesh.Mesh, fine: dmesh.Mesh, parents: Indices) -> Halves:
     return np.rint(2.0 * both).astype(np.int8)
 
 
-def _cell_facets(mesh: dmesh.Mesh) -> Indices:
+def cell_facets(mesh: dmesh.Mesh) -> Indices:
     """Local facets of each local cell, shape (cells, d+1); the i-th lies opposite to the i-th vertex."""
     d = mesh.topology.dim
     mesh.topology.create_entities(d - 1)
@@ -118,7 +118,7 @@ def _cell_facets(mesh: dmesh.Mesh) -> Indices:
 
 def _sides(domain: Domain, fine: dmesh.Mesh, parents: Indices, halves: Halves) -> dict[str, Indices]:
     """The children's facets that lie in those of the domain's sides."""
-    coarse, own = _cell_facets(domain.mesh), _cell_facets(fine)
+    coarse, own = cell_facets(domain.mesh), cell_facets(fine)
     # A child's facet i lies in its parent's facet j when none of its vertices (all but i) has a part in vertex j.
     cell, i, j = np.nonzero(halves.sum(axis=1, dtype=np.int8)[:, None, :] == halves)
     above = coarse[parents[cell], j]

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 
+import pytest
 from hypothesis import settings
 
 for name, value in {
@@ -26,3 +27,10 @@ for name, value in {
 settings.register_profile("repeatable", derandomize=True, deadline=None)
 settings.register_profile("search", derandomize=False, deadline=None)
 settings.load_profile("repeatable")
+
+
+@pytest.fixture
+def everything_nested(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Small meshes go up the ladder too, and take its multigrid."""
+    monkeypatch.setattr("hvi_fenicsx.nested._WORTHWHILE", 1_000)
+    monkeypatch.setattr("hvi_fenicsx.solvers.linear._LARGEST_DIRECT", {2: 1_000, 3: 1_000})

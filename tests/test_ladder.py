@@ -80,13 +80,6 @@ def test_odd_and_small_meshes_have_no_ladder() -> None:
         assert ladder.coarser(read_scene(DEMOS / "strong_law.toml", [f"domain.cells={cells}"])) is None
 
 
-@pytest.fixture
-def everything_nested(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Small meshes go up the ladder too, and take its multigrid."""
-    monkeypatch.setattr(nested, "_WORTHWHILE", 1_000)
-    monkeypatch.setattr("hvi_fenicsx.solvers.linear._LARGEST_DIRECT", {2: 1_000, 3: 1_000})
-
-
 @pytest.mark.parametrize("demo", ["wall_left", "strong_law"])
 @pytest.mark.usefixtures("everything_nested")
 def test_nested_solutions_are_certified(demo: str) -> None:

@@ -1,0 +1,159 @@
+"""Why: a coarser mesh of another body, or one that lost a side, would only make the solve slow, which nobody sees.
+
+The thinned outline is held to the lengths of the sides and the areas of the regions; the prolongation to linear fields.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import meshes
+import numpy as np
+import pytest
+from dolfinx import fem
+from dolfinx.mesh import entities_to_geometry
+from mpi4py import MPI
+from test_refinement import measure, volume
+
+from hvi_fenicsx import Scene, building, coarsening, domain, ladder, meshfile, read_scene, solution
+from hvi_fenicsx.domain import Domain
+from hvi_fenicsx.outline import HalfEdges
+from hvi_fenicsx.scene import HalfDisk, NotchedStrip
+
+DEMOS = Path(__file__).parents[1] / "demos"
+COMM = MPI.COMM_WORLD
+POLYGONS = {
+    "square": meshes.GOOD.replace("0.2", "0.03"),
+    "halves": meshes.HALVES.replace("0.2", "0.03"),
+    "slanted": meshes.SLANTED.replace("0.3", "0.03"),
+    "graded": meshes.GRADED,
+}
+
+
+@pytest.fixture(autouse=True)
+def everything_founded(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Coarser meshes for small ones too."""
+    monkeypatch.setattr(coarsening, "_WORTHWHILE", 500)
+    monkeypatch.setattr(coarsening, "_COARSEST", 100)
+
+
+def from_file(path: Path, body: str) -> Domain:
+    return domain.from_file(COMM, meshes.make(path / "m.msh", body), 2)
+
+
+def below(body: Domain) -> Domain:
+    made = coarsening.founded(body).origin
+    assert made is not None
+    return made[0]
+
+
+def area(body: Domain, name: str) -> float:
+    x = body.mesh.geometry.x[body.mesh.geometry.dofmap[body.cells([name])]][:, :, :2]
+    return float(np.abs(np.linalg.det(x[:, 1:] - x[:, :1])).sum() / 2)
+
+
+@pytest.mark.parametrize("name", POLYGONS)
+def test_a_polygon_keeps_its_sides_and_regions(name: str, tmp_path: Path) -> None:
+    body = from_file(tmp_path, POLYGONS[name])
+    coarse = below(body)
+    assert volume(coarse) == pytest.approx(volume(body), rel=1e-12)
+    assert {s: measure(coarse, s) for s in coarse.sides} == pytest.approx({s: measure(body, s) for s in body.sides})
+    assert {r: area(coarse, r) for r in coarse.regions} == pytest.approx({r: area(body, r) for r in body.regions})
+    fewer = body.mesh.topology.index_map(2).size_global / coarse.mesh.topology.index_map(2).size_global
+    assert 2.5 < fewer < 6
+
+
+def test_what_is_round_stays_nearly_so(tmp_path: Path) -> None:
+    """A hole and an inclusion keep their areas to what inscribed polygons lose."""
+    body = from_file(tmp_path, meshes.HOLLOW)
+    coarse = below(body)
+    assert area(coarse, "inclusion") == pytest.approx(np.pi * 0.01, rel=0.06)
+    assert area(coarse, "matrix") == pytest.approx(1 - 2 * np.pi * 0.01, rel=0.005)
+    assert measure(coarse, "bottom") == pytest.approx(1.0, rel=1e-12)
+
+
+def test_known_curves_are_met_by_all_rungs() -> None:
+    body = below(domain.build(COMM, HalfDisk(radius=0.5, mesh_size=0.02), 2))
+    x = body.mesh.geometry.x[np.unique(entities_to_geometry(body.mesh, 1, body.sides["arc"]))]
+    assert np.hypot(x[:, 0], x[:, 1] - 0.5) == pytest.approx(0.5, rel=1e-12)
+
+
+def test_what_is_finer_stays_finer(tmp_path: Path) -> None:
+    body = from_file(tmp_path, meshes.GRADED)
+    for rung in (body, below(body)):
+        lengths = rung.mesh.h(1, np.sort(rung.sides["bottom"]))
+        assert lengths.max() / lengths.min() > 10
+
+
+def test_a_notch_is_not_lost() -> None:
+    strip = NotchedStrip(size=(1.0, 0.5), notch=(0.1, 0.2), mesh_size=0.02)
+    body = domain.build(COMM, strip, 2)
+    assert measure(below(body), "notch") == pytest.approx(measure(body, "notch"), rel=1e-12)
+
+
+@pytest.mark.parametrize("body", [meshes.HINGE.replace("0.5)", "0.03)")], ids=["touches itself"])
+def test_what_cannot_be_outlined_stands_alone(body: str, tmp_path: Path) -> None:
+    assert coarsening.founded(from_file(tmp_path, body)).origin is None
+
+
+def test_outlines_that_cross_themselves_are_given_up() -> None:
+    """A hook whose thinned point reaches through its other side."""
+    corners = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.4, -0.2], [0.0, 1.0]])
+    ends = np.column_stack([np.arange(5), (np.arange(5) + 1) % 5])
+    edges = HalfEdges(ends, corners[ends], np.zeros(5, dtype=np.int64), np.zeros(5, dtype=np.int64))
+    with meshfile.session(COMM) as gmsh:
+        assert coarsening._meshed(gmsh, edges, 1.0, ["rim"], ["body"]) is None
+
+
+def test_a_coarse_mesh_of_another_area_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(coarsening, "_DIFFERENT", 1e-6)
+    assert coarsening.founded(domain.build(COMM, HalfDisk(radius=0.5, mesh_size=0.02), 2)).origin is None
+
+
+@pytest.mark.parametrize("name", POLYGONS)
+def test_linear_fields_are_prolonged_as_they_are(name: str, tmp_path: Path) -> None:
+    body = from_file(tmp_path, POLYGONS[name])
+    fine, coarse = (fem.functionspace(b.mesh, ("Lagrange", 1, (2,))) for b in (body, below(body)))
+    fields = [fem.Function(space) for space in (fine, coarse)]
+    for field in fields:
+        field.interpolate(lambda x: np.array([1 + 2 * x[0] - x[1], x[0] + 3 * x[1]]))
+    found = ladder.prolongation(fine, coarse, None) * fields[1].x.petsc_vec
+    assert found.array == pytest.approx(fields[0].x.array, abs=1e-12)
+
+
+def scene(path: Path, *overrides: str) -> Scene:
+    file = meshes.make(path / "m.msh", meshes.GOOD.replace("0.2", "0.03"))
+    return read_scene(DEMOS / "strong_law.toml", [f'domain={{shape="file", file="{file}"}}', *overrides])
+
+
+@pytest.mark.usefixtures("everything_nested")
+def test_a_start_from_another_mesh_ends_where_mumps_does(tmp_path: Path) -> None:
+    """Without friction the minimiser is unique."""
+    convex = ["boundary.wall.displacement=[0.0, 0.0]", 'boundary.floor={on="bottom", contact={gap=0.0}}']
+    climbed = solution.solve(scene(tmp_path, *convex))
+    alone = scene(tmp_path, *convex, 'solver={linear_solver="lu"}')
+    direct = solution.finish(solution.prepare(alone, body=domain.from_file(COMM, alone.domain.file, 2)))  # type: ignore[union-attr]
+    assert climbed.solved is not None
+    assert climbed.solved.levels > 1
+    assert climbed.converged
+    assert direct.solved is not None
+    assert direct.solved.levels == 1
+    assert climbed.examined.energy == pytest.approx(direct.examined.energy, rel=1e-9)  # type: ignore[union-attr]
+
+
+def test_built_in_blocks_keep_their_own_ladder() -> None:
+    assert building.mesh(read_scene(DEMOS / "strong_law.toml", ["domain.cells=[64, 64]"]), COMM).origin is None
+
+
+@pytest.mark.parametrize("ranks", [2, 3])
+def test_ranks_make_the_same_meshes_and_prolong_alike(ranks: int, tmp_path: Path) -> None:
+    file = meshes.make(tmp_path / "m.msh", POLYGONS["halves"])
+    told = []
+    for n in (1, ranks):
+        command = ["mpirun", "--oversubscribe", "-n", str(n), sys.executable, "coarsened_ranks.py", str(file)]
+        run = subprocess.run(command, cwd=Path(__file__).parent, capture_output=True, text=True, timeout=120)
+        assert run.returncode == 0, run.stderr
+        told.append([float(word) for word in run.stdout.split()])
+    assert told[1] == pytest.approx(told[0], rel=1e-10)
