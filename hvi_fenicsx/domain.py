@@ -13,7 +13,7 @@ import numpy.typing as npt
 from dolfinx import mesh as dmesh
 from mpi4py import MPI
 
-from . import domain_shapes, memory, meshfile
+from . import blocks, domain_shapes, memory, meshfile
 from .domain_shapes import Arc
 from .errors import InputError
 from .parallel import agree
@@ -108,24 +108,9 @@ class Refinement:
     halves: Halves
 
 
-def rectangle(comm: MPI.Comm, size: Sequence[float], cells: Sequence[int]) -> Domain:
-    """[0, size] cut into right-diagonal triangles (``create_rectangle``). Collective."""
-    mesh = dmesh.create_rectangle(
-        comm,
-        [np.zeros(2), np.asarray(size, dtype=float)],
-        list(cells),
-        dmesh.CellType.triangle,
-        ghost_mode=dmesh.GhostMode.none,
-        diagonal=dmesh.DiagonalType.right,
-    )
-    return _box_domain(mesh, np.asarray(size, dtype=float))
-
-
-def box(comm: MPI.Comm, size: Sequence[float], cells: Sequence[int]) -> Domain:
-    """[0, size] cut into tetrahedra (``create_box``). Collective."""
-    corners = [np.zeros(3), np.asarray(size, dtype=float)]
-    mesh = dmesh.create_box(comm, corners, list(cells), dmesh.CellType.tetrahedron, ghost_mode=dmesh.GhostMode.none)
-    return _box_domain(mesh, np.asarray(size, dtype=float))
+def block(comm: MPI.Comm, size: Sequence[float], cells: Sequence[int]) -> Domain:
+    """[0, size], a rectangle or a box, in cells cut into triangles or tetrahedra (:mod:`.blocks`). Collective."""
+    return _box_domain(blocks.mesh(comm, size, cells), np.asarray(size, dtype=float))
 
 
 def build(comm: MPI.Comm, shape: Shape, dimension: int) -> Domain:
@@ -136,12 +121,9 @@ def build(comm: MPI.Comm, shape: Shape, dimension: int) -> Domain:
     """
     if shape.shape == "file":
         return from_file(comm, shape.file, dimension, shape.scale)
-    if shape.shape == "rectangle":
+    if shape.shape == "rectangle" or shape.shape == "box":
         check_affordable(comm, dimension * math.prod(n + 1 for n in shape.cells), "cells")
-        return rectangle(comm, shape.size, shape.cells)
-    if shape.shape == "box":
-        check_affordable(comm, dimension * math.prod(n + 1 for n in shape.cells), "cells")
-        return box(comm, shape.size, shape.cells)
+        return block(comm, shape.size, shape.cells)
     mesh, sides = domain_shapes.build(comm, shape)
     return Domain(mesh, sides, {}, *_bounding_box(mesh), domain_shapes.curves(shape), one_piece=True)
 
