@@ -36,7 +36,8 @@ def share(cells: Sequence[int], ranks: int, rank: int) -> tuple[Numbers, Numbers
     first, last = 0, ranks
     while last - first > 1:
         middle = (first + last + 1) // 2
-        axis = np.argmax((upper - lower) * cells)  # of equals the first, which runs along the bottom
+        extent = (upper - lower) * cells
+        axis = len(extent) - 1 - np.argmax(extent[::-1])  # of equals the last: bodies stand on what then stays whole
         cut = lower[axis] + (upper[axis] - lower[axis]) * (middle - first) / (last - first)
         if rank < middle:
             upper[axis], last = cut, middle
