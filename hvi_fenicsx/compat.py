@@ -7,6 +7,7 @@ from typing import Any
 import dolfinx
 import numpy as np
 import numpy.typing as npt
+from dolfinx import graph
 from dolfinx import mesh as _mesh
 from petsc4py import PETSc
 
@@ -48,11 +49,26 @@ def refine(mesh: _mesh.Mesh, edges: npt.NDArray[np.int32] | None) -> tuple[_mesh
 
 
 def simplex_mesh(comm: Any, cells: npt.NDArray[Any], points: npt.NDArray[np.float64], kind: str) -> _mesh.Mesh:
-    """Mesh of the simplices (c, d+1) over points (n, d); ``kind`` is triangle or tetrahedron. Collective."""
+    """Mesh of the simplices (c, d+1) over points (n, d), each rank giving some of both. Collective.
+
+    Args:
+        comm: the ranks. cells: stay where they are given; numbers of points, counted through the ranks.
+        points: each of them once, on any rank. kind: triangle or tetrahedron.
+
+    Returns:
+        The mesh, without ghost cells.
+    """
     import basix.ufl
 
     element = basix.ufl.element("Lagrange", kind, 1, shape=(points.shape[1],))
-    return _mesh.create_mesh(comm, cells=np.asarray(cells, dtype=np.int64), x=np.ascontiguousarray(points), e=element)
+
+    def stay(_: Any, ranks: int, types: Any, vertices: Any) -> Any:
+        places = graph.adjacencylist(np.full((len(cells), 1), comm.rank, dtype=np.int32))
+        return getattr(places, "_cpp_object", places)
+
+    cells, points = np.asarray(cells, dtype=np.int64), np.ascontiguousarray(points)
+    partitioner = stay if comm.size > 1 else None  # without, dolfinx does not even distribute
+    return _mesh.create_mesh(comm, cells=cells, x=points, e=element, partitioner=partitioner)
 
 
 def petsc_version() -> str:

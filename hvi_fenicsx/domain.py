@@ -6,14 +6,14 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 from dolfinx import mesh as dmesh
 from mpi4py import MPI
 
-from . import domain_shapes, memory, meshfile
+from . import blocks, domain_shapes, memory, meshfile
 from .domain_shapes import Arc
 from .errors import InputError
 from .parallel import agree
@@ -109,24 +109,10 @@ class Refinement:
     halves: Halves
 
 
-def rectangle(comm: MPI.Comm, size: Sequence[float], cells: Sequence[int]) -> Domain:
-    """[0, size] cut into right-diagonal triangles (``create_rectangle``). Collective."""
-    mesh = dmesh.create_rectangle(
-        comm,
-        [np.zeros(2), np.asarray(size, dtype=float)],
-        list(cells),
-        dmesh.CellType.triangle,
-        ghost_mode=dmesh.GhostMode.none,
-        diagonal=dmesh.DiagonalType.right,
-    )
-    return _box_domain(mesh, np.asarray(size, dtype=float))
-
-
-def box(comm: MPI.Comm, size: Sequence[float], cells: Sequence[int]) -> Domain:
-    """[0, size] cut into tetrahedra (``create_box``). Collective."""
-    corners = [np.zeros(3), np.asarray(size, dtype=float)]
-    mesh = dmesh.create_box(comm, corners, list(cells), dmesh.CellType.tetrahedron, ghost_mode=dmesh.GhostMode.none)
-    return _box_domain(mesh, np.asarray(size, dtype=float))
+def block(comm: MPI.Comm, size: Sequence[float], cells: Sequence[int]) -> Domain:
+    """[0, size], a rectangle or a box, in cells cut into triangles or tetrahedra (:mod:`.blocks`). Collective."""
+    mesh, upper = blocks.mesh(comm, size, cells), np.asarray(size, dtype=float)
+    return Domain(mesh, _block_sides(mesh, upper), {}, np.zeros(len(upper)), upper, one_piece=True)
 
 
 def build(comm: MPI.Comm, shape: Shape, dimension: int) -> Domain:
@@ -137,12 +123,9 @@ def build(comm: MPI.Comm, shape: Shape, dimension: int) -> Domain:
     """
     if shape.shape == "file":
         return from_file(comm, shape.file, dimension, shape.scale)
-    if shape.shape == "rectangle":
+    if shape.shape == "rectangle" or shape.shape == "box":
         check_affordable(comm, dimension * math.prod(n + 1 for n in shape.cells), "cells")
-        return rectangle(comm, shape.size, shape.cells)
-    if shape.shape == "box":
-        check_affordable(comm, dimension * math.prod(n + 1 for n in shape.cells), "cells")
-        return box(comm, shape.size, shape.cells)
+        return block(comm, shape.size, shape.cells)
     mesh, sides = domain_shapes.build(comm, shape)
     return Domain(mesh, sides, {}, *_bounding_box(mesh), domain_shapes.curves(shape), one_piece=True)
 
@@ -175,21 +158,15 @@ def from_file(comm: MPI.Comm, path: Path, dimension: int, scale: float = 1.0) ->
     return Domain(mesh, sides, regions, *_bounding_box(mesh))
 
 
-def _box_domain(mesh: dmesh.Mesh, size: npt.NDArray[np.float64]) -> Domain:
-    names = [n for n in _AXIS_OF_SIDE if mesh.geometry.dim == 3 or n not in ("front", "back")]
-    sides = {name: _side(mesh, name, size) for name in names}
-    return Domain(mesh, sides, {}, np.zeros(len(size)), size, one_piece=True)
-
-
-def _side(mesh: dmesh.Mesh, name: str, size: npt.NDArray[np.float64]) -> Facets:
-    axis, end = _AXIS_OF_SIDE[name]
-    axis %= len(size)
-    tolerance = 1e-9 * size[axis]
-
-    def on_side(x: npt.NDArray[np.float64]) -> Any:
-        return np.abs(x[axis] - end * size[axis]) < tolerance
-
-    return dmesh.locate_entities_boundary(mesh, mesh.topology.dim - 1, on_side)
+def _block_sides(mesh: dmesh.Mesh, size: npt.NDArray[np.float64]) -> dict[str, Facets]:
+    """Facets of the surface by the side that their middle lies on."""
+    d = len(size)
+    mesh.topology.create_connectivity(d - 1, d)
+    facets, middles = dmesh.exterior_facet_indices(mesh.topology), np.empty((0, 3))
+    if len(facets):  # dolfinx divides by their number
+        middles = dmesh.compute_midpoints(mesh, d - 1, facets)
+    ends = {n: (axis % d, end) for n, (axis, end) in _AXIS_OF_SIDE.items() if d == 3 or n not in ("front", "back")}
+    return {name: facets[np.abs(middles[:, i] - end * size[i]) < 1e-9 * size[i]] for name, (i, end) in ends.items()}
 
 
 def _bounding_box(mesh: dmesh.Mesh) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:

@@ -32,11 +32,11 @@ COMM = MPI.COMM_WORLD
 
 
 def rectangle() -> Domain:
-    return domain.rectangle(COMM, [1.0, 2.0], [3, 5])
+    return domain.block(COMM, [1.0, 2.0], [3, 5])
 
 
 def box() -> Domain:
-    return domain.box(COMM, [1.0, 2.0, 0.5], [2, 3, 2])
+    return domain.block(COMM, [1.0, 2.0, 0.5], [2, 3, 2])
 
 
 def half_disk() -> Domain:

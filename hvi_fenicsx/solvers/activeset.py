@@ -35,8 +35,8 @@ _LARGEST_ROUNDING, _SAFETY = 1e-4, 4.0
 """A residual above the first is no rounding; the sample of the rounding error is trusted within the second."""
 _INEXACT, _FORCING, _FINEST = 1e-2, 0.5, 1e-4
 """Relative tolerance of a step's linear solve: while the active set moves; as a part of what is left; the least."""
-_STRAIGHT = 0.25
-"""The second where one step shall do: nodal tractions fall by half as much as the norm, or less."""
+_STRAIGHT = 0.125
+"""The second where one step shall do: nodal tractions fall by a quarter as much as the norm, where ranks meet on Γc."""
 _RUNAWAY = 1e8
 """A displacement of so many times p0 L / E0 is a body that slides away."""
 _REASON = {v: k for k, v in vars(PETSc.SNES.ConvergedReason).items() if isinstance(v, int) and not k.startswith("_")}

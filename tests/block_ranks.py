@@ -1,0 +1,43 @@
+"""Prints, of the block with the cells given as words, what each rank has of it and of the prolongation to it."""
+
+from __future__ import annotations
+
+import json
+import sys
+
+import numpy as np
+from dolfinx import fem
+from mpi4py import MPI
+from scenes import model
+
+from hvi_fenicsx import Scene, blocks, ladder
+
+
+def main() -> None:
+    """By rank: its cells, and of its vertices with values from another rank how many cells they lie from a cut."""
+    scene = Scene.model_validate(model(2) | {"domain": {"shape": "rectangle", "size": [1.0, 2.0], "cells": CELLS}})
+    below = [n // 2 for n in CELLS]
+    fine, coarse = (fem.functionspace(blocks.mesh(COMM, SIZE, n), ("Lagrange", 1, (2,))) for n in (CELLS, below))
+    columns = ladder.prolongation(fine, coarse, scene)
+    indptr, found, _ = columns.getValuesCSR()
+    first, last = columns.getOwnershipRangesColumn()[COMM.rank : COMM.rank + 2]
+    foreign = np.add.reduceat((found < first) | (found >= last), indptr[:-1]) > 0
+    points = fine.tabulate_dof_coordinates()[: len(foreign) // 2, :2][foreign[::2]]
+    cells = fine.mesh.topology.index_map(2).size_local
+    result = COMM.gather([cells, len(points), float(np.max(distances(points), initial=0.0))])
+    if COMM.rank == 0:
+        print(json.dumps(result))
+
+
+def distances(points: np.ndarray) -> np.ndarray:
+    """Of points from the sides of this rank's part that lie inside of the block, in cells."""
+    place = points * CELLS / np.array(SIZE)
+    lower, upper = blocks.share(CELLS, COMM.size, COMM.rank)
+    sides = [(axis, side) for end in (lower, upper) for axis, side in enumerate(end) if 0 < side < CELLS[axis]]
+    return np.min([np.abs(place[:, axis] - side) for axis, side in sides], axis=0)
+
+
+COMM, CELLS, SIZE = MPI.COMM_WORLD, [int(word) for word in sys.argv[1:]], [1.0, 2.0]
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,59 @@
+"""Why: a block that is not the documented one, or not whole, would be solved all the same; a bad share of it too."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+from dolfinx import mesh as dmesh
+from mpi4py import MPI
+from runs import on_ranks
+
+from hvi_fenicsx import blocks, compat
+
+COMM = MPI.COMM_WORLD
+GRIDS = [[1, 1], [3, 5], [16, 20], [2, 3, 4], [1, 7, 1]]
+
+
+@pytest.mark.parametrize("cells", GRIDS)
+def test_a_block_is_the_one_that_dolfinx_makes(cells: list[int]) -> None:
+    size = [1.0, 2.0, 0.7][: len(cells)]
+    corners = [np.zeros(len(cells)), np.array(size)]
+    make = dmesh.create_rectangle if len(cells) == 2 else dmesh.create_box
+    assert simplices(blocks.mesh(COMM, size, cells)) == simplices(make(COMM, corners, cells))
+
+
+def simplices(mesh: dmesh.Mesh) -> set[frozenset[tuple[float, ...]]]:
+    """The cells as sets of their corners."""
+    corners = np.round(mesh.geometry.x[compat.geometry_dofmap(mesh)], 12)
+    return {frozenset(tuple(map(float, x)) for x in cell) for cell in corners}
+
+
+@pytest.mark.parametrize(("cells", "ranks"), itertools.product(GRIDS, [1, 2, 3, 4, 7, 40]))
+def test_each_cell_is_on_one_rank(cells: Sequence[int], ranks: int) -> None:
+    count = np.zeros(cells, dtype=int)
+    for rank in range(ranks):
+        count[tuple(itertools.starmap(slice, zip(*blocks.share(cells, ranks, rank), strict=True)))] += 1
+    assert np.all(count == 1)
+
+
+@pytest.mark.parametrize(("cells", "ranks"), itertools.product([[64, 64], [50, 70], [16, 16, 16]], [2, 3, 5, 8]))
+def test_ranks_have_as_many_cells_and_the_same_part_on_each_rung(cells: list[int], ranks: int) -> None:
+    """A cut is half a cell from where it belongs at most, and half a cell of the coarser rung is one of the finer."""
+    for rank in range(ranks):
+        part = np.array(blocks.share(cells, ranks, rank))
+        below = np.array(blocks.share([n // 2 for n in cells], ranks, rank))
+        assert np.max(np.abs(part - 2 * below)) <= 1
+        assert np.prod(part[1] - part[0]) * ranks == pytest.approx(np.prod(cells), rel=0.15)
+
+
+@pytest.mark.parametrize(("ranks", "cells", "away"), [(2, (16, 24), 1), (3, (24, 36), 1), (3, (16, 20), 2)])
+def test_values_between_rungs_cross_ranks_at_the_cuts_only(ranks: int, cells: tuple[int, int], away: int) -> None:
+    """A vertex next to a cut is the mean of one on it; where the rungs' cuts differ by a cell, so do the vertices."""
+    found = on_ranks(ranks, "tests/block_ranks.py", *cells)
+    assert sum(own for own, _, _ in found) == 2 * cells[0] * cells[1]
+    assert max(own for own, _, _ in found) <= 1.1 * 2 * cells[0] * cells[1] / ranks
+    assert 0 < sum(foreign for _, foreign, _ in found) <= ranks * sum(cells)
+    assert max(distance for _, _, distance in found) <= away + 1e-9
