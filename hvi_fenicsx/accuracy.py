@@ -205,22 +205,31 @@ class _Climb:
             return self.climber.again(rung, _solved_with(scene, tight))
         if self._mesh_will_do():
             return self.climber.again(rung, scene)
-        nesting = adaptive.refined(rung, self._bulk())
+        bulk = self._bulk()
+        nesting = adaptive.refined(rung, bulk) if bulk == self._most else adaptive.sparing(rung, bulk)
         ahead = None if self.watched is None else self.watched.ahead()
         return self._too_long(nesting) or self.climber.up(rung, nesting, scene, ahead)
 
     def _bulk(self) -> float:
         """How much of the squared error to refine: no more than takes the estimate to where it should be."""
-        told = isinstance(self.watched, quantities.Estimated)
-        most = _BULK_ON_CONTACT if told else _BULK[self.scene.dimension]
-        known = self.watched is None or told
+        known = self.watched is None or self._told
         if not self.steps or self.failures or self.goal.accuracy is None or not known:
-            return most
+            return self._most
         mesh, smoothing, _ = self._parts()
         left = math.sqrt(max((_AIM * self.goal.accuracy) ** 2 - smoothing**2, 0.0)) / mesh if mesh > 0 else 1.0
         # On Γc errors fall as the square of the energy norm's. Halving the edges of what is marked leaves a quarter.
         needed = (1 - (left**2 if self.watched is None else left)) / 0.75
-        return min(most, max(_SMALLEST_BULK, needed))
+        return min(self._most, max(_SMALLEST_BULK, needed))
+
+    @property
+    def _told(self) -> bool:
+        """Whether one mesh tells the error of the quantity on Γc."""
+        return isinstance(self.watched, quantities.Estimated)
+
+    @property
+    def _most(self) -> float:
+        """Of the squared error, what one step refines that is not the last."""
+        return _BULK_ON_CONTACT if self._told else _BULK[self.scene.dimension]
 
     def _parts(self) -> tuple[float, float, float]:
         """The mesh's, smoothing's and the solver's part of the last error; the last one in energy."""

@@ -18,7 +18,7 @@ from petsc4py import PETSc
 from . import ladder, refinement
 from .domain import Domain, Refinement
 from .estimate import Estimate
-from .parallel import agree
+from .parallel import agree, total
 from .scene import Scene
 from .solution import Prepared, Solution, finish, prepare
 from .solvers.base import Progress, silent
@@ -29,6 +29,8 @@ _FEWEST = 3
 """Cells each way that the coarsest block has at least."""
 _LARGEST_PART = 1 / 6
 """Of a shape's extent, that the cells of the coarsest mesh of it have at most."""
+_CLOSE, _CORRECTIONS = 1.05, 2
+"""How near to the share wanted is near enough, and how often the marking is corrected for it."""
 
 
 @dataclass(frozen=True)
@@ -121,6 +123,31 @@ def refined(rung: Rung, bulk: float) -> Refinement:
         if estimate is None or bulk >= 1.0 or estimate.discretisation == 0.0:
             return refinement.uniform(domain)
         return refinement.marked(domain, marked(rung.comm, estimate, bulk))
+
+
+def sparing(rung: Rung, share: float) -> Refinement:
+    """The mesh with so much of the squared error refined, neighbours that are cut with the marked cells included.
+
+    On coarse meshes they are many: to mark such a share would refine far more than it. Collective.
+    """
+    bulk, step = share, refined(rung, share)
+    for _ in range(_CORRECTIONS):
+        if (reached := _refined_share(rung, step, bulk)) <= _CLOSE * share:
+            break
+        bulk *= share / reached
+        step = refined(rung, bulk)
+    return step
+
+
+def _refined_share(rung: Rung, step: Refinement, bulk: float) -> float:
+    """Of the squared error: a marked cell counts in full, others by the cuts they have beside a marked one's."""
+    found = rung.solution.estimate
+    if found is None or found.discretisation == 0.0:
+        return 0.0
+    squares, chosen = found.cells**2, marked(rung.comm, found, bulk)
+    cuts = squares * (np.bincount(step.parents, minlength=len(squares))[: len(squares)] - 1.0)
+    own, cut, all_cut = (total(rung.comm, float(a.sum())) for a in (squares[chosen], cuts[chosen], cuts))
+    return own / found.discretisation**2 * all_cut / cut
 
 
 def marked(comm: MPI.Comm, estimate: Estimate, bulk: float) -> npt.NDArray[np.int32]:

@@ -155,6 +155,18 @@ def test_the_bulk_criterion_marks_as_few_cells_as_it_can(bulk: float) -> None:
     assert squares[0] >= np.max(np.delete(cells, found) ** 2)
 
 
+@pytest.mark.parametrize("share", [0.2, 0.35, 0.5])
+def test_a_last_step_refines_as_much_of_the_error_as_it_is_to(share: float) -> None:
+    """What halves its edges leaves a quarter of its square, so the step after it tells what share was refined."""
+    scene = Scene.model_validate(model(4, pull=6e6, friction=quadratic_linear(3e6)))
+    rung = Climber(Timer()).begin(scene, COMM)
+    for _ in range(3):
+        rung = Climber(Timer()).up(rung, adaptive.refined(rung, 0.75), scene)
+    finest = Climber(Timer()).up(rung, adaptive.sparing(rung, share), scene)
+    left = [r.solution.estimate.discretisation for r in (finest, rung)]  # type: ignore[union-attr]
+    assert 1.0 - (left[0] / left[1]) ** 2 == pytest.approx(0.75 * share, abs=0.02)
+
+
 @pytest.mark.parametrize("order", [0.7, 1.0, 1.9])
 def test_extrapolation_knows_the_order(order: float) -> None:
     """Values 1 + h^p on h = 1, 1.7, 2.6: the error of the finest is 1, times the safety factor."""

@@ -20,7 +20,7 @@ from scenes import Table, block, model, quadratic_linear, solved
 from hvi_fenicsx import Scene, Solution, prepare
 from hvi_fenicsx.certificate import examine
 from hvi_fenicsx.estimate import Estimate, estimate, on_contact
-from hvi_fenicsx.estimate.bubbles import assembled
+from hvi_fenicsx.estimate.bubbles import Stiffness, assembled, diagonal, space
 from hvi_fenicsx.nested import solve as solve_system
 from hvi_fenicsx.problem import Problem
 from hvi_fenicsx.solution import finish
@@ -140,6 +140,19 @@ def test_against_a_mesh_four_times_finer(name: str) -> None:
 
 
 # --- its parts
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_the_bubbles_stiffness_is_dolfinx_own_matrix(name: str) -> None:
+    problem = prepare(Scene.model_validate(CASES[name])).problem
+    bubbles = space(problem.domain.mesh)
+    test, trial = problem.bilinear.arguments()
+    form = ufl.replace(problem.bilinear, {test: ufl.TestFunction(bubbles), trial: ufl.TrialFunction(bubbles)})
+    matrix = fem.assemble_matrix(fem.form(form)).to_scipy()
+    found = diagonal(problem, bubbles)
+    assert found.ravel() == pytest.approx(matrix.diagonal(), rel=1e-12)
+    e = np.random.default_rng(1).standard_normal(found.shape)
+    assert Stiffness(problem, bubbles).times(e).ravel() == pytest.approx(matrix @ e.ravel(), rel=1e-9, abs=1e-12)
 
 
 @pytest.mark.parametrize("strong", [False, True])

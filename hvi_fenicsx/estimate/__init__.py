@@ -88,15 +88,12 @@ def _norm(square: float) -> float:
 
 
 def _between_vertices(problem: Problem, u: fem.Function, examined: Examined) -> tuple[Array, Array]:
-    """η_K² of the owned cells that P1 does not see; nodal forces (n, d) that it takes the laws' for. Collective.
-
-    The edge bubbles are gone when this returns: they take more memory than all else.
-    """
+    """η_K² of the owned cells that P1 does not see; nodal forces (n, d) that it takes the laws' for. Collective."""
     space = bubbles.space(problem.domain.mesh)
     edges, vertices = traces.pointwise(problem, space, u, examined.states)
     edges *= -1.0
     edges += defect.residual(problem, u, space)
-    cells = defect.by_cell(problem, defect.least(problem, u, space, edges))
+    cells = defect.by_cell(problem, defect.least(bubbles.Stiffness(problem, space), u, edges))
     if problem.averaged:
         cells += defect.compressibility(problem, u)
     return cells, vertices

@@ -80,11 +80,11 @@ def _change(system: System, u: fem.Function, examined: Examined, inverse: Dual) 
     """The defect with its influence on the vertices and, from the second time on, theirs on it. Collective."""
     problem = system.problem
     space, moved = bubbles.space(problem.domain.mesh), fem.Function(problem.space)
-    change, residual = None, defect.residual(problem, u, space)
+    change, residual, stiffness = None, defect.residual(problem, u, space), bubbles.Stiffness(problem, space)
     for _ in range(_TIMES):
         edges, _ = pointwise(problem, space, u, examined.states, change)
         load = residual - edges - _internal(problem, space, moved)
-        change = Change(moved, defect.least(problem, u, space, load))
+        change = Change(moved, defect.least(stiffness, u, load))
         _answer(problem, u, examined, inverse, change)
     assert change is not None
     return change

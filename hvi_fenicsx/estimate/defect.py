@@ -19,7 +19,7 @@ from mpi4py import MPI
 
 from .. import dilatation
 from ..problem import Bounds, Problem
-from .bubbles import Stiffness, assembled
+from .bubbles import Stiffness, assembled, by_cells
 
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
@@ -131,11 +131,11 @@ def _on(space: fem.FunctionSpace, facets: npt.NDArray[np.int32]) -> npt.NDArray[
     return np.unique(found[found < space.dofmap.index_map.size_local]).astype(np.int32)
 
 
-def least(problem: Problem, u: fem.Function, space: fem.FunctionSpace, load: Array) -> fem.Function:
+def least(stiffness: Stiffness, u: fem.Function, load: Array) -> fem.Function:
     """The admissible bubbles of least energy under a load (n, d), ghosts updated. Collective."""
+    problem, space = stiffness.problem, stiffness.space
     free, value = prescribed(problem, u, space)
-    parts = [midpoints(problem, u, b, space) for b in problem.bounds]
-    solve(Stiffness(problem, space), load, free, value, parts, _RTOL)
+    solve(stiffness, load, free, value, [midpoints(problem, u, b, space) for b in problem.bounds], _RTOL)
     e = fem.Function(space)
     e.x.array[: value.size] = value.ravel()
     e.x.scatter_forward()
@@ -155,8 +155,7 @@ def solve(stiffness: Stiffness, load: Array, free: Flags, e: Array, parts: Seque
     for _ in range(_ROUNDS):
         for part in parts:
             part.placed(e)
-        stiffness.solve(load, e, functools.partial(_project, free, tuple(parts)), rtol)
-        force = load - stiffness.times(e)
+        force = stiffness.solve(load, e, functools.partial(_project, free, tuple(parts)), rtol)
         changed = [part.moved(e, force) for part in parts]
         same = all(np.array_equal(a.side, b.side) for a, b in zip(parts, changed, strict=True))
         parts = changed
@@ -195,5 +194,4 @@ def by_cell(problem: Problem, e: fem.Function) -> Array:
     test, trial = problem.bilinear.arguments()
     q = ufl.TestFunction(fem.functionspace(problem.domain.mesh, ("Discontinuous Lagrange", 0)))
     form = ufl.replace(problem.bilinear, {test: e, trial: e})
-    weighted = ufl.Form([part.reconstruct(integrand=part.integrand() * q) for part in form.integrals()])
-    return np.maximum(assembled(weighted)[:, 0], 0.0)
+    return np.maximum(assembled(by_cells(form, q))[:, 0], 0.0)
