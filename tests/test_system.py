@@ -17,8 +17,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 from scenes import DELTA, NU, E, P, Q, Table, block, energy, model, quadratic_linear, solved
 
-from hvi_fenicsx import Scene, Superpotential, prepare
-from hvi_fenicsx.domain import box
+from hvi_fenicsx import Scene, Superpotential, domain, prepare
 from hvi_fenicsx.solution import Prepared
 
 Array = npt.NDArray[np.float64]
@@ -158,7 +157,7 @@ def test_weights_in_space_add_up_to_the_area() -> None:
 
 
 def test_the_sides_of_a_box_are_where_they_are_said_to_be() -> None:
-    body = box(MPI.COMM_SELF, [1.0, 2.0, 3.0], [1, 1, 1])
+    body = domain.block(MPI.COMM_SELF, [1.0, 2.0, 3.0], [1, 1, 1])
     x = body.mesh.geometry.x
     body.mesh.topology.create_connectivity(2, 0)
     wanted = {"left": (0, 0), "right": (0, 1), "front": (1, 0), "back": (1, 2), "bottom": (2, 0), "top": (2, 3)}
