@@ -29,6 +29,7 @@ POLYGONS = {
     "halves": meshes.HALVES.replace("0.2", "0.03"),
     "slanted": meshes.SLANTED.replace("0.3", "0.03"),
     "graded": meshes.GRADED,
+    "two bodies": meshes.BLOCKS.format(size=0.04, dimension=2, named=True),
 }
 
 
