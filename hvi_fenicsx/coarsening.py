@@ -8,23 +8,21 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from dolfinx import mesh as dmesh
 
 from . import compat, meshfile, outline, refinement
 from .domain import Domain
 from .outline import NONE, HalfEdges, Outline
-from .parallel import on_root, total
+from .parallel import on_root
 
 _WORTHWHILE = 20_000
 """Unknowns from which it pays: below, one factorisation takes less than gmsh."""
 _COARSEST = 2_500
 """Unknowns of the coarsest mesh, about."""
-_DIFFERENT = 0.1
-"""Part of the body's area by which that of the coarsest mesh may differ."""
 _UNNAMED = ""
 
 
@@ -51,24 +49,22 @@ def _coarse(domain: Domain, factor: float) -> Domain | None:
             return None
         mesh, found, within = meshfile.distribute(comm, gmsh, 2, names)
     mesh.geometry.x[:] *= domain.length
-    made = replace(domain, mesh=mesh, sides=found, regions={name: within[name] for name in regions})
-    alike = abs(_area(made.mesh) / _area(domain.mesh) - 1.0) < _DIFFERENT
-    return made if alike else None
+    return replace(domain, mesh=mesh, sides=found, regions={name: within[name] for name in regions})
 
 
 def _half_edges(domain: Domain, sides: Sequence[str], regions: Sequence[str]) -> HalfEdges:
     """This rank's edges without a second cell, or on a side, or between regions; lengths in those of the body."""
-    mesh, d = domain.mesh, 2
+    mesh = domain.mesh
     facets, nodes = refinement.cell_facets(mesh), compat.geometry_dofmap(mesh)
     region = _numbered(domain.regions, regions, len(facets))
     side = _numbered(domain.sides, sides, facets.max(initial=-1) + 1)
-    cells = np.repeat(np.arange(len(facets)), d + 1)
+    cells = np.repeat(np.arange(len(facets)), 3)
     own = facets.ravel()
     alone = np.bincount(own, minlength=len(side)) == 1
     least, most = np.full(len(side), len(regions)), np.full(len(side), NONE)
     np.minimum.at(least, own, region[cells])
     np.maximum.at(most, own, region[cells])
-    cell, i = np.divmod(np.flatnonzero((alone | (side != NONE) | (least != most))[own]), d + 1)
+    cell, i = np.divmod(np.flatnonzero((alone | (side != NONE) | (least != most))[own]), 3)
     ends = np.stack([nodes[cell, (i + 1) % 3], nodes[cell, (i + 2) % 3]], axis=1)
     x = mesh.geometry.x[:, :2] / domain.length
     (ax, ay), (bx, by) = (x[ends[:, 1]] - x[ends[:, 0]]).T, (x[nodes[cell, i]] - x[ends[:, 0]]).T
@@ -96,7 +92,7 @@ def _meshed(
     try:
         gmsh.model.mesh.generate(2)
     except Exception:
-        # gmsh raises bare Exceptions; a thinned outline may well cross itself
+        # gmsh raises bare Exceptions, whatever it is that it cannot mesh
         return None
     return groups
 
@@ -109,10 +105,7 @@ def _drawn(gmsh: Any, thinned: Outline, sides: list[str], regions: list[str]) ->
     geo = gmsh.model.geo
     kept = sorted({v for chain in thinned.chains for v in chain.vertices})
     points = {v: geo.addPoint(*thinned.places[v], 0.0) for v in kept}
-    lines = [
-        [geo.addLine(points[a], points[b]) for a, b in zip(c.vertices, c.vertices[1:], strict=False)]
-        for c in thinned.chains
-    ]
+    lines = [[geo.addLine(points[a], points[b]) for a, b in pairwise(c.vertices)] for c in thinned.chains]
     surfaces: dict[int, list[int]] = {}
     for face in thinned.faces:
         loops = [geo.addCurveLoop(_curves(lines, loop)) for loop in face.loops]
@@ -134,10 +127,3 @@ def _drawn(gmsh: Any, thinned: Outline, sides: list[str], regions: list[str]) ->
 def _curves(lines: Sequence[Sequence[int]], loop: Sequence[tuple[int, bool]]) -> list[int]:
     """Signed gmsh lines along a loop."""
     return [line if forward else -line for number, forward in loop for line in lines[number][:: 1 if forward else -1]]
-
-
-def _area(mesh: dmesh.Mesh) -> float:
-    """Of the whole mesh, m². Collective."""
-    cells = mesh.topology.index_map(2).size_local
-    x = mesh.geometry.x[compat.geometry_dofmap(mesh)[:cells]][:, :, :2]
-    return total(mesh.comm, float(np.sum(np.abs(np.linalg.det(x[:, 1:] - x[:, :1]))) / 2))

@@ -57,14 +57,16 @@ def prolongation(
     Returns:
         Rows are the fine unknowns, columns the coarse ones.
     """
-    near, far = points or (fine.tabulate_dof_coordinates(), coarse.tabulate_dof_coordinates())
-    near = near[: fine.dofmap.index_map.size_local]
-    if nesting is None:
-        rows = _interpolating(*placing.between(near, coarse, far), fine.dofmap.index_map_bs)
-    elif isinstance(nesting, Refinement):
-        rows = _rows(_parents_by_cell(fine, coarse, nesting), fine.dofmap.index_map_bs)
+    d = fine.dofmap.index_map_bs
+    if isinstance(nesting, Refinement):
+        rows = _rows(_parents_by_cell(fine, coarse, nesting), d)
     else:
-        rows = _rows(_parents_on_grid(near, coarse, far, nesting), fine.dofmap.index_map_bs)
+        near, far = points or (fine.tabulate_dof_coordinates(), coarse.tabulate_dof_coordinates())
+        near = near[: fine.dofmap.index_map.size_local]
+        if nesting is None:
+            rows = _interpolating(*placing.between(near, coarse, far), d)
+        else:
+            rows = _rows(_parents_on_grid(near, coarse, far, nesting), d)
     # The rows are used in place: PETSc would insert them one by one.
     matrix = PETSc.Mat().createAIJWithArrays((_sizes(fine), _sizes(coarse)), rows, comm=fine.mesh.comm)
     matrix.assemble()

@@ -20,6 +20,8 @@ _CORNER = np.radians(20.0)
 """By which the outline turns at a vertex that is kept in any case."""
 _TURN = np.radians(30.0)
 """Of a chain, at most, between two vertices that are kept: a coarse chord must not leave its curve far behind."""
+_DIFFERENT = 0.1
+"""Part of the body's area by which that within the thinned outline may differ."""
 _ALONG = 1e-9
 """Angle between two edges that run along each other."""
 NONE = -1
@@ -71,6 +73,10 @@ class Chain:
     right: int | None
 
 
+Loop = tuple[int, list[tuple[int, bool]]]
+"""A region to the left of a closed path, and its chains with whether it runs along them forward."""
+
+
 @dataclass(frozen=True)
 class Face:
     """A piece of a region: (chain, whether it runs forward) of its boundary, then of each of its holes."""
@@ -89,9 +95,10 @@ class Outline:
 
 
 def traced(edges: HalfEdges, factor: float) -> Outline | None:
-    """The outline with one vertex of so many kept; None where it touches itself, or a side ends inside of a body.
+    """The outline with one vertex of so many kept; None where that cannot be meshed or is another body.
 
-    (Gmsh takes crossing edges for an endless task.)
+    So it is where it touches itself (gmsh takes crossing edges for an endless task) or has another area, and where
+    a side ends inside of a body.
     """
     places = dict(zip(edges.ends.ravel().tolist(), edges.points.reshape(-1, 2), strict=True))
     chains = _chains(edges, places)
@@ -101,6 +108,9 @@ def traced(edges: HalfEdges, factor: float) -> Outline | None:
     faces, thinned = _faces(chains, loops, places), [_thinned(c, places, factor) for c in chains]
     pairs = np.array([pair for c in thinned for pair in pairwise(c.vertices)])
     if faces is None or _touching(pairs, np.array([[places[a], places[b]] for a, b in pairs])):
+        return None
+    before, after = (sum(_area(p) for p in _polygons(c, loops, places)) for c in (chains, thinned))
+    if abs(after / before - 1.0) >= _DIFFERENT:
         return None
     return Outline(thinned, faces, places)
 
@@ -167,7 +177,7 @@ def _thinned(chain: Chain, places: Mapping[int, Array], factor: float) -> Chain:
     return Chain([path[i] for i in kept], chain.side, chain.left, chain.right)
 
 
-def _loops(chains: Sequence[Chain]) -> list[tuple[int, list[tuple[int, bool]]]] | None:
+def _loops(chains: Sequence[Chain]) -> list[Loop] | None:
     """Closed loops of chains by region, which lies on their left; None where one does not close."""
     leaving: dict[tuple[int, int], list[tuple[int, bool]]] = defaultdict(list)
     for number, chain in enumerate(chains):
@@ -191,11 +201,9 @@ def _loops(chains: Sequence[Chain]) -> list[tuple[int, list[tuple[int, bool]]]] 
     return found
 
 
-def _faces(
-    chains: Sequence[Chain], loops: Sequence[tuple[int, list[tuple[int, bool]]]], places: Mapping[int, Array]
-) -> list[Face] | None:
+def _faces(chains: Sequence[Chain], loops: Sequence[Loop], places: Mapping[int, Array]) -> list[Face] | None:
     """Loops that run counterclockwise, each with the clockwise ones of its region that lie inside of it."""
-    polygons = [np.array([places[v] for v in _vertices(chains, loop)]) for _, loop in loops]
+    polygons = _polygons(chains, loops, places)
     areas = [_area(p) for p in polygons]
     faces = {i: Face(loops[i][0], [loops[i][1]]) for i, area in enumerate(areas) if area > 0}
     for i in (i for i, area in enumerate(areas) if area <= 0):
@@ -204,6 +212,11 @@ def _faces(
             return None
         faces[min(around, key=lambda j: areas[j])].loops.append(loops[i][1])
     return list(faces.values())
+
+
+def _polygons(chains: Sequence[Chain], loops: Sequence[Loop], places: Mapping[int, Array]) -> list[Array]:
+    """The corners of each loop, (n, 2)."""
+    return [np.array([places[v] for v in _vertices(chains, loop)]) for _, loop in loops]
 
 
 def _vertices(chains: Sequence[Chain], loop: Sequence[tuple[int, bool]]) -> Iterator[int]:

@@ -17,7 +17,7 @@ from dolfinx.mesh import entities_to_geometry
 from mpi4py import MPI
 from test_refinement import measure, volume
 
-from hvi_fenicsx import Scene, building, coarsening, domain, ladder, meshfile, read_scene, solution
+from hvi_fenicsx import Scene, building, coarsening, domain, ladder, meshfile, outline, read_scene, solution
 from hvi_fenicsx.domain import Domain
 from hvi_fenicsx.outline import HalfEdges
 from hvi_fenicsx.scene import HalfDisk, NotchedStrip
@@ -109,7 +109,7 @@ def test_outlines_that_cross_themselves_are_given_up() -> None:
 
 
 def test_a_coarse_mesh_of_another_area_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(coarsening, "_DIFFERENT", 1e-6)
+    monkeypatch.setattr(outline, "_DIFFERENT", 1e-6)
     assert coarsening.founded(domain.build(COMM, HalfDisk(radius=0.5, mesh_size=0.02), 2)).origin is None
 
 
