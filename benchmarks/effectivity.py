@@ -22,13 +22,14 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from hvi_fenicsx import Scene, ladder, read_scene, refinement
+from hvi_fenicsx.below import Below
 from hvi_fenicsx.building import assemble
 from hvi_fenicsx.certificate import examine
 from hvi_fenicsx.estimate import Estimate, defect, estimate
 from hvi_fenicsx.nested import ascend, solve
 from hvi_fenicsx.problem import Problem
 from hvi_fenicsx.solvers.base import Solved, silent
-from hvi_fenicsx.system import Below, System
+from hvi_fenicsx.system import System
 from hvi_fenicsx.timing import Timer
 
 DEMOS = Path(__file__).resolve().parents[1] / "demos"

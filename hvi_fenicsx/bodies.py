@@ -48,21 +48,20 @@ def whole(domain: Domain) -> Body:
     return Body(domain.dimension, np.asarray(domain.centre / domain.length), domain.length)
 
 
-def find(domain: Domain, space: fem.FunctionSpace) -> Bodies:
-    """The bodies of a domain; ``space`` is P1 on its mesh. Collective.
+def find(domain: Domain, space: fem.FunctionSpace, points: Array) -> Bodies:
+    """The bodies of a domain; ``space`` is P1 on its mesh, ``points`` its local vertices. Collective.
 
     Raises:
         InputError: on all ranks alike: two bodies meet at a vertex (in 3D perhaps along an edge) only, a hinge.
     """
-    vertices = space.dofmap.index_map.size_local + space.dofmap.index_map.num_ghosts
     one = whole(domain)
     if domain.one_piece:
-        return Bodies((one,), np.zeros(vertices, np.int64))
+        return Bodies((one,), np.zeros(len(points), np.int64))
     cells, count = _cells(domain)
     if count == 1:
-        return Bodies((one,), np.zeros(vertices, np.int64))
-    labels = _vertices(domain, space, cells, vertices)
-    lower, upper = _boxes(domain, space, labels, count)
+        return Bodies((one,), np.zeros(len(points), np.int64))
+    labels = _vertices(domain, space, cells, points)
+    lower, upper = _boxes(domain, points[:, : domain.dimension], labels, count)
     centres = (lower + upper) / 2
     order = np.lexsort(np.round(centres / domain.length, 9).T[::-1])
     place = np.argsort(order)
@@ -107,15 +106,15 @@ def _owners(index_map: Any, values: Labels) -> Labels:
     return np.array(vector.array)
 
 
-def _vertices(domain: Domain, space: fem.FunctionSpace, cells: Labels, vertices: int) -> Labels:
+def _vertices(domain: Domain, space: fem.FunctionSpace, cells: Labels, points: Array) -> Labels:
     """The body of each local vertex. Collective; refuses a hinge."""
-    labels = np.full(vertices, -1, np.int64)
+    labels = np.full(len(points), -1, np.int64)
     corners = space.dofmap.list
     labels[corners] = cells[: len(corners), None]
     hinges = corners[labels[corners] != cells[: len(corners), None]]
     apart = np.flatnonzero(labels != _owners(space.dofmap.index_map, labels))
-    points = space.tabulate_dof_coordinates()[np.concatenate([hinges, apart])[:1]]
-    found = [p for rank in agree(domain.mesh.comm, points.tolist()) for p in rank]
+    first = points[np.concatenate([hinges, apart])[:1]]
+    found = [p for rank in agree(domain.mesh.comm, first.tolist()) for p in rank]
     if found:
         at = ", ".join(f"{c:.6g}" for c in found[0][: domain.dimension])
         raise InputError(
@@ -125,9 +124,8 @@ def _vertices(domain: Domain, space: fem.FunctionSpace, cells: Labels, vertices:
     return labels
 
 
-def _boxes(domain: Domain, space: fem.FunctionSpace, labels: Labels, count: int) -> tuple[Array, Array]:
+def _boxes(domain: Domain, points: Array, labels: Labels, count: int) -> tuple[Array, Array]:
     """Corners of the bodies' bounding boxes, (count, d) each. Collective."""
-    points = space.tabulate_dof_coordinates()[:, : domain.dimension]
     lower, upper = np.full((2, count, domain.dimension), [[[np.inf]], [[-np.inf]]])
     np.minimum.at(lower, labels, points)
     np.maximum.at(upper, labels, points)

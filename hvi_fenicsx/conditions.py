@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import combinations
 
 import numpy as np
 import numpy.typing as npt
@@ -45,25 +46,31 @@ def _condition(stage: Stage, scales: Scales, part: str, condition: Condition) ->
 
 def _check_agreement(stage: Stage, scales: Scales, named: Sequence[tuple[str, fem.DirichletBC]]) -> None:
     """Where two parts meet they must prescribe the same: else the order of the tables would decide."""
-    known = fem.Function(stage.space)
-    values, owner = known.x.array, np.full(len(known.x.array), -1)
+    values = np.empty(len(stage.points) * stage.dimension)
+    prescribed = [(part, *_values(condition, values)) for part, condition in named]
+    size = max((float(np.max(np.abs(v), initial=0.0)) for _, _, v in prescribed), default=0.0)
     bad: list[str] = []
-    for i, (_, condition) in enumerate(named):
-        dofs, before = condition.dof_indices()[0], values.copy()
-        condition.set(values)
-        size = float(np.max(np.abs(values), initial=0.0))
-        apart = dofs[(owner[dofs] >= 0) & (np.abs(values[dofs] - before[dofs]) > _SAME * size)]
-        bad += [_disagreement(stage, dof, (named[owner[dof]][0], named[i][0]), before, values, scales) for dof in apart]
-        owner[dofs] = i
+    for (one, dofs, these), (other, more, those) in combinations(prescribed, 2):
+        shared, i, j = np.intersect1d(dofs, more, assume_unique=True, return_indices=True)
+        apart = np.abs(these[i] - those[j]) > _SAME * size
+        differing = zip(shared[apart], these[i][apart], those[j][apart], strict=True)
+        bad += [_disagreement(stage, int(dof), (one, other), pair, scales) for dof, *pair in differing]
     found = [text for rank in agree(stage.domain.mesh.comm, bad[:1]) for text in rank]
     if found:
         raise InputError(found[0])
 
 
-def _disagreement(stage: Stage, dof: int, parts: tuple[str, str], before: Array, after: Array, scales: Scales) -> str:
-    block, component = divmod(int(dof), stage.dimension)
-    at = ", ".join(f"{c:.6g}" for c in stage.space.tabulate_dof_coordinates()[block][: stage.dimension])
-    one, other = (float(v[dof]) * scales.displacement for v in (before, after))
+def _values(condition: fem.DirichletBC, values: Array) -> tuple[npt.NDArray[np.int32], Array]:
+    """The dofs of a condition and what it prescribes; ``values`` is room for all dofs."""
+    dofs = condition.dof_indices()[0]
+    condition.set(values)
+    return dofs, values[dofs]
+
+
+def _disagreement(stage: Stage, dof: int, parts: tuple[str, str], pair: Sequence[float], scales: Scales) -> str:
+    block, component = divmod(dof, stage.dimension)
+    at = ", ".join(f"{c:.6g}" for c in stage.points[block][: stage.dimension])
+    one, other = (float(value) * scales.displacement for value in pair)
     return (
         f"boundary.{parts[0]} and boundary.{parts[1]} meet at ({at}) and prescribe displacements along "
         f'{"xyz"[component]} that differ, {one:.6g} and {other:.6g} m; make them equal there, or write "free" in one'

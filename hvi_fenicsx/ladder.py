@@ -16,15 +16,18 @@ import numpy.typing as npt
 from dolfinx import fem
 from petsc4py import PETSc
 
-from . import placing
+from . import nodes, placing
+from .below import Below
 from .domain import Refinement
-from .system import Below, System
+from .system import System
 
 if TYPE_CHECKING:
     from .scene import Scene
 
 Array = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.integer]
+Rows = tuple[Indices, Indices, Array]
+"""Of a sparse matrix, compressed: where each begins, columns, values."""
 _COARSEST = 8
 """Cells each way below which no coarser rung helps."""
 _GROWTH = 3.0
@@ -61,14 +64,15 @@ def prolongation(
     if isinstance(nesting, Refinement):
         rows = _rows(_parents_by_cell(fine, coarse, nesting), d)
     else:
-        near, far = points or (fine.tabulate_dof_coordinates(), coarse.tabulate_dof_coordinates())
+        near, far = points or (nodes.points(fine), nodes.points(coarse))
         near = near[: fine.dofmap.index_map.size_local]
         if nesting is None:
             rows = _interpolating(*placing.between(near, coarse, far), d)
         else:
             rows = _rows(_parents_on_grid(near, coarse, far, nesting), d)
     # The rows are used in place: PETSc would insert them one by one.
-    matrix = PETSc.Mat().createAIJWithArrays((_sizes(fine), _sizes(coarse)), rows, comm=fine.mesh.comm)
+    used = rows if fine.mesh.comm.size == 1 else _split(*rows, coarse)
+    matrix = PETSc.Mat().createAIJWithArrays((_sizes(fine), _sizes(coarse)), used, comm=fine.mesh.comm)
     matrix.assemble()
     return matrix
 
@@ -117,27 +121,32 @@ def _parents_on_grid(points: Array, coarse: fem.FunctionSpace, far: Array, scene
     return np.asarray(_numbers(coarse, far, cells // 2, scene).app2petsc(parents.ravel()).reshape(-1, 2))
 
 
-def _rows(pairs: Indices, d: int) -> tuple[Indices, Indices, Array]:
+def _rows(pairs: Indices, d: int) -> Rows:
     """Compressed rows of the matrix that takes the mean of each pair of block columns, component by component."""
     low, high = np.minimum(pairs[:, 0], pairs[:, 1]), np.maximum(pairs[:, 0], pairs[:, 1])
-    double = low < high
-    start = np.concatenate([[0], np.cumsum((1 + double).repeat(d))]).astype(PETSc.IntType)
-    columns, values = np.empty(start[-1], PETSc.IntType), np.full(start[-1], 0.5)
-    first = start[:-1].reshape(-1, d)
-    for i in range(d):
-        columns[first[:, i]] = low * d + i
-        columns[first[double, i] + 1] = high[double] * d + i
-    values[first[~double]] = 1.0
-    return start, columns, values
+    entries = np.repeat(1 + (low < high).astype(np.int8), d)
+    start = np.concatenate([[0], np.cumsum(entries)]).astype(PETSc.IntType)
+    columns, component = np.empty(start[-1], PETSc.IntType), np.arange(d, dtype=PETSc.IntType)
+    columns[start[:-1]] = (low[:, None] * d + component).ravel()
+    columns[start[1:] - 1] = (high[:, None] * d + component).ravel()
+    return start, columns, np.repeat(1.0 / entries, entries)
 
 
-def _interpolating(corners: Indices, weights: Array, d: int) -> tuple[Indices, Indices, Array]:
+def _interpolating(corners: Indices, weights: Array, d: int) -> Rows:
     """The same of the matrix that weighs the block columns ``corners`` (n, c)."""
     order = np.argsort(corners, axis=1)
     columns = np.take_along_axis(corners, order, axis=1)[:, None, :] * d + np.arange(d)[None, :, None]
     start = np.arange(0, columns.size + 1, corners.shape[1])
     values = np.broadcast_to(np.take_along_axis(weights, order, axis=1)[:, None, :], columns.shape).ravel()
     return start.astype(PETSc.IntType), columns.ravel().astype(PETSc.IntType), values
+
+
+def _split(start: Indices, columns: Indices, values: Array, coarse: fem.FunctionSpace) -> tuple[Rows, Rows]:
+    """Compressed rows as PETSc keeps them on several ranks: this rank's columns, counted from its first, and others."""
+    first, last = (end * coarse.dofmap.index_map_bs for end in coarse.dofmap.index_map.local_range)
+    own = (columns >= first) & (columns < last)
+    before = np.concatenate([[0], np.cumsum(own)])[start].astype(PETSc.IntType)
+    return (before, columns[own] - PETSc.IntType(first), values[own]), (start - before, columns[~own], values[~own])
 
 
 def _sizes(space: fem.FunctionSpace) -> tuple[int, int]:

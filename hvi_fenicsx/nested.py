@@ -12,12 +12,13 @@ from dataclasses import replace
 from petsc4py import PETSc
 
 from . import building, ladder, solvers
+from .below import Below
 from .domain import Refinement
 from .scene import Scene
 from .solvers.base import Counts, Progress, Solved
 from .solvers.linear import LinearSettings
 from .solvers.single import LinearSolve
-from .system import Below, System
+from .system import System
 from .timing import Timer
 
 _WORTHWHILE = 5_000

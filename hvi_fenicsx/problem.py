@@ -69,7 +69,7 @@ class Problem:
     """Minimise ½a(u, u) - <g, u> + Σ laws over the admissible u, nondimensional.
 
     Attributes:
-        domain, scales: as they are. space: P1 vectors.
+        domain, scales: as they are. space: P1 vectors. points: its local vertices (owned and ghost), m, (n, 3).
         bilinear, linear: UFL forms a(u, v) and <g, v>, the latter by name of its part.
         strains: names of linear forms that no rigid motion feels (thermal strain).
         averaged: volumetric parts of a(u, v) that are averaged by vertex.
@@ -83,6 +83,7 @@ class Problem:
     domain: Domain
     scales: Scales
     space: fem.FunctionSpace
+    points: Array
     bilinear: Any
     averaged: tuple[Averaged, ...]
     linear: dict[str, Any]
@@ -97,11 +98,6 @@ class Problem:
     held: tuple[tuple[str, Indices], ...]
 
     @functools.cached_property
-    def points(self) -> Array:
-        """The local vertices (owned and ghost), m, (n, 3); kept, since making them takes longer than most uses."""
-        return np.asarray(self.space.tabulate_dof_coordinates(), np.float64)
-
-    @functools.cached_property
     def fixed_here(self) -> npt.NDArray[np.int32]:
         """The scalar dofs that are prescribed and that this rank owns."""
         return self.fixed[self.fixed < self.space.dofmap.index_map.size_local * self.space.dofmap.index_map_bs]
@@ -109,7 +105,7 @@ class Problem:
     @functools.cached_property
     def bodies(self) -> Bodies:
         """The connected parts of the mesh. Collective when first used."""
-        return bodies.find(self.domain, self.space)
+        return bodies.find(self.domain, self.space, self.points)
 
 
 def compose(
@@ -190,6 +186,7 @@ def _sum(
         stage.domain,
         scales,
         stage.space,
+        stage.points,
         sum(bilinear),
         tuple(a for _, _, c in made for a in c.averaged),
         {**linear, **strains},
@@ -211,6 +208,7 @@ def _surfaces(stage: Stage, made: Sequence[Made]) -> dict[str, Surface]:
         where: surface.build(
             where,
             stage.space,
+            stage.points,
             stage.part_facets[where],
             stage.boundary(where, **_VERTEX),
             stage.length ** (stage.dimension - 1),

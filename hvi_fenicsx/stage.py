@@ -8,10 +8,12 @@ from typing import Any
 
 import dolfinx
 import numpy as np
+import numpy.typing as npt
 import ufl
 from dolfinx import fem
 from petsc4py import PETSc
 
+from . import nodes
 from .domain import Domain
 from .effects.base import Place
 from .expressions import Formula, ufl_algebra
@@ -32,6 +34,11 @@ class Stage:
         self.normal = ufl.FacetNormal(domain.mesh)
         self.materials = [placed for placed in effects if placed[1].place is Place.MATERIAL]
         self.part_facets = {name: domain.facets(on) for name, on in parts.items()}
+
+    @functools.cached_property
+    def points(self) -> npt.NDArray[np.float64]:
+        """The local vertices (owned and ghost), m, (n, 3)."""
+        return nodes.points(self.space)
 
     @functools.cached_property
     def scalar_test(self) -> Any:

@@ -15,7 +15,6 @@ import ufl
 from dolfinx import fem
 from mpi4py import MPI
 
-from . import compat
 from .errors import InputError
 from .vectors import nodal
 
@@ -55,6 +54,7 @@ class Surface:
 def build(
     part: str,
     space: fem.FunctionSpace,
+    vertices: Array,
     facets: Indices,
     measure: Any,
     area: float,
@@ -64,7 +64,7 @@ def build(
 
     Args:
         part: its name.
-        space: the P1 vector space.
+        space: the P1 vector space. vertices: its local ones, m, (n, 3).
         facets: its local facets.
         measure: ds with vertex quadrature over the part, SI.
         area: L^(d-1), what the weights are divided by.
@@ -85,10 +85,9 @@ def build(
     if direction is not None:
         normal = np.broadcast_to(np.asarray(direction, dtype=np.float64), normal.shape)
     normals = normal / np.linalg.norm(normal, axis=1, keepdims=True)
-    points = space.tabulate_dof_coordinates()[blocks]
     # Rounding must not make an axis-parallel part a slanted one.
     normals = np.where(np.max(np.abs(normals), axis=1, keepdims=True) > 1 - 1e-10, np.round(normals), normals)
-    return Surface(part, facets, blocks, points, normals, tangents(normals), weights)
+    return Surface(part, facets, blocks, vertices[blocks], normals, tangents(normals), weights)
 
 
 def tangents(normals: Array) -> Array:
@@ -112,14 +111,3 @@ def component_dofs(blocks: Indices, directions: Array) -> tuple[npt.NDArray[np.i
     """The scalar dof (m,) of a direction (m, d) along an axis of its vertex's frame, and its sign (m,)."""
     axis = np.argmax(np.abs(directions), axis=1)
     return blocks.astype(np.int64) * directions.shape[1] + axis, np.sign(directions[np.arange(len(axis)), axis])
-
-
-def dof_of_node(space: fem.FunctionSpace) -> Indices:
-    """The (block) dof at each geometry node of a P1 space on simplices."""
-    mesh = space.mesh
-    result = np.zeros(mesh.geometry.x.shape[0], dtype=np.int32)
-    cells = (
-        mesh.topology.index_map(mesh.topology.dim).size_local + mesh.topology.index_map(mesh.topology.dim).num_ghosts
-    )
-    result[compat.geometry_dofmap(mesh)[:cells]] = space.dofmap.list[:cells]
-    return result

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -25,6 +25,9 @@ from .problem import Problem
 from .rigid import Mode
 from .timing import Timer
 from .vectors import assembled, new_vector, turn
+
+if TYPE_CHECKING:
+    from .below import Below
 
 Array = npt.NDArray[np.float64]
 
@@ -64,6 +67,7 @@ class System:
         matrix: J = A + W K (+ H, see :meth:`hold`), symmetric, Dirichlet rows and columns replaced by the identity;
             block size d. rows: those of Γc.
         load: b, lifted; the prescribed values stand in the Dirichlet rows.
+        held: the unknowns of Γc (local, owned, sorted) that J holds.
         lower, upper: bounds of u; infinite on Dirichlet rows.
         scale: norm of the load, what residuals are relative to.
         below: the next coarser rung of the ladder; None where there is none.
@@ -85,7 +89,7 @@ class System:
             self.rotation = self._rotate()
             self.rows = ContactRows(self.matrix, [*(t.surface for t in self.terms), *(b.surface for b in self.bounds)])
         self._rates = [np.zeros((*t.free.shape, t.free.shape[1])) for t in self.terms]
-        self._held: npt.NDArray[np.int32] = np.empty(0, np.int32)
+        self.held: npt.NDArray[np.int32] = np.empty(0, np.int32)
         self._work = self.load.duplicate()
         self.lower, self.upper = self._box()
         free = self.load.copy()
@@ -197,38 +201,20 @@ class System:
 
     def hold(self, held: npt.NDArray[np.int32]) -> None:
         """Hold some unknowns of Γc (local, owned, sorted) in J where a solve finds them, and no others. Collective."""
-        if self.comm.allreduce(not np.array_equal(held, self._held), op=MPI.LOR):
+        if self.comm.allreduce(not np.array_equal(held, self.held), op=MPI.LOR):
             self._write(held)
 
-    def follow(self, finer: System, step: PETSc.Mat) -> None:
-        """Take the tangent and the held unknowns of the next finer system, prolonged to by ``step``. Collective.
-
-        W K is restricted and lumped; an unknown is held when one that it moves is, so that J stays the finer one's
-        Galerkin product (off a curved boundary).
-        """
-        value, sum_ = finer.load.duplicate(), self.load.duplicate()
-        d = finer.rows.tangent.shape[1]
-        for column in range(d):
-            value.set(0.0)
-            value.array[finer.rows.dofs] = finer.rows.tangent[:, :, column].ravel()
-            step.multTranspose(value, sum_)
-            self.rows.tangent[:, :, column] = sum_.array_r[self.rows.dofs].reshape(-1, d)
-        value.set(0.0)
-        value.array[finer._held] = 1.0
-        step.multTranspose(value, sum_)
-        self._rates = [np.full_like(k, np.nan) for k in self._rates]  # its own are no longer in force
-        self._write(self.rows.dofs[sum_.array_r[self.rows.dofs] > 0.0].astype(np.int32))
-        value.destroy()
-        sum_.destroy()
+    def take(self, tangent: Array, held: npt.NDArray[np.int32]) -> None:
+        """Take the tangent W K (m, d, d) of a finer rung, and hold these unknowns. Collective."""
+        changed = not (np.array_equal(tangent, self.rows.tangent) and np.array_equal(held, self.held))
+        if self.comm.allreduce(changed, op=MPI.LOR):
+            self.rows.tangent[:] = tangent
+            self._rates = [np.full_like(k, np.nan) for k in self._rates]  # its own are no longer in force
+            self._write(held)
 
     def _write(self, held: npt.NDArray[np.int32]) -> None:
         self.rows.write(self.matrix, held)
-        self._held = held.copy()
-
-    @property
-    def immovable(self) -> npt.NDArray[np.int32]:
-        """Unknowns (local, owned) that are held or prescribed."""
-        return np.concatenate([self._held, self.problem.fixed_here])
+        self.held = held.copy()
 
     @property
     def rates(self) -> list[Array]:
@@ -305,11 +291,3 @@ class System:
             limit = tolerance * term.traction_scale * term.surface.weights
             allowed[dofs[touched]] = np.minimum(allowed[dofs], limit[:, None])[touched]
         return allowed
-
-
-@dataclass(frozen=True)
-class Below:
-    """The next coarser rung, and the prolongation from its unknowns."""
-
-    system: System
-    prolongation: PETSc.Mat

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from dolfinx import fem
+from dolfinx import fem, la
 from dolfinx.fem.petsc import assemble_vector
 from petsc4py import PETSc
 
@@ -29,10 +29,10 @@ def assembled(form: fem.Form) -> PETSc.Vec:
 def nodal(form: Any) -> npt.NDArray[np.float64]:
     """A UFL linear form's values at the blocks that this rank owns, (n, d). Collective."""
     compiled = fem.form(form)
-    vector = assembled(compiled)
-    values = np.array(vector.array_r).reshape(-1, compiled.function_spaces[0].dofmap.index_map_bs)
-    vector.destroy()
-    return values
+    dofs = compiled.function_spaces[0].dofmap
+    vector = fem.assemble_vector(compiled)
+    vector.scatter_reverse(la.InsertMode.add)
+    return np.asarray(vector.array.reshape(-1, dofs.index_map_bs)[: dofs.index_map.size_local], dtype=np.float64)
 
 
 def turn(vector: PETSc.Vec, rotation: PETSc.Mat | None) -> None:

@@ -158,3 +158,17 @@ def test_ranks_make_the_same_meshes_and_prolong_alike(tmp_path: Path) -> None:
         told.append([float(word) for word in run.stdout.split()])
     assert told[1] == pytest.approx(told[0], rel=1e-10)
     assert told[2] == pytest.approx(told[0], rel=1e-10)
+
+
+@pytest.mark.usefixtures("everything_nested")
+def test_coarse_bodies_slide_along_a_curved_part_as_the_fine_one_does() -> None:
+    """A half-disk in a cavity: its normals turn, and what holds them must not hold the tangents of the coarse ones."""
+    shape = '{shape="half_disk", radius=0.1, mesh_size=3e-3, mesh_size_below=2e-3}'
+    law = '{law="quadratic_linear", gamma1=1e4, gamma2=5e3, delta=1e-4}'
+    overrides = [f"domain={shape}", 'boundary.top={on="top", traction=[0.0, -2e4]}']
+    floor = f'boundary.floor={{on="arc", contact={{gap=0.0}}, friction={law}}}'
+    found = solution.solve(read_scene(DEMOS / "hertz.toml", [*overrides, floor]))
+    assert found.converged
+    assert found.solved is not None
+    assert found.solved.levels > 1
+    assert found.solved.counts.linear < 45

@@ -21,6 +21,7 @@ from hvi_fenicsx.solvers import linear
 from hvi_fenicsx.solvers.activeset import ActiveSetSolver
 from hvi_fenicsx.solvers.base import held_dofs, silent
 from hvi_fenicsx.solvers.linear import LinearSettings
+from hvi_fenicsx.system import System
 from hvi_fenicsx.timing import Timer
 
 DEMOS = Path(__file__).parents[1] / "demos"
@@ -116,6 +117,46 @@ def iterations(cells: int) -> int:
     load.array[held_dofs(prepared.system, laws)] = 0.0
     x.set(0.0)
     return solver.held.solve(load, x, 1e-8)[0]
+
+
+@pytest.mark.parametrize("kind", ["lu", "gamg", "mg"])
+@pytest.mark.usefixtures("everything_nested")
+def test_a_preconditioner_used_before_is_that_made_anew(kind: linear.Kind) -> None:
+    """Factors, levels and prolongations are kept; what was held before must leave no trace in them."""
+    used, new = (
+        linear.HeldPreconditioner(on_its_ladder("wall_left", 32), LinearSettings(kind), Timer()) for _ in range(2)
+    )
+    dofs = used.system.rows.dofs.astype(np.int32)
+    for stiffness, held in ((0.7, dofs[::3]), (0.2, dofs[:20]), (0.9, dofs[:0]), (0.4, dofs[5::2])):
+        used.system.set_rates(tangent(used.system, stiffness))
+        used.prepare(held)
+    new.system.set_rates(tangent(new.system, stiffness))
+    new.prepare(held)
+    right = np.random.default_rng(3).standard_normal(used.system.dofs - len(held))
+    found, wanted = (applied(preconditioner, held, right) for preconditioner in (used, new))
+    np.testing.assert_allclose(found, wanted, rtol=0, atol=1e-11 * np.max(np.abs(wanted)))
+
+
+def on_its_ladder(demo: str, cells: int) -> System:
+    """A demo on a square of so many cells a side, with the rungs below."""
+    scene = read_scene(DEMOS / f"{demo}.toml", [f"domain.cells=[{cells}, {cells}]"])
+    system = solution.prepare(scene).system
+    system.below = nested.hierarchy(scene, system, Timer())
+    return system
+
+
+def tangent(system: System, stiffness: float) -> list[np.ndarray]:
+    """K of laws that grow along the part."""
+    return [np.linspace(0, stiffness, len(k))[:, None, None] * np.eye(k.shape[1]) for k in system.rates]
+
+
+def applied(preconditioner: linear.HeldPreconditioner, held: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """To a vector on the dofs that are not held."""
+    free = np.setdiff1d(np.arange(preconditioner.system.dofs), held).astype(PETSc.IntType)
+    preconditioner.select(PETSc.IS().createGeneral(free, comm=MPI.COMM_WORLD))
+    x, y = (PETSc.Vec().createWithArray(values, comm=MPI.COMM_WORLD) for values in (right, np.zeros_like(right)))
+    preconditioner.apply_reduced(x, y)
+    return y.array.copy()
 
 
 @pytest.mark.parametrize(("demo", "steady"), [("strong_law", True), ("lift_off", False)])

@@ -61,7 +61,7 @@ def facets(problem: Problem, bubbles: fem.FunctionSpace, local: Indices) -> Face
         vertices[here] = problem.space.dofmap.list[cells[here]][:, corners]
         numbers = [cell_edges.index((corners[a], corners[b])) for a, b in pairs]
         edges[here] = bubbles.dofmap.list[cells[here]][:, numbers]
-    points = problem.space.tabulate_dof_coordinates()[vertices] / problem.scales.length
+    points = np.asarray(problem.points[vertices] / problem.scales.length)
     return Facets(vertices, edges, pairs, _areas(points))
 
 

@@ -7,8 +7,9 @@ import numpy as np
 import numpy.typing as npt
 
 from .. import compat
+from ..nodes import dof_of_node
 from ..problem import Problem
-from ..surface import Surface, dof_of_node
+from ..surface import Surface
 
 Array = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.int64]

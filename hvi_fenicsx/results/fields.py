@@ -15,10 +15,10 @@ from .. import compat
 from ..boundary import State
 from ..errors import InputError
 from ..estimate import Estimate
+from ..nodes import dof_of_node
 from ..parallel import agree
 from ..problem import Problem
 from ..rigid import Mode
-from ..surface import dof_of_node
 from . import stress
 
 Array = npt.NDArray[np.float64]
@@ -49,7 +49,7 @@ def _constant(space: fem.FunctionSpace, name: str, values: Array) -> fem.Functio
 def write_escape(path: Path, problem: Problem, mode: Mode) -> None:
     """The rigid motion along which the body escapes, dimensionless."""
     field = fem.Function(problem.space, name="escape_mode")
-    points = problem.space.tabulate_dof_coordinates() / problem.scales.length
+    points = np.asarray(problem.points / problem.scales.length)
     field.x.array[:] = problem.bodies.motion(points, mode).ravel()
     _write(path, problem.domain.mesh, [field])
 

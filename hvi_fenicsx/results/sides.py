@@ -26,7 +26,7 @@ def _vertices(problem: Problem, on: Sequence[str]) -> Array:
     facets = problem.domain.facets(on)
     dofs = fem.locate_dofs_topological(space, problem.domain.dimension - 1, facets)
     owned = np.unique(dofs[dofs < space.dofmap.index_map.size_local])
-    gathered = problem.domain.mesh.comm.gather(space.tabulate_dof_coordinates()[owned], root=0)
+    gathered = problem.domain.mesh.comm.gather(problem.points[owned], root=0)
     found = np.concatenate(gathered) if gathered else np.empty((0, 3))
     return found[np.lexsort(found.T[::-1])]
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -21,7 +21,8 @@ from petsc4py import PETSc
 from ..system import System
 from ..timing import Timer
 from . import multigrid, schur
-from .options import PREFIX, below_the_users, configure
+from .copied import Copied
+from .options import PREFIX, configure
 
 Indices = npt.NDArray[np.int32]
 Kind = Literal["lu", "gamg", "mg"]
@@ -84,6 +85,23 @@ class LinearSettings:
         return {"lu": _LU, "gamg": _GAMG, "mg": _MG}[self.kind]
 
 
+class Prepared(Protocol):
+    """A preconditioner that can be made fit for other held unknowns.
+
+    Attributes:
+        pc: it. matrix: what it is of, and equations are to be solved with.
+    """
+
+    pc: PETSc.PC
+    matrix: PETSc.Mat
+
+    def prepare(self, held: Indices) -> None:
+        """Fit it to the system's matrix as it stands with these unknowns held. Collective."""
+
+    def free(self) -> None:
+        """Free the PETSc objects."""
+
+
 class HeldPreconditioner:
     """The preconditioner of the system's matrix with some dofs held; set up anew only when it has to be.
 
@@ -96,9 +114,8 @@ class HeldPreconditioner:
         self._held: Indices | None = None
         self._rates: list[npt.NDArray[np.float64]] = []
         self._fresh, self._worn = 0, False
-        self._copy: PETSc.Mat | None = None
-        self._pc: PETSc.PC | None = None
-        self._schur: schur.SchurDirect | None = None
+        self._made: Prepared | None = None
+        self._kind: Kind | None = None
         self._factorised = 0
         self._in, self._out = system.load.duplicate(), system.load.duplicate()
         self._runs: list[tuple[slice, slice]] = []
@@ -130,62 +147,35 @@ class HeldPreconditioner:
             self.settings, self._worn = LinearSettings("lu"), True
 
     def _build(self, held: Indices) -> None:
-        self._forget()
-        self._pc = PETSc.PC().create(self.system.comm)
-        if self.settings.kind == "lu" and self._condensed(held):
-            self._pc.setType(PETSc.PC.Type.PYTHON)
-            self._pc.setPythonContext(self._schur)
-            self._pc.setOperators(self.system.matrix)
-            return
+        kind = self.settings.kind
+        condensing = kind == "lu" and schur.pays(self.system, self._factorised)
+        if self._made is None or kind != self._kind or (condensing and not isinstance(self._made, schur.SchurDirect)):
+            self._forget()
+            self._made, self._kind = self._new(condensing=condensing), kind
+        self._made.prepare(held)
         self._factorised += 1
-        self._pc.setOptionsPrefix(PREFIX)
-        with below_the_users(self.settings.pc):
-            if self.settings.kind == "mg":
-                multigrid.hang(self._pc, self.system)
-            else:
-                self._copy = self._identity_at(held)
-                self._pc.setOperators(self._copy)
-            self._pc.setFromOptions()
-            self._pc.setUp()
 
-    def _condensed(self, held: Indices) -> bool:
-        """Whether the body's own factorisation, made once, serves a matrix that has changed on Γc alone."""
-        if self._schur is None and schur.pays(self.system, self._factorised):
-            self._schur = schur.SchurDirect(self.system, _LU)
-        if self._schur is not None:
-            self._schur.prepare(held)
-        return self._schur is not None
+    def _new(self, *, condensing: bool) -> Prepared:
+        """Condensing: the body's own factorisation, made once, serves a matrix that changes on Γc alone."""
+        if condensing:
+            return schur.SchurDirect(self.system, self.settings.pc)
+        if self.settings.kind == "mg":
+            return multigrid.Multigrid(self.system, self.settings.pc)
+        return Copied(self.system, self.settings.pc, direct=self.settings.kind == "lu")
 
     @property
     def _pins(self) -> Indices:
         """Dofs at which free motions are pinned: where all other equations hold, theirs do too."""
         return self.system.freedom.pins if self.system.freedom else np.empty(0, np.int32)
 
-    def _identity_at(self, held: Indices) -> PETSc.Mat:
-        """A copy of the matrix with these rows and columns, and those of pinned dofs, replaced by the identity."""
-        held = np.union1d(held, self._pins).astype(np.int32)
-        matrix = self.system.matrix.copy()
-        matrix.zeroRowsColumns((held + self.system.load.owner_range[0]).astype(PETSc.IntType), diag=1.0)
-        matrix.setBlockSize(self.system.problem.scales.dimension)
-        matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
-        matrix.setOption(PETSc.Mat.Option.SPD, self.settings.kind != "lu")
-        if self.settings.kind == "gamg":
-            matrix.setNearNullSpace(self.system.near_null)
-        return matrix
-
     def destroy(self) -> None:
         """Free the PETSc objects."""
         self._forget()
-        if self._schur is not None:
-            self._schur.free()
-            self._schur = None
 
     def _forget(self) -> None:
-        for thing in (self._copy, self._pc):
-            if thing is not None:
-                thing.destroy()
-        self._copy = self._pc = None
-        self._held = None
+        if self._made is not None:
+            self._made.free()
+        self._made = self._held = None
 
     def select(self, inactive: PETSc.IS) -> None:
         """Reduced vectors hold these dofs from now on."""
@@ -202,7 +192,7 @@ class HeldPreconditioner:
 
     def _unpinned(self, x: PETSc.Vec, y: PETSc.Vec) -> None:
         x.array[self._pins] = 0.0
-        self._pc.apply(x, y)  # type: ignore[union-attr]
+        self._made.pc.apply(x, y)  # type: ignore[union-attr]
 
     def _reduced(self, operation: Callable[[PETSc.Vec, PETSc.Vec], None], x: PETSc.Vec, y: PETSc.Vec) -> None:
         whole, part = self._in.array, x.array_r
@@ -220,8 +210,9 @@ class HeldPreconditioner:
         """
         load.array[self._pins] = 0.0
         ksp = PETSc.KSP().create(self.system.comm)
-        ksp.setOperators(self.system.matrix if self._copy is None else self._copy)
-        ksp.setPC(self._pc)
+        assert self._made is not None
+        ksp.setOperators(self._made.matrix)
+        ksp.setPC(self._made.pc)
         ksp.setTolerances(rtol=rtol, max_it=2000)
         ksp.setInitialGuessNonzero(self.settings.kind != "lu")
         configure(ksp, self.settings.ksp, PREFIX)

@@ -7,6 +7,7 @@ active set or tangent then costs one small dense factorisation instead of that o
 from __future__ import annotations
 
 import warnings
+from collections.abc import Mapping
 
 import numpy as np
 import numpy.typing as npt
@@ -35,13 +36,16 @@ def pays(system: System, factorisations: int) -> bool:
 
 
 class SchurDirect:
-    """The condensed body; a context for PETSc's PC of type python.
+    """The condensed body; the context of its PC of type python. Creation is collective.
 
     Args:
-        system: whose stiffness is condensed to the n unknowns of Γc. options: of the factorisation.
+        system: whose stiffness is condensed to the n unknowns of Γc. options: of the factorisation, below the user's.
+
+    Attributes:
+        pc, matrix: the PC, and the system's matrix, of which it is.
     """
 
-    def __init__(self, system: System, options: dict[str, object]) -> None:
+    def __init__(self, system: System, options: Mapping[str, object]) -> None:
         self._system, self._dofs = system, system.rows.dofs
         bulk = system.rows.bulk
         rows = csr_matrix(bulk.getValuesCSR()[::-1], shape=bulk.getSize())
@@ -53,8 +57,12 @@ class SchurDirect:
         self._lu: tuple[Array, npt.NDArray[np.int32]] | None = None
         self._free: npt.NDArray[np.bool_] = np.ones(len(self._dofs), dtype=bool)
         self._work = system.load.duplicate()
+        self.pc, self.matrix = PETSc.PC().create(system.comm), system.matrix
+        self.pc.setType(PETSc.PC.Type.PYTHON)
+        self.pc.setPythonContext(self)
+        self.pc.setOperators(self.matrix)
 
-    def _interior(self, options: dict[str, object]) -> PETSc.PC:
+    def _interior(self, options: Mapping[str, object]) -> PETSc.PC:
         matrix = self._system.matrix.copy()
         matrix.zeroRowsColumns(self._dofs.astype(PETSc.IntType), diag=1.0)
         matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
@@ -106,5 +114,5 @@ class SchurDirect:
 
     def free(self) -> None:
         """Free the PETSc objects (``destroy`` is what petsc4py calls on a context, with every PC that has it)."""
-        self._factor.destroy()
-        self._work.destroy()
+        for thing in (self.pc, self._factor, self._work):
+            thing.destroy()

@@ -22,9 +22,9 @@ from scipy import sparse
 from .. import dilatation
 from ..boundary import State
 from ..effects.base import Direction
+from ..nodes import dof_of_node
 from ..scales import Scales
 from ..solution import Solution
-from ..surface import dof_of_node
 
 Array = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.int64]
@@ -74,7 +74,7 @@ def take(solution: Solution) -> Sample | None:
     index_map = space.dofmap.index_map
     owned = index_map.size_local
     cells = space.mesh.topology.index_map(space.mesh.topology.dim).size_local
-    points = space.tabulate_dof_coordinates()[:owned, :d]
+    points = solution.problem.points[:owned, :d]
     u = solution.solved.u.x.array.reshape(-1, d)[:owned] * scales.displacement
     corners = index_map.local_to_global(space.dofmap.list[:cells].ravel()).reshape(-1, d + 1)
     parts = {s.surface.part: _part(solution, s) for s in solution.examined.states}
