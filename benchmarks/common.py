@@ -23,12 +23,20 @@ ROOT = Path(__file__).parents[1]
 DEMOS = ROOT / "demos"
 Figures = dict[str, Any]
 LIFTING = ['boundary.press.traction=[0.0, "-1e6*(1 - 1.5*x)"]']
+FLOOR = (
+    'boundary.floor={on="bottom", contact={gap=0.0}, '
+    'friction={law="quadratic_linear", gamma1=4e5, gamma2=2e5, delta=1e-5}}'
+)
 SCENES: Mapping[str, tuple[str, list[str]]] = {
     "frictionless": ("wall_left", ["solver={}", 'boundary.floor={on="bottom", contact={gap=0.0}}']),
     "paper": ("wall_left", []),
     "strong law": ("lift_off", []),
     "lift-off": ("strong_law", LIFTING),
     "block": ("block_3d", []),
+    "lifted block": (
+        "block_3d",
+        ["boundary={}", FLOOR, 'boundary.press={on="top", traction=[5e4, 0.0, "-1e6*(1 - 1.9*x*y)"]}'],
+    ),
 }
 """Demo and overrides. The strong law has P = 6e6, γ1 = 3e6 N/m²; in the lift-off the press turns into a pull."""
 

@@ -100,6 +100,28 @@ def plate(folder: Path, size: float, refinements: int = 0) -> list[str]:
     return [f'domain={{shape="file", file="{file}", refinements={refinements}}}']
 
 
+def bored(folder: Path, size: float) -> list[str]:
+    """Overrides for the unit cube with a bore as an unstructured gmsh mesh of this cell size."""
+    import gmsh
+
+    gmsh.initialize()
+    gmsh.option.setNumber("General.Terminal", 0)
+    occ = gmsh.model.occ
+    occ.cut([(3, occ.addBox(0, 0, 0, 1, 1, 1))], [(3, occ.addCylinder(0.5, -0.1, 0.6, 0, 1.2, 0, 0.2))])
+    occ.synchronize()
+    for name, z in (("bottom", 0.0), ("top", 1.0)):
+        found = gmsh.model.getEntitiesInBoundingBox(-0.1, -0.1, z - 1e-3, 1.1, 1.1, z + 1e-3, 2)
+        gmsh.model.addPhysicalGroup(2, [tag for _, tag in found], name=name)
+    gmsh.model.addPhysicalGroup(3, [tag for _, tag in gmsh.model.getEntities(3)], name="block")
+    gmsh.option.setNumber("Mesh.MeshSizeMax", size)
+    gmsh.option.setNumber("Mesh.MeshSizeMin", size)
+    gmsh.model.mesh.generate(3)
+    file = folder / f"bored_{size}.msh"
+    gmsh.write(str(file))
+    gmsh.finalize()
+    return [f'domain={{shape="file", file="{file}"}}']
+
+
 def main() -> None:
     made = parser(__doc__)
     made.add_argument("--cells", type=int, nargs="*", default=[512], help="a side: 128, 256, 512, 1024 in full")
@@ -107,6 +129,7 @@ def main() -> None:
     made.add_argument("--boxes", type=int, nargs="*", default=[], help="cells a side in 3D: 32, 52, 68 in full")
     made.add_argument("--unstructured", type=float, nargs="*", default=[], help="cell sizes of gmsh meshes: 0.004")
     made.add_argument("--refined", type=float, nargs="*", default=[], help="such sizes, refined four times: 0.064")
+    made.add_argument("--bored", type=float, nargs="*", default=[], help="cell sizes of gmsh meshes in 3D: 0.028")
     made.add_argument("--scenes", nargs="*", choices=[*SCENES], default=[*PLANE])
     options = made.parse_args()
     rows, counted = [], []
@@ -118,6 +141,9 @@ def main() -> None:
             cases += [(f"{s}, gmsh", s, plate(Path(folder), h), options.algebraic) for s in options.scenes]
         for h in options.refined:
             cases += [(f"{s}, gmsh refined", s, plate(Path(folder), h, refinements=4), both) for s in options.scenes]
+        cases += [
+            ("lifted block, gmsh", "lifted block", bored(Path(folder), h), options.algebraic) for h in options.bored
+        ]
         for name, scene, overrides, kinds in cases:
             runs = measured(scene, overrides, kinds, options)
             if not runs["contact"] or not any(runs[kind] for kind in options.algebraic):

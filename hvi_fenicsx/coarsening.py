@@ -1,7 +1,8 @@
-"""A ladder for a plane mesh that has none: coarser meshes of the same body, made by gmsh within a thinned outline.
+"""A ladder for a mesh that has none: coarser meshes of the same body.
 
-Only the last of them is made anew; those between are its refinements, so the one step that is not nested is the last,
-onto the mesh itself. What these meshes give is a start and a preconditioner: solutions are those of the mesh itself.
+In the plane gmsh makes one within a thinned outline; in space :mod:`.remeshing` does. Only that is made anew; the
+meshes between are its refinements, so the one step that is not nested is the last, onto the mesh itself. What these
+meshes give is a start and a preconditioner: solutions are those of the mesh itself.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from . import compat, meshfile, outline, refinement
+from . import compat, meshfile, outline, refinement, remeshing
 from .domain import Domain
 from .outline import NONE, HalfEdges, Outline
 from .parallel import on_root
@@ -27,20 +28,21 @@ _UNNAMED = ""
 
 
 def founded(domain: Domain) -> Domain:
-    """The domain with coarser ones below it, where it is plane and large enough and gmsh can make them. Collective."""
-    unknowns = 2 * domain.mesh.topology.index_map(0).size_global
-    times = round(np.log2(unknowns / _COARSEST) / 2)
-    if domain.dimension != 2 or domain.origin is not None or unknowns < _WORTHWHILE:
+    """The domain with coarser ones below it, where it is large enough and gmsh can make them. Collective."""
+    d = domain.dimension
+    unknowns = d * domain.mesh.topology.index_map(0).size_global
+    if domain.origin is not None or unknowns < _WORTHWHILE:
         return domain
-    coarse = _coarse(domain, 2.0**times)
+    factor = 2.0 ** round(np.log2(unknowns / _COARSEST) / d)
+    coarse = _coarse(domain, factor) if d == 2 else remeshing.coarse(domain, factor)
     if coarse is None:
         return domain
-    growth = unknowns / (2 * coarse.mesh.topology.index_map(0).size_global)  # what is round may ask for more vertices
-    return replace(domain, origin=(refinement.repeated(coarse, max(0, round(np.log2(growth) / 2) - 1)), None))
+    growth = unknowns / (d * coarse.mesh.topology.index_map(0).size_global)  # what is round may ask for more vertices
+    return replace(domain, origin=(refinement.repeated(coarse, max(0, round(np.log2(growth) / d) - 1)), None))
 
 
 def _coarse(domain: Domain, factor: float) -> Domain | None:
-    """The body with edges longer by a factor, about. Collective."""
+    """The plane body with edges longer by a factor, about. Collective."""
     comm, sides, regions = domain.mesh.comm, sorted(domain.sides), sorted(domain.regions)
     parts = comm.gather(_half_edges(domain, sides, regions))
     with meshfile.session(comm) as gmsh:

@@ -135,3 +135,22 @@ groups(SIDES)
 body()
 mesh.generate(2)
 """
+BORED = """
+occ = gmsh.model.occ
+box = occ.addBox(0, 0, 0, 1, 1, 1)
+if {radius}:
+    occ.cut([(3, box)], [(3, occ.addCylinder(0.5, -0.1, 0.6, 0, 1.2, 0, {radius}))])
+occ.synchronize()
+found = {{}}
+for _, tag in gmsh.model.getEntities(2):
+    ends = gmsh.model.getBoundingBox(2, tag)
+    thin = [i for i in range(3) if ends[i + 3] - ends[i] < 1e-5]
+    names = ("left", "front", "bottom", "right", "back", "top")
+    found.setdefault(names[thin[0] + 3 * (ends[thin[0]] > 0.5)] if thin else "bore", []).append(tag)
+for name, tags in found.items():
+    gmsh.model.addPhysicalGroup(2, tags, name=name)
+gmsh.model.addPhysicalGroup(3, [tag for _, tag in gmsh.model.getEntities(3)], name="body")
+gmsh.option.setNumber("Mesh.MeshSizeMax", {size})
+gmsh.option.setNumber("Mesh.MeshSizeMin", {size})
+mesh.generate(3)
+"""

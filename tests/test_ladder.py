@@ -13,6 +13,7 @@ import meshes
 import numpy as np
 import pytest
 from dolfinx import fem
+from dolfinx.mesh import Mesh
 from mpi4py import MPI
 from petsc4py import PETSc
 
@@ -54,18 +55,22 @@ def test_prolongation_keeps_a_coarse_field(overrides: list[str], dimension: int)
     assert lost(ladder.prolongation(fine, coarse, scene), fine, coarse) < 1e-13
 
 
-def lost(step: PETSc.Mat, fine: fem.FunctionSpace, coarse: fem.FunctionSpace) -> float:
-    """Largest difference of a prolonged field from its interpolation."""
+def lost(step: PETSc.Mat, fine: fem.FunctionSpace, coarse: fem.FunctionSpace, *, linear: bool = False) -> float:
+    """Largest difference of a prolonged field, rough or linear, from its interpolation."""
     known = fem.Function(coarse)
-    known.interpolate(lambda x: rough(x)[: coarse.mesh.geometry.dim])
+    known.interpolate(lambda x: ((x[[1, 2, 0]] - x) if linear else rough(x))[: coarse.mesh.geometry.dim])
     column = step.createVecRight()
     column.array[:] = known.x.array[: column.local_size]
     return float(np.max(np.abs((step * column).array - interpolated(fine, known))))
 
 
 def space(scene: Scene, dimension: int) -> fem.FunctionSpace:
-    mesh = domain.build(MPI.COMM_WORLD, scene.domain, dimension).mesh
-    return fem.functionspace(mesh, ("Lagrange", 1, (dimension,)))
+    return space_on(domain.build(MPI.COMM_WORLD, scene.domain, dimension).mesh)
+
+
+def space_on(mesh: Mesh) -> fem.FunctionSpace:
+    """P1 vectors."""
+    return fem.functionspace(mesh, ("Lagrange", 1, (mesh.geometry.dim,)))
 
 
 def interpolated(fine: fem.FunctionSpace, known: fem.Function) -> Any:

@@ -1,0 +1,35 @@
+"""Prints by rank, of the mesh below a file's: its part of the cells, its distance from the fine part, sides' error."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+from mpi4py import MPI
+
+from hvi_fenicsx import coarsening, domain, remeshing
+
+COMM = MPI.COMM_WORLD
+
+
+def main() -> None:
+    """For the file of the first argument."""
+    coarsening._WORTHWHILE, coarsening._COARSEST = 500, 400
+    body = coarsening.founded(domain.from_file(COMM, Path(sys.argv[1]), 3))
+    assert body.origin is not None
+    coarse = body.origin[0]
+    centres = [remeshing._corners(b.mesh).reshape(-1, 3).mean(axis=0) for b in (body, coarse)]
+    cells = coarse.mesh.topology.index_map(3)
+    before, after = remeshing._measures(body), remeshing._measures(coarse)
+    told = (
+        cells.size_local / cells.size_global,
+        float(np.linalg.norm(centres[0] - centres[1])) / body.length,
+        max(abs(after[name] / size - 1) for name, size in before.items()),
+    )
+    for line in COMM.gather(told) or []:
+        print(*line)
+
+
+if __name__ == "__main__":
+    main()

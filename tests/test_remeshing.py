@@ -1,0 +1,108 @@
+"""Why: a coarser mesh of another body, or none at all, would only make the solve slow, which nobody sees.
+
+Sides and regions keep their sizes about; linear fields are prolonged exactly; what is solved does not change.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import meshes
+import numpy as np
+import pytest
+from mpi4py import MPI
+from test_ladder import lost, space_on
+
+from hvi_fenicsx import Scene, coarsening, domain, ladder, remeshing, solution
+from hvi_fenicsx.domain import Domain
+
+COMM = MPI.COMM_WORLD
+LIFTED: dict[str, Any] = {
+    "material": {"model": "three_dimensional", "youngs_modulus": 3e10, "poisson_ratio": 0.2},
+    "boundary": {
+        "floor": {
+            "on": "bottom",
+            "contact": {"gap": 0.0},
+            "friction": {"law": "quadratic_linear", "gamma1": 4e5, "gamma2": 2e5, "delta": 1e-5},
+        },
+        "press": {"on": "top", "traction": [5e4, 0.0, "-1e6*(1 - 1.9*x*y)"]},
+    },
+}
+"""A block with a bore, pressed down at three of its corners and pulled up at the fourth."""
+
+
+@pytest.fixture(autouse=True)
+def everything_founded(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Coarser meshes for small ones too."""
+    monkeypatch.setattr(coarsening, "_WORTHWHILE", 500)
+    monkeypatch.setattr(coarsening, "_COARSEST", 400)
+
+
+@pytest.fixture(scope="module")
+def bored(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return meshes.make(tmp_path_factory.mktemp("bored") / "m.msh", meshes.BORED.format(radius=0.2, size=0.09))
+
+
+def below(file: Path) -> tuple[Domain, Domain]:
+    body = domain.from_file(COMM, file, 3)
+    made = coarsening.founded(body).origin
+    assert made is not None
+    return body, made[0]
+
+
+def test_a_bored_block_keeps_its_sides_and_regions(bored: Path) -> None:
+    body, coarse = below(bored)
+    fine, found = remeshing._measures(body), remeshing._measures(coarse)
+    assert found == pytest.approx(fine, rel=0.1)
+    flat = {name: size for name, size in fine.items() if name[1] in ("left", "right", "bottom", "top")}
+    assert {name: found[name] for name in flat} == pytest.approx(flat, rel=1e-9)
+    assert 5 < body.mesh.topology.index_map(3).size_global / coarse.mesh.topology.index_map(3).size_global < 30
+
+
+def test_a_linear_field_is_prolonged_exactly(tmp_path: Path) -> None:
+    body, coarse = below(meshes.make(tmp_path / "m.msh", meshes.BORED.format(radius=0, size=0.12)))
+    fine, under = space_on(body.mesh), space_on(coarse.mesh)
+    assert lost(ladder.prolongation(fine, under, None), fine, under, linear=True) < 1e-10
+
+
+def test_what_is_solved_does_not_change(bored: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("hvi_fenicsx.nested._WORTHWHILE", 500)
+    scene = Scene.model_validate(LIFTED | {"domain": {"shape": "file", "file": str(bored)}})
+    climbed = solution.solve(scene)
+    monkeypatch.setattr(coarsening, "_WORTHWHILE", 10**9)
+    alone = solution.solve(scene)
+    assert [s.solved.levels for s in (climbed, alone)] == [2, 1]  # type: ignore[union-attr]
+    assert climbed.converged
+    assert alone.converged
+    assert climbed.examined.energy == pytest.approx(alone.examined.energy, rel=1e-9)  # type: ignore[union-attr]
+
+
+@pytest.mark.parametrize("body", [meshes.BLOCKS.format(size=0.1, dimension=3, named=True)])
+def test_bodies_that_gmsh_cannot_take_as_one_have_none(body: str, tmp_path: Path) -> None:
+    assert coarsening.founded(domain.from_file(COMM, meshes.make(tmp_path / "m.msh", body), 3)).origin is None
+
+
+def test_a_mesher_that_takes_too_long_is_not_waited_for(bored: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(remeshing, "_PATIENCE", 0.01)
+    monkeypatch.setattr(remeshing, "_PER_TRIANGLE", 0.0)
+    assert coarsening.founded(domain.from_file(COMM, bored, 3)).origin is None
+
+
+def test_a_coarse_mesh_of_another_size_is_given_up(bored: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(remeshing, "_DIFFERENT", 1e-6)
+    assert coarsening.founded(domain.from_file(COMM, bored, 3)).origin is None
+
+
+@pytest.mark.parametrize("ranks", [2, 3])
+def test_each_rank_has_the_coarse_cells_of_its_part(ranks: int, bored: Path) -> None:
+    command = ["mpirun", "--oversubscribe", "-n", str(ranks), sys.executable, "remeshed_ranks.py", str(bored)]
+    run = subprocess.run(command, cwd=Path(__file__).parent, capture_output=True, text=True, timeout=120)
+    assert run.returncode == 0, run.stderr
+    told = np.array([[float(word) for word in line.split()] for line in run.stdout.splitlines()])
+    assert len(told) == ranks
+    assert np.all(told[:, 0] > 0.5 / ranks), "of the coarse cells"
+    assert np.all(told[:, 1] < 0.2), "distance of the parts' centres over the body"
+    assert np.all(told[:, 2] < 0.1), "of a side's area"
