@@ -118,18 +118,27 @@ def _remeshed(surface: _Surface, cells: _Cells, factor: float) -> tuple[Array, I
     triangles = inverse.reshape(-1, 3)
     if not _one_shell(triangles):
         return None
-    points = surface.corners.reshape(-1, 3)[first]
+    try:
+        return _by_child(surface.corners.reshape(-1, 3)[first], triangles, cells.midpoints, factor * cells.sizes)
+    except (subprocess.SubprocessError, OSError):
+        return None
+
+
+def _by_child(points: Array, triangles: Indices, places: Array, sizes: Array) -> tuple[Array, Indices]:
+    """What :mod:`.remesher` makes of these arrays.
+
+    Raises:
+        SubprocessError: it failed, or took too long.
+        OSError: there is no room for the files that it reads and writes.
+    """
     with tempfile.TemporaryDirectory() as folder:
-        given, made = Path(folder, "given.npz"), Path(folder, "made.npz")
-        np.savez(given, points=points, triangles=triangles, places=cells.midpoints, sizes=factor * cells.sizes)
-        command = [sys.executable, "-m", "hvi_fenicsx.remesher", os.fspath(given), os.fspath(made)]
+        source, target = Path(folder, "given.npz"), Path(folder, "made.npz")
+        np.savez(source, points=points, triangles=triangles, places=places, sizes=sizes)
+        command = [sys.executable, "-m", "hvi_fenicsx.remesher", os.fspath(source), os.fspath(target)]
         patience = _PATIENCE + _PER_TRIANGLE * len(triangles)
-        try:
-            subprocess.run(command, env=children.environment(), capture_output=True, check=True, timeout=patience)
-        except subprocess.SubprocessError:
-            return None
-        with np.load(made) as found:
-            return found["points"], found["cells"]
+        subprocess.run(command, env=children.environment(), capture_output=True, check=True, timeout=patience)
+        with np.load(target) as made:
+            return made["points"], made["cells"]
 
 
 def _one_shell(triangles: Indices) -> bool:
