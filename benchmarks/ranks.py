@@ -61,6 +61,7 @@ def gain(repeats: Sequence[Runs], kind: str) -> float:
 
 def main() -> None:
     made = parser(__doc__)
+    made.set_defaults(repeats=5)
     made.add_argument("--cells", type=int, default=512, help="each way, a multiple of 16")
     made.add_argument("--scenes", nargs="*", default=["paper", "strong law"])
     options = made.parse_args()
