@@ -44,7 +44,7 @@ class _Cells:
 
 @dataclass(frozen=True)
 class _Surface:
-    """All triangles (t) of the body's surface: global nodes (t, 3), corners (t, 3, 3), and whether on sides (t, s)."""
+    """All triangles (t) of the surface: the file's nodes (t, 3), corners (t, 3, 3), whether on each side (t, s)."""
 
     nodes: Indices
     corners: Array
@@ -68,15 +68,19 @@ def coarse(domain: Domain, factor: float) -> Domain | None:
 
 
 def _sampled(domain: Domain) -> _Cells:
-    """Collective."""
-    comm, every = domain.mesh.comm, max(1, domain.mesh.topology.index_map(3).size_global // _SAMPLE)
-    corners = _corners(domain.mesh)[::every]
-    within = np.zeros((len(_corners(domain.mesh)), len(domain.regions)), dtype=bool)
+    """The same cells in the same order, whatever the ranks. Collective."""
+    comm, topology = domain.mesh.comm, domain.mesh.topology
+    every = max(1, topology.index_map(3).size_global // _SAMPLE)
+    numbers = np.asarray(topology.original_cell_index, dtype=np.int64)
+    chosen = np.flatnonzero(numbers % every == 0)
+    corners = _corners(domain.mesh)[chosen]
+    within = np.zeros((len(numbers), len(domain.regions)), dtype=bool)
     for i, name in enumerate(sorted(domain.regions)):
         within[domain.regions[name], i] = True
-    sizes = np.cbrt(6 * np.sqrt(2) * _volumes(corners))
-    parts = agree(comm, (corners.mean(axis=1), sizes, np.full(len(corners), comm.rank), within[::every]))
-    return _Cells(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
+    sizes, ranks = np.cbrt(6 * np.sqrt(2) * _volumes(corners)), np.full(len(chosen), comm.rank)
+    parts = agree(comm, (numbers[chosen], corners.mean(axis=1), sizes, ranks, within[chosen]))
+    order, *found = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
+    return _Cells(*(array[np.argsort(order)] for array in found))
 
 
 def _surface(domain: Domain) -> _Surface | None:
@@ -88,11 +92,13 @@ def _surface(domain: Domain) -> _Surface | None:
         on[domain.sides[name], i] = True
     inside = np.setdiff1d(np.flatnonzero(on[:owned].any(axis=1)), facets)
     nodes = _outward(mesh, facets)
-    numbers = mesh.geometry.index_map().local_to_global(nodes.ravel()).reshape(-1, 3)
+    numbers = np.asarray(mesh.geometry.input_global_indices, dtype=np.int64)[nodes]
     parts = agree(mesh.comm, (len(inside), numbers, mesh.geometry.x[nodes], on[facets]))
     if any(part[0] for part in parts):
         return None
-    return _Surface(*(np.concatenate([part[i] for part in parts]) for i in (1, 2, 3)))
+    found = [np.concatenate([part[i] for part in parts]) for i in (1, 2, 3)]
+    order = np.lexsort(np.sort(found[0], axis=1).T)
+    return _Surface(*(array[order] for array in found))
 
 
 def _exterior(mesh: dmesh.Mesh) -> npt.NDArray[np.int32]:
@@ -101,7 +107,7 @@ def _exterior(mesh: dmesh.Mesh) -> npt.NDArray[np.int32]:
 
 
 def _outward(mesh: dmesh.Mesh, facets: npt.NDArray[np.int32]) -> npt.NDArray[np.int32]:
-    """The (local) nodes of facets, counterclockwise as seen from outside, (f, 3)."""
+    """The (local) nodes of facets, counterclockwise as seen from outside, from the file's first on, (f, 3)."""
     if not len(facets):
         return np.empty((0, 3), dtype=np.int32)  # dolfinx divides by their number
     nodes = np.asarray(dmesh.entities_to_geometry(mesh, 2, facets), dtype=np.int32)
@@ -109,7 +115,9 @@ def _outward(mesh: dmesh.Mesh, facets: npt.NDArray[np.int32]) -> npt.NDArray[np.
     middle = mesh.geometry.x[compat.geometry_dofmap(mesh)[links.array[links.offsets[facets]]]].mean(axis=1)
     a, b, c = mesh.geometry.x[nodes].transpose(1, 0, 2)
     inward = np.einsum("fi,fi->f", np.cross(b - a, c - a), middle - a) > 0
-    return np.where(inward[:, None], nodes[:, ::-1], nodes)
+    nodes = np.where(inward[:, None], nodes[:, ::-1], nodes)
+    first = np.argmin(np.asarray(mesh.geometry.input_global_indices)[nodes], axis=1)
+    return np.take_along_axis(nodes, (first[:, None] + np.arange(3)) % 3, axis=1)
 
 
 def _remeshed(surface: _Surface, cells: _Cells, factor: float) -> tuple[Array, Indices] | None:

@@ -1,4 +1,4 @@
-"""Prints by rank, of the mesh below a file's: its part of the cells, its distance from the fine part, sides' error."""
+"""Prints by rank, of the mesh below a file's: its part of the cells, its way from the fine one's, errors, sizes."""
 
 from __future__ import annotations
 
@@ -26,6 +26,8 @@ def main() -> None:
         cells.size_local / cells.size_global,
         float(np.linalg.norm(centres[0] - centres[1])) / body.length,
         max(abs(after[name] / size - 1) for name, size in before.items()),
+        cells.size_global,
+        *after.values(),
     )
     for line in COMM.gather(told) or []:
         print(*line)

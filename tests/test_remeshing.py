@@ -97,7 +97,7 @@ def test_a_coarse_mesh_of_another_size_is_given_up(bored: Path, monkeypatch: pyt
 
 
 @pytest.mark.parametrize("ranks", [2, 3])
-def test_each_rank_has_the_coarse_cells_of_its_part(ranks: int, bored: Path) -> None:
+def test_the_coarse_mesh_is_the_same_on_several_ranks_shared_like_the_fine_one(ranks: int, bored: Path) -> None:
     command = ["mpirun", "--oversubscribe", "-n", str(ranks), sys.executable, "remeshed_ranks.py", str(bored)]
     run = subprocess.run(command, cwd=Path(__file__).parent, capture_output=True, text=True, timeout=120)
     assert run.returncode == 0, run.stderr
@@ -106,3 +106,6 @@ def test_each_rank_has_the_coarse_cells_of_its_part(ranks: int, bored: Path) -> 
     assert np.all(told[:, 0] > 0.5 / ranks), "of the coarse cells"
     assert np.all(told[:, 1] < 0.2), "distance of the parts' centres over the body"
     assert np.all(told[:, 2] < 0.1), "of a side's area"
+    coarse = below(bored)[1]
+    alone = [coarse.mesh.topology.index_map(3).size_global, *remeshing._measures(coarse).values()]
+    np.testing.assert_allclose(told[:, 3:], [alone] * ranks, rtol=1e-12)
