@@ -10,8 +10,10 @@ from __future__ import annotations
 
 import argparse
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import matplotlib.pyplot as plt
 from common import (
@@ -81,44 +83,44 @@ def draw(rows: Sequence[Sequence[object]]) -> None:
     picture("cost", figure)
 
 
-def plate(folder: Path, size: float, refinements: int = 0) -> list[str]:
-    """Overrides for the unit square as an unstructured gmsh mesh of this cell size, refined so often."""
+@contextmanager
+def drawn(file: Path, size: float, dimension: int) -> Iterator[Any]:
+    """Gmsh, whose model of the block is meshed with cells of this size into a file when it has been drawn."""
     import gmsh
 
     gmsh.initialize()
     gmsh.option.setNumber("General.Terminal", 0)
-    gmsh.model.occ.addRectangle(0, 0, 0, 1, 1)
-    gmsh.model.occ.synchronize()
-    for tag, name in ((1, "bottom"), (2, "right"), (3, "top"), (4, "left")):
-        gmsh.model.addPhysicalGroup(1, [tag], name=name)
-    gmsh.model.addPhysicalGroup(2, [1], name="plate")
     gmsh.option.setNumber("Mesh.MeshSizeMax", size)
-    gmsh.model.mesh.generate(2)
-    file = folder / f"plate_{size}.msh"
+    yield gmsh
+    gmsh.model.mesh.generate(dimension)
     gmsh.write(str(file))
     gmsh.finalize()
+
+
+def plate(folder: Path, size: float, refinements: int = 0) -> list[str]:
+    """Overrides for the unit square as an unstructured gmsh mesh of this cell size, refined so often."""
+    file = folder / f"plate_{size}.msh"
+    with drawn(file, size, 2) as gmsh:
+        gmsh.model.occ.addRectangle(0, 0, 0, 1, 1)
+        gmsh.model.occ.synchronize()
+        for tag, name in ((1, "bottom"), (2, "right"), (3, "top"), (4, "left")):
+            gmsh.model.addPhysicalGroup(1, [tag], name=name)
+        gmsh.model.addPhysicalGroup(2, [1], name="plate")
     return [f'domain={{shape="file", file="{file}", refinements={refinements}}}']
 
 
 def bored(folder: Path, size: float) -> list[str]:
     """Overrides for the unit cube with a bore as an unstructured gmsh mesh of this cell size."""
-    import gmsh
-
-    gmsh.initialize()
-    gmsh.option.setNumber("General.Terminal", 0)
-    occ = gmsh.model.occ
-    occ.cut([(3, occ.addBox(0, 0, 0, 1, 1, 1))], [(3, occ.addCylinder(0.5, -0.1, 0.6, 0, 1.2, 0, 0.2))])
-    occ.synchronize()
-    for name, z in (("bottom", 0.0), ("top", 1.0)):
-        found = gmsh.model.getEntitiesInBoundingBox(-0.1, -0.1, z - 1e-3, 1.1, 1.1, z + 1e-3, 2)
-        gmsh.model.addPhysicalGroup(2, [tag for _, tag in found], name=name)
-    gmsh.model.addPhysicalGroup(3, [tag for _, tag in gmsh.model.getEntities(3)], name="block")
-    gmsh.option.setNumber("Mesh.MeshSizeMax", size)
-    gmsh.option.setNumber("Mesh.MeshSizeMin", size)
-    gmsh.model.mesh.generate(3)
     file = folder / f"bored_{size}.msh"
-    gmsh.write(str(file))
-    gmsh.finalize()
+    with drawn(file, size, 3) as gmsh:
+        occ, model = gmsh.model.occ, gmsh.model
+        occ.cut([(3, occ.addBox(0, 0, 0, 1, 1, 1))], [(3, occ.addCylinder(0.5, -0.1, 0.6, 0, 1.2, 0, 0.2))])
+        occ.synchronize()
+        for name, z in (("bottom", 0.0), ("top", 1.0)):
+            found = model.getEntitiesInBoundingBox(-0.1, -0.1, z - 1e-3, 1.1, 1.1, z + 1e-3, 2)
+            model.addPhysicalGroup(2, [tag for _, tag in found], name=name)
+        model.addPhysicalGroup(3, [tag for _, tag in model.getEntities(3)], name="block")
+        gmsh.option.setNumber("Mesh.MeshSizeMin", size)
     return [f'domain={{shape="file", file="{file}"}}']
 
 

@@ -115,6 +115,11 @@ class System:
         self.matrix.setNullSpace(self.freedom.null_space)
         self.freedom.null_space.remove(self.load)
 
+    @property
+    def pins(self) -> npt.NDArray[np.int32]:
+        """Dofs at which free motions are pinned: where all other equations hold, theirs do too."""
+        return self.freedom.pins if self.freedom else np.empty(0, np.int32)
+
     @cached_property
     def near_null(self) -> PETSc.NullSpace:
         """What algebraic multigrid must keep (:mod:`.nearnull`). Collective when first used."""

@@ -37,8 +37,7 @@ class Copied:
     def prepare(self, held: npt.NDArray[np.int32]) -> None:
         """Make it that of the matrix as it stands with these unknowns (local, owned, sorted) held. Collective."""
         self._system.matrix.copy(self.matrix, structure=PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
-        pins = self._system.freedom.pins if self._system.freedom else held[:0]
-        rows = np.union1d(held, pins) + self._system.load.owner_range[0]
+        rows = np.union1d(held, self._system.pins) + self._system.load.owner_range[0]
         self.matrix.zeroRowsColumns(rows.astype(PETSc.IntType), diag=1.0)
         if not self._direct:
             self.pc.destroy()

@@ -163,11 +163,6 @@ class HeldPreconditioner:
             return multigrid.Multigrid(self.system, self.settings.pc)
         return Copied(self.system, self.settings.pc, direct=self.settings.kind == "lu")
 
-    @property
-    def _pins(self) -> Indices:
-        """Dofs at which free motions are pinned: where all other equations hold, theirs do too."""
-        return self.system.freedom.pins if self.system.freedom else np.empty(0, np.int32)
-
     def destroy(self) -> None:
         """Free the PETSc objects."""
         self._forget()
@@ -191,7 +186,7 @@ class HeldPreconditioner:
         self._reduced(self._unpinned, x, y)
 
     def _unpinned(self, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        x.array[self._pins] = 0.0
+        x.array[self.system.pins] = 0.0
         self._made.pc.apply(x, y)  # type: ignore[union-attr]
 
     def _reduced(self, operation: Callable[[PETSc.Vec, PETSc.Vec], None], x: PETSc.Vec, y: PETSc.Vec) -> None:
@@ -208,7 +203,7 @@ class HeldPreconditioner:
 
         Where motions are free, the load may be changed at pinned dofs, and of all solutions x is the shortest.
         """
-        load.array[self._pins] = 0.0
+        load.array[self.system.pins] = 0.0
         ksp = PETSc.KSP().create(self.system.comm)
         assert self._made is not None
         ksp.setOperators(self._made.matrix)
