@@ -23,10 +23,12 @@ import numpy as np
 from dolfinx import fem
 from mpi4py import MPI
 
-from hvi_fenicsx import Scene, accuracy, adaptive, boundary, quantities, read_scene
-from hvi_fenicsx.accuracy import Goal, Reached
-from hvi_fenicsx.adaptive import Climber, Rung
-from hvi_fenicsx.timing import Timer
+from hvi_fenicsx import Scene, read_scene
+from hvi_fenicsx.accuracy import adaptive, control, quantities
+from hvi_fenicsx.accuracy.adaptive import Climber, Rung
+from hvi_fenicsx.accuracy.control import Goal, Reached
+from hvi_fenicsx.certify import contact_state
+from hvi_fenicsx.runtime.timing import Timer
 
 ROOT = Path(__file__).parents[1]
 PAGE = ROOT / "docs" / "accuracy.md"
@@ -98,7 +100,7 @@ def measured(name: str, quantity: str, requested: float, largest: int) -> Row:
     """One request, carried out and checked."""
     scene = read_scene(ROOT / "demos" / f"{name}.toml")
     start = time.process_time()
-    reached = accuracy.reach(scene, MPI.COMM_WORLD, Goal(requested, quantity), climber(), lambda line: None)
+    reached = control.reach(scene, MPI.COMM_WORLD, Goal(requested, quantity), climber(), lambda line: None)
     seconds, last = time.process_time() - start, reached.steps[-1]
     true = reference = None
     if reached.why is None:
@@ -165,7 +167,7 @@ def distance(rung: Rung, field: fem.Function, quantity: str) -> float:
 def energy_norm(rung: Rung, values: Any) -> float:
     field = fem.Function(rung.prepared.problem.space)
     field.x.array[:] = values
-    forces = boundary.forces(rung.prepared.problem, field)
+    forces = contact_state.forces(rung.prepared.problem, field)
     internal = (forces.reaction + forces.load).ravel()
     return float(np.sqrt(values[: internal.size] @ internal))
 

@@ -18,8 +18,9 @@ import numpy as np
 from accuracy import PAGE, climber
 from mpi4py import MPI
 
-from hvi_fenicsx import Scene, accuracy, adaptive, read_scene
-from hvi_fenicsx.accuracy import Goal
+from hvi_fenicsx import Scene, read_scene
+from hvi_fenicsx.accuracy import adaptive, control
+from hvi_fenicsx.accuracy.control import Goal
 
 ROOT = Path(__file__).parents[1]
 CORNERS = {
@@ -102,12 +103,12 @@ def tolerance_savings() -> Iterator[str]:
     for name, requested in (("strong_law", 1e-3), ("lift_off", 2e-3), ("hertz", 1e-2)):
         scene = read_scene(ROOT / "demos" / f"{name}.toml")
         spent = []
-        for limits in (accuracy.TOLERANCES, (1e-10, 1e-10)):
-            accuracy.TOLERANCES, kept = limits, accuracy.TOLERANCES
+        for limits in (control.TOLERANCES, (1e-10, 1e-10)):
+            control.TOLERANCES, kept = limits, control.TOLERANCES
             start = time.process_time()
-            reached = accuracy.reach(scene, MPI.COMM_WORLD, Goal(requested), climber(), lambda line: None)
+            reached = control.reach(scene, MPI.COMM_WORLD, Goal(requested), climber(), lambda line: None)
             spent.append((time.process_time() - start, reached.solution.solved.counts.linear))  # type: ignore[union-attr]
-            accuracy.TOLERANCES = kept
+            control.TOLERANCES = kept
         (tied, few), (tight, many) = spent
         yield f"| {name} | {requested:g} | {tied:.1f} | {tight:.1f} | {tight / tied:.2f} | {few}, {many} |"
 

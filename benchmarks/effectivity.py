@@ -21,16 +21,18 @@ from dolfinx import fem
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from hvi_fenicsx import Scene, ladder, read_scene, refinement
-from hvi_fenicsx.below import Below
-from hvi_fenicsx.building import assemble
-from hvi_fenicsx.certificate import examine
-from hvi_fenicsx.estimate import Estimate, defect, estimate
-from hvi_fenicsx.nested import ascend, solve
-from hvi_fenicsx.problem import Problem
-from hvi_fenicsx.solvers.base import Solved, silent
-from hvi_fenicsx.system import System
-from hvi_fenicsx.timing import Timer
+from hvi_fenicsx import Scene, read_scene
+from hvi_fenicsx.certify.certificate import examine
+from hvi_fenicsx.certify.estimate import defect
+from hvi_fenicsx.certify.estimate.estimator import Estimate, estimate
+from hvi_fenicsx.mesh import refinement, transfer
+from hvi_fenicsx.problem.problem import Problem
+from hvi_fenicsx.runtime.timing import Timer
+from hvi_fenicsx.solvers.method import Solved, silent
+from hvi_fenicsx.solvers.nested_iteration import ascend, solve
+from hvi_fenicsx.system.assemble import assemble
+from hvi_fenicsx.system.coarser_level import Below
+from hvi_fenicsx.system.system import System
 
 DEMOS = Path(__file__).resolve().parents[1] / "demos"
 STEEL = {"model": "plane_stress", "youngs_modulus": 2.15e11, "poisson_ratio": 0.29}
@@ -56,7 +58,7 @@ def rungs(scene: Scene, count: int) -> list[Rung]:
             solved = solve(scene, system, Timer(), silent, lambda: False)
         else:
             below = found[-1]
-            lift = ladder.between(system, below.system, step)
+            lift = transfer.between(system, below.system, step)
             system.below = Below(below.system, lift)
             solved = ascend(scene, system, (below.system, below.solved, lift), Timer(), silent, lambda: False)
         found.append(Rung(system, solved, step))
@@ -95,7 +97,7 @@ def _raised(u: fem.Function, rung: Rung, finer: Sequence[Rung]) -> fem.Function:
     below = rung
     for above in finer:
         assert above.step is not None
-        x = ladder.prolongation(above.system.problem.space, below.system.problem.space, above.step) * x
+        x = transfer.prolongation(above.system.problem.space, below.system.problem.space, above.step) * x
         below = above
     result = fem.Function(finer[-1].system.problem.space)
     result.x.array[: x.local_size] = x.array_r

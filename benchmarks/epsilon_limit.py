@@ -17,7 +17,7 @@ import matplotlib
 import numpy as np
 
 from hvi_fenicsx import Solution, read_scene, solve
-from hvi_fenicsx.smoothing import PLUS_FUNCTIONS
+from hvi_fenicsx.laws.smoothing.plus_functions import PLUS_FUNCTIONS
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt

@@ -24,9 +24,9 @@ from scipy.sparse import csr_matrix
 
 from hvi_fenicsx.laws import Superpotential
 from hvi_fenicsx.laws.polyline import PolylineLaw
-from hvi_fenicsx.smoothing import SmoothedLaw
-from hvi_fenicsx.surface import component_dofs
-from hvi_fenicsx.system import System
+from hvi_fenicsx.laws.smoothing.smoothed_law import SmoothedLaw
+from hvi_fenicsx.problem.contact_surface import component_dofs
+from hvi_fenicsx.system.system import System
 
 Array = npt.NDArray[np.float64]
 MOST = 4_000

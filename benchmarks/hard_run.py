@@ -14,9 +14,11 @@ from covering import Case
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from hvi_fenicsx import certificate, solution, solvers
+from hvi_fenicsx import workflow
+from hvi_fenicsx.certify import certificate
 from hvi_fenicsx.errors import HviError
-from hvi_fenicsx.solvers.base import Solved, silent
+from hvi_fenicsx.solvers import registry
+from hvi_fenicsx.solvers.method import Solved, silent
 
 COMM = MPI.COMM_WORLD
 UNDECIDED = ("metastable", "borderline")
@@ -25,7 +27,7 @@ Record = dict[str, Any]
 
 def methods() -> list[str]:
     """All methods there are."""
-    return list(solvers.METHODS)
+    return list(registry.METHODS)
 
 
 def attempt(case: Case, data: Mapping[str, Any], method: str, limit: float) -> Record:
@@ -77,12 +79,12 @@ def _unsolved(state: str, found: Solved) -> str:
     return "no_equilibrium" if state in UNDECIDED and not broken else "failed"
 
 
-def _solved(case: Case, data: Mapping[str, Any], prepared: solution.Prepared, late: Callable[[], bool]) -> Solved:
+def _solved(case: Case, data: Mapping[str, Any], prepared: workflow.Prepared, late: Callable[[], bool]) -> Solved:
     """The method's result; the case's start is for the methods that begin on pieces of the laws."""
-    method = solvers.create(prepared.scene.solver, prepared.system, prepared.timer, silent, late)
+    method = registry.create(prepared.scene.solver, prepared.system, prepared.timer, silent, late)
     begin = hard_scenes.branches(case, prepared, data)
     takes = "branches" in inspect.signature(method.solve).parameters
     try:
         return method.solve(branches=begin) if takes else method.solve()  # type: ignore[call-arg]
     except HviError as error:
-        return Solved(solution.fem.Function(prepared.problem.space), method.name, False, str(error))
+        return Solved(workflow.fem.Function(prepared.problem.space), method.name, False, str(error))

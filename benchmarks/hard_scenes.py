@@ -12,8 +12,11 @@ from covering import Case
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from hvi_fenicsx import Scene, building, domain, existence, problem, solution, system
-from hvi_fenicsx.timing import Timer
+from hvi_fenicsx import Scene, workflow
+from hvi_fenicsx.mesh import domain
+from hvi_fenicsx.problem import problem
+from hvi_fenicsx.runtime.timing import Timer
+from hvi_fenicsx.system import assemble, existence, system
 
 Array = npt.NDArray[np.float64]
 Plain = dict[str, Any]
@@ -143,16 +146,16 @@ def _adhesion(f: Frame) -> Plain:
     return {"adhesion": {"law": "graph", "points": points}}
 
 
-def prepare(case: Case, data: Mapping[str, Any], method: str, comm: MPI.Comm) -> solution.Prepared:
-    """As :func:`hvi_fenicsx.solution.prepare`, on a mesh whose vertices are moved first. Collective."""
+def prepare(case: Case, data: Mapping[str, Any], method: str, comm: MPI.Comm) -> workflow.Prepared:
+    """As :func:`hvi_fenicsx.workflow.prepare`, on a mesh whose vertices are moved first. Collective."""
     made, timer = scene(case, data, method), Timer()
     body = domain.build(comm, made.domain, made.dimension)
     distort(body, case)
     placed = [(p.where, p.effect) for p in made.effects()]
-    composed = problem.compose(body, made.parts, placed, building.modification(made))
+    composed = problem.compose(body, made.parts, placed, assemble.modification(made))
     assembled = system.System(composed, system.compile_forms(composed), timer)
     verdict = existence.solvability(composed, assembled.forces)
-    return solution.Prepared(made, composed, assembled, verdict, timer)
+    return workflow.Prepared(made, composed, assembled, verdict, timer)
 
 
 def distort(body: domain.Domain, case: Case) -> None:
@@ -191,7 +194,7 @@ def _noise(points: Array, seed: float) -> Array:
     return 2.0 * (mixed - np.floor(mixed)) - 1.0
 
 
-def branches(case: Case, prepared: solution.Prepared, data: Mapping[str, Any]) -> PETSc.Vec | None:
+def branches(case: Case, prepared: workflow.Prepared, data: Mapping[str, Any]) -> PETSc.Vec | None:
     """The displacement, in units of u0, whose pieces of the laws a method is to begin on; None for its own start."""
     if case["start"] == "default":
         return None

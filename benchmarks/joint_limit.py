@@ -19,8 +19,8 @@ from mpi4py import MPI
 
 from hvi_fenicsx import read_scene, solve
 from hvi_fenicsx.scene import Scene
-from hvi_fenicsx.study import sample
-from hvi_fenicsx.study.errors import Yardstick
+from hvi_fenicsx.studies import solution_arrays
+from hvi_fenicsx.studies.errors import Yardstick
 
 DEMOS = Path(__file__).parents[1] / "demos"
 COARSEST = 4
@@ -65,7 +65,7 @@ def scene(name: str, cells: int, epsilon: float = 0.0) -> Scene:
 def yardstick(name: str, cells: int) -> Yardstick:
     """The exact law on a fine mesh."""
     solution = solve(scene(name, cells), MPI.COMM_SELF)
-    found, stiffness = sample.take(solution), sample.stiffness(solution)
+    found, stiffness = solution_arrays.take(solution), solution_arrays.stiffness(solution)
     if not solution.converged or found is None or stiffness is None:
         raise SystemExit(f"{name}: the reference has no certified solution: {solution.reason}")
     return Yardstick(found, stiffness)
@@ -80,7 +80,7 @@ def lines(name: str, finest: int) -> Iterator[Line]:
         for n in meshes:
             epsilon = law(1 / n) / (law(1 / COARSEST) or 1.0)
             solution = solve(scene(name, n, epsilon), MPI.COMM_SELF)
-            found = sample.take(solution) if solution.converged else None
+            found = solution_arrays.take(solution) if solution.converged else None
             points.append((1 / n, epsilon, reference.errors(reference.move(found)) if found else None))
         yield Line(coupling, tuple(points))
 

@@ -18,16 +18,18 @@ from typing import Any
 
 from mpi4py import MPI
 
-from hvi_fenicsx import building, nested, read_scene, timing
-from hvi_fenicsx.estimate.contact import ratio
+from hvi_fenicsx import read_scene
+from hvi_fenicsx.certify.estimate.contact_errors import ratio
+from hvi_fenicsx.runtime import timing
+from hvi_fenicsx.runtime.timing import Timer
 from hvi_fenicsx.scene import Scene
-from hvi_fenicsx.solution import finish, prepare
-from hvi_fenicsx.solvers import options
-from hvi_fenicsx.solvers.activeset import ActiveSetSolver
-from hvi_fenicsx.solvers.base import resting_start
-from hvi_fenicsx.solvers.linear import LinearSettings
-from hvi_fenicsx.system import System
-from hvi_fenicsx.timing import Timer
+from hvi_fenicsx.solvers import nested_iteration
+from hvi_fenicsx.solvers.active_set import ActiveSetSolver
+from hvi_fenicsx.solvers.method import resting_start
+from hvi_fenicsx.system import assemble, petsc_options
+from hvi_fenicsx.system.held_solver import LinearSettings
+from hvi_fenicsx.system.system import System
+from hvi_fenicsx.workflow import finish, prepare
 
 COMM = MPI.COMM_WORLD
 HYPRE = (
@@ -60,11 +62,11 @@ def contact(scene: Scene) -> Figures:
 def linear(scene: Scene, kind: str) -> Figures:
     """The linear solve, to the scene's tolerance of the residual."""
     if kind == "hypre":
-        options.insert(HYPRE)
+        petsc_options.insert(HYPRE)
     timer = Timer()
-    system = building.assemble(scene, COMM, timer)
+    system = assemble.assemble(scene, COMM, timer)
     if kind == "mg":
-        system.below = nested.hierarchy(scene, system, timer)
+        system.below = nested_iteration.hierarchy(scene, system, timer)
     solver = ActiveSetSolver(system, LinearSettings(KINDS[kind]), timer)
     _, iterations = resting_start(solver, [t.law for t in system.terms], scene.solver.tolerance)
     return {**timer.report(), "linear": iterations, "dofs": system.dofs, "certified": True}
@@ -75,7 +77,7 @@ def plain(scene: Scene) -> Figures:
     from plain_snes import solve
 
     timer = Timer()
-    system = building.assemble(scene, COMM, timer)
+    system = assemble.assemble(scene, COMM, timer)
     with timer("solve"):
         figures = solve(system, scene.solver.tolerance)
     return {**timer.report(), **figures, "dofs": system.dofs}
@@ -116,7 +118,7 @@ def main() -> None:
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
     figures |= {"peak_mb": COMM.allreduce(peak), "net_mb": COMM.allreduce(peak - before)}
     if task.get("spmv"):
-        figures["spmv"] = spmv(building.assemble(scene, COMM, Timer()))
+        figures["spmv"] = spmv(assemble.assemble(scene, COMM, Timer()))
     if COMM.rank == 0:
         print(json.dumps(figures), flush=True)
 

@@ -6,12 +6,12 @@ from typing import Any
 
 from petsc4py import PETSc
 
-from hvi_fenicsx.solvers.activeset import ActiveSetSolver
-from hvi_fenicsx.solvers.base import resting_start
-from hvi_fenicsx.solvers.linear import LinearSettings
-from hvi_fenicsx.solvers.models import Cells, Full
-from hvi_fenicsx.system import System
-from hvi_fenicsx.timing import Timer
+from hvi_fenicsx.runtime.timing import Timer
+from hvi_fenicsx.solvers.active_set import ActiveSetSolver
+from hvi_fenicsx.solvers.law_models import Cells, Full
+from hvi_fenicsx.solvers.method import resting_start
+from hvi_fenicsx.system.held_solver import LinearSettings
+from hvi_fenicsx.system.system import System
 
 _MOST = 100
 

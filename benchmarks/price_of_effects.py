@@ -74,9 +74,12 @@ def by_program(name: str, cells: int, clock: Callable[[], float]) -> dict[str, f
     import dolfinx
     from mpi4py import MPI
 
-    from hvi_fenicsx import Scene, building, domain, nested
-    from hvi_fenicsx.solvers.base import silent
-    from hvi_fenicsx.timing import Timer
+    from hvi_fenicsx import Scene
+    from hvi_fenicsx.mesh import domain
+    from hvi_fenicsx.runtime.timing import Timer
+    from hvi_fenicsx.solvers import nested_iteration
+    from hvi_fenicsx.solvers.method import silent
+    from hvi_fenicsx.system import assemble
 
     forms, make = [], dolfinx.fem.form
 
@@ -88,10 +91,10 @@ def by_program(name: str, cells: int, clock: Callable[[], float]) -> dict[str, f
     body = domain.build(MPI.COMM_WORLD, wanted.domain, wanted.dimension)
     dolfinx.fem.form = counted
     start = clock()
-    system = building.assemble(wanted, MPI.COMM_WORLD, Timer(), body)
+    system = assemble.assemble(wanted, MPI.COMM_WORLD, Timer(), body)
     assembled = clock()
     dolfinx.fem.form = make
-    found = nested.solve(wanted, system, Timer(), silent, lambda: False)
+    found = nested_iteration.solve(wanted, system, Timer(), silent, lambda: False)
     if not found.converged:
         raise SystemExit(f"{name}: {found.reason}")
     return {"integrals": integrals(forms), "assembly": assembled - start, "solve": clock() - assembled}

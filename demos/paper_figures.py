@@ -21,9 +21,10 @@ import numpy as np
 import numpy.typing as npt
 from mpi4py import MPI
 
-from hvi_fenicsx import Solution, read_scene, smoothing, solve
+from hvi_fenicsx import Solution, read_scene, solve
 from hvi_fenicsx.laws import QuadraticLinear, create
-from hvi_fenicsx.results.table import rows
+from hvi_fenicsx.laws.smoothing import create as smoothing
+from hvi_fenicsx.results.contact_table import rows
 
 Array = npt.NDArray[np.float64]
 COMM = MPI.COMM_WORLD
@@ -160,7 +161,7 @@ Runs = dict[tuple[str, int], Run]
 
 def draw_curves(path: Path, wall: str, runs: Runs, told: dict[str, float]) -> None:
     """Figure 4 or 5: (a) u1 and (b) -σ_t on Γc, smoothed on the left, the law itself on the right."""
-    from hvi_fenicsx.pictures.style import figure, save
+    from hvi_fenicsx.report.pictures.style import figure, save
 
     made = figure(9.3)
     panels = made.subplots(2, 2, sharex=True, sharey="row")
@@ -196,8 +197,8 @@ BODIES = (
 
 def draw_bodies(path: Path, wall: str, runs: Runs, told: dict[str, float]) -> None:
     """Figure 3: reference and deformed configuration with the displacement on all of Γ, one panel for each mesh."""
-    from hvi_fenicsx.pictures.style import figure, save
-    from hvi_fenicsx.pictures.units import round_below, thousands
+    from hvi_fenicsx.report.pictures.style import figure, save
+    from hvi_fenicsx.report.units import round_below, thousands
 
     factor = round_below(0.1 / max(float(np.abs(run.displacement).max()) for run in runs.values()))
     made = figure(9.9)

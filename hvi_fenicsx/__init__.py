@@ -9,25 +9,35 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any
 
-__version__ = "0.1.0"
-
 _HOME = {
+    "__version__": "runtime.versions",
     "InputError": "errors",
     "Scene": "scene",
-    "Solution": "solution",
+    "Solution": "workflow",
     "Superpotential": "laws",
     "dump_scene": "scene",
-    "prepare": "solution",
+    "prepare": "workflow",
     "read_scene": "scene",
-    "solve": "solution",
+    "solve": "workflow",
 }
-__all__ = ["InputError", "Scene", "Solution", "Superpotential", "dump_scene", "prepare", "read_scene", "solve"]
+__all__ = [
+    "InputError",
+    "Scene",
+    "Solution",
+    "Superpotential",
+    "__version__",
+    "dump_scene",
+    "prepare",
+    "read_scene",
+    "solve",
+]
 
 if TYPE_CHECKING:
     from .errors import InputError
     from .laws import Superpotential
+    from .runtime.versions import __version__
     from .scene import Scene, dump_scene, read_scene
-    from .solution import Solution, prepare, solve
+    from .workflow import Solution, prepare, solve
 
 
 def __getattr__(name: str) -> Any:

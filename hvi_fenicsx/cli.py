@@ -13,8 +13,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import NoReturn
 
-from . import children
 from .errors import HviError, InputError
+from .runtime import processes
 
 INTERRUPTED = 130
 QUANTITIES = ("energy", "u_t", "sigma_t", "resultant", "lambda_held", "lambda_peak")
@@ -155,11 +155,11 @@ def _dispatch(options: argparse.Namespace, words: Sequence[str]) -> int:
     if options.command == "study":
         return _study(options, words)
     if getattr(options, "np", None) and not _under_mpi():
-        from . import mpirun
+        from .runtime import mpirun
 
         return mpirun.run(options.np, words, INTERRUPTED)
     if _under_mpi():
-        children.die_with_parent(signal.SIGKILL)
+        processes.die_with_parent(signal.SIGKILL)
     with _undisturbed():
         from . import commands
 
@@ -178,7 +178,7 @@ def _undisturbed() -> Iterator[None]:
 
 
 def _version() -> int:
-    from .versions import versions
+    from .runtime.versions import versions
 
     if _first():
         print("\n".join(f"{name} {version}" for name, version in versions().items()))
@@ -193,13 +193,13 @@ def _study(options: argparse.Namespace, words: Sequence[str]) -> int:
     if _under_mpi():
         if not _first():
             return 0
-        from . import mpirun
+        from .runtime import mpirun
 
         ranks = options.np or next((int(os.environ[n]) for n in _SIZE_VARIABLES if n in os.environ), 1)
         alone = [sys.executable, "-m", "hvi_fenicsx", *mpirun.without_ranks(words), f"--np={ranks}"]
-        os.execve(sys.executable, alone, children.environment())
+        os.execve(sys.executable, alone, processes.environment())
     with _undisturbed():
-        from . import study
+        from .studies import study
 
     return study.run(options)
 

@@ -13,18 +13,21 @@ from typing import Any
 
 from mpi4py import MPI
 
-from . import accuracy, htmlreport, pictures, report, results
-from .accuracy import Goal, Reached
-from .adaptive import Climber
+from . import console, results
+from .accuracy import control
+from .accuracy.adaptive import Climber
+from .accuracy.control import Goal, Reached
 from .errors import HviError, InputError
-from .interrupt import Interrupt
-from .journal import Journal
-from .parallel import on_root
+from .report.html import render
+from .report.pictures import draw as pictures
 from .results.write import write_record
+from .runtime.log import Journal
+from .runtime.mpi import on_root
+from .runtime.signals import Interrupt
+from .runtime.timing import Timer
 from .scene import Scene, dump_scene, read_scene
-from .solution import NO_SOLUTION, NOT_CONVERGED, Prepared, Solution, finish, prepare
-from .solvers import options as petsc_options
-from .timing import Timer
+from .system import petsc_options
+from .workflow import NO_SOLUTION, NOT_CONVERGED, Prepared, Solution, finish, prepare
 
 COMM = MPI.COMM_WORLD
 
@@ -92,16 +95,16 @@ def _run(
     said: tuple[str, ...] = ()
     if goal is not None:
         climber = Climber(timer, journal.progress, interrupt.requested)
-        reached = accuracy.reach(scene, COMM, goal, climber, journal.say)
+        reached = control.reach(scene, COMM, goal, climber, journal.say)
         solution = reached.solution
     else:
         prepared = prepare(scene, COMM, timer)
         said = prepared.warnings
-        for line in report.heading(prepared, COMM.size):
+        for line in console.heading(prepared, COMM.size):
             journal.say(line)
         solution = finish(prepared, journal.progress, interrupt.requested)
-    odd = report.odd(warning for warning in solution.warnings if warning not in said)
-    for line in [*report.outcome(solution), *odd, *(report.bought(reached) if reached else [])]:
+    odd = console.odd(warning for warning in solution.warnings if warning not in said)
+    for line in [*console.outcome(solution), *odd, *(console.bought(reached) if reached else [])]:
         journal.say(line)
     with timer("output"):
         record = {**results.write(folder.work, solution), **given, **(_bought(reached) if reached else {})}
@@ -109,7 +112,7 @@ def _run(
             on_root(COMM, lambda: _from_files("pictures", pictures.draw, folder.work, record, journal))
     with timer("output"):
         record["time"] = timer.report()
-        on_root(COMM, lambda: _from_files("report", htmlreport.write, folder.work, record, journal))
+        on_root(COMM, lambda: _from_files("report", render.write, folder.work, record, journal))
     record["time"] = timer.report()
     on_root(COMM, lambda: write_record(folder.work, record, journal))
     folder.commit()
@@ -170,8 +173,8 @@ def _report(prepared: Prepared, loads: Sequence[str], *, as_json: bool) -> str:
     """What ``check`` prints. Collective."""
     factors = {name: prepared.load_factors(name) for name in loads}
     if as_json:
-        return json.dumps(report.as_data(prepared, factors), indent=2, ensure_ascii=False)
-    lines = [*report.heading(prepared, COMM.size), *report.load_factors(factors), *report.effects(prepared)]
+        return json.dumps(console.as_data(prepared, factors), indent=2, ensure_ascii=False)
+    lines = [*console.heading(prepared, COMM.size), *console.load_factors(factors), *console.effects(prepared)]
     return "\n".join(lines)
 
 

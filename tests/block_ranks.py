@@ -10,7 +10,8 @@ from dolfinx import fem
 from mpi4py import MPI
 from scenes import model
 
-from hvi_fenicsx import Scene, blocks, ladder
+from hvi_fenicsx import Scene
+from hvi_fenicsx.mesh import blocks, transfer
 
 
 def main() -> None:
@@ -18,7 +19,7 @@ def main() -> None:
     scene = Scene.model_validate(model(2) | {"domain": {"shape": "rectangle", "size": [1.0, 2.0], "cells": CELLS}})
     below = [n // 2 for n in CELLS]
     fine, coarse = (fem.functionspace(blocks.mesh(COMM, SIZE, n), ("Lagrange", 1, (2,))) for n in (CELLS, below))
-    columns = ladder.prolongation(fine, coarse, scene)
+    columns = transfer.prolongation(fine, coarse, scene)
     indptr, found, _ = columns.getValuesCSR()
     first, last = columns.getOwnershipRangesColumn()[COMM.rank : COMM.rank + 2]
     foreign = np.add.reduceat((found < first) | (found >= last), indptr[:-1]) > 0

@@ -10,19 +10,19 @@ from dolfinx import fem
 from petsc4py import PETSc
 from test_refinement import COMM, measure
 
-from hvi_fenicsx import coarsening, domain, ladder
+from hvi_fenicsx.mesh import coarsening_2d, domain, transfer
 
 
 def main() -> None:
     """For the file of the first argument."""
-    coarsening._WORTHWHILE, coarsening._COARSEST = 500, 100
-    body = coarsening.founded(domain.from_file(COMM, Path(sys.argv[1]), 2))
+    coarsening_2d._WORTHWHILE, coarsening_2d._COARSEST = 500, 100
+    body = coarsening_2d.founded(domain.from_file(COMM, Path(sys.argv[1]), 2))
     assert body.origin is not None
     coarse, nesting = body.origin
     spaces = [fem.functionspace(b.mesh, ("Lagrange", 1, (2,))) for b in (body, coarse)]
     field = fem.Function(spaces[1])
     field.interpolate(lambda x: np.array([x[0] ** 2, np.sin(x[1])]))
-    up = ladder.prolongation(*spaces, nesting) * field.x.petsc_vec
+    up = transfer.prolongation(*spaces, nesting) * field.x.petsc_vec
     told = [coarse.mesh.topology.index_map(2).size_global, up.norm(), up.norm(PETSc.NormType.NORM_1)]
     told += [measure(coarse, name) for name in sorted(coarse.sides)]
     if COMM.rank == 0:

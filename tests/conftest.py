@@ -32,5 +32,5 @@ settings.load_profile("repeatable")
 @pytest.fixture
 def everything_nested(monkeypatch: pytest.MonkeyPatch) -> None:
     """Small meshes go up the ladder too, and take its multigrid."""
-    monkeypatch.setattr("hvi_fenicsx.nested._WORTHWHILE", 1_000)
-    monkeypatch.setattr("hvi_fenicsx.solvers.linear._LARGEST_DIRECT", {2: 1_000, 3: 1_000})
+    monkeypatch.setattr("hvi_fenicsx.solvers.nested_iteration._WORTHWHILE", 1_000)
+    monkeypatch.setattr("hvi_fenicsx.system.held_solver._LARGEST_DIRECT", {2: 1_000, 3: 1_000})

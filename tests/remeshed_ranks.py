@@ -8,20 +8,20 @@ from pathlib import Path
 import numpy as np
 from mpi4py import MPI
 
-from hvi_fenicsx import coarsening, domain, remeshing
+from hvi_fenicsx.mesh import coarsening_2d, coarsening_3d, domain
 
 COMM = MPI.COMM_WORLD
 
 
 def main() -> None:
     """For the file of the first argument."""
-    coarsening._WORTHWHILE, coarsening._COARSEST = 500, 400
-    body = coarsening.founded(domain.from_file(COMM, Path(sys.argv[1]), 3))
+    coarsening_2d._WORTHWHILE, coarsening_2d._COARSEST = 500, 400
+    body = coarsening_2d.founded(domain.from_file(COMM, Path(sys.argv[1]), 3))
     assert body.origin is not None
     coarse = body.origin[0]
-    centres = [remeshing._corners(b.mesh).reshape(-1, 3).mean(axis=0) for b in (body, coarse)]
+    centres = [coarsening_3d._corners(b.mesh).reshape(-1, 3).mean(axis=0) for b in (body, coarse)]
     cells = coarse.mesh.topology.index_map(3)
-    before, after = remeshing._measures(body), remeshing._measures(coarse)
+    before, after = coarsening_3d._measures(body), coarsening_3d._measures(coarse)
     told = (
         cells.size_local / cells.size_global,
         float(np.linalg.norm(centres[0] - centres[1])) / body.length,

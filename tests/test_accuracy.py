@@ -16,12 +16,15 @@ from mpi4py import MPI
 from runs import hvi, summary, write_scene
 from scenes import STEEL, model, quadratic_linear
 
-from hvi_fenicsx import Scene, accuracy, adaptive, boundary, forecast, memory, quantities, read_scene
-from hvi_fenicsx.accuracy import Goal, Reached
-from hvi_fenicsx.adaptive import Climber, Rung
-from hvi_fenicsx.forecast import Step
-from hvi_fenicsx.quantities import carried, extrapolated
-from hvi_fenicsx.timing import Timer
+from hvi_fenicsx import Scene, read_scene
+from hvi_fenicsx.accuracy import adaptive, control, cost_forecast, quantities
+from hvi_fenicsx.accuracy.adaptive import Climber, Rung
+from hvi_fenicsx.accuracy.control import Goal, Reached
+from hvi_fenicsx.accuracy.cost_forecast import Step
+from hvi_fenicsx.accuracy.quantities import carried, extrapolated
+from hvi_fenicsx.certify import contact_state
+from hvi_fenicsx.runtime import memory
+from hvi_fenicsx.runtime.timing import Timer
 
 COMM = MPI.COMM_WORLD
 DEMOS = Path(__file__).parents[1] / "demos"
@@ -29,7 +32,7 @@ STRONG = model(64, 3e6, friction=quadratic_linear(1e6))
 
 
 def reach(scene: Scene, goal: Goal) -> Reached:
-    return accuracy.reach(scene, COMM, goal, Climber(Timer()), lambda line: None)
+    return control.reach(scene, COMM, goal, Climber(Timer()), lambda line: None)
 
 
 def finer(rung: Rung, times: int) -> list[Rung]:
@@ -49,7 +52,7 @@ def far_in_energy(rungs: list[Rung]) -> float:
     norms = []
     for sign in (1.0, 0.0):
         field.x.array[:] = own.x.array - sign * field.x.array
-        forces = boundary.forces(problem, field)
+        forces = contact_state.forces(problem, field)
         internal = (forces.reaction + forces.load).ravel()
         norms.append(np.sqrt(field.x.array[: internal.size] @ internal))
     return float(norms[0] / norms[1])
@@ -87,7 +90,7 @@ def test_a_mesh_without_a_solution_at_a_loose_tolerance_is_not_refined_for_that(
     """Peeling is undecided on its fourth mesh at 1e-4; at 1e-7 it is certified there, and good enough."""
     told: list[str] = []
     scene = read_scene(DEMOS / "peeling.toml")
-    reached = accuracy.reach(scene, COMM, Goal(0.17), Climber(Timer()), told.append)
+    reached = control.reach(scene, COMM, Goal(0.17), Climber(Timer()), told.append)
     assert any("not certified" in line for line in told)
     assert reached.why is None
     assert reached.rung.dofs < 8_000
@@ -185,11 +188,11 @@ def ladder(rate: float, count: int) -> list[Step]:
 def test_a_forecast_hits_a_ladder_that_goes_on_as_it_did() -> None:
     steps = ladder(0.4, 9)
     known = steps[:7]
-    found = forecast.cost(known, steps[-1].error, 2, 150.0)
+    found = cost_forecast.cost(known, steps[-1].error, 2, 150.0)
     assert found.dofs == pytest.approx(steps[-1].dofs, rel=1e-6)
     assert found.seconds == pytest.approx(sum(s.seconds for s in steps), rel=0.1)
     assert found.memory == pytest.approx(steps[-1].memory, rel=0.1)
-    assert forecast.seconds(known, steps[7].dofs) == pytest.approx(steps[7].seconds, rel=0.1)
+    assert cost_forecast.seconds(known, steps[7].dofs) == pytest.approx(steps[7].seconds, rel=0.1)
 
 
 def test_what_memory_cannot_hold_is_refused_before_it_is_tried(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -214,10 +217,10 @@ class Late(Timer):
 def test_a_time_budget_ends_before_the_step_that_would_exceed_it(seconds: float, meshes: int) -> None:
     """With the accuracy at which three meshes are enough."""
     scene = Scene.model_validate(STRONG)
-    reached = accuracy.reach(scene, COMM, Goal(3e-2, seconds=seconds), Climber(Late()), lambda line: None)
+    reached = control.reach(scene, COMM, Goal(3e-2, seconds=seconds), Climber(Late()), lambda line: None)
     assert len(reached.steps) == meshes
     assert (reached.why is None) == (meshes > 1)
-    best = accuracy.reach(scene, COMM, Goal(None, seconds=10.0), Climber(Late()), lambda line: None)
+    best = control.reach(scene, COMM, Goal(None, seconds=10.0), Climber(Late()), lambda line: None)
     assert (len(best.steps), best.exit_code) == (1, 0)
 
 

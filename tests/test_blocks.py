@@ -11,7 +11,8 @@ from dolfinx import mesh as dmesh
 from mpi4py import MPI
 from runs import on_ranks
 
-from hvi_fenicsx import blocks, compat
+from hvi_fenicsx import compat
+from hvi_fenicsx.mesh import blocks
 
 COMM = MPI.COMM_WORLD
 GRIDS = [[1, 1], [3, 5], [16, 20], [2, 3, 4], [1, 7, 1]]

@@ -14,7 +14,7 @@ from dolfinx import fem
 from scenes import P, Q, Table, displacement, far, model, quadratic_linear, solved
 
 from hvi_fenicsx import Scene, Solution, prepare, solve
-from hvi_fenicsx.certificate import Certificate, examine
+from hvi_fenicsx.certify.certificate import Certificate, examine
 
 Array = npt.NDArray[np.float64]
 STRONG = quadratic_linear(3e6)

@@ -11,9 +11,9 @@ import pytest
 from runs import ROOT, hvi, write_scene
 from scenes import model
 
-from hvi_fenicsx import Scene, prepare, report
+from hvi_fenicsx import Scene, console, prepare
 from hvi_fenicsx.rigid import Body, Mode
-from hvi_fenicsx.solution import finish
+from hvi_fenicsx.workflow import finish
 
 TOWER = ROOT / "demos" / "tipping_tower.toml"
 WEIGHT, WIND = 2.5e4 * 1.0 * 4.0 * 0.5, 5.0e3 * 4.0 * 2.0
@@ -52,11 +52,11 @@ def test_few_rigid_motions_are_named_and_many_are_counted(tmp_path: Path) -> Non
     """Twelve motions in words are no line that a person reads."""
     bodies = [Body(3, np.zeros(3), name=f"body {i}", index=i) for i in (1, 2)]
     names = [Mode(f"motion {i}", (0.0,) * 6) for i in range(12)]
-    assert report.motions([], bodies) == "none"
-    assert report.motions(names[:3], bodies) == "motion 0, motion 1, motion 2"
-    assert report.motions(names[:11], bodies) == "11 (`hvi check --json` lists them)"
-    assert report.motions(names, bodies) == "all 12 of 2 bodies"
-    assert report.motions(names[:6], bodies[:1]) == "all 6"
+    assert console.motions([], bodies) == "none"
+    assert console.motions(names[:3], bodies) == "motion 0, motion 1, motion 2"
+    assert console.motions(names[:11], bodies) == "11 (`hvi check --json` lists them)"
+    assert console.motions(names, bodies) == "all 12 of 2 bodies"
+    assert console.motions(names[:6], bodies[:1]) == "all 6"
     file = write_scene(tmp_path / "square.toml", model(3))
     assert "that the supports leave: translation along y; " in hvi("check", file).stdout
 
@@ -65,6 +65,6 @@ def test_few_rigid_motions_are_named_and_many_are_counted(tmp_path: Path) -> Non
 def test_the_linear_solver_is_the_one_that_a_run_takes(cells: int, linear: str) -> None:
     """On 64 x 64 cells a ladder pays: after the run the system stands on one."""
     prepared = prepare(Scene.model_validate(model(cells)))
-    assert report.solver(prepared).endswith(linear)
+    assert console.solver(prepared).endswith(linear)
     assert finish(prepared).converged
     assert (prepared.system.below is not None) == ("multigrid" in linear)

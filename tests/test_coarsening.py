@@ -17,10 +17,12 @@ from dolfinx.mesh import entities_to_geometry
 from mpi4py import MPI
 from test_refinement import measure, volume
 
-from hvi_fenicsx import Scene, building, coarsening, domain, ladder, meshfile, outline, read_scene, solution
-from hvi_fenicsx.domain import Domain
-from hvi_fenicsx.outline import HalfEdges
+from hvi_fenicsx import Scene, read_scene, workflow
+from hvi_fenicsx.mesh import coarsening_2d, domain, gmsh_model, thinned_outline, transfer
+from hvi_fenicsx.mesh.domain import Domain
+from hvi_fenicsx.mesh.thinned_outline import HalfEdges
 from hvi_fenicsx.scene import HalfDisk, NotchedStrip
+from hvi_fenicsx.system import assemble
 
 DEMOS = Path(__file__).parents[1] / "demos"
 COMM = MPI.COMM_WORLD
@@ -36,8 +38,8 @@ POLYGONS = {
 @pytest.fixture(autouse=True)
 def everything_founded(monkeypatch: pytest.MonkeyPatch) -> None:
     """Coarser meshes for small ones too."""
-    monkeypatch.setattr(coarsening, "_WORTHWHILE", 500)
-    monkeypatch.setattr(coarsening, "_COARSEST", 100)
+    monkeypatch.setattr(coarsening_2d, "_WORTHWHILE", 500)
+    monkeypatch.setattr(coarsening_2d, "_COARSEST", 100)
 
 
 def from_file(path: Path, body: str) -> Domain:
@@ -45,7 +47,7 @@ def from_file(path: Path, body: str) -> Domain:
 
 
 def below(body: Domain) -> Domain:
-    made = coarsening.founded(body).origin
+    made = coarsening_2d.founded(body).origin
     assert made is not None
     return made[0]
 
@@ -96,7 +98,7 @@ def test_a_notch_is_not_lost() -> None:
 
 @pytest.mark.parametrize("body", [meshes.HINGE.replace("0.5)", "0.03)")], ids=["touches itself"])
 def test_what_cannot_be_outlined_stands_alone(body: str, tmp_path: Path) -> None:
-    assert coarsening.founded(from_file(tmp_path, body)).origin is None
+    assert coarsening_2d.founded(from_file(tmp_path, body)).origin is None
 
 
 def test_outlines_that_cross_themselves_are_given_up() -> None:
@@ -104,13 +106,13 @@ def test_outlines_that_cross_themselves_are_given_up() -> None:
     corners = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.4, -0.2], [0.0, 1.0]])
     ends = np.column_stack([np.arange(5), (np.arange(5) + 1) % 5])
     edges = HalfEdges(ends, corners[ends], np.zeros(5, dtype=np.int64), np.zeros(5, dtype=np.int64))
-    with meshfile.session(COMM) as gmsh:
-        assert coarsening._meshed(gmsh, edges, 1.0, ["rim"], ["body"]) is None
+    with gmsh_model.session(COMM) as gmsh:
+        assert coarsening_2d._meshed(gmsh, edges, 1.0, ["rim"], ["body"]) is None
 
 
 def test_a_coarse_mesh_of_another_area_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(outline, "_DIFFERENT", 1e-6)
-    assert coarsening.founded(domain.build(COMM, HalfDisk(radius=0.5, mesh_size=0.02), 2)).origin is None
+    monkeypatch.setattr(thinned_outline, "_DIFFERENT", 1e-6)
+    assert coarsening_2d.founded(domain.build(COMM, HalfDisk(radius=0.5, mesh_size=0.02), 2)).origin is None
 
 
 @pytest.mark.parametrize("name", POLYGONS)
@@ -120,7 +122,7 @@ def test_linear_fields_are_prolonged_as_they_are(name: str, tmp_path: Path) -> N
     fields = [fem.Function(space) for space in (fine, coarse)]
     for field in fields:
         field.interpolate(lambda x: np.array([1 + 2 * x[0] - x[1], x[0] + 3 * x[1]]))
-    found = ladder.prolongation(fine, coarse, None) * fields[1].x.petsc_vec
+    found = transfer.prolongation(fine, coarse, None) * fields[1].x.petsc_vec
     assert found.array == pytest.approx(fields[0].x.array, abs=1e-12)
 
 
@@ -133,9 +135,9 @@ def scene(path: Path, *overrides: str) -> Scene:
 def test_a_start_from_another_mesh_ends_where_mumps_does(tmp_path: Path) -> None:
     """Without friction the minimiser is unique."""
     convex = ["boundary.wall.displacement=[0.0, 0.0]", 'boundary.floor={on="bottom", contact={gap=0.0}}']
-    climbed = solution.solve(scene(tmp_path, *convex))
+    climbed = workflow.solve(scene(tmp_path, *convex))
     alone = scene(tmp_path, *convex, 'solver={linear_solver="lu"}')
-    direct = solution.finish(solution.prepare(alone, body=domain.from_file(COMM, alone.domain.file, 2)))  # type: ignore[union-attr]
+    direct = workflow.finish(workflow.prepare(alone, body=domain.from_file(COMM, alone.domain.file, 2)))  # type: ignore[union-attr]
     assert climbed.solved is not None
     assert climbed.solved.levels > 1
     assert climbed.converged
@@ -145,7 +147,7 @@ def test_a_start_from_another_mesh_ends_where_mumps_does(tmp_path: Path) -> None
 
 
 def test_built_in_blocks_keep_their_own_ladder() -> None:
-    assert building.mesh(read_scene(DEMOS / "strong_law.toml", ["domain.cells=[64, 64]"]), COMM).origin is None
+    assert assemble.mesh(read_scene(DEMOS / "strong_law.toml", ["domain.cells=[64, 64]"]), COMM).origin is None
 
 
 def test_ranks_make_the_same_meshes_and_prolong_alike(tmp_path: Path) -> None:
@@ -167,7 +169,7 @@ def test_coarse_bodies_slide_along_a_curved_part_as_the_fine_one_does() -> None:
     law = '{law="quadratic_linear", gamma1=1e4, gamma2=5e3, delta=1e-4}'
     overrides = [f"domain={shape}", 'boundary.top={on="top", traction=[0.0, -2e4]}']
     floor = f'boundary.floor={{on="arc", contact={{gap=0.0}}, friction={law}}}'
-    found = solution.solve(read_scene(DEMOS / "hertz.toml", [*overrides, floor]))
+    found = workflow.solve(read_scene(DEMOS / "hertz.toml", [*overrides, floor]))
     assert found.converged
     assert found.solved is not None
     assert found.solved.levels > 1

@@ -18,10 +18,11 @@ from petsc4py import PETSc
 from runs import hvi, summary, write_scene
 from scenes import STEEL, Table, displacement, energy, model, quadratic_linear, solved
 
-from hvi_fenicsx import Scene, nested, prepare
-from hvi_fenicsx.solution import Prepared, finish
-from hvi_fenicsx.solvers import choose
-from hvi_fenicsx.solvers.base import Solved, silent
+from hvi_fenicsx import Scene, prepare
+from hvi_fenicsx.solvers import nested_iteration
+from hvi_fenicsx.solvers.method import Solved, silent
+from hvi_fenicsx.solvers.registry import choose
+from hvi_fenicsx.workflow import Prepared, finish
 
 SPRING = {"law": "linear_spring", "stiffness": 1e12}
 LAW = quadratic_linear(1e3)
@@ -101,7 +102,7 @@ def calls(name: str) -> int:
 
 def found_by_solver(ready: Prepared) -> Solved:
     """The solve alone: certificate and error estimate have systems of their own."""
-    return nested.solve(ready.scene, ready.system, ready.timer, silent, lambda: False)
+    return nested_iteration.solve(ready.scene, ready.system, ready.timer, silent, lambda: False)
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -154,8 +155,8 @@ def test_the_simple_solvers_find_what_the_branch_iteration_finds(name: str) -> N
 
 
 def test_a_linear_scene_takes_the_ladder_for_its_multigrid_only(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(nested, "_WORTHWHILE", 0)
-    monkeypatch.setattr("hvi_fenicsx.solvers.linear._LARGEST_DIRECT", {2: 0, 3: 0})
+    monkeypatch.setattr(nested_iteration, "_WORTHWHILE", 0)
+    monkeypatch.setattr("hvi_fenicsx.system.held_solver._LARGEST_DIRECT", {2: 0, 3: 0})
     table = rolling()
     table["domain"]["cells"] = [64, 64]
     found, direct = solved(table), solved(table | {"solver": {"linear_solver": "lu"}})

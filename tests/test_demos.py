@@ -17,7 +17,7 @@ from scipy.sparse import csc_matrix, csr_matrix, diags
 from scipy.sparse.linalg import spsolve
 
 from hvi_fenicsx import Scene, Solution, prepare, read_scene, solve
-from hvi_fenicsx.boundary import State
+from hvi_fenicsx.certify.contact_state import State
 
 Array = npt.NDArray[np.float64]
 DEMOS = ROOT / "demos"

@@ -9,11 +9,11 @@ from mpi4py import MPI
 from scenes import DELTA, displacement, model, quadratic_linear, solved
 
 from hvi_fenicsx import Scene, prepare
-from hvi_fenicsx.solvers import schur
-from hvi_fenicsx.solvers.activeset import ActiveSetSolver, Outcome
-from hvi_fenicsx.solvers.linear import HeldPreconditioner, LinearSettings
-from hvi_fenicsx.system import System
-from hvi_fenicsx.timing import Timer
+from hvi_fenicsx.runtime.timing import Timer
+from hvi_fenicsx.solvers.active_set import ActiveSetSolver, Outcome
+from hvi_fenicsx.system import schur
+from hvi_fenicsx.system.held_solver import HeldPreconditioner, LinearSettings
+from hvi_fenicsx.system.system import System
 
 DIRECT = LinearSettings("lu")
 STRONG = quadratic_linear(3e6, DELTA)

@@ -12,7 +12,8 @@ from mpi4py import MPI
 from runs import contact, hvi, summary, write_scene
 from scenes import NU, STEEL, E, P, Q, Table, displacement, energy, far, model, points, quadratic_linear, solved
 
-from hvi_fenicsx import InputError, domain
+from hvi_fenicsx import InputError
+from hvi_fenicsx.mesh import domain
 
 
 def on_file(file: Path, table: Table, **domain: Any) -> Table:

@@ -18,10 +18,11 @@ from dolfinx import fem
 from enumeration import Floor, Point, polyline
 from scenes import DELTA, Table, block, displacement, energy, far, model, points, quadratic_linear, solved
 
-from hvi_fenicsx import Scene, prepare, solvers
-from hvi_fenicsx.certificate import Certificate, examine
-from hvi_fenicsx.solution import Prepared
-from hvi_fenicsx.solvers.base import silent
+from hvi_fenicsx import Scene, prepare
+from hvi_fenicsx.certify.certificate import Certificate, examine
+from hvi_fenicsx.solvers import registry
+from hvi_fenicsx.solvers.method import silent
+from hvi_fenicsx.workflow import Prepared
 
 Array = npt.NDArray[np.float64]
 Graph = list[tuple[float, float]]
@@ -168,7 +169,7 @@ def test_from_the_wrong_branch_the_solver_ends_in_the_list(case: Case) -> None:
 def reached(case: Case, u: Array) -> list[Point]:
     """The points of the list that the solver reaches from a start."""
     ready = prepared(case)
-    method = solvers.create(ready.scene.solver, ready.system, ready.timer, silent, lambda: False)
+    method = registry.create(ready.scene.solver, ready.system, ready.timer, silent, lambda: False)
     start = ready.system.load.duplicate()
     start.array[:] = as_function(case, u).x.array
     found = method.solve(start)  # type: ignore[call-arg]

@@ -18,14 +18,15 @@ from runs import hvi, summary, write_scene
 from scenes import Table, block, model, quadratic_linear, solved
 
 from hvi_fenicsx import Scene, Solution, prepare
-from hvi_fenicsx.certificate import examine
-from hvi_fenicsx.estimate import Estimate, estimate, on_contact
-from hvi_fenicsx.estimate.bubbles import Stiffness, assembled, diagonal, space
-from hvi_fenicsx.nested import solve as solve_system
-from hvi_fenicsx.problem import Problem
-from hvi_fenicsx.solution import finish
-from hvi_fenicsx.solvers.base import silent
-from hvi_fenicsx.timing import Timer
+from hvi_fenicsx.certify.certificate import examine
+from hvi_fenicsx.certify.estimate.contact_errors import on_contact
+from hvi_fenicsx.certify.estimate.edge_bubbles import Stiffness, assembled, diagonal, space
+from hvi_fenicsx.certify.estimate.estimator import Estimate, estimate
+from hvi_fenicsx.problem.problem import Problem
+from hvi_fenicsx.runtime.timing import Timer
+from hvi_fenicsx.solvers.method import silent
+from hvi_fenicsx.solvers.nested_iteration import solve as solve_system
+from hvi_fenicsx.workflow import finish
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "benchmarks"))
 

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hvi_fenicsx.errors import InputError
-from hvi_fenicsx.expressions import Formula, ufl_algebra
+from hvi_fenicsx.formula import Formula, ufl_algebra
 
 _PYTHON: dict[str, Callable[..., Any]] = {
     "abs": abs, "sqrt": math.sqrt, "exp": math.exp, "log": math.log, "sin": math.sin, "cos": math.cos,

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from runs import ROOT
 
-from hvi_fenicsx.children import environment
+from hvi_fenicsx.runtime.processes import environment
 
 pytestmark = pytest.mark.long
 BUILD = "import sys; from setuptools import build_meta; build_meta.build_wheel(sys.argv[1])"

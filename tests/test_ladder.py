@@ -17,13 +17,16 @@ from dolfinx.mesh import Mesh
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from hvi_fenicsx import InputError, Scene, building, domain, ladder, nested, read_scene, solution
-from hvi_fenicsx.solvers import linear
-from hvi_fenicsx.solvers.activeset import ActiveSetSolver
-from hvi_fenicsx.solvers.base import held_dofs, silent
-from hvi_fenicsx.solvers.linear import LinearSettings
-from hvi_fenicsx.system import System
-from hvi_fenicsx.timing import Timer
+from hvi_fenicsx import InputError, Scene, read_scene, workflow
+from hvi_fenicsx.mesh import domain, transfer
+from hvi_fenicsx.runtime.timing import Timer
+from hvi_fenicsx.solvers import nested_iteration
+from hvi_fenicsx.solvers.active_set import ActiveSetSolver
+from hvi_fenicsx.solvers.method import held_dofs, silent
+from hvi_fenicsx.system import assemble
+from hvi_fenicsx.system import held_solver as linear
+from hvi_fenicsx.system.held_solver import LinearSettings
+from hvi_fenicsx.system.system import System
 
 DEMOS = Path(__file__).parents[1] / "demos"
 SHAPES: list[tuple[list[str], int]] = [
@@ -49,10 +52,10 @@ def rough(x: np.ndarray) -> np.ndarray:
 def test_prolongation_keeps_a_coarse_field(overrides: list[str], dimension: int) -> None:
     """Against dolfinx's own interpolation between meshes that do not match."""
     scene = read_scene(DEMOS / "strong_law.toml", overrides)
-    below = ladder.coarser(scene)
+    below = transfer.coarser(scene)
     assert below is not None
     fine, coarse = (space(s, dimension) for s in (scene, below))
-    assert lost(ladder.prolongation(fine, coarse, scene), fine, coarse) < 1e-13
+    assert lost(transfer.prolongation(fine, coarse, scene), fine, coarse) < 1e-13
 
 
 def lost(step: PETSc.Mat, fine: fem.FunctionSpace, coarse: fem.FunctionSpace, *, linear: bool = False) -> float:
@@ -83,13 +86,13 @@ def interpolated(fine: fem.FunctionSpace, known: fem.Function) -> Any:
 
 def test_odd_and_small_meshes_have_no_ladder() -> None:
     for cells in ([9, 16], [8, 8], [15, 15]):
-        assert ladder.coarser(read_scene(DEMOS / "strong_law.toml", [f"domain.cells={cells}"])) is None
+        assert transfer.coarser(read_scene(DEMOS / "strong_law.toml", [f"domain.cells={cells}"])) is None
 
 
 @pytest.mark.parametrize("demo", ["wall_left", "strong_law"])
 @pytest.mark.usefixtures("everything_nested")
 def test_nested_solutions_are_certified(demo: str) -> None:
-    found = solution.solve(read_scene(DEMOS / f"{demo}.toml", ["domain.cells=[64, 64]"]))
+    found = workflow.solve(read_scene(DEMOS / f"{demo}.toml", ["domain.cells=[64, 64]"]))
     assert found.converged
     assert found.solved is not None
     assert found.solved.levels == 3
@@ -101,7 +104,7 @@ def test_a_convex_scene_ends_where_the_direct_solve_ends() -> None:
     overrides = ["domain.cells=[64, 64]", 'boundary.press.traction=[0.0, "-1e6*(1 - 1.5*x)"]']
     scene = read_scene(DEMOS / "strong_law.toml", [*overrides, 'boundary.floor={on="bottom", contact={gap=0.0}}'])
     direct = scene.model_copy(update={"solver": scene.solver.model_copy(update={"linear_solver": "lu"})})
-    energies = [solution.solve(s).examined.energy for s in (scene, direct)]  # type: ignore[union-attr]
+    energies = [workflow.solve(s).examined.energy for s in (scene, direct)]  # type: ignore[union-attr]
     assert energies[0] == pytest.approx(energies[1], rel=1e-9)
 
 
@@ -113,8 +116,8 @@ def test_multigrid_iterations_do_not_grow_with_the_mesh() -> None:
 def iterations(cells: int) -> int:
     """Of a solve with contact closed, to 1e-8."""
     scene = read_scene(DEMOS / "wall_left.toml", [f"domain.cells=[{cells}, {cells}]", "solver={}"])
-    prepared = solution.prepare(scene)
-    nested.solve(scene, prepared.system, Timer(), silent, lambda: False)
+    prepared = workflow.prepare(scene)
+    nested_iteration.solve(scene, prepared.system, Timer(), silent, lambda: False)
     solver = ActiveSetSolver(prepared.system, LinearSettings("mg"), Timer())
     laws = [t.law for t in prepared.system.terms]
     solver.held.prepare(held_dofs(prepared.system, laws))
@@ -145,8 +148,8 @@ def test_a_preconditioner_used_before_is_that_made_anew(kind: linear.Kind) -> No
 def on_its_ladder(demo: str, cells: int) -> System:
     """A demo on a square of so many cells a side, with the rungs below."""
     scene = read_scene(DEMOS / f"{demo}.toml", [f"domain.cells=[{cells}, {cells}]"])
-    system = solution.prepare(scene).system
-    system.below = nested.hierarchy(scene, system, Timer())
+    system = workflow.prepare(scene).system
+    system.below = nested_iteration.hierarchy(scene, system, Timer())
     return system
 
 
@@ -168,7 +171,7 @@ def applied(preconditioner: linear.HeldPreconditioner, held: np.ndarray, right: 
 @pytest.mark.usefixtures("everything_nested")
 def test_only_what_stood_on_every_rung_is_solved_in_one_step(demo: str, steady: bool) -> None:
     """The floor stays closed and its pieces stand, or the end of contact and the drop move from rung to rung."""
-    found = solution.solve(read_scene(DEMOS / f"{demo}.toml", ["domain.cells=[128, 128]"]))
+    found = workflow.solve(read_scene(DEMOS / f"{demo}.toml", ["domain.cells=[128, 128]"]))
     assert found.converged
     assert found.solved is not None
     assert found.solved.steady is steady
@@ -184,8 +187,8 @@ def test_a_refined_file_goes_up_the_ladder_of_its_meshes(body: str, tmp_path: Pa
         read_scene(DEMOS / "strong_law.toml", [*convex, f'domain={{shape="file", file="{file}", {more}}}', *solver])
         for more, solver in (("refinements=3", []), ("scale=1.0", ['solver={linear_solver="lu"}']))
     )
-    mesh = replace(building.mesh(scene, MPI.COMM_WORLD), origin=None)
-    direct, found = solution.finish(solution.prepare(alone, body=mesh)), solution.solve(scene)
+    mesh = replace(assemble.mesh(scene, MPI.COMM_WORLD), origin=None)
+    direct, found = workflow.finish(workflow.prepare(alone, body=mesh)), workflow.solve(scene)
     assert found.solved is not None
     assert found.solved.levels > 1
     assert found.dofs == direct.dofs
@@ -196,7 +199,7 @@ def test_refinements_that_memory_cannot_hold_are_refused(tmp_path: Path) -> None
     file = meshes.make(tmp_path / "m.msh", meshes.GOOD)
     scene = read_scene(DEMOS / "strong_law.toml", [f'domain={{shape="file", file="{file}", refinements=10}}'])
     with pytest.raises(InputError, match=r"domain\.refinements: make .* use fewer refinements"):
-        solution.solve(scene)
+        workflow.solve(scene)
 
 
 @pytest.mark.parametrize("chosen", [[], [0], [3, 4, 5], [0, 2, 3, 7, 8, 9, 11]])

@@ -16,8 +16,8 @@ from scenes import P, Table, displacement, energy, far, model, quadratic_linear,
 
 from hvi_fenicsx import Scene, Solution, prepare
 from hvi_fenicsx.errors import InputError
-from hvi_fenicsx.solution import finish
 from hvi_fenicsx.solvers.condensed import fischer_burmeister
+from hvi_fenicsx.workflow import finish
 
 METHODS = ["tao", "ssls", "condensed"]
 LIFTING = [0.0, "-1e6*(1 - 1.8*x)"]

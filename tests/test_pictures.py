@@ -24,12 +24,12 @@ from dolfinx import fem, mesh
 from dolfinx.io import VTKFile
 from mpi4py import MPI
 
-from hvi_fenicsx import pictures
 from hvi_fenicsx.errors import HviError
-from hvi_fenicsx.pictures import inputs, sides, units
-from hvi_fenicsx.pictures.mesh import read_body
-from hvi_fenicsx.pictures.raster import shade
-from hvi_fenicsx.results.table import COLUMNS
+from hvi_fenicsx.report import reader, units
+from hvi_fenicsx.report.pictures import draw, loads_supports
+from hvi_fenicsx.report.pictures.raster import shade
+from hvi_fenicsx.report.vtu import read_body
+from hvi_fenicsx.results.contact_table import COLUMNS
 
 Array = npt.NDArray[np.float64]
 E, NU, LOAD = 2.15e11, 0.29, 1.0e6
@@ -132,7 +132,7 @@ def assert_drawn(paths: list[Path], *names: str) -> None:
         assert image.shape[1] == 1200
         assert 500 <= image.shape[0] <= 2000
         assert image[..., :3].std() > 0.05
-        assert not list(path.parent.glob(f".*{pictures.UNFINISHED}"))
+        assert not list(path.parent.glob(f".*{draw.UNFINISHED}"))
 
 
 @pytest.fixture
@@ -160,14 +160,14 @@ def test_a_plane_result_has_its_body_and_its_contact(
     tmp_path: Path, value: Callable[[Array], Array], summary: dict[str, Any]
 ) -> None:
     folder = result(tmp_path / "r", square(), value, **summary)
-    assert_drawn(pictures.draw(folder), "body.png", "contact.png")
+    assert_drawn(draw.draw(folder), "body.png", "contact.png")
 
 
 @pytest.mark.parametrize("value", [pressed, peeled], ids=lambda f: f.__name__)
 def test_so_has_a_result_in_space_and_no_x_server_remains(
     tmp_path: Path, value: Callable[[Array], Array], left_running: Callable[[], list[str]]
 ) -> None:
-    assert_drawn(pictures.draw(result(tmp_path / "r", box(), value)), "body.png", "contact.png")
+    assert_drawn(draw.draw(result(tmp_path / "r", box(), value)), "body.png", "contact.png")
     assert left_running() == []
 
 
@@ -180,7 +180,7 @@ def test_so_has_a_result_in_space_and_no_x_server_remains(
 def test_an_escape_is_drawn_as_a_motion(
     tmp_path: Path, body: Callable[[], mesh.Mesh], value: Callable[[Array], Array]
 ) -> None:
-    assert_drawn(pictures.draw(escaping(tmp_path / "r", body(), value)), "escape.png")
+    assert_drawn(draw.draw(escaping(tmp_path / "r", body(), value)), "escape.png")
 
 
 def write_sides(folder: Path, body: mesh.Mesh, **on: Callable[[Array], npt.NDArray[np.bool_]]) -> None:
@@ -196,9 +196,9 @@ ON = {"wall": lambda x: x[0] == 0, "pull": lambda x: x[0] == 1}
 def test_the_scene_is_drawn_where_the_folder_tells_its_sides(tmp_path: Path, body: Callable[[], mesh.Mesh]) -> None:
     folder = result(tmp_path / "r", body(), pressed)
     write_sides(folder, body(), **ON)
-    assert_drawn(pictures.draw(folder), "body.png", "scene.png", "contact.png")
-    found, drawn = inputs.read(folder), read_body(folder / "displacement.pvd")
-    (support,), (load,) = sides.supports(found, drawn), sides.loads(found, drawn)
+    assert_drawn(draw.draw(folder), "body.png", "scene.png", "contact.png")
+    found, drawn = reader.read(folder), read_body(folder / "displacement.pvd")
+    (support,), (load,) = loads_supports.supports(found, drawn), loads_supports.loads(found, drawn)
     assert support.rolling
     assert support.side.normals == pytest.approx(np.broadcast_to([-1.0, 0.0, 0.0], support.side.normals.shape))
     x, y, _ = drawn.points[load.side.vertices].T
@@ -215,7 +215,7 @@ def test_a_slanted_side_is_held_along_its_own_normal(tmp_path: Path) -> None:
     folder = result(tmp_path / "r", body, np.zeros_like)
     (folder / "contact.csv").unlink()
     write_sides(folder, body, wall=lambda _: upright[:, 0] == 0)
-    (support,) = sides.supports(inputs.read(folder), read_body(folder / "displacement.pvd"))
+    (support,) = loads_supports.supports(reader.read(folder), read_body(folder / "displacement.pvd"))
     assert support.side.normals[:, :2] == pytest.approx(np.broadcast_to(-turn[:, 0], (5, 2)))
     assert len(support.side.facets) == 4
 
@@ -223,10 +223,10 @@ def test_a_slanted_side_is_held_along_its_own_normal(tmp_path: Path) -> None:
 def test_each_part_has_its_picture_and_a_scene_without_contact_has_its_body(tmp_path: Path) -> None:
     folder = result(tmp_path / "r", square(), peeled)
     write_table(folder, [*floor_rows(square(), peeled, "a.b"), *floor_rows(square(), pressed, "floor")])
-    assert_drawn(pictures.draw(folder), "body.png", "contact_a.b.png", "contact_floor.png")
+    assert_drawn(draw.draw(folder), "body.png", "contact_a.b.png", "contact_floor.png")
     bare = result(tmp_path / "bare", square(), pressed)
     (bare / "contact.csv").unlink()
-    assert_drawn(pictures.draw(bare), "body.png")
+    assert_drawn(draw.draw(bare), "body.png")
 
 
 @pytest.mark.parametrize(
@@ -244,7 +244,7 @@ def test_what_cannot_be_drawn_is_said_in_one_line(tmp_path: Path, damage: Callab
     folder = result(tmp_path / "r", square(4), pressed)
     damage(folder)
     with pytest.raises(HviError, match=words) as caught:
-        pictures.draw(folder)
+        draw.draw(folder)
     assert "\n" not in str(caught.value)
     assert "Traceback" not in str(caught.value)
 
@@ -253,7 +253,7 @@ def test_one_picture_that_fails_takes_no_other_with_it(tmp_path: Path) -> None:
     folder = result(tmp_path / "r", square(4), pressed)
     write_table(folder, [{**row, "x": float(str(row["x"])) + 7.0} for row in floor_rows(square(4), pressed)])
     with pytest.raises(HviError, match=r"body\.png"):
-        pictures.draw(folder)
+        draw.draw(folder)
     assert (folder / "contact.png").exists()
     assert not (folder / "body.png").exists()
 
@@ -265,7 +265,7 @@ def test_a_library_that_aborts_is_an_error_like_any_other(tmp_path: Path, monkey
     folder = result(tmp_path / "r", box(), pressed)
     failure = "body.png: none, this VTK needs no display"
     try:
-        pictures.draw(folder)
+        draw.draw(folder)
     except HviError as error:
         failure = str(error)
     assert failure.startswith("body.png: ")
@@ -279,12 +279,12 @@ def test_a_child_that_takes_too_long_is_ended_with_its_server(
 ) -> None:
     folder = result(tmp_path / "r", box(), pressed)
     with pytest.raises(HviError, match="not drawn within"):
-        pictures.draw(folder, timeout=0.8)
+        draw.draw(folder, timeout=0.8)
     deadline = time.monotonic() + 5.0
     while left_running() and time.monotonic() < deadline:
         time.sleep(0.1)
     assert left_running() == []
-    assert not list(folder.glob(f".*{pictures.UNFINISHED}"))
+    assert not list(folder.glob(f".*{draw.UNFINISHED}"))
 
 
 def test_the_child_is_no_rank_and_the_package_loads_no_plotting(
@@ -292,9 +292,10 @@ def test_the_child_is_no_rank_and_the_package_loads_no_plotting(
 ) -> None:
     monkeypatch.setenv("OMPI_COMM_WORLD_SIZE", "2")
     monkeypatch.setenv("PMIX_RANK", "1")
-    assert_drawn(pictures.draw(result(tmp_path / "r", square(4), pressed)), "body.png", "contact.png")
+    assert_drawn(draw.draw(result(tmp_path / "r", square(4), pressed)), "body.png", "contact.png")
     code = (
-        "import sys, hvi_fenicsx.pictures; print([m for m in ('pyvista', 'matplotlib', 'mpi4py') if m in sys.modules])"
+        "import sys, hvi_fenicsx.report.pictures.draw; "
+        "print([m for m in ('pyvista', 'matplotlib', 'mpi4py') if m in sys.modules])"
     )
     told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, env=os.environ)
     assert told.stdout.strip() == "[]"
@@ -302,7 +303,9 @@ def test_the_child_is_no_rank_and_the_package_loads_no_plotting(
 
 def test_a_package_that_is_not_there_is_named(tmp_path: Path) -> None:
     result(tmp_path / "r", box(), pressed)
-    code = "import sys; sys.modules['pyvista'] = None; from hvi_fenicsx.pictures.__main__ import main; main(['r'])"
+    code = (
+        "import sys; sys.modules['pyvista'] = None; from hvi_fenicsx.report.pictures.__main__ import main; main(['r'])"
+    )
     told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=tmp_path, check=False)
     assert "needs the package pyvista, which is not installed here" in told.stderr
 
@@ -366,7 +369,7 @@ SAID = [(1e6, "Pa"), (0.999e6, "Pa"), (9e-6, "m"), (1.26e-7, "m"), (1.5, "m"), (
 
 def test_an_empty_cell_is_nothing_and_not_zero(tmp_path: Path) -> None:
     folder = result(tmp_path / "r", square(4), peeled)
-    part = inputs.read(folder).parts[0]
+    part = reader.read(folder).parts[0]
     assert not part.has("u_t2")
     assert part.has("gap")
     assert np.count_nonzero(part.lifted) == 2

@@ -22,11 +22,14 @@ from mpi4py import MPI
 from scenes import model, quadratic_linear
 from test_ladder import lost, rough
 
-from hvi_fenicsx import Scene, building, domain, ladder, nested, refinement, solution
-from hvi_fenicsx.domain import Domain, Refinement
+from hvi_fenicsx import Scene, workflow
+from hvi_fenicsx.mesh import domain, refinement, transfer
+from hvi_fenicsx.mesh.domain import Domain, Refinement
+from hvi_fenicsx.runtime.timing import Timer
 from hvi_fenicsx.scene import HalfDisk
-from hvi_fenicsx.solvers.base import silent
-from hvi_fenicsx.timing import Timer
+from hvi_fenicsx.solvers import nested_iteration
+from hvi_fenicsx.solvers.method import silent
+from hvi_fenicsx.system import assemble
 
 COMM = MPI.COMM_WORLD
 
@@ -111,7 +114,7 @@ def test_prolongation_from_parent_cells(make: Callable[[], Domain]) -> None:
     d = body.dimension
     for step in (refinement.uniform(body), towards(body, np.zeros(d), 1)[0]):
         fine, coarse = (fem.functionspace(b.mesh, ("Lagrange", 1, (d,))) for b in (step.domain, body))
-        assert lost(ladder.prolongation(fine, coarse, step), fine, coarse) < 1e-13
+        assert lost(transfer.prolongation(fine, coarse, step), fine, coarse) < 1e-13
 
 
 def smallest_angle(body: Domain) -> float:
@@ -161,12 +164,12 @@ def slanted(cells: float) -> Scene:
 
 def test_prolongation_turns_with_the_frames() -> None:
     scene = slanted(0.15)
-    below = building.assemble(scene, COMM, Timer())
+    below = assemble.assemble(scene, COMM, Timer())
     step = refinement.uniform(below.problem.domain)
-    above = building.assemble(scene, COMM, Timer(), step.domain)
+    above = assemble.assemble(scene, COMM, Timer(), step.domain)
     assert below.rotation is not None
-    plain = ladder.prolongation(above.problem.space, below.problem.space, step)
-    turned = ladder.between(above, below, step)
+    plain = transfer.prolongation(above.problem.space, below.problem.space, step)
+    turned = transfer.between(above, below, step)
     known = fem.Function(below.problem.space)
     known.interpolate(lambda x: rough(x)[:2])
     cartesian = plain.createVecRight()
@@ -178,20 +181,20 @@ def test_prolongation_turns_with_the_frames() -> None:
 @pytest.mark.parametrize("scene", [Scene.model_validate(model(8, 3e6, friction=quadratic_linear(1e6))), slanted(0.1)])
 def test_multigrid_and_starts_on_a_refined_hierarchy(scene: Scene, monkeypatch: pytest.MonkeyPatch) -> None:
     """The solution of the finest mesh is that of a direct solve from rest; from below one step or two remain."""
-    below = building.assemble(scene, COMM, Timer())
-    found = nested.solve(scene, below, Timer(), silent, lambda: False)
-    monkeypatch.setattr("hvi_fenicsx.solvers.linear._LARGEST_DIRECT", {2: 500, 3: 500})
+    below = assemble.assemble(scene, COMM, Timer())
+    found = nested_iteration.solve(scene, below, Timer(), silent, lambda: False)
+    monkeypatch.setattr("hvi_fenicsx.system.held_solver._LARGEST_DIRECT", {2: 500, 3: 500})
     for k in range(3):
         step = refinement.uniform(below.problem.domain) if k else towards(below.problem.domain, np.zeros(2), 1)[0]
-        system = building.assemble(scene, COMM, Timer(), step.domain)
-        up = ladder.between(system, below, step)
-        system.below = ladder.stacked(up, below)
-        found = nested.ascend(scene, system, (below, found, up), Timer(), silent, lambda: False)
+        system = assemble.assemble(scene, COMM, Timer(), step.domain)
+        up = transfer.between(system, below, step)
+        system.below = transfer.stacked(up, below)
+        found = nested_iteration.ascend(scene, system, (below, found, up), Timer(), silent, lambda: False)
         below = system
     assert found.converged
     assert found.levels == 4
     monkeypatch.undo()
-    direct = solution.finish(solution.prepare(scene, COMM, body=step.domain)).solved
+    direct = workflow.finish(workflow.prepare(scene, COMM, body=step.domain)).solved
     assert direct is not None
     assert np.max(np.abs(found.u.x.array - direct.u.x.array)) < 1e-6 * np.max(np.abs(direct.u.x.array))
     assert found.counts.newton <= 4 * direct.counts.newton

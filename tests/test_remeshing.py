@@ -16,8 +16,9 @@ import pytest
 from mpi4py import MPI
 from test_ladder import lost, space_on
 
-from hvi_fenicsx import Scene, coarsening, domain, ladder, remeshing, solution
-from hvi_fenicsx.domain import Domain
+from hvi_fenicsx import Scene, workflow
+from hvi_fenicsx.mesh import coarsening_2d, coarsening_3d, domain, transfer
+from hvi_fenicsx.mesh.domain import Domain
 
 COMM = MPI.COMM_WORLD
 LIFTED: dict[str, Any] = {
@@ -37,8 +38,8 @@ LIFTED: dict[str, Any] = {
 @pytest.fixture(autouse=True)
 def everything_founded(monkeypatch: pytest.MonkeyPatch) -> None:
     """Coarser meshes for small ones too."""
-    monkeypatch.setattr(coarsening, "_WORTHWHILE", 500)
-    monkeypatch.setattr(coarsening, "_COARSEST", 400)
+    monkeypatch.setattr(coarsening_2d, "_WORTHWHILE", 500)
+    monkeypatch.setattr(coarsening_2d, "_COARSEST", 400)
 
 
 @pytest.fixture(scope="module")
@@ -48,14 +49,14 @@ def bored(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def below(file: Path) -> tuple[Domain, Domain]:
     body = domain.from_file(COMM, file, 3)
-    made = coarsening.founded(body).origin
+    made = coarsening_2d.founded(body).origin
     assert made is not None
     return body, made[0]
 
 
 def test_a_bored_block_keeps_its_sides_and_regions(bored: Path) -> None:
     body, coarse = below(bored)
-    fine, found = remeshing._measures(body), remeshing._measures(coarse)
+    fine, found = coarsening_3d._measures(body), coarsening_3d._measures(coarse)
     assert found == pytest.approx(fine, rel=0.1)
     flat = {name: size for name, size in fine.items() if name[1] in ("left", "right", "bottom", "top")}
     assert {name: found[name] for name in flat} == pytest.approx(flat, rel=1e-9)
@@ -65,15 +66,15 @@ def test_a_bored_block_keeps_its_sides_and_regions(bored: Path) -> None:
 def test_a_linear_field_is_prolonged_exactly(tmp_path: Path) -> None:
     body, coarse = below(meshes.make(tmp_path / "m.msh", meshes.BORED.format(radius=0, size=0.12)))
     fine, under = space_on(body.mesh), space_on(coarse.mesh)
-    assert lost(ladder.prolongation(fine, under, None), fine, under, linear=True) < 1e-10
+    assert lost(transfer.prolongation(fine, under, None), fine, under, linear=True) < 1e-10
 
 
 def test_what_is_solved_does_not_change(bored: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("hvi_fenicsx.nested._WORTHWHILE", 500)
+    monkeypatch.setattr("hvi_fenicsx.solvers.nested_iteration._WORTHWHILE", 500)
     scene = Scene.model_validate(LIFTED | {"domain": {"shape": "file", "file": str(bored)}})
-    climbed = solution.solve(scene)
-    monkeypatch.setattr(coarsening, "_WORTHWHILE", 10**9)
-    alone = solution.solve(scene)
+    climbed = workflow.solve(scene)
+    monkeypatch.setattr(coarsening_2d, "_WORTHWHILE", 10**9)
+    alone = workflow.solve(scene)
     assert [s.solved.levels for s in (climbed, alone)] == [2, 1]  # type: ignore[union-attr]
     assert climbed.converged
     assert alone.converged
@@ -82,18 +83,18 @@ def test_what_is_solved_does_not_change(bored: Path, monkeypatch: pytest.MonkeyP
 
 @pytest.mark.parametrize("body", [meshes.BLOCKS.format(size=0.1, dimension=3, named=True)])
 def test_bodies_that_gmsh_cannot_take_as_one_have_none(body: str, tmp_path: Path) -> None:
-    assert coarsening.founded(domain.from_file(COMM, meshes.make(tmp_path / "m.msh", body), 3)).origin is None
+    assert coarsening_2d.founded(domain.from_file(COMM, meshes.make(tmp_path / "m.msh", body), 3)).origin is None
 
 
 def test_a_mesher_that_takes_too_long_is_not_waited_for(bored: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(remeshing, "_PATIENCE", 0.01)
-    monkeypatch.setattr(remeshing, "_PER_TRIANGLE", 0.0)
-    assert coarsening.founded(domain.from_file(COMM, bored, 3)).origin is None
+    monkeypatch.setattr(coarsening_3d, "_PATIENCE", 0.01)
+    monkeypatch.setattr(coarsening_3d, "_PER_TRIANGLE", 0.0)
+    assert coarsening_2d.founded(domain.from_file(COMM, bored, 3)).origin is None
 
 
 def test_a_coarse_mesh_of_another_size_is_given_up(bored: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(remeshing, "_DIFFERENT", 1e-6)
-    assert coarsening.founded(domain.from_file(COMM, bored, 3)).origin is None
+    monkeypatch.setattr(coarsening_3d, "_DIFFERENT", 1e-6)
+    assert coarsening_2d.founded(domain.from_file(COMM, bored, 3)).origin is None
 
 
 @pytest.mark.parametrize("ranks", [2, 3])
@@ -107,5 +108,5 @@ def test_the_coarse_mesh_is_the_same_on_several_ranks_shared_like_the_fine_one(r
     assert np.all(told[:, 1] < 0.2), "distance of the parts' centres over the body"
     assert np.all(told[:, 2] < 0.1), "of a side's area"
     coarse = below(bored)[1]
-    alone = [coarse.mesh.topology.index_map(3).size_global, *remeshing._measures(coarse).values()]
+    alone = [coarse.mesh.topology.index_map(3).size_global, *coarsening_3d._measures(coarse).values()]
     np.testing.assert_allclose(told[:, 3:], [alone] * ranks, rtol=1e-12)

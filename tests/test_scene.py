@@ -22,8 +22,8 @@ from hvi_fenicsx.effects.contact import Contact
 from hvi_fenicsx.effects.friction import Friction
 from hvi_fenicsx.errors import InputError
 from hvi_fenicsx.scene import Boundary, MeshFile, Rectangle, Scene, Solver, dump_scene, read_scene
-from hvi_fenicsx.scene.locate import lines_of
-from hvi_fenicsx.scene.reference import reference
+from hvi_fenicsx.scene.reference_doc import reference
+from hvi_fenicsx.scene.toml_lines import lines_of
 
 ROOT = Path(__file__).parent.parent
 DEMOS = sorted((ROOT / "demos").glob("*.toml"))
@@ -517,7 +517,7 @@ def test_reading_a_scene_needs_no_dolfinx() -> None:
 
 def test_the_reference_is_what_the_classes_say() -> None:
     assert (ROOT / "docs" / "scene.md").read_text() == reference(), (
-        "renew it: python3 -m hvi_fenicsx.scene.reference > docs/scene.md"
+        "renew it: python3 -m hvi_fenicsx.scene.reference_doc > docs/scene.md"
     )
 
 

@@ -12,10 +12,10 @@ from mpi4py import MPI
 from runs import on_ranks
 
 from hvi_fenicsx import Scene, prepare, solve
-from hvi_fenicsx.solvers.activeset import ActiveSetSolver
-from hvi_fenicsx.solvers.linear import LinearSettings
-from hvi_fenicsx.solvers.settling import settled
-from hvi_fenicsx.timing import Timer
+from hvi_fenicsx.runtime.timing import Timer
+from hvi_fenicsx.solvers.active_set import ActiveSetSolver
+from hvi_fenicsx.solvers.rigid_start import settled
+from hvi_fenicsx.system.held_solver import LinearSettings
 
 WEIGHT = 8.0e4
 FLOOR = {"point": [0.0, 0.0], "normal": [0.0, 1.0]}

@@ -10,11 +10,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hvi_fenicsx import laws, smoothing
+from hvi_fenicsx import laws
 from hvi_fenicsx.errors import InputError
 from hvi_fenicsx.laws.base import Superpotential
 from hvi_fenicsx.laws.scaled import ScaledLaw
-from hvi_fenicsx.smoothing import PLUS_FUNCTIONS, PaperSmoothing, PlusFunction, SmoothedLaw
+from hvi_fenicsx.laws.smoothing import create
+from hvi_fenicsx.laws.smoothing.paper import PaperSmoothing
+from hvi_fenicsx.laws.smoothing.plus_functions import PLUS_FUNCTIONS, PlusFunction
+from hvi_fenicsx.laws.smoothing.smoothed_law import SmoothedLaw
 
 GAMMA1, GAMMA2, DELTA = 1.0e3, 0.5e3, 9.0e-6
 MODEL = laws.QuadraticLinear(GAMMA1, GAMMA2, DELTA)
@@ -352,12 +355,12 @@ def test_papers_smoothing_far_out_and_scaled() -> None:
 
 
 def test_create() -> None:
-    law = smoothing.create("chks", MODEL, epsilon=0.01)
+    law = create.create("chks", MODEL, epsilon=0.01)
     assert isinstance(law, SmoothedLaw)
     assert law.epsilon_absolute == pytest.approx(0.01 * GAMMA2 * DELTA)
-    paper = smoothing.create("paper", MODEL, epsilon_absolute=0.1)
+    paper = create.create("paper", MODEL, epsilon_absolute=0.1)
     assert paper == PaperSmoothing(MODEL, 0.1)
-    assert set(smoothing.available()) == {"quadratic", "chks", "log_exp", "paper"}
+    assert set(create.available()) == {"quadratic", "chks", "log_exp", "paper"}
 
 
 @pytest.mark.parametrize(
@@ -377,9 +380,9 @@ def test_create() -> None:
 )
 def test_refusals(kind: str, given_epsilon: dict[str, Any], said: str) -> None:
     with pytest.raises(InputError, match=said):
-        smoothing.create(kind, MODEL, **given_epsilon)
+        create.create(kind, MODEL, **given_epsilon)
 
 
 def test_papers_smoothing_refuses_other_laws() -> None:
     with pytest.raises(InputError, match=r'"quadratic_linear" only.*"log_exp"'):
-        smoothing.create("paper", laws.Tresca(1.0), epsilon=0.1)
+        create.create("paper", laws.Tresca(1.0), epsilon=0.1)

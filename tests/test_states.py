@@ -10,10 +10,11 @@ import pytest
 from runs import hvi, summary, write_scene
 from scenes import DELTA, P, Q, Table, block, displacement, model, points, quadratic_linear, solved
 
-from hvi_fenicsx import Scene, sliding, solution, solve
+from hvi_fenicsx import Scene, solve, workflow
 from hvi_fenicsx.cli import main
-from hvi_fenicsx.rigid import programme
+from hvi_fenicsx.rigid import cutting_planes
 from hvi_fenicsx.solvers import auto
+from hvi_fenicsx.system import boundedness
 
 GAMMA = 1.0e6
 LAW = quadratic_linear(GAMMA)
@@ -159,11 +160,11 @@ def test_a_convex_step_has_a_solution_as_long_as_its_branch_bears_the_push(
     body: Callable[[float], Table], share: float, broken: bool, expected: bool
 ) -> None:
     """Unbroken bonds bear γ1 L, broken ones γ2 L = γ1 L/2; in the plane and in space, where the law is one of |u_t|."""
-    prepared = solution.prepare(Scene.model_validate(body(share * GAMMA)))
+    prepared = workflow.prepare(Scene.model_validate(body(share * GAMMA)))
     (term,) = prepared.problem.terms
     slip = np.full(len(term.surface.weights), 10 * term.law.length_scale if broken else 0.0)
     xi = [term.law.concave.right(slip)]
-    assert sliding.slides(prepared.problem, prepared.system.forces, [term.law], xi) == expected
+    assert boundedness.slides(prepared.problem, prepared.system.forces, [term.law], xi) == expected
 
 
 def test_the_search_for_an_equilibrium_that_need_not_exist_ends(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -213,7 +214,7 @@ def test_where_existence_cannot_be_decided_a_run_goes_on(
     push: float, code: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """A certificate needs no verdict; without one the result says what is not known, and is written all the same."""
-    monkeypatch.setattr(programme, "MAX_ROUNDS", 0)
+    monkeypatch.setattr(cutting_planes, "MAX_ROUNDS", 0)
     scene = write_scene(tmp_path / "s.toml", block(3, push, 4 * Q, LAW))
     assert main(["check", str(scene)]) == 4
     assert "existence: undecided (rigid motions: " in capsys.readouterr().out

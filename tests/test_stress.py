@@ -15,8 +15,8 @@ from runs import ROOT, hvi
 from scenes import Table, solved
 
 from hvi_fenicsx import Solution, read_scene, solve
-from hvi_fenicsx.pictures.mesh import read_body
-from hvi_fenicsx.results import stress
+from hvi_fenicsx.problem import stress
+from hvi_fenicsx.report.vtu import read_body
 
 Array = npt.NDArray[np.float64]
 E, ALPHA, HEAT, PULL = 2.0e11, 1.2e-5, 40.0, 3.0e6

@@ -21,10 +21,11 @@ from mpi4py import MPI
 from runs import command, hvi, write_scene
 from scenes import model, quadratic_linear
 
-from hvi_fenicsx import InputError, Scene, compat, domain, ladder, refinement, solve
-from hvi_fenicsx.study import cost, interpolation, meshes, plan, reference, sample, sentences, table
-from hvi_fenicsx.study.errors import QUANTITIES, Yardstick
-from hvi_fenicsx.study.reference import Certainty
+from hvi_fenicsx import InputError, Scene, compat, solve
+from hvi_fenicsx.mesh import domain, refinement, transfer
+from hvi_fenicsx.studies import cost, interpolation, meshes, plan, reference, sentences, solution_arrays, table
+from hvi_fenicsx.studies.errors import QUANTITIES, Yardstick
+from hvi_fenicsx.studies.reference import Certainty
 
 LAW = quadratic_linear(1.0e6)
 
@@ -33,8 +34,8 @@ def scene(cells: int = 4, **keys: Any) -> Scene:
     return Scene.model_validate(model(cells, **keys))
 
 
-def taken(found: Scene) -> sample.Sample:
-    result = sample.take(solve(found, MPI.COMM_SELF))
+def taken(found: Scene) -> solution_arrays.Sample:
+    result = solution_arrays.take(solve(found, MPI.COMM_SELF))
     assert result is not None
     return result
 
@@ -42,7 +43,7 @@ def taken(found: Scene) -> sample.Sample:
 @pytest.fixture(scope="module")
 def yardstick() -> Yardstick:
     solution = solve(scene(8, friction=LAW), MPI.COMM_SELF)
-    stiffness, found = sample.stiffness(solution), sample.take(solution)
+    stiffness, found = solution_arrays.stiffness(solution), solution_arrays.take(solution)
     assert stiffness is not None
     assert found is not None
     return Yardstick(found, stiffness)
@@ -50,7 +51,7 @@ def yardstick() -> Yardstick:
 
 @pytest.mark.parametrize("shape", ["rectangle", "box"])
 def test_interpolation_between_nested_meshes_is_the_ladders_prolongation(shape: str) -> None:
-    from hvi_fenicsx import domain
+    from hvi_fenicsx.mesh import domain
 
     size, cells = ([1.0, 2.0], [4, 6]) if shape == "rectangle" else ([1.0, 2.0, 0.5], [4, 6, 2])
     table_of = model(4)
@@ -69,10 +70,10 @@ def test_interpolation_between_nested_meshes_is_the_ladders_prolongation(shape: 
         fem.functionspace(domain.build(MPI.COMM_SELF, s.domain, s.dimension).mesh, ("Lagrange", 1, (s.dimension,)))
         for s in (fine, coarse)
     ]
-    step = ladder.prolongation(*spaces, fine)
+    step = transfer.prolongation(*spaces, fine)
     d = fine.dimension
     points = [s.tabulate_dof_coordinates()[:, :d] for s in spaces]
-    source = sample.Sample(points[1], spaces[1].dofmap.list.astype(np.int64), np.zeros_like(points[1]), {})
+    source = solution_arrays.Sample(points[1], spaces[1].dofmap.list.astype(np.int64), np.zeros_like(points[1]), {})
     way = interpolation.body(source, points[0])
     values = np.random.default_rng(1).normal(size=points[1].shape)
     coarse_vector, fine_vector = step.createVecs()
@@ -85,7 +86,7 @@ def test_a_surface_in_space_is_interpolated_linearly_and_its_facets_are_found() 
     corners = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1.0], [0, 1, 1]])
     facets = np.array([[0, 1, 2], [0, 2, 3], [0, 3, 5], [0, 4, 5]])
     nothing = np.zeros(len(corners))
-    part = sample.PartSample(
+    part = solution_arrays.PartSample(
         facets, corners, nothing, corners, corners, corners, nothing, nothing, np.empty(0), np.array(True)
     )
     points = np.array([[0.3, 0.1, 0.0], [0.2, 0.7, 0.0], [0.0, 0.6, 0.2], [0.0, 0.1, 0.9]])
@@ -95,7 +96,7 @@ def test_a_surface_in_space_is_interpolated_linearly_and_its_facets_are_found() 
 def test_the_closed_form_is_met_on_every_mesh() -> None:
     """Without friction P1 holds the solution: all errors are rounding, whatever the mesh."""
     solution = solve(scene(8), MPI.COMM_SELF)
-    stiffness, found = sample.stiffness(solution), sample.take(solution)
+    stiffness, found = solution_arrays.stiffness(solution), solution_arrays.take(solution)
     assert stiffness is not None
     assert found is not None
     exact = Yardstick(found, stiffness)
@@ -123,7 +124,7 @@ def test_every_norm_measures_a_known_difference(yardstick: Yardstick) -> None:
 def test_the_energy_norm_is_that_of_the_closed_form() -> None:
     """Of the model problem without friction: a(u, u) = <g, u>, and the energy is -6 J/m, so a(u, u) = 12 J/m."""
     solution = solve(scene(4), MPI.COMM_SELF)
-    stiffness, found = sample.stiffness(solution), sample.take(solution)
+    stiffness, found = solution_arrays.stiffness(solution), solution_arrays.take(solution)
     assert stiffness is not None
     assert found is not None
     scales = solution.problem.scales
@@ -273,7 +274,7 @@ def test_the_mesh_width_halves_where_a_mesh_is_refined(shape: str) -> None:
     """Whatever the angles of its cells: an order in h is a slope over it."""
     size = (1.0, 0.3, 0.7)[: 2 if shape == "rectangle" else 3]
     body = domain.build(MPI.COMM_SELF, scene_of(shape, size), len(size))
-    widths = [sample.width(cells_of(b)) for b in (body, refinement.uniform(body).domain)]
+    widths = [solution_arrays.width(cells_of(b)) for b in (body, refinement.uniform(body).domain)]
     assert widths[1] == pytest.approx(widths[0] / 2, rel=1e-9)
 
 
@@ -287,9 +288,9 @@ def scene_of(shape: str, size: tuple[float, ...]) -> Any:
     return Scene.model_validate({"domain": table, "material": steel, "boundary": {}}).domain
 
 
-def cells_of(body: domain.Domain) -> sample.Sample:
+def cells_of(body: domain.Domain) -> solution_arrays.Sample:
     points = body.mesh.geometry.x[:, : body.dimension]
-    return sample.Sample(points, compat.geometry_dofmap(body.mesh), np.zeros_like(points), {})
+    return solution_arrays.Sample(points, compat.geometry_dofmap(body.mesh), np.zeros_like(points), {})
 
 
 def test_adaptive_meshes_are_added_and_the_reference_stays_finer_than_the_scenes_own_mesh() -> None:

@@ -17,8 +17,9 @@ from mpi4py import MPI
 from petsc4py import PETSc
 from scenes import DELTA, NU, E, P, Q, Table, block, energy, model, quadratic_linear, solved
 
-from hvi_fenicsx import Scene, Superpotential, domain, nodes, prepare
-from hvi_fenicsx.solution import Prepared
+from hvi_fenicsx import Scene, Superpotential, prepare
+from hvi_fenicsx.mesh import domain, vertex_dofs
+from hvi_fenicsx.workflow import Prepared
 
 Array = npt.NDArray[np.float64]
 STRONG = quadratic_linear(3e6)
@@ -159,7 +160,7 @@ def test_weights_in_space_add_up_to_the_area() -> None:
 def test_vertices_are_where_dolfinx_tabulates_them() -> None:
     for size in ([3.0, 0.7], [1.0, 2.0, 3.0]):
         space = fem.functionspace(domain.block(MPI.COMM_SELF, size, [5, 4, 3][: len(size)]).mesh, ("Lagrange", 1))
-        np.testing.assert_allclose(nodes.points(space), space.tabulate_dof_coordinates(), rtol=0, atol=1e-15)
+        np.testing.assert_allclose(vertex_dofs.points(space), space.tabulate_dof_coordinates(), rtol=0, atol=1e-15)
 
 
 def test_the_sides_of_a_box_are_where_they_are_said_to_be() -> None:

@@ -18,7 +18,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, PlainSerializer
 from pydantic_core import PydanticCustomError
 
 from ..errors import InputError
-from ..expressions import Formula
+from ..formula import Formula
 from ..laws import Superpotential
 
 

@@ -7,7 +7,7 @@ from typing import Annotated, Any, ClassVar
 
 from pydantic import BaseModel, ConfigDict, Field, model_serializer, model_validator
 
-from ..expressions import COORDINATES, Formula
+from ..formula import COORDINATES, Formula
 from .base import (
     Contribution,
     Drive,

@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from ..errors import InputError
 from .base import Direction
-from .lawfield import LawEffect
+from .law_effect import LawEffect
 
 
 class Friction(LawEffect):

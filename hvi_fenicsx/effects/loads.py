@@ -13,7 +13,7 @@ from pydantic import (
 )
 
 from ..errors import InputError
-from ..expressions import Formula
+from ..formula import Formula
 from .base import (
     Condition,
     Contribution,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import ClassVar
 
 from .base import Direction
-from .lawfield import LawEffect
+from .law_effect import LawEffect
 
 
 class Adhesion(LawEffect):

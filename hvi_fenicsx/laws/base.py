@@ -20,7 +20,7 @@ import numpy.typing as npt
 from typing_extensions import override
 
 from ..errors import InputError
-from .extremes import Extremes, extremes
+from .traction_bounds import Extremes, extremes
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]

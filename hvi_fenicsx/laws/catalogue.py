@@ -15,7 +15,7 @@ from typing_extensions import override
 
 from ..errors import InputError
 from .base import Superpotential
-from .checks import require_number, require_ordered, require_positive
+from .parameter_checks import require_number, require_ordered, require_positive
 from .polyline import PolylineLaw
 from .traction_graph import TractionGraph
 

@@ -12,7 +12,7 @@ from typing_extensions import override
 
 from ..errors import InputError
 from .base import ConvexPart, Directional, FloatArray, IntArray, Superpotential
-from .extremes import Extremes
+from .traction_bounds import Extremes
 from .traction_graph import TractionGraph
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from typing_extensions import override
 
 from .base import ConvexPart, Directional, FloatArray, IntArray, Superpotential, quotient
-from .checks import require_positive
+from .parameter_checks import require_positive
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,9 +10,9 @@ import numpy as np
 from typing_extensions import override
 
 from .base import ConvexPart, DifferentiablePart, Directional, FloatArray, Superpotential
-from .checks import require_ordered, require_positive
-from .extremes import Extremes
+from .parameter_checks import require_ordered, require_positive
 from .polyline import PolylinePart
+from .traction_bounds import Extremes
 from .traction_graph import TractionGraph
 
 

@@ -12,8 +12,8 @@ from typing import Literal
 from mpi4py import MPI
 
 from ..errors import InputError
-from ..interrupt import SIGNALS
-from ..parallel import on_root
+from ..runtime.mpi import on_root
+from ..runtime.signals import SIGNALS
 
 MARK = "summary.json"
 """The file that says that a folder holds a finished result; always moved last."""

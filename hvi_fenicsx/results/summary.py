@@ -7,10 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from .. import memory, shares, versions
-from ..parallel import agree, largest
-from ..problem import Problem
-from ..solution import Solution
+from ..problem import effect_summary
+from ..problem.problem import Problem
+from ..runtime import memory, versions
+from ..runtime.mpi import agree, largest
+from ..workflow import Solution
 
 
 def summary(solution: Solution) -> dict[str, Any]:
@@ -37,7 +38,7 @@ def summary(solution: Solution) -> dict[str, Any]:
             "estimate": _estimate(solution),
             "accuracy": None,
             "warnings": list(solution.warnings),
-            "effects": [share.as_dict() for share in shares.shares(problem)],
+            "effects": [share.as_dict() for share in effect_summary.shares(problem)],
             "scales": _scales(problem),
             "time": {name: largest(comm, value) for name, value in solution.timer.report().items()},
             "peak_memory_mb": memory.peak(comm),

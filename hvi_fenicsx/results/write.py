@@ -6,11 +6,11 @@ import json
 from pathlib import Path
 from typing import Any
 
-from ..journal import Journal
-from ..parallel import on_root
+from ..runtime.log import Journal
+from ..runtime.mpi import on_root
 from ..scene import dump_scene
-from ..solution import Solution
-from . import fields, sides, table
+from ..workflow import Solution
+from . import boundary_table, contact_table, vtk_fields
 from .summary import summary
 
 
@@ -22,15 +22,15 @@ def write(folder: Path, solution: Solution) -> dict[str, Any]:
     problem, examined, solved = solution.problem, solution.examined, solution.solved
     comm = problem.domain.mesh.comm
     if solved is not None and examined is not None:
-        fields.write_body(folder / "displacement.pvd", problem, solved.u, solution.estimate)
+        vtk_fields.write_body(folder / "displacement.pvd", problem, solved.u, solution.estimate)
         if examined.states:
-            fields.write_contact(folder / "contact.pvd", problem, examined.states)
-        rows = table.rows(problem, examined.states)
-        on_root(comm, lambda: table.write_csv(folder / "contact.csv", rows) if examined.states else None)
+            vtk_fields.write_contact(folder / "contact.pvd", problem, examined.states)
+        rows = contact_table.rows(problem, examined.states)
+        on_root(comm, lambda: contact_table.write_csv(folder / "contact.csv", rows) if examined.states else None)
     elif solution.solvability.direction is not None:
-        fields.write_escape(folder / "displacement.pvd", problem, solution.solvability.direction)
-    lying = sides.rows(problem, solution.scene.parts)
-    on_root(comm, lambda: sides.write_csv(folder / "boundary.csv", lying, problem.scales.dimension))
+        vtk_fields.write_escape(folder / "displacement.pvd", problem, solution.solvability.direction)
+    lying = boundary_table.rows(problem, solution.scene.parts)
+    on_root(comm, lambda: boundary_table.write_csv(folder / "boundary.csv", lying, problem.scales.dimension))
     on_root(comm, lambda: _text(folder / "scene.toml", dump_scene(solution.scene)))
     return summary(solution)
 

@@ -3,7 +3,7 @@
 from ..laws.base import Directional
 from .kernel import Fixed, kernel, modes
 from .motions import Body, Mode, describe, motion_at, rigid_fields
-from .parts import ContactCone, Resistance, RigidProblem
+from .reduction import ContactCone, Resistance, RigidProblem
 from .solvability import analyse, load_factors
 from .verdict import LoadFactors, Paper, Solvability, State, combine, combine_factors
 

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..laws.base import Directional
+from .cutting_planes import Functional, Minimum, Programme, Region, ball, cross
 from .kernel import modes, natural_basis, null_space, triangle
 from .motions import Mode, named
-from .parts import Reduced, RigidProblem
-from .programme import Functional, Minimum, Programme, Region, ball, cross
+from .reduction import Reduced, RigidProblem
 from .verdict import LoadFactors, Paper, Solvability, State
 
 Array = NDArray[np.float64]

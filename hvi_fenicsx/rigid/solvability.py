@@ -17,7 +17,7 @@ from mpi4py import MPI
 from ..errors import HviError, InputError, SolverError
 from .analysis import Analysis
 from .kernel import modes
-from .parts import Reduced, RigidProblem, reduce
+from .reduction import Reduced, RigidProblem, reduce
 from .verdict import LoadFactors, Solvability, undecided, unmovable
 
 Result = TypeVar("Result")

@@ -1,11 +1,11 @@
 """The scene: what the user asked for, from a TOML file (:func:`read_scene`) or Python (:class:`Scene`)."""
 
-from .curved import Disk, HalfDisk, LShape, NotchedStrip
+from .effect_tables import Body, Boundary, Material
 from .model import Placed, Scene
-from .parts import Body, Boundary, Material
+from .plane_shapes import Disk, HalfDisk, LShape, NotchedStrip
 from .reader import read_scene
-from .settings import Solver
 from .shapes import Box, MeshFile, Rectangle
+from .solver_table import Solver
 from .writer import dump_scene
 
 __all__ = [

@@ -11,10 +11,10 @@ from pydantic_core import PydanticCustomError
 
 from ..effects import Effect, Place
 from . import plugins
-from .checks import contradictions
-from .parts import Bodies, Boundary, Materials
-from .settings import Solver
+from .consistency import contradictions
+from .effect_tables import Bodies, Boundary, Materials
 from .shapes import Domain, MeshFile
+from .solver_table import Solver
 from .tables import Names, Problem, Table, refuse
 
 _NAME = re.compile(r"\w[\w.-]{0,99}")

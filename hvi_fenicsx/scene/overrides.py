@@ -6,7 +6,7 @@ import tomllib
 from typing import Any
 
 from ..errors import InputError
-from .words import shown, unknown
+from .messages import shown, unknown
 
 Path = tuple[str | int, ...]
 

@@ -10,7 +10,7 @@ from typing import Any
 
 from pydantic_core import PydanticCustomError
 
-from .words import shown
+from .messages import shown
 
 
 def load(names: Any, folder: str | os.PathLike[str]) -> tuple[str, ...]:

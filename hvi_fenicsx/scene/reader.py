@@ -13,10 +13,10 @@ from typing import Any
 from pydantic import ValidationError
 
 from ..errors import InputError
-from .locate import line_of, lines_of
 from .model import Scene
 from .overrides import override
 from .tables import WHOLE, Problem, problems_of
+from .toml_lines import line_of, lines_of
 
 _LARGEST = 1_000_000
 _MOST_PROBLEMS = 10

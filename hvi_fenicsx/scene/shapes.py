@@ -11,7 +11,7 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import BeforeValidator, Field, PlainSerializer, ValidationInfo, model_validator
 from pydantic_core import PydanticCustomError
 
-from .curved import Disk, HalfDisk, LShape, NotchedStrip
+from .plane_shapes import Disk, HalfDisk, LShape, NotchedStrip
 from .tables import Count, Length, Positive, Problem, Table, choose, refuse, vector
 
 _MOST_UNKNOWNS = 2**31 - 1  # PETSc's default integers

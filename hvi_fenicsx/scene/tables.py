@@ -17,7 +17,7 @@ from pydantic import (
 )
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
-from .words import in_words, shown, suggestion, unknown
+from .messages import in_words, shown, suggestion, unknown
 
 Model = TypeVar("Model", bound=BaseModel)
 Step = str | int

@@ -1,7 +1,7 @@
 """What a scene gets that names no method: the branch iteration, begun again elsewhere where it finds no equilibrium.
 
 The unbroken branch comes first. A narrowly smoothed law is then approached from the solution of the unsmoothed one. A
-body that rolls or tips on its way to rest is put down as a rigid one first (:mod:`.settling`). In the metastable
+body that rolls or tips on its way to rest is put down as a rigid one first (:mod:`.rigid_start`). In the metastable
 state the iteration may slide off while an equilibrium exists on other pieces of the laws: starts on the pieces of the
 resting slips, with every bond broken, and a continuation in the smoothing look for it there. Where no equilibrium need
 exist, the search ends after so many Newton steps.
@@ -16,14 +16,14 @@ from functools import cached_property
 
 from petsc4py import PETSc
 
-from .. import existence
 from ..errors import SolverError
 from ..laws import Superpotential
-from .base import Counts, Solved, resting_start
+from ..system import existence
 from .branch import BranchIteration
 from .continuation import Continuation
-from .models import Majorant
-from .settling import settled
+from .law_models import Majorant
+from .method import Counts, Solved, resting_start
+from .rigid_start import settled
 
 _BROKEN = 1e6
 """Times the resting slip: beyond every kink."""

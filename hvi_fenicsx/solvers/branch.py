@@ -16,14 +16,14 @@ import numpy as np
 import numpy.typing as npt
 from petsc4py import PETSc
 
-from .. import sliding
 from ..errors import SolverError
 from ..laws import Superpotential
-from . import kinks, pieces
-from .activeset import ActiveSetSolver, Outcome
-from .attempts import Attempt, first_success
-from .base import Counts, Settings, Solved, resting_start
-from .models import Cells, Full, Majorant, Softened
+from ..system import boundedness
+from . import initial_branches, kink_bounds
+from .active_set import ActiveSetSolver, Outcome
+from .fallbacks import Attempt, first_success
+from .law_models import Cells, Full, Majorant, Softened
+from .method import Counts, Settings, Solved, resting_start
 
 Array = npt.NDArray[np.float64]
 _LOOSE = 1e-4
@@ -92,7 +92,7 @@ class BranchIteration:
         if branches is not None or start is not None:
             xi = self._subgradients(start if branches is None else branches, 0.0)
         else:
-            first = pieces.arguments(self.system, x, self.settings.start)
+            first = initial_branches.arguments(self.system, x, self.settings.start)
             xi = [law.concave.left(a) for law, a in zip(self._laws, first, strict=True)]
         with self.solver.reporting(self._progress):
             outcome = self._descend(x, self._cells(x), xi)
@@ -176,7 +176,7 @@ class BranchIteration:
             models = [Majorant(law, c, s) for law, c, s in zip(self._laws, cells, xi, strict=True)]
             outcome = self._bounded(x, models, cells, tolerance)
             self.system.residual(x, self._residual, models)
-            moves = kinks.overloaded(self.system, x, self._residual, models, self.settings.tolerance)
+            moves = kink_bounds.overloaded(self.system, x, self._residual, models, self.settings.tolerance)
             if not outcome.converged or not self._any(moves):
                 return cells, outcome
             cells = [c.moved(m) for c, m in zip(cells, moves, strict=True)]
@@ -184,10 +184,10 @@ class BranchIteration:
 
     def _slides(self, xi: list[Array]) -> bool:
         """Whether the convex step has no solution."""
-        return sliding.slides(self.system.problem, self.system.forces, self._laws, xi)
+        return boundedness.slides(self.system.problem, self.system.forces, self._laws, xi)
 
     def _bounded(self, x: PETSc.Vec, models: Sequence[Majorant], cells: list[Cells], tolerance: float) -> Outcome:
-        bounds, attempts = kinks.boxes(self.system, cells), self._attempts(models)
+        bounds, attempts = kink_bounds.boxes(self.system, cells), self._attempts(models)
         return first_success(self.solver, x, attempts, tolerance, bounds, self.counts)
 
     def _attempts(self, models: Sequence[Majorant]) -> Iterator[Attempt | str]:
@@ -209,7 +209,7 @@ class BranchIteration:
         if not self._any([np.array(curved)]):
             return outcome, False
         trial = x.copy()
-        lower, upper = kinks.boxes(self.system, cells)
+        lower, upper = kink_bounds.boxes(self.system, cells)
         full = [Full(law, c) for law, c in zip(self._laws, cells, strict=True)]
         found = self.solver.solve(
             trial, full, self.settings.tolerance, lower=lower, upper=upper, line_search="bt", max_iterations=15
@@ -219,7 +219,9 @@ class BranchIteration:
             return outcome, False
         trial.copy(x)
         self.system.residual(x, self._residual, full)
-        return found, not self._any(kinks.overloaded(self.system, x, self._residual, full, self.settings.tolerance))
+        return found, not self._any(
+            kink_bounds.overloaded(self.system, x, self._residual, full, self.settings.tolerance)
+        )
 
     def _measure(self, x: PETSc.Vec, cells: list[Cells], xi: list[Array]) -> float:
         """The residual of the true inequality: ξ stands if it is still in ∂G. Collective."""
@@ -228,7 +230,7 @@ class BranchIteration:
             for law, c, s, a in zip(self._laws, cells, xi, self._arguments(x), strict=True)
         ]
         self.system.residual(x, self._residual, models)
-        lower, upper = kinks.boxes(self.system, cells)
+        lower, upper = kink_bounds.boxes(self.system, cells)
         return self.solver.measure(x, self._residual, lower, upper)
 
     def _arguments(self, x: PETSc.Vec) -> list[Array]:

@@ -20,9 +20,9 @@ from scipy.sparse import csr_matrix
 
 from ..errors import InputError, SolverError
 from ..laws import Superpotential
-from ..system import Model, System
-from .activeset import ActiveSetSolver
-from .base import Counts, Settings, Solved
+from ..system.system import Model, System
+from .active_set import ActiveSetSolver
+from .method import Counts, Settings, Solved
 from .ssls import onto_bounds
 
 Array = npt.NDArray[np.float64]

@@ -7,10 +7,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from ..smoothing import SmoothedLaw
-from .activeset import ActiveSetSolver
-from .base import Counts, Settings, Solved
+from ..laws.smoothing.smoothed_law import SmoothedLaw
+from .active_set import ActiveSetSolver
 from .branch import BranchIteration
+from .method import Counts, Settings, Solved
 
 _WIDTHS = (1.0, 1e-1, 1e-2, 1e-3)
 """Relative widths that are passed through, as long as they are wider than the wanted one."""

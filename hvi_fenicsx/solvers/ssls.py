@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 from petsc4py import PETSc
 
-from ..system import System
-from .options import configure
-from .smooth import Run, SmoothMethod
+from ..system.petsc_options import configure
+from ..system.system import System
+from .smooth_method import Run, SmoothMethod
 
 _DIRECT = {"ksp_type": "preonly", "pc_type": "lu", "pc_factor_mat_solver_type": "mumps"}
 _KRYLOV = {

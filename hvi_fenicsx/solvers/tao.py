@@ -11,11 +11,11 @@ import numpy as np
 import numpy.typing as npt
 from petsc4py import PETSc
 
-from ..system import System
-from .base import Counts
-from .linear import HeldPreconditioner
-from .options import configure
-from .smooth import Run, SmoothMethod
+from ..system.held_solver import HeldPreconditioner
+from ..system.petsc_options import configure
+from ..system.system import System
+from .method import Counts
+from .smooth_method import Run, SmoothMethod
 
 Array = npt.NDArray[np.float64]
 _FOUNDATION = 1e-3

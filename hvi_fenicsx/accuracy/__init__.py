@@ -1,0 +1,1 @@
+"""Mesh, smoothing and tolerance chosen until an error goal is met."""

@@ -1,0 +1,1 @@
+"""What is said of a solution: certificate, second order, plausibility, error estimate."""

@@ -1,0 +1,197 @@
+"""The defect of u_h in the edge bubbles: minimise ½a(e, e) - ρ(e) among the bubbles that the constraints admit.
+
+ρ is the residual with all that the body feels pointwise: loads, thermal strain, the laws between the vertices. The
+constraints are those of the inequality at the midpoints of the edges (Kornhuber 1996; Zou, Veeser, Kornhuber and
+Gräser 2011).
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+import ufl
+from dolfinx import fem
+from mpi4py import MPI
+
+from ...problem import nodal_averaging
+from ...problem.problem import Bounds, Problem
+from .edge_bubbles import Stiffness, assembled, by_cells
+
+Array = npt.NDArray[np.float64]
+Flags = npt.NDArray[np.bool_]
+_RTOL = 0.1
+"""Of the bubbles' solve, in the energy norm: their energy is right to about its square."""
+_ROUNDS = 4
+_FAR = 1e30
+"""Stands for no bound: an infinite nodal value has no interpolant."""
+
+
+@dataclass(frozen=True)
+class Midpoints:
+    """Edges of a part with bounds (k of them, owned blocks): lower ≤ e·n ≤ upper.
+
+    ``side`` is 1 where e is held on the upper bound, -1 on the lower one, else 0.
+    """
+
+    blocks: npt.NDArray[np.int32]
+    normals: Array
+    lower: Array
+    upper: Array
+    side: npt.NDArray[np.int8]
+
+    def component(self, e: Array) -> Array:
+        """E·n, (k,)."""
+        return np.asarray(np.sum(e[self.blocks] * self.normals, axis=1))
+
+    def moved(self, e: Array, force: Array) -> Midpoints:
+        """Held where e leaves the bounds, let go where the force (n, d) draws away from the bound that holds."""
+        along, push = self.component(e), self.component(force)
+        upper = np.where(self.side == 1, push >= 0, along > self.upper)
+        lower = np.where(self.side == -1, push <= 0, along < self.lower)
+        return replace(self, side=np.where(upper, 1, np.where(lower, -1, 0)).astype(np.int8))
+
+    def placed(self, e: Array) -> None:
+        """Put e on the bounds that hold it."""
+        target = np.where(self.side == 1, self.upper, self.lower)
+        change = np.where(self.side == 0, 0.0, target - self.component(e))
+        e[self.blocks] += change[:, None] * self.normals
+
+    def project(self, r: Array) -> None:
+        """Take out of r what the bounds carry."""
+        carried = np.where(self.side == 0, 0.0, self.component(r))
+        r[self.blocks] -= carried[:, None] * self.normals
+
+
+def residual(problem: Problem, u: fem.Function, space: fem.FunctionSpace) -> Array:
+    """<g, v> - a(u, v) of vector-valued test functions of a space, owned blocks (n, d). Collective."""
+    test, trial = problem.bilinear.arguments()
+    v = ufl.TestFunction(space)
+    form = -ufl.replace(problem.bilinear, {test: v, trial: u})
+    for load in problem.linear.values():
+        form += ufl.replace(load, {test: v})
+    for part, pressure in zip(problem.averaged, pressures(problem, u), strict=True):
+        scalar, vector = part.divergence.arguments()
+        form -= ufl.replace(part.divergence, {scalar: pressure, vector: v})
+    return assembled(form)
+
+
+def pressures(problem: Problem, u: fem.Function) -> list[fem.Function]:
+    """The averaged volumetric stress of each locking-free region, a P1 field. Collective."""
+    found = []
+    for part, averages in zip(problem.averaged, nodal_averaging.assemble(problem.averaged), strict=True):
+        pressure = fem.Function(part.volume.arguments()[0].ufl_function_space())
+        pressure.x.array[: averages.stiffness.local_size] = averages.pressure(u)
+        pressure.x.scatter_forward()
+        found.append(pressure)
+    return found
+
+
+def prescribed(problem: Problem, u: fem.Function, space: fem.FunctionSpace) -> tuple[Flags, Array]:
+    """Whether a bubble is free (n, d), and what prescribed displacements ask of the others (n, d). Collective."""
+    d, owned = problem.scales.dimension, space.dofmap.index_map.size_local
+    free, value = np.ones((owned, d), dtype=np.bool_), np.zeros((owned, d))
+    middle = fem.Function(space)
+    middle.interpolate(u)
+    points = space.tabulate_dof_coordinates()
+    for part in problem.prescribed:
+        blocks = _on(space, part.facets)
+        free[blocks, part.component] = False
+        wanted = part.value.at(points[blocks]) / problem.scales.displacement
+        value[blocks, part.component] = wanted - middle.x.array.reshape(-1, d)[blocks, part.component]
+    return free, value
+
+
+def midpoints(problem: Problem, u: fem.Function, bounds: Bounds, space: fem.FunctionSpace) -> Midpoints:
+    """The bounds of a part at the midpoints of its edges, means of those at their ends. Collective."""
+    d = problem.scales.dimension
+    blocks = _on(space, bounds.surface.facets)
+
+    def middle(values: Array) -> Array:
+        field, result = fem.Function(problem.space), fem.Function(space)
+        spread = np.clip(values, -_FAR, _FAR)
+        field.x.array.reshape(-1, d)[bounds.surface.blocks] = spread
+        field.x.scatter_forward()
+        result.interpolate(field)
+        return np.asarray(result.x.array.reshape(-1, d)[blocks])
+
+    normals = middle(bounds.surface.normals)
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    normal = np.sum(bounds.surface.values(u.x.array) * bounds.surface.normals, axis=1)
+    lower, upper = (middle((b - normal)[:, None])[:, 0] for b in (bounds.lower, bounds.upper))
+    return Midpoints(blocks, normals, np.minimum(lower, 0.0), np.maximum(upper, 0.0), np.zeros(len(blocks), np.int8))
+
+
+def _on(space: fem.FunctionSpace, facets: npt.NDArray[np.int32]) -> npt.NDArray[np.int32]:
+    """Owned blocks on facets, those of a facet of another rank included. Collective."""
+    found = fem.locate_dofs_topological(space, space.mesh.topology.dim - 1, facets)
+    return np.unique(found[found < space.dofmap.index_map.size_local]).astype(np.int32)
+
+
+def least(stiffness: Stiffness, u: fem.Function, load: Array) -> fem.Function:
+    """The admissible bubbles of least energy under a load (n, d), ghosts updated. Collective."""
+    problem, space = stiffness.problem, stiffness.space
+    free, value = prescribed(problem, u, space)
+    solve(stiffness, load, free, value, [midpoints(problem, u, b, space) for b in problem.bounds], _RTOL)
+    e = fem.Function(space)
+    e.x.array[: value.size] = value.ravel()
+    e.x.scatter_forward()
+    return e
+
+
+def solve(stiffness: Stiffness, load: Array, free: Flags, e: Array, parts: Sequence[Midpoints], rtol: float) -> None:
+    """The admissible bubbles of least energy, an active set method, a few rounds. Collective.
+
+    Args:
+        stiffness: a(e, e). load: ρ (n, d). free: see :func:`prescribed`. parts: bounds. rtol: of each solve.
+        e: (n, d), what is prescribed, which the result takes the place of.
+    """
+    guess = np.where(free, stiffness.diagonal_solve(load), e)
+    parts = [part.moved(guess, load) for part in parts]
+    del guess
+    for _ in range(_ROUNDS):
+        for part in parts:
+            part.placed(e)
+        force = stiffness.solve(load, e, functools.partial(_project, free, tuple(parts)), rtol)
+        changed = [part.moved(e, force) for part in parts]
+        same = all(np.array_equal(a.side, b.side) for a, b in zip(parts, changed, strict=True))
+        parts = changed
+        if stiffness.comm.allreduce(same, op=MPI.LAND):
+            break
+
+
+def _project(free: Flags, parts: Sequence[Midpoints], r: Array) -> None:
+    """Take out of r (n, d) what is prescribed and what the bounds hold."""
+    r *= free
+    for part in parts:
+        part.project(r)
+
+
+def compressibility(problem: Problem, u: fem.Function) -> Array:
+    """2μ/d ∫ (div u_h - p_h/λ)² of every owned cell, p_h being the averaged volumetric stress. Collective.
+
+    Where div u is averaged, a(e, e) has the shear part only, and the volumetric stress is an unknown of its own. This
+    is the residual of its equation, by the least shear energy of a strain with that trace.
+    """
+    q = ufl.TestFunction(fem.functionspace(problem.domain.mesh, ("Discontinuous Lagrange", 0)))
+    d, result = problem.scales.dimension, 0.0
+    for part, pressure in zip(problem.averaged, pressures(problem, u), strict=True):
+        scalar, vector = part.divergence.arguments()
+        volume = assembled(ufl.replace(part.volume, {scalar: q}))
+        dilated = assembled(ufl.replace(part.divergence, {scalar: q, vector: u}))
+        mean = np.divide(dilated, volume, out=np.zeros_like(dilated), where=volume > 0)
+        at = mean - pressure.x.array[pressure.function_space.dofmap.list[: len(mean)]] / part.modulus
+        squares = np.sum(at**2, axis=1) + np.sum(at, axis=1) ** 2
+        result = result + part.shear / d * volume[:, 0] * squares / ((d + 1) * (d + 2))
+    return np.asarray(result)
+
+
+def by_cell(problem: Problem, e: fem.Function) -> Array:
+    """a(e, e) of every owned cell. Collective."""
+    test, trial = problem.bilinear.arguments()
+    q = ufl.TestFunction(fem.functionspace(problem.domain.mesh, ("Discontinuous Lagrange", 0)))
+    form = ufl.replace(problem.bilinear, {test: e, trial: e})
+    return np.maximum(assembled(by_cells(form, q))[:, 0], 0.0)

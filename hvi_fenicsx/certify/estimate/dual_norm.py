@@ -1,0 +1,142 @@
+"""Dual energy norms of functionals on P1: sqrt(r·A⁻¹r), A the stiffness with what contact and sticking hold left out.
+
+Two functionals are measured so: what smoothing changes of the law, and what the solver left over.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+from dolfinx import fem
+from petsc4py import PETSc
+
+from ...problem.law_term import LawTerm
+from ...problem.problem import Bounds, Problem
+from ...problem.vectors import new_vector, turn
+from ...runtime.mpi import total
+from ...runtime.timing import Timer
+from ...system.held_solver import HeldPreconditioner, LinearSettings
+from ...system.system import System
+from .. import contact_state
+from ..certificate import Examined
+from ..contact_state import State
+from ..force_attribution import components, on_bounds, on_kink, touches
+from .law_traces import nearest, tractions
+
+Array = npt.NDArray[np.float64]
+RTOL = 0.1
+"""Of the residual: the energy is then right to about its square."""
+
+
+class Dual:
+    """The inverse of the system's stiffness where u is held: by contact, by convex kinks, by supports.
+
+    Laws add the rising part of their tangent, so that the body they hold has no free motion. Creation is collective.
+    """
+
+    def __init__(self, system: System, u: fem.Function) -> None:
+        self.system, self._before = system, system.rates
+        x = system.unknowns(u)
+        self.held = _held(system, x)
+        system.set_rates([_rising(term, x.array_r) for term in system.terms])
+        self._inverse = HeldPreconditioner(system, LinearSettings.choose(system), Timer())
+        self._inverse.prepare(self.held)
+
+    def solve(self, functional: Array) -> tuple[fem.Function, float]:
+        """The Riesz representative of a functional (owned blocks (n, d), Cartesian) and its energy norm. Collective."""
+        system = self.system
+        load, x = self._load(functional), system.load.duplicate()
+        x.set(0.0)
+        if load.norm() > 0:
+            self._inverse.solve(load, x, RTOL)
+        energy = float(load.dot(x))
+        return system.displacement(x), float(np.sqrt(max(energy, 0.0)))
+
+    def _load(self, functional: Array) -> PETSc.Vec:
+        system = self.system
+        load = new_vector(system.problem.space)
+        load.array[:] = functional.ravel()
+        turn(load, system.rotation)
+        load.array[self.held] = 0.0
+        load.array[system.problem.fixed_here] = 0.0
+        return load
+
+    def destroy(self) -> None:
+        """Free the preconditioner and put the tangent back that was there. Collective."""
+        self._inverse.destroy()
+        self.system.set_rates(self._before)
+
+
+def _held(system: System, x: PETSc.Vec) -> npt.NDArray[np.int32]:
+    """Owned scalar dofs on a bound, or on a convex kink of a law."""
+    u = x.array_r
+    found: list[npt.NDArray[np.int64]] = [np.empty(0, np.int64)]
+    for bounds in system.bounds:
+        dofs, sign = bounds.component()
+        found.append(dofs[touches(bounds, sign * u[dofs])])
+    for term in system.terms:
+        stuck = on_kink(term.law.convex, term.argument(u))
+        found.extend(dofs[stuck] for dofs, _ in components(term))
+    return np.setdiff1d(np.unique(np.concatenate(found)), system.problem.fixed).astype(np.int32)
+
+
+def _rising(term: LawTerm, u: Array) -> Array:
+    argument = term.argument(u)
+    convex = term.law.convex
+    second = np.maximum(convex.second(argument) - term.law.concave.second(argument), 0.0)
+    secant = np.maximum((convex.left(argument) + convex.right(argument)) / 2, 0.0) if term.radial else second
+    return term.rate(u, secant, second)
+
+
+def smoothing(problem: Problem, states: Sequence[State]) -> Array:
+    """The smoothed laws' nodal forces minus the nearest ones of the unsmoothed laws, owned blocks (n, d)."""
+    return _law_forces(problem, states, exact=True)
+
+
+def algebraic(problem: Problem, examined: Examined) -> Array:
+    """Nodal forces that nothing accounts for: off the carriers, beyond the laws, pulling or distant contact; (n, d)."""
+    rest = contact_state.balanced(problem, examined.forces.reaction, examined.states)
+    rest = rest - _law_forces(problem, examined.states, exact=False)  # a law's force is minus its residual
+    for state in examined.states:
+        if state.bounds is not None:
+            force = state.surface.weights * _unfounded(state.bounds, state)
+            rest[state.surface.blocks] += force[:, None] * state.surface.normals
+    return np.asarray(rest)
+
+
+def _unfounded(bounds: Bounds, state: State) -> Array:
+    """σ_n (m,) that contact cannot carry: at a gap, or of the wrong sign."""
+    lower, upper = on_bounds(bounds, state.normal)
+    p = state.contact_pressure
+    right = (upper & (p <= 0)) | (lower & (p >= 0))
+    return np.where(right, 0.0, p)
+
+
+def penetration_energy(problem: Problem, states: Sequence[State]) -> float:
+    """Σ force times penetration over the vertices with bounds. Collective."""
+    local = 0.0
+    for state in states:
+        if state.bounds is not None:
+            beyond = np.maximum(state.bounds.beyond(state.normal), 0.0)
+            local += float(np.sum(state.surface.weights * np.abs(state.contact_pressure) * beyond))
+    return total(problem.domain.mesh.comm, local)
+
+
+def _law_forces(problem: Problem, states: Sequence[State], *, exact: bool) -> Array:
+    """Nodal law forces that the (exact or solved) law cannot give, owned blocks (n, d)."""
+    d = problem.scales.dimension
+    forces = np.zeros((problem.space.dofmap.index_map.size_local, d))
+    for state in states:
+        for number, term in enumerate(state.terms):
+            given, slip = tractions(state, number), _slip(state, number)
+            away = given - nearest(term.exact if exact else term.law, slip, given)
+            away[state.hidden[number]] = 0.0
+            vectors = np.einsum("mk,mkd->md", away * state.surface.weights[:, None], term.directions)
+            np.add.at(forces, state.surface.blocks, vectors)
+    return forces
+
+
+def _slip(state: State, number: int) -> Array:
+    return state.slip if state.terms[number].radial else state.arguments[number][:, None]

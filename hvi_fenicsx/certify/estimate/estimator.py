@@ -1,0 +1,112 @@
+"""A posteriori error estimation: how far u_h is from the solution of the inequality, by cause and by cell.
+
+Errors are of the energy norm |||v||| = a(v, v)^½, which no rigid motion changes. Discretisation: the defect in the
+edge bubbles that complete P1 to P2, under the inequality's own constraints (docs/estimator.md). Smoothing, algebraic:
+dual norms of what the smoothed law and the solver leave in the discrete equations.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from dolfinx import fem
+
+from ...problem.problem import Problem
+from ...runtime.mpi import total
+from ...system.system import System
+from ..certificate import Examined
+from . import defect, dual_norm, edge_bubbles, law_traces
+from .contact_errors import OnContact, on_contact, ratio
+
+Array = npt.NDArray[np.float64]
+_ROUNDING = 1e-12
+"""Nondimensional norms up to this are rounding: a body that meets no force has no error, not 100 % of nothing."""
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """Estimated errors in the energy norm, nondimensional (energies in units of :attr:`.Scales.energy`).
+
+    Attributes:
+        cells: η_K of the cells that this rank owns, Σ η_K² = discretisation² over all ranks.
+        discretisation: of the mesh. smoothing: of the smoothed laws, 0 for exact ones. algebraic: of the solver.
+        energy_norm: |||u_h|||.
+    """
+
+    cells: Array
+    discretisation: float
+    smoothing: float
+    algebraic: float
+    energy_norm: float
+
+    @property
+    def total(self) -> float:
+        """All three; the last two are errors within P1, to which the first is orthogonal."""
+        return float(np.sqrt(self.discretisation**2 + self.smoothing**2 + self.algebraic**2))
+
+    @property
+    def relative(self) -> float:
+        """The total over |||u_h|||; infinite where u_h is a rigid motion and the error is not 0."""
+        return ratio(self.total, self.energy_norm)
+
+    def as_dict(self) -> dict[str, float]:
+        """The numbers by name, nondimensional."""
+        names = ("relative", "total", "discretisation", "smoothing", "algebraic", "energy_norm")
+        return {name: float(getattr(self, name)) for name in names}
+
+
+def estimate(system: System, u: fem.Function, examined: Examined) -> Estimate:
+    """Estimate the error of a displacement. Collective.
+
+    Args:
+        system: what was solved. u: its solution, nondimensional, ghosts updated. examined: of the same u.
+    """
+    problem = system.problem
+    cells, unmet = _between_vertices(problem, u, examined)
+    inverse = dual_norm.Dual(system, u)
+    if problem.terms:
+        cells += defect.by_cell(problem, inverse.solve(unmet)[0])
+    smoothing = inverse.solve(dual_norm.smoothing(problem, examined.states))[1] if _smoothed(problem) else 0.0
+    _, algebraic = inverse.solve(dual_norm.algebraic(problem, examined))
+    inverse.destroy()
+    comm = problem.domain.mesh.comm
+    beyond = dual_norm.penetration_energy(problem, examined.states)
+    return Estimate(
+        np.sqrt(cells),
+        _norm(total(comm, float(cells.sum()))),
+        _norm(smoothing**2),
+        _norm(algebraic**2 + beyond),
+        _norm(_energy(problem, u, examined)),
+    )
+
+
+def _norm(square: float) -> float:
+    """The root of what is more than rounding, else 0."""
+    return float(np.sqrt(square)) if square > _ROUNDING**2 else 0.0
+
+
+def _between_vertices(problem: Problem, u: fem.Function, examined: Examined) -> tuple[Array, Array]:
+    """η_K² of the owned cells that P1 does not see; nodal forces (n, d) that it takes the laws' for. Collective."""
+    space = edge_bubbles.space(problem.domain.mesh)
+    edges, vertices = law_traces.pointwise(problem, space, u, examined.states)
+    edges *= -1.0
+    edges += defect.residual(problem, u, space)
+    cells = defect.by_cell(problem, defect.least(edge_bubbles.Stiffness(problem, space), u, edges))
+    if problem.averaged:
+        cells += defect.compressibility(problem, u)
+    return cells, vertices
+
+
+def _smoothed(problem: Problem) -> bool:
+    return any(term.law != term.exact for term in problem.terms)
+
+
+def _energy(problem: Problem, u: fem.Function, examined: Examined) -> float:
+    """a(u, u). Collective."""
+    internal = examined.forces.reaction + examined.forces.load
+    return total(problem.domain.mesh.comm, float(u.x.array[: internal.size] @ internal.ravel()))
+
+
+__all__ = ["Estimate", "OnContact", "estimate", "on_contact"]

@@ -1,0 +1,162 @@
+"""What the program tells in words: the scene, whether a solution exists, what was found and how sure it is."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Any
+
+from .accuracy.control import Reached
+from .accuracy.quantities import NAMES
+from .certify.estimate.estimator import Estimate
+from .problem import effect_summary
+from .rigid import Body, LoadFactors, Mode
+from .solvers import nested_iteration, registry
+from .workflow import Prepared, Solution
+
+_LISTED = 3
+"""Rigid motions that are told one by one."""
+
+
+def heading(prepared: Prepared, ranks: int) -> Iterator[str]:
+    """The scene, its size and its existence."""
+    title = prepared.scene.title or "untitled"
+    yield f"{title}: {prepared.system.dofs:,} unknowns on {ranks} rank{'s'[: ranks - 1]}"
+    yield f"existence: {existence(prepared)}"
+    yield from odd(prepared.warnings)
+
+
+def odd(warnings: Iterable[str]) -> Iterator[str]:
+    """What looks odd, a line each."""
+    return (f"odd: {warning}" for warning in warnings)
+
+
+def existence(prepared: Prepared) -> str:
+    """One line on kernel, state, margin and load factors."""
+    s = prepared.solvability
+    bodies = prepared.problem.bodies.bodies
+    trouble = f" ({s.trouble})" if s.trouble else ""
+    parts = [f"{s.state}{trouble}; rigid motions that the supports leave: {motions(s.kernel, bodies)}"]
+    if s.direction is not None:
+        parts.append(f"escape by {s.direction.words}")
+    if s.margin is not None:
+        parts.append(f"margin {s.margin:.3g}")
+    if s.free:
+        free = motions(s.free, bodies)
+        parts.append(f"free, held by nothing and in balance: {free} (what is returned moves least that way)")
+    for name, factor in (("held up to load factor", s.lambda_held), ("peak at load factor", s.lambda_peak)):
+        if math.isfinite(factor):
+            parts.append(f"{name} {factor:.6g}")
+    return "; ".join(parts)
+
+
+def motions(found: Sequence[Mode], bodies: Sequence[Body]) -> str:
+    """Rigid motions of some bodies: a few in words, more by their number."""
+    if len(found) <= _LISTED:
+        return ", ".join(mode.words for mode in found) or "none"
+    if len(found) == sum(body.motions for body in bodies):
+        return f"all {len(found)}" + (f" of {len(bodies)} bodies" if len(bodies) > 1 else "")
+    return f"{len(found)} (`hvi check --json` lists them)"
+
+
+def load_factors(factors: Mapping[str, LoadFactors]) -> Iterator[str]:
+    """One line on each load: between which factors of it the body is held, the others as they are."""
+    for name, f in factors.items():
+        if f.held_from < f.held:
+            ends = [f"above {f.held_from:.6g}"] if math.isfinite(f.held_from) else []
+            ends += [f"up to {f.held:.6g}"] if math.isfinite(f.held) else []
+            held = f"held at factors {' and '.join(ends)}" if ends else "held at any factor"
+        else:
+            held = "held at no factor"
+        words = f" ({f.mode.words})" if f.mode else ""
+        peak = f"peak at {f.peak:.6g}" if math.isfinite(f.peak) else "no peak" if f.peak > 0 else "beyond every peak"
+        yield f"load {name} alone: {held}{words}; {peak}" + (f" ({f.peak_mode.words})" if f.peak_mode else "")
+
+
+def effects(prepared: Prepared) -> Iterator[str]:
+    """The effects in force with what each adds, and the solver that follows. Collective."""
+    found = effect_summary.shares(prepared.problem)
+    yield from (f"effect: {share.effect} on {share.where or 'the body'}: {share.adds}" for share in found)
+    yield from effect_summary.table(found)
+    yield f"solver: {solver(prepared)}"
+
+
+def solver(prepared: Prepared) -> str:
+    """Which solver the effects call for."""
+    wanted = prepared.scene.solver
+    kind = nested_iteration.linear(prepared.scene, prepared.system).kind
+    linear = {"lu": "MUMPS", "gamg": "CG with GAMG", "mg": "CG with geometric multigrid on the ladder"}[kind]
+    bounds = "" if prepared.problem.bounds else ", no bounds"
+    return f"{registry.choose(wanted, prepared.system).words}{bounds}, {linear}"
+
+
+def outcome(solution: Solution) -> Iterator[str]:
+    """What was found and how sure it is."""
+    yield f"result: {solution.reason}"
+    if solution.examined is None or solution.solved is None:
+        return
+    c, counts = solution.examined.certificate, solution.solved.counts
+    yield (
+        f"certificate ({c.tolerance:g}): equilibrium {c.equilibrium:.1e}, penetration {c.penetration:.1e}, tension "
+        f"{c.tension:.1e}, complementarity {c.complementarity:.1e}, inclusion {c.inclusion:.1e}; {c.second_order}"
+    )
+    if solution.scene.solver.smoothing is not None:
+        away = solution.examined.smoothing_error * solution.problem.scales.stress
+        yield f"smoothing: -σ_t is up to {away:.3g} N/m² from what the unsmoothed law gives there"
+    if solution.estimate is not None:
+        yield error(solution.estimate)
+    energy = solution.examined.energy * solution.problem.scales.energy
+    unit = "J/m" if solution.problem.scales.dimension == 2 else "J"
+    yield (
+        f"energy {energy:.10g} {unit}; {counts.branch} branch steps, {counts.newton} Newton steps, {counts.linear} "
+        f"linear iterations, {solution.timer.seconds['setup'] + solution.timer.seconds['solve']:.2f} s"
+    )
+
+
+def error(estimate: Estimate) -> str:
+    """One line on the estimated error and its parts."""
+    norm = estimate.energy_norm or 1.0
+    parts = {name: getattr(estimate, name) / norm for name in ("discretisation", "smoothing", "algebraic")}
+    split = ", ".join(f"{name} {percent(value)}" for name, value in parts.items())
+    return f"estimated error {percent(estimate.total / norm)} in the energy norm ({split})"
+
+
+def percent(value: float) -> str:
+    """A share as a person reads it."""
+    if not math.isfinite(value):
+        return "unknown"
+    return f"{100 * value:.2g} %" if value >= 1e-5 or value == 0 else f"{value:.0e}"
+
+
+def bought(reached: Reached) -> Iterator[str]:
+    """What was chosen for an accuracy, what it cost, and what a tenth of the error would cost."""
+    goal, steps = reached.goal, reached.steps
+    if reached.why is not None:
+        yield f"accuracy not reached: {reached.why}"
+    if not steps:
+        return
+    last, asked = steps[-1], "" if goal.accuracy is None else f" ({percent(goal.accuracy)} was asked for)"
+    epsilon = "" if last.epsilon is None else f", ε {last.epsilon:.2g}"
+    yield (
+        f"accuracy: {percent(last.error)}{asked} of {NAMES[goal.quantity]}, by {len(steps)} meshes up to {last.dofs:,} "
+        f"unknowns, tolerance {last.tolerance:.0e}{epsilon}, {sum(s.seconds for s in steps):.1f} s"
+    )
+    if reached.more is not None:
+        more = reached.more
+        yield (
+            f"{percent(more.accuracy)} would take about {more.dofs:.1e} unknowns, {more.seconds:.3g} s and "
+            f"{more.memory / 1024:.2g} GB"
+        )
+
+
+def as_data(prepared: Prepared, factors: Mapping[str, LoadFactors]) -> dict[str, Any]:
+    """The report of ``check --json``. Collective."""
+    return {
+        "scene": prepared.scene.title,
+        "dofs": prepared.system.dofs,
+        "solvability": prepared.solvability.summary(),
+        "load_factors": {name: found.summary() for name, found in factors.items()},
+        "effects": [share.as_dict() for share in effect_summary.shares(prepared.problem)],
+        "solver": solver(prepared),
+        "warnings": list(prepared.warnings),
+    }

@@ -1,0 +1,1 @@
+"""The mesh: domain shapes, gmsh, refinement, coarsening, and the transfer between levels."""

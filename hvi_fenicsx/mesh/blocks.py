@@ -1,0 +1,66 @@
+"""Rectangles and boxes of equal cells, each rank making the part that it keeps.
+
+Each cell of the grid is cut along the paths of edges from its lowest to its highest corner (Kuhn 1960): in the plane
+``create_rectangle``'s right-diagonal pattern, in space ``create_box``'s six tetrahedra, both nested in themselves. The
+ranks share a block by recursive bisection (Berger and Bokhari 1987). It cuts at fractions of the block, rounded to
+cells, so that a rank has the same part on every rung of a ladder, to half a cell, and hardly a value travels between
+rungs; a graph partitioner would also have to be run on each of them, and cut each of them elsewhere.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+from dolfinx import mesh as dmesh
+from mpi4py import MPI
+
+from .. import compat
+
+Array = npt.NDArray[np.float64]
+Numbers = npt.NDArray[np.int64]
+
+
+def mesh(comm: MPI.Comm, size: Sequence[float], cells: Sequence[int]) -> dmesh.Mesh:
+    """[0, size] in so many cells each way, cut into triangles or tetrahedra, without ghost cells. Collective."""
+    lower, upper = share(cells, comm.size, comm.rank)
+    kind = {2: "triangle", 3: "tetrahedron"}[len(cells)]
+    return compat.simplex_mesh(comm, _simplices(lower, upper, cells), _points(comm, size, cells), kind)
+
+
+def share(cells: Sequence[int], ranks: int, rank: int) -> tuple[Numbers, Numbers]:
+    """The cells of the grid that a rank keeps: from ``lower`` to before ``upper`` (d,); none where they are too few."""
+    lower, upper = np.zeros(len(cells)), np.ones(len(cells))
+    first, last = 0, ranks
+    while last - first > 1:
+        middle = (first + last + 1) // 2
+        extent = (upper - lower) * cells
+        axis = len(extent) - 1 - np.argmax(extent[::-1])  # of equals the last: bodies stand on what then stays whole
+        cut = lower[axis] + (upper[axis] - lower[axis]) * (middle - first) / (last - first)
+        if rank < middle:
+            upper[axis], last = cut, middle
+        else:
+            lower[axis], first = cut, middle
+    begin, end = (np.floor(place * cells + 0.5).astype(np.int64) for place in (lower, upper))
+    return begin, end
+
+
+def _simplices(lower: Numbers, upper: Numbers, cells: Sequence[int]) -> Numbers:
+    """Those of a part of the grid, (n, d+1), in numbers of the grid's vertices, x running fastest."""
+    steps = np.cumprod([1, *(n + 1 for n in cells[:-1])], dtype=np.int64)
+    corners = np.zeros(1, np.int64)
+    for begin, end, step in zip(lower, upper, steps, strict=True):
+        corners = np.add.outer(np.arange(begin, end) * step, corners).ravel()
+    paths = np.array([np.cumsum([0, *path]) for path in itertools.permutations(steps)])
+    return np.asarray((corners[:, None, None] + paths).reshape(-1, len(cells) + 1))
+
+
+def _points(comm: MPI.Comm, size: Sequence[float], cells: Sequence[int]) -> Array:
+    """An equal share of the grid's vertices in the order of their numbers, (n, d); dolfinx sends each where it goes."""
+    counts = [n + 1 for n in cells]
+    total = int(np.prod(counts, dtype=np.int64))
+    numbers = np.arange(total * comm.rank // comm.size, total * (comm.rank + 1) // comm.size)
+    places = np.unravel_index(numbers, counts, order="F")
+    return np.column_stack([np.linspace(0.0, s, n)[at] for s, n, at in zip(size, counts, places, strict=True)])

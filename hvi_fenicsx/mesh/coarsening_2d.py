@@ -1,0 +1,132 @@
+"""A ladder for a mesh that has none: coarser meshes of the same body.
+
+In the plane gmsh makes one within a thinned outline; in space :mod:`.coarsening_3d` does. Only that is made anew; the
+meshes between are its refinements, so the one step that is not nested is the last, onto the mesh itself. What these
+meshes give is a start and a preconditioner: solutions are those of the mesh itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from .. import compat
+from ..runtime.mpi import on_root
+from . import coarsening_3d, gmsh_model, refinement, thinned_outline
+from .domain import Domain
+from .thinned_outline import NONE, HalfEdges, Outline
+
+_WORTHWHILE = 20_000
+"""Unknowns from which it pays: below, one factorisation takes less than gmsh."""
+_COARSEST = 2_500
+"""Unknowns of the coarsest mesh, about."""
+_UNNAMED = ""
+
+
+def founded(domain: Domain) -> Domain:
+    """The domain with coarser ones below it, where it is large enough and gmsh can make them. Collective."""
+    d = domain.dimension
+    unknowns = d * domain.mesh.topology.index_map(0).size_global
+    if domain.origin is not None or unknowns < _WORTHWHILE:
+        return domain
+    factor = 2.0 ** round(np.log2(unknowns / _COARSEST) / d)
+    coarse = _coarse(domain, factor) if d == 2 else coarsening_3d.coarse(domain, factor)
+    if coarse is None:
+        return domain
+    growth = unknowns / (d * coarse.mesh.topology.index_map(0).size_global)  # what is round may ask for more vertices
+    return replace(domain, origin=(refinement.repeated(coarse, max(0, round(np.log2(growth) / d) - 1)), None))
+
+
+def _coarse(domain: Domain, factor: float) -> Domain | None:
+    """The plane body with edges longer by a factor, about. Collective."""
+    comm, sides, regions = domain.mesh.comm, sorted(domain.sides), sorted(domain.regions)
+    parts = comm.gather(_half_edges(domain, sides, regions))
+    with gmsh_model.session(comm) as gmsh:
+        names = on_root(comm, lambda: _meshed(gmsh, HalfEdges.joined(parts or []), factor, sides, regions))
+        if names is None:
+            return None
+        mesh, found, within = gmsh_model.distribute(comm, gmsh, 2, names)
+    mesh.geometry.x[:] *= domain.length
+    return replace(domain, mesh=mesh, sides=found, regions={name: within[name] for name in regions})
+
+
+def _half_edges(domain: Domain, sides: Sequence[str], regions: Sequence[str]) -> HalfEdges:
+    """This rank's edges without a second cell, or on a side, or between regions; lengths in those of the body."""
+    mesh = domain.mesh
+    facets, nodes = refinement.cell_facets(mesh), compat.geometry_dofmap(mesh)
+    region = _numbered(domain.regions, regions, len(facets))
+    side = _numbered(domain.sides, sides, facets.max(initial=-1) + 1)
+    cells = np.repeat(np.arange(len(facets)), 3)
+    own = facets.ravel()
+    alone = np.bincount(own, minlength=len(side)) == 1
+    least, most = np.full(len(side), len(regions)), np.full(len(side), NONE)
+    np.minimum.at(least, own, region[cells])
+    np.maximum.at(most, own, region[cells])
+    cell, i = np.divmod(np.flatnonzero((alone | (side != NONE) | (least != most))[own]), 3)
+    ends = np.stack([nodes[cell, (i + 1) % 3], nodes[cell, (i + 2) % 3]], axis=1)
+    x = mesh.geometry.x[:, :2] / domain.length
+    (ax, ay), (bx, by) = (x[ends[:, 1]] - x[ends[:, 0]]).T, (x[nodes[cell, i]] - x[ends[:, 0]]).T
+    ends = np.where((ax * by < ay * bx)[:, None], ends[:, ::-1], ends)  # the cell to the left
+    numbers = mesh.geometry.index_map().local_to_global(ends.ravel().astype(np.int32)).reshape(-1, 2)
+    return HalfEdges(numbers, x[ends], region[cell], side[facets[cell, i]])
+
+
+def _numbered(named: Mapping[str, npt.NDArray[np.int32]], names: Sequence[str], size: int) -> npt.NDArray[np.int64]:
+    """For each entity the number of the name that it bears, or NONE."""
+    numbers = np.full(size, NONE)
+    for number, name in enumerate(names):
+        numbers[named[name]] = number
+    return numbers
+
+
+def _meshed(
+    gmsh: Any, edges: HalfEdges, factor: float, sides: Sequence[str], regions: Sequence[str]
+) -> dict[int, dict[str, int]] | None:
+    """Mesh the thinned outline in gmsh; its physical groups, or None where it cannot. On gmsh's rank."""
+    thinned = thinned_outline.traced(edges, factor)
+    if thinned is None:
+        return None
+    groups = _drawn(gmsh, thinned, [*sides], [*regions, _UNNAMED])
+    try:
+        gmsh.model.mesh.generate(2)
+    except Exception:
+        # gmsh raises bare Exceptions, whatever it is that it cannot mesh
+        return None
+    return groups
+
+
+def _drawn(gmsh: Any, thinned: Outline, sides: list[str], regions: list[str]) -> dict[int, dict[str, int]]:
+    """The outline in gmsh, each of its edges one edge of a cell; the physical groups by dimension and name.
+
+    Cells of no region are in one of the last name.
+    """
+    geo = gmsh.model.geo
+    kept = sorted({v for chain in thinned.chains for v in chain.vertices})
+    points = {v: geo.addPoint(*thinned.places[v], 0.0) for v in kept}
+    lines = [[geo.addLine(points[a], points[b]) for a, b in pairwise(c.vertices)] for c in thinned.chains]
+    surfaces: dict[int, list[int]] = {}
+    for face in thinned.faces:
+        loops = [geo.addCurveLoop(_curves(lines, loop)) for loop in face.loops]
+        surfaces.setdefault(face.region, []).append(geo.addPlaneSurface(loops))
+    geo.synchronize()
+    for line in (line for found in lines for line in found):
+        gmsh.model.mesh.setTransfiniteCurve(line, 2)
+    bounds: dict[int, list[int]] = {}
+    for chain, found in zip(thinned.chains, lines, strict=True):
+        bounds.setdefault(chain.side, []).extend(found)
+    bounds.pop(NONE, None)
+    add = gmsh.model.addPhysicalGroup
+    return {
+        1: {sides[number]: add(1, found) for number, found in bounds.items()},
+        2: {regions[number]: add(2, found) for number, found in surfaces.items()},
+    }
+
+
+def _curves(lines: Sequence[Sequence[int]], loop: Sequence[tuple[int, bool]]) -> list[int]:
+    """Signed gmsh lines along a loop."""
+    return [line if forward else -line for number, forward in loop for line in lines[number][:: 1 if forward else -1]]

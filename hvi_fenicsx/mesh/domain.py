@@ -1,0 +1,178 @@
+"""The body: mesh, named boundary parts and regions, in SI. Knows no effect and no solver."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+from dolfinx import mesh as dmesh
+from mpi4py import MPI
+
+from ..errors import InputError
+from ..runtime import memory
+from ..runtime.mpi import agree
+from . import blocks, gmsh_model, gmsh_shapes
+from .gmsh_shapes import Arc
+
+if TYPE_CHECKING:
+    from ..scene.shapes import Shape
+
+_LEAST_MEMORY = 300.0
+"""Bytes for one unknown: its row of the matrix and its share of the mesh, without any solver."""
+Facets = npt.NDArray[np.int32]
+Halves = npt.NDArray[np.int8]
+_AXIS_OF_SIDE = {"left": (0, 0), "right": (0, 1), "bottom": (-1, 0), "top": (-1, 1), "front": (1, 0), "back": (1, 1)}
+"""Axis (-1: the last, the vertical one) and end of each named side."""
+
+
+@dataclass(frozen=True)
+class Domain:
+    """A mesh with named sides and regions.
+
+    Attributes:
+        mesh: the dolfinx mesh, SI coordinates.
+        sides: local facet indices by name (built-in sides, or physical groups of a file).
+        regions: local cell indices by name (physical groups of a file).
+        lower, upper: corners of the bounding box, shape (d,), the same on all ranks.
+        curves: the true curve of a side by its name, where that is known and not straight; the facets of all other
+            sides, those of mesh files among them, are taken for the geometry itself.
+        one_piece: whether the mesh is known to be connected; else one has to look (:mod:`.bodies`).
+        origin: the coarser domain that serves as the rung below, and how it was refined (None: it was not, but is
+            another mesh of the same body); None where there is none.
+    """
+
+    mesh: dmesh.Mesh
+    sides: Mapping[str, Facets]
+    regions: Mapping[str, Facets]
+    lower: npt.NDArray[np.float64]
+    upper: npt.NDArray[np.float64]
+    curves: Mapping[str, Arc] = field(default_factory=dict)
+    one_piece: bool = False
+    origin: tuple[Domain, Refinement | None] | None = None
+
+    @property
+    def dimension(self) -> int:
+        """2 or 3."""
+        return int(self.mesh.geometry.dim)
+
+    @property
+    def length(self) -> float:
+        """The longest edge of the bounding box, m: the length scale L."""
+        return float(np.max(self.upper - self.lower))
+
+    @property
+    def centre(self) -> npt.NDArray[np.float64]:
+        """Centre of the bounding box, shape (3,), m."""
+        return np.pad((self.lower + self.upper) / 2, (0, 3 - self.dimension))
+
+    def facets(self, names: Sequence[str]) -> Facets:
+        """Local facets of the named sides together, sorted.
+
+        Raises:
+            InputError: a name that the domain does not have (the same on all ranks).
+        """
+        for name in names:
+            if name not in self.sides:
+                raise InputError(f"the domain has no boundary part {name!r}; it has {', '.join(sorted(self.sides))}")
+        return np.unique(np.concatenate([self.sides[name] for name in names])).astype(np.int32)
+
+    def cells(self, names: Sequence[str]) -> Facets:
+        """Local cells of the named regions together, sorted.
+
+        Raises:
+            InputError: a name that the domain does not have (the same on all ranks).
+        """
+        for name in names:
+            if name not in self.regions:
+                known = ", ".join(sorted(self.regions)) or "no named regions"
+                raise InputError(f"the domain has no region {name!r}; it has {known}")
+        return np.unique(np.concatenate([self.regions[name] for name in names])).astype(np.int32)
+
+
+@dataclass(frozen=True)
+class Refinement:
+    """A refined domain and how it came from the one before.
+
+    Attributes:
+        domain: the refined one.
+        parents: local parent cell of each local cell, shape (cells,).
+        halves: twice the barycentric coordinates of each cell's vertices in the parent cell, shape (cells, d+1, d+1):
+            a 2 for a vertex of the parent, two 1s for the middle of one of its edges.
+    """
+
+    domain: Domain
+    parents: Facets
+    halves: Halves
+
+
+def block(comm: MPI.Comm, size: Sequence[float], cells: Sequence[int]) -> Domain:
+    """[0, size], a rectangle or a box, in cells cut into triangles or tetrahedra (:mod:`.blocks`). Collective."""
+    mesh, upper = blocks.mesh(comm, size, cells), np.asarray(size, dtype=float)
+    return Domain(mesh, _block_sides(mesh, upper), {}, np.zeros(len(upper)), upper, one_piece=True)
+
+
+def build(comm: MPI.Comm, shape: Shape, dimension: int) -> Domain:
+    """The domain that a scene's ``[domain]`` table describes. Collective.
+
+    Raises:
+        InputError: on all ranks alike, when a file cannot be read or is no usable mesh, or memory cannot suffice.
+    """
+    if shape.shape == "file":
+        return from_file(comm, shape.file, dimension, shape.scale)
+    if shape.shape == "rectangle" or shape.shape == "box":
+        check_affordable(comm, dimension * math.prod(n + 1 for n in shape.cells), "cells")
+        return block(comm, shape.size, shape.cells)
+    mesh, sides = gmsh_shapes.build(comm, shape)
+    return Domain(mesh, sides, {}, *_bounding_box(mesh), gmsh_shapes.curves(shape), one_piece=True)
+
+
+def check_affordable(comm: MPI.Comm, unknowns: int, key: str) -> None:
+    """Refuse what would be killed for want of memory, half an hour later. Collective.
+
+    Args:
+        comm: all ranks. unknowns: of the mesh to be made. key: of ``[domain]``, which makes them so many.
+
+    Raises:
+        InputError: on all ranks alike.
+    """
+    least, room = unknowns * _LEAST_MEMORY / 2**20, memory.room(comm)
+    if least > room:
+        raise InputError(
+            f"domain.{key}: make {unknowns:.1e} unknowns, which need {least / 1024:.3g} GB at least; there are "
+            f"{room / 1024:.3g} GB: use fewer {key}"
+        )
+
+
+def from_file(comm: MPI.Comm, path: Path, dimension: int, scale: float = 1.0) -> Domain:
+    """A gmsh file, its physical groups being sides and regions; ``scale`` is m per unit of the file. Collective.
+
+    Raises:
+        InputError: on all ranks alike, when the file cannot be read or is no usable mesh.
+    """
+    mesh, sides, regions = gmsh_model.read(comm, path, dimension)
+    mesh.geometry.x[:] *= scale
+    return Domain(mesh, sides, regions, *_bounding_box(mesh))
+
+
+def _block_sides(mesh: dmesh.Mesh, size: npt.NDArray[np.float64]) -> dict[str, Facets]:
+    """Facets of the surface by the side that their middle lies on."""
+    d = len(size)
+    mesh.topology.create_connectivity(d - 1, d)
+    facets, middles = dmesh.exterior_facet_indices(mesh.topology), np.empty((0, 3))
+    if len(facets):  # dolfinx divides by their number
+        middles = dmesh.compute_midpoints(mesh, d - 1, facets)
+    ends = {n: (axis % d, end) for n, (axis, end) in _AXIS_OF_SIDE.items() if d == 3 or n not in ("front", "back")}
+    return {name: facets[np.abs(middles[:, i] - end * size[i]) < 1e-9 * size[i]] for name, (i, end) in ends.items()}
+
+
+def _bounding_box(mesh: dmesh.Mesh) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+    x = mesh.geometry.x[:, : mesh.geometry.dim]
+    inside = x if len(x) else np.full((1, x.shape[1]), np.nan)
+    lower, upper = np.fmin.reduce(inside, axis=0), np.fmax.reduce(inside, axis=0)
+    gathered = agree(mesh.comm, (lower, upper))
+    return np.nanmin([g[0] for g in gathered], axis=0), np.nanmax([g[1] for g in gathered], axis=0)

@@ -1,0 +1,147 @@
+"""A domain refined, uniformly or where it is marked, with its named sides and regions.
+
+Edges are bisected by Plaza's rule (Plaza and Carey 2000): the longest edge of a cell goes first, so that angles stay
+bounded from below. Children stay on their parent's rank. New vertices of a side whose curve is known move onto it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import basix
+import numpy as np
+import numpy.typing as npt
+from dolfinx import la
+from dolfinx import mesh as dmesh
+
+from .. import compat
+from .domain import Domain, Halves, Refinement, check_affordable
+from .gmsh_shapes import Arc
+
+Array = npt.NDArray[np.float64]
+Indices = npt.NDArray[np.int32]
+_LONG = {2: 0.0, 3: 0.76}
+"""Of a cell's longest edge, what is bisected with it, by dimension: in space all six would make a step of 4 to 5 times
+the unknowns; the longest and, of a sixth of a cube, the diagonals of its faces make it about 2."""
+_SKEWED = np.eye(3) + 1e-6 * np.sqrt([[2.0, 3.0, 5.0], [3.0, 7.0, 11.0], [5.0, 11.0, 13.0]])
+"""Where the edges are measured: lengths that tie in the body differ here by their direction, on all ranks alike."""
+
+
+def uniform(domain: Domain) -> Refinement:
+    """Each cell cut into 2^d. Collective."""
+    return _refined(domain, None)
+
+
+def repeated(domain: Domain, times: int) -> Domain:
+    """Each cell cut into 2^d so often; each of the domains knows the one that it came from. Collective.
+
+    Raises:
+        InputError: on all ranks alike: memory cannot suffice.
+    """
+    d, vertices = domain.dimension, domain.mesh.topology.index_map(0).size_global
+    if times:
+        check_affordable(domain.mesh.comm, d * vertices * 2 ** (d * times), "refinements")
+    for _ in range(times):
+        step = uniform(domain)
+        domain = replace(step.domain, origin=(domain, step))
+    return domain
+
+
+def marked(domain: Domain, cells: Indices) -> Refinement:
+    """The long edges of the marked cells (local indices) bisected, and others as far as the mesh asks for it.
+
+    In the plane all three count as long. Collective.
+    """
+    topology = domain.mesh.topology
+    topology.create_entities(1)
+    topology.create_connectivity(domain.dimension, 1)
+    lengths = _edge_lengths(domain.mesh, cells)
+    long = lengths >= _LONG[domain.dimension] * lengths.max(axis=1, keepdims=True)
+    edges = topology.connectivity(domain.dimension, 1).array.reshape(-1, lengths.shape[1])[cells]
+    return _refined(domain, np.unique(edges[long]).astype(np.int32))
+
+
+def _edge_lengths(mesh: dmesh.Mesh, cells: Indices) -> Array:
+    """Of the edges of cells in the order of their topology, shape (cells, 3 or 6)."""
+    ends = np.array(basix.topology(basix.CellType[mesh.topology.cell_name()])[1])
+    corners = _corners(mesh)[cells]
+    return np.asarray(np.linalg.norm(corners[:, ends[:, 0]] - corners[:, ends[:, 1]], axis=2))
+
+
+def _refined(domain: Domain, edges: Indices | None) -> Refinement:
+    mesh, parents, halves = _bisected(domain.mesh, edges)
+    sides = _sides(domain, mesh, parents, halves)
+    regions = {name: np.flatnonzero(np.isin(parents, cells)).astype(np.int32) for name, cells in domain.regions.items()}
+    _bend(mesh, sides, domain.curves)
+    return Refinement(replace(domain, mesh=mesh, sides=sides, regions=regions, origin=None), parents, halves)
+
+
+def _bisected(mesh: dmesh.Mesh, edges: Indices | None) -> tuple[dmesh.Mesh, Indices, Halves]:
+    """Plaza's rule, by which the first of equally long edges in dolfinx's own numbering, that of the ranks, would go.
+
+    Returns:
+        The refined mesh, and ``parents`` and ``halves`` of a :class:`Refinement`.
+    """
+    d, straight = mesh.geometry.dim, mesh.geometry.x.copy()
+    mesh.geometry.x[:, :d] = straight[:, :d] @ _SKEWED[:d, :d]
+    fine, parents = compat.refine(mesh, edges)
+    halves = _halves(mesh, fine, parents)
+    mesh.geometry.x[:] = straight
+    fine.geometry.x[compat.geometry_dofmap(fine), :d] = 0.5 * halves @ _corners(mesh)[parents]
+    return fine, parents, halves
+
+
+def _corners(mesh: dmesh.Mesh) -> Array:
+    """Vertices of each local cell, shape (cells, d+1, d)."""
+    return np.asarray(mesh.geometry.x[compat.geometry_dofmap(mesh)][:, :, : mesh.geometry.dim])
+
+
+def _halves(coarse: dmesh.Mesh, fine: dmesh.Mesh, parents: Indices) -> Halves:
+    """Twice the barycentric coordinates of the children's vertices. Before anything is bent they are whole numbers."""
+    corners = _corners(coarse)[parents]
+    edges = corners[:, 1:] - corners[:, :1]
+    inner = np.linalg.solve(edges.transpose(0, 2, 1), (_corners(fine) - corners[:, :1]).transpose(0, 2, 1))
+    inner = inner.transpose(0, 2, 1)
+    both = np.concatenate([1.0 - inner.sum(axis=2, keepdims=True), inner], axis=2)
+    return np.rint(2.0 * both).astype(np.int8)
+
+
+def cell_facets(mesh: dmesh.Mesh) -> Indices:
+    """Local facets of each local cell, shape (cells, d+1); the i-th lies opposite to the i-th vertex."""
+    d = mesh.topology.dim
+    mesh.topology.create_entities(d - 1)
+    mesh.topology.create_connectivity(d, d - 1)
+    mesh.topology.create_connectivity(d - 1, d)
+    return np.asarray(mesh.topology.connectivity(d, d - 1).array).reshape(-1, d + 1)
+
+
+def _sides(domain: Domain, fine: dmesh.Mesh, parents: Indices, halves: Halves) -> dict[str, Indices]:
+    """The children's facets that lie in those of the domain's sides."""
+    coarse, own = cell_facets(domain.mesh), cell_facets(fine)
+    # A child's facet i lies in its parent's facet j when none of its vertices (all but i) has a part in vertex j.
+    cell, i, j = np.nonzero(halves.sum(axis=1, dtype=np.int8)[:, None, :] == halves)
+    above = coarse[parents[cell], j]
+    found = {}
+    for name, facets in domain.sides.items():
+        mask = np.zeros(coarse.max(initial=-1) + 1, dtype=bool)
+        mask[facets] = True
+        found[name] = np.unique(own[cell, i][mask[above]]).astype(np.int32)
+    return found
+
+
+def _bend(mesh: dmesh.Mesh, sides: Mapping[str, Indices], curves: Mapping[str, Arc]) -> None:
+    """Move the vertices of curved sides onto their curves, on all ranks that have them. Collective."""
+    for name, curve in curves.items():
+        nodes = np.empty(0, dtype=np.int32)
+        if len(sides[name]):  # dolfinx divides by their number
+            nodes = np.unique(dmesh.entities_to_geometry(mesh, mesh.topology.dim - 1, sides[name]))
+        x = mesh.geometry.x[nodes, :2]
+        shifts = np.column_stack([curve.nearest(x) - x, np.ones(len(nodes))])
+        shared = la.vector(mesh.geometry.index_map(), 3)
+        shared.array[:] = 0.0
+        shared.array.reshape(-1, 3)[nodes] = shifts
+        shared.scatter_reverse(la.InsertMode.add)
+        shared.scatter_forward()
+        total = shared.array.reshape(-1, 3)
+        mesh.geometry.x[:, :2] += total[:, :2] / np.maximum(total[:, 2:], 1.0)

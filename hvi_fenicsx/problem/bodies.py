@@ -1,0 +1,152 @@
+"""The bodies of a mesh: its parts that share no facet with each other, told apart alike on all ranks.
+
+Each rank joins the cells that share a facet; the facets that ranks share join what the ranks found.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from dolfinx import fem, la
+from mpi4py import MPI
+
+from ..errors import InputError
+from ..mesh.domain import Domain
+from ..rigid import Body, Mode, motion_at
+from ..runtime.mpi import agree
+
+Array = npt.NDArray[np.float64]
+Labels = npt.NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Bodies:
+    """The bodies, from left to right (then from bottom to top), lengths in units of L.
+
+    Attributes:
+        bodies: what each is, the same on all ranks. labels: the body of each local vertex (owned and ghost), (n,).
+    """
+
+    bodies: tuple[Body, ...]
+    labels: Labels
+
+    def __iter__(self) -> Any:
+        return iter(self.bodies)
+
+    def motion(self, points: Array, mode: Mode) -> Array:
+        """A rigid motion of one body at all local vertices (n, 3), the others at rest, (n, d)."""
+        field = motion_at(points, self.bodies[mode.body], mode.coefficients)
+        return np.where((self.labels == mode.body)[:, None], field, 0.0)
+
+
+def whole(domain: Domain) -> Body:
+    """All that a domain is made of, as one body."""
+    return Body(domain.dimension, np.asarray(domain.centre / domain.length), domain.length)
+
+
+def find(domain: Domain, space: fem.FunctionSpace, points: Array) -> Bodies:
+    """The bodies of a domain; ``space`` is P1 on its mesh, ``points`` its local vertices. Collective.
+
+    Raises:
+        InputError: on all ranks alike: two bodies meet at a vertex (in 3D perhaps along an edge) only, a hinge.
+    """
+    one = whole(domain)
+    if domain.one_piece:
+        return Bodies((one,), np.zeros(len(points), np.int64))
+    cells, count = _cells(domain)
+    if count == 1:
+        return Bodies((one,), np.zeros(len(points), np.int64))
+    labels = _vertices(domain, space, cells, points)
+    lower, upper = _boxes(domain, points[:, : domain.dimension], labels, count)
+    centres = (lower + upper) / 2
+    order = np.lexsort(np.round(centres / domain.length, 9).T[::-1])
+    place = np.argsort(order)
+    found = [replace(one, centre=np.pad(centres[i] / domain.length, (0, 3 - domain.dimension))) for i in order]
+    names = _names(domain, place[cells], found)
+    bodies = (replace(body, name=name, index=i) for i, (body, name) in enumerate(zip(found, names, strict=True)))
+    return Bodies(tuple(bodies), place[labels])
+
+
+def _cells(domain: Domain) -> tuple[Labels, int]:
+    """The body of each local cell, and how many there are in all. Collective."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    def joined(pairs: Labels, size: int) -> tuple[int, Labels]:
+        graph = coo_array((np.ones(len(pairs), np.int8), pairs.T), shape=(size, size))
+        count, labels = connected_components(graph, directed=False)
+        return int(count), np.asarray(labels, np.int64)
+
+    mesh, dim = domain.mesh, domain.dimension
+    mesh.topology.create_connectivity(dim - 1, dim)
+    facets, cells = mesh.topology.connectivity(dim - 1, dim), mesh.topology.index_map(dim)
+    first = facets.array[facets.offsets[:-1]]
+    twice = np.flatnonzero(np.diff(facets.offsets) == 2)
+    pairs = np.column_stack([first[twice], facets.array[facets.offsets[twice] + 1]])
+    count, local = joined(pairs, cells.size_local + cells.num_ghosts)
+    counts = agree(mesh.comm, count)
+    local = local + sum(counts[: mesh.comm.rank])
+    mine = local[first]
+    owners = _owners(mesh.topology.index_map(dim - 1), mine)
+    apart = mine != owners
+    shared = np.unique(np.column_stack([mine[apart], owners[apart]]), axis=0)
+    total, merged = joined(np.vstack(agree(mesh.comm, shared)), sum(counts))
+    return merged[local], total
+
+
+def _owners(index_map: Any, values: Labels) -> Labels:
+    """What the owners of shared entities hold, for local values (owned and ghost). Collective."""
+    vector = la.vector(index_map, 1, dtype=np.int64)
+    vector.array[:] = values
+    vector.scatter_forward()
+    return np.array(vector.array)
+
+
+def _vertices(domain: Domain, space: fem.FunctionSpace, cells: Labels, points: Array) -> Labels:
+    """The body of each local vertex. Collective; refuses a hinge."""
+    labels = np.full(len(points), -1, np.int64)
+    corners = space.dofmap.list
+    labels[corners] = cells[: len(corners), None]
+    hinges = corners[labels[corners] != cells[: len(corners), None]]
+    apart = np.flatnonzero(labels != _owners(space.dofmap.index_map, labels))
+    first = points[np.concatenate([hinges, apart])[:1]]
+    found = [p for rank in agree(domain.mesh.comm, first.tolist()) for p in rank]
+    if found:
+        at = ", ".join(f"{c:.6g}" for c in found[0][: domain.dimension])
+        raise InputError(
+            f"the mesh: at ({at}) two bodies share a vertex but no facet, and would turn about it as about a hinge; "
+            "let them share a facet, or give each its own vertex"
+        )
+    return labels
+
+
+def _boxes(domain: Domain, points: Array, labels: Labels, count: int) -> tuple[Array, Array]:
+    """Corners of the bodies' bounding boxes, (count, d) each. Collective."""
+    lower, upper = np.full((2, count, domain.dimension), [[[np.inf]], [[-np.inf]]])
+    np.minimum.at(lower, labels, points)
+    np.maximum.at(upper, labels, points)
+    comm = domain.mesh.comm
+    comm.Allreduce(MPI.IN_PLACE, lower, op=MPI.MIN)
+    comm.Allreduce(MPI.IN_PLACE, upper, op=MPI.MAX)
+    return lower, upper
+
+
+def _names(domain: Domain, cells: Labels, bodies: Sequence[Body]) -> list[str]:
+    """A body is called by the regions that lie in it alone, else by its number and centre. Collective."""
+    regions: dict[int, list[str]] = {}
+    for name in sorted(domain.regions):
+        inside = np.concatenate(agree(domain.mesh.comm, np.unique(cells[domain.regions[name]])))
+        if len(within := np.unique(inside)) == 1:
+            regions.setdefault(int(within[0]), []).append(f'"{name}"')
+    return [
+        f"body {', '.join(regions[i])}" if i in regions else f"body {i + 1} at {_point(body)}"
+        for i, body in enumerate(bodies)
+    ]
+
+
+def _point(body: Body) -> str:
+    return "(" + ", ".join(f"{c:.4g}" for c in body.centre[: body.dimension] * body.length) + ")"

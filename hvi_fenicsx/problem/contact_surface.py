@@ -1,0 +1,113 @@
+"""Γc at its vertices: where each contact part's nodes are, their normals, tangents and lumped areas.
+
+Vertex (trapezoidal) quadrature makes every boundary term a sum over these nodes (paper, section 4.2).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import ufl
+from dolfinx import fem
+from mpi4py import MPI
+
+from ..errors import InputError
+from .vectors import nodal
+
+Array = npt.NDArray[np.float64]
+Indices = npt.NDArray[np.int32]
+
+
+@dataclass(frozen=True, slots=True)
+class Surface:
+    """The vertices of one boundary part that this rank owns (m of them).
+
+    Attributes:
+        part: name. facets: its local facets. blocks: local vertex (block) indices (m,). points: SI (m, 3).
+        normals: outward unit, shape (m, d). tangents: shape (m, d-1, d), by design.md's rule.
+        weights: lumped area of each vertex over L^(d-1), shape (m,).
+    """
+
+    part: str
+    facets: Indices
+    blocks: Indices
+    points: Array
+    normals: Array
+    tangents: Array
+    weights: Array
+
+    @property
+    def dofs(self) -> npt.NDArray[np.int64]:
+        """The scalar dofs of these vertices, shape (m, d)."""
+        d = self.normals.shape[1]
+        return self.blocks[:, None].astype(np.int64) * d + np.arange(d)
+
+    def values(self, u: Array) -> Array:
+        """The vectors at these vertices of a local array of a P1 vector field; shape (m, d)."""
+        return u.reshape(-1, self.normals.shape[1])[self.blocks]
+
+
+def build(
+    part: str,
+    space: fem.FunctionSpace,
+    vertices: Array,
+    facets: Indices,
+    measure: Any,
+    area: float,
+    direction: Sequence[float] | None = None,
+) -> Surface:
+    """The nodes of a part. Collective.
+
+    Args:
+        part: its name.
+        space: the P1 vector space. vertices: its local ones, m, (n, 3).
+        facets: its local facets.
+        measure: ds with vertex quadrature over the part, SI.
+        area: L^(d-1), what the weights are divided by.
+        direction: a constant unit vector that stands for the normal (that towards a flat obstacle).
+
+    Raises:
+        InputError: on all ranks alike: a vertex is on none but facets inside the body, which have no outward normal.
+    """
+    dimension = space.mesh.geometry.dim
+    dofs = fem.locate_dofs_topological(space, dimension - 1, facets)
+    blocks = np.unique(dofs[dofs < space.dofmap.index_map.size_local]).astype(np.int32)
+    test = ufl.TestFunction(space)
+    normal = nodal(ufl.inner(ufl.FacetNormal(space.mesh), test) * measure)[blocks]
+    ones = ufl.as_vector([fem.Constant(space.mesh, 1.0)] * dimension)
+    weights = nodal(ufl.inner(ones, test) * measure)[blocks, 0] / area
+    if space.mesh.comm.allreduce(bool(np.any(weights == 0.0)), op=MPI.LOR):
+        raise InputError(f"boundary.{part}: contact and laws act on the body's surface, and facets of it lie inside")
+    if direction is not None:
+        normal = np.broadcast_to(np.asarray(direction, dtype=np.float64), normal.shape)
+    normals = normal / np.linalg.norm(normal, axis=1, keepdims=True)
+    # Rounding must not make an axis-parallel part a slanted one.
+    normals = np.where(np.max(np.abs(normals), axis=1, keepdims=True) > 1 - 1e-10, np.round(normals), normals)
+    return Surface(part, facets, blocks, vertices[blocks], normals, tangents(normals), weights)
+
+
+def tangents(normals: Array) -> Array:
+    """Unit tangents of outward normals (m, d), shape (m, d-1, d).
+
+    In 2D the one whose larger component is positive; in 3D t1 is the projected x-axis (the y-axis where n is within
+    45° of x) and t2 = n x t1.
+    """
+    if normals.shape[1] == 2:
+        t = np.column_stack([-normals[:, 1], normals[:, 0]])
+        rows = np.arange(len(t))
+        return (t * np.sign(t[rows, np.argmax(np.abs(t), axis=1)])[:, None])[:, None, :] + 0.0
+    steep = np.abs(normals[:, 0]) > np.sqrt(0.5)
+    axis = np.where(steep[:, None], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0])
+    t1 = axis - np.sum(axis * normals, axis=1)[:, None] * normals
+    t1 /= np.linalg.norm(t1, axis=1)[:, None]
+    return np.stack([t1, np.cross(normals, t1)], axis=1) + 0.0
+
+
+def component_dofs(blocks: Indices, directions: Array) -> tuple[npt.NDArray[np.int64], Array]:
+    """The scalar dof (m,) of a direction (m, d) along an axis of its vertex's frame, and its sign (m,)."""
+    axis = np.argmax(np.abs(directions), axis=1)
+    return blocks.astype(np.int64) * directions.shape[1] + axis, np.sign(directions[np.arange(len(axis)), axis])

@@ -1,0 +1,77 @@
+"""Prescribed displacements as Dirichlet conditions, which must agree where their parts meet."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import combinations
+
+import numpy as np
+import numpy.typing as npt
+from dolfinx import fem
+from petsc4py import PETSc
+
+from ..effects.base import Condition
+from ..errors import InputError
+from ..runtime.mpi import agree
+from .scaling import Scales
+from .ufl_context import Stage
+
+Array = npt.NDArray[np.float64]
+_SAME = 1e-9
+"""Difference of two prescribed displacements, relative to the largest, that is rounding."""
+
+
+def build(stage: Stage, scales: Scales, wanted: Sequence[tuple[str, Condition]]) -> tuple[fem.DirichletBC, ...]:
+    """The conditions, each with the part it stands on, nondimensional. Collective.
+
+    Raises:
+        InputError: on all ranks alike: two parts prescribe different values where they meet.
+    """
+    found = tuple(_condition(stage, scales, part, condition) for part, condition in wanted)
+    _check_agreement(stage, scales, [(part, bc) for (part, _), bc in zip(wanted, found, strict=True)])
+    return found
+
+
+def _condition(stage: Stage, scales: Scales, part: str, condition: Condition) -> fem.DirichletBC:
+    facets, dim = stage.part_facets[part], stage.dimension - 1
+    component = stage.space.sub(condition.component)
+    if condition.value.is_number:
+        value = PETSc.ScalarType(condition.value.source / scales.displacement)  # type: ignore[operator]
+        return fem.dirichletbc(value, fem.locate_dofs_topological(component, dim, facets), component)
+    collapsed, _ = component.collapse()
+    function = fem.Function(collapsed)
+    function.interpolate(lambda x: condition.value.at(x.T) / scales.displacement)
+    return fem.dirichletbc(function, fem.locate_dofs_topological((component, collapsed), dim, facets), component)
+
+
+def _check_agreement(stage: Stage, scales: Scales, named: Sequence[tuple[str, fem.DirichletBC]]) -> None:
+    """Where two parts meet they must prescribe the same: else the order of the tables would decide."""
+    values = np.empty(len(stage.points) * stage.dimension)
+    prescribed = [(part, *_values(condition, values)) for part, condition in named]
+    size = max((float(np.max(np.abs(v), initial=0.0)) for _, _, v in prescribed), default=0.0)
+    bad: list[str] = []
+    for (one, dofs, these), (other, more, those) in combinations(prescribed, 2):
+        shared, i, j = np.intersect1d(dofs, more, assume_unique=True, return_indices=True)
+        apart = np.abs(these[i] - those[j]) > _SAME * size
+        differing = zip(shared[apart], these[i][apart], those[j][apart], strict=True)
+        bad += [_disagreement(stage, int(dof), (one, other), pair, scales) for dof, *pair in differing]
+    found = [text for rank in agree(stage.domain.mesh.comm, bad[:1]) for text in rank]
+    if found:
+        raise InputError(found[0])
+
+
+def _values(condition: fem.DirichletBC, values: Array) -> tuple[npt.NDArray[np.int32], Array]:
+    """The dofs of a condition and what it prescribes; ``values`` is room for all dofs."""
+    dofs = condition.dof_indices()[0]
+    condition.set(values)
+    return dofs, values[dofs]
+
+
+def _disagreement(stage: Stage, dof: int, parts: tuple[str, str], pair: Sequence[float], scales: Scales) -> str:
+    block, component = divmod(dof, stage.dimension)
+    at = ", ".join(f"{c:.6g}" for c in stage.points[block][: stage.dimension])
+    one, other = (float(value) * scales.displacement for value in pair)
+    return (
+        f"boundary.{parts[0]} and boundary.{parts[1]} meet at ({at}) and prescribe displacements along "
+        f'{"xyz"[component]} that differ, {one:.6g} and {other:.6g} m; make them equal there, or write "free" in one'
+    )

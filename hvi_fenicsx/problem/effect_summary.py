@@ -1,0 +1,128 @@
+"""What each effect in force adds to a problem, read off its contribution: terms, bounds, unknowns, output, solver.
+
+Nothing here is stated by an effect twice: a user's own effect is told about like the program's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass
+
+import numpy as np
+
+from ..effects.base import Contribution, Direction, Effect, Place
+from .contact_surface import Surface
+from .problem import Made, Problem
+
+_BOUNDS = ("gap", "sigma_n", "contact")
+_LAWS = {
+    Direction.SLIP: ("friction_t", "branch_t"),
+    Direction.OPENING: ("sigma_n", "branch_n"),
+    Direction.PENETRATION: ("sigma_n", "branch_n"),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Share:
+    """One effect's share.
+
+    Attributes:
+        effect, where: its key and its place. adds: its term, in words and symbols.
+        terms: what is assembled for it. bounds: bounded displacements. unknowns: displacements that it brings, or with
+            a minus sign takes away. output: what the results hold because of it. solver: what it asks of the solver.
+    """
+
+    effect: str
+    where: str | None
+    adds: str
+    terms: str
+    bounds: int
+    unknowns: int
+    output: tuple[str, ...]
+    solver: str
+
+    def as_dict(self) -> dict[str, object]:
+        """For ``check --json``."""
+        return {**asdict(self), "output": list(self.output)}
+
+
+def shares(problem: Problem) -> list[Share]:
+    """Of all effects, in the scene's order. Collective."""
+    first = next((i for i, (_, e, _) in enumerate(problem.made) if e.place is Place.MATERIAL), None)
+    return [_share(problem, made, brings=i == first) for i, made in enumerate(problem.made)]
+
+
+def _share(problem: Problem, made: Made, *, brings: bool) -> Share:
+    where, effect, contribution = made
+    total = problem.space.dofmap.index_map.size_global * problem.space.dofmap.index_map_bs
+    return Share(
+        effect.key,
+        where,
+        effect.term,
+        ", ".join(_terms(contribution)) or "none",
+        _bounded(problem, where) if contribution.bounds else 0,
+        total if brings else -_prescribed(problem, where, contribution),
+        tuple(_output(effect, contribution)),
+        _solver(contribution),
+    )
+
+
+def _terms(contribution: Contribution) -> Iterator[str]:
+    parts = {
+        "bilinear": contribution.bilinear,
+        "averaged": contribution.averaged,
+        "linear": (*contribution.linear, *contribution.strains),
+        "law": contribution.laws,
+    }
+    yield from (f"{len(found)} {name}" for name, found in parts.items() if found)
+
+
+def _bounded(problem: Problem, part: str | None) -> int:
+    """Vertices of a part, over all ranks. Collective."""
+    return _vertices(problem, [s for s in problem.surfaces if s.part == part])
+
+
+def _vertices(problem: Problem, surfaces: Sequence[Surface]) -> int:
+    return int(problem.domain.mesh.comm.allreduce(sum(len(s.blocks) for s in surfaces)))
+
+
+def _prescribed(problem: Problem, part: str | None, contribution: Contribution) -> int:
+    """Displacements that its conditions take away, over all ranks. Collective."""
+    own = [d for name, d in problem.held if name == part] if contribution.conditions else []
+    size = problem.space.dofmap.index_map.size_local * problem.space.dofmap.index_map_bs
+    dofs = np.unique(np.concatenate([np.empty(0, np.int32), *own]))
+    return int(problem.domain.mesh.comm.allreduce(int(np.count_nonzero(dofs < size))))
+
+
+def _output(effect: Effect, contribution: Contribution) -> Iterator[str]:
+    if effect.place is Place.MATERIAL:
+        yield "displacement"
+    if contribution.bounds:
+        yield from _BOUNDS
+    for law in contribution.laws:
+        yield from _LAWS[law.direction]
+
+
+def _solver(contribution: Contribution) -> str:
+    if any(not law.law.is_linear for law in contribution.laws):
+        return "branch iteration"
+    return "bounds" if contribution.bounds else "linear"
+
+
+def table(found: Sequence[Share]) -> Iterator[str]:
+    """The shares as lines of aligned columns."""
+    rows = [("effect", "terms", "bounds", "unknowns", "output", "solver"), *map(_row, found)]
+    widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
+    for row in rows:
+        yield "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
+
+
+def _row(share: Share) -> tuple[str, ...]:
+    return (
+        f"{share.effect} on {share.where or 'the body'}",
+        share.terms,
+        f"{share.bounds:,}" if share.bounds else "none",
+        f"{share.unknowns:+,}" if share.unknowns else "none",
+        ", ".join(share.output) or "none",
+        share.solver,
+    )

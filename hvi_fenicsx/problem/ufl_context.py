@@ -1,0 +1,109 @@
+"""What effects see of the problem while it is composed: arguments, measures, constants that are not compiled in."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import dolfinx
+import numpy as np
+import numpy.typing as npt
+import ufl
+from dolfinx import fem
+from petsc4py import PETSc
+
+from ..effects.base import Place
+from ..formula import Formula, ufl_algebra
+from ..mesh import vertex_dofs
+from ..mesh.domain import Domain
+from ..runtime.mpi import agree
+from .scaling import Placed, Scales
+
+
+class Stage:
+    """What effects see of the problem while it is composed (:class:`.effects.base.Stage`)."""
+
+    def __init__(
+        self, domain: Domain, parts: Mapping[str, Sequence[str]], scales: Scales, effects: Sequence[Placed]
+    ) -> None:
+        self.domain, self.dimension = domain, domain.dimension
+        self.length, self.stress, self.modulus = scales.length, scales.stress, scales.modulus
+        self.space = fem.functionspace(domain.mesh, ("Lagrange", 1, (self.dimension,)))
+        self.trial, self.test = ufl.TrialFunction(self.space), ufl.TestFunction(self.space)
+        self.normal = ufl.FacetNormal(domain.mesh)
+        self.materials = [placed for placed in effects if placed[1].place is Place.MATERIAL]
+        self.part_facets = {name: domain.facets(on) for name, on in parts.items()}
+
+    @functools.cached_property
+    def points(self) -> npt.NDArray[np.float64]:
+        """The local vertices (owned and ghost), m, (n, 3)."""
+        return vertex_dofs.points(self.space)
+
+    @functools.cached_property
+    def scalar_test(self) -> Any:
+        """A test function of scalar P1; few effects want it, and its space takes time."""
+        return ufl.TestFunction(fem.functionspace(self.domain.mesh, ("Lagrange", 1)))
+
+    def number(self, value: float) -> Any:
+        """A constant that is not compiled into the form."""
+        return fem.Constant(self.domain.mesh, PETSc.ScalarType(value))
+
+    def render(self, formula: Formula) -> Any:
+        """A formula in UFL, in SI coordinates."""
+        return formula.render(ufl.SpatialCoordinate(self.domain.mesh), ufl_algebra(self.number))
+
+    @functools.cached_property
+    def _facet_tags(self) -> tuple[Any, dict[str, tuple[int, ...]]]:
+        return _tags(self.domain.mesh, self.dimension - 1, self.part_facets)
+
+    @functools.cached_property
+    def _cell_tags(self) -> tuple[Any, dict[str, tuple[int, ...]]]:
+        return _tags(self.domain.mesh, self.dimension, dict(self.domain.regions))
+
+    def cells(self, *regions: str | None) -> Any:
+        """dx/L^d over what the regions share; None where that is nothing."""
+        scale = self.number(self.length**-self.dimension)
+        named = [region for region in regions if region is not None]
+        if not named:
+            return Scaled(scale, ufl.dx(domain=self.domain.mesh))
+        self.domain.cells(named)
+        tags, ids = self._cell_tags
+        shared = tuple(sorted(set.intersection(*(set(ids[region]) for region in named))))
+        measure = ufl.Measure("dx", domain=self.domain.mesh, subdomain_data=tags)
+        return Scaled(scale, measure(shared)) if shared else None
+
+    def facets(self, part: str) -> Any:
+        """ds/L^(d-1)."""
+        return Scaled(self.number(self.length ** (1 - self.dimension)), self.boundary(part))
+
+    def boundary(self, part: str, **metadata: Any) -> Any:
+        """Ds over a part, SI."""
+        tags, ids = self._facet_tags
+        measure = ufl.Measure("ds", domain=self.domain.mesh, subdomain_data=tags, metadata=metadata)
+        return measure(ids[part])
+
+
+class Scaled:
+    """A measure with a factor: ``integrand * Scaled`` is ``factor * integrand * measure``."""
+
+    def __init__(self, factor: Any, measure: Any) -> None:
+        self.factor, self.measure = factor, measure
+
+    def __rmul__(self, integrand: Any) -> Any:
+        return self.factor * integrand * self.measure
+
+
+def _tags(mesh: Any, dimension: int, parts: dict[str, Any]) -> tuple[Any, dict[str, tuple[int, ...]]]:
+    """Mesh tags in which overlapping parts are unions of atoms. The atoms' numbers agree on all ranks. Collective."""
+    names = sorted(parts)
+    codes: dict[int, int] = {}
+    for bit, name in enumerate(names):
+        for entity in parts[name]:
+            codes[int(entity)] = codes.get(int(entity), 0) | 1 << bit
+    atoms = sorted({code for rank in agree(mesh.comm, set(codes.values())) for code in rank})
+    number = {code: i + 1 for i, code in enumerate(atoms)}
+    entities = np.array(sorted(codes), dtype=np.int32)
+    values = np.array([number[codes[int(e)]] for e in entities], dtype=np.int32)
+    ids = {n: tuple(number[c] for c in atoms if c >> bit & 1) for bit, n in enumerate(names)}
+    return dolfinx.mesh.meshtags(mesh, dimension, entities, values), ids

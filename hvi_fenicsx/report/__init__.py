@@ -1,0 +1,1 @@
+"""The report of a finished result folder: pictures and one page of html. No MPI, no dolfinx."""

@@ -1,0 +1,1 @@
+"""The page report.html, made from a finished folder alone."""

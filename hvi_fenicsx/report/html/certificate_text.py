@@ -1,0 +1,89 @@
+"""The certificate and the estimate in plain language: what each number means, and whether it passed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from ..reader import Result
+from .scene_text import number
+
+_ENTRIES = {
+    "equilibrium": "Forces balance: the largest force that nothing carries, as a share of the load",
+    "penetration": "Nothing passes through an obstacle: the deepest intrusion, as a share of the largest displacement",
+    "tension": "Contact only pushes: the largest pull in contact, as a share of the load's stress",
+    "complementarity": "Contact presses only where it is closed: the largest overlap of an open gap with a pressure",
+    "inclusion": "The law is obeyed: the largest distance of a traction from what its law allows there",
+}
+"""All that must be within the tolerance."""
+_SECOND_ORDER = {
+    "local minimiser": "The solution is a local minimiser of the energy: a stable equilibrium.",
+    "not a minimiser": "The solution is an equilibrium, but not a minimiser of the energy: it is unstable.",
+    "undecided": "Whether the equilibrium is stable was left undecided; second_order = true in [solver] asks for it.",
+}
+
+
+def certificate(result: Result) -> dict[str, Any] | None:
+    """Its rows and what goes with them; None where nothing was solved."""
+    found = result.summary.get("certificate")
+    if not found:
+        return None
+    limit = max(float(found["tolerance"]), float(found.get("rounding") or 0.0))
+    return {
+        "passed": bool(found["passed"]),
+        "tolerance": number(found["tolerance"]),
+        "rows": [_row(name, words, found[name], limit) for name, words in _ENTRIES.items()],
+        "remarks": list(_remarks(result, found)),
+    }
+
+
+def _row(name: str, words: str, value: float | None, limit: float) -> dict[str, Any]:
+    passed, text = (False, "not finite") if value is None else (value <= limit, _two_digits(value))
+    return {"name": name, "words": words, "value": text, "passed": passed}
+
+
+def _two_digits(value: float | None) -> str:
+    return "not finite" if value is None else number(float(f"{value:.1e}"))
+
+
+def _remarks(result: Result, found: Mapping[str, Any]) -> Iterator[str]:
+    if found["passed"]:
+        yield _SECOND_ORDER.get(str(found["second_order"]), str(found["second_order"]))
+    if found.get("rounding"):
+        rounding = _two_digits(found["rounding"])
+        yield f"Rounding alone moves these numbers by {rounding}, above the tolerance; what is no larger passes."
+    if result.summary.get("smoothing") and result.summary["epsilon"] is not None:  # null: there is no law
+        yield _smoothed(result.summary, found)
+
+
+def _smoothed(summary: Mapping[str, Any], found: Mapping[str, Any]) -> str:
+    width, away = _two_digits(summary["epsilon"]), _two_digits(found["inclusion_true"])
+    return (
+        f"The law was smoothed ({summary['smoothing']}, ε = {width} of the law's energy): the certificate is that of "
+        f"the smoothed law. From the true one the tractions are off by up to {away} of its scale."
+    )
+
+
+_ESTIMATE = {
+    "relative": "estimated error, as a share of the solution",
+    "discretisation": "of it by the mesh",
+    "smoothing": "of it by the smoothing of the law",
+    "algebraic": "of it by the solver's tolerance",
+}
+
+
+def estimate(found: Mapping[str, float | None] | None) -> list[tuple[str, str]]:
+    """The error estimate in the energy norm as rows of words and percentages; empty where there is none."""
+    if not found:
+        return []
+    norm = float(found.get("energy_norm") or 0.0) or 1.0
+    shares = {name: value if name == "relative" else value / norm for name, value in _known(found)}
+    return [
+        (words, f"{number(float(f'{100 * shares[name]:.2g}'))} %")
+        for name, words in _ESTIMATE.items()
+        if name in shares
+    ]
+
+
+def _known(found: Mapping[str, float | None]) -> Iterator[tuple[str, float]]:
+    return ((name, value) for name, value in found.items() if value is not None)

@@ -1,0 +1,100 @@
+"""What a run's report says, as plain data for its template."""
+
+from __future__ import annotations
+
+import base64
+import shlex
+import struct
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from ..reader import Result
+from . import numbers, scene_text, verdict
+from .certificate_text import certificate, estimate
+
+_CAPTIONS = {
+    "escape": "The rigid motion along which the load carries the body away.",
+    "scene": "The scene: the undeformed body with its supports, loads and contact parts.",
+    "body": "The deformed body, its displacements magnified, with what acts on it.",
+    "stress": "Stress in the body (von Mises), constant in each cell; the scale may end below a peak in a corner.",
+}
+"""By the name of the picture, in the order in which they are shown; what is not named here comes after."""
+
+
+def content(result: Result) -> dict[str, Any]:
+    """All that the template shows."""
+    shown = {path.stem: picture(path) for path in _pictures(result.folder)}
+    return {
+        "title": str(result.scene.get("title") or result.summary.get("scene") or result.folder.name),
+        "summary": result.summary,
+        "verdict": verdict.headline(result),
+        "existence": list(verdict.existence(result)),
+        "odd": result.summary.get("warnings") or [],
+        "facts_of_run": list(numbers.facts(result)),
+        "drawing": shown.pop("scene", None),
+        "pictures": list(shown.values()),
+        "body": list(scene_text.body(result)),
+        "parts": list(scene_text.parts(result)),
+        "contact": [numbers.contact(part) for part in result.parts],
+        "certificate": certificate(result),
+        "estimate": estimate(result.summary.get("estimate")),
+        "time": list(numbers.time(result.summary.get("time") or {})),
+        "effects": list(scene_text.effects(result)),
+        "reproduce": reproduce(result),
+    }
+
+
+def _pictures(folder: Path) -> list[Path]:
+    """The finished pictures, the known ones first."""
+    order = list(_CAPTIONS)
+    found = (path for path in folder.glob("*.png") if not path.name.startswith("."))
+    return sorted(found, key=lambda p: (order.index(p.stem) if p.stem in order else len(order), p.stem))
+
+
+def picture(path: Path) -> dict[str, Any]:
+    """A picture that lies in the page itself, with its size, so that the page does not jump while it is decoded."""
+    raw = path.read_bytes()
+    width, height = struct.unpack(">II", raw[16:24])
+    return {
+        "name": path.name,
+        "caption": _CAPTIONS.get(path.stem) or _of_part(path.stem),
+        "data": f"data:image/png;base64,{base64.b64encode(raw).decode()}",
+        "width": width,
+        "height": height,
+    }
+
+
+def _of_part(stem: str) -> str:
+    part = stem.removeprefix("contact").removeprefix("_")
+    where = f"“{part}”" if part else "the contact part"
+    return f"Along {where}: displacement, friction and pressure." if stem.startswith("contact") else stem
+
+
+def reproduce(result: Result) -> dict[str, Any]:
+    """The command that gave the result, the one that gives it again, the scene and the versions."""
+    summary, text = result.summary, (result.folder / "scene.toml").read_text(encoding="utf-8")
+    mesh = (result.scene.get("domain") or {}).get("file")
+    return {
+        "given": summary.get("command"),
+        "again": shlex.join(_again(summary)),
+        "scene": text,
+        "download": f"data:application/toml;base64,{base64.b64encode(text.encode()).decode()}",
+        "mesh": mesh,
+        "versions": versions(summary.get("versions") or {}),
+    }
+
+
+def _again(summary: Mapping[str, Any]) -> Iterable[str]:
+    ranks = int(summary.get("ranks") or 1)
+    petsc = str(summary.get("petsc") or "")
+    return [
+        *("hvi", "run", "scene.toml", "--out", "again"),
+        *(("--np", str(ranks)) if ranks > 1 else ()),
+        *((f"--petsc={petsc}",) if petsc else ()),
+    ]
+
+
+def versions(found: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    """Names and versions of what is installed."""
+    return ((name, str(version)) for name, version in found.items() if version != "absent")

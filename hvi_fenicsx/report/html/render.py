@@ -1,0 +1,62 @@
+"""``report.html`` beside a result: one file that a colleague reads without the program, made from the folder alone."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ...errors import HviError
+from ..reader import read
+
+if TYPE_CHECKING:
+    import jinja2
+
+NAME = "report.html"
+
+
+class ReportError(HviError):
+    """The report could not be written; the rest of the folder is as it was."""
+
+
+def write(folder: Path) -> Path:
+    """Write ``report.html`` into a result folder, from its files; for rank 0 alone.
+
+    Raises:
+        HviError: no result is there, its files are damaged, or the report cannot be written.
+    """
+    from .content import content
+
+    return render("run.html.j2", content(read(folder)), folder / NAME)
+
+
+def render(template: str, values: dict[str, Any], path: Path) -> Path:
+    """A template of this package with its values, as a file that is there whole or not at all.
+
+    Raises:
+        ReportError: it cannot be written.
+    """
+    text = _environment().get_template(template).render(values)
+    aside = path.with_name(f".{path.name}.{os.getpid()}.part")
+    try:
+        aside.write_text(text, encoding="utf-8")
+        os.replace(aside, path)
+    except OSError as error:
+        raise ReportError(f"{path}: cannot be written: {error.strerror or error}") from None
+    finally:
+        with contextlib.suppress(OSError):
+            aside.unlink()
+    return path
+
+
+def _environment() -> jinja2.Environment:
+    import jinja2  # a tenth of a second, for the report alone
+
+    loader = jinja2.FileSystemLoader(Path(__file__).parent)
+    return jinja2.Environment(
+        loader=loader, autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    )
+
+
+__all__ = ["NAME", "ReportError", "render", "write"]

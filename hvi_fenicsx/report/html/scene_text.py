@@ -1,0 +1,97 @@
+"""The scene in words: the body, its materials, and what acts on each part, from the resolved scene file."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from ...effects import Effect
+from ..reader import Result
+
+_PLACE = {"on", "region"}
+_SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
+def body(result: Result) -> Iterator[tuple[str, str]]:
+    """The body's shape and what it is made of, each with a name."""
+    yield "body", _entries(result.scene.get("domain") or {})
+    for name, table in _named(result.scene.get("material") or {}):
+        yield f"material{name}", _entries(table)
+    for name, table in _named(result.scene.get("body") or {}):
+        yield f"in the volume{name}", _entries(table)
+
+
+def _named(table: Mapping[str, Any]) -> list[tuple[str, Mapping[str, Any]]]:
+    """``[material]`` itself, or each ``[material.NAME]``."""
+    tables = [(f" “{name}”", t) for name, t in table.items() if isinstance(t, Mapping) and "law" not in t]
+    return tables if len(tables) == len(table) else [("", table)]
+
+
+def parts(result: Result) -> Iterator[dict[str, Any]]:
+    """Each boundary part: its name, where it lies, and what acts on it."""
+    for name, table in (result.scene.get("boundary") or {}).items():
+        on = table.get("on", ())
+        acts = [(key, words(value)) for key, value in table.items() if key not in _PLACE]
+        yield {"name": name, "on": on if isinstance(on, str) else ", ".join(on), "acts": acts}
+
+
+def effects(result: Result) -> Iterator[dict[str, str]]:
+    """Each effect in force: where, what it is, what it adds to the problem."""
+    known = {key: kind for place in Effect.registry.values() for key, kind in place.items()}
+    for entry in result.summary.get("effects") or []:
+        kind = known.get(entry["effect"])
+        yield {
+            "name": entry["effect"],
+            "where": entry["where"] or "the whole body",
+            "meaning": _first_paragraph(kind) if kind else "",
+            "adds": entry["adds"],
+            "share": ", ".join(_share(entry)),
+        }
+
+
+def _share(entry: Mapping[str, Any]) -> Iterator[str]:
+    """How much of the problem it is."""
+    for name in ("unknowns", "bounds"):
+        if entry.get(name):
+            yield f"{entry[name]:+,} {name}".replace("-", "−")
+    if entry.get("solver"):
+        yield f"solver: {entry['solver']}"
+
+
+def _first_paragraph(kind: type) -> str:
+    return (inspect.getdoc(kind) or "").split("\n\n")[0].replace("\n", " ").replace("`", "")
+
+
+def _entries(table: Mapping[str, Any]) -> str:
+    """``key value, key value``, without what is zero and so does nothing."""
+    return ", ".join(f"{key.replace('_', ' ')} {words(value)}" for key, value in table.items() if value != 0.0)
+
+
+def words(value: Any) -> str:
+    """A value of a scene file as people write it."""
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, int | float):
+        return number(value)
+    if isinstance(value, list):
+        return f"({', '.join(map(words, value))})"
+    if isinstance(value, Mapping):
+        return ", ".join(_pair(key, item) for key, item in value.items())
+    return str(value).replace("_", " ") if str(value).isidentifier() else str(value)
+
+
+def _pair(key: str, value: Any) -> str:
+    text = f"({words(value)})" if isinstance(value, Mapping) else words(value)
+    return text if key == "law" else f"{key} {text}"
+
+
+def number(value: float) -> str:
+    """A number to six digits, very large and small ones with a power of ten."""
+    text = f"{value:.6g}"
+    if "e" not in text and not 0 < abs(value) < 1e-3 and abs(value) < 1e5:
+        return text.replace("-", "−")
+    digits, exponent = f"{value:.6e}".split("e")
+    digits = digits.rstrip("0").rstrip(".").replace("-", "−")
+    power = f"10{str(int(exponent)).translate(_SUPERSCRIPTS)}"
+    return f"{digits}·{power}".replace("1·", "", 1) if digits in ("1", "−1") else f"{digits}·{power}"

@@ -1,0 +1,46 @@
+"""``report.html`` of a study: what accuracy costs, in its sentences and pictures, from the study's folder alone."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+from .content import picture
+from .render import NAME, ReportError, render
+
+_CAPTIONS = {
+    "work_precision": "Error against time: each point a run, the line what nothing cheaper is as accurate as.",
+    "error_h": "Error against the mesh width.",
+    "error_epsilon": "Error against ε, the width of the smoothing.",
+    "time": "Where the time goes.",
+}
+
+
+def write(folder: Path) -> Path:
+    """Write the page into the folder of a finished study; for one process alone.
+
+    Raises:
+        ReportError: no study is there, it is damaged, or the page cannot be written.
+    """
+    file = folder / "study.json"
+    try:
+        study = json.loads(file.read_text(encoding="utf-8"))
+        return render("study.html.j2", _content(study, folder), folder / NAME)
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise ReportError(f"{file}: no finished study, or damaged ({error})") from None
+
+
+def _content(study: dict[str, Any], folder: Path) -> dict[str, Any]:
+    shown = [folder / f"{name}.png" for name in _CAPTIONS]
+    return {
+        "title": f"{study['scene'] or 'untitled'}: what accuracy costs",
+        "sentences": list(study["sentences"]),
+        "pictures": [{**picture(path), "caption": _CAPTIONS[path.stem]} for path in shown if path.exists()],
+        "facts_of_study": [
+            ("points", str(len(study["points"]))),
+            ("MPI ranks of each", str(study["ranks"])),
+            ("hvi_fenicsx", str(study["version"])),
+        ],
+        "quantities": list(study["quantities"].items()),
+    }

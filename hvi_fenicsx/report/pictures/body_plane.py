@@ -1,0 +1,103 @@
+"""``body.png`` of a plane body: deformed over its outline, |u| in it, contact pressure drawn under its parts."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
+from matplotlib.colors import Colormap
+from matplotlib.figure import Figure
+from matplotlib.image import AxesImage
+from matplotlib.patches import PathPatch
+
+from ..reader import Result
+from ..units import times, unit_for
+from ..vtu import Array, Body, Ints
+from . import plane_marks as marks
+from .boundary_chains import chains, closed_path
+from .deformed import Deformed, deform, footings, largest_stress
+from .legend import FOOT, colour_bar, legend
+from .loads_supports import loads, supports
+from .raster import shade
+from .style import DPI, GREY, HEADING, INK, SLATE, area, figure, heading, save
+
+MARGIN, SIDE = 0.3, 7.4
+"""Inches: left and right of the body, and its largest width."""
+TALLEST, FLATTEST = 6.4, 2.2
+FEWEST_PIXELS = 13
+"""Mesh lines are drawn if they are so far apart."""
+
+
+def draw(path: Path, result: Result, body: Body) -> None:
+    """Draw the body with its loads, supports and contact parts."""
+    parts = footings(result, body)
+    shape = deform(body, parts)
+    drawn = [
+        *marks.supports(shape, supports(result, body)),
+        *marks.loads(shape, loads(result, body)),
+        *(m for part in parts for m in marks.footing(shape, part, largest_stress(parts))),
+    ]
+    made, axes = canvas(np.concatenate([shape.points[:, :2], body.points[:, :2], *(m.extent for m in drawn)]))
+    heading(made, result, "deformed body")
+    paint(axes, shape, shape.body.cells, shape.points, shape.amount, SLATE, float(shape.amount.max()))
+    for mark in drawn:
+        mark.draw(axes)
+    most = float(shape.amount.max())
+    unit = unit_for(most, "m")
+    words = f"displacement |u|, up to {unit.text(most)}"
+    colour_bar(made, SLATE, (0.0, most / unit.size), words, times(shape.factor))
+    legend(made, [marks.undeformed(), *marks.keys(drawn)])
+    save(made, path)
+
+
+def canvas(points: Array) -> tuple[Figure, Axes]:
+    """Axes without a frame for points (n, 2): a picture just high enough for them, or as wide as they need it."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    extent = np.maximum(high - low, 1e-3 * float(np.max(high - low)) or 1.0)
+    scale = min(SIDE / extent[0], TALLEST / extent[1])
+    tall = max(FLATTEST, scale * extent[1])
+    made = figure(HEADING + tall + FOOT + 0.1)
+    axes = area(made, MARGIN, FOOT, SIDE, tall)
+    axes.set_axis_off()
+    middle, half = (low + high) / 2, np.array([SIDE, tall]) / scale / 2
+    axes.set_xlim(middle[0] - half[0], middle[0] + half[0])
+    axes.set_ylim(middle[1] - half[1], middle[1] + half[1])
+    return made, axes
+
+
+def paint(
+    axes: Axes, shape: Deformed, triangles: Ints, corners: Array, values: Array, colours: Colormap, end: float
+) -> None:
+    """The body over its undeformed outline, in the colours of values at the corners of triangles, from zero."""
+    body, points = shape.body, shape.points
+    loops = chains(body.boundary)
+    outline = closed_path(points, loops)
+    drawn = _shading(axes, corners, triangles, values)
+    drawn.set(cmap=colours, clim=(0.0, end or 1.0))
+    drawn.set_clip_path(outline, axes.transData)
+    for patch, style in (
+        (closed_path(body.points, loops), {"ec": GREY, "ls": (0, (5, 4)), "lw": 1.3, "zorder": 3}),
+        (outline, {"ec": INK, "lw": 1.6, "zorder": 4}),
+    ):
+        axes.add_patch(PathPatch(patch, fc="none", joinstyle="round", **style))
+    if _pixels_between_lines(axes, body) >= FEWEST_PIXELS:
+        sides = np.unique(np.sort(np.concatenate([body.cells[:, c] for c in ((0, 1), (1, 2), (2, 0))]), axis=1), axis=0)
+        axes.add_collection(LineCollection(list(points[sides, :2]), colors="white", lw=0.6, alpha=0.5, zorder=2))
+
+
+def _pixels_between_lines(axes: Axes, body: Body) -> float:
+    per_metre = SIDE * DPI / float(np.ptp(axes.get_xlim()))
+    return per_metre * float(np.sqrt(np.prod(np.ptp(body.points[:, :2], axis=0)) / len(body.cells)))
+
+
+def _shading(axes: Axes, corners: Array, triangles: Ints, values: Array) -> AxesImage:
+    """Values as an image of the picture's own pixels."""
+    (left, right), (bottom, top) = axes.get_xlim(), axes.get_ylim()
+    wide = round(SIDE * DPI)
+    tall = round(wide * (top - bottom) / (right - left))
+    pixels = (corners[:, :2] - [left, bottom]) * [wide / (right - left), tall / (top - bottom)]
+    image = shade(pixels, triangles, values, (tall, wide))
+    extent = (left, right, bottom, top)
+    return axes.imshow(image, origin="lower", extent=extent, interpolation="nearest", aspect="auto", zorder=1)

@@ -1,0 +1,203 @@
+"""``contact.png`` in the plane: slip, -σ_t and contact pressure along a part."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+from matplotlib.axes import Axes
+from matplotlib.ticker import MaxNLocator
+
+from ..reader import Array, Part, Result
+from ..units import Unit, quantity, unit_for
+from .style import BLUE, GREEN, GREY, HEADING, INK, ORANGE, VERMILION, area, figure, heading, save
+
+if TYPE_CHECKING:
+    from ...laws import Superpotential
+
+PANEL, GAP, FOOT = 1.75, 0.62, 0.72
+"""Inches: a panel, the room for its title, the axis below the last."""
+MARKED = 80
+"""Vertices up to which each is marked."""
+SHORT = 0.2
+"""Of a part's length: a closed stretch shorter than this is shown alone."""
+IN_RANGE = 1.6
+"""A kink of the law is drawn if it lies within this many times the largest slip."""
+
+
+def draw(path: Path, result: Result, part: Part) -> None:
+    """Draw the curves of a part, with what the laws say of them; a law that it does not have has no curve."""
+    part = _worth_seeing(part)
+    length = unit_for(float(np.max(part["s"])), "m")
+    panels = list(_panels(result, part, length))
+    made = figure(HEADING + len(panels) * (PANEL + GAP) + FOOT)
+    heading(made, result, f"on “{part.name}”")
+    lifted = _lifted_spans(part)
+    for above, panel in enumerate(reversed(panels)):
+        axes = area(made, 0.95, FOOT + above * (PANEL + GAP), 6.75, PANEL)
+        panel(axes)
+        for start, end in lifted:
+            axes.axvspan(start / length.size, end / length.size, color=ORANGE, alpha=0.16, lw=0)
+        _finish(axes, part, length)
+        axes.tick_params(labelbottom=above == 0)
+    _say_lifted(made.axes[0], lifted, part, length)
+    made.axes[0].set_xlabel(f"s along “{part.name}” in {length.name}")
+    save(made, path)
+
+
+def _worth_seeing(part: Part) -> Part:
+    """Of a part that is closed on a short stretch only, that stretch and its neighbourhood."""
+    s, closed = part["s"], part["s"][part["contact"] == 1.0]
+    if len(closed) < 2 or np.ptp(closed) > SHORT * np.ptp(s):
+        return part
+    room = np.ptp(closed)
+    near = (s >= closed.min() - room) & (s <= closed.max() + room)
+    return Part(part.name, {name: values[near] for name, values in part.columns.items()})
+
+
+def _panels(result: Result, part: Part, length: Unit) -> Iterator[Callable[[Axes], None]]:
+    """From the top: slip and friction, what a normal law acts on, the pressure."""
+
+    def displacement(values: Array, words: str, key: str) -> Callable[[Axes], None]:
+        return partial(
+            _displacement, part=part, values=values, law=result.law(part.name, key), words=words, length=length
+        )
+
+    yield displacement(part.slip, "slip $u_t$", "friction")
+    if result.acts(part.name, "friction"):
+        yield partial(_friction, part=part, result=result, length=length)
+    if result.acts(part.name, "adhesion"):
+        yield displacement(-part["u_n"], "opening $-u_n$", "adhesion")
+    if result.acts(part.name, "support"):
+        yield displacement(part["u_n"], "penetration $u_n$", "support")
+    yield partial(_pressure, part=part, length=length)
+
+
+def _displacement(axes: Axes, part: Part, values: Array, law: Superpotential | None, words: str, length: Unit) -> None:
+    """What a law acts on, and the values at which the law drops."""
+    values = _without_noise(values, part)
+    unit = unit_for(_largest(values), "m")
+    _line(axes, part, values, length, unit, BLUE)
+    kinks = law.concave.kinks if law is not None else np.empty(0)
+    shown, beyond = _within(kinks, values)
+    for kink in shown:
+        axes.axhline(kink / unit.size, color=INK, ls=(0, (4, 3)), lw=1.4)
+    note = ""
+    if len(shown):
+        note = f"dashed: the law drops at {_listed(shown)}"
+    elif len(beyond):
+        note = f"the law drops at {_listed(beyond)}, not reached"
+    _title(axes, f"{words} in {unit.name}", note)
+
+
+def _within(kinks: Array, values: Array) -> tuple[Array, Array]:
+    """The kinks worth drawing, and those too far away; on the side of the slips, of an even law's two."""
+    low, high = min(float(np.nanmin(values)), 0.0), max(float(np.nanmax(values)), 0.0)
+    near = (kinks <= IN_RANGE * high) & (kinks >= IN_RANGE * low)
+    near &= ((kinks > 0.0) & (high > -0.1 * low)) | ((kinks < 0.0) & (low < -0.1 * high)) | (kinks == 0.0)
+    return kinks[near], kinks[~near]
+
+
+def _listed(kinks: Array) -> str:
+    """An even law's two kinks are said as one."""
+    return " and ".join(
+        ("±" if -k in kinks and k else "") + quantity(k, "m") for k in kinks if k >= 0 or -k not in kinks
+    )
+
+
+def _friction(axes: Axes, *, part: Part, result: Result, length: Unit) -> None:
+    values = part.friction
+    unit = unit_for(_largest(values), "Pa")
+    law = result.law(part.name) if result.summary.get("smoothing") else None
+    note = ""
+    if law is not None:
+        low, high = law.interval(part.slip.astype(np.float64))
+        note = "dashed: the law itself, unsmoothed"
+        for bound in (low, high) if np.any(high > low) else (low,):
+            axes.plot(part["s"] / length.size, bound / unit.size, color=INK, ls=(0, (4, 3)), lw=1.4, zorder=4)
+    _line(axes, part, values, length, unit, GREEN)
+    _title(axes, f"friction $-\\sigma_t$ in {unit.name}", note or _pieces(axes, part, length, unit))
+
+
+def _pieces(axes: Axes, part: Part, length: Unit, unit: Unit) -> str:
+    """Mark the vertices that have left the law's first piece; says what the mark means."""
+    fallen = part["branch_t"] > 0
+    if not fallen.any():
+        return ""
+    axes.plot(part["s"][fallen] / length.size, part.friction[fallen] / unit.size, "o", mfc="white", mec=GREEN, ms=6)
+    return f"hollow: past the drop ({np.count_nonzero(fallen)} of {len(fallen)} vertices)"
+
+
+def _pressure(axes: Axes, *, part: Part, length: Unit) -> None:
+    values = part.pressure
+    unit = unit_for(_largest(values), "Pa")
+    _line(axes, part, values, length, unit, VERMILION)
+    axes.fill_between(part["s"] / length.size, values / unit.size, color=VERMILION, alpha=0.15, lw=0)
+    off = part.lifted
+    axes.plot(part["s"][off] / length.size, values[off] / unit.size, "o", mfc="white", mec=VERMILION, ms=6, zorder=5)
+    extreme = float(values[np.nanargmax(np.abs(values))]) if np.isfinite(values).any() else 0.0
+    note = f"largest {'tension ' if extreme < 0.0 else ''}{unit.text(abs(extreme))}"
+    _title(axes, f"contact pressure $-\\sigma_n$ in {unit.name}", note)
+
+
+def _line(axes: Axes, part: Part, values: Array, length: Unit, unit: Unit, colour: str) -> None:
+    marker = "o" if len(values) <= MARKED else ""
+    size = 4.5 if len(values) <= MARKED // 2 else 3.0
+    axes.plot(part["s"] / length.size, values / unit.size, color=colour, marker=marker, ms=size)
+
+
+def _title(axes: Axes, words: str, note: str) -> None:
+    axes.set_title(words, loc="left", size=14, parse_math=True)
+    axes.set_title(note, loc="right", size=11.5, color=GREY)
+
+
+def _finish(axes: Axes, part: Part, length: Unit) -> None:
+    """Zero is always in sight: a pressure that is uniform to a thousandth should look so."""
+    bottom, top = axes.get_ylim()
+    low, high = min(0.0, *axes.dataLim.intervaly), max(0.0, *axes.dataLim.intervaly)
+    low, high = min(low, *(bottom,) if bottom < 0 and low < 0 else (low,)), max(high, top if high > 0 else high)
+    room = 0.06 * (high - low or 1.0)
+    axes.set_ylim(low - room, high + room)
+    axes.axhline(0.0, color=GREY, lw=0.8, zorder=1)
+    start, end = float(np.min(part["s"])) / length.size, float(np.max(part["s"])) / length.size
+    axes.set_xlim(start - 0.015 * (end - start), end + 0.015 * (end - start))
+    axes.yaxis.set_major_locator(MaxNLocator(nbins=4, min_n_ticks=3, steps=[1, 2, 2.5, 5, 10]))
+    axes.grid(axis="y", color="#e6e6e6", lw=0.8)
+    axes.set_axisbelow(True)
+
+
+def _lifted_spans(part: Part) -> list[tuple[float, float]]:
+    """Stretches of s whose vertices are lifted; each vertex stands for half the way to its neighbours."""
+    s = part["s"]
+    middles = np.concatenate([s[:1], (s[1:] + s[:-1]) / 2, s[-1:]])
+    return [(float(middles[a]), float(middles[b])) for a, b in _runs(part.lifted)]
+
+
+def _runs(flags: npt.NDArray[np.bool_]) -> Iterator[tuple[int, int]]:
+    """Where flags are set, as half-open ranges."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(int), [0]])))
+    yield from zip(map(int, edges[::2]), map(int, edges[1::2]), strict=True)
+
+
+def _say_lifted(axes: Axes, spans: list[tuple[float, float]], part: Part, length: Unit) -> None:
+    if not spans:
+        return
+    start, end = max(spans, key=lambda span: span[1] - span[0])
+    gap = quantity(float(np.nanmax(part["gap"])), "m")
+    middle = (start + end) / 2 / length.size
+    words = f"lifted\nup to {gap}"
+    axes.text(middle, 0.93, words, transform=axes.get_xaxis_transform(), ha="center", va="top", size=12, color=INK)
+
+
+def _largest(values: Array) -> float:
+    return float(np.nanmax(np.abs(values), initial=0.0))
+
+
+def _without_noise(values: Array, part: Part) -> Array:
+    """Displacements that are rounding beside the part's others are zero, and are drawn so."""
+    whole = max(_largest(part[name]) for name in ("u_n", "u_t1", "gap") if part.has(name))
+    return values if _largest(values) > 1e-9 * whole else 0.0 * values

@@ -1,0 +1,193 @@
+"""``contact.png`` in space: slip, -σ_t and contact pressure over a part, seen flat, from its mean normal."""
+
+from __future__ import annotations
+
+import textwrap
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import Colormap
+from matplotlib.figure import Figure
+from matplotlib.tri import Triangulation
+
+from ..reader import Part, Result
+from ..units import Unit, quantity, unit_for
+from ..vtu import Array, Body, Ints
+from .deformed import Footing, footings
+from .raster import shade
+from .style import BLUE, GREEN, GREY, HEADING, INK, WIDTH, area, figure, heading, pressure_scale, save, shades
+from .vtk_view import area_vectors
+
+WIDEST, TALLEST = 5.8, 2.75
+"""Inches: a map."""
+LEFT, GAP, FOOT = 0.95, 0.62, 0.75
+ROOMY = 0.55
+"""Of the width: where a map ends that leaves room for words beside it."""
+ARROWS = 13
+"""Along the longer side of a map."""
+
+
+@dataclass(frozen=True)
+class Flat:
+    """A part laid flat: its vertices (m, 2), m, triangles between them, the two axes (2, 3) and their names."""
+
+    points: Array
+    triangles: Ints
+    axes: Array
+    names: tuple[str, str]
+
+
+def draw(path: Path, result: Result, part: Part, body: Body) -> None:
+    """Draw the three maps of a part."""
+    foot = next(foot for foot in footings(result, body) if foot.part.name == part.name)
+    flat, normal = laid_flat(foot, body)
+    rows: list[tuple[str, str, Array, Array | None, Colormap | None]] = [
+        ("slip", "m", part.slip, _vectors(part, flat, normal, "u_t"), shades(BLUE))
+    ]
+    if result.acts(part.name, "friction"):
+        rows.append(("friction", "Pa", part.friction, _vectors(part, flat, normal, "friction_t"), shades(GREEN)))
+    rows.append(("contact pressure", "Pa", part.pressure, None, None))
+    width, height = _map_size(flat)
+    made = figure(HEADING + len(rows) * (height + GAP) + FOOT)
+    heading(made, result, f"on “{part.name}”")
+    for above, (words, name, values, arrows, colours) in enumerate(reversed(rows)):
+        axes = area(made, LEFT, FOOT + above * (height + GAP), width, height)
+        unit = unit_for(float(np.nanmax(np.abs(values), initial=0.0)), name)
+        _map(made, axes, flat, values / unit.size, colours, _symbol(words, unit))
+        _grey_where_lifted(axes, flat, part)
+        if arrows is not None:
+            _arrows(axes, flat, arrows)
+        _frame(axes, flat, last=above == 0)
+    _notes(made, result, part, flat)
+    save(made, path)
+
+
+def laid_flat(foot: Footing, body: Body) -> tuple[Flat, Array]:
+    """The part in two of the coordinate axes, those most along it; and its mean unit normal."""
+    total = area_vectors(body.points, foot.facets).sum(axis=0)
+    normal = total / (float(np.linalg.norm(total)) or 1.0)
+    kept = [i for i in range(3) if i != int(np.argmax(np.abs(normal)))]
+    axes = np.eye(3)[kept]
+    return Flat(foot.part.points @ axes.T, foot.row[foot.facets], axes, ("xyz"[kept[0]], "xyz"[kept[1]])), normal
+
+
+def _vectors(part: Part, flat: Flat, normal: Array, column: str) -> Array:
+    """A tangential field of the table along the map's axes; its tangents are the contract's, of the mean normal."""
+    axis = np.array([0.0, 1.0, 0.0]) if abs(normal[0]) > np.cos(np.pi / 4) else np.array([1.0, 0.0, 0.0])
+    first = axis - (axis @ normal) * normal
+    first = first / np.linalg.norm(first)
+    tangents = np.stack([first, np.cross(normal, first)])
+    values = np.nan_to_num(np.column_stack([part[f"{column}1"], part[f"{column}2"]]))
+    return np.asarray(values @ tangents @ flat.axes.T)
+
+
+def _map_size(flat: Flat) -> tuple[float, float]:
+    wide, tall = np.maximum(np.ptp(flat.points, axis=0), 1e-12)
+    scale = min(WIDEST / wide, TALLEST / tall)
+    return float(scale * wide), max(float(scale * tall), 0.6)
+
+
+def _symbol(words: str, unit: Unit) -> str:
+    symbols = {"slip": "$|u_t|$", "friction": "$|\\sigma_t|$", "contact pressure": "$-\\sigma_n$"}
+    return f"{words} {symbols[words]} in {unit.name}"
+
+
+def _map(made: Figure, axes: Axes, flat: Flat, values: Array, colours: Colormap | None, words: str) -> None:
+    """Values as an image of the picture's own pixels, with a bar beside it, from zero; without colours, a pressure."""
+    low, high = float(np.nanmin(values)), float(np.nanmax(np.abs(values)))
+    scale = pressure_scale(low, high) if colours is None else (colours, 0.0, high or 1.0)
+    drawn = axes.imshow(
+        _image(axes, flat, values),
+        cmap=scale[0],
+        vmin=scale[1],
+        vmax=scale[2],
+        origin="lower",
+        aspect="auto",
+        extent=_extent(flat),
+    )
+    box = axes.get_position()
+    bar = made.add_axes((box.x1 + 0.02, box.y0, 0.02, box.height))
+    made.colorbar(drawn, cax=bar)
+    bar.locator_params(axis="y", nbins=4)
+    bar.spines[:].set_visible(False)
+    axes.set_title(words, loc="left", size=14, parse_math=True)
+
+
+def _extent(flat: Flat) -> tuple[float, float, float, float]:
+    (left, bottom), (right, top) = flat.points.min(axis=0), flat.points.max(axis=0)
+    return float(left), float(right), float(bottom), float(top)
+
+
+def _image(axes: Axes, flat: Flat, values: Array) -> Array:
+    box = axes.get_window_extent()
+    wide, tall = round(box.width), round(box.height)
+    left, right, bottom, top = _extent(flat)
+    scale = np.array([wide / (right - left), tall / ((top - bottom) or 1.0)])
+    return shade((flat.points - [left, bottom]) * scale, flat.triangles, np.nan_to_num(values), (tall, wide))
+
+
+def _grey_where_lifted(axes: Axes, flat: Flat, part: Part) -> None:
+    if part.idle.any():
+        image = _image(axes, flat, part.idle.astype(float))
+        veil = np.zeros((*image.shape, 4))
+        veil[...] = (0.55, 0.55, 0.55, 0.0)
+        veil[..., 3] = np.where(image > 0.5, 0.45, 0.0)
+        axes.imshow(veil, origin="lower", aspect="auto", extent=_extent(flat))
+
+
+def _arrows(axes: Axes, flat: Flat, vectors: Array) -> None:
+    """A field along the part at the nodes of a coarse grid, whatever the mesh."""
+    low, extent = flat.points.min(axis=0), np.ptp(flat.points, axis=0)
+    spacing = float(np.max(extent)) / ARROWS
+    count = np.maximum(np.round(extent / spacing), 1).astype(int)
+    pixels = (flat.points - low) / np.where(extent > 0.0, extent, 1.0) * count
+    shape = (int(count[1]), int(count[0]))
+    ways = np.stack([shade(pixels, flat.triangles, component, shape) for component in vectors.T])
+    ways *= 0.9 * spacing / (float(np.linalg.norm(vectors, axis=1).max()) or 1.0)
+    ways[:, np.linalg.norm(ways, axis=0) < 0.05 * spacing] = np.nan
+    x, y = (low[i] + (np.arange(count[i]) + 0.5) * extent[i] / count[i] for i in (0, 1))
+    style: dict[str, Any] = {"angles": "xy", "scale_units": "xy", "scale": 1.0, "pivot": "mid"}
+    axes.quiver(*np.meshgrid(x, y), *ways, **style, width=0.0045, color=INK, alpha=0.85)
+
+
+def _frame(axes: Axes, flat: Flat, *, last: bool) -> None:
+    left, right, bottom, top = _extent(flat)
+    axes.set_xlim(left, right)
+    axes.set_ylim(bottom, top)
+    axes.spines[:].set_visible(False)
+    axes.locator_params(axis="y", nbins=4)
+    axes.set_ylabel(f"{flat.names[1]} in m")
+    axes.tick_params(labelbottom=last, bottom=last)
+    if last:
+        axes.set_xlabel(f"{flat.names[0]} in m")
+
+
+def _notes(made: Figure, result: Result, part: Part, flat: Flat) -> None:
+    """Where the law drops, as a line on the map of the slip, and what grey means; both said there."""
+    law, said = result.law(part.name), []
+    axes = made.axes[-2]  # the map on top, which was drawn last, before its bar
+    kinks = law.concave.kinks if law is not None else np.empty(0)
+    for kink in kinks[kinks > 0.0]:
+        if np.nanmin(part.slip) < kink < np.nanmax(part.slip):
+            triangles = Triangulation(flat.points[:, 0], flat.points[:, 1], flat.triangles)
+            axes.tricontour(triangles, part.slip, [kink], colors=INK, linestyles="--")
+            said.append(f"dashed: the law drops at {quantity(float(kink), 'm')}")
+        else:
+            said.append(f"the law drops at {quantity(float(kink), 'm')}, not reached")
+    if part.idle.any():
+        said.append(f"grey: lifted, up to {quantity(float(np.nanmax(part['gap'])), 'm')}")
+    _say(made, axes, said[-2:])
+
+
+def _say(made: Figure, axes: Axes, said: list[str]) -> None:
+    """Beside the map and its bar if there is room, else above it."""
+    box = axes.get_position()
+    style: dict[str, Any] = {"size": 12, "color": GREY}
+    if box.x1 < ROOMY:
+        lines = [line for words in said for line in textwrap.wrap(words, 24)]
+        made.text(box.x1 + 0.13, box.y1, "\n".join(lines), va="top", linespacing=1.4, **style)
+    else:
+        made.text(1 - 0.3 / WIDTH, box.y1 + 0.007, "; ".join(said), ha="right", va="bottom", **style)

@@ -1,0 +1,78 @@
+"""Pictures of a finished folder, drawn by a child process: :func:`draw`, or ``python3 -m hvi_fenicsx.report.pictures``.
+
+The child knows the folder alone, and no MPI: what goes wrong in it (VTK aborts where it finds no display) costs a
+picture, never a run. Nothing here imports a plotting library; the child does.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+from ...errors import HviError
+from ...runtime import processes
+
+UNFINISHED = ".part.png"
+"""How the name of a picture ends that is being written."""
+PATIENCE = 3.0
+"""Seconds for a child to end by itself."""
+COMPLAINT = "pictures: "
+"""How the child's message to its caller begins."""
+
+
+class PictureError(HviError):
+    """A picture could not be drawn; those that could are in the folder."""
+
+
+def draw(folder: Path, *, timeout: float = 120) -> list[Path]:
+    """Draw all pictures of a result folder into it; for rank 0 alone.
+
+    Args:
+        folder: a result (design.md, the contract). timeout: seconds after which the child is ended.
+
+    Returns:
+        The pictures, as paths.
+
+    Raises:
+        PictureError: the child failed; its message says which picture and why.
+    """
+    command = [sys.executable, "-m", __package__, os.fspath(folder)]
+    # One thread for linear algebra: the child forks, and what it draws needs none.
+    alone = {**processes.environment(), "OMP_NUM_THREADS": "1"}
+    child = subprocess.Popen(
+        command, env=alone, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
+    )
+    with _ended(child, Path(folder)):
+        try:
+            names, errors = child.communicate(timeout=timeout)
+        except subprocess.TimeoutExpired:
+            raise PictureError(f"not drawn within {timeout:g} s; {' '.join(command)} tries again") from None
+    if child.returncode != 0:
+        raise PictureError(_message(errors, child.returncode))
+    return [Path(folder) / name for name in names.splitlines()]
+
+
+@contextlib.contextmanager
+def _ended(child: subprocess.Popen[str], folder: Path) -> Iterator[None]:
+    """Whatever happens, of the child nothing remains: no process (it leads a group), no half-written file."""
+    try:
+        yield
+    finally:
+        if child.returncode != 0:
+            processes.end(child, PATIENCE)
+            for file in folder.glob(f".*{UNFINISHED}"):
+                file.unlink(missing_ok=True)
+
+
+def _message(errors: str, code: int) -> str:
+    """The child's own words are the lines that begin so; before them there may be a library's noise."""
+    own = [line.removeprefix(COMPLAINT) for line in errors.splitlines() if line.startswith(COMPLAINT)]
+    noise = errors.strip().splitlines()[-1:]
+    return "; ".join(own or [f"the drawing process ended with {code}", *noise])
+
+
+__all__ = ["PictureError", "draw"]

@@ -1,0 +1,209 @@
+"""What is drawn around a plane body: loads, supports, obstacles and contact pressure. Each mark knows its extent."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from ..units import quantity
+from ..vtu import Array
+from .boundary_chains import chains, normals
+from .deformed import Deformed, Footing
+from .loads_supports import Load, Support
+from .style import GREY, INK, ORANGE, PURPLE, VERMILION
+
+LOAD, PRESSURE, ROLLER = 0.13, 0.15, 0.011
+"""Of the body's size: the longest arrow, the highest pressure, a roller's radius."""
+OBSTACLE, NOTHING = 0.004, 1e-6
+"""How far behind its face an obstacle's line is drawn, of the body's size; what counts as no stress, of the largest."""
+ARROWS = 9
+"""Along a side of the body's size."""
+
+
+@dataclass(frozen=True)
+class Mark:
+    """Something to draw: the points (n, 2) that it reaches, how, and its line in the legend."""
+
+    extent: Array
+    draw: Callable[[Axes], None]
+    key: Callable[[], Artist]
+    words: str
+
+
+def keys(drawn: Sequence[Mark]) -> list[Artist]:
+    """One line of the legend for each kind of mark."""
+    return [mark.key() for mark in {mark.words: mark for mark in drawn if mark.words}.values()]
+
+
+def undeformed() -> Artist:
+    """The legend's line for the dashed outline."""
+    return Line2D([], [], color=GREY, ls=(0, (3, 2)), lw=1.3, label="undeformed outline")
+
+
+def loads(shape: Deformed, found: list[Load]) -> Iterator[Mark]:
+    """Arrows onto a side where it is pushed, from it where it is pulled; each load with its own scale and value."""
+    size = shape.body.size
+    for load in found:
+        points = shape.points[load.side.vertices, :2]
+        largest = float(np.linalg.norm(load.traction, axis=1).max())
+        at = _spread(points, size)
+        arrows = _along(points, load.traction[:, :2], at) * LOAD * size / largest
+        feet, outward = _along(points, points, at), _along(points, load.side.normals[:, :2], at)
+        pushed = np.einsum("ki,ki->k", arrows, outward) < -1e-6 * LOAD * size
+        tails = feet - np.where(pushed[:, None], arrows, 0.0)
+        yield _arrows(tails, arrows, INK, "load", size)
+        yield _label(feet, outward, quantity(largest, "Pa"), size)
+
+
+def _label(feet: Array, outward: Array, words: str, size: float) -> Mark:
+    """A load's largest value beyond its arrows, where the middle of the side is."""
+    normal = outward[len(outward) // 2]
+    middle = (feet[(len(feet) - 1) // 2] + feet[len(feet) // 2]) / 2
+    at = middle + (LOAD + 0.015) * size * normal
+    room = at + size * normal * np.where(np.abs(normal) > 0.5, [0.12, 0.045], 0.0)
+
+    def draw(axes: Axes) -> None:
+        across = {1: "left", 0: "center", -1: "right"}[round(float(normal[0]))]
+        upright = {1: "bottom", 0: "center", -1: "top"}[round(float(normal[1]))]
+        axes.text(at[0], at[1], words, ha=across, va=upright, size=12.5, weight="bold", color=INK)
+
+    return Mark(np.array([at, room]), draw, Artist, "")
+
+
+def _lengths(points: Array) -> Array:
+    """The way along a line to each of its points."""
+    return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+
+
+def _spread(points: Array, size: float, fewest: int = 2) -> Array:
+    """Where to put arrows on a line, as lengths along it."""
+    length = float(_lengths(points)[-1])
+    return np.linspace(0.0, length, max(fewest, round(ARROWS * length / size)))
+
+
+def _along(points: Array, values: Array, at: Array) -> Array:
+    """Values (m, k) at points on a line, interpolated at lengths along it."""
+    s = _lengths(points)
+    return np.column_stack([np.interp(at, s, column) for column in values.T])
+
+
+def _arrows(tails: Array, arrows: Array, colour: str, words: str, size: float) -> Mark:
+    long = np.linalg.norm(arrows, axis=1) > 0.012 * size
+
+    def draw(axes: Axes) -> None:
+        axes.quiver(*tails[long].T, *arrows[long].T, color=colour, zorder=6, clip_on=False, **_ARROW, width=0.0042)
+
+    key = Line2D([], [], color=colour, marker=">", ms=7, markevery=(1, 1), lw=1.6, label=words)
+    key.set_data([0, 1], [0, 0])
+    return Mark(np.concatenate([tails, tails + arrows]), draw, lambda: key, words)
+
+
+_ARROW: dict[str, Any] = {
+    "angles": "xy",
+    "scale_units": "xy",
+    "scale": 1.0,
+    "headwidth": 4.2,
+    "headlength": 4.6,
+    "headaxislength": 4.4,
+    "minlength": 0.1,
+}
+
+
+def supports(shape: Deformed, found: list[Support]) -> Iterator[Mark]:
+    """A wall along the side, with rollers where the side may move along it."""
+    for support in found:
+        points, outward = shape.points[support.side.vertices, :2], support.side.normals[:, :2]
+        radius = ROLLER * shape.body.size if support.rolling else 0.0
+        rollers = _along(points, points + radius * outward, _spread(points, shape.body.size))
+        shown = rollers if support.rolling else rollers[:0]
+        yield _support(points + 2 * radius * outward, shown, outward, shape.body.size)
+
+
+def _support(wall: Array, rollers: Array, outward: Array, size: float) -> Mark:
+    words = "support, free to slide" if len(rollers) else "support"
+
+    def draw(axes: Axes) -> None:
+        _hatched(axes, wall, outward, size)
+        per_metre = axes.get_window_extent().width / float(np.ptp(axes.get_xlim())) * 72 / axes.figure.dpi
+        style: dict[str, Any] = {"mfc": "white", "mec": INK, "mew": 1.2, "clip_on": False, "zorder": 5}
+        axes.plot(*rollers.T, "o", ms=2 * ROLLER * size * per_metre, **style)
+
+    key = Line2D([], [], color=INK, lw=2.2, marker="o" if len(rollers) else "", mfc="white", ms=7, label=words)
+    return Mark(np.concatenate([wall, wall + 0.03 * size * outward]), draw, lambda: key, words)
+
+
+def _hatched(axes: Axes, line: Array, outward: Array, size: float) -> None:
+    """A line with the short strokes behind it by which drawings tell a wall."""
+    axes.plot(*line.T, color=INK, lw=2.2, solid_capstyle="butt", clip_on=False, zorder=3)
+    places = np.arange(0.0, float(_lengths(line)[-1]), 0.02 * size)
+    at, normal = _along(line, line, places), _along(line, outward, places)
+    tips = at + 0.02 * size * (normal + np.column_stack([-normal[:, 1], normal[:, 0]]))
+    strokes = np.stack([at, tips, np.full_like(at, np.nan)], axis=1).reshape(-1, 2)
+    axes.plot(*strokes.T, color=GREY, lw=0.9, clip_on=False, zorder=2)
+
+
+def footing(shape: Deformed, foot: Footing, largest: float) -> Iterator[Mark]:
+    """The obstacle of a part, where the part is off it, and the pressure on it as arrows that end there."""
+    for chain in chains(foot.facets):
+        outward = normals(shape.body.points, chain)
+        if foot.obstacle is not None:
+            outward = np.broadcast_to(foot.obstacle[:2], outward.shape)
+        gap = np.nan_to_num(foot.values(foot.part["gap"], chain))
+        base = shape.points[chain, :2] + (shape.factor * gap)[:, None] * outward
+        pressure = np.nan_to_num(foot.values(foot.part.pressure, chain))
+        if foot.part.has("gap"):
+            yield _obstacle(base + OBSTACLE * shape.body.size * outward)
+        off = foot.part.lifted[foot.row[chain]]
+        if off.any():
+            yield _lifted(shape.points[chain, :2], off, float(gap[off].max()))
+        yield from _profile(base, outward, pressure, largest or 1.0, shape.body.size)
+
+
+def _obstacle(base: Array) -> Mark:
+    def draw(axes: Axes) -> None:
+        axes.plot(*base.T, color=GREY, lw=4, solid_capstyle="butt", clip_on=False, zorder=3.5)
+
+    return Mark(base, draw, lambda: Line2D([], [], color=GREY, lw=4, label="obstacle"), "obstacle")
+
+
+def _lifted(points: Array, off: npt.NDArray[np.bool_], gap: float) -> Mark:
+    """The part's own line where it is off the obstacle; points that are not are left out of it."""
+    line, words = np.where(off[:, None], points, np.nan), f"lifted, up to {quantity(gap, 'm')}"
+    style: dict[str, Any] = {"color": ORANGE, "lw": 4.5, "marker": "o", "ms": 2.5, "solid_capstyle": "butt"}
+
+    def draw(axes: Axes) -> None:
+        axes.plot(*line.T, **style, clip_on=False, zorder=5.5)
+
+    return Mark(points, draw, lambda: Line2D([], [], **style, label=words), words)
+
+
+def _profile(base: Array, outward: Array, pressure: Array, largest: float, size: float) -> Iterator[Mark]:
+    for sign, colour, words in ((1, VERMILION, "contact pressure"), (-1, PURPLE, "contact tension")):
+        part = np.maximum(sign * pressure, 0.0)
+        if part.max() <= NOTHING * largest:
+            continue
+        tips = base + PRESSURE * size / largest * part[:, None] * outward
+        tips[np.convolve(part > NOTHING * largest, [1, 1, 1], "same") == 0] = np.nan  # no line where there is no stress
+        yield _filled(base, tips, colour, f"{words}, up to {quantity(float(part.max()), 'Pa')}")
+        tips = np.where(np.isnan(tips), base, tips)
+        first, last = np.flatnonzero(part > 0.02 * part.max())[[0, -1]]
+        at = _lengths(base)[first] + _spread(base[first : last + 1], size / 2, fewest=5)
+        feet, ends = _along(base, base, at), _along(base, tips, at)
+        yield _arrows(ends if sign > 0 else feet, sign * (feet - ends), colour, "", size)
+
+
+def _filled(base: Array, tips: Array, colour: str, words: str) -> Mark:
+    def draw(axes: Axes) -> None:
+        ends = np.where(np.isnan(tips), base, tips)
+        axes.fill(*np.concatenate([base, ends[::-1]]).T, color=colour, alpha=0.16, lw=0, clip_on=False, zorder=2)
+        axes.plot(*tips.T, color=colour, lw=1.8, clip_on=False, zorder=5)
+
+    return Mark(tips[np.isfinite(tips[:, 0])], draw, lambda: Patch(fc=colour, alpha=0.5, ec=colour, label=words), words)

@@ -1,0 +1,74 @@
+"""Linear values on triangles as an image: every pixel centre in a triangle takes its value there.
+
+matplotlib's own shading takes 3 s for half a million triangles; this takes a fraction of one, for many small triangles
+as for few large ones.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+
+from ..vtu import Array, Ints
+
+_AT_ONCE = 100_000
+"""Candidate pixels handled at a time: what fits a cache is twice as fast."""
+_EDGE = 1e-6
+_LARGEST = 1 << 20
+"""More pixels than an image has on a side."""
+
+
+def shade(points: Array, triangles: Ints, values: Array, shape: tuple[int, int]) -> Array:
+    """Values (n,) at points (n, 2) in pixels, the image's lower left corner being (0, 0), as an image.
+
+    Returns:
+        An array of the shape, its first row the lowest, NaN where there is no triangle.
+    """
+    image = np.full(shape, np.nan)
+    corners = points[triangles] - 0.5  # pixel centres at whole numbers
+    low = np.maximum(np.ceil(corners.min(axis=1) - _EDGE), 0).astype(np.int64)
+    high = np.minimum(np.floor(corners.max(axis=1) + _EDGE), np.array(shape)[::-1] - 1).astype(np.int64)
+    for chosen, box in _by_box(high - low + 1):
+        _fill(image, corners[chosen], values[triangles[chosen]], low[chosen], box)
+    return image
+
+
+def _by_box(sizes: Ints) -> Iterator[tuple[Ints, tuple[int, int]]]:
+    """Triangles grouped by the width and height of their boxes, in portions; those that hold no pixel left out."""
+    full = np.flatnonzero((sizes > 0).all(axis=1))
+    width, height = _coarser(sizes[full]).T
+    box = width * _LARGEST + height
+    for key in np.unique(box):
+        group, (w, h) = full[box == key], divmod(int(key), _LARGEST)
+        portion = max(1, _AT_ONCE // (w * h))
+        for start in range(0, len(group), portion):
+            yield group[start : start + portion], (w, h)
+
+
+def _coarser(sizes: Ints) -> Ints:
+    """Sizes rounded up, so that there are few groups: to 1, 2, 3, 4, 6, 8, 12, 16, ..."""
+    power = 2 ** np.floor(np.log2(sizes)).astype(np.int64)
+    half = np.maximum(power // 2, 1)
+    return power + half * -((power - sizes) // half)
+
+
+def _fill(image: Array, corners: Array, values: Array, low: Ints, box: tuple[int, int]) -> None:
+    """Set the pixels of triangles whose boxes start at ``low`` and are of a common size."""
+    x, y = (a.ravel() for a in np.meshgrid(np.arange(box[0]), np.arange(box[1])))
+    columns, rows = low[:, :1] + x, low[:, 1:] + y
+    second, third = (weight(columns - corners[:, :1, 0], rows - corners[:, :1, 1]) for weight in _barycentric(corners))
+    inside = (second >= -_EDGE) & (third >= -_EDGE) & (second + third <= 1.0 + _EDGE)
+    inside &= (columns < image.shape[1]) & (rows < image.shape[0])
+    rise = values[:, 1:] - values[:, :1]
+    value = values[:, :1] + second * rise[:, :1] + third * rise[:, 1:]
+    image[rows[inside], columns[inside]] = value[inside]
+
+
+def _barycentric(corners: Array) -> Iterator[Callable[[Array, Array], Array]]:
+    """The second and third coordinate as functions of the way from the first corner; none in a flat triangle."""
+    a, b = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    area = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
+    a, b = (side / np.where(area == 0.0, np.nan, area)[:, None] for side in (a, b))
+    yield lambda x, y: x * b[:, 1:] - y * b[:, :1]
+    yield lambda x, y: y * a[:, :1] - x * a[:, 1:]

@@ -1,0 +1,99 @@
+"""``scene.png`` of a body in space: its loads, and its parts coloured by what acts on them, the hidden ones apart."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.patches import Patch
+
+from ..reader import Result
+from ..vtu import Array, Body
+from . import vtk_loads
+from .body_plane import canvas
+from .deformed import Deformed
+from .legend import legend
+from .loads_supports import Side, loads, supports, tables
+from .scene_plane import inside, say, touches
+from .style import BLUE, INK, PALE, heading, save
+from .vtk_view import View, area_vectors, best_view, creases, render, surface
+
+if TYPE_CHECKING:
+    import pyvista
+
+FACING = 0.15
+"""Cosine from which a part is drawn where it is."""
+CONTACT, SUPPORT, LOADED = "#eea06d", "#9fb7c9", "#f3cf7a"
+
+
+@dataclass(frozen=True)
+class Coloured:
+    """A part as drawn: its side, its colour, and how far it is moved, (3,)."""
+
+    side: Side
+    colour: str
+    away: Array
+
+
+def draw(path: Path, result: Result, body: Body) -> None:
+    """Draw the scene of a body in space."""
+    rest, pulled = Deformed(body, np.zeros_like(body.points), 1.0), loads(result, body)
+    sides = list(tables(result, body))
+    view = best_view([area_vectors(body.points, side.facets).sum(axis=0) for side, table in sides if touches(table)])
+    held = {support.side.part for support in supports(result, body)}
+    colours = [CONTACT if touches(t) else SUPPORT if s.part in held else LOADED for s, t in sides]
+    shown = [Coloured(s, c, _away(view, body, s)) for (s, _), c in zip(sides, colours, strict=True)]
+    arrows = [vtk_loads.arrows(rest, load) for load in pulled]
+    reached = [body.points, *(body.points[s.side.vertices] + s.away for s in shown)]
+    everything = np.concatenate([*reached, *(end for tails, ways in arrows for end in (tails, tails + ways))])
+    made, axes = canvas(view.project(everything))
+    heading(made, result, "the scene")
+    depths = (float(view.depth(everything).min()), float(view.depth(everything).max()))
+    render(axes, view, depths, partial(_fill, body=body, shown=shown, arrows=arrows, toward=view.toward))
+    for part in shown:
+        _name(axes, view, body, part)
+    vtk_loads.labels(axes, view, rest, pulled)
+    say(made, body)
+    legend(made, [*keys(shown), *inside(result)])
+    save(made, path)
+
+
+def keys(shown: list[Coloured]) -> list[Artist]:
+    """What the colours mean that are there."""
+    words = {CONTACT: "contact, friction or adhesion", SUPPORT: "support", LOADED: "loaded"}
+    return [Patch(fc=c, ec=INK, label=w) for c, w in words.items() if c in {s.colour for s in shown}]
+
+
+def _away(view: View, body: Body, side: Side) -> Array:
+    """Nothing for a part that is seen; a hidden one is moved out along its normal until the body hides it no more."""
+    seen = view.project(side.normal[None])[0]
+    if float(side.normal @ view.toward) > FACING or not np.any(np.abs(seen) > 1e-6):
+        return np.zeros(3)
+    across = seen / float(np.linalg.norm(seen))
+    own = view.project(body.points[side.vertices]) @ across
+    reach = float((view.project(body.points) @ across).max() - own.min()) + 0.05 * body.size
+    return np.asarray(reach / float(np.linalg.norm(seen)) * side.normal)
+
+
+def _fill(
+    plotter: pyvista.Plotter, *, body: Body, shown: list[Coloured], arrows: list[tuple[Array, Array]], toward: Array
+) -> None:
+    plotter.add_mesh(surface(body.points, body.boundary), color=PALE, ambient=0.75, diffuse=0.3)
+    plotter.add_mesh(creases(body.points, body.boundary), color=INK, line_width=3)
+    for part in shown:
+        points = body.points + part.away + 1e-3 * body.size * toward
+        plotter.add_mesh(surface(points, part.side.facets), color=part.colour, lighting=False)
+        plotter.add_mesh(creases(points, part.side.facets), color=INK, line_width=2)
+    for tails, ways in arrows:
+        vtk_loads.fill(plotter, tails, ways)
+
+
+def _name(axes: Axes, view: View, body: Body, part: Coloured) -> None:
+    x, y = view.project((body.points[part.side.vertices].mean(axis=0) + part.away)[None])[0]
+    halo = {"boxstyle": "round,pad=0.15", "fc": "white", "ec": "none", "alpha": 0.85}
+    axes.text(x, y, part.side.part, size=12.5, color=BLUE, ha="center", va="center", bbox=halo, zorder=9)

@@ -1,0 +1,65 @@
+"""Loads on the sides of a body in space: arrows that VTK draws, and values in letters."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from ..units import quantity
+from ..vtu import Array, Ints
+from .deformed import Deformed
+from .loads_supports import Load
+from .style import INK
+from .vtk_view import View
+
+if TYPE_CHECKING:
+    import pyvista
+
+ARROW = 0.16
+"""The longest, of the body's size."""
+
+
+def fill(plotter: pyvista.Plotter, tails: Array, ways: Array) -> None:
+    """Put arrows into the scene."""
+    import pyvista
+
+    cloud = pyvista.PolyData(tails)
+    cloud.point_data["way"] = ways
+    shaft = pyvista.Arrow(tip_length=0.3, tip_radius=0.075, shaft_radius=0.022, tip_resolution=16, shaft_resolution=10)
+    plotter.add_mesh(cloud.glyph(orient="way", scale="way", geom=shaft), color=INK, lighting=False)
+
+
+def arrows(shape: Deformed, load: Load) -> tuple[Array, Array]:
+    """Tails and ways of a load's arrows: onto the side where it is pushed, from it where it is pulled."""
+    chosen = _sparse(shape.body.points[load.side.vertices], shape.body.size)
+    traction = load.traction[chosen]
+    ways = traction * ARROW * shape.body.size / float(np.linalg.norm(load.traction, axis=1).max())
+    feet = shape.points[load.side.vertices[chosen]]
+    visible = np.linalg.norm(ways, axis=1) > 0.02 * shape.body.size
+    pushed = np.einsum("ki,ki->k", ways, load.side.normals[chosen]) < 0.0
+    tails = feet - np.where(pushed[:, None], ways, 0.0)
+    return tails[visible], ways[visible]
+
+
+def _sparse(points: Array, size: float) -> Ints:
+    """Of points on a face, one near each node of a coarse grid."""
+    low = points.min(axis=0)
+    extent = np.ptp(points, axis=0)
+    flat = extent < 1e-9 * size
+    cells = np.where(flat, 0.0, np.maximum(np.round(extent / (0.25 * size)), 1.0))
+    place = (points - low) / np.where(flat, 1.0, extent) * cells
+    node = np.round(place)
+    order = np.argsort(np.linalg.norm(place - node, axis=1), kind="stable")
+    return np.asarray(order[np.unique(node[order], axis=0, return_index=True)[1]])
+
+
+def labels(axes: Axes, view: View, shape: Deformed, pulled: list[Load]) -> None:
+    """Each load's largest value, over the middle of its side, off the tips of its arrows."""
+    halo = {"boxstyle": "round,pad=0.15", "fc": "white", "ec": "none", "alpha": 0.85}
+    for load in pulled:
+        middle = shape.points[load.side.vertices].mean(axis=0) + 1.3 * ARROW * shape.body.size * load.side.normal
+        words = quantity(float(np.linalg.norm(load.traction, axis=1).max()), "Pa")
+        x, y = view.project(middle[None])[0]
+        axes.text(x, y, words, size=12.5, weight="bold", ha="center", va="center", bbox=halo)

@@ -1,0 +1,109 @@
+"""The order of a plane part's vertices along it: chains of facets, followed from end to end, with their arc length."""
+
+from __future__ import annotations
+
+import dolfinx
+import numpy as np
+import numpy.typing as npt
+
+from .. import compat
+from ..mesh.vertex_dofs import dof_of_node
+from ..problem.contact_surface import Surface
+from ..problem.problem import Problem
+
+Array = npt.NDArray[np.float64]
+Indices = npt.NDArray[np.int64]
+_DIGITS = 9
+"""Of the part's size: coordinates that should be equal may differ in the last digits."""
+
+
+def vertices(problem: Problem, surface: Surface) -> Indices:
+    """Global numbers of the part's vertices that this rank owns, (m,)."""
+    return np.asarray(problem.space.dofmap.index_map.local_to_global(surface.blocks), dtype=np.int64)
+
+
+def edges(problem: Problem, surface: Surface) -> Indices:
+    """The part's facets that this rank knows as pairs of global vertices, the body to their left; (k, 2)."""
+    mesh, space = problem.domain.mesh, problem.space
+    facets = np.asarray(surface.facets, dtype=np.int32)
+    if not len(facets):
+        return np.empty((0, 2), dtype=np.int64)
+    nodes = dolfinx.mesh.entities_to_geometry(mesh, 1, facets)
+    mesh.topology.create_connectivity(1, 2)
+    cells = [mesh.topology.connectivity(1, 2).links(f)[0] for f in facets]
+    x = mesh.geometry.x[:, :2]
+    ends = x[nodes]
+    inwards = x[compat.geometry_dofmap(mesh)[cells]].mean(axis=1) - ends[:, 0]
+    along = ends[:, 1] - ends[:, 0]
+    left = along[:, 0] * inwards[:, 1] - along[:, 1] * inwards[:, 0] > 0
+    nodes = np.where(left[:, None], nodes, nodes[:, ::-1])
+    dofs = dof_of_node(space)[nodes]
+    found = space.dofmap.index_map.local_to_global(dofs.ravel().astype(np.int32))
+    return np.asarray(found, dtype=np.int64).reshape(-1, 2)
+
+
+def lexicographic(points: Array) -> npt.NDArray[np.intp]:
+    """The order of points (m, d) by their coordinates, rounded."""
+    size = float(np.max(np.ptp(points, axis=0), initial=0.0)) or 1.0
+    return np.lexsort(np.round(points / size, _DIGITS).T[::-1])
+
+
+def along(points: Array, numbers: Indices, pairs: Indices) -> tuple[Indices, Array]:
+    """The order of vertices along their part and the arc length of each, in that order.
+
+    A chain runs from the lexicographically smaller of its ends; a closed one from its smallest vertex, the body to the
+    left, and is cut there. Chains follow one another by their smallest vertices, each beginning at the arc length at
+    which the last one ended. The arc length is 0 at the smallest vertex of all, and negative before it.
+
+    Args:
+        points: (m, 2). numbers: the vertices' numbers (m,). pairs: facets by these numbers, (k, 2), each perhaps twice.
+    """
+    rank = np.empty(len(points), dtype=np.int64)
+    rank[lexicographic(points)] = np.arange(len(points))
+    place = {int(number): i for i, number in enumerate(numbers)}
+    local = [(place[int(a)], place[int(b)]) for a, b in np.unique(pairs, axis=0)]
+    chains = sorted(_chains(local, rank), key=lambda chain: int(np.min(rank[chain])))
+    return _measured(points, chains, rank)
+
+
+def _chains(pairs: list[tuple[int, int]], rank: Indices) -> list[list[int]]:
+    """Vertices chain by chain; open ones first, since a walk from within one would cut it in two.
+
+    A closed chain ends with the vertex that it began with.
+    """
+    onwards: dict[int, list[int]] = {}
+    for a, b in pairs:
+        onwards.setdefault(a, []).append(b)
+    ends = {b for _, b in pairs}
+    begins = [a for a in onwards if a not in ends]
+    found = [_oriented(_walked(a, onwards), rank) for a in begins]
+    while left := [a for a, to in onwards.items() if to]:
+        found.append(_walked(min(left, key=lambda a: int(rank[a])), onwards))
+    return found
+
+
+def _walked(start: int, onwards: dict[int, list[int]]) -> list[int]:
+    """Along the facets as far as they lead, each once."""
+    chain = [start]
+    while onwards.get(chain[-1]):
+        chain.append(onwards[chain[-1]].pop())
+    return chain
+
+
+def _oriented(chain: list[int], rank: Indices) -> list[int]:
+    return chain if rank[chain[0]] <= rank[chain[-1]] else chain[::-1]
+
+
+def _measured(points: Array, chains: list[list[int]], rank: Indices) -> tuple[Indices, Array]:
+    """All chains one after the other; a vertex where two of them touch belongs to the first."""
+    order: dict[int, float] = {}
+    end = 0.0
+    for i, chain in enumerate(chains):
+        steps = np.linalg.norm(np.diff(points[chain], axis=0), axis=1)
+        s = end + np.concatenate([[0.0], np.cumsum(steps)])
+        if i == 0:
+            s -= s[int(np.argmin(rank[chain]))]
+        for vertex, length in zip(chain, s, strict=True):
+            order.setdefault(vertex, float(length))
+        end = float(s[-1])
+    return np.array(list(order), dtype=np.int64), np.array(list(order.values()))

@@ -1,0 +1,112 @@
+"""The fields that ParaView opens: ``displacement.pvd`` on the body, ``contact.pvd`` on Γc, in SI. Collective."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+from dolfinx import fem
+from dolfinx import mesh as dmesh
+from dolfinx.io import VTKFile
+
+from .. import compat
+from ..certify.contact_state import State
+from ..certify.estimate.estimator import Estimate
+from ..errors import InputError
+from ..mesh.vertex_dofs import dof_of_node
+from ..problem import stress
+from ..problem.problem import Problem
+from ..rigid import Mode
+from ..runtime.mpi import agree
+
+Array = npt.NDArray[np.float64]
+
+
+def write_body(path: Path, problem: Problem, u: fem.Function, estimate: Estimate | None) -> None:
+    """The displacement, m; by cell the von Mises stress, N/m², and the estimated error, over the energy norm of u."""
+    field = fem.Function(problem.space, name="displacement")
+    field.x.array[:] = u.x.array * problem.scales.displacement
+    by_cell: dict[str, Array] = {"von_mises": stress.von_mises(stress.by_cell(problem, u))}
+    if estimate is not None:
+        by_cell["error"] = np.asarray(estimate.cells / (estimate.energy_norm or 1.0), dtype=np.float64)
+    space = fem.functionspace(problem.domain.mesh, ("Discontinuous Lagrange", 0))
+    _write(path, problem.domain.mesh, [field, *(_constant(space, name, values) for name, values in by_cell.items())])
+
+
+def _constant(space: fem.FunctionSpace, name: str, values: Array) -> fem.Function:
+    """A field that is constant in each cell, of values at the owned cells. Collective.
+
+    Of its digits the first seven are kept: more say nothing, and their text takes twice as long to write.
+    """
+    field = fem.Function(space, name=name)
+    field.x.array[: len(values)] = values.astype(np.float32)
+    field.x.scatter_forward()
+    return field
+
+
+def write_escape(path: Path, problem: Problem, mode: Mode) -> None:
+    """The rigid motion along which the body escapes, dimensionless."""
+    field = fem.Function(problem.space, name="escape_mode")
+    points = np.asarray(problem.points / problem.scales.length)
+    field.x.array[:] = problem.bodies.motion(points, mode).ravel()
+    _write(path, problem.domain.mesh, [field])
+
+
+def write_contact(path: Path, problem: Problem, states: Sequence[State]) -> None:
+    """Γc as a mesh of its own with nodal values; a vertex of two parts has those of the later one."""
+    mesh, d = problem.domain.mesh, problem.scales.dimension
+    facets = np.unique(np.concatenate([s.facets for s in (state.surface for state in states)])).astype(np.int32)
+    surface, nodes = compat.submesh_nodes(mesh, d - 1, facets)
+    parent = dof_of_node(problem.space)[nodes]
+    space = fem.functionspace(surface, ("Lagrange", 1))
+    target = dof_of_node(space)
+    fields = []
+    for name, values in _nodal(problem, states).items():
+        field = fem.Function(space, name=name)
+        field.x.array[target] = values[parent]
+        fields.append(field)
+    _write(path, surface, fields)
+
+
+def _nodal(problem: Problem, states: Sequence[State]) -> dict[str, Array]:
+    """By name, values at all local vertices of the body (NaN where there is none). Collective."""
+    scalar = fem.functionspace(problem.domain.mesh, ("Lagrange", 1))
+    u, p = problem.scales.displacement, problem.scales.stress
+    found: dict[str, fem.Function] = {}
+
+    def put(name: str, state: State, values: Array) -> None:
+        if name not in found:
+            found[name] = fem.Function(scalar)
+            found[name].x.array[:] = np.nan
+        found[name].x.array[state.surface.blocks] = values
+
+    for state in states:
+        put("u_n", state, state.normal * u)
+        put("sigma_n", state, state.pressure * p)
+        put("gap", state, state.gap * u)
+        put("contact", state, state.contact.astype(float))
+        for i in range(problem.scales.dimension - 1):
+            put(f"u_t{i + 1}", state, state.slip[:, i] * u)
+            put(f"friction_t{i + 1}", state, state.friction[:, i] * p)
+        distances = state.distances
+        put("inclusion_distance", state, np.max(distances, axis=0) * p if distances else 0.0 * state.normal)
+    for field in found.values():
+        field.x.scatter_forward()
+    return {name: field.x.array for name, field in found.items()}
+
+
+def _write(path: Path, mesh: dmesh.Mesh, fields: Sequence[fem.Function]) -> None:
+    if faults := [fault for fault in agree(mesh.comm, _fault(path, mesh, fields)) if fault]:
+        raise InputError(f"{path.name}: {faults[0]} Is the disk full?")
+
+
+def _fault(path: Path, mesh: dmesh.Mesh, fields: Sequence[fem.Function]) -> str | None:
+    """Write a file; what went wrong. The writer dies with this frame: it would write again when it is collected."""
+    try:
+        with VTKFile(mesh.comm, str(path), "w") as file:
+            file.write_function(list(fields), 0.0)
+    except RuntimeError as error:
+        return str(error)
+    return None

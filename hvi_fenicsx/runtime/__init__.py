@@ -1,0 +1,1 @@
+"""What surrounds a run: ranks, processes, signals, log, timing, memory."""

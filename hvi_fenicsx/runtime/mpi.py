@@ -1,0 +1,53 @@
+"""Small collective helpers: all ranks agree, on values and on errors, before any of them goes on."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+from mpi4py import MPI
+
+from ..errors import HviError, InputError
+
+T = TypeVar("T")
+
+
+def agree(comm: MPI.Comm, value: T) -> list[T]:
+    """Every rank's value, on every rank. Collective."""
+    return comm.allgather(value)
+
+
+def on_root(comm: MPI.Comm, action: Callable[[], T]) -> T:
+    """Run an action on rank 0 only; all ranks get its result, or raise its error. Collective.
+
+    Raises:
+        HviError: what the action raised; of a file that cannot be read or written, which one and why.
+    """
+    error: HviError | None = None
+    result: Any = None
+    if comm.rank == 0:
+        try:
+            result = action()
+        except HviError as caught:
+            error = caught
+        except OSError as caught:
+            error = InputError(f"{caught.filename or 'a file could not be written'}: {caught.strerror or caught}")
+    error, result = comm.bcast((error, result), root=0)
+    _raise_first([error])
+    return result
+
+
+def _raise_first(errors: list[HviError | None]) -> None:
+    for error in errors:
+        if error is not None:
+            raise error
+
+
+def total(comm: MPI.Comm, value: float) -> float:
+    """Sum over the ranks. Collective."""
+    return float(comm.allreduce(value, op=MPI.SUM))
+
+
+def largest(comm: MPI.Comm, value: float) -> float:
+    """Maximum over the ranks. Collective."""
+    return float(comm.allreduce(value, op=MPI.MAX))

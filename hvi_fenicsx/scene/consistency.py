@@ -1,0 +1,159 @@
+"""What no single table can know: whether the tables of a scene fit together."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from itertools import chain, combinations
+from typing import TYPE_CHECKING, Any
+
+from ..effects import Effect
+from ..effects.contact import Contact
+from ..effects.loads import PrescribedDisplacement, Traction
+from ..errors import InputError
+from .messages import shown, unknown
+from .shapes import MeshFile
+from .tables import WHOLE, Problem
+
+if TYPE_CHECKING:
+    from .effect_tables import Boundary
+    from .model import Scene
+
+_Key = tuple[str, ...]
+_Item = tuple[_Key, tuple[str, ...], Effect]
+"""The place in the scene, the sides, the effect."""
+
+
+def contradictions(scene: Scene) -> list[Problem]:
+    """All that does not fit; the finer checks only where the coarse ones find nothing."""
+    return list(_coarse(scene)) or list(_fine(scene))
+
+
+def _coarse(scene: Scene) -> Iterator[Problem]:
+    yield from _unknown_sides(scene)
+    yield from _regions(scene)
+    yield from _one_by_one(scene)
+    yield from _start(scene)
+
+
+def _fine(scene: Scene) -> Iterator[Problem]:
+    yield from _smoothing(scene)
+    items = [*_on_boundary(scene.boundary)]
+    yield from _exclusive(items)
+    for side in dict.fromkeys(chain.from_iterable(on for _, on, _ in items)):
+        yield from _on_side(side, [(key, effect) for key, on, effect in items if side in on], scene)
+
+
+def _unknown_sides(scene: Scene) -> Iterator[Problem]:
+    if isinstance(scene.domain, MeshFile):
+        return  # only the mesh knows its groups
+    known = list(scene.domain.normals)
+    for name, boundary in scene.boundary.items():
+        for side in boundary.on:
+            if side not in known:
+                text = f"{unknown('side', side, known)} (a {scene.domain.shape})"
+                yield Problem(("boundary", name, "on"), text)
+
+
+def _regions(scene: Scene) -> Iterator[Problem]:
+    seen: dict[str, str] = {}
+    for name, material in scene.material.items():
+        if material.region is None and len(scene.material) > 1:
+            text = 'region is missing: with several materials each says where it is, region = "..."'
+            yield Problem(("material", name), text)
+        for region in material.region or ():
+            if region in seen:
+                text = f"{shown(region)} has a material already, {seen[region]}; name it once"
+                yield Problem(("material", name, "region"), text)
+            seen[region] = name
+    if not isinstance(scene.domain, MeshFile):
+        yield from _no_regions("material", scene.material)
+        yield from _no_regions("body", scene.body)
+
+
+def _no_regions(table: str, entries: Mapping[str, Any]) -> Iterator[Problem]:
+    for name, entry in entries.items():
+        if entry.region is not None:
+            text = 'a built-in shape has no regions; leave region out, or use shape = "file"'
+            yield Problem((table, name, "region"), text)
+
+
+def _one_by_one(scene: Scene) -> Iterator[Problem]:
+    """What each effect itself refuses in this dimension."""
+    materials = [(("material", n), m.elasticity) for n, m in scene.material.items()]
+    bodies = [(("body", n, e.key), e) for n, b in scene.body.items() for e in b.effects]
+    parts = [(key, effect) for key, _, effect in _on_boundary(scene.boundary)]
+    for key, effect in [*materials, *bodies, *parts]:
+        try:
+            effect.check(scene.dimension)
+        except InputError as error:
+            yield Problem(key, str(error))
+
+
+def _start(scene: Scene) -> Iterator[Problem]:
+    start = scene.solver.start
+    if not isinstance(start, str) and len(start) != scene.dimension:
+        text = f"has {len(start)} components; a {scene.dimension}D scene wants {scene.dimension}"
+        yield Problem(("solver", "start"), text)
+
+
+def _on_boundary(boundary: Mapping[str, Boundary]) -> Iterator[_Item]:
+    for name, part in boundary.items():
+        yield from ((("boundary", name, effect.key), part.on, effect) for effect in part.effects)
+
+
+def _smoothing(scene: Scene) -> Iterator[Problem]:
+    laws = [(key, getattr(effect, "law", None)) for key, _, effect in _on_boundary(scene.boundary)]
+    names = sorted({law.name for _, law in laws if law is not None})
+    if scene.solver.smoothing == "paper" and (others := [n for n in names if n != "quadratic_linear"]):
+        text = f'"paper" is made for law = "quadratic_linear", not for {_quoted(others)}; use "quadratic"'
+        yield Problem(("solver", "smoothing"), text)
+
+
+def _exclusive(items: Iterable[_Item]) -> Iterator[Problem]:
+    """Of an exclusive kind, a side bears one."""
+    for (key, on, effect), (other, sides, second) in combinations(items, 2):
+        shared = sorted(set(on) & set(sides))
+        if effect.key == second.key and effect.exclusive and shared:
+            text = f"{_quoted(shared)} has {effect.key} already, from {_dotted(key)}; give it once"
+            yield Problem(other, text)
+
+
+def _on_side(side: str, effects: list[tuple[_Key, Effect]], scene: Scene) -> Iterator[Problem]:
+    prescribed: dict[int, _Key] = {}
+    for key, effect in effects:
+        for axis in effect.prescribed() if isinstance(effect, PrescribedDisplacement) else ():
+            if axis in prescribed:
+                text = f'"{side}" has {_axis(axis)} prescribed already, by {_dotted(prescribed[axis])}'
+                yield Problem(key, f'{text}; write "free" in one')
+            prescribed[axis] = key
+    normal = None if isinstance(scene.domain, MeshFile) else scene.domain.normals[side]
+    for key, effect in effects:
+        yield from _against(key, effect, side, prescribed, normal, scene.dimension)
+
+
+def _against(
+    key: _Key, effect: Effect, side: str, prescribed: Mapping[int, _Key], normal: int | None, dimension: int
+) -> Iterator[Problem]:
+    """Contact and tractions in a direction that is prescribed anyway."""
+    blocking = normal if normal in prescribed else (0 if len(prescribed) == dimension else None)
+    if isinstance(effect, Contact) and blocking is not None:
+        text = f'the displacement normal to "{side}" is prescribed by {_dotted(prescribed[blocking])}'
+        yield Problem(key, f'{text}; leave contact out or write "free" there')
+    if isinstance(effect, Traction):
+        idle = [i for i, formula in enumerate(effect.values) if i in prescribed and formula.source != 0.0]
+        for axis in idle:
+            reason = f'{_axis(axis)} is prescribed on "{side}" by {_dotted(prescribed[axis])}'
+            mend = 'write 0 here or "free" there'
+            yield Problem(key, f"component {axis + 1} does nothing: {reason}; {mend}")
+
+
+def _axis(axis: int) -> str:
+    return f"u_{'xyz'[axis]}"
+
+
+def _quoted(names: Iterable[str]) -> str:
+    return ", ".join(map(shown, names))
+
+
+def _dotted(key: _Key) -> str:
+    return ".".join(step for step in key if step != WHOLE)

@@ -1,0 +1,127 @@
+"""The scene reference, written from the classes that read a scene, so that it cannot drift from them.
+
+``python3 -m hvi_fenicsx.scene.reference_doc > docs/scene.md`` renews the document.
+"""
+
+from __future__ import annotations
+
+import inspect
+import math
+from collections.abc import Iterable, Iterator
+from typing import Any
+
+from pydantic import BaseModel
+from pydantic.fields import FieldInfo
+
+from ..effects import Effect, Place
+from ..laws.base import registered
+from .effect_tables import DEFAULT_ELASTICITY, Body, Boundary, Material
+from .model import Scene
+from .shapes import SHAPES
+from .solver_table import Solver
+
+_INTRODUCTION = """\
+# Scene reference
+
+*Written by `python3 -m hvi_fenicsx.scene.reference_doc` from the classes that read scenes, and tested to agree.*
+
+A scene is a TOML file in SI units. Unknown keys are errors; whole numbers serve as numbers, texts and
+booleans do not; `nan` and `inf` are refused. A *formula* is a number or a text in x, y, z (m) with numbers,
+`pi`, `+ - * / **`, `a if x < 1 else b` and abs, sqrt, exp, log, sin, cos, tan, sinh, cosh, tanh, min, max,
+such as `"-1e6*(1 - 1.8*x)"`.
+
+Every value can be changed on the command line: `--set solver.tolerance=1e-10`, `--set domain.cells.0=64`
+(entries of a list by number from 0), `--set 'solver.method="branch"'` (texts in quotes, and for the shell
+quotes around them), `--set 'solver={}'` (a whole table: here all defaults, so the unsmoothed law).
+The name of a boundary table (`floor` in `[boundary.floor]`) is the part's name in the results.
+"""
+
+
+def reference() -> str:
+    """The whole document, Markdown."""
+    return "\n".join(_document()).rstrip() + "\n"
+
+
+def _document() -> Iterator[str]:
+    yield _INTRODUCTION
+    yield from _table("Top level", Scene, ["title", "plugins"])
+    for name, shape in SHAPES.items():
+        yield from _table(f'`[domain]` with `shape = "{name}"`', shape)
+    yield from _table("`[material]`, or `[material.NAME]` where there are several", Material)
+    yield from _effects(Place.MATERIAL, 'The keys of `elasticity = "{key}"`')
+    yield from _table("`[body]`, or `[body.NAME]`", Body)
+    yield from _effects(Place.BODY, "`{key}` in a body table")
+    yield from _table("`[boundary.NAME]`", Boundary)
+    yield from _effects(Place.BOUNDARY, "`{key}` in a boundary table")
+    yield from _laws()
+    yield from _table("`[solver]`", Solver)
+
+
+def _table(title: str, model: type[BaseModel], only: Iterable[str] | None = None) -> Iterator[str]:
+    yield from (f"## {title}", "", _summary(model), "", "| key | value | default |", "|---|---|---|")
+    for name in only or model.model_fields:
+        yield _row(name, model.model_fields[name])
+    yield ""
+
+
+def _effects(place: Place, title: str) -> Iterator[str]:
+    for key, kind in Effect.registry[place].items():
+        yield from (f"### {title.format(key=key)}", "", f"{_summary(kind)} Adds `{kind.term}`.", "")
+        fields = {n: f for n, f in kind.model_fields.items() if f.description}
+        if fields:
+            yield from ("| key | value | default |", "|---|---|---|")
+            yield from (_row(name, field) for name, field in fields.items())
+            yield ""
+
+
+def _laws() -> Iterator[str]:
+    yield from ("## Laws", "", "| `law =` | parameters | |", "|---|---|---|")
+    own = {name: law for name, law in registered().items() if law.__module__.startswith(__package__.split(".")[0])}
+    for name, law in own.items():
+        parameters = (_parameter(p) for p in inspect.signature(law).parameters.values())
+        yield f"| `{name}` | {', '.join(parameters)} | {_escaped(_summary(law))} |"
+    yield ""
+
+
+def _parameter(parameter: inspect.Parameter) -> str:
+    default = "" if parameter.default is parameter.empty else f" ({_toml(parameter.default)})"
+    return f"`{parameter.name}`{default}"
+
+
+def _row(name: str, field: FieldInfo) -> str:
+    value = ", ".join(filter(None, [_escaped(field.description or ""), _limits(field), _choices(field)]))
+    default = _toml(field.get_default(call_default_factory=True)) if not field.is_required() else "required"
+    default = _toml(DEFAULT_ELASTICITY) if field.annotation is Effect else default
+    return f"| `{name}` | {value} | {default} |"
+
+
+def _limits(field: FieldInfo) -> str:
+    signs = {"gt": ">", "ge": "≥", "lt": "<", "le": "≤"}
+    found = [(sign, getattr(m, key, None)) for m in field.metadata for key, sign in signs.items()]
+    return ", ".join(f"{sign} {limit:g}" for sign, limit in found if limit is not None and math.isfinite(limit))
+
+
+def _choices(field: FieldInfo) -> str:
+    """The names of a Literal, also within ``Literal[...] | None``."""
+    options = getattr(field.annotation, "__args__", ())
+    nested = [a for option in options for a in getattr(option, "__args__", (option,))]
+    names = [a for a in nested if isinstance(a, str)]
+    return "one of " + " ".join(f"`{n}`" for n in names) if len(names) > 1 else ""
+
+
+def _toml(value: Any) -> str:
+    if value is None or value == "":
+        return "none"
+    return f'`"{value}"`' if isinstance(value, str) else f"`{str(value).lower()}`"
+
+
+def _summary(kind: type) -> str:
+    return (inspect.getdoc(kind) or "").split("\n\n")[0].replace("\n", " ").replace("``", "`")
+
+
+def _escaped(text: str) -> str:
+    return text.replace("|", "\\|").replace("\n", " ")
+
+
+if __name__ == "__main__":
+    print(reference(), end="")

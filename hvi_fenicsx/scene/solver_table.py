@@ -1,0 +1,108 @@
+"""How to solve: the ``[solver]`` table."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, BeforeValidator, Field, PlainSerializer, model_validator
+from pydantic_core import PydanticCustomError
+
+from .. import method_names
+from ..errors import InputError
+from ..formula import Formula
+from .messages import shown, unknown
+from .tables import Count, Positive, Problem, Table, refuse
+
+Smoothing = Literal["paper", "quadratic", "chks", "log_exp"]
+
+
+def _method(name: str) -> str:
+    if name not in method_names.available():
+        text = unknown("method", name, method_names.available())
+        raise PydanticCustomError("scene", "{text}", {"text": text})
+    return name
+
+
+_STARTS = ("unbroken", "resting", "broken")
+
+
+def _start(value: Any) -> Any:
+    if isinstance(value, list | tuple):
+        return tuple(v if isinstance(v, Formula) else _formula(v) for v in value)
+    if value not in _STARTS:
+        words = ", ".join(map(shown, _STARTS))
+        text = f"must be one of {words}, or a list of formulas, one for each component (is {shown(value)})"
+        raise PydanticCustomError("scene", "{text}", {"text": text})
+    return value
+
+
+def _formula(value: Any) -> Formula:
+    try:
+        return Formula(value)
+    except InputError as error:
+        raise PydanticCustomError("scene", "{text}", {"text": str(error)}) from None
+
+
+Start = Annotated[
+    Any,
+    BeforeValidator(_start),
+    PlainSerializer(lambda start: start if isinstance(start, str) else [f.source for f in start]),
+]
+"""The name of a start, or a displacement by component."""
+
+
+class Solver(Table):
+    """Method and accuracy. Without smoothing and epsilon the law itself is solved, not a smoothed one."""
+
+    method: Annotated[str, AfterValidator(_method)] = "auto"
+    """auto chooses by the effects: linear, convex or branch; branch is exact; condensed is the paper's own;
+    snes_vi, tao, ssls are to compare with; or the name of a method of one's own"""
+    smoothing: Smoothing | None = None
+    """the plus function that rounds the law's kinks; paper is the paper's S; without it the law is exact"""
+    epsilon: Positive | None = None
+    """width of the smoothing, relative to the law's energy at its kink"""
+    epsilon_absolute: Positive | None = None
+    """the same in N/m (J/m²), as in the paper; one of the two, not both"""
+    start: Start = "unbroken"
+    """where there are several solutions: the pieces of the laws to begin on: "unbroken", "resting" (of the slips with
+    every bond a spring), "broken" (beyond every drop), or those of a displacement (m), a list of formulas"""
+    tolerance: Annotated[float, Field(gt=0, lt=1, allow_inf_nan=False)] = 1e-8
+    """relative residual of the inequality at which the iteration ends"""
+    linear_solver: Literal["auto", "lu", "gamg"] = "auto"
+    """auto chooses by size; any PETSc option overrides it"""
+    second_order: bool = False
+    """whether to factorise the Hessian where a falling law leaves open if the solution is a local minimum"""
+    max_iterations: Count = 100
+    """Newton iterations at most"""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _default_smoothing(cls, data: Any) -> Any:
+        smoothed = isinstance(data, dict) and ("epsilon" in data or "epsilon_absolute" in data)
+        return {"smoothing": "quadratic", **data} if smoothed else data
+
+    @model_validator(mode="after")
+    def _fits(self) -> Solver:
+        if problems := self._contradictions():
+            raise refuse(problems)
+        return self
+
+    def _contradictions(self) -> list[Problem]:
+        found = []
+        if self.epsilon is not None and self.epsilon_absolute is not None:
+            found.append(Problem(("epsilon_absolute",), "epsilon is given too; leave one of them out"))
+        if self.smoothing and self.epsilon is None and self.epsilon_absolute is None:
+            found.append(Problem(("smoothing",), _HOW_WIDE))
+        if self.smoothing and self.method == "branch":
+            text = '"branch" solves the law without smoothing; leave out smoothing and epsilon, or use "auto"'
+            found.append(Problem(("method",), text))
+        if self.start != "unbroken" and self.method in ("snes_vi", "tao", "ssls", "condensed"):
+            text = f'is for the branch iteration; leave it out, or use method = "auto", not {shown(self.method)}'
+            found.append(Problem(("start",), text))
+        return found
+
+
+_HOW_WIDE = (
+    "needs its width: add epsilon = 0.01 (relative to the law's energy at its kink) "
+    "or epsilon_absolute = 0.1 (N/m), or leave smoothing out to solve the law itself"
+)

@@ -1,0 +1,47 @@
+"""The pieces of the laws that the branch iteration begins on: where there are several solutions, they decide which."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+from petsc4py import PETSc
+
+from ..effects.base import Direction
+from ..formula import Formula
+from ..problem.law_term import LawTerm
+from ..system.system import System
+
+Array = npt.NDArray[np.float64]
+Start = Literal["unbroken", "resting", "broken"] | tuple[Formula, ...]
+"""No slip; the slips at rest (contact closed, every bond a spring); beyond every drop; those of a displacement (m)."""
+_FAR = 1e6
+"""Times the law's length and the slip at rest: beyond every drop."""
+
+
+def arguments(system: System, resting: PETSc.Vec, start: Start) -> list[Array]:
+    """What the laws act on there, by term; (m,) each."""
+    if start == "unbroken":
+        return [np.zeros(len(t.surface.blocks)) for t in system.terms]
+    if not isinstance(start, str):
+        return _displaced(system, start)
+    found = [t.argument(resting.array_r) for t in system.terms]
+    return found if start == "resting" else [_broken(t, a) for t, a in zip(system.terms, found, strict=True)]
+
+
+def _displaced(system: System, start: Sequence[Formula]) -> list[Array]:
+    """Of a displacement in Cartesian components, so by the problem's terms, whose directions are Cartesian too."""
+    found = []
+    for term in system.problem.terms:
+        u = np.column_stack([f.at(term.surface.points) for f in start]) / system.problem.scales.displacement
+        slip = np.einsum("mkd,md->mk", term.directions, u)
+        found.append(slip[:, 0] if slip.shape[1] == 1 else np.linalg.norm(slip, axis=1))
+    return found
+
+
+def _broken(term: LawTerm, slip: Array) -> Array:
+    """Far off in the direction of the slip at rest; opened, or pressed in, where the law is one of that."""
+    sign = np.where(slip < 0, -1.0, 1.0) if term.direction is Direction.SLIP else np.ones_like(slip)
+    return np.asarray(sign * _FAR * np.maximum(np.abs(slip), term.exact.length_scale))

@@ -1,0 +1,122 @@
+"""What needs no iteration over branches: one linear solve, or one convex quadratic programme.
+
+Without contact and with laws that are linear springs at most, the inequality is an equation: one KSP solve, no SNES.
+With contact it is a convex quadratic programme with bounds on u·n: one SNES VI solve.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from petsc4py import PETSc
+
+from ..system.system import System
+from .active_set import ActiveSetSolver, Outcome
+from .fallbacks import Attempt, first_success
+from .law_models import Full
+from .method import Counts, Settings, Solved, resting_start
+from .rigid_start import settled
+from .smooth_method import smooth_models
+
+_MARGIN = 0.5
+"""Of the tolerance, for Krylov's recursive residual to stay below it."""
+_REFINEMENTS = 3
+"""Linear solves at most: further ones only where rounding, or the traction of a spring, is coarser than the norm."""
+_ATTEMPTS = (("basic", 30), ("basic", 30), ("bt", 60), ("basic", 60), ("bt", 200))
+"""Of a programme, until one converges: PETSc's line search, most iterations."""
+
+
+def is_equation(system: System) -> bool:
+    """Whether nothing nonsmooth acts: no bounds, and laws that are linear springs at most. The same on all ranks."""
+    return not system.bounds and is_quadratic(system)
+
+
+def is_quadratic(system: System) -> bool:
+    """Whether the energy is quadratic: laws that are linear springs at most. The same on all ranks."""
+    return all(term.law.is_linear for term in system.terms)
+
+
+class LinearSolve:
+    """The equation on one system; call :meth:`solve` once."""
+
+    name = "linear"
+    words = "one linear solve"
+    takes_start = False
+
+    def __init__(self, solver: ActiveSetSolver, settings: Settings) -> None:
+        self.solver, self.settings, self.system = solver, settings, solver.system
+
+    def solve(self) -> Solved:
+        """The solution of the equation, or what was reached. Collective."""
+        x, models, counts = self.system.undisplaced(), smooth_models(self.system), Counts()
+        outcome = Outcome(False, 0, 0, float("inf"), "not started")
+        for _ in range(_REFINEMENTS):
+            outcome = self._step(x, models)
+            counts.linear += outcome.linear
+            if outcome.converged:
+                break
+        self.settings.progress(self.name, None, 1, outcome.measure, 0)
+        reason = "stationary" if outcome.converged else outcome.reason
+        return Solved(self.system.displacement(x), self.name, outcome.converged, reason, counts)
+
+    def _step(self, x: PETSc.Vec, models: Sequence[Full]) -> Outcome:
+        """One solve of the residual equation, and how far x is then from the solution. Collective."""
+        step = self.solver.newton_step(x, np.empty(0, np.int32), models, _MARGIN * self.settings.tolerance)
+        return self.solver.judged(step, x, models, self.settings.tolerance)
+
+
+class ConvexProgramme:
+    """The quadratic programme on one system; call :meth:`solve` once."""
+
+    name = "convex"
+    words = "one convex quadratic programme by SNES VI (reduced space)"
+    takes_start = True
+
+    def __init__(self, solver: ActiveSetSolver, settings: Settings) -> None:
+        self.solver, self.settings, self.system = solver, settings, solver.system
+
+    def solve(self, start: PETSc.Vec | None = None) -> Solved:
+        """The minimiser, or what was reached; from the start with contact closed by default. Collective."""
+        counts, system = Counts(), self.system
+        laws = [term.law for term in system.terms]
+        if start is None:
+            x, counts.linear = resting_start(self.solver, laws)
+        else:
+            x = start.copy()
+        with self.solver.reporting(self._progress):
+            outcome = self._minimise(x, counts)
+        reason = "stationary" if outcome.converged else outcome.reason
+        return Solved(
+            system.displacement(x),
+            self.name,
+            outcome.converged,
+            reason,
+            counts,
+            interrupted=outcome.interrupted,
+            steady=counts.newton <= 1,
+        )
+
+    def _progress(self, iteration: int, residual: float, contact: int) -> None:
+        self.settings.progress(self.name, None, iteration, residual, contact)
+
+    def _minimise(self, x: PETSc.Vec, counts: Counts) -> Outcome:
+        """Attempts until one converges, into x; the best one's outcome. Collective."""
+        bounds = self.system.lower, self.system.upper
+        return first_success(self.solver, x, self._attempts(counts), self.settings.tolerance, bounds, counts)
+
+    def _attempts(self, counts: Counts) -> Iterator[Attempt]:
+        """From the start, then from bodies at rest on their supports."""
+        models = smooth_models(self.system)
+        for number, (search, most) in enumerate(_ATTEMPTS):
+            start = self._settled(models, counts) if number == 1 else None
+            limit = min(most, self.settings.max_newton)
+            steady = self.settings.steady and number == 0
+            yield Attempt(models, search, limit, kept=search == "bt", start=start, steady=steady)
+
+    def _settled(self, models: list[Full], counts: Counts) -> PETSc.Vec | None:
+        rested = settled(self.solver, lambda _: models, min(1e-4, self.settings.tolerance))
+        if rested is None:
+            return None
+        counts.linear += rested[1]
+        return rested[0]

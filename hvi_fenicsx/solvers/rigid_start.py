@@ -1,0 +1,150 @@
+"""A start for bodies that contact alone holds: put down as rigid bodies, they rest on a few vertices of Γc.
+
+With contact closed everywhere, the active set shrinks to what bears the load; where a body rolls or tips on its way, it
+passes through sets that hold it no longer, the tangent is singular, and a step has any length. From below it grows: the
+rigid position of least potential energy is a linear programme in the at most six motions of each body, and its
+multipliers are the reactions, which no elastic deformation of a statically determinate support changes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import astuple, dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from petsc4py import PETSc
+
+from ..runtime.mpi import agree, on_root
+from ..system import existence, free_motions
+from ..system.system import Model, System
+from .active_set import ActiveSetSolver
+from .method import contact_dofs
+
+Array = npt.NDArray[np.float64]
+_TOUCHES = 1e-7
+"""Of the largest distance: a vertex that is so near to its bound rests on it."""
+_INDEPENDENT = 1e-6
+"""Part of a support's row that others do not span already."""
+
+
+@dataclass(frozen=True)
+class _Programme:
+    """min work·a + Σ cost |slips a| subject to lower <= rows a <= upper, over the amplitudes a (k,) of rigid motions.
+
+    Attributes:
+        work: (k,). rows, lower, upper: (m, k), (m,), (m,). slips, forward, backward: (n, k), costs of either sign (n,).
+    """
+
+    work: Array
+    rows: Array
+    lower: Array
+    upper: Array
+    slips: Array
+    forward: Array
+    backward: Array
+
+    def solve(self) -> tuple[Array, npt.NDArray[np.intp]] | None:
+        """The amplitudes, and k rows at most that bear the load; None where nothing stops the body."""
+        size = max(float(np.max(np.abs(v[np.isfinite(v)]), initial=0.0)) for v in (self.lower, self.upper)) or 1.0
+        below, above = np.isfinite(self.lower), np.isfinite(self.upper)
+        sides = np.concatenate([self.rows[above], -self.rows[below]])
+        found = self._solved(sides, np.concatenate([self.upper[above], -self.lower[below]]) / size)
+        if found.status != 0:
+            return None
+        number = np.concatenate([np.flatnonzero(above), np.flatnonzero(below)])
+        touching = np.flatnonzero(found.slack <= _TOUCHES)
+        # multipliers are negative: the largest reactions first
+        first = touching[np.argsort(found.ineqlin.marginals[touching], kind="stable")]
+        return found.x[: len(self.work)] * size, number[_independent(sides, first)]
+
+    def _solved(self, sides: Array, limits: Array) -> Any:
+        """Unknowns: the amplitudes, then the positive and the negative parts of the slips."""
+        from scipy import sparse
+        from scipy.optimize import linprog
+
+        n, k = self.slips.shape
+        cost = np.concatenate([self.work, self.forward, self.backward])
+        one = sparse.eye_array(n)
+        return linprog(
+            cost / (float(np.max(np.abs(cost))) or 1.0),
+            A_ub=sparse.hstack([sides, sparse.csr_array((len(sides), 2 * n))]),
+            b_ub=limits,
+            A_eq=sparse.hstack([self.slips, -one, one]) if n else None,
+            b_eq=np.zeros(n) if n else None,
+            bounds=[(None, None)] * k + [(0, None)] * (2 * n),
+            method="highs",
+        )
+
+
+def _independent(rows: Array, order: npt.NDArray[np.intp]) -> npt.NDArray[np.intp]:
+    """Of these rows, in this order, those that the ones before do not span."""
+    chosen: list[int] = []
+    basis = np.zeros((0, rows.shape[1]))
+    for i in order:
+        rest = rows[i] - basis.T @ (basis @ rows[i])
+        length = float(np.linalg.norm(rest))
+        if length > _INDEPENDENT * float(np.linalg.norm(rows[i])):
+            basis, chosen = np.vstack([basis, rest / length]), [*chosen, int(i)]
+    return np.array(chosen, dtype=np.intp)
+
+
+def settled(
+    solver: ActiveSetSolver, models: Callable[[PETSc.Vec], Sequence[Model]], rtol: float
+) -> tuple[PETSc.Vec, int] | None:
+    """The bodies at rest on their supports, and linear iterations. Collective.
+
+    Args:
+        solver: of the one linear solve. models: what stands for the laws at a displacement. rtol: of the solve.
+
+    Returns:
+        None where contact does not hold them, or where springs do: their tangent is never singular.
+    """
+    system = solver.system
+    modes = existence.solvability(system.problem, system.forces).kernel
+    bounded = all(np.isfinite([*astuple(term.law.growth)]).all() for term in system.terms)
+    if not modes or not bounded or system.freedom is not None or not system.bounds:
+        return None
+    motions = [system.unknowns(field) for field in free_motions.fields(system.problem, modes)]
+    x = system.undisplaced()
+    held = _rest(system, x, motions)
+    return None if held is None else (x, solver.newton_step(x, held, models(x), rtol).linear)
+
+
+def _rest(system: System, x: PETSc.Vec, motions: Sequence[PETSc.Vec]) -> npt.NDArray[np.int32] | None:
+    """Move x, rigidly, to where it rests; the owned unknowns that bear the load. Collective."""
+    comm = system.comm
+    dofs = contact_dofs(system)
+    rows = np.column_stack([motion.array_r[dofs] for motion in motions])
+    bounds = [v.array_r[dofs] - x.array_r[dofs] for v in (system.lower, system.upper)]
+    gathered = agree(comm, (rows, *bounds, *_slips(system, motions)))
+    work = np.array([-float(system.load.dot(motion)) for motion in motions])
+    programme = _Programme(work, *(np.concatenate([part[i] for part in gathered]) for i in range(6)))
+    found = on_root(comm, programme.solve)
+    if found is None:
+        return None
+    for amplitude, motion in zip(found[0], motions, strict=True):
+        x.axpy(float(amplitude), motion)
+    start = sum(len(part[1]) for part in gathered[: comm.rank])
+    mine = np.sort(dofs[found[1][(found[1] >= start) & (found[1] < start + len(dofs))] - start]).astype(np.int32)
+    low, high = system.lower.array_r[mine], system.upper.array_r[mine]
+    x.array[mine] = np.where(x.array_r[mine] - low <= high - x.array_r[mine], low, high)
+    return mine
+
+
+def _slips(system: System, motions: Sequence[PETSc.Vec]) -> tuple[Array, Array, Array]:
+    """What the laws' arguments become by each motion (n, k), and what they resist at infinity either way, (n,).
+
+    Of a slip that is a vector each component counts for itself.
+    """
+    slips: list[Array] = [np.zeros((0, len(motions)))]
+    forward: list[Array] = [np.zeros(0)]
+    backward: list[Array] = [np.zeros(0)]
+    for term in system.terms:
+        by_motion = [term.slip(motion.array_r).ravel() for motion in motions]
+        weights = term.surface.weights.repeat(term.directions.shape[1])
+        slips.append(np.column_stack(by_motion))
+        forward.append(weights * max(term.law.growth.plus, 0.0))
+        backward.append(weights * max(term.law.growth.minus, 0.0))
+    return np.concatenate(slips), np.concatenate(forward), np.concatenate(backward)

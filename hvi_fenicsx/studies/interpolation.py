@@ -1,0 +1,53 @@
+"""P1 fields from one mesh onto the vertices of another, in the body and along Γc: exact where the meshes are nested.
+
+Where they are not (curved boundaries, meshes made anew), a vertex outside of all cells takes its nearest cell's field,
+continued linearly.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from mpi4py import MPI
+from scipy import sparse
+
+from .. import compat
+from ..mesh import point_location
+from .solution_arrays import Array, Indices, PartSample, Sample
+
+_PAIRS = 4_000_000
+"""Of vertices and facets that are looked at together."""
+
+
+def body(source: Sample, points: Array) -> sparse.csr_array:
+    """From values at the source's vertices to those at the points (m, d): a matrix (m, n). On this process alone."""
+    d = source.points.shape[1]
+    mesh = compat.simplex_mesh(MPI.COMM_SELF, source.cells, source.points, {2: "triangle", 3: "tetrahedron"}[d])
+    found = mesh.topology.original_cell_index[point_location.cells(mesh, np.pad(points, ((0, 0), (0, 3 - d))))]
+    corners = source.cells[found]
+    return _rows(corners, point_location.weights(source.points[corners], points), len(source.points))
+
+
+def surface(source: PartSample, points: Array) -> sparse.csr_array:
+    """From values at the vertices of a part to those at the points (m, d) on it: a matrix (m, n)."""
+    corners = source.points[source.facets]
+    chunk = max(1, _PAIRS // len(corners))
+    nearest = [_nearest(corners, points[i : i + chunk]) for i in range(0, len(points), chunk)]
+    facets = np.concatenate(nearest) if nearest else np.empty(0, dtype=np.int64)
+    return _rows(
+        source.facets[facets],
+        point_location.inside(point_location.weights(corners[facets], points)),
+        len(source.points),
+    )
+
+
+def _nearest(corners: Array, points: Array) -> Indices:
+    """The facet (of k, each of d corners) nearest to each point."""
+    weights = point_location.inside(point_location.weights(corners[None], points[:, None]))
+    away = np.einsum("mkc,kcd->mkd", weights, corners) - points[:, None]
+    return np.asarray(np.argmin(np.einsum("mkd,mkd->mk", away, away), axis=1))
+
+
+def _rows(corners: Indices, weights: Array, columns: int) -> sparse.csr_array:
+    count, each = corners.shape
+    starts = np.arange(0, count * each + 1, each)
+    return sparse.csr_array((weights.ravel(), corners.ravel(), starts), (count, columns))

@@ -1,0 +1,276 @@
+"""The pictures of a study, one page each: error against cost with its front, against h, against ε; where time goes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patheffects import withStroke
+
+from ..report.pictures.style import (
+    BLUE,
+    GREEN,
+    GREY,
+    HEADING,
+    INK,
+    ORANGE,
+    PALE,
+    PURPLE,
+    VERMILION,
+    area,
+    figure,
+    save,
+    titled,
+)
+from .axes import LEAST, apart, error_axis, plain_log, span, time_axis
+from .cost import PHASES
+from .sentences import headlines, order, over_h, seconds, told_first
+from .table import Row, front
+
+if TYPE_CHECKING:
+    from .study import Study
+
+PANEL, GAP, FOOT = 2.6, 0.6, 0.85
+"""Inches: a panel, the room for its title, the axis below the last."""
+_SMOOTHINGS = {None: GREEN, "quadratic": BLUE, "chks": PURPLE, "log_exp": ORANGE, "paper": VERMILION}
+_PHASE_COLOURS = dict(zip(PHASES, (PALE, "#8fb8d6", ORANGE, BLUE, GREEN), strict=True))
+_BARS = 12
+"""Bars of the picture of time, at most."""
+
+
+def draw(study: Study, folder: Path) -> None:
+    """Draw all that the study has values for; pictures of an earlier one that it has none for are removed."""
+    for name, made in (
+        ("work_precision.png", _work_precision(study)),
+        ("error_h.png", _against_h(study)),
+        ("error_epsilon.png", _against_epsilon(study)),
+        ("time.png", _time(study)),
+    ):
+        if made is None:
+            (folder / name).unlink(missing_ok=True)
+        else:
+            save(made, folder / name)
+
+
+def _page(study: Study, subject: str, panels: int, tall: float = PANEL, wide: float = 6.5) -> tuple[Figure, list[Axes]]:
+    """Panels below each other, the first at the top."""
+    made = figure(HEADING + panels * (tall + GAP) + FOOT)
+    titled(made, study.scene.title or "untitled", subject)
+    places = reversed(range(panels))
+    return made, [area(made, 1.15, FOOT + above * (tall + GAP), wide, tall) for above in places]
+
+
+def _quantities(study: Study) -> list[str]:
+    """The traction first: it is what accuracy costs most in."""
+    found = headlines(study.rows)
+    return sorted(found, key=lambda q: q != told_first(found))
+
+
+def _work_precision(study: Study) -> Figure | None:
+    quantities = _quantities(study)[:2]
+    if not any(r.seconds for r in study.rows):
+        return None
+    made, axes = _page(study, "what accuracy costs: a point is a setting, down and left is better", len(quantities))
+    for quantity, here in zip(quantities, axes, strict=True):
+        _cost_panel(here, study, quantity)
+        here.tick_params(labelbottom=here is axes[-1])
+    _legend(axes[0], _kinds(study))
+    axes[-1].set_xlabel("time to solution, without compilation and output")
+    low, high = span([r.seconds for r in study.rows if r.converged and r.seconds])
+    for here in axes:
+        here.set_xlim(low / 3.0, high * 1.3)
+    time_axis(axes[-1])
+    return made
+
+
+def _cost_panel(axes: Axes, study: Study, quantity: str) -> None:
+    known = [(r.seconds, e, r) for r in study.rows if (e := r.error(quantity)) is not None and r.seconds]
+    for s, e, r in known:
+        here = "o" if r.method == "auto" else "D"
+        axes.plot(s, max(e, LEAST), here, color=_SMOOTHINGS[r.smoothing], ms=6.5, alpha=0.85, mec="white", mew=0.6)
+    own = study.own
+    if (error := own.error(quantity)) is not None and own.seconds:
+        axes.plot(own.seconds, max(error, LEAST), "*", ms=19, mfc="none", mec=INK, mew=1.5, zorder=6)
+    error_axis(axes, quantity, study.certain[quantity].error, [e for _, e, _ in known])
+    if best := front(study.rows, quantity, study.certain):
+        _front_line(axes, best, quantity)
+
+
+def _front_line(axes: Axes, best: Sequence[Row], quantity: str) -> None:
+    points = [(r.seconds or 0.0, max(r.error(quantity) or 0.0, LEAST)) for r in best]
+    xs, ys = zip(*points, strict=True)
+    axes.plot(xs, ys, color=INK, lw=1.6, zorder=1, drawstyle="steps-post")
+    named: list[float] = []
+    for r, (x, y) in list(zip(best, points, strict=True))[::-1]:
+        if all(apart(axes, y, other) for other in named):
+            named.append(y)
+            axes.annotate(
+                _short(r), (x, y), (-8, -2), textcoords="offset points", ha="right", va="center", size=10, zorder=7,
+                path_effects=[withStroke(linewidth=3, foreground="white")],
+            )  # fmt: skip
+
+
+def _short(found: Row) -> str:
+    return f"{found.mesh.removesuffix(' cells')}, {found.law.replace('exact law', 'exact')}"
+
+
+def _kinds(study: Study) -> list[tuple[str, str, str]]:
+    """Marker, colour and words of each kind of point that there is."""
+    there = {r.smoothing for r in study.rows if r.converged}
+    kinds = [("o", _SMOOTHINGS[s], "exact law" if s is None else s) for s in _SMOOTHINGS if s in there]
+    if any(r.method != "auto" for r in study.rows if r.converged):
+        kinds.append(("D", GREY, "another method"))
+    return [*kinds, ("*", INK, "the scene's own")]
+
+
+def _legend(axes: Axes, kinds: Sequence[tuple[str, str, str]]) -> None:
+    for marker, colour, words in kinds:
+        hollow: dict[str, Any] = {"mfc": "none", "mec": INK} if marker == "*" else {"mec": "white"}
+        axes.plot([], [], marker, color=colour, label=words, ms=13 if marker == "*" else 7, **hollow)
+    axes.legend(
+        loc="lower right", bbox_to_anchor=(1.015, 1.085), ncols=len(kinds), frameon=False, fontsize=10,
+        handletextpad=0.0, columnspacing=0.6, borderaxespad=0.0,
+    )  # fmt: skip
+
+
+def _against_h(study: Study) -> Figure | None:
+    quantities = [q for q in _quantities(study) if len(over_h(study.rows, study.own, q)) > 1][:3]
+    if not quantities:
+        return None
+    made, axes = _page(study, "error against the mesh width h", len(quantities), 2.3, 5.3)
+    for quantity, here in zip(quantities, axes, strict=True):
+        values, ends = _lines_over_h(here, study, quantity)
+        found = order(study.rows, study.own, quantity, study.certain)
+        note = "" if found is None else f"exact law: h^{found:.2f} at the fine end"
+        error_axis(here, quantity, study.certain[quantity].error, values, note)
+        _name_lines(here, ends)
+        here.tick_params(labelbottom=here is axes[-1])
+        plain_log(here)
+        here.set_xticks(sorted({h for h, _ in over_h(study.rows, study.own, quantity)}))
+        here.invert_xaxis()
+    axes[-1].set_xlabel("mesh width h in m, finer to the right")
+    return made
+
+
+End = tuple[float, float, str, str]
+"""Where a line ends at the fine mesh (h, error), its name and colour."""
+
+
+def _lines_over_h(axes: Axes, study: Study, quantity: str) -> tuple[list[float], list[End]]:
+    """The exact law, then each smoothing by its width, bolder where it is narrower; the errors drawn, and the ends."""
+    smoothed = {r.law: r for r in study.rows if r.smoothing and r.converged}
+    ordered = sorted(smoothed.values(), key=lambda r: (r.smoothing or "", -(r.epsilon or 0.0)))
+    ends: list[End] = []
+    values: list[float] = []
+    for i, like in enumerate([None, *ordered]):
+        points = over_h(study.rows, study.own, quantity, like=like)
+        if len(points) < 2:
+            continue
+        xs, ys = zip(*points, strict=True)
+        colour = _SMOOTHINGS[like.smoothing if like else None]
+        shown = [max(y, LEAST) for y in ys]
+        thin: dict[str, Any] = {"lw": 1.5, "alpha": 0.35 + 0.6 * i / (len(ordered) or 1)}
+        style = thin if like is not None else {"lw": 2.6, "zorder": 5}
+        axes.plot(xs, shown, "o-", color=colour, ms=5, **style)
+        ends.append((xs[-1], shown[-1], "exact law" if like is None else like.law, colour))
+        values += shown
+    return values, ends
+
+
+def _name_lines(axes: Axes, ends: Sequence[End]) -> None:
+    """At the fine end; lines that end together share a name."""
+    groups: list[list[End]] = []
+    for end in sorted(ends, key=lambda e: -e[1]):
+        if groups and not apart(axes, end[1], groups[-1][-1][1]):
+            groups[-1].append(end)
+        else:
+            groups.append([end])
+    for group in groups:
+        exact = next((e for e in group if e[2] == "exact law"), group[0])
+        words = exact[2] if len(group) == 1 else f"{exact[2]} and {len(group) - 1} more"
+        axes.annotate(words, exact[:2], (8, 0), textcoords="offset points", size=10, color=exact[3], va="center")
+
+
+def _against_epsilon(study: Study) -> Figure | None:
+    quantities = [q for q in _quantities(study) if any(len(p) > 1 for _, _, p in _over_epsilon(study, q))][:3]
+    if not quantities:
+        return None
+    made, axes = _page(study, f"error against ε; {study.exact.mesh}; dashed: the exact law", len(quantities), 2.3)
+    kinds = {}
+    for quantity, here in zip(quantities, axes, strict=True):
+        values: list[float] = []
+        for kind, colour, points in _over_epsilon(study, quantity):
+            xs, ys = zip(*points, strict=True)
+            here.plot(xs, [max(y, LEAST) for y in ys], "o-", color=colour, ms=6)
+            kinds[kind] = ("o", colour, kind)
+            values += ys
+        if (bare := study.exact.error(quantity)) is not None:
+            here.axhline(max(bare, LEAST), color=GREEN, ls=(0, (4, 3)), lw=2)
+            values.append(bare)
+        if (own := study.own.error(quantity)) is not None and study.own.epsilon:
+            here.plot(study.own.epsilon, max(own, LEAST), "*", ms=19, mfc="none", mec=INK, mew=1.5, zorder=6)
+            values.append(own)
+            kinds["~own"] = ("*", INK, "the scene's own")
+        error_axis(here, quantity, study.certain[quantity].error, values)
+        plain_log(here)
+        here.tick_params(labelbottom=here is axes[-1])
+    _legend(axes[0], [kinds[k] for k in sorted(kinds)])
+    axes[-1].set_xlabel("ε, relative to the law's energy at its kink")
+    return made
+
+
+def _over_epsilon(study: Study, quantity: str) -> list[tuple[str, str, list[tuple[float, float]]]]:
+    """Smoothing, colour, and (ε, error) of the points on the scene's own mesh with its method, by falling ε."""
+    own, found = study.own, []
+    for kind in sorted({r.smoothing for r in study.rows if r.smoothing}):
+        points = {
+            r.epsilon: e
+            for r in study.rows
+            if (r.smoothing, r.mesh, r.method, r.tolerance) == (kind, own.mesh, own.method, own.tolerance)
+            and r.epsilon is not None
+            and (e := r.error(quantity)) is not None
+        }
+        if points:
+            found.append((kind, _SMOOTHINGS[kind], sorted(points.items())))
+    return found
+
+
+def _time(study: Study) -> Figure | None:
+    rows = _bars(study)
+    if not rows:
+        return None
+    made = figure(HEADING + 0.42 * len(rows) + 0.55 + FOOT)
+    titled(made, study.scene.title or "untitled", "where the time goes: the scene's own setting and the front")
+    axes = area(made, 3.1, FOOT, 4.2, 0.42 * len(rows))
+    for i, r in enumerate(reversed(rows)):
+        left = 0.0
+        for phase in PHASES:
+            length = (r.phases or {}).get(phase, 0.0)
+            axes.barh(i, length, left=left, color=_PHASE_COLOURS[phase], height=0.72)
+            left += length
+        axes.text(left, i, f" {seconds(r.seconds)}", va="center", size=10.5, color=GREY)
+    axes.set_yticks(range(len(rows)), [_bar_name(study, r) for r in reversed(rows)], size=10.5)
+    axes.tick_params(axis="y", length=0, labelcolor=INK)
+    axes.set_xlim(0, 1.12 * max(r.seconds or 0.0 for r in rows))
+    axes.set_xlabel("seconds, without compilation and output")
+    for phase in PHASES:
+        axes.bar(0, 0, color=_PHASE_COLOURS[phase], label=phase)
+    axes.legend(loc="lower right", bbox_to_anchor=(1.03, 1.0), ncols=len(PHASES), frameon=False, fontsize=11,
+                handlelength=1.0, handletextpad=0.4, columnspacing=1.0)  # fmt: skip
+    return made
+
+
+def _bars(study: Study) -> list[Row]:
+    """The front of the first quantity and the scene's own setting, by cost."""
+    quantities = _quantities(study)
+    best = front(study.rows, quantities[0], study.certain)[-(_BARS - 2) :] if quantities else []
+    chosen = {r.point: r for r in (*best, study.own, study.exact) if r.converged and r.phases}
+    return sorted(chosen.values(), key=lambda r: r.seconds or 0.0)
+
+
+def _bar_name(study: Study, found: Row) -> str:
+    words = found.words.replace(" cells", "").replace("exact law", "exact")
+    return f"★ {words}" if found.point == study.own.point else words

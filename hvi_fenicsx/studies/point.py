@@ -1,0 +1,108 @@
+"""``python3 -m hvi_fenicsx.studies.point SCENE.toml RESULT``: one point of a study, in a process (or ranks) of its own.
+
+Solved once to fill caches and to read the peak memory off, then again until the median of its cost is steady. Writes
+RESULT.npz (the solution), then RESULT.json (what it cost), each whole or not at all; with ``--stiffness`` also
+RESULT.stiffness.npz. Exit code 0 whatever the outcome of the solve; 2 for a scene that does not fit its mesh.
+"""
+
+from __future__ import annotations
+
+import argparse
+import gc
+import sys
+from pathlib import Path
+from typing import Any
+
+from mpi4py import MPI
+from scipy import sparse
+
+from ..accuracy.adaptive import Climber
+from ..accuracy.control import Goal, reach
+from ..commands import ended_together
+from ..errors import HviError
+from ..results.summary import summary
+from ..runtime.mpi import on_root
+from ..runtime.timing import Timer
+from ..scene import Scene, read_scene
+from ..workflow import Solution, finish, prepare
+from . import cost, solution_arrays
+from .store import write_json
+
+COMM = MPI.COMM_WORLD
+
+
+def main() -> int:
+    """The command; its exit code. Collective under mpirun."""
+    parser = argparse.ArgumentParser(prog="python3 -m hvi_fenicsx.studies.point")
+    parser.add_argument("scene", type=Path)
+    parser.add_argument("result", type=Path)
+    parser.add_argument("--repeat", type=int, default=1, help="repetitions at most")
+    parser.add_argument("--stiffness", action="store_true", help="write the stiffness too: it will be a reference")
+    parser.add_argument("--accuracy", type=float, help="of an adaptive mesh, in the energy norm")
+    options = parser.parse_args()
+    try:
+        with ended_together():
+            _point(options)
+    except HviError as error:
+        if COMM.rank == 0:
+            print(error, file=sys.stderr)
+        return error.exit_code
+    return 0
+
+
+def _point(options: argparse.Namespace) -> None:
+    scene = on_root(COMM, lambda: read_scene(options.scene))
+    first = _solved(scene, options, Timer())
+    record = summary(first)
+    if first.solved is not None:
+        _keep(options, first, record)
+    times = [record["time"]]
+    converged = first.converged
+    del first
+    if converged:
+        times = _repeated(scene, options, times)
+    record["cost"] = cost.summarised(times)
+    on_root(COMM, lambda: write_json(options.result.with_suffix(".json"), record))
+
+
+def _solved(scene: Scene, options: argparse.Namespace, timer: Timer) -> Solution:
+    """The scene on its mesh, or on one made for an accuracy. Collective."""
+    if options.accuracy is not None:
+        found = reach(scene, COMM, Goal(options.accuracy), Climber(timer), lambda line: None).solution
+        timer.seconds["solve"] += timer.seconds["estimate"]  # which steers the climb: part of what it costs
+        return found
+    return finish(prepare(scene, COMM, timer))
+
+
+def _keep(options: argparse.Namespace, solution: Solution, record: dict[str, Any]) -> None:
+    """The solution, its mesh width and, of a reference, its stiffness. Collective."""
+    found = solution_arrays.take(solution)
+    stiffness = solution_arrays.stiffness(solution) if options.stiffness else None
+    if found is not None:
+        record["h"] = solution_arrays.width(found)
+        solution_arrays.save(options.result.with_suffix(".npz"), found)
+    if stiffness is not None:
+        sparse.save_npz(options.result.with_suffix(".stiffness.npz"), stiffness, compressed=False)
+
+
+def _repeated(scene: Scene, options: argparse.Namespace, times: list[dict[str, float]]) -> list[dict[str, float]]:
+    """Times of further runs until their median is steady; the first, which filled the caches, only where it is alone.
+
+    Collective: rank 0 decides.
+    """
+    found: list[dict[str, float]] = []
+    while COMM.bcast(cost.wanted(found, times[0], options.repeat), root=0):
+        gc.collect()
+        timer = Timer()
+        _solved(scene, options, timer)
+        found.append(_slowest(timer.report()))
+    return found or times
+
+
+def _slowest(times: dict[str, float]) -> dict[str, float]:
+    """By phase, the slowest rank's. Collective."""
+    return {name: COMM.allreduce(value, op=MPI.MAX) for name, value in times.items()}
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

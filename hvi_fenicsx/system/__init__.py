@@ -1,0 +1,1 @@
+"""The assembled system: matrix, Jacobian, local frames, levels, linear solvers, existence."""

@@ -1,0 +1,229 @@
+"""Linear solves in which some dofs are held, at full size.
+
+SNES VI extracts the inactive rows and columns into a matrix without block size and near-null space, and algebraic
+multigrid then fails. Here the full size is kept, whatever is held (solver-notes.md): one preconditioner serves the
+start and every Newton step with the same active set. Algebraic multigrid and the direct solver get a copy of the
+matrix with those rows and columns replaced by the identity; geometric multigrid gets the matrix itself, in which they
+are held by their diagonals (:meth:`.System.hold`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Literal, Protocol
+
+import numpy as np
+import numpy.typing as npt
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from ..runtime.timing import Timer
+from . import multigrid, schur
+from .copied_matrix import Copied
+from .petsc_options import PREFIX, configure
+from .system import System
+
+Indices = npt.NDArray[np.int32]
+Kind = Literal["lu", "gamg", "mg"]
+_LARGEST_DIRECT = {2: 60_000, 3: 15_000}
+"""Unknowns up to which a direct solve is the faster one, by dimension (docs/benchmarks.md)."""
+_DRIFT = 0.3
+"""Change of a law's nodal stiffness, relative to an elastic one (about 1), that a Krylov method takes lightly."""
+_SLOW = 50
+"""Iterations from which a direct solver takes over where it can: at 65 a Newton step costs twice as much as with it."""
+_GAMG: dict[str, object] = {
+    "pc_type": "gamg",
+    "pc_gamg_threshold": 0.01,
+    "mg_levels_ksp_type": "chebyshev",
+    "mg_levels_pc_type": "jacobi",
+    "pc_gamg_coarse_eq_limit": 200,
+}
+_MG: dict[str, object] = {
+    "pc_type": "mg",
+    "mg_levels_ksp_type": "richardson",
+    "mg_levels_ksp_max_it": 1,
+    "mg_levels_ksp_norm_type": "none",
+    "mg_levels_pc_type": "sor",
+    "mg_levels_pc_sor_local_symmetric": None,
+    "mg_coarse_ksp_type": "preonly",
+    "mg_coarse_pc_type": "redundant",
+}
+_LU: dict[str, object] = {"pc_type": "cholesky", "pc_factor_mat_solver_type": "mumps"}
+
+
+@dataclass(frozen=True, slots=True)
+class LinearSettings:
+    """How linear systems are solved."""
+
+    kind: Kind
+
+    @classmethod
+    def choose(
+        cls, system: System, wanted: Literal["auto", "lu", "gamg"] = "auto", *, ladder: bool = False
+    ) -> LinearSettings:
+        """By the number of unknowns, unless the user wants one; a nearly incompressible body goes to the direct one.
+
+        ``ladder`` tells that the system will stand on one when it is solved (``System.below``).
+        """
+        if wanted != "auto":
+            return cls(wanted)
+        if system.problem.averaged:
+            return cls("lu")
+        if (ladder or system.below is not None) and system.freedom is None:
+            return cls("mg")
+        return cls("lu" if system.dofs <= _LARGEST_DIRECT[system.problem.scales.dimension] else "gamg")
+
+    @property
+    def ksp(self) -> dict[str, str]:
+        """The Krylov method that goes with it."""
+        return {"ksp_type": "preonly"} if self.kind == "lu" else {"ksp_type": "cg", "ksp_norm_type": "unpreconditioned"}
+
+    @property
+    def pc(self) -> dict[str, object]:
+        """The preconditioner's options."""
+        return {"lu": _LU, "gamg": _GAMG, "mg": _MG}[self.kind]
+
+
+class Prepared(Protocol):
+    """A preconditioner that can be made fit for other held unknowns.
+
+    Attributes:
+        pc: it. matrix: what it is of, and equations are to be solved with.
+    """
+
+    pc: PETSc.PC
+    matrix: PETSc.Mat
+
+    def prepare(self, held: Indices) -> None:
+        """Fit it to the system's matrix as it stands with these unknowns held. Collective."""
+
+    def free(self) -> None:
+        """Free the PETSc objects."""
+
+
+class HeldPreconditioner:
+    """The preconditioner of the system's matrix with some dofs held; set up anew only when it has to be.
+
+    A direct solve wants the very matrix. A Krylov method is content with that of a similar active set and tangent, as
+    long as its iterations do not grow.
+    """
+
+    def __init__(self, system: System, settings: LinearSettings, timer: Timer) -> None:
+        self.system, self.settings, self._timer = system, settings, timer
+        self._held: Indices | None = None
+        self._rates: list[npt.NDArray[np.float64]] = []
+        self._fresh, self._worn = 0, False
+        self._made: Prepared | None = None
+        self._kind: Kind | None = None
+        self._factorised = 0
+        self._in, self._out = system.load.duplicate(), system.load.duplicate()
+        self._runs: list[tuple[slice, slice]] = []
+
+    def prepare(self, held: Indices) -> None:
+        """Make it fit for these held dofs (local, owned, sorted). Collective."""
+        self.system.hold(held if self.settings.kind == "mg" else held[:0])
+        if self.system.comm.allreduce(self._fits(held), op=MPI.LAND):
+            return
+        with self._timer("setup"):
+            self._build(held)
+        self._held, self._rates = held.copy(), self.system.rates
+        self._fresh, self._worn = 0, False
+
+    def _fits(self, held: Indices) -> bool:
+        if self._held is None or self._worn:
+            return False
+        changed, drift = len(np.setxor1d(held, self._held, assume_unique=True)), self.system.drift(self._rates)
+        if self.settings.kind == "lu":
+            return changed == 0 and drift == 0.0
+        return changed <= (0 if self.settings.kind == "mg" else max(2, 0.1 * len(held))) and drift <= _DRIFT
+
+    def report(self, iterations: int) -> None:
+        """Tell what a solve took (the same on all ranks): a preconditioner that serves badly is not used again."""
+        self._fresh = self._fresh or iterations
+        self._worn = iterations > 1.5 * self._fresh + 5
+        small = self.system.dofs <= _LARGEST_DIRECT[self.system.problem.scales.dimension]
+        if iterations > _SLOW and small:
+            self.settings, self._worn = LinearSettings("lu"), True
+
+    def _build(self, held: Indices) -> None:
+        kind = self.settings.kind
+        condensing = kind == "lu" and schur.pays(self.system, self._factorised)
+        if self._made is None or kind != self._kind or (condensing and not isinstance(self._made, schur.SchurDirect)):
+            self._forget()
+            self._made, self._kind = self._new(condensing=condensing), kind
+        self._made.prepare(held)
+        self._factorised += 1
+
+    def _new(self, *, condensing: bool) -> Prepared:
+        """Condensing: the body's own factorisation, made once, serves a matrix that changes on Γc alone."""
+        if condensing:
+            return schur.SchurDirect(self.system, self.settings.pc)
+        if self.settings.kind == "mg":
+            return multigrid.Multigrid(self.system, self.settings.pc)
+        return Copied(self.system, self.settings.pc, direct=self.settings.kind == "lu")
+
+    def destroy(self) -> None:
+        """Free the PETSc objects."""
+        self._forget()
+
+    def _forget(self) -> None:
+        if self._made is not None:
+            self._made.free()
+        self._made = self._held = None
+
+    def select(self, inactive: PETSc.IS) -> None:
+        """Reduced vectors hold these dofs from now on."""
+        self._runs = list(runs(inactive.getIndices() - self.system.load.owner_range[0]))
+        self._in.set(0.0)
+
+    def multiply_reduced(self, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        """Y = J x on the selected dofs, all others being zero. Collective."""
+        self._reduced(self.system.matrix.mult, x, y)
+
+    def apply_reduced(self, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        """Y = P^-1 x on the selected dofs. Collective."""
+        self._reduced(self._unpinned, x, y)
+
+    def _unpinned(self, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        x.array[self.system.pins] = 0.0
+        self._made.pc.apply(x, y)  # type: ignore[union-attr]
+
+    def _reduced(self, operation: Callable[[PETSc.Vec, PETSc.Vec], None], x: PETSc.Vec, y: PETSc.Vec) -> None:
+        whole, part = self._in.array, x.array_r
+        for at, of in self._runs:
+            whole[at] = part[of]
+        operation(self._in, self._out)
+        whole, part = self._out.array_r, y.array
+        for at, of in self._runs:
+            part[of] = whole[at]
+
+    def solve(self, load: PETSc.Vec, x: PETSc.Vec, rtol: float) -> tuple[int, int]:
+        """Solve with the held matrix, from the guess in x; iterations and PETSc's reason. Collective.
+
+        Where motions are free, the load may be changed at pinned dofs, and of all solutions x is the shortest.
+        """
+        load.array[self.system.pins] = 0.0
+        ksp = PETSc.KSP().create(self.system.comm)
+        assert self._made is not None
+        ksp.setOperators(self._made.matrix)
+        ksp.setPC(self._made.pc)
+        ksp.setTolerances(rtol=rtol, max_it=2000)
+        ksp.setInitialGuessNonzero(self.settings.kind != "lu")
+        configure(ksp, self.settings.ksp, PREFIX)
+        with self._timer("solve"):
+            ksp.solve(load, x)
+        if self.system.freedom is not None:
+            self.system.freedom.null_space.remove(x)
+        result = int(ksp.getIterationNumber()), int(ksp.getConvergedReason())
+        ksp.destroy()
+        self.report(result[0])
+        return result
+
+
+def runs(chosen: Indices) -> Iterator[tuple[slice, slice]]:
+    """Runs of consecutive dofs, in the whole vector and in the reduced one: copied far faster than dof by dof."""
+    breaks = np.flatnonzero(np.diff(chosen) != 1) + 1
+    for run in np.split(np.arange(len(chosen)), breaks) if len(chosen) else []:
+        begin, end = int(run[0]), int(run[-1]) + 1
+        yield slice(int(chosen[begin]), int(chosen[end - 1]) + 1), slice(begin, end)

@@ -1,0 +1,156 @@
+"""Nodal frames: at vertices with slanted normals the unknowns are (u_n, u_t), so that bounds stay component bounds.
+
+PETSc's variational inequalities know component bounds only. û = R u at such a vertex, R's rows being its local axes;
+all other vertices keep the Cartesian components (paper, section 5.1, has axis-parallel parts only).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+from petsc4py import PETSc
+
+from ..errors import InputError
+from ..problem.contact_surface import Surface
+from ..problem.law_term import LawTerm
+from ..problem.problem import Bounds, Problem
+from ..runtime.mpi import agree
+
+Array = npt.NDArray[np.float64]
+_PARALLEL = 1e-8
+
+
+@dataclass(frozen=True)
+class Frames:
+    """The rotated vertices of this rank.
+
+    Attributes:
+        blocks: local vertex indices (k,). axes: R, rows are the local axes, (k, d, d).
+    """
+
+    blocks: npt.NDArray[np.int32]
+    axes: Array
+
+    def at(self, surface: Surface) -> Array:
+        """R at the vertices of a surface, (m, d, d)."""
+        d = surface.normals.shape[1]
+        result = np.broadcast_to(np.eye(d), (len(surface.blocks), d, d)).copy()
+        place = {int(b): i for i, b in enumerate(self.blocks)}
+        for i, block in enumerate(surface.blocks):
+            if int(block) in place:
+                result[i] = self.axes[place[int(block)]]
+        return result
+
+    def turned(self, vectors: Array) -> Array:
+        """Cartesian vectors by vertex (any shape that reshapes to (blocks, d)) in local components, same shape."""
+        d = self.axes.shape[1]
+        result = vectors.copy()
+        rows = result.reshape(-1, d)
+        rows[self.blocks] = np.einsum("kij,kj->ki", self.axes, rows[self.blocks])
+        return result
+
+    def surface(self, surface: Surface) -> Surface:
+        """The surface with its normals and tangents in local components."""
+        axes = self.at(surface)
+        normals = np.einsum("mij,mj->mi", axes, surface.normals)
+        return replace(
+            surface,
+            normals=np.where(np.abs(normals) > 1 - _PARALLEL, np.round(normals), normals),
+            tangents=np.einsum("mij,mkj->mki", axes, surface.tangents),
+        )
+
+    def bounds(self, bounds: Bounds) -> Bounds:
+        """The bounds with their surface in local components."""
+        return replace(bounds, surface=self.surface(bounds.surface))
+
+    def term(self, term: LawTerm) -> LawTerm:
+        """The law with its directions in local components."""
+        directions = np.einsum("mij,mkj->mki", self.at(term.surface), term.directions)
+        directions = np.where(np.abs(directions) < _PARALLEL, 0.0, directions)
+        return replace(term, surface=self.surface(term.surface), directions=directions)
+
+    def matrix(self, problem: Problem, like: PETSc.Mat) -> PETSc.Mat:
+        """Q with u = Q û: block-diagonal, Rᵀ at the rotated vertices. Collective."""
+        d = problem.scales.dimension
+        q = PETSc.Mat().createAIJ(like.getSizes(), bsize=d, nnz=d, comm=like.comm)
+        start, end = like.getOwnershipRange()
+        every = np.arange(start // d, end // d)
+        for plain in np.setdiff1d(every, self.blocks + start // d):
+            q.setValuesBlocked([plain], [plain], np.eye(d))
+        for turned, axes in zip(self.blocks + start // d, self.axes, strict=True):
+            q.setValuesBlocked([turned], [turned], np.ascontiguousarray(axes.T))
+        q.assemble()
+        return q
+
+
+def build(problem: Problem) -> Frames | None:
+    """The frames that a problem's surfaces call for; None where every normal is parallel to an axis. Collective.
+
+    Raises:
+        InputError: on all ranks: two parts meet at a vertex with directions neither orthogonal nor equal, or a slanted
+            one meets a prescribed component.
+    """
+    d, comm = problem.scales.dimension, problem.domain.mesh.comm
+    if not any(agree(comm, any(_slanted(s.normals).any() for s in problem.surfaces))):
+        return None
+    slanted = _normals_at_slanted(problem)
+    fixed = {int(dof) for dof in problem.fixed}
+    axes: list[Array] = []
+    bad: list[tuple[float, ...]] = []
+    for block, normals in slanted.items():
+        frame = _axes(normals, [i for i in range(d) if block * d + i in fixed], d)
+        axes.append(np.eye(d) if frame is None else frame)
+        if frame is None:
+            bad.append(tuple(float(c) for c in problem.points[block]))
+    found = [point for rank in agree(comm, bad) for point in rank]
+    if found:
+        raise InputError(
+            f"at the vertex {found[0]} a contact part meets another one, or a prescribed displacement, in a direction "
+            "that is neither orthogonal nor equal to its own; move the edge, or prescribe all components there"
+        )
+    return Frames(np.array(list(slanted), dtype=np.int32), np.array(axes).reshape(-1, d, d))
+
+
+def _slanted(normals: Array) -> npt.NDArray[np.bool_]:
+    return np.asarray(np.max(np.abs(normals), axis=1, initial=0.0) < 1 - _PARALLEL)
+
+
+def _normals_at_slanted(problem: Problem) -> dict[int, list[Array]]:
+    """By vertex, the normals of all parts there, where one of them is slanted."""
+    found: dict[int, list[Array]] = {}
+    for surface in problem.surfaces:
+        for block, normal in zip(surface.blocks, surface.normals, strict=True):
+            found.setdefault(int(block), []).append(np.asarray(normal))
+    return {block: normals for block, normals in found.items() if _slanted(np.array(normals)).any()}
+
+
+def _axes(normals: Sequence[Array], held: Sequence[int], d: int) -> Array | None:
+    """Local axes as rows: prescribed components and normals among them; None where these are not orthogonal."""
+    if len(held) == d:
+        return np.eye(d)
+    rows: dict[int, Array] = {i: np.eye(d)[i] for i in held}
+    for normal in normals:
+        along = [abs(float(row @ normal)) for row in rows.values()]
+        if any(a > 1 - _PARALLEL for a in along):
+            continue
+        if any(a > _PARALLEL for a in along):
+            return None
+        free = [i for i in range(d) if i not in rows]
+        rows[max(free, key=lambda i: abs(normal[i]))] = normal
+    return _completed(rows, d)
+
+
+def _completed(rows: dict[int, Array], d: int) -> Array:
+    """The rows completed to an orthonormal basis, each new one near its Cartesian axis."""
+    frame = np.zeros((d, d))
+    for i, row in rows.items():
+        frame[i] = row
+    for i in (i for i in range(d) if i not in rows):
+        known = [row for row in frame if row.any()]
+        candidates = np.eye(d) - sum((np.outer(k @ np.eye(d), k) for k in known), np.zeros((d, d)))
+        best = candidates[i] if np.linalg.norm(candidates[i]) > 0.1 else max(candidates, key=np.linalg.norm)
+        frame[i] = best / np.linalg.norm(best)
+    return frame

@@ -1,0 +1,118 @@
+"""A direct solve for many matrices that differ on Γc alone, as those of an active set method do.
+
+The body is factorised once, with all unknowns of Γc held; what is left of it there is a dense Schur complement. A new
+active set or tangent then costs one small dense factorisation instead of that of the whole matrix. One process only.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping
+
+import numpy as np
+import numpy.typing as npt
+from petsc4py import PETSc
+from scipy.linalg import LinAlgWarning, block_diag, lu_factor, lu_solve
+from scipy.sparse import csr_matrix
+
+from .petsc_options import PREFIX, below_the_users
+from .system import System
+
+Array = npt.NDArray[np.float64]
+_COLUMNS = 64
+"""Right-hand sides that are solved at once."""
+_WORTH = 30
+"""Unknowns of Γc for which condensing costs as much as one factorisation of the whole matrix (measured: 13 to 45)."""
+
+
+def pays(system: System, factorisations: int) -> bool:
+    """Whether so many factorisations have cost what condensing would: then it loses little at worst, and may save much.
+
+    Not where free motions are pinned inside the body, on several processes, or with a preconditioner of the user's.
+    """
+    if system.comm.size > 1 or system.freedom is not None or PETSc.Options().hasName(f"{PREFIX}pc_type"):
+        return False
+    return 0 < len(system.rows.dofs) <= factorisations * _WORTH
+
+
+class SchurDirect:
+    """The condensed body; the context of its PC of type python. Creation is collective.
+
+    Args:
+        system: whose stiffness is condensed to the n unknowns of Γc. options: of the factorisation, below the user's.
+
+    Attributes:
+        pc, matrix: the PC, and the system's matrix, of which it is.
+    """
+
+    def __init__(self, system: System, options: Mapping[str, object]) -> None:
+        self._system, self._dofs = system, system.rows.dofs
+        bulk = system.rows.bulk
+        rows = csr_matrix(bulk.getValuesCSR()[::-1], shape=bulk.getSize())
+        self._coupling = rows.copy()
+        self._coupling.data[np.isin(rows.indices, self._dofs)] = 0.0
+        self._coupling.eliminate_zeros()
+        self._factor = self._interior(options)
+        self._stiffness = rows[:, self._dofs].toarray() - self._carried()
+        self._lu: tuple[Array, npt.NDArray[np.int32]] | None = None
+        self._free: npt.NDArray[np.bool_] = np.ones(len(self._dofs), dtype=bool)
+        self._work = system.load.duplicate()
+        self.pc, self.matrix = PETSc.PC().create(system.comm), system.matrix
+        self.pc.setType(PETSc.PC.Type.PYTHON)
+        self.pc.setPythonContext(self)
+        self.pc.setOperators(self.matrix)
+
+    def _interior(self, options: Mapping[str, object]) -> PETSc.PC:
+        matrix = self._system.matrix.copy()
+        matrix.zeroRowsColumns(self._dofs.astype(PETSc.IntType), diag=1.0)
+        matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+        pc = PETSc.PC().create(self._system.comm)
+        pc.setOptionsPrefix(PREFIX)
+        pc.setOperators(matrix)
+        with below_the_users(options):
+            pc.setFromOptions()
+            pc.setUp()
+        return pc
+
+    def _carried(self) -> Array:
+        """What the body inside makes of the displacements of Γc, (n, n)."""
+        columns = self._coupling.T.tocsc()
+        carried = np.empty((len(self._dofs),) * 2)
+        for start in range(0, len(self._dofs), _COLUMNS):
+            block = slice(start, start + _COLUMNS)
+            right = np.asfortranarray(columns[:, block].toarray())
+            b = PETSc.Mat().createDense(right.shape, array=right, comm=self._system.comm)
+            x = PETSc.Mat().createDense(right.shape, comm=self._system.comm)
+            x.assemble()
+            self._factor.getFactorMatrix().matSolve(b, x)
+            carried[:, block] = self._coupling @ x.getDenseArray()
+            b.destroy()
+            x.destroy()
+        return carried
+
+    def prepare(self, held: npt.NDArray[np.int32]) -> None:
+        """Take the tangent in force, and hold these dofs, of which all but prescribed ones must be Γc's."""
+        self._free = ~np.isin(self._dofs, held)
+        matrix = self._stiffness + block_diag(*self._system.rows.tangent)
+        matrix[~self._free] = matrix[:, ~self._free] = 0.0
+        matrix[~self._free, ~self._free] = 1.0
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", LinAlgWarning)  # a body that nothing holds: the step is not finite
+            self._lu = lu_factor(matrix, check_finite=False)
+
+    def apply(self, pc: PETSc.PC, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        """Y = J^-1 x, held dofs being decoupled with a diagonal of 1."""
+        inner = self._work
+        x.copy(inner)
+        inner.array[self._dofs] = 0.0
+        self._factor.apply(inner, y)
+        value = x.array_r[self._dofs] - np.where(self._free, self._coupling @ y.array_r, 0.0)
+        value = lu_solve(self._lu, value, check_finite=False)
+        inner.array[:] -= self._coupling.T @ np.where(self._free, value, 0.0)
+        self._factor.apply(inner, y)
+        y.array[self._dofs] = value
+
+    def free(self) -> None:
+        """Free the PETSc objects (``destroy`` is what petsc4py calls on a context, with every PC that has it)."""
+        for thing in (self.pc, self._factor, self._work):
+            thing.destroy()
