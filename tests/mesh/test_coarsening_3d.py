@@ -20,6 +20,7 @@ from hvi_fenicsx import Scene, workflow
 from hvi_fenicsx.mesh import coarsening_2d, coarsening_3d, domain, transfer
 from hvi_fenicsx.mesh.domain import Domain
 
+SUPPORT = Path(__file__).parents[1] / "support"
 COMM = MPI.COMM_WORLD
 LIFTED: dict[str, Any] = {
     "material": {"model": "three_dimensional", "youngs_modulus": 3e10, "poisson_ratio": 0.2},
@@ -100,7 +101,7 @@ def test_a_coarse_mesh_of_another_size_is_given_up(bored: Path, monkeypatch: pyt
 @pytest.mark.parametrize("ranks", [2, 3])
 def test_the_coarse_mesh_is_the_same_on_several_ranks_shared_like_the_fine_one(ranks: int, bored: Path) -> None:
     command = ["mpirun", "--oversubscribe", "-n", str(ranks), sys.executable, "remeshed_ranks.py", str(bored)]
-    run = subprocess.run(command, cwd=Path(__file__).parent, capture_output=True, text=True, timeout=120)
+    run = subprocess.run(command, cwd=SUPPORT, capture_output=True, text=True, timeout=120)
     assert run.returncode == 0, run.stderr
     told = np.array([[float(word) for word in line.split()] for line in run.stdout.splitlines()])
     assert len(told) == ranks

@@ -24,7 +24,8 @@ from hvi_fenicsx.mesh.thinned_outline import HalfEdges
 from hvi_fenicsx.scene import HalfDisk, NotchedStrip
 from hvi_fenicsx.system import assemble
 
-DEMOS = Path(__file__).parents[1] / "demos"
+SUPPORT = Path(__file__).parents[1] / "support"
+DEMOS = Path(__file__).parents[2] / "demos"
 COMM = MPI.COMM_WORLD
 POLYGONS = {
     "square": meshes.GOOD.replace("0.2", "0.03"),
@@ -155,7 +156,7 @@ def test_ranks_make_the_same_meshes_and_prolong_alike(tmp_path: Path) -> None:
     told = []
     for ranks in (1, 2, 3):
         command = ["mpirun", "--oversubscribe", "-n", str(ranks), sys.executable, "coarsened_ranks.py", str(file)]
-        run = subprocess.run(command, cwd=Path(__file__).parent, capture_output=True, text=True, timeout=120)
+        run = subprocess.run(command, cwd=SUPPORT, capture_output=True, text=True, timeout=120)
         assert run.returncode == 0, run.stderr
         told.append([float(word) for word in run.stdout.split()])
     assert told[1] == pytest.approx(told[0], rel=1e-10)

@@ -27,7 +27,7 @@ from hvi_fenicsx.runtime import memory
 from hvi_fenicsx.runtime.timing import Timer
 
 COMM = MPI.COMM_WORLD
-DEMOS = Path(__file__).parents[1] / "demos"
+DEMOS = Path(__file__).parents[2] / "demos"
 STRONG = model(64, 3e6, friction=quadratic_linear(1e6))
 
 

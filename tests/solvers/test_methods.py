@@ -197,7 +197,7 @@ def test_the_fischer_burmeister_function_is_zero_on_complementary_pairs_only() -
 
 _TWO_RANKS = """
 import sys
-sys.path.insert(0, {tests!r})
+sys.path[:0] = {tests!r}
 from test_methods import strong
 from hvi_fenicsx import Scene, solve
 from hvi_fenicsx.errors import InputError
@@ -213,7 +213,9 @@ if MPI.COMM_WORLD.rank == 0:
 
 
 def on_two_ranks(method: str) -> str:
-    code = _TWO_RANKS.format(tests=str(Path(__file__).parent), method=method)
+    code = _TWO_RANKS.format(
+        tests=[str(Path(__file__).parent), str(Path(__file__).parents[1] / "support")], method=method
+    )
     run = subprocess.run(
         ["mpirun", "-n", "2", sys.executable, "-c", code], capture_output=True, text=True, timeout=300, check=True
     )

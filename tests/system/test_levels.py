@@ -28,7 +28,7 @@ from hvi_fenicsx.system import held_solver as linear
 from hvi_fenicsx.system.held_solver import LinearSettings
 from hvi_fenicsx.system.system import System
 
-DEMOS = Path(__file__).parents[1] / "demos"
+DEMOS = Path(__file__).parents[2] / "demos"
 SHAPES: list[tuple[list[str], int]] = [
     (["domain.cells=[16, 32]", "domain.size=[1.0, 3.0]"], 2),
     (

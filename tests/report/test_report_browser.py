@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 from browser import CHROMIUM, Browser, browser
 
-ROOT = Path(__file__).parent.parent
+ROOT = Path(__file__).parents[2]
 pytestmark = [
     pytest.mark.long,
     pytest.mark.skipif(CHROMIUM is None, reason="no chromium here; CI has one (.ci/run)"),

@@ -28,7 +28,7 @@ from hvi_fenicsx.solvers.method import silent
 from hvi_fenicsx.solvers.nested_iteration import solve as solve_system
 from hvi_fenicsx.workflow import finish
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "benchmarks"))
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "benchmarks"))
 
 from effectivity import l_shape, rows, rubber
 

@@ -379,7 +379,7 @@ def paper_figures(out: Path, ranks: int) -> tuple[list[Path], list[str]]:
     """Run the demo; its pictures, and the norms that it prints."""
     script = [sys.executable, "-m", "mpi4py", "demos/paper_figures.py", "--out", str(out)]
     parallel = ["mpirun", "-n", str(ranks)] if ranks > 1 else []
-    root = Path(__file__).parent.parent
+    root = Path(__file__).parents[2]
     told = subprocess.run([*parallel, *script], cwd=root, capture_output=True, text=True, check=True, timeout=300)
     return sorted(out.iterdir()), [line for line in told.stdout.splitlines() if line.startswith("norm")]
 

@@ -212,6 +212,6 @@ def test_ranks_agree(ranks: int) -> None:
 def _run(ranks: int) -> list[float]:
     mpi = ["mpirun", "-n", str(ranks)] if ranks > 1 else []
     words = [*mpi, sys.executable, "-m", "mpi4py", "-m", "refined_ranks"]
-    root = Path(__file__).parent
+    root = Path(__file__).parents[1] / "support"
     out = subprocess.run(words, cwd=root, capture_output=True, text=True, check=True, timeout=300).stdout
     return [float(word) for word in out.split()]

@@ -129,7 +129,7 @@ def test_a_broken_file_does_not_spoil_the_next(tmp_path: Path) -> None:
     """What gmsh's parser has left of a broken file is emptied out."""
     broken = tmp_path / "broken.geo"
     broken.write_text("Point(1) = {0, 0, 0 this is broken; letters\nfoo bar {")
-    good = Path(__file__).parents[1] / "demos" / "thermal_bar.geo"
+    good = Path(__file__).parents[2] / "demos" / "thermal_bar.geo"
     with pytest.raises(InputError, match="gmsh cannot read it"):
         domain.from_file(MPI.COMM_WORLD, broken, 2)
     assert domain.from_file(MPI.COMM_WORLD, good, 2).regions

@@ -14,7 +14,7 @@ import pytest
 from enumeration import Floor, polyline
 from scenes import DELTA, model, quadratic_linear, solved
 
-BENCHMARKS = Path(__file__).resolve().parents[1] / "benchmarks"
+BENCHMARKS = Path(__file__).resolve().parents[2] / "benchmarks"
 sys.path.insert(0, str(BENCHMARKS))
 
 import hard_enumeration  # noqa: E402 (a script's neighbour, not a package)

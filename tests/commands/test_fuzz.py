@@ -3,7 +3,7 @@
 One process runs many cases, since its start costs more than a case; when it dies or hangs, the case is known by its
 number and the rest go on in a new one. A case again: see :func:`damage.make`, or
 
-    PYTHONPATH=tests ./hvi exec python3 tests/fuzz_runner.py FOLDER NUMBER NUMBER+1 1
+    PYTHONPATH=tests/support ./hvi exec python3 tests/support/fuzz_runner.py FOLDER NUMBER NUMBER+1 1
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ def run(folder: Path, first: int, last: int, step: int, ranks: int = 1) -> list[
 
 def started(words: list[str]) -> str:
     """How a process ended; nothing if well."""
-    environment = os.environ | {"PYTHONPATH": f"{ROOT / 'tests'}:{ROOT}:{os.environ.get('PYTHONPATH', '')}"}
+    environment = os.environ | {"PYTHONPATH": f"{ROOT / 'tests' / 'support'}:{ROOT}:{os.environ.get('PYTHONPATH', '')}"}
     try:
         done = subprocess.run(words, env=environment, capture_output=True, text=True, check=False, timeout=LIMIT)
     except subprocess.TimeoutExpired:

@@ -25,7 +25,7 @@ from hvi_fenicsx.scene import Boundary, MeshFile, Rectangle, Scene, Solver, dump
 from hvi_fenicsx.scene.reference_doc import reference
 from hvi_fenicsx.scene.toml_lines import lines_of
 
-ROOT = Path(__file__).parent.parent
+ROOT = Path(__file__).parents[2]
 DEMOS = sorted((ROOT / "demos").glob("*.toml"))
 PAPER = """\
 title = "Wall left"
