@@ -150,7 +150,7 @@ def reader(quantity: str) -> Callable[[Rung], Any]:
 def displacement(rung: Rung) -> fem.Function:
     """The displacement, m."""
     field = fem.Function(rung.prepared.problem.space)
-    field.x.array[:] = rung.solution.solved.u.x.array * rung.prepared.problem.scales.displacement  # type: ignore[union-attr]
+    field.x.array[:] = rung.solution.solve_result.u.x.array * rung.prepared.problem.scales.displacement  # type: ignore[union-attr]
     return field
 
 

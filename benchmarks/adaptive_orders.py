@@ -107,7 +107,7 @@ def tolerance_savings() -> Iterator[str]:
             control.TOLERANCES, kept = limits, control.TOLERANCES
             start = time.process_time()
             reached = control.reach(scene, MPI.COMM_WORLD, Goal(requested), climber(), lambda line: None)
-            spent.append((time.process_time() - start, reached.solution.solved.counts.linear))  # type: ignore[union-attr]
+            spent.append((time.process_time() - start, reached.solution.solve_result.counts.linear))  # type: ignore[union-attr]
             control.TOLERANCES = kept
         (tied, few), (tight, many) = spent
         yield f"| {name} | {requested:g} | {tied:.1f} | {tight:.1f} | {tight / tied:.2f} | {few}, {many} |"

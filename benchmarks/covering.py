@@ -84,12 +84,12 @@ _NOTHING = object()
 def cases(table: Table) -> list[Case]:
     """The list, without repetition: singles, corners, coverage; then the same again with the values that came later."""
     found: list[Values] = []
-    for stage in (table.first(), table):
-        found += [*_singles(stage), *_corners(stage)]
-        left = stage.tuples()
+    for context in (table.first(), table):
+        found += [*_singles(context), *_corners(context)]
+        left = context.tuples()
         for values in found:
-            left -= _covered(values, stage)
-        found += _coverage(stage, left)
+            left -= _covered(values, context)
+        found += _coverage(context, left)
     unique = {json.dumps(v, sort_keys=True): v for v in found}
     return [Case(i, v) for i, v in enumerate(unique.values(), start=1)]
 

@@ -28,7 +28,7 @@ from hvi_fenicsx.certify.estimate.estimator import Estimate, estimate
 from hvi_fenicsx.mesh import refinement, transfer
 from hvi_fenicsx.problem.problem import Problem
 from hvi_fenicsx.runtime.timing import Timer
-from hvi_fenicsx.solvers.method import Solved, silent
+from hvi_fenicsx.solvers.method import SolveResult, silent
 from hvi_fenicsx.solvers.nested_iteration import ascend, solve
 from hvi_fenicsx.system.assemble import assemble
 from hvi_fenicsx.system.coarser_level import Below
@@ -44,7 +44,7 @@ class Rung:
     """One mesh of a ladder with its solution; ``step`` is the refinement that made it (None for the first)."""
 
     system: System
-    solved: Solved
+    solve_result: SolveResult
     step: refinement.Refinement | None
 
 
@@ -60,7 +60,7 @@ def rungs(scene: Scene, count: int) -> list[Rung]:
             below = found[-1]
             lift = transfer.between(system, below.system, step)
             system.below = Below(below.system, lift)
-            solved = ascend(scene, system, (below.system, below.solved, lift), Timer(), silent, lambda: False)
+            solved = ascend(scene, system, (below.system, below.solve_result, lift), Timer(), silent, lambda: False)
         found.append(Rung(system, solved, step))
     return found
 
@@ -68,12 +68,12 @@ def rungs(scene: Scene, count: int) -> list[Rung]:
 def distance(rung: Rung, finer: Sequence[Rung]) -> float:
     """|||u_h - u||| for u on the last of the finer rungs. Collective."""
     fine = finer[-1].system.problem
-    away = _raised(rung.solved.u, rung, finer)
+    away = _raised(rung.solve_result.u, rung, finer)
     away.x.array[:] = finer[-1].solved.u.x.array - away.x.array
     force = fem.assemble_scalar(fem.form(ufl.action(ufl.action(fine.bilinear, away), away)))
     pressures = zip(
         fine.averaged,
-        defect.pressures(rung.system.problem, rung.solved.u),
+        defect.pressures(rung.system.problem, rung.solve_result.u),
         defect.pressures(fine, finer[-1].solved.u),
         strict=True,
     )
@@ -128,10 +128,10 @@ def rows(scene: Scene, levels: int, extra: int = 2) -> list[Row]:
 
 
 def _row(rung: Rung, finer: Sequence[Rung], scene: Scene) -> Row:
-    problem, u = rung.system.problem, rung.solved.u
-    examined = examine(problem, u, scene.solver.tolerance)
-    found = estimate(rung.system, u, examined)
-    return Row(rung.system.dofs, distance(rung, finer), found, examined.certificate.passed)
+    problem, u = rung.system.problem, rung.solve_result.u
+    examination = examine(problem, u, scene.solver.tolerance)
+    found = estimate(rung.system, u, examination)
+    return Row(rung.system.dofs, distance(rung, finer), found, examination.certificate.passed)
 
 
 def _exact(scene: Scene) -> Scene:

@@ -39,15 +39,15 @@ class Error:
 
 def energy(solution: Solution) -> float:
     """J/m of a certified solution."""
-    if not solution.converged or solution.examined is None:
+    if not solution.converged or solution.examination is None:
         raise SystemExit(f"{solution.scene.title}: {solution.reason}")
-    return solution.examined.energy * solution.problem.scales.energy
+    return solution.examination.energy * solution.problem.scales.energy
 
 
 def curves(solution: Solution) -> tuple[np.ndarray, np.ndarray]:
     """u_t and -σ_t on the floor, nondimensional."""
-    assert solution.examined is not None
-    state = solution.examined.states[0]
+    assert solution.examination is not None
+    state = solution.examination.states[0]
     return state.slip[:, 0], state.friction[:, 0]
 
 

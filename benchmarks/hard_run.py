@@ -18,7 +18,7 @@ from hvi_fenicsx import workflow
 from hvi_fenicsx.certify import certificate
 from hvi_fenicsx.errors import HviError
 from hvi_fenicsx.solvers import registry
-from hvi_fenicsx.solvers.method import Solved, silent
+from hvi_fenicsx.solvers.method import SolveResult, silent
 
 COMM = MPI.COMM_WORLD
 UNDECIDED = ("metastable", "borderline")
@@ -73,13 +73,13 @@ def _attempt(case: Case, data: Mapping[str, Any], method: str, late: Callable[[]
     }
 
 
-def _unsolved(state: str, found: Solved) -> str:
+def _unsolved(state: str, found: SolveResult) -> str:
     """What has neither a proof of existence nor of the opposite may end without; a raised energy or no time may not."""
     broken = found.interrupted or "raised the energy" in found.reason
     return "no_equilibrium" if state in UNDECIDED and not broken else "failed"
 
 
-def _solved(case: Case, data: Mapping[str, Any], prepared: workflow.Prepared, late: Callable[[], bool]) -> Solved:
+def _solved(case: Case, data: Mapping[str, Any], prepared: workflow.Prepared, late: Callable[[], bool]) -> SolveResult:
     """The method's result; the case's start is for the methods that begin on pieces of the laws."""
     method = registry.create(prepared.scene.solver, prepared.system, prepared.timer, silent, late)
     begin = hard_scenes.branches(case, prepared, data)
@@ -87,4 +87,4 @@ def _solved(case: Case, data: Mapping[str, Any], prepared: workflow.Prepared, la
     try:
         return method.solve(branches=begin) if takes else method.solve()  # type: ignore[call-arg]
     except HviError as error:
-        return Solved(workflow.fem.Function(prepared.problem.space), method.name, False, str(error))
+        return SolveResult(workflow.fem.Function(prepared.problem.space), method.name, False, str(error))

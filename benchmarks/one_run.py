@@ -44,16 +44,16 @@ def contact(scene: Scene) -> Figures:
     """From the scene to a certified solution."""
     timer = Timer()
     solution = finish(prepare(scene, COMM, timer))
-    counts, errors = solution.solved.counts, solution.estimate
+    counts, errors = solution.solve_result.counts, solution.estimate
     return {
         **timer.report(),
         "certified": solution.converged,
         "reason": solution.reason,
-        "energy": solution.examined.energy,
+        "energy": solution.examination.energy,
         "newton": counts.newton,
         "linear": counts.linear,
         "branch": counts.branch,
-        "levels": solution.solved.levels,
+        "levels": solution.solve_result.levels,
         "unsolved": ratio(errors.algebraic, errors.discretisation) if errors else float("nan"),
         "dofs": solution.dofs,
     }

@@ -59,9 +59,9 @@ def compute(wall: str, cells: int, overrides: list[str]) -> Run | None:
     """One run, gathered on rank 0 (None elsewhere). Collective."""
     scene = read_scene(DEMOS / f"wall_{wall}.toml", [f"domain.cells=[{cells}, {cells}]", *overrides])
     solution = solve(scene, COMM)
-    if not solution.converged or solution.examined is None:
+    if not solution.converged or solution.examination is None:
         raise SystemExit(f"wall {wall}, h = 1/{cells}: {solution.reason}")
-    floor = rows(solution.problem, solution.examined.states)
+    floor = rows(solution.problem, solution.examination.states)
     around = boundary(solution)
     if COMM.rank != 0:
         return None
@@ -75,11 +75,11 @@ def compute(wall: str, cells: int, overrides: list[str]) -> Run | None:
 
 def boundary(solution: Solution) -> tuple[Array, Array]:
     """Points and displacements on Γ, on rank 0. Collective."""
-    assert solution.solved is not None
+    assert solution.solve_result is not None
     problem = solution.problem
     owned = problem.space.dofmap.index_map.size_local
     points = problem.space.tabulate_dof_coordinates()[:owned, :2]
-    u = solution.solved.u.x.array.reshape(-1, 2)[:owned] * problem.scales.displacement
+    u = solution.solve_result.u.x.array.reshape(-1, 2)[:owned] * problem.scales.displacement
     pieces = COMM.gather((points, u), root=0) or [(points, u)]
     points, u = (np.concatenate(arrays) for arrays in zip(*pieces, strict=True))
     on = np.isclose(np.abs(points - 0.5).max(axis=1), 0.5)

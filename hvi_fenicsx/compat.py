@@ -11,6 +11,8 @@ from dolfinx import graph
 from dolfinx import mesh as _mesh
 from petsc4py import PETSc
 
+from .typing import Array, Entities
+
 VERSION: str = dolfinx.__version__
 
 if hasattr(dolfinx.io, "gmsh"):
@@ -19,7 +21,7 @@ else:
     from dolfinx.io import gmshio as gmsh_io
 
 
-def geometry_dofmap(mesh: _mesh.Mesh) -> npt.NDArray[np.int32]:
+def geometry_dofmap(mesh: _mesh.Mesh) -> Entities:
     """Geometry nodes of each cell, shape (cells, nodes)."""
     geometry = mesh.geometry
     return geometry.dofmaps[0] if hasattr(geometry, "dofmaps") else geometry.dofmap
@@ -30,13 +32,13 @@ def mesh_from_gmsh(model: Any, comm: Any, rank: int, dimension: int) -> tuple[An
     return tuple(gmsh_io.model_to_mesh(model, comm, rank, gdim=dimension)[:3])
 
 
-def submesh_nodes(mesh: _mesh.Mesh, dimension: int, entities: npt.NDArray[np.int32]) -> tuple[Any, Any]:
+def submesh_nodes(mesh: _mesh.Mesh, dimension: int, entities: Entities) -> tuple[Any, Any]:
     """Submesh of the entities, and for each of its geometry nodes the node of ``mesh``. Collective."""
     result = _mesh.create_submesh(mesh, dimension, entities)
     return result[0], np.asarray(result[3])
 
 
-def refine(mesh: _mesh.Mesh, edges: npt.NDArray[np.int32] | None) -> tuple[_mesh.Mesh, npt.NDArray[np.int32]]:
+def refine(mesh: _mesh.Mesh, edges: Entities | None) -> tuple[_mesh.Mesh, Entities]:
     """Bisect the edges (None: all) by Plaza's rule; the fine mesh, its cells on the ranks of their parents.
 
     Returns:
@@ -48,7 +50,7 @@ def refine(mesh: _mesh.Mesh, edges: npt.NDArray[np.int32] | None) -> tuple[_mesh
     return fine, np.asarray(parents[fine.topology.original_cell_index - offset], dtype=np.int32)
 
 
-def simplex_mesh(comm: Any, cells: npt.NDArray[Any], points: npt.NDArray[np.float64], kind: str) -> _mesh.Mesh:
+def simplex_mesh(comm: Any, cells: npt.NDArray[Any], points: Array, kind: str) -> _mesh.Mesh:
     """Mesh of the simplices (c, d+1) over points (n, d), each rank giving some of both. Collective.
 
     Args:

@@ -93,19 +93,19 @@ def solver(prepared: Prepared) -> str:
 def outcome(solution: Solution) -> Iterator[str]:
     """What was found and how sure it is."""
     yield f"result: {solution.reason}"
-    if solution.examined is None or solution.solved is None:
+    if solution.examination is None or solution.solve_result is None:
         return
-    c, counts = solution.examined.certificate, solution.solved.counts
+    c, counts = solution.examination.certificate, solution.solve_result.counts
     yield (
         f"certificate ({c.tolerance:g}): equilibrium {c.equilibrium:.1e}, penetration {c.penetration:.1e}, tension "
         f"{c.tension:.1e}, complementarity {c.complementarity:.1e}, inclusion {c.inclusion:.1e}; {c.second_order}"
     )
     if solution.scene.solver.smoothing is not None:
-        away = solution.examined.smoothing_error * solution.problem.scales.stress
+        away = solution.examination.smoothing_error * solution.problem.scales.stress
         yield f"smoothing: -σ_t is up to {away:.3g} N/m² from what the unsmoothed law gives there"
     if solution.estimate is not None:
         yield error(solution.estimate)
-    energy = solution.examined.energy * solution.problem.scales.energy
+    energy = solution.examination.energy * solution.problem.scales.energy
     unit = "J/m" if solution.problem.scales.dimension == 2 else "J"
     yield (
         f"energy {energy:.10g} {unit}; {counts.branch} branch steps, {counts.newton} Newton steps, {counts.linear} "

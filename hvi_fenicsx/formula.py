@@ -16,9 +16,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from .errors import InputError
+from .typing import Array
 
 COORDINATES = ("x", "y", "z")
 CONSTANTS = {"pi": math.pi}
@@ -134,7 +134,7 @@ class Formula:
         """The formula in another algebra; ``x`` is indexed by coordinate (missing ones count as 0)."""
         return _render(self._tree, x, algebra)
 
-    def at(self, points: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    def at(self, points: Array) -> Array:
         """Values at points of shape (n, 3), SI; shape (n,). Not checked for finiteness."""
         with np.errstate(all="ignore"):
             value = self.render(points.T, NUMPY)

@@ -8,7 +8,7 @@ from .errors import InputError
 
 if TYPE_CHECKING:
     from .solvers.active_set import ActiveSetSolver
-    from .solvers.method import Settings, Solved
+    from .solvers.method import Settings, SolveResult
 
 BUILT_IN = ("auto", "snes_vi", "branch", "tao", "ssls", "condensed")
 _OWN: dict[str, type[CustomMethod]] = {}
@@ -41,7 +41,7 @@ class CustomMethod:
     def __init__(self, solver: ActiveSetSolver, settings: Settings) -> None:
         self.solver, self.settings, self.system = solver, settings, solver.system
 
-    def solve(self, *args: Any) -> Solved:
+    def solve(self, *args: Any) -> SolveResult:
         """A stationary point, or what was reached. Collective. The certificate judges it afterwards.
 
         It is given a start (a PETSc vector) where ``takes_start`` says so and there is a coarser rung, else nothing.

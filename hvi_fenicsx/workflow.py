@@ -10,7 +10,7 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from .certify import certificate, plausibility
-from .certify.certificate import Examined
+from .certify.certificate import Examination
 from .certify.estimate.estimator import Estimate, estimate
 from .errors import SolverError
 from .mesh.domain import Domain
@@ -18,7 +18,7 @@ from .problem.problem import Problem
 from .rigid import LoadFactors, Solvability
 from .runtime.timing import Timer
 from .solvers import nested_iteration, registry
-from .solvers.method import Progress, Solved, silent
+from .solvers.method import Progress, SolveResult, silent
 from .system import assemble, existence, free_motions, system
 
 if TYPE_CHECKING:
@@ -36,7 +36,7 @@ class Solution:
         scene, problem: what was solved; the problem's laws are the smoothed ones where the scene smooths.
         solvability: whether a solution can exist.
         solved: what the method found, None when the state is *escapes* (nothing was solved).
-        examined: the certificate and the state of Γc, None likewise.
+        examination: the certificate and the state of Γc, None likewise.
         estimate: of the error; None where nothing was certified.
         dofs: unknowns. epsilon: relative width of the smoothing, None for exact laws. timer: wall time by phase.
         warnings: what looks odd, see :mod:`.plausibility`.
@@ -45,8 +45,8 @@ class Solution:
     scene: Scene
     problem: Problem
     solvability: Solvability
-    solved: Solved | None
-    examined: Examined | None
+    solve_result: SolveResult | None
+    examination: Examination | None
     estimate: Estimate | None
     dofs: int
     epsilon: float | None
@@ -56,30 +56,30 @@ class Solution:
     @property
     def converged(self) -> bool:
         """Certified within the tolerance."""
-        return self.examined is not None and self.examined.certificate.passed
+        return self.examination is not None and self.examination.certificate.passed
 
     @property
     def exit_code(self) -> int:
         """By the contract: certified, no solution exists, or not converged."""
         if self.converged:
             return CERTIFIED
-        if self.solved is None:
+        if self.solve_result is None:
             return NO_SOLUTION
-        return INTERRUPTED if self.solved.interrupted else NOT_CONVERGED
+        return INTERRUPTED if self.solve_result.interrupted else NOT_CONVERGED
 
     @property
     def reason(self) -> str:
         """Why it ended as it did, in words."""
-        if self.solved is None:
+        if self.solve_result is None:
             return "no solution exists: the load moves the body away"
         if self.converged:
             local = " (a local equilibrium: the state is metastable)" if self.solvability.state == "metastable" else ""
             free = ", ".join(mode.words for mode in self.solvability.free)
             return f"certified{local}" + (f"; determined up to {free}" if free else "")
-        if self.solvability.state == "metastable" and not self.solved.interrupted:
-            return f"metastable, and no equilibrium found ({self.solved.reason})"
+        if self.solvability.state == "metastable" and not self.solve_result.interrupted:
+            return f"metastable, and no equilibrium found ({self.solve_result.reason})"
         unknown = "; whether a solution exists could not be decided" if self.solvability.state == "undecided" else ""
-        return f"not certified ({self.solved.reason}){unknown}"
+        return f"not certified ({self.solve_result.reason}){unknown}"
 
 
 @dataclass(frozen=True)
@@ -155,23 +155,23 @@ def finish(
         prepared: the scene. progress: see :mod:`.method`. interrupted: whether to stop (collective, asked often).
         below: a coarser rung to start from, where the mesh was refined.
     """
-    found = examined = errors = None
+    found = examination = errors = None
     odd = prepared.warnings
     if prepared.solvability.state != "escapes":
         found = _solved(prepared, progress, interrupted, below)
         with prepared.timer("certificate"):
             wanted = prepared.scene.solver
-            examined = certificate.examine(prepared.problem, found.u, wanted.tolerance, inertia=wanted.second_order)
-            odd += plausibility.found(prepared.problem, examined, found.u)
-        if examined.certificate.passed:
+            examination = certificate.examine(prepared.problem, found.u, wanted.tolerance, inertia=wanted.second_order)
+            odd += plausibility.found(prepared.problem, examination, found.u)
+        if examination.certificate.passed:
             with prepared.timer("estimate"):
-                errors = estimate(prepared.system, found.u, examined)
+                errors = estimate(prepared.system, found.u, examination)
     return Solution(
         prepared.scene,
         prepared.problem,
         prepared.solvability,
         found,
-        examined,
+        examination,
         errors,
         prepared.system.dofs,
         registry.relative_width(prepared.scene.solver, prepared.system),
@@ -182,7 +182,7 @@ def finish(
 
 def _solved(
     prepared: Prepared, progress: Progress, interrupted: Callable[[], bool], below: nested_iteration.Rung | None
-) -> Solved:
+) -> SolveResult:
     scene, assembled, timer = prepared.scene, prepared.system, prepared.timer
     try:
         if below is not None:
@@ -194,4 +194,4 @@ def _solved(
         return found
     except SolverError as error:
         u = fem.Function(prepared.problem.space, name="displacement")
-        return Solved(u, prepared.scene.solver.method, False, str(error))
+        return SolveResult(u, prepared.scene.solver.method, False, str(error))

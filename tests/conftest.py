@@ -7,6 +7,7 @@ new ones: ``./hvi test --hypothesis-profile=search``; what it finds belongs into
 from __future__ import annotations
 
 import os
+from pathlib import Path
 
 import pytest
 from hypothesis import settings
@@ -22,6 +23,8 @@ for name, value in {
     "OMP_NUM_THREADS": "1",
 }.items():
     os.environ.setdefault(name, value)
+# Ranks and children of the tests find what the tests share, as pytest itself does.
+os.environ["PYTHONPATH"] = os.pathsep.join([str(Path(__file__).parent / "support"), os.environ.get("PYTHONPATH", "")])
 
 # No deadline for one example: the first one compiles or imports what the others find ready.
 settings.register_profile("repeatable", derandomize=True, deadline=None)

@@ -10,7 +10,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 from dolfinx import fem
 from mpi4py import MPI
 from petsc4py import PETSc
@@ -22,9 +21,9 @@ from ..runtime.mpi import agree, total
 from ..runtime.timing import Timer
 from ..scene import Scene
 from ..solvers.method import Progress, silent
+from ..typing import Entities
 from ..workflow import Prepared, Solution, finish, prepare
 
-Array = npt.NDArray[np.float64]
 _FEWEST = 3
 """Cells each way that the coarsest block has at least."""
 _LARGEST_PART = 1 / 6
@@ -104,7 +103,7 @@ class Climber:
         return prepare(scene, rung.comm, self.timer, body, None if self.existence else rung.solution.solvability)
 
     def _solved(self, rung: Rung, prepared: Prepared, step: PETSc.Mat, ahead: fem.Function | None = None) -> Rung:
-        found = rung.solution.solved
+        found = rung.solution.solve_result
         if found is not None and ahead is not None:
             found = replace(found, u=ahead)
         start = (rung.prepared.system, found, step) if found is not None else None
@@ -150,7 +149,7 @@ def _refined_share(rung: Rung, step: Refinement, bulk: float) -> float:
     return own / found.discretisation**2 * all_cut / cut
 
 
-def marked(comm: MPI.Comm, estimate: Estimate, bulk: float) -> npt.NDArray[np.int32]:
+def marked(comm: MPI.Comm, estimate: Estimate, bulk: float) -> Entities:
     """The cells (local, owned) of the largest errors, which make up this share of the squared error. Collective.
 
     The threshold is one for all ranks; cells that tie with the last one are marked too, so symmetry stays.

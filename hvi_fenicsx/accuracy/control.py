@@ -160,7 +160,7 @@ class _Climb:
     def _note(self, rung: Rung, start: float) -> str | None:
         """Record a rung; why to stop at it, or None. Collective."""
         solution = rung.solution
-        if solution.solved is None or solution.solved.interrupted:
+        if solution.solve_result is None or solution.solve_result.interrupted:
             return solution.reason
         if self.watched is not None:
             self.watched.add(rung)

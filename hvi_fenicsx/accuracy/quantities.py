@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-import numpy.typing as npt
 from dolfinx import fem
 from scipy.optimize import brentq
 
@@ -22,9 +21,9 @@ from ..certify.force_attribution import NEAR
 from ..effects.base import Direction
 from ..errors import InputError
 from ..runtime.mpi import total
+from ..typing import Array
 from .adaptive import Rung
 
-Array = npt.NDArray[np.float64]
 Name = Literal["energy", "u_t", "sigma_t", "resultant", "lambda_held", "lambda_peak"]
 NAMES: Mapping[str, str] = {
     "energy": "the displacement in the energy norm",
@@ -108,9 +107,9 @@ class Estimated(Watched):
     def error(self) -> float:
         """See :meth:`Watched.error`; with its safety factor."""
         found, self._ahead = self._last.solution, None
-        if found.solved is None or found.examined is None:
+        if found.solve_result is None or found.examination is None:
             return np.inf
-        parts = estimator.on_contact(self._last.prepared.system, found.solved.u, found.examined)
+        parts = estimator.on_contact(self._last.prepared.system, found.solve_result.u, found.examination)
         self._ahead = parts.moved
         return _SAFETY[self.name] * (parts.slip if self.name == "u_t" else parts.friction)
 
@@ -132,7 +131,7 @@ class History(Watched):
 
     def add(self, rung: Rung) -> None:
         """See :meth:`Watched.add`; the fields of the rungs below are taken to the new mesh. Collective."""
-        if rung.solution.examined is None:
+        if rung.solution.examination is None:
             self._samples = []
             return
         self._samples = [Sample(s.size, _moved(s.value, rung, self._last)) for s in self._samples]
@@ -212,8 +211,8 @@ def _from_true_law(rung: Rung) -> float:
 
 
 def _states(rung: Rung) -> tuple[State, ...]:
-    examined = rung.solution.examined
-    return () if examined is None else examined.states
+    examination = rung.solution.examination
+    return () if examination is None else examination.states
 
 
 def _moved(value: fem.Function | Array, rung: Rung, below: Rung) -> fem.Function | Array:

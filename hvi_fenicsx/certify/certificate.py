@@ -9,18 +9,17 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 
 import numpy as np
-import numpy.typing as npt
 from dolfinx import fem
 from mpi4py import MPI
 
 from ..problem.problem import Bounds, Problem
 from ..runtime.mpi import agree, largest, total
+from ..typing import Array
 from . import contact_state
 from . import second_order as stability
 from .contact_state import Forces, State
 from .force_attribution import NEAR, on_bounds, on_kink
 
-Array = npt.NDArray[np.float64]
 _LARGEST_ROUNDING, _SAFETY = 1e-4, 4.0
 """An entry above the first is no rounding; the sample of the rounding error is trusted within the second."""
 
@@ -62,7 +61,7 @@ class Certificate:
 
 
 @dataclass(frozen=True)
-class Examined:
+class Examination:
     """The certificate and what it was read off, nondimensional.
 
     Attributes:
@@ -77,7 +76,7 @@ class Examined:
     smoothing_error: float
 
 
-def examine(problem: Problem, u: fem.Function, tolerance: float, *, inertia: bool = False) -> Examined:
+def examine(problem: Problem, u: fem.Function, tolerance: float, *, inertia: bool = False) -> Examination:
     """Certify u. Collective.
 
     Args:
@@ -113,7 +112,7 @@ def examine(problem: Problem, u: fem.Function, tolerance: float, *, inertia: boo
         passed=passed,
         rounding=rounding,
     )
-    return Examined(certificate, _energy(problem, u, forces, states), forces, states, error)
+    return Examination(certificate, _energy(problem, u, forces, states), forces, states, error)
 
 
 def _within(entries: Mapping[str, float], limit: float) -> bool:

@@ -10,7 +10,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 import ufl
 from dolfinx import fem
 
@@ -20,10 +19,9 @@ from ..problem.contact_surface import Surface
 from ..problem.law_term import LawTerm
 from ..problem.problem import Bounds, Problem
 from ..problem.vectors import nodal
+from ..typing import Array, Integers, Mask
 from . import force_attribution
 from .force_attribution import NEAR, Ledger
-
-Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -60,13 +58,13 @@ class State:
     pressure: Array
     contact_pressure: Array
     friction: Array
-    contact: npt.NDArray[np.bool_]
+    contact: Mask
     arguments: tuple[Array, ...]
     tractions: tuple[Array, ...]
     distances: tuple[Array, ...]
-    hidden: tuple[npt.NDArray[np.bool_], ...]
+    hidden: tuple[Mask, ...]
 
-    def branch(self, *directions: Direction) -> npt.NDArray[np.int64] | None:
+    def branch(self, *directions: Direction) -> Integers | None:
         """The active piece of the law in one of these directions, (m,); None where there is no such law."""
         for term, argument in zip(self.terms, self.arguments, strict=True):
             if term.direction in directions:
@@ -103,7 +101,7 @@ class _Law:
     argument: Array
     traction: Array
     distance: Array
-    hidden: npt.NDArray[np.bool_]
+    hidden: Mask
 
 
 def _law(book: Ledger, term: LawTerm, local: LawTerm, u: Array) -> _Law:
@@ -119,9 +117,7 @@ def _law(book: Ledger, term: LawTerm, local: LawTerm, u: Array) -> _Law:
     return _radial(book, term, local, argument, u, hidden)
 
 
-def _radial(
-    book: Ledger, term: LawTerm, local: LawTerm, argument: Array, u: Array, hidden: npt.NDArray[np.bool_]
-) -> _Law:
+def _radial(book: Ledger, term: LawTerm, local: LawTerm, argument: Array, u: Array, hidden: Mask) -> _Law:
     """A law of |u_t|: the traction is a vector along the slip, at zero slip any within the kink's disc."""
     dofs = [d for d, _ in force_attribution.components(local)]
     signs = np.stack([s for _, s in force_attribution.components(local)], axis=1)

@@ -11,16 +11,14 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from ..laws import ConvexPart
 from ..problem.contact_surface import component_dofs
 from ..problem.law_term import LawTerm
 from ..problem.problem import Bounds, Problem
 from ..system import local_frames
+from ..typing import Array, Integers, Mask
 
-Array = npt.NDArray[np.float64]
-Mask = npt.NDArray[np.bool_]
 NEAR = 1e-10
 """Distance (of u0) from a kink or a bound that counts as being on it."""
 
@@ -123,7 +121,7 @@ def on_kink(part: ConvexPart, argument: Array) -> Mask:
     return np.asarray(np.any(np.abs(argument[:, None] - part.kinks) <= NEAR, axis=1))
 
 
-def components(term: LawTerm) -> Iterator[tuple[npt.NDArray[np.int64], Array]]:
+def components(term: LawTerm) -> Iterator[tuple[Integers, Array]]:
     """For each of a law's directions the scalar dof at every vertex and the direction's sign."""
     for i in range(term.directions.shape[1]):
         yield component_dofs(term.surface.blocks, term.directions[:, i])

@@ -10,7 +10,6 @@ from collections.abc import Iterator, Mapping
 from itertools import combinations
 
 import numpy as np
-import numpy.typing as npt
 from dolfinx import fem
 from petsc4py import PETSc
 
@@ -20,11 +19,10 @@ from ..problem.problem import Problem
 from ..rigid import kernel, rigid_fields
 from ..runtime.mpi import largest, total
 from ..system import existence
-from .certificate import Examined
+from .certificate import Examination
 from .contact_state import State
 from .force_attribution import NEAR
 
-Array = npt.NDArray[np.float64]
 LARGEST_STRAIN = 0.1
 """Small strains are assumed everywhere."""
 MODULI = 1e3, 2e12
@@ -51,16 +49,16 @@ def foreseen(problem: Problem, forces: Mapping[str, PETSc.Vec]) -> tuple[str, ..
     return (*_of_scales(problem), *_weak_laws(problem, forces))
 
 
-def found(problem: Problem, examined: Examined, u: fem.Function) -> tuple[str, ...]:
+def found(problem: Problem, examination: Examination, u: fem.Function) -> tuple[str, ...]:
     """What is odd about what was found, in sentences. Collective; the same on all ranks.
 
     Args:
-        problem: as composed. examined: its state at u. u: the displacement, nondimensional.
+        problem: as composed. examination: its state at u. u: the displacement, nondimensional.
     """
     odd = [*_strain(problem, u)]
-    if examined.certificate.passed:
+    if examination.certificate.passed:
         size = largest(problem.domain.mesh.comm, float(np.max(np.abs(u.x.array), initial=0.0)))
-        for state in examined.states:
+        for state in examination.states:
             odd += [*_distant(problem, state, size)]
             for index in range(len(state.terms)):
                 odd += [*_slip_and_kink(problem, state, index), *_blurred(problem, state, index)]

@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 from dolfinx import fem
 from petsc4py import PETSc
 
@@ -20,10 +19,10 @@ from ..problem.problem import Problem
 from ..runtime.timing import Timer
 from ..solvers.law_models import Cells, Full
 from ..system.system import System, compile_forms
+from ..typing import Array, Integers, Mask
 from .contact_state import State
 from .force_attribution import NEAR, on_kink
 
-Indices = npt.NDArray[np.int64]
 LOCAL_MINIMISER, NO_MINIMISER, UNDECIDED = "local minimiser", "not a minimiser", "undecided"
 _NEGATIVE_PIVOTS = 12
 """MUMPS's INFOG entry."""
@@ -49,10 +48,10 @@ def by_inertia(problem: Problem, u: fem.Function, states: Sequence[State], toler
     return NO_MINIMISER if _negative(system, np.union1d(strong, weak)) > 0 else UNDECIDED
 
 
-def _active(system: System, states: Sequence[State], tolerance: float) -> tuple[Indices, Indices]:
+def _active(system: System, states: Sequence[State], tolerance: float) -> tuple[Integers, Integers]:
     """Local dofs that constraints hold strongly and weakly."""
-    strong: list[Indices] = [np.empty(0, np.int64)]
-    weak: list[Indices] = [np.empty(0, np.int64)]
+    strong: list[Integers] = [np.empty(0, np.int64)]
+    weak: list[Integers] = [np.empty(0, np.int64)]
     by_part = {s.surface.part: s for s in states}
     for bounds in system.bounds:
         state = by_part[bounds.surface.part]
@@ -71,9 +70,7 @@ def _active(system: System, states: Sequence[State], tolerance: float) -> tuple[
     return np.unique(np.concatenate(strong)), np.unique(np.concatenate(weak))
 
 
-def _kinks(
-    term: LawTerm, argument: npt.NDArray[np.float64], traction: npt.NDArray[np.float64], tolerance: float
-) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
+def _kinks(term: LawTerm, argument: Array, traction: Array, tolerance: float) -> tuple[Mask, Mask]:
     """Whether a vertex sits within a convex kink, or at the edge of what it carries."""
     law = term.law
     on = on_kink(law.convex, argument)
@@ -83,7 +80,7 @@ def _kinks(
     return on & inside, on & ~inside
 
 
-def _negative(system: System, held: Indices) -> int:
+def _negative(system: System, held: Integers) -> int:
     """Negative eigenvalues of the Hessian with some dofs held. Collective."""
     matrix = system.matrix.copy()
     start = system.load.owner_range[0]

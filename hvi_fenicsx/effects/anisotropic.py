@@ -7,7 +7,8 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
-from .base import Array, Contribution, Stage, refusal
+from ..typing import Array
+from .base import Contribution, FormContext, refusal
 from .elasticity import Elasticity, strain
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
@@ -32,13 +33,13 @@ class _ByMatrix(Elasticity):
         """C with σ = C ε in Voigt's order, N/m²; shape (3, 3) or (6, 6)."""
         raise NotImplementedError
 
-    def contribute(self, stage: Stage, where: str | None) -> Contribution:
+    def contribute(self, context: FormContext, where: str | None) -> Contribution:
         """The bilinear form, strains multiplied by L. The pattern of zeros of C is compiled, its values are not."""
-        length, cells = stage.number(stage.length), stage.cells(where)
-        given, virtual = (_voigt(length * strain(v), stage.dimension) for v in (stage.trial, stage.test))
-        c = self.stiffness() / stage.modulus
-        density = sum(stage.number(c[i, j]) * given[j] * virtual[i] for i, j in np.argwhere(c != 0.0))
-        return Contribution(bilinear=(density * cells,), across=self.across(stage, cells))
+        length, cells = context.number(context.length), context.cells(where)
+        given, virtual = (_voigt(length * strain(v), context.dimension) for v in (context.trial, context.test))
+        c = self.stiffness() / context.modulus
+        density = sum(context.number(c[i, j]) * given[j] * virtual[i] for i, j in np.argwhere(c != 0.0))
+        return Contribution(bilinear=(density * cells,), across=self.across(context, cells))
 
     def thermal_stress(self) -> Array:
         """C : αI."""

@@ -12,8 +12,6 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Annotated, Any, ClassVar, Protocol
 
-import numpy as np
-import numpy.typing as npt
 from pydantic import BaseModel, BeforeValidator, ConfigDict, PlainSerializer
 from pydantic_core import PydanticCustomError
 
@@ -115,7 +113,7 @@ class Averaged:
 
 @dataclass(frozen=True, slots=True)
 class Contribution:
-    """What one effect adds to the problem; forms are nondimensional UFL in the stage's arguments."""
+    """What one effect adds to the problem; forms are nondimensional UFL in the context's arguments."""
 
     bilinear: tuple[Any, ...] = ()
     averaged: tuple[Averaged, ...] = ()
@@ -129,7 +127,7 @@ class Contribution:
     laws: tuple[BoundaryLaw, ...] = ()
 
 
-class Stage(Protocol):
+class FormContext(Protocol):
     """What an effect may see of the problem that is being composed."""
 
     dimension: int
@@ -215,7 +213,7 @@ class Effect(BaseModel):
                 raise TypeError(f"two effects are called {cls.key!r}: {known} and {cls}")
 
     @abstractmethod
-    def contribute(self, stage: Stage, where: str | None) -> Contribution:
+    def contribute(self, context: FormContext, where: str | None) -> Contribution:
         """What it adds on ``where`` (a boundary part, a region, or None for the whole body)."""
 
     def stress_scale(self, largest: Evaluate, sizes: Sizes) -> float:
@@ -250,6 +248,3 @@ def components(formulas: tuple[Any, ...], dimension: int, key: str) -> None:
     """
     if len(formulas) != dimension:
         raise InputError(f"{key} has {len(formulas)} components; a {dimension}D scene wants {dimension}")
-
-
-Array = npt.NDArray[np.float64]

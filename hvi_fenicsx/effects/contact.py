@@ -13,11 +13,11 @@ from .base import (
     Drive,
     Effect,
     Evaluate,
+    FormContext,
     FormulaField,
     NormalBounds,
     Place,
     Sizes,
-    Stage,
     components,
     refusal,
 )
@@ -84,7 +84,7 @@ class Contact(Effect):
         demanded += [f"max(0, -({f.source}))" for f in (bounds.upper,) if f is not None]
         return max(largest(Formula(formula)) for formula in demanded) * sizes.modulus / sizes.length
 
-    def contribute(self, stage: Stage, where: str | None) -> Contribution:
+    def contribute(self, context: FormContext, where: str | None) -> Contribution:
         """The bounds on the normal displacement."""
         return Contribution(bounds=(self._bounds(),))
 

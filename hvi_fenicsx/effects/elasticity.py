@@ -9,7 +9,8 @@ import numpy as np
 from pydantic import Field
 
 from ..errors import InputError
-from .base import Array, Averaged, Contribution, Effect, Place, Stage
+from ..typing import Array
+from .base import Averaged, Contribution, Effect, FormContext, Place
 
 _LOCKING = 0.45
 """Poisson's ratio above which P1 cells answer too stiffly (docs/methods.md)."""
@@ -43,12 +44,12 @@ class Elasticity(Effect):
         """σ_33 of a plane body by unit ε_11, ε_22 and ΔT = -1 K, N/m²; shape (3,). Zero in plane stress."""
         return np.zeros(3)
 
-    def across(self, stage: Stage, cells: Any) -> tuple[Any, ...]:
+    def across(self, context: FormContext, cells: Any) -> tuple[Any, ...]:
         """∫ σ_33(u) q dx over cells, nondimensional; nothing where it is zero."""
-        deformation = stage.number(stage.length) * strain(stage.trial)
-        found = [(i, float(c)) for i, c in enumerate(self.out_of_plane()[:2] / stage.modulus) if c]
-        sigma = sum(stage.number(c) * deformation[i, i] for i, c in found)
-        return (sigma * stage.scalar_test * cells,) if found else ()
+        deformation = context.number(context.length) * strain(context.trial)
+        found = [(i, float(c)) for i, c in enumerate(self.out_of_plane()[:2] / context.modulus) if c]
+        sigma = sum(context.number(c) * deformation[i, i] for i, c in found)
+        return (sigma * context.scalar_test * cells,) if found else ()
 
     def expansion_scale(self) -> float:
         """|α|."""
@@ -94,19 +95,21 @@ class IsotropicElasticity(Elasticity):
         """Whether P1 cells would lock: nearly incompressible, and not free to change thickness."""
         return self.model != "plane_stress" and self.poisson_ratio > _LOCKING
 
-    def contribute(self, stage: Stage, where: str | None) -> Contribution:
+    def contribute(self, context: FormContext, where: str | None) -> Contribution:
         """The bilinear form, strains multiplied by L: nondimensional. Where P1 locks, div u is averaged by vertex."""
         import ufl
 
-        length, cells = stage.number(stage.length), stage.cells(where)
-        deformation, virtual = length * strain(stage.trial), length * strain(stage.test)
+        length, cells = context.number(context.length), context.cells(where)
+        deformation, virtual = length * strain(context.trial), length * strain(context.test)
         if not self.locks:
-            sigma = self.stress(deformation, stage.number, stage.modulus)
-            return Contribution(bilinear=(ufl.inner(sigma, virtual) * cells,), across=self.across(stage, cells))
-        lam, two_mu = (value / stage.modulus for value in self.lame())
-        shear = stage.number(two_mu) * ufl.inner(deformation, virtual) * cells
-        divergence = stage.scalar_test * length * ufl.div(stage.trial) * cells
-        return Contribution(bilinear=(shear,), averaged=(Averaged(lam, two_mu, divergence, stage.scalar_test * cells),))
+            sigma = self.stress(deformation, context.number, context.modulus)
+            return Contribution(bilinear=(ufl.inner(sigma, virtual) * cells,), across=self.across(context, cells))
+        lam, two_mu = (value / context.modulus for value in self.lame())
+        shear = context.number(two_mu) * ufl.inner(deformation, virtual) * cells
+        divergence = context.scalar_test * length * ufl.div(context.trial) * cells
+        return Contribution(
+            bilinear=(shear,), averaged=(Averaged(lam, two_mu, divergence, context.scalar_test * cells),)
+        )
 
     def out_of_plane(self) -> Array:
         """λ, λ, Eα/(1-2ν)."""

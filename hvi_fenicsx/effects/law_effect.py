@@ -15,7 +15,7 @@ from pydantic import (
 
 from .. import laws
 from ..errors import InputError
-from .base import BoundaryLaw, Contribution, Direction, Effect, Evaluate, Place, Sizes, Stage, refusal
+from .base import BoundaryLaw, Contribution, Direction, Effect, Evaluate, FormContext, Place, Sizes, refusal
 
 
 def _law(value: Any) -> laws.Superpotential:
@@ -68,7 +68,7 @@ class LawEffect(Effect):
     def _as_table(self, handler: SerializerFunctionWrapHandler) -> Any:
         return handler(self)["law"]
 
-    def contribute(self, stage: Stage, where: str | None) -> Contribution:
+    def contribute(self, context: FormContext, where: str | None) -> Contribution:
         """The law, acting on its displacement."""
         return Contribution(laws=(BoundaryLaw(self.direction, self.law),))
 

@@ -20,10 +20,10 @@ from .base import (
     Drive,
     Effect,
     Evaluate,
+    FormContext,
     FormulaField,
     Place,
     Sizes,
-    Stage,
     components,
     refusal,
 )
@@ -62,14 +62,14 @@ class Traction(_Listed):
 
     values: tuple[FormulaField, ...]
 
-    def contribute(self, stage: Stage, where: str | None) -> Contribution:
+    def contribute(self, context: FormContext, where: str | None) -> Contribution:
         """The linear form over its part."""
         import ufl  # here and below: a scene is read without it
 
         if where is None:
             raise InputError("a traction needs a boundary part")
-        vector = ufl.as_vector([stage.render(f) for f in self.values]) / stage.number(stage.stress)
-        return Contribution(linear=(ufl.inner(vector, stage.test) * stage.facets(where),))
+        vector = ufl.as_vector([context.render(f) for f in self.values]) / context.number(context.stress)
+        return Contribution(linear=(ufl.inner(vector, context.test) * context.facets(where),))
 
     def stress_scale(self, largest: Evaluate, sizes: Sizes) -> float:
         """The largest component."""
@@ -86,13 +86,13 @@ class BodyForce(_Listed):
 
     values: tuple[FormulaField, ...]
 
-    def contribute(self, stage: Stage, where: str | None) -> Contribution:
+    def contribute(self, context: FormContext, where: str | None) -> Contribution:
         """The linear form over its region."""
         import ufl
 
-        factor = stage.number(stage.length / stage.stress)
-        vector = factor * ufl.as_vector([stage.render(f) for f in self.values])
-        return Contribution(linear=(ufl.inner(vector, stage.test) * stage.cells(where),))
+        factor = context.number(context.length / context.stress)
+        vector = factor * ufl.as_vector([context.render(f) for f in self.values])
+        return Contribution(linear=(ufl.inner(vector, context.test) * context.cells(where),))
 
     def stress_scale(self, largest: Evaluate, sizes: Sizes) -> float:
         """The largest component times the body's length."""
@@ -124,7 +124,7 @@ class PrescribedDisplacement(_Listed):
 
     values: tuple[Component, ...]
 
-    def contribute(self, stage: Stage, where: str | None) -> Contribution:
+    def contribute(self, context: FormContext, where: str | None) -> Contribution:
         """The conditions of its components that are not free."""
         return Contribution(conditions=tuple(Condition(i, self.values[i]) for i in self.prescribed()))
 

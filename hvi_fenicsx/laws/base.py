@@ -16,19 +16,16 @@ from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
-import numpy.typing as npt
 from typing_extensions import override
 
 from ..errors import InputError
+from ..typing import Array, Integers
 from .traction_bounds import Extremes, extremes
 
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
 
-
-def quotient(a: FloatArray, b: FloatArray | float) -> FloatArray:
+def quotient(a: Array, b: Array | float) -> Array:
     """The quotient a / b; numpy's stubs do not know that of doubles it is one."""
-    result: FloatArray = np.divide(a, b)
+    result: Array = np.divide(a, b)
     return result
 
 
@@ -48,27 +45,27 @@ class ConvexPart(ABC):
 
     @property
     @abstractmethod
-    def kinks(self) -> FloatArray:
+    def kinks(self) -> Array:
         """Positions (k,), ascending, at which the derivative jumps upwards."""
 
     @abstractmethod
-    def value(self, x: FloatArray) -> FloatArray:
+    def value(self, x: Array) -> Array:
         """The function."""
 
     @abstractmethod
-    def left(self, x: FloatArray) -> FloatArray:
+    def left(self, x: Array) -> Array:
         """Left derivative, nondecreasing."""
 
     @abstractmethod
-    def right(self, x: FloatArray) -> FloatArray:
+    def right(self, x: Array) -> Array:
         """Right derivative, nondecreasing; equals `left` off the kinks."""
 
     @abstractmethod
-    def second(self, x: FloatArray) -> FloatArray:
+    def second(self, x: Array) -> Array:
         """Second derivative off the kinks; the larger one-sided one where the derivative's slope breaks."""
 
     @property
-    def jumps(self) -> FloatArray:
+    def jumps(self) -> Array:
         """Heights (k,) of the jumps of the derivative at the kinks, all positive."""
         return self.right(self.kinks) - self.left(self.kinks)
 
@@ -78,11 +75,11 @@ class DifferentiablePart(ConvexPart):
 
     @property
     @override
-    def kinks(self) -> FloatArray:
+    def kinks(self) -> Array:
         return np.empty(0)
 
     @override
-    def left(self, x: FloatArray) -> FloatArray:
+    def left(self, x: Array) -> Array:
         return self.right(x)
 
 
@@ -103,7 +100,7 @@ class Superpotential(ABC):
             _register(cls)
 
     @abstractmethod
-    def value(self, x: FloatArray) -> FloatArray:
+    def value(self, x: Array) -> Array:
         """J at the displacements x (m,), in N/m, with j(0) = 0 (smoothed laws: to within their bound)."""
 
     @property
@@ -146,20 +143,20 @@ class Superpotential(ABC):
         """energy_scale / length_scale, N/m²."""
         return self.energy_scale / self.length_scale
 
-    def left(self, x: FloatArray) -> FloatArray:
+    def left(self, x: Array) -> Array:
         """Left derivative of j at x (m,), N/m²."""
         return self.convex.left(x) - self.concave.left(x)
 
-    def right(self, x: FloatArray) -> FloatArray:
+    def right(self, x: Array) -> Array:
         """Right derivative of j at x (m,), N/m²."""
         return self.convex.right(x) - self.concave.right(x)
 
     @cached_property
-    def kinks(self) -> FloatArray:
+    def kinks(self) -> Array:
         """Positions (k,), ascending, of all kinks of j."""
         return np.union1d(self.convex.kinks, self.concave.kinks)
 
-    def interval(self, x: FloatArray, atol: float = 0.0) -> tuple[FloatArray, FloatArray]:
+    def interval(self, x: Array, atol: float = 0.0) -> tuple[Array, Array]:
         """Clarke's subdifferential [lo, hi] of j at x (m,), N/m².
 
         With `atol` (a length), the hull of the intervals at x and at every kink within atol of x: so a
@@ -173,16 +170,16 @@ class Superpotential(ABC):
             hi = np.where(near, np.maximum(hi, high[0]), hi)
         return lo, hi
 
-    def distance(self, x: FloatArray, traction: FloatArray, atol: float = 0.0) -> FloatArray:
+    def distance(self, x: Array, traction: Array, atol: float = 0.0) -> Array:
         """Distance (m,) of a traction from ∂j(x), N/m², zero if the law allows it. `atol`: see `interval`."""
         lo, hi = self.interval(x, atol)
         return np.asarray(np.maximum(np.maximum(lo - traction, traction - hi), 0.0))
 
-    def piece(self, x: FloatArray) -> IntArray:
+    def piece(self, x: Array) -> Integers:
         """Index (m,) of the law's piece that x lies on, counted from 0 by |x|; this default knows one."""
         return np.zeros(np.shape(x), dtype=np.int64)
 
-    def branch(self, x: FloatArray, atol: float = 0.0) -> IntArray:
+    def branch(self, x: Array, atol: float = 0.0) -> Integers:
         """Index (m,) of the active piece, counted from 0 by |x|; -1 on a kink or within atol of it."""
         result = self.piece(x)
         for kink in self._kinks_within(x, atol):
@@ -217,11 +214,11 @@ class Superpotential(ABC):
     def _extremes(self) -> Extremes:
         return extremes(self)
 
-    def _clarke(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def _clarke(self, x: Array) -> tuple[Array, Array]:
         left, right = self.left(x), self.right(x)
         return np.minimum(left, right), np.maximum(left, right)
 
-    def _kinks_within(self, x: FloatArray, atol: float) -> FloatArray:
+    def _kinks_within(self, x: Array, atol: float) -> Array:
         if np.size(x) == 0:
             return np.empty(0)
         return self.kinks[(self.kinks >= np.min(x) - atol) & (self.kinks <= np.max(x) + atol)]

@@ -11,7 +11,8 @@ import numpy.typing as npt
 from typing_extensions import override
 
 from ..errors import InputError
-from .base import ConvexPart, Directional, FloatArray, IntArray, Superpotential
+from ..typing import Array, Integers
+from .base import ConvexPart, Directional, Superpotential
 from .traction_bounds import Extremes
 from .traction_graph import TractionGraph
 
@@ -24,23 +25,23 @@ class PolylinePart(ConvexPart):
 
     @override
     @cached_property
-    def kinks(self) -> FloatArray:
+    def kinks(self) -> Array:
         return self.graph.breaks[self.graph.jumps > 0.0]
 
     @override
-    def value(self, x: FloatArray) -> FloatArray:
+    def value(self, x: Array) -> Array:
         return self.graph.primitive(x)
 
     @override
-    def left(self, x: FloatArray) -> FloatArray:
+    def left(self, x: Array) -> Array:
         return self.graph.traction(x, "left")
 
     @override
-    def right(self, x: FloatArray) -> FloatArray:
+    def right(self, x: Array) -> Array:
         return self.graph.traction(x, "right")
 
     @override
-    def second(self, x: FloatArray) -> FloatArray:
+    def second(self, x: Array) -> Array:
         return self.graph.slope(x)
 
 
@@ -79,23 +80,23 @@ class PolylineLaw(Superpotential):
         return PolylinePart(self._split[1])
 
     @override
-    def value(self, x: FloatArray) -> FloatArray:
+    def value(self, x: Array) -> Array:
         return self.graph.primitive(x)
 
     @override
-    def left(self, x: FloatArray) -> FloatArray:
+    def left(self, x: Array) -> Array:
         return self.graph.traction(x, "left")
 
     @override
-    def right(self, x: FloatArray) -> FloatArray:
+    def right(self, x: Array) -> Array:
         return self.graph.traction(x, "right")
 
     @override
     @cached_property
-    def kinks(self) -> FloatArray:
+    def kinks(self) -> Array:
         return np.asarray(self.graph.breaks[self.graph.jumps != 0.0])
 
-    def piece(self, x: FloatArray) -> IntArray:
+    def piece(self, x: Array) -> Integers:
         """Number (m,) of breaks between 0 and x: the index of the segment, counted from 0 by |x|."""
         g = self.graph
         ahead = np.searchsorted(g.breaks[g.zero + 1 :], x, side="right")
@@ -158,7 +159,7 @@ class PolylineLaw(Superpotential):
         return self._scales[1]
 
     @property
-    def _corners(self) -> FloatArray:
+    def _corners(self) -> Array:
         """Displacements that mean something where the law has no kink off zero."""
         return self.graph.breaks
 

@@ -11,7 +11,7 @@ import numpy as np
 from typing_extensions import override
 
 from ..errors import InputError
-from .base import FloatArray, IntArray
+from ..typing import Array, Integers
 from .polyline import PolylineLaw
 from .traction_graph import TractionGraph
 
@@ -32,7 +32,7 @@ class SampledLaw(PolylineLaw):
     one_sided: ClassVar[bool] = False
 
     @abstractmethod
-    def traction(self, x: FloatArray) -> FloatArray:
+    def traction(self, x: Array) -> Array:
         """Traction (m,) at displacements x (m,) > 0 inside the pieces."""
 
     @abstractmethod
@@ -43,20 +43,20 @@ class SampledLaw(PolylineLaw):
     def build(self) -> TractionGraph:
         return TractionGraph.from_points(sample_traction(self.traction, self.ends(), self.samples), self.one_sided)
 
-    def piece(self, x: FloatArray) -> IntArray:
+    def piece(self, x: Array) -> Integers:
         """Number (m,) of ends between 0 and x."""
         slip = np.maximum(x, 0.0) if self.one_sided else np.abs(x)
         return np.asarray(np.searchsorted(np.asarray(self.ends(), dtype=float), slip, side="right"), dtype=np.int64)
 
     @property
     @override
-    def _corners(self) -> FloatArray:
+    def _corners(self) -> Array:
         # Not the samples: how finely the law is sampled is no scale of it.
         return np.asarray(self.ends(), dtype=np.float64)
 
 
 def sample_traction(
-    traction: Callable[[FloatArray], FloatArray], ends: Sequence[float], samples: int = 200
+    traction: Callable[[Array], Array], ends: Sequence[float], samples: int = 200
 ) -> tuple[tuple[float, float], ...]:
     """Points of a graph law from a traction function, smooth between 0 and the ends (ascending, > 0)."""
     stops = np.append(0.0, np.asarray(ends, dtype=float))
@@ -74,11 +74,9 @@ def sample_traction(
     return tuple(points)
 
 
-def _sample_piece(
-    traction: Callable[[FloatArray], FloatArray], a: float, b: float, samples: int
-) -> tuple[FloatArray, FloatArray]:
+def _sample_piece(traction: Callable[[Array], Array], a: float, b: float, samples: int) -> tuple[Array, Array]:
     """Abscissae and tractions of a piece; at its ends those just inside, for the one-sided limits."""
-    x: FloatArray = np.linspace(a, b, samples + 1, dtype=np.float64)
+    x: Array = np.linspace(a, b, samples + 1, dtype=np.float64)
     inside = x.copy()
     inside[0] = max(np.nextafter(a, b), a + 1e-12 * (b - a))
     inside[-1] = min(np.nextafter(b, a), b - 1e-12 * (b - a))

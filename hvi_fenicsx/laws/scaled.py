@@ -8,7 +8,8 @@ from functools import cached_property
 import numpy as np
 from typing_extensions import override
 
-from .base import ConvexPart, Directional, FloatArray, IntArray, Superpotential, quotient
+from ..typing import Array, Integers
+from .base import ConvexPart, Directional, Superpotential, quotient
 from .parameter_checks import require_positive
 
 
@@ -22,26 +23,26 @@ class ScaledPart(ConvexPart):
 
     @override
     @cached_property
-    def kinks(self) -> FloatArray:
+    def kinks(self) -> Array:
         return quotient(self.part.kinks, self.length)
 
     @override
-    def value(self, x: FloatArray) -> FloatArray:
+    def value(self, x: Array) -> Array:
         return quotient(self.part.value(x * self.length), self.length * self.traction)
 
     @override
-    def left(self, x: FloatArray) -> FloatArray:
+    def left(self, x: Array) -> Array:
         return quotient(self.part.left(self._original(x)), self.traction)
 
     @override
-    def right(self, x: FloatArray) -> FloatArray:
+    def right(self, x: Array) -> Array:
         return quotient(self.part.right(self._original(x)), self.traction)
 
     @override
-    def second(self, x: FloatArray) -> FloatArray:
+    def second(self, x: Array) -> Array:
         return self.part.second(self._original(x)) * (self.length / self.traction)
 
-    def _original(self, x: FloatArray) -> FloatArray:
+    def _original(self, x: Array) -> Array:
         """The displacement in the law's own unit, exact at kinks, which kink / length * length may miss."""
         original = x * self.length
         for kink, own in zip(self.kinks, self.part.kinks, strict=True):
@@ -62,7 +63,7 @@ class ScaledLaw(Superpotential, register=False):
         require_positive(self.name, length=self.length, traction=self.traction)
 
     @override
-    def value(self, x: FloatArray) -> FloatArray:
+    def value(self, x: Array) -> Array:
         return quotient(self.law.value(x * self.length), self.length * self.traction)
 
     @override
@@ -106,7 +107,7 @@ class ScaledLaw(Superpotential, register=False):
         return self.law.is_linear
 
     @override
-    def piece(self, x: FloatArray) -> IntArray:
+    def piece(self, x: Array) -> Integers:
         return self.law.piece(x * self.length)
 
     @override

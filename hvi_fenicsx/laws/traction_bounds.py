@@ -12,12 +12,13 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
+
+from ..typing import Array
 
 if TYPE_CHECKING:
     from .base import Superpotential
 
-_Array = npt.NDArray[np.float64]
+_Array = Array
 _Objective = Callable[[_Array, _Array, _Array], _Array]
 """Objective f(lo, hi, |x|) of an interval of tractions lo..hi and a displacement."""
 

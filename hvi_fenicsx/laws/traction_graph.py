@@ -8,7 +8,8 @@ from functools import cached_property
 
 import numpy as np
 
-from .base import FloatArray, IntArray, quotient
+from ..typing import Array, Integers
+from .base import quotient
 
 
 @dataclass(frozen=True, eq=False)
@@ -19,10 +20,10 @@ class TractionGraph:
     slopes (k+1,): slope of each piece, the first and the last one being unbounded.
     """
 
-    breaks: FloatArray
-    left: FloatArray
-    right: FloatArray
-    slopes: FloatArray
+    breaks: Array
+    left: Array
+    right: Array
+    slopes: Array
 
     @staticmethod
     def from_points(points: Sequence[Sequence[float]], one_sided: bool = False) -> TractionGraph:
@@ -47,7 +48,7 @@ class TractionGraph:
         )
 
     @staticmethod
-    def from_slopes(breaks: FloatArray, slopes: FloatArray, jumps: FloatArray, start: FloatArray) -> TractionGraph:
+    def from_slopes(breaks: Array, slopes: Array, jumps: Array, start: Array) -> TractionGraph:
         """Graph of given slopes (k+1,) and jumps (k,), with the limits `start` = (left, right) at 0."""
         zero = int(np.searchsorted(breaks, 0.0))
         near, far = _outward(breaks[zero:], slopes[zero + 1 :], jumps[zero:], start[1])
@@ -60,7 +61,7 @@ class TractionGraph:
         )
 
     @property
-    def jumps(self) -> FloatArray:
+    def jumps(self) -> Array:
         """Jumps (k,) of the traction at the breaks; most of them may be 0."""
         return self.right - self.left
 
@@ -70,17 +71,17 @@ class TractionGraph:
         return int(np.searchsorted(self.breaks, 0.0))
 
     @cached_property
-    def _anchor(self) -> IntArray:
+    def _anchor(self) -> Integers:
         """For each piece the break nearest to 0. Evaluated from there, an odd graph is odd to the bit."""
         return np.append(np.arange(self.zero + 1), np.arange(self.zero, self.breaks.size))
 
     @cached_property
-    def _start(self) -> FloatArray:
+    def _start(self) -> Array:
         """Traction of each piece at its anchor."""
         return np.append(self.left[: self.zero + 1], self.right[self.zero :])
 
     @cached_property
-    def _energy(self) -> FloatArray:
+    def _energy(self) -> Array:
         """Primitive at the breaks (k,), summed outward from 0."""
         z, gaps = self.zero, np.diff(self.breaks)
         steps = (
@@ -89,7 +90,7 @@ class TractionGraph:
         steps += 0.5 * self.slopes[1:-1] * gaps**2
         return np.concatenate([np.cumsum(steps[:z][::-1])[::-1], [0.0], np.cumsum(steps[z:])])
 
-    def traction(self, x: FloatArray, side: str) -> FloatArray:
+    def traction(self, x: Array, side: str) -> Array:
         """Limit (m,) of the traction at x from the given side, "left" or "right"; at a break to the bit."""
         next_break, passed = np.searchsorted(self.breaks, x), np.searchsorted(self.breaks, x, side="right")
         piece, limits = (next_break, self.left) if side == "left" else (passed, self.right)
@@ -97,7 +98,7 @@ class TractionGraph:
             inside = self._start[piece] + self.slopes[piece] * (x - self.breaks[self._anchor[piece]])
         return np.where(passed > next_break, limits[np.minimum(next_break, limits.size - 1)], inside)
 
-    def slope(self, x: FloatArray) -> FloatArray:
+    def slope(self, x: Array) -> Array:
         """Slope (m,) at x; at a break the larger of the two."""
         before, after = (
             np.searchsorted(self.breaks, x, side="left"),
@@ -105,7 +106,7 @@ class TractionGraph:
         )
         return np.asarray(np.maximum(self.slopes[before], self.slopes[after]))
 
-    def primitive(self, x: FloatArray) -> FloatArray:
+    def primitive(self, x: Array) -> Array:
         """Integral (m,) of the traction from 0 to x; inf where that is beyond the largest float."""
         # Of a break's two pieces the one nearer to 0, so that an even law is even to the bit.
         ahead, behind = np.searchsorted(self.breaks, x), np.searchsorted(self.breaks, x, side="right")
@@ -137,7 +138,7 @@ class TractionGraph:
         )
 
 
-def _outward(breaks: FloatArray, slopes: FloatArray, jumps: FloatArray, start: float) -> tuple[FloatArray, FloatArray]:
+def _outward(breaks: Array, slopes: Array, jumps: Array, start: float) -> tuple[Array, Array]:
     """Limits before and behind each break of a half-line that starts at 0 with the traction `start`."""
     near, far = np.full(breaks.size, start), np.full(breaks.size, start)
     rises = slopes[:-1] * np.diff(breaks)

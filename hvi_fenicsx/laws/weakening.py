@@ -9,7 +9,8 @@ from functools import cached_property
 import numpy as np
 from typing_extensions import override
 
-from .base import ConvexPart, DifferentiablePart, Directional, FloatArray, Superpotential
+from ..typing import Array
+from .base import ConvexPart, DifferentiablePart, Directional, Superpotential
 from .parameter_checks import require_ordered, require_positive
 from .polyline import PolylinePart
 from .traction_bounds import Extremes
@@ -34,7 +35,7 @@ class WeakeningLaw(Superpotential):
         require_ordered(self.name, residual_traction=self.residual_traction, peak_traction=self.peak_traction)
 
     @abstractmethod
-    def shape(self, z: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def shape(self, z: Array) -> tuple[Array, Array, Array]:
         """W(z) = ∫₀ᶻ w, w(z) and w'(z) at slips z = |x|/delta ≥ 0, shape (m,), dimensionless."""
 
     @override
@@ -48,7 +49,7 @@ class WeakeningLaw(Superpotential):
         return _Weakened(self)
 
     @override
-    def value(self, x: FloatArray) -> FloatArray:
+    def value(self, x: Array) -> Array:
         return self.convex.value(x) - self.concave.value(x)
 
     @override
@@ -94,22 +95,22 @@ class _Weakened(DifferentiablePart):
     law: WeakeningLaw
 
     @override
-    def value(self, x: FloatArray) -> FloatArray:
+    def value(self, x: Array) -> Array:
         return (self._drop * self.law.delta) * self._shape(x)[0]
 
     @override
-    def right(self, x: FloatArray) -> FloatArray:
+    def right(self, x: Array) -> Array:
         return self._drop * np.sign(x) * self._shape(x)[1]
 
     @override
-    def second(self, x: FloatArray) -> FloatArray:
+    def second(self, x: Array) -> Array:
         return (self._drop / self.law.delta) * self._shape(x)[2]
 
     @property
     def _drop(self) -> float:
         return self.law.peak_traction - self.law.residual_traction
 
-    def _shape(self, x: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def _shape(self, x: Array) -> tuple[Array, Array, Array]:
         with np.errstate(over="ignore"):
             return self.law.shape(np.abs(x) / self.law.delta)
 
@@ -121,6 +122,6 @@ class Exponential(WeakeningLaw):
     name = "exponential"
 
     @override
-    def shape(self, z: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def shape(self, z: Array) -> tuple[Array, Array, Array]:
         decay = np.exp(-z)
         return z + np.expm1(-z), -np.expm1(-z), decay

@@ -13,14 +13,11 @@ import itertools
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 from dolfinx import mesh as dmesh
 from mpi4py import MPI
 
 from .. import compat
-
-Array = npt.NDArray[np.float64]
-Numbers = npt.NDArray[np.int64]
+from ..typing import Array, Integers
 
 
 def mesh(comm: MPI.Comm, size: Sequence[float], cells: Sequence[int]) -> dmesh.Mesh:
@@ -30,7 +27,7 @@ def mesh(comm: MPI.Comm, size: Sequence[float], cells: Sequence[int]) -> dmesh.M
     return compat.simplex_mesh(comm, _simplices(lower, upper, cells), _points(comm, size, cells), kind)
 
 
-def share(cells: Sequence[int], ranks: int, rank: int) -> tuple[Numbers, Numbers]:
+def share(cells: Sequence[int], ranks: int, rank: int) -> tuple[Integers, Integers]:
     """The cells of the grid that a rank keeps: from ``lower`` to before ``upper`` (d,); none where they are too few."""
     lower, upper = np.zeros(len(cells)), np.ones(len(cells))
     first, last = 0, ranks
@@ -47,7 +44,7 @@ def share(cells: Sequence[int], ranks: int, rank: int) -> tuple[Numbers, Numbers
     return begin, end
 
 
-def _simplices(lower: Numbers, upper: Numbers, cells: Sequence[int]) -> Numbers:
+def _simplices(lower: Integers, upper: Integers, cells: Sequence[int]) -> Integers:
     """Those of a part of the grid, (n, d+1), in numbers of the grid's vertices, x running fastest."""
     steps = np.cumprod([1, *(n + 1 for n in cells[:-1])], dtype=np.int64)
     corners = np.zeros(1, np.int64)

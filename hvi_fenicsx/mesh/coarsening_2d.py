@@ -13,10 +13,10 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from .. import compat
 from ..runtime.mpi import on_root
+from ..typing import Entities, Integers
 from . import coarsening_3d, gmsh_model, refinement, thinned_outline
 from .domain import Domain
 from .thinned_outline import NONE, HalfEdges, Outline
@@ -76,7 +76,7 @@ def _half_edges(domain: Domain, sides: Sequence[str], regions: Sequence[str]) ->
     return HalfEdges(numbers, x[ends], region[cell], side[facets[cell, i]])
 
 
-def _numbered(named: Mapping[str, npt.NDArray[np.int32]], names: Sequence[str], size: int) -> npt.NDArray[np.int64]:
+def _numbered(named: Mapping[str, Entities], names: Sequence[str], size: int) -> Integers:
     """For each entity the number of the name that it bears, or NONE."""
     numbers = np.full(size, NONE)
     for number, name in enumerate(names):

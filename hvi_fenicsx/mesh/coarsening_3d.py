@@ -14,17 +14,14 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 from dolfinx import mesh as dmesh
 
 from .. import compat
 from ..runtime import processes
 from ..runtime.mpi import agree, on_root, total
+from ..typing import Array, Entities, Integers, Mask
 from .domain import Domain
 
-Array = npt.NDArray[np.float64]
-Indices = npt.NDArray[np.int64]
-Flags = npt.NDArray[np.bool_]
 _SAMPLE = 20_000
 """Cells, about, by which sizes, regions and ranks are known."""
 _DIFFERENT = 0.25
@@ -39,17 +36,17 @@ class _Cells:
 
     midpoints: Array
     sizes: Array
-    ranks: Indices
-    within: Flags
+    ranks: Integers
+    within: Mask
 
 
 @dataclass(frozen=True)
 class _Surface:
     """All triangles (t) of the surface: the file's nodes (t, 3), corners (t, 3, 3), whether on each side (t, s)."""
 
-    nodes: Indices
+    nodes: Integers
     corners: Array
-    on: Flags
+    on: Mask
 
 
 def coarse(domain: Domain, factor: float) -> Domain | None:
@@ -88,7 +85,7 @@ def _surface(domain: Domain) -> _Surface | None:
     """None where a side lies inside of the body. Collective."""
     mesh, owned = domain.mesh, domain.mesh.topology.index_map(2).size_local
     facets = _exterior(mesh)
-    on: Flags = np.zeros((owned + mesh.topology.index_map(2).num_ghosts, len(domain.sides)), dtype=np.bool_)
+    on: Mask = np.zeros((owned + mesh.topology.index_map(2).num_ghosts, len(domain.sides)), dtype=np.bool_)
     for i, name in enumerate(sorted(domain.sides)):
         on[domain.sides[name], i] = True
     inside = np.setdiff1d(np.flatnonzero(on[:owned].any(axis=1)), facets)
@@ -102,12 +99,12 @@ def _surface(domain: Domain) -> _Surface | None:
     return _Surface(*(array[order] for array in found))
 
 
-def _exterior(mesh: dmesh.Mesh) -> npt.NDArray[np.int32]:
+def _exterior(mesh: dmesh.Mesh) -> Entities:
     mesh.topology.create_connectivity(2, 3)
     return np.asarray(dmesh.exterior_facet_indices(mesh.topology), dtype=np.int32)
 
 
-def _outward(mesh: dmesh.Mesh, facets: npt.NDArray[np.int32]) -> npt.NDArray[np.int32]:
+def _outward(mesh: dmesh.Mesh, facets: Entities) -> Entities:
     """The (local) nodes of facets, counterclockwise as seen from outside, from the file's first on, (f, 3)."""
     if not len(facets):
         return np.empty((0, 3), dtype=np.int32)  # dolfinx divides by their number
@@ -121,7 +118,7 @@ def _outward(mesh: dmesh.Mesh, facets: npt.NDArray[np.int32]) -> npt.NDArray[np.
     return np.take_along_axis(nodes, (first[:, None] + np.arange(3)) % 3, axis=1)
 
 
-def _remeshed(surface: _Surface, cells: _Cells, factor: float) -> tuple[Array, Indices] | None:
+def _remeshed(surface: _Surface, cells: _Cells, factor: float) -> tuple[Array, Integers] | None:
     """Vertices (n, 3) and cells (c, 4), or None where gmsh fails, or takes too long. On rank 0."""
     _, first, inverse = np.unique(surface.nodes, return_index=True, return_inverse=True)
     triangles = inverse.reshape(-1, 3)
@@ -133,7 +130,7 @@ def _remeshed(surface: _Surface, cells: _Cells, factor: float) -> tuple[Array, I
         return None
 
 
-def _by_child(points: Array, triangles: Indices, places: Array, sizes: Array) -> tuple[Array, Indices]:
+def _by_child(points: Array, triangles: Integers, places: Array, sizes: Array) -> tuple[Array, Integers]:
     """What :mod:`.gmsh_worker` makes of these arrays.
 
     Raises:
@@ -150,7 +147,7 @@ def _by_child(points: Array, triangles: Indices, places: Array, sizes: Array) ->
             return made["points"], made["cells"]
 
 
-def _one_shell(triangles: Indices) -> bool:
+def _one_shell(triangles: Integers) -> bool:
     """Whether each edge has two triangles, and all hang together."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
@@ -161,14 +158,14 @@ def _one_shell(triangles: Indices) -> bool:
     return bool(np.all(count == 2)) and connected_components(graph, directed=False)[0] == 1
 
 
-def _sides(domain: Domain, mesh: dmesh.Mesh, surface: _Surface) -> dict[str, npt.NDArray[np.int32]]:
+def _sides(domain: Domain, mesh: dmesh.Mesh, surface: _Surface) -> dict[str, Entities]:
     facets = _exterior(mesh)
     middles = dmesh.compute_midpoints(mesh, 2, facets) if len(facets) else np.empty((0, 3))
     on = surface.on[_nearest(surface.corners.mean(axis=1), middles)]
     return {name: facets[on[:, i]] for i, name in enumerate(sorted(domain.sides))}
 
 
-def _regions(domain: Domain, mesh: dmesh.Mesh, cells: _Cells) -> dict[str, npt.NDArray[np.int32]]:
+def _regions(domain: Domain, mesh: dmesh.Mesh, cells: _Cells) -> dict[str, Entities]:
     within = cells.within[_nearest(cells.midpoints, _corners(mesh).mean(axis=1))]
     return {name: np.flatnonzero(within[:, i]).astype(np.int32) for i, name in enumerate(sorted(domain.regions))}
 
@@ -193,7 +190,7 @@ def _measures(domain: Domain) -> dict[tuple[str, str], float]:
     return {name: total(comm, size) for name, size in sizes.items()}
 
 
-def _nearest(places: Array, points: Array) -> Indices:
+def _nearest(places: Array, points: Array) -> Integers:
     """The place (number) nearest to each point."""
     from scipy.spatial import cKDTree
 

@@ -16,6 +16,7 @@ from mpi4py import MPI
 from ..errors import InputError
 from ..runtime import memory
 from ..runtime.mpi import agree
+from ..typing import Array, Entities
 from . import blocks, gmsh_model, gmsh_shapes
 from .gmsh_shapes import Arc
 
@@ -24,7 +25,6 @@ if TYPE_CHECKING:
 
 _LEAST_MEMORY = 300.0
 """Bytes for one unknown: its row of the matrix and its share of the mesh, without any solver."""
-Facets = npt.NDArray[np.int32]
 Halves = npt.NDArray[np.int8]
 _AXIS_OF_SIDE = {"left": (0, 0), "right": (0, 1), "bottom": (-1, 0), "top": (-1, 1), "front": (1, 0), "back": (1, 1)}
 """Axis (-1: the last, the vertical one) and end of each named side."""
@@ -47,10 +47,10 @@ class Domain:
     """
 
     mesh: dmesh.Mesh
-    sides: Mapping[str, Facets]
-    regions: Mapping[str, Facets]
-    lower: npt.NDArray[np.float64]
-    upper: npt.NDArray[np.float64]
+    sides: Mapping[str, Entities]
+    regions: Mapping[str, Entities]
+    lower: Array
+    upper: Array
     curves: Mapping[str, Arc] = field(default_factory=dict)
     one_piece: bool = False
     origin: tuple[Domain, Refinement | None] | None = None
@@ -66,11 +66,11 @@ class Domain:
         return float(np.max(self.upper - self.lower))
 
     @property
-    def centre(self) -> npt.NDArray[np.float64]:
+    def centre(self) -> Array:
         """Centre of the bounding box, shape (3,), m."""
         return np.pad((self.lower + self.upper) / 2, (0, 3 - self.dimension))
 
-    def facets(self, names: Sequence[str]) -> Facets:
+    def facets(self, names: Sequence[str]) -> Entities:
         """Local facets of the named sides together, sorted.
 
         Raises:
@@ -81,7 +81,7 @@ class Domain:
                 raise InputError(f"the domain has no boundary part {name!r}; it has {', '.join(sorted(self.sides))}")
         return np.unique(np.concatenate([self.sides[name] for name in names])).astype(np.int32)
 
-    def cells(self, names: Sequence[str]) -> Facets:
+    def cells(self, names: Sequence[str]) -> Entities:
         """Local cells of the named regions together, sorted.
 
         Raises:
@@ -106,7 +106,7 @@ class Refinement:
     """
 
     domain: Domain
-    parents: Facets
+    parents: Entities
     halves: Halves
 
 
@@ -159,7 +159,7 @@ def from_file(comm: MPI.Comm, path: Path, dimension: int, scale: float = 1.0) ->
     return Domain(mesh, sides, regions, *_bounding_box(mesh))
 
 
-def _block_sides(mesh: dmesh.Mesh, size: npt.NDArray[np.float64]) -> dict[str, Facets]:
+def _block_sides(mesh: dmesh.Mesh, size: Array) -> dict[str, Entities]:
     """Facets of the surface by the side that their middle lies on."""
     d = len(size)
     mesh.topology.create_connectivity(d - 1, d)
@@ -170,7 +170,7 @@ def _block_sides(mesh: dmesh.Mesh, size: npt.NDArray[np.float64]) -> dict[str, F
     return {name: facets[np.abs(middles[:, i] - end * size[i]) < 1e-9 * size[i]] for name, (i, end) in ends.items()}
 
 
-def _bounding_box(mesh: dmesh.Mesh) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+def _bounding_box(mesh: dmesh.Mesh) -> tuple[Array, Array]:
     x = mesh.geometry.x[:, : mesh.geometry.dim]
     inside = x if len(x) else np.full((1, x.shape[1]), np.nan)
     lower, upper = np.fmin.reduce(inside, axis=0), np.fmax.reduce(inside, axis=0)

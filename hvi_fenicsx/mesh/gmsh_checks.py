@@ -7,11 +7,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from ..errors import InputError
-
-Nodes = npt.NDArray[np.int64]
+from ..typing import Integers
 
 
 def check(gmsh: Any, path: Path, dimension: int) -> None:
@@ -36,7 +34,7 @@ def check(gmsh: Any, path: Path, dimension: int) -> None:
         raise InputError(f"mesh file {path}: the boundary element of nodes {first} lies on no cell; remesh")
 
 
-def _elements(gmsh: Any, dimension: int) -> Nodes:
+def _elements(gmsh: Any, dimension: int) -> Integers:
     """Node tags of the simplices in named groups, shape (n, dimension + 1), sorted in each row."""
     found = [np.empty((0, dimension + 1), dtype=np.int64)]
     for _, group in gmsh.model.getPhysicalGroups(dimension):
@@ -46,14 +44,14 @@ def _elements(gmsh: Any, dimension: int) -> Nodes:
     return np.sort(np.concatenate(found), axis=1)
 
 
-def _refuse_more_than(most: int, rows: Nodes, what: str, fault: str) -> None:
+def _refuse_more_than(most: int, rows: Integers, what: str, fault: str) -> None:
     distinct, counts = _counted(rows)
     if np.any(counts > most):
         first = ", ".join(map(str, distinct[np.argmax(counts > most)]))
         raise InputError(f"{what} {first} {fault}; remesh")
 
 
-def _counted(rows: Nodes) -> tuple[Nodes, Nodes]:
+def _counted(rows: Integers) -> tuple[Integers, Integers]:
     """The distinct ones among sorted rows, and how often each is there (``np.unique`` takes four times as long)."""
     ordered = rows[np.lexsort(rows.T)]
     first = np.flatnonzero(np.append(len(rows) > 0, np.any(ordered[1:] != ordered[:-1], axis=1)))

@@ -10,16 +10,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from dolfinx import mesh as dmesh
 from mpi4py import MPI
 
 from .. import compat
 from ..errors import InputError
 from ..runtime.mpi import on_root
+from ..typing import Entities
 from . import gmsh_checks
 
-Entities = npt.NDArray[np.int32]
 _MOST_REMNANTS = 100
 _FLAT = 1e-9
 """Ratio of a cell's inscribed to its circumscribed sphere (1 for an equilateral one), below which it has no volume."""

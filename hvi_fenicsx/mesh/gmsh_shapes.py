@@ -13,6 +13,7 @@ from mpi4py import MPI
 
 from ..errors import InputError
 from ..runtime.mpi import on_root
+from ..typing import Array
 from . import gmsh_model
 
 if TYPE_CHECKING:
@@ -45,7 +46,7 @@ class Arc:
     centre: Point
     radius: float
 
-    def nearest(self, x: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    def nearest(self, x: Array) -> Array:
         """The points of the circle nearest to x, shape (n, 2)."""
         away = x - np.asarray(self.centre)
         return np.asarray(self.centre + self.radius * away / np.linalg.norm(away, axis=1, keepdims=True))

@@ -12,9 +12,9 @@ import sys
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
+from ..typing import Array, Integers
+
 _CORNER = math.radians(40.0)
 """By which a surface turns at an edge that is kept."""
 _TETRAHEDRON, _TRIANGLE = 4, 2
@@ -37,7 +37,7 @@ def main() -> None:
     np.savez(sys.argv[2], points=points, cells=cells)
 
 
-def _surface(gmsh: Any, points: Array, triangles: npt.NDArray[np.int64]) -> None:
+def _surface(gmsh: Any, points: Array, triangles: Integers) -> None:
     """Patches of the surface, parted at its edges, and the volume within."""
     mesh = gmsh.model.mesh
     gmsh.model.addDiscreteEntity(2, 1)
@@ -64,7 +64,7 @@ def _wish(gmsh: Any, places: Array, sizes: Array) -> None:
     gmsh.model.mesh.setSizeCallback(lambda dim, tag, x, y, z, size: float(sizes[tree.query((x, y, z))[1]]))
 
 
-def _made(gmsh: Any) -> tuple[Array, npt.NDArray[np.int64]]:
+def _made(gmsh: Any) -> tuple[Array, Integers]:
     """Vertices (n, 3) and cells (c, 4) of the volume."""
     tags, flat, _ = gmsh.model.mesh.getNodes()
     corners = gmsh.model.mesh.getElementsByType(_TETRAHEDRON)[1].astype(np.int64)

@@ -4,20 +4,18 @@ from __future__ import annotations
 
 import dolfinx
 import numpy as np
-import numpy.typing as npt
 from dolfinx import fem, geometry
 from mpi4py import MPI
 
 from .. import compat
 from ..runtime.mpi import agree
+from ..typing import Array, Integers
 
-Array = npt.NDArray[np.float64]
-Indices = npt.NDArray[np.int64]
 _NOTHING = 1e-9
 """A barycentric weight that is rounding: the point lies on the facet opposite to that vertex."""
 
 
-def between(points: Array, space: fem.FunctionSpace, vertices: Array) -> tuple[Indices, Array]:
+def between(points: Array, space: fem.FunctionSpace, vertices: Array) -> tuple[Integers, Array]:
     """The vertices (global blocks) between which each point (m, 3) lies, and their weights; (m, d+1) both. Collective.
 
     Each rank is sent the cells that may hold its points. A point outside of all cells is moved to the nearest one.
@@ -38,7 +36,7 @@ def between(points: Array, space: fem.FunctionSpace, vertices: Array) -> tuple[I
     return numbers[found], inside(np.where(share < _NOTHING, 0.0, share))
 
 
-def _gathered(comm: MPI.Comm, points: Array, vertices: Array, space: fem.FunctionSpace) -> tuple[Array, Indices]:
+def _gathered(comm: MPI.Comm, points: Array, vertices: Array, space: fem.FunctionSpace) -> tuple[Array, Integers]:
     """Corners (k, d+1, d) and their global numbers (k, d+1) of the cells near a rank's points, from all. Collective."""
     d = space.mesh.geometry.dim
     blocks = space.dofmap.list
@@ -52,7 +50,7 @@ def _gathered(comm: MPI.Comm, points: Array, vertices: Array, space: fem.Functio
     return np.concatenate([c for c, _ in found]), np.concatenate([n for _, n in found])
 
 
-def cells(mesh: dolfinx.mesh.Mesh, points: Array) -> Indices:
+def cells(mesh: dolfinx.mesh.Mesh, points: Array) -> Integers:
     """The cell that holds each point (m, 3), or the one nearest to it, on a mesh of this process alone.
 
     Of those whose boxes hold it, it is the one with the largest least weight: dolfinx's own test of collision takes

@@ -11,16 +11,14 @@ from dataclasses import replace
 
 import basix
 import numpy as np
-import numpy.typing as npt
 from dolfinx import la
 from dolfinx import mesh as dmesh
 
 from .. import compat
+from ..typing import Array, Entities
 from .domain import Domain, Halves, Refinement, check_affordable
 from .gmsh_shapes import Arc
 
-Array = npt.NDArray[np.float64]
-Indices = npt.NDArray[np.int32]
 _LONG = {2: 0.0, 3: 0.76}
 """Of a cell's longest edge, what is bisected with it, by dimension: in space all six would make a step of 4 to 5 times
 the unknowns; the longest and, of a sixth of a cube, the diagonals of its faces make it about 2."""
@@ -48,7 +46,7 @@ def repeated(domain: Domain, times: int) -> Domain:
     return domain
 
 
-def marked(domain: Domain, cells: Indices) -> Refinement:
+def marked(domain: Domain, cells: Entities) -> Refinement:
     """The long edges of the marked cells (local indices) bisected, and others as far as the mesh asks for it.
 
     In the plane all three count as long. Collective.
@@ -62,14 +60,14 @@ def marked(domain: Domain, cells: Indices) -> Refinement:
     return _refined(domain, np.unique(edges[long]).astype(np.int32))
 
 
-def _edge_lengths(mesh: dmesh.Mesh, cells: Indices) -> Array:
+def _edge_lengths(mesh: dmesh.Mesh, cells: Entities) -> Array:
     """Of the edges of cells in the order of their topology, shape (cells, 3 or 6)."""
     ends = np.array(basix.topology(basix.CellType[mesh.topology.cell_name()])[1])
     corners = _corners(mesh)[cells]
     return np.asarray(np.linalg.norm(corners[:, ends[:, 0]] - corners[:, ends[:, 1]], axis=2))
 
 
-def _refined(domain: Domain, edges: Indices | None) -> Refinement:
+def _refined(domain: Domain, edges: Entities | None) -> Refinement:
     mesh, parents, halves = _bisected(domain.mesh, edges)
     sides = _sides(domain, mesh, parents, halves)
     regions = {name: np.flatnonzero(np.isin(parents, cells)).astype(np.int32) for name, cells in domain.regions.items()}
@@ -77,7 +75,7 @@ def _refined(domain: Domain, edges: Indices | None) -> Refinement:
     return Refinement(replace(domain, mesh=mesh, sides=sides, regions=regions, origin=None), parents, halves)
 
 
-def _bisected(mesh: dmesh.Mesh, edges: Indices | None) -> tuple[dmesh.Mesh, Indices, Halves]:
+def _bisected(mesh: dmesh.Mesh, edges: Entities | None) -> tuple[dmesh.Mesh, Entities, Halves]:
     """Plaza's rule, by which the first of equally long edges in dolfinx's own numbering, that of the ranks, would go.
 
     Returns:
@@ -97,7 +95,7 @@ def _corners(mesh: dmesh.Mesh) -> Array:
     return np.asarray(mesh.geometry.x[compat.geometry_dofmap(mesh)][:, :, : mesh.geometry.dim])
 
 
-def _halves(coarse: dmesh.Mesh, fine: dmesh.Mesh, parents: Indices) -> Halves:
+def _halves(coarse: dmesh.Mesh, fine: dmesh.Mesh, parents: Entities) -> Halves:
     """Twice the barycentric coordinates of the children's vertices. Before anything is bent they are whole numbers."""
     corners = _corners(coarse)[parents]
     edges = corners[:, 1:] - corners[:, :1]
@@ -107,7 +105,7 @@ def _halves(coarse: dmesh.Mesh, fine: dmesh.Mesh, parents: Indices) -> Halves:
     return np.rint(2.0 * both).astype(np.int8)
 
 
-def cell_facets(mesh: dmesh.Mesh) -> Indices:
+def cell_facets(mesh: dmesh.Mesh) -> Entities:
     """Local facets of each local cell, shape (cells, d+1); the i-th lies opposite to the i-th vertex."""
     d = mesh.topology.dim
     mesh.topology.create_entities(d - 1)
@@ -116,7 +114,7 @@ def cell_facets(mesh: dmesh.Mesh) -> Indices:
     return np.asarray(mesh.topology.connectivity(d, d - 1).array).reshape(-1, d + 1)
 
 
-def _sides(domain: Domain, fine: dmesh.Mesh, parents: Indices, halves: Halves) -> dict[str, Indices]:
+def _sides(domain: Domain, fine: dmesh.Mesh, parents: Entities, halves: Halves) -> dict[str, Entities]:
     """The children's facets that lie in those of the domain's sides."""
     coarse, own = cell_facets(domain.mesh), cell_facets(fine)
     # A child's facet i lies in its parent's facet j when none of its vertices (all but i) has a part in vertex j.
@@ -130,7 +128,7 @@ def _sides(domain: Domain, fine: dmesh.Mesh, parents: Indices, halves: Halves) -
     return found
 
 
-def _bend(mesh: dmesh.Mesh, sides: Mapping[str, Indices], curves: Mapping[str, Arc]) -> None:
+def _bend(mesh: dmesh.Mesh, sides: Mapping[str, Entities], curves: Mapping[str, Arc]) -> None:
     """Move the vertices of curved sides onto their curves, on all ranks that have them. Collective."""
     for name, curve in curves.items():
         nodes = np.empty(0, dtype=np.int32)

@@ -12,10 +12,9 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
-Indices = npt.NDArray[np.int64]
+from ..typing import Array, Integers, Mask
+
 _CORNER = np.radians(20.0)
 """By which the outline turns at a vertex that is kept in any case."""
 _TURN = np.radians(30.0)
@@ -36,10 +35,10 @@ class HalfEdges:
         ends: vertex numbers, (k, 2). points: their places, (k, 2, 2). region, side: numbers, or NONE, (k,).
     """
 
-    ends: Indices
+    ends: Integers
     points: Array
-    region: Indices
-    side: Indices
+    region: Integers
+    side: Integers
 
     @classmethod
     def joined(cls, parts: Sequence[HalfEdges]) -> HalfEdges:
@@ -54,7 +53,7 @@ class HalfEdges:
         return cls(ends[order], points[kept][order], region[kept][order], side[kept][order])
 
 
-def _by_place(ends: Indices, points: Array) -> Indices:
+def _by_place(ends: Integers, points: Array) -> Integers:
     """The same vertices, numbered from left to right; those at one place (of a crack) by their numbers."""
     numbers, first, which = np.unique(ends, return_index=True, return_inverse=True)
     x, y = points.reshape(-1, 2)[first].T
@@ -239,7 +238,7 @@ def _holds(polygon: Array, point: Array) -> bool:
     return bool(np.count_nonzero(x > point[0]) % 2)
 
 
-def _touching(ends: Indices, segments: Array) -> bool:
+def _touching(ends: Integers, segments: Array) -> bool:
     """Whether any two edges (n, 2, 2) meet elsewhere than in a vertex of both, or leave one in the same direction."""
     for i in range(len(ends) - 1):
         shared = np.isin(ends[i + 1 :], ends[i]).any(axis=1)
@@ -251,7 +250,7 @@ def _touching(ends: Indices, segments: Array) -> bool:
     return bool(np.any((np.diff(start[order]) == 0) & (np.diff(angle[order]) < _ALONG)))
 
 
-def _meeting(one: Array, others: Array) -> npt.NDArray[np.bool_]:
+def _meeting(one: Array, others: Array) -> Mask:
     """Which of the segments (n, 2, 2) one of them, (2, 2), meets, ends included."""
     (a, b), (c, d) = one, others.transpose(1, 0, 2)
     near = (np.maximum(a, b) >= np.minimum(c, d)) & (np.minimum(a, b) <= np.maximum(c, d))

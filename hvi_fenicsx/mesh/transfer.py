@@ -18,13 +18,13 @@ from petsc4py import PETSc
 
 from ..system.coarser_level import Below
 from ..system.system import System
+from ..typing import Array
 from . import point_location, vertex_dofs
 from .domain import Refinement
 
 if TYPE_CHECKING:
     from ..scene import Scene
 
-Array = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.integer]
 Rows = tuple[Indices, Indices, Array]
 """Of a sparse matrix, compressed: where each begins, columns, values."""

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 from dolfinx import fem
 
 from .. import compat
+from ..typing import Array, Entities
 
-Indices = npt.NDArray[np.int32]
 
-
-def dof_of_node(space: fem.FunctionSpace) -> Indices:
+def dof_of_node(space: fem.FunctionSpace) -> Entities:
     """The (block) dof at each geometry node of a P1 space on simplices."""
     nodes, dofs = _by_cell(space)
     result = np.zeros(space.mesh.geometry.x.shape[0], dtype=np.int32)
@@ -19,7 +17,7 @@ def dof_of_node(space: fem.FunctionSpace) -> Indices:
     return result
 
 
-def points(space: fem.FunctionSpace) -> npt.NDArray[np.float64]:
+def points(space: fem.FunctionSpace) -> Array:
     """The local vertices (owned and ghost) of a P1 space on simplices, m, (n, 3).
 
     They are the nodes of the geometry; ``tabulate_dof_coordinates`` maps each from each of its cells, four times as
@@ -32,7 +30,7 @@ def points(space: fem.FunctionSpace) -> npt.NDArray[np.float64]:
     return np.asarray(space.mesh.geometry.x[node], dtype=np.float64)
 
 
-def _by_cell(space: fem.FunctionSpace) -> tuple[Indices, Indices]:
+def _by_cell(space: fem.FunctionSpace) -> tuple[Entities, Entities]:
     """Geometry nodes and dofs of each local cell (owned and ghost)."""
     cells = space.mesh.topology.index_map(space.mesh.topology.dim)
     count = cells.size_local + cells.num_ghosts

@@ -10,7 +10,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from dolfinx import fem, la
 from mpi4py import MPI
 
@@ -18,9 +17,7 @@ from ..errors import InputError
 from ..mesh.domain import Domain
 from ..rigid import Body, Mode, motion_at
 from ..runtime.mpi import agree
-
-Array = npt.NDArray[np.float64]
-Labels = npt.NDArray[np.int64]
+from ..typing import Array, Integers
 
 
 @dataclass(frozen=True)
@@ -32,7 +29,7 @@ class Bodies:
     """
 
     bodies: tuple[Body, ...]
-    labels: Labels
+    labels: Integers
 
     def __iter__(self) -> Any:
         return iter(self.bodies)
@@ -71,12 +68,12 @@ def find(domain: Domain, space: fem.FunctionSpace, points: Array) -> Bodies:
     return Bodies(tuple(bodies), place[labels])
 
 
-def _cells(domain: Domain) -> tuple[Labels, int]:
+def _cells(domain: Domain) -> tuple[Integers, int]:
     """The body of each local cell, and how many there are in all. Collective."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
-    def joined(pairs: Labels, size: int) -> tuple[int, Labels]:
+    def joined(pairs: Integers, size: int) -> tuple[int, Integers]:
         graph = coo_array((np.ones(len(pairs), np.int8), pairs.T), shape=(size, size))
         count, labels = connected_components(graph, directed=False)
         return int(count), np.asarray(labels, np.int64)
@@ -98,7 +95,7 @@ def _cells(domain: Domain) -> tuple[Labels, int]:
     return merged[local], total
 
 
-def _owners(index_map: Any, values: Labels) -> Labels:
+def _owners(index_map: Any, values: Integers) -> Integers:
     """What the owners of shared entities hold, for local values (owned and ghost). Collective."""
     vector = la.vector(index_map, 1, dtype=np.int64)
     vector.array[:] = values
@@ -106,7 +103,7 @@ def _owners(index_map: Any, values: Labels) -> Labels:
     return np.array(vector.array)
 
 
-def _vertices(domain: Domain, space: fem.FunctionSpace, cells: Labels, points: Array) -> Labels:
+def _vertices(domain: Domain, space: fem.FunctionSpace, cells: Integers, points: Array) -> Integers:
     """The body of each local vertex. Collective; refuses a hinge."""
     labels = np.full(len(points), -1, np.int64)
     corners = space.dofmap.list
@@ -124,7 +121,7 @@ def _vertices(domain: Domain, space: fem.FunctionSpace, cells: Labels, points: A
     return labels
 
 
-def _boxes(domain: Domain, points: Array, labels: Labels, count: int) -> tuple[Array, Array]:
+def _boxes(domain: Domain, points: Array, labels: Integers, count: int) -> tuple[Array, Array]:
     """Corners of the bodies' bounding boxes, (count, d) each. Collective."""
     lower, upper = np.full((2, count, domain.dimension), [[[np.inf]], [[-np.inf]]])
     np.minimum.at(lower, labels, points)
@@ -135,7 +132,7 @@ def _boxes(domain: Domain, points: Array, labels: Labels, count: int) -> tuple[A
     return lower, upper
 
 
-def _names(domain: Domain, cells: Labels, bodies: Sequence[Body]) -> list[str]:
+def _names(domain: Domain, cells: Integers, bodies: Sequence[Body]) -> list[str]:
     """A body is called by the regions that lie in it alone, else by its number and centre. Collective."""
     regions: dict[int, list[str]] = {}
     for name in sorted(domain.regions):

@@ -10,16 +10,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import ufl
 from dolfinx import fem
 from mpi4py import MPI
 
 from ..errors import InputError
+from ..typing import Array, Entities, Integers
 from .vectors import nodal
-
-Array = npt.NDArray[np.float64]
-Indices = npt.NDArray[np.int32]
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,15 +30,15 @@ class Surface:
     """
 
     part: str
-    facets: Indices
-    blocks: Indices
+    facets: Entities
+    blocks: Entities
     points: Array
     normals: Array
     tangents: Array
     weights: Array
 
     @property
-    def dofs(self) -> npt.NDArray[np.int64]:
+    def dofs(self) -> Integers:
         """The scalar dofs of these vertices, shape (m, d)."""
         d = self.normals.shape[1]
         return self.blocks[:, None].astype(np.int64) * d + np.arange(d)
@@ -55,7 +52,7 @@ def build(
     part: str,
     space: fem.FunctionSpace,
     vertices: Array,
-    facets: Indices,
+    facets: Entities,
     measure: Any,
     area: float,
     direction: Sequence[float] | None = None,
@@ -107,7 +104,7 @@ def tangents(normals: Array) -> Array:
     return np.stack([t1, np.cross(normals, t1)], axis=1) + 0.0
 
 
-def component_dofs(blocks: Indices, directions: Array) -> tuple[npt.NDArray[np.int64], Array]:
+def component_dofs(blocks: Entities, directions: Array) -> tuple[Integers, Array]:
     """The scalar dof (m,) of a direction (m, d) along an axis of its vertex's frame, and its sign (m,)."""
     axis = np.argmax(np.abs(directions), axis=1)
     return blocks.astype(np.int64) * directions.shape[1] + axis, np.sign(directions[np.arange(len(axis)), axis])

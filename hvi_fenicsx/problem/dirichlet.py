@@ -6,35 +6,34 @@ from collections.abc import Sequence
 from itertools import combinations
 
 import numpy as np
-import numpy.typing as npt
 from dolfinx import fem
 from petsc4py import PETSc
 
 from ..effects.base import Condition
 from ..errors import InputError
 from ..runtime.mpi import agree
+from ..typing import Array, Entities
+from .form_context import FormContext
 from .scaling import Scales
-from .ufl_context import Stage
 
-Array = npt.NDArray[np.float64]
 _SAME = 1e-9
 """Difference of two prescribed displacements, relative to the largest, that is rounding."""
 
 
-def build(stage: Stage, scales: Scales, wanted: Sequence[tuple[str, Condition]]) -> tuple[fem.DirichletBC, ...]:
+def build(context: FormContext, scales: Scales, wanted: Sequence[tuple[str, Condition]]) -> tuple[fem.DirichletBC, ...]:
     """The conditions, each with the part it stands on, nondimensional. Collective.
 
     Raises:
         InputError: on all ranks alike: two parts prescribe different values where they meet.
     """
-    found = tuple(_condition(stage, scales, part, condition) for part, condition in wanted)
-    _check_agreement(stage, scales, [(part, bc) for (part, _), bc in zip(wanted, found, strict=True)])
+    found = tuple(_condition(context, scales, part, condition) for part, condition in wanted)
+    _check_agreement(context, scales, [(part, bc) for (part, _), bc in zip(wanted, found, strict=True)])
     return found
 
 
-def _condition(stage: Stage, scales: Scales, part: str, condition: Condition) -> fem.DirichletBC:
-    facets, dim = stage.part_facets[part], stage.dimension - 1
-    component = stage.space.sub(condition.component)
+def _condition(context: FormContext, scales: Scales, part: str, condition: Condition) -> fem.DirichletBC:
+    facets, dim = context.part_facets[part], context.dimension - 1
+    component = context.space.sub(condition.component)
     if condition.value.is_number:
         value = PETSc.ScalarType(condition.value.source / scales.displacement)  # type: ignore[operator]
         return fem.dirichletbc(value, fem.locate_dofs_topological(component, dim, facets), component)
@@ -44,9 +43,9 @@ def _condition(stage: Stage, scales: Scales, part: str, condition: Condition) ->
     return fem.dirichletbc(function, fem.locate_dofs_topological((component, collapsed), dim, facets), component)
 
 
-def _check_agreement(stage: Stage, scales: Scales, named: Sequence[tuple[str, fem.DirichletBC]]) -> None:
+def _check_agreement(context: FormContext, scales: Scales, named: Sequence[tuple[str, fem.DirichletBC]]) -> None:
     """Where two parts meet they must prescribe the same: else the order of the tables would decide."""
-    values = np.empty(len(stage.points) * stage.dimension)
+    values = np.empty(len(context.points) * context.dimension)
     prescribed = [(part, *_values(condition, values)) for part, condition in named]
     size = max((float(np.max(np.abs(v), initial=0.0)) for _, _, v in prescribed), default=0.0)
     bad: list[str] = []
@@ -54,22 +53,22 @@ def _check_agreement(stage: Stage, scales: Scales, named: Sequence[tuple[str, fe
         shared, i, j = np.intersect1d(dofs, more, assume_unique=True, return_indices=True)
         apart = np.abs(these[i] - those[j]) > _SAME * size
         differing = zip(shared[apart], these[i][apart], those[j][apart], strict=True)
-        bad += [_disagreement(stage, int(dof), (one, other), pair, scales) for dof, *pair in differing]
-    found = [text for rank in agree(stage.domain.mesh.comm, bad[:1]) for text in rank]
+        bad += [_disagreement(context, int(dof), (one, other), pair, scales) for dof, *pair in differing]
+    found = [text for rank in agree(context.domain.mesh.comm, bad[:1]) for text in rank]
     if found:
         raise InputError(found[0])
 
 
-def _values(condition: fem.DirichletBC, values: Array) -> tuple[npt.NDArray[np.int32], Array]:
+def _values(condition: fem.DirichletBC, values: Array) -> tuple[Entities, Array]:
     """The dofs of a condition and what it prescribes; ``values`` is room for all dofs."""
     dofs = condition.dof_indices()[0]
     condition.set(values)
     return dofs, values[dofs]
 
 
-def _disagreement(stage: Stage, dof: int, parts: tuple[str, str], pair: Sequence[float], scales: Scales) -> str:
-    block, component = divmod(dof, stage.dimension)
-    at = ", ".join(f"{c:.6g}" for c in stage.points[block][: stage.dimension])
+def _disagreement(context: FormContext, dof: int, parts: tuple[str, str], pair: Sequence[float], scales: Scales) -> str:
+    block, component = divmod(dof, context.dimension)
+    at = ", ".join(f"{c:.6g}" for c in context.points[block][: context.dimension])
     one, other = (float(value) * scales.displacement for value in pair)
     return (
         f"boundary.{parts[0]} and boundary.{parts[1]} meet at ({at}) and prescribe displacements along "

@@ -10,14 +10,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from dolfinx import fem
 
 from ..effects.base import Direction
 from ..laws import Superpotential
+from ..typing import Array
 from .contact_surface import Surface
-
-Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)

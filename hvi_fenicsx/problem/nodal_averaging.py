@@ -13,12 +13,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from dolfinx import fem
 from dolfinx.fem.petsc import assemble_matrix
 from petsc4py import PETSc
 
 from ..effects.base import Averaged
+from ..typing import Array
 from .vectors import assembled
 
 
@@ -41,11 +41,11 @@ class Dilatation:
         average.pointwiseMult(average, self.stiffness)
         return average
 
-    def pressure(self, u: fem.Function) -> npt.NDArray[np.float64]:
+    def pressure(self, u: fem.Function) -> Array:
         """(λ/V) D u at the vertices that this rank owns. Collective."""
         return np.array(self._pressure(u).array_r)
 
-    def force(self, u: fem.Function) -> npt.NDArray[np.float64]:
+    def force(self, u: fem.Function) -> Array:
         """Dᵀ (λ/V) D u at the unknowns that this rank owns. Collective."""
         force = self.divergence.createVecRight()
         self.divergence.multTranspose(self._pressure(u), force)

@@ -13,7 +13,6 @@ from typing import Any
 
 import dolfinx
 import numpy as np
-import numpy.typing as npt
 import ufl
 from dolfinx import fem
 
@@ -23,18 +22,17 @@ from ..formula import Formula
 from ..laws import Superpotential
 from ..mesh.domain import Domain
 from ..runtime.mpi import agree
+from ..typing import Array, Entities, Integers
 from . import bodies, scaling
 from . import contact_surface as surface
 from . import dirichlet as conditions
 from .bodies import Bodies
 from .contact_surface import Surface
+from .form_context import FormContext, Scaled
 from .law_term import LawTerm
 from .scaling import Placed, Scales
-from .ufl_context import Scaled, Stage
 
-Array = npt.NDArray[np.float64]
-Indices = npt.NDArray[np.int32]
-Made = tuple[str | None, Effect, Contribution]
+PlacedContribution = tuple[str | None, Effect, Contribution]
 """An effect with its place and what it contributed."""
 _VERTEX = {"quadrature_rule": "vertex", "quadrature_degree": 1}
 
@@ -51,7 +49,7 @@ class Bounds:
         """How far u·n (m,) is outside of the bounds; negative within."""
         return np.maximum(normal - self.upper, self.lower - normal)
 
-    def component(self) -> tuple[npt.NDArray[np.int64], Array]:
+    def component(self) -> tuple[Integers, Array]:
         """The scalar dof (m,) of u·n where n is along an axis of its vertex's frame, and n's sign there (m,)."""
         return surface.component_dofs(self.surface.blocks, self.surface.normals)
 
@@ -61,7 +59,7 @@ class Prescribed:
     """A displacement component that is prescribed on facets (local), its value in SI."""
 
     component: int
-    facets: npt.NDArray[np.int32]
+    facets: Entities
     value: Formula
 
 
@@ -90,16 +88,16 @@ class Problem:
     linear: dict[str, Any]
     strains: frozenset[str]
     conditions: tuple[fem.DirichletBC, ...]
-    fixed: npt.NDArray[np.int32]
+    fixed: Entities
     prescribed: tuple[Prescribed, ...]
     bounds: tuple[Bounds, ...]
     terms: tuple[LawTerm, ...]
     surfaces: tuple[Surface, ...]
-    made: tuple[Made, ...]
-    held: tuple[tuple[str, Indices], ...]
+    made: tuple[PlacedContribution, ...]
+    held: tuple[tuple[str, Entities], ...]
 
     @functools.cached_property
-    def fixed_here(self) -> npt.NDArray[np.int32]:
+    def fixed_here(self) -> Entities:
         """The scalar dofs that are prescribed and that this rank owns."""
         return self.fixed[self.fixed < self.space.dofmap.index_map.size_local * self.space.dofmap.index_map_bs]
 
@@ -133,8 +131,8 @@ def compose(
     scales = scaling.choose(
         domain.length, domain.dimension, effects, lambda placed: functools.partial(_largest, domain, parts, placed)
     )
-    stage = Stage(domain, parts, scales, effects)
-    return _sum(stage, scales, [(where, e, e.contribute(stage, where)) for where, e in effects], modify)
+    context = FormContext(domain, parts, scales, effects)
+    return _sum(context, scales, [(where, e, e.contribute(context, where)) for where, e in effects], modify)
 
 
 def _largest(domain: Domain, parts: Mapping[str, Sequence[str]], placed: Placed, formula: Formula) -> float:
@@ -168,33 +166,36 @@ def _points(domain: Domain, entities: tuple[int, Any]) -> Array:
 
 
 def _sum(
-    stage: Stage, scales: Scales, made: Sequence[Made], modify: Callable[[Superpotential], Superpotential]
+    context: FormContext,
+    scales: Scales,
+    made: Sequence[PlacedContribution],
+    modify: Callable[[Superpotential], Superpotential],
 ) -> Problem:
     wanted = [(str(where), c) for where, _, contribution in made for c in contribution.conditions]
-    prescribed = conditions.build(stage, scales, wanted)
+    prescribed = conditions.build(context, scales, wanted)
     held = tuple((where, bc.dof_indices()[0]) for (where, _), bc in zip(wanted, prescribed, strict=True))
     fixed = np.unique(np.concatenate([np.empty(0, np.int32), *(dofs for _, dofs in held)])).astype(np.int32)
-    surfaces = _surfaces(stage, made)
-    bounds = [_bounds(stage, surfaces[w], b, scales) for w, _, c in made if w is not None for b in c.bounds]
-    _check_compatible(stage, bounds, prescribed, fixed)
+    surfaces = _surfaces(context, made)
+    bounds = [_bounds(context, surfaces[w], b, scales) for w, _, c in made if w is not None for b in c.bounds]
+    _check_compatible(context, bounds, prescribed, fixed)
     _check_normal_laws(made)
     terms = [
-        _term(stage, surfaces[w], law, modify, scales, fixed) for w, _, c in made if w is not None for law in c.laws
+        _term(context, surfaces[w], law, modify, scales, fixed) for w, _, c in made if w is not None for law in c.laws
     ]
     bilinear = [form for _, _, c in made for form in c.bilinear]
     linear, strains = (_by_name(made, kind) for kind in ("linear", "strains"))
     return Problem(
-        stage.domain,
+        context.domain,
         scales,
-        stage.space,
-        stage.points,
+        context.space,
+        context.points,
         sum(bilinear),
         tuple(a for _, _, c in made for a in c.averaged),
         {**linear, **strains},
         frozenset(strains),
         prescribed,
         fixed,
-        _prescribed(stage, made),
+        _prescribed(context, made),
         tuple(bounds),
         tuple(terms),
         tuple(surfaces.values()),
@@ -203,23 +204,23 @@ def _sum(
     )
 
 
-def _surfaces(stage: Stage, made: Sequence[Made]) -> dict[str, Surface]:
+def _surfaces(context: FormContext, made: Sequence[PlacedContribution]) -> dict[str, Surface]:
     """The parts with bounds or laws, in the scene's order. Collective."""
     return {
         where: surface.build(
             where,
-            stage.space,
-            stage.points,
-            stage.part_facets[where],
-            stage.boundary(where, **_VERTEX),
-            stage.length ** (stage.dimension - 1),
+            context.space,
+            context.points,
+            context.part_facets[where],
+            context.boundary(where, **_VERTEX),
+            context.length ** (context.dimension - 1),
             next((b.direction for w, _, other in made if w == where for b in other.bounds), None),
         )
         for where in dict.fromkeys(w for w, _, c in made if w is not None and (c.bounds or c.laws))
     }
 
 
-def _by_name(made: Sequence[Made], kind: str) -> dict[str, Any]:
+def _by_name(made: Sequence[PlacedContribution], kind: str) -> dict[str, Any]:
     """Forms of one kind by the name of their place and effect; several tables may load one place."""
     found: dict[str, Any] = {}
     for where, effect, contribution in made:
@@ -229,7 +230,7 @@ def _by_name(made: Sequence[Made], kind: str) -> dict[str, Any]:
     return found
 
 
-def _check_normal_laws(made: Sequence[Made]) -> None:
+def _check_normal_laws(made: Sequence[PlacedContribution]) -> None:
     """Two normal laws on one part would be one law of the opening: the user states it."""
     normal = [w for w, _, c in made for law in c.laws if law.direction is not Direction.SLIP]
     for where in normal:
@@ -240,15 +241,15 @@ def _check_normal_laws(made: Sequence[Made]) -> None:
             )
 
 
-def _prescribed(stage: Stage, made: Sequence[Made]) -> tuple[Prescribed, ...]:
+def _prescribed(context: FormContext, made: Sequence[PlacedContribution]) -> tuple[Prescribed, ...]:
     return tuple(
-        Prescribed(c.component, stage.part_facets[str(where)], c.value)
+        Prescribed(c.component, context.part_facets[str(where)], c.value)
         for where, _, contribution in made
         for c in contribution.conditions
     )
 
 
-def _bounds(stage: Stage, where: Surface, bounds: NormalBounds, scales: Scales) -> Bounds:
+def _bounds(context: FormContext, where: Surface, bounds: NormalBounds, scales: Scales) -> Bounds:
     """Collective.
 
     Raises:
@@ -259,7 +260,7 @@ def _bounds(stage: Stage, where: Surface, bounds: NormalBounds, scales: Scales) 
         if formula is None:
             return np.full(len(where.blocks), np.inf)
         found = formula.at(where.points) / scales.displacement
-        if not all(agree(stage.domain.mesh.comm, bool(np.all(np.isfinite(found))))):
+        if not all(agree(context.domain.mesh.comm, bool(np.all(np.isfinite(found))))):
             raise InputError(f"boundary.{where.part}.contact: the gap is not finite everywhere there; see its formula")
         return np.asarray(found)
 
@@ -267,30 +268,30 @@ def _bounds(stage: Stage, where: Surface, bounds: NormalBounds, scales: Scales) 
     return Bounds(where, -value(bounds.upper), -value(bounds.lower) if bounds.lower else value(None))
 
 
-def _check_compatible(stage: Stage, bounds: Sequence[Bounds], conditions: Any, fixed: Any) -> None:
+def _check_compatible(context: FormContext, bounds: Sequence[Bounds], conditions: Any, fixed: Any) -> None:
     """A bound that excludes a prescribed value would silently change it (solver-notes.md)."""
-    prescribed = fem.Function(stage.space)
+    prescribed = fem.Function(context.space)
     for condition in conditions:
         condition.set(prescribed.x.array)
     bad: list[str] = []
     for b in bounds:
         un = np.sum(b.surface.values(prescribed.x.array) * b.surface.normals, axis=1)
         axis = np.argmax(np.abs(b.surface.normals), axis=1)
-        held = np.isin(b.surface.blocks * stage.dimension + axis, fixed)
+        held = np.isin(b.surface.blocks * context.dimension + axis, fixed)
         out = held & ((un < b.lower - 1e-12) | (un > b.upper + 1e-12))
         bad += [f"{b.surface.part} at {tuple(map(float, b.surface.points[i]))}" for i in np.flatnonzero(out)[:1]]
-    found = [b for rank in agree(stage.domain.mesh.comm, bad) for b in rank]
+    found = [b for rank in agree(context.domain.mesh.comm, bad) for b in rank]
     if found:
         raise InputError(f"boundary.{found[0]}: the prescribed displacement violates the contact bound there")
 
 
 def _term(
-    stage: Stage,
+    context: FormContext,
     where: Surface,
     law: BoundaryLaw,
     modify: Callable[[Superpotential], Superpotential],
     scales: Scales,
-    fixed: npt.NDArray[np.int32],
+    fixed: Entities,
 ) -> LawTerm:
     directions = {
         Direction.SLIP: where.tangents,
@@ -304,9 +305,9 @@ def _term(
             "bounds cannot follow; smooth it: [solver] smoothing and epsilon"
         )
     free = (~np.isin(where.dofs, fixed)).astype(np.float64)
-    density = fem.Function(stage.space, name="clarke_derivative")
-    ds = Scaled(stage.number(stage.length ** (1 - stage.dimension)), stage.boundary(where.part, **_VERTEX))
-    residual = ufl.inner(density, stage.test) * ds
+    density = fem.Function(context.space, name="clarke_derivative")
+    ds = Scaled(context.number(context.length ** (1 - context.dimension)), context.boundary(where.part, **_VERTEX))
+    residual = ufl.inner(density, context.test) * ds
     return LawTerm(where, law.direction, solved, exact, directions, free, density, fem.form(residual))
 
 

@@ -12,16 +12,15 @@ from typing import Any
 
 import basix.ufl
 import numpy as np
-import numpy.typing as npt
 import ufl
 from dolfinx import fem
 
 from ..certify.estimate.defect import pressures
 from ..certify.estimate.edge_bubbles import assembled
 from ..effects.base import Place
+from ..typing import Array
 from .problem import Problem
 
-Array = npt.NDArray[np.float64]
 _SEEN = {2: ((0, 0), (1, 1), (0, 1)), 3: ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))}
 """The components that the energy sees, by dimension."""
 

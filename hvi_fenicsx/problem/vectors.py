@@ -5,10 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from dolfinx import fem, la
 from dolfinx.fem.petsc import assemble_vector
 from petsc4py import PETSc
+
+from ..typing import Array
 
 
 def new_vector(space: fem.FunctionSpace) -> PETSc.Vec:
@@ -26,7 +27,7 @@ def assembled(form: fem.Form) -> PETSc.Vec:
     return vector
 
 
-def nodal(form: Any) -> npt.NDArray[np.float64]:
+def nodal(form: Any) -> Array:
     """A UFL linear form's values at the blocks that this rank owns, (n, d). Collective."""
     compiled = fem.form(form)
     dofs = compiled.function_spaces[0].dofmap

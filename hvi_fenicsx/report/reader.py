@@ -12,15 +12,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
-import numpy.typing as npt
 
 from ..errors import HviError
+from ..typing import Array, Mask
 from .pictures.draw import PictureError
 
 if TYPE_CHECKING:
     from ..laws import Superpotential
 
-Array = npt.NDArray[np.floating[Any]]
 T = TypeVar("T")
 NUMBERS = ("s", "x", "y", "z", "u_n", "u_t1", "u_t2", "gap", "sigma_n", "friction_t1", "friction_t2")
 STATES = ("contact", "branch_t", "branch_n")
@@ -66,13 +65,13 @@ class Part:
         return -self["sigma_n"]
 
     @property
-    def idle(self) -> npt.NDArray[np.bool_]:
+    def idle(self) -> Mask:
         """Vertices that are lifted and carry nothing; where something adheres, a lifted one may."""
         stress = np.nan_to_num(np.abs(self["sigma_n"]))
         return self.lifted & (stress <= 1e-6 * stress.max(initial=0.0))
 
     @property
-    def lifted(self) -> npt.NDArray[np.bool_]:
+    def lifted(self) -> Mask:
         """Vertices off the obstacle; none where the part has no contact."""
         return self["contact"] == 0.0
 

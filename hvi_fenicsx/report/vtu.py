@@ -11,15 +11,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from ..typing import Array, Integers, Mask
 from .pictures.draw import PictureError
 
-Array = npt.NDArray[np.floating[Any]]
-Ints = npt.NDArray[np.int64]
 AT_ONCE = 2_000_000
 """Pairs of points whose distances are simply all computed."""
 CELL_FIELDS = ("von_mises",)
@@ -38,7 +35,7 @@ class Body:
     """
 
     points: Array
-    cells: Ints
+    cells: Integers
     fields: Mapping[str, Array]
     by_cell: Mapping[str, Array] = field(default_factory=dict)
 
@@ -53,17 +50,17 @@ class Body:
         return float(np.max(np.ptp(self.points, axis=0)))
 
     @property
-    def boundary(self) -> Ints:
+    def boundary(self) -> Integers:
         """Facets of one cell only (k, 2|3); counterclockwise seen from outside, in the plane the body on their left."""
         return self._skin[0]
 
     @property
-    def behind(self) -> Ints:
+    def behind(self) -> Integers:
         """The cell of each facet of the boundary, (k,)."""
         return self._skin[1]
 
     @cached_property
-    def _skin(self) -> tuple[Ints, Ints]:
+    def _skin(self) -> tuple[Integers, Integers]:
         d = self.dimension
         facets = np.concatenate([np.delete(self.cells, i, axis=1) for i in range(d + 1)])
         _, first, count = np.unique(_keys(facets, len(self.points)), return_index=True, return_counts=True)
@@ -79,7 +76,7 @@ class Body:
         fields = {name: values[kept] for name, values in self.fields.items()}
         return Body(self.points[kept], numbered.reshape(cells.shape), fields)
 
-    def vertices(self, points: Array) -> Ints:
+    def vertices(self, points: Array) -> Integers:
         """The body's vertices at given points (m, 3).
 
         Raises:
@@ -91,18 +88,18 @@ class Body:
             raise PictureError("contact.csv and displacement.pvd do not belong together: a vertex is not on the body")
         return np.asarray(candidates[nearest])
 
-    def facets_of(self, vertices: Ints) -> Ints:
+    def facets_of(self, vertices: Integers) -> Integers:
         """The boundary facets all of whose corners are among the vertices."""
         return np.asarray(self.boundary[self.among(vertices)])
 
-    def among(self, vertices: Ints) -> npt.NDArray[np.bool_]:
+    def among(self, vertices: Integers) -> Mask:
         """Which facets of the boundary these are, (k,)."""
         chosen = np.zeros(len(self.points), dtype=bool)
         chosen[vertices] = True
         return np.asarray(chosen[self.boundary].all(axis=1))
 
 
-def _nearest(candidates: Array, points: Array) -> tuple[Array, Ints]:
+def _nearest(candidates: Array, points: Array) -> tuple[Array, Integers]:
     """How far the nearest candidate is from each point, and which it is."""
     if len(candidates) * len(points) <= AT_ONCE:
         squares = np.sum((points[:, None] - candidates[None]) ** 2, axis=2)
@@ -113,7 +110,7 @@ def _nearest(candidates: Array, points: Array) -> tuple[Array, Ints]:
     return distance, nearest
 
 
-def _outward(points: Array, facets: Ints, opposite: Ints) -> Ints:
+def _outward(points: Array, facets: Integers, opposite: Integers) -> Integers:
     """Facets turned so that the opposite corner of their cell is behind them."""
     corner = points[facets[:, 0]]
     sides = [points[facets[:, i]] - corner for i in range(1, facets.shape[1])]
@@ -123,7 +120,7 @@ def _outward(points: Array, facets: Ints, opposite: Ints) -> Ints:
     return np.where(inward[:, None], facets[:, ::-1], facets)
 
 
-def _keys(facets: Ints, count: int) -> Ints:
+def _keys(facets: Integers, count: int) -> Integers:
     """One number for each set of corners."""
     ordered = np.sort(facets, axis=1)
     key = ordered[:, 0]
@@ -156,7 +153,7 @@ def _pieces(path: Path) -> list[str]:
     return files
 
 
-def _piece(path: Path) -> tuple[Ints, Body]:
+def _piece(path: Path) -> tuple[Integers, Body]:
     """A rank's own cells, and the mesh-wide numbers of its points."""
     piece = ElementTree.parse(path).getroot().find("UnstructuredGrid/Piece")
     if piece is None:
@@ -193,7 +190,7 @@ def _array(element: ElementTree.Element | None) -> Array:
     return np.fromstring(element.text or "", sep=" ")
 
 
-def _joined(pieces: Sequence[tuple[Ints, Body]]) -> Body:
+def _joined(pieces: Sequence[tuple[Integers, Body]]) -> Body:
     """One mesh of the ranks' pieces: a vertex that several of them know is one vertex."""
     if len(pieces) == 1:
         return pieces[0][1]

@@ -10,19 +10,18 @@ from .. import compat
 from ..mesh.vertex_dofs import dof_of_node
 from ..problem.contact_surface import Surface
 from ..problem.problem import Problem
+from ..typing import Array, Integers
 
-Array = npt.NDArray[np.float64]
-Indices = npt.NDArray[np.int64]
 _DIGITS = 9
 """Of the part's size: coordinates that should be equal may differ in the last digits."""
 
 
-def vertices(problem: Problem, surface: Surface) -> Indices:
+def vertices(problem: Problem, surface: Surface) -> Integers:
     """Global numbers of the part's vertices that this rank owns, (m,)."""
     return np.asarray(problem.space.dofmap.index_map.local_to_global(surface.blocks), dtype=np.int64)
 
 
-def edges(problem: Problem, surface: Surface) -> Indices:
+def edges(problem: Problem, surface: Surface) -> Integers:
     """The part's facets that this rank knows as pairs of global vertices, the body to their left; (k, 2)."""
     mesh, space = problem.domain.mesh, problem.space
     facets = np.asarray(surface.facets, dtype=np.int32)
@@ -48,7 +47,7 @@ def lexicographic(points: Array) -> npt.NDArray[np.intp]:
     return np.lexsort(np.round(points / size, _DIGITS).T[::-1])
 
 
-def along(points: Array, numbers: Indices, pairs: Indices) -> tuple[Indices, Array]:
+def along(points: Array, numbers: Integers, pairs: Integers) -> tuple[Integers, Array]:
     """The order of vertices along their part and the arc length of each, in that order.
 
     A chain runs from the lexicographically smaller of its ends; a closed one from its smallest vertex, the body to the
@@ -66,7 +65,7 @@ def along(points: Array, numbers: Indices, pairs: Indices) -> tuple[Indices, Arr
     return _measured(points, chains, rank)
 
 
-def _chains(pairs: list[tuple[int, int]], rank: Indices) -> list[list[int]]:
+def _chains(pairs: list[tuple[int, int]], rank: Integers) -> list[list[int]]:
     """Vertices chain by chain; open ones first, since a walk from within one would cut it in two.
 
     A closed chain ends with the vertex that it began with.
@@ -90,11 +89,11 @@ def _walked(start: int, onwards: dict[int, list[int]]) -> list[int]:
     return chain
 
 
-def _oriented(chain: list[int], rank: Indices) -> list[int]:
+def _oriented(chain: list[int], rank: Integers) -> list[int]:
     return chain if rank[chain[0]] <= rank[chain[-1]] else chain[::-1]
 
 
-def _measured(points: Array, chains: list[list[int]], rank: Indices) -> tuple[Indices, Array]:
+def _measured(points: Array, chains: list[list[int]], rank: Integers) -> tuple[Integers, Array]:
     """All chains one after the other; a vertex where two of them touch belongs to the first."""
     order: dict[int, float] = {}
     end = 0.0

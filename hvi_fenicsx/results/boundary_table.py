@@ -7,12 +7,11 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 from dolfinx import fem
 
 from ..problem.problem import Problem
+from ..typing import Array
 
-Array = npt.NDArray[np.float64]
 COLUMNS = ("part", "x", "y", "z")
 
 

@@ -8,16 +8,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from mpi4py import MPI
 
 from ..certify.contact_state import State
 from ..effects.base import Direction
 from ..problem.problem import Problem
+from ..typing import Array, Integers
 from . import arc_length
 
-Array = npt.NDArray[np.float64]
-Indices = npt.NDArray[np.int64]
 COLUMNS = (
     "part",
     "s",
@@ -87,7 +85,7 @@ def _gathered(comm: MPI.Comm, columns: dict[str, Any]) -> dict[str, Any]:
     return {name: np.concatenate([piece[name] for piece in pieces]) for name in columns}
 
 
-def _along(columns: dict[str, Array], numbers: Indices, pairs: Indices) -> dict[str, Array]:
+def _along(columns: dict[str, Array], numbers: Integers, pairs: Integers) -> dict[str, Array]:
     """In 2D along the part, with the arc length s."""
     order, s = arc_length.along(np.column_stack([columns["x"], columns["y"]]), numbers, pairs)
     return {name: values[order] for name, values in columns.items()} | {"s": s}

@@ -16,7 +16,7 @@ from ..workflow import Solution
 
 def summary(solution: Solution) -> dict[str, Any]:
     """All of ``summary.json``; null for infinite or absent. Collective; the same on all ranks."""
-    problem, solved, examined = solution.problem, solution.solved, solution.examined
+    problem, solved, examination = solution.problem, solution.solve_result, solution.examination
     comm = problem.domain.mesh.comm
     wanted = solution.scene.solver
     return plain(
@@ -31,10 +31,10 @@ def summary(solution: Solution) -> dict[str, Any]:
             "smoothing": wanted.smoothing,
             "epsilon": solution.epsilon,
             "iterations": _iterations(solution),
-            "energy": examined.energy * problem.scales.energy if examined else None,
+            "energy": examination.energy * problem.scales.energy if examination else None,
             "contact": _contact(solution),
             "solvability": solution.solvability.summary(),
-            "certificate": examined.certificate.as_dict() if examined else None,
+            "certificate": examination.certificate.as_dict() if examination else None,
             "estimate": _estimate(solution),
             "accuracy": None,
             "warnings": list(solution.warnings),
@@ -48,10 +48,15 @@ def summary(solution: Solution) -> dict[str, Any]:
 
 
 def _iterations(solution: Solution) -> dict[str, int] | None:
-    if solution.solved is None:
+    if solution.solve_result is None:
         return None
-    counts = solution.solved.counts
-    return {"newton": counts.newton, "linear": counts.linear, "levels": solution.solved.levels, "branch": counts.branch}
+    counts = solution.solve_result.counts
+    return {
+        "newton": counts.newton,
+        "linear": counts.linear,
+        "levels": solution.solve_result.levels,
+        "branch": counts.branch,
+    }
 
 
 def _estimate(solution: Solution) -> dict[str, float] | None:
@@ -64,10 +69,10 @@ def _estimate(solution: Solution) -> dict[str, float] | None:
 
 def _contact(solution: Solution) -> dict[str, Any] | None:
     """Over all parts with contact: vertices, those closed, largest gap and penetration (m), resultant (N/m or N)."""
-    examined, scales = solution.examined, solution.problem.scales
-    states = [s for s in examined.states if s.bounds is not None] if examined else []
+    examination, scales = solution.examination, solution.problem.scales
+    states = [s for s in examination.states if s.bounds is not None] if examination else []
     comm = solution.problem.domain.mesh.comm
-    if not sum(agree(comm, len(solution.problem.bounds))) or examined is None:
+    if not sum(agree(comm, len(solution.problem.bounds))) or examination is None:
         return None
     gaps = [s.gap[np.isfinite(s.gap)] for s in states]
     forces = [s.surface.weights[:, None] * s.pressure[:, None] * s.surface.normals for s in states]

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 from dolfinx import fem
 from dolfinx import mesh as dmesh
 from dolfinx.io import VTKFile
@@ -20,8 +19,7 @@ from ..problem import stress
 from ..problem.problem import Problem
 from ..rigid import Mode
 from ..runtime.mpi import agree
-
-Array = npt.NDArray[np.float64]
+from ..typing import Array
 
 
 def write_body(path: Path, problem: Problem, u: fem.Function, estimate: Estimate | None) -> None:

@@ -19,14 +19,14 @@ def write(folder: Path, solution: Solution) -> dict[str, Any]:
 
     ``summary.json`` and ``run.log`` are written by :func:`write_record`, once the pictures are there too.
     """
-    problem, examined, solved = solution.problem, solution.examined, solution.solved
+    problem, examination, solved = solution.problem, solution.examination, solution.solve_result
     comm = problem.domain.mesh.comm
-    if solved is not None and examined is not None:
+    if solved is not None and examination is not None:
         vtk_fields.write_body(folder / "displacement.pvd", problem, solved.u, solution.estimate)
-        if examined.states:
-            vtk_fields.write_contact(folder / "contact.pvd", problem, examined.states)
-        rows = contact_table.rows(problem, examined.states)
-        on_root(comm, lambda: contact_table.write_csv(folder / "contact.csv", rows) if examined.states else None)
+        if examination.states:
+            vtk_fields.write_contact(folder / "contact.pvd", problem, examination.states)
+        rows = contact_table.rows(problem, examination.states)
+        on_root(comm, lambda: contact_table.write_csv(folder / "contact.csv", rows) if examination.states else None)
     elif solution.solvability.direction is not None:
         vtk_fields.write_escape(folder / "displacement.pvd", problem, solution.solvability.direction)
     lying = boundary_table.rows(problem, solution.scene.parts)

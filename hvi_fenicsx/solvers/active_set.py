@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from mpi4py import MPI
 from petsc4py import PETSc
 
@@ -20,8 +19,8 @@ from ..runtime.timing import Timer
 from ..system.held_solver import HeldPreconditioner, LinearSettings
 from ..system.petsc_options import configure
 from ..system.system import Model, System
+from ..typing import Array, Entities
 
-Array = npt.NDArray[np.float64]
 Progress = Callable[[int, float, int], None]
 """Called with iteration, residual, and vertices in contact (of all ranks)."""
 Sizes = tuple[float, float]
@@ -118,7 +117,7 @@ class ActiveSetSolver:
         norm = float(np.sqrt(comm.allreduce(float(r @ r)))) / self.system.scale
         return norm, float(comm.allreduce(nodal, op=MPI.MAX))
 
-    def newton_step(self, x: PETSc.Vec, held: npt.NDArray[np.int32], models: Sequence[Model], rtol: float) -> Outcome:
+    def newton_step(self, x: PETSc.Vec, held: Entities, models: Sequence[Model], rtol: float) -> Outcome:
         """One Newton step with some dofs (local, owned) kept at their values in x. Collective."""
         self.system.set_rates(self.system.tangents(x, models))
         self.system.residual(x, self._residual, models)
@@ -317,7 +316,7 @@ class _ReducedPC:
 
     def __init__(self, snes: PETSc.SNES, held: HeldPreconditioner, accuracy: Callable[..., float]) -> None:
         self._snes, self._held, self._accuracy = snes, held, accuracy
-        self._active: npt.NDArray[np.int32] | None = None
+        self._active: Entities | None = None
 
     def setUp(self, pc: PETSc.PC) -> None:
         """Take the active dofs of this step and prepare for them."""

@@ -22,7 +22,7 @@ from ..system import existence
 from .branch import BranchIteration
 from .continuation import Continuation
 from .law_models import Majorant
-from .method import Counts, Solved, resting_start
+from .method import Counts, SolveResult, resting_start
 from .rigid_start import settled
 
 _BROKEN = 1e6
@@ -36,7 +36,7 @@ class Auto(BranchIteration):
 
     _steps, _spent = 0, False
 
-    def solve(self, start: PETSc.Vec | None = None, branches: PETSc.Vec | None = None) -> Solved:
+    def solve(self, start: PETSc.Vec | None = None, branches: PETSc.Vec | None = None) -> SolveResult:
         """A stationary point; that of the first start that finds one, else what the first start left. Collective."""
         told, self.solver.interrupted = self.solver.interrupted, lambda: told() or self._over()
         try:
@@ -57,7 +57,7 @@ class Auto(BranchIteration):
     def _held(self) -> bool:
         return existence.solvability(self.system.problem, self.system.forces).state == "held"
 
-    def _search(self, start: PETSc.Vec | None, branches: PETSc.Vec | None) -> Solved:
+    def _search(self, start: PETSc.Vec | None, branches: PETSc.Vec | None) -> SolveResult:
         first = super().solve(start, branches)
         if first.converged or first.interrupted or not self.system.terms:
             return first
@@ -69,7 +69,7 @@ class Auto(BranchIteration):
                 return replace(other, counts=counts)
         return first
 
-    def _others(self) -> Iterator[Solved]:
+    def _others(self) -> Iterator[SolveResult]:
         exact = [term.exact for term in self.system.terms]
         if any(law is not true for law, true in zip(self._laws, exact, strict=True)):
             for found in self._tried(self._anew(exact).solve):
@@ -82,7 +82,7 @@ class Auto(BranchIteration):
             yield from self._tried(self._anew().solve, None, pieces)
         yield from self._tried(Continuation(self.solver, self.settings).solve)
 
-    def _settled(self) -> Iterator[Solved]:
+    def _settled(self) -> Iterator[SolveResult]:
         """From bodies at rest on their supports, bonds as they are there, or unbroken.
 
         Where bodies roll, closed contact is no start.
@@ -99,7 +99,7 @@ class Auto(BranchIteration):
         parts = zip(self._laws, self._cells(x), self._subgradients(x, 0.0), strict=True)
         return [Majorant(law, cells, xi) for law, cells, xi in parts]
 
-    def _beside(self, exact: Solved) -> Iterator[Solved]:
+    def _beside(self, exact: SolveResult) -> Iterator[SolveResult]:
         """From the unsmoothed law's solution: what sticks there is within the narrow band that smoothing leaves."""
         if exact.converged:
             yield from self._tried(self._anew().solve, self.system.unknowns(exact.u))
@@ -111,7 +111,7 @@ class Auto(BranchIteration):
         )
 
     @staticmethod
-    def _tried(solve: Callable[..., Solved], *start: PETSc.Vec | None) -> Iterator[Solved]:
+    def _tried(solve: Callable[..., SolveResult], *start: PETSc.Vec | None) -> Iterator[SolveResult]:
         """One attempt; a breakdown is no result."""
         with suppress(SolverError):
             yield solve(*start)

@@ -19,13 +19,13 @@ from petsc4py import PETSc
 from ..errors import SolverError
 from ..laws import Superpotential
 from ..system import boundedness
+from ..typing import Array
 from . import initial_branches, kink_bounds
 from .active_set import ActiveSetSolver, Outcome
 from .fallbacks import Attempt, first_success
 from .law_models import Cells, Full, Majorant, Softened
-from .method import Counts, Settings, Solved, resting_start
+from .method import Counts, Settings, SolveResult, resting_start
 
-Array = npt.NDArray[np.float64]
 _LOOSE = 1e-4
 """Tolerance of convex steps while ξ still changes."""
 _NEAR = 1e-11
@@ -75,7 +75,7 @@ class BranchIteration:
         self._epsilon = settings.epsilon if epsilon is None else epsilon
         self._residual = self.system.load.duplicate()
 
-    def solve(self, start: PETSc.Vec | None = None, branches: PETSc.Vec | None = None) -> Solved:
+    def solve(self, start: PETSc.Vec | None = None, branches: PETSc.Vec | None = None) -> SolveResult:
         """A stationary point. Collective.
 
         Args:
@@ -260,10 +260,10 @@ class BranchIteration:
     def _any(self, flags: Sequence[npt.NDArray[np.generic]]) -> bool:
         return bool(self.system.comm.allreduce(any(bool(np.any(f)) for f in flags)))
 
-    def _result(self, x: PETSc.Vec, outcome: Outcome) -> Solved:
+    def _result(self, x: PETSc.Vec, outcome: Outcome) -> SolveResult:
         reason = "stationary" if outcome.converged else outcome.reason
         steady = self.counts.branch <= 1 and self.counts.newton <= len(self._tolerances())
-        return Solved(
+        return SolveResult(
             self.system.displacement(x),
             self.name,
             outcome.converged,

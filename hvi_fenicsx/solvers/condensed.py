@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from petsc4py import PETSc
 from scipy.optimize import least_squares
 from scipy.sparse import csr_matrix
@@ -21,12 +20,11 @@ from scipy.sparse import csr_matrix
 from ..errors import InputError, SolverError
 from ..laws import Superpotential
 from ..system.system import Model, System
+from ..typing import Array, Integers
 from .active_set import ActiveSetSolver
-from .method import Counts, Settings, Solved
+from .method import Counts, Settings, SolveResult
 from .ssls import onto_bounds
 
-Array = npt.NDArray[np.float64]
-Indices = npt.NDArray[np.int64]
 _EVALUATIONS = 100
 """The paper's limit of lsqnonlin's iterations, each of which evaluates the functions once."""
 _COLUMNS = 64
@@ -82,7 +80,7 @@ class Condensation:
         self.models = [MeanDerivative(t.law) for t in self.system.terms]
         self.stopped = False
 
-    def solve(self) -> Solved:
+    def solve(self) -> SolveResult:
         """A stationary point of the smoothed energy, or what was reached.
 
         Raises:
@@ -97,7 +95,7 @@ class Condensation:
         converged = measure <= self.settings.tolerance
         words = "stationary" if converged else f"least squares stopped: {reason}, residual {measure:.1e}"
         energies = (self.system.energy(found, self.models),)
-        return Solved(self.system.displacement(found), self.name, converged, words, counts, energies, self.stopped)
+        return SolveResult(self.system.displacement(found), self.name, converged, words, counts, energies, self.stopped)
 
     def _minimise(self, mixed: _Complementarity) -> tuple[Array, str, Counts]:
         """Contact displacements, why it ended there, and evaluations."""
@@ -201,7 +199,7 @@ def _sparse(matrix: PETSc.Mat) -> Any:
     return csr_matrix(matrix.getValuesCSR()[::-1], shape=matrix.getSize())
 
 
-def _partition(system: System) -> tuple[Indices, Indices]:
+def _partition(system: System) -> tuple[Integers, Integers]:
     """The free dofs of Γc's vertices, and all others; prescribed ones have rows of the identity."""
     d = system.problem.scales.dimension
     blocks = [s.blocks for s in system.problem.surfaces]

@@ -10,7 +10,7 @@ from dataclasses import replace
 from ..laws.smoothing.smoothed_law import SmoothedLaw
 from .active_set import ActiveSetSolver
 from .branch import BranchIteration
-from .method import Counts, Settings, Solved
+from .method import Counts, Settings, SolveResult
 
 _WIDTHS = (1.0, 1e-1, 1e-2, 1e-3)
 """Relative widths that are passed through, as long as they are wider than the wanted one."""
@@ -26,7 +26,7 @@ class Continuation:
     def __init__(self, solver: ActiveSetSolver, settings: Settings) -> None:
         self.solver, self.settings = solver, settings
 
-    def solve(self) -> Solved:
+    def solve(self) -> SolveResult:
         """A stationary point of the wanted law, reached along the widths. Collective."""
         counts, start = Counts(), None
         loose = replace(self.settings, tolerance=max(1e-4, self.settings.tolerance))

@@ -6,15 +6,14 @@ from collections.abc import Sequence
 from typing import Literal
 
 import numpy as np
-import numpy.typing as npt
 from petsc4py import PETSc
 
 from ..effects.base import Direction
 from ..formula import Formula
 from ..problem.law_term import LawTerm
 from ..system.system import System
+from ..typing import Array
 
-Array = npt.NDArray[np.float64]
 Start = Literal["unbroken", "resting", "broken"] | tuple[Formula, ...]
 """No slip; the slips at rest (contact closed, every bond a spring); beyond every drop; those of a displacement (m)."""
 _FAR = 1e6

@@ -5,16 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 from petsc4py import PETSc
 
 from ..laws import ConvexPart
 from ..problem.contact_surface import component_dofs
 from ..problem.law_term import LawTerm
 from ..system.system import System
+from ..typing import Array, Integers, Mask
 from .law_models import Cells, Full, Majorant
-
-Array = npt.NDArray[np.float64]
 
 
 def boxes(system: System, cells: Sequence[Cells]) -> tuple[PETSc.Vec, PETSc.Vec]:
@@ -35,7 +33,7 @@ def boxes(system: System, cells: Sequence[Cells]) -> tuple[PETSc.Vec, PETSc.Vec]
 
 def overloaded(
     system: System, x: PETSc.Vec, residual: PETSc.Vec, models: Sequence[Majorant | Full], tolerance: float
-) -> list[npt.NDArray[np.int64]]:
+) -> list[Integers]:
     """Per vertex -1, 0 or 1: where it goes if the kink it sits on cannot carry its force.
 
     ``residual`` is that of the convex step, H' being taken from within the cell: at the lower end the right derivative,
@@ -68,7 +66,7 @@ def _hold_stuck(term: LawTerm, cells: Cells, lower: PETSc.Vec, upper: PETSc.Vec)
 
 def _radial_moves(
     term: LawTerm, model: Majorant | Full, argument: Array, residual: PETSc.Vec, tolerance: float
-) -> npt.NDArray[np.int64]:
+) -> Integers:
     """A law of |u_t|: a stuck vertex goes when the force leaves the kink's disc, a free one sticks below the ramp."""
     cells = model.cells
     if not len(cells.kinks):
@@ -82,7 +80,7 @@ def _radial_moves(
     return go.astype(np.int64) - stick.astype(np.int64)
 
 
-def _slip_dofs(term: LawTerm) -> tuple[npt.NDArray[np.int64], Array, npt.NDArray[np.bool_]]:
+def _slip_dofs(term: LawTerm) -> tuple[Integers, Array, Mask]:
     """The scalar dof of each slip, the sign of its direction, and whether it is not prescribed."""
     dofs, sign = component_dofs(term.surface.blocks, term.directions[:, 0, :])
     return dofs, sign, term.free[np.arange(len(dofs)), dofs % term.free.shape[1]] > 0

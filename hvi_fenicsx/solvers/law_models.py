@@ -11,11 +11,10 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-import numpy.typing as npt
 
 from ..laws import ConvexPart, Superpotential
+from ..typing import Array, Integers
 
-Array = npt.NDArray[np.float64]
 _FIRST_RAMP = 1e-2
 """Of the largest slip; it shrinks whenever a stuck vertex is let go."""
 _SHRINK = 0.3
@@ -31,7 +30,7 @@ class Cells:
     """
 
     kinks: Array
-    index: npt.NDArray[np.int64]
+    index: Integers
     ramp: float = 0.0
 
     @classmethod
@@ -51,7 +50,7 @@ class Cells:
         """Upper ends; inf where there is none."""
         return np.concatenate([self.kinks, [np.inf]])[self.index]
 
-    def moved(self, step: npt.NDArray[np.int64]) -> Cells:
+    def moved(self, step: Integers) -> Cells:
         """The cells after each vertex moved by -1, 0 or 1."""
         return Cells(self.kinks, self.index + step, self.ramp * (_SHRINK if np.any(step > 0) else 1.0))
 

@@ -6,13 +6,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-import numpy.typing as npt
 from dolfinx import fem
 from petsc4py import PETSc
 
 from ..laws import Superpotential
 from ..system import existence
 from ..system.system import Model, System
+from ..typing import Array, Entities, Integers
 from .active_set import ActiveSetSolver, Outcome
 from .initial_branches import Start
 from .law_models import Resting
@@ -68,7 +68,7 @@ class Counts:
 
 
 @dataclass(frozen=True)
-class Solved:
+class SolveResult:
     """What a method found.
 
     Attributes:
@@ -89,13 +89,13 @@ class Solved:
     steady: bool = False
 
 
-def contact_dofs(system: System) -> npt.NDArray[np.int64]:
+def contact_dofs(system: System) -> Integers:
     """Scalar dofs (local, owned, sorted) of the normal displacements that have bounds."""
     normal = (b.component()[0] for b in system.bounds)
     return np.unique(np.concatenate([np.empty(0, np.int64), *normal]))
 
 
-def held_dofs(system: System, laws: Sequence[Superpotential]) -> npt.NDArray[np.int32]:
+def held_dofs(system: System, laws: Sequence[Superpotential]) -> Entities:
     """Scalar dofs (local, owned, sorted) that the start holds. Collective.
 
     The normal ones of contact parts; where these leave a rigid motion, also slips at which a law has a convex kink.
@@ -131,7 +131,7 @@ def resting_start(
     return x, linear
 
 
-def _pushed(solver: ActiveSetSolver, x: PETSc.Vec, contact: npt.NDArray[np.int64], models: Sequence[Model]) -> bool:
+def _pushed(solver: ActiveSetSolver, x: PETSc.Vec, contact: Integers, models: Sequence[Model]) -> bool:
     """Bilateral contact: put vertices between their bounds on the one that the reaction points to. Collective.
 
     Between its bounds a vertex is held by nothing, and the body could drift. Whether any vertex was moved.
@@ -147,7 +147,7 @@ def _pushed(solver: ActiveSetSolver, x: PETSc.Vec, contact: npt.NDArray[np.int64
     return bool(system.comm.allreduce(bool(np.any(between))))
 
 
-def closed(lower: npt.NDArray[np.float64], upper: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+def closed(lower: Array, upper: Array) -> Array:
     """The bound to close on: the only finite one, or of two the point nearest 0; 0 where there is none."""
     both = np.isfinite(lower) & np.isfinite(upper)
     one = np.where(np.isfinite(lower), lower, np.where(np.isfinite(upper), upper, 0.0))

@@ -20,7 +20,7 @@ from ..system.coarser_level import Below
 from ..system.held_solver import LinearSettings
 from ..system.system import System
 from . import registry
-from .method import Counts, Progress, Solved
+from .method import Counts, Progress, SolveResult
 from .quadratic import LinearSolve
 
 _WORTHWHILE = 5_000
@@ -42,7 +42,9 @@ def linear(scene: Scene, system: System) -> LinearSettings:
     return LinearSettings.choose(system, scene.solver.linear_solver, ladder=climbed)
 
 
-def solve(scene: Scene, system: System, timer: Timer, progress: Progress, interrupted: Callable[[], bool]) -> Solved:
+def solve(
+    scene: Scene, system: System, timer: Timer, progress: Progress, interrupted: Callable[[], bool]
+) -> SolveResult:
     """Solve a scene's system, from the coarsest rung up where there is one and the method takes a start. Collective.
 
     Raises:
@@ -62,13 +64,13 @@ def solve(scene: Scene, system: System, timer: Timer, progress: Progress, interr
     return ascend(scene, system, (below, found, system.below.prolongation), timer, progress, interrupted)
 
 
-Rung = tuple[System, Solved, PETSc.Mat]
+Rung = tuple[System, SolveResult, PETSc.Mat]
 """The next coarser rung, its solution, and the prolongation from its unknowns (:func:`.transfer.between`)."""
 
 
 def ascend(
     scene: Scene, system: System, rung: Rung, timer: Timer, progress: Progress, interrupted: Callable[[], bool]
-) -> Solved:
+) -> SolveResult:
     """Solve a scene's system from the solution on the rung below. Collective.
 
     Raises:
@@ -111,7 +113,7 @@ def _loosened(scene: Scene) -> Scene:
     return scene.model_copy(update={"solver": scene.solver.model_copy(update={"tolerance": tolerance})})
 
 
-def _prolonged(step: PETSc.Mat, below: System, found: Solved, system: System) -> PETSc.Vec:
+def _prolonged(step: PETSc.Mat, below: System, found: SolveResult, system: System) -> PETSc.Vec:
     """The coarse solution on the finer mesh, within its bounds and with its prescribed values. Collective."""
     x = system.load.duplicate()
     step.mult(below.unknowns(found.u), x)

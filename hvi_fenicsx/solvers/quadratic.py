@@ -15,7 +15,7 @@ from ..system.system import System
 from .active_set import ActiveSetSolver, Outcome
 from .fallbacks import Attempt, first_success
 from .law_models import Full
-from .method import Counts, Settings, Solved, resting_start
+from .method import Counts, Settings, SolveResult, resting_start
 from .rigid_start import settled
 from .smooth_method import smooth_models
 
@@ -47,7 +47,7 @@ class LinearSolve:
     def __init__(self, solver: ActiveSetSolver, settings: Settings) -> None:
         self.solver, self.settings, self.system = solver, settings, solver.system
 
-    def solve(self) -> Solved:
+    def solve(self) -> SolveResult:
         """The solution of the equation, or what was reached. Collective."""
         x, models, counts = self.system.undisplaced(), smooth_models(self.system), Counts()
         outcome = Outcome(False, 0, 0, float("inf"), "not started")
@@ -58,7 +58,7 @@ class LinearSolve:
                 break
         self.settings.progress(self.name, None, 1, outcome.measure, 0)
         reason = "stationary" if outcome.converged else outcome.reason
-        return Solved(self.system.displacement(x), self.name, outcome.converged, reason, counts)
+        return SolveResult(self.system.displacement(x), self.name, outcome.converged, reason, counts)
 
     def _step(self, x: PETSc.Vec, models: Sequence[Full]) -> Outcome:
         """One solve of the residual equation, and how far x is then from the solution. Collective."""
@@ -76,7 +76,7 @@ class ConvexProgramme:
     def __init__(self, solver: ActiveSetSolver, settings: Settings) -> None:
         self.solver, self.settings, self.system = solver, settings, solver.system
 
-    def solve(self, start: PETSc.Vec | None = None) -> Solved:
+    def solve(self, start: PETSc.Vec | None = None) -> SolveResult:
         """The minimiser, or what was reached; from the start with contact closed by default. Collective."""
         counts, system = Counts(), self.system
         laws = [term.law for term in system.terms]
@@ -87,7 +87,7 @@ class ConvexProgramme:
         with self.solver.reporting(self._progress):
             outcome = self._minimise(x, counts)
         reason = "stationary" if outcome.converged else outcome.reason
-        return Solved(
+        return SolveResult(
             system.displacement(x),
             self.name,
             outcome.converged,

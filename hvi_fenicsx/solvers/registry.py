@@ -14,7 +14,7 @@ from .auto import Auto
 from .branch import BranchIteration
 from .condensed import Condensation
 from .continuation import Continuation
-from .method import Progress, Settings, Solved
+from .method import Progress, Settings, SolveResult
 from .quadratic import ConvexProgramme, LinearSolve, is_equation, is_quadratic
 from .ssls import SemismoothNewton
 from .tao import BoundedNewton
@@ -37,7 +37,7 @@ class Method(Protocol):
 
     def __init__(self, solver: ActiveSetSolver, settings: Settings) -> None: ...
 
-    def solve(self, *args: Any) -> Solved:
+    def solve(self, *args: Any) -> SolveResult:
         """A stationary point, or what was reached. Collective."""
 
 

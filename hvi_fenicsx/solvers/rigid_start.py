@@ -19,10 +19,10 @@ from petsc4py import PETSc
 from ..runtime.mpi import agree, on_root
 from ..system import existence, free_motions
 from ..system.system import Model, System
+from ..typing import Array, Entities
 from .active_set import ActiveSetSolver
 from .method import contact_dofs
 
-Array = npt.NDArray[np.float64]
 _TOUCHES = 1e-7
 """Of the largest distance: a vertex that is so near to its bound rests on it."""
 _INDEPENDENT = 1e-6
@@ -112,7 +112,7 @@ def settled(
     return None if held is None else (x, solver.newton_step(x, held, models(x), rtol).linear)
 
 
-def _rest(system: System, x: PETSc.Vec, motions: Sequence[PETSc.Vec]) -> npt.NDArray[np.int32] | None:
+def _rest(system: System, x: PETSc.Vec, motions: Sequence[PETSc.Vec]) -> Entities | None:
     """Move x, rigidly, to where it rests; the owned unknowns that bear the load. Collective."""
     comm = system.comm
     dofs = contact_dofs(system)

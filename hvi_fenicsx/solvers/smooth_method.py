@@ -12,7 +12,7 @@ from ..errors import InputError
 from ..system.system import System
 from .active_set import ActiveSetSolver
 from .law_models import Cells, Full
-from .method import Counts, Settings, Solved, resting_start
+from .method import Counts, Settings, SolveResult, resting_start
 
 
 class Run(ABC):
@@ -89,7 +89,7 @@ class SmoothMethod:
         refuse_kinks(solver.system, self.name)
         self.solver, self.settings = solver, settings
 
-    def solve(self) -> Solved:
+    def solve(self) -> SolveResult:
         """A stationary point of the smoothed energy, or what was reached. Collective."""
         system = self.solver.system
         x, linear = resting_start(self.solver, [t.law for t in system.terms])
@@ -101,7 +101,7 @@ class SmoothMethod:
         converged = measure <= self.settings.tolerance
         words = "stationary" if converged else f"{self.solver_words} stopped: {reason}, residual {measure:.1e}"
         energies = (system.energy(found, run.models),)
-        return Solved(system.displacement(found), self.name, converged, words, run.counts, energies, run.stopped)
+        return SolveResult(system.displacement(found), self.name, converged, words, run.counts, energies, run.stopped)
 
 
 def refuse_kinks(system: System, method: str) -> None:

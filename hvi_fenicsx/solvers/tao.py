@@ -8,16 +8,15 @@ Any option may be overridden under the prefix ``hvi_`` (``-hvi_tao_type bntr``).
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 from petsc4py import PETSc
 
 from ..system.held_solver import HeldPreconditioner
 from ..system.petsc_options import configure
 from ..system.system import System
+from ..typing import Array
 from .method import Counts
 from .smooth_method import Run, SmoothMethod
 
-Array = npt.NDArray[np.float64]
 _FOUNDATION = 1e-3
 """Stiffness per area, in units of E0/L, that keeps the preconditioner regular where the body is free to move."""
 _Reason = PETSc.TAO.ConvergedReason

@@ -12,11 +12,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from scipy import sparse
 
+from ..typing import Array, Mask
 from . import interpolation
-from .solution_arrays import Array, PartSample, Sample
+from .solution_arrays import PartSample, Sample
 
 JUMP_WIDTHS = 2.0
 """So many facets of the coarser mesh about a jump of the law count as near it."""
@@ -105,7 +105,7 @@ class Yardstick:
             error = _sum(error, difference, part.weights, norm)
         return _ratio(math.sqrt(error), math.sqrt(size)) if norm == "l2" else _ratio(error, size)
 
-    def _near(self, name: str, found: Moved) -> npt.NDArray[np.bool_]:
+    def _near(self, name: str, found: Moved) -> Mask:
         """The vertices within some facets of the found mesh of where the reference's slip passes a drop of the law."""
         part = self.sample.parts[name]
         places = _jumps(part)

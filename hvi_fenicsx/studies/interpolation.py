@@ -12,7 +12,8 @@ from scipy import sparse
 
 from .. import compat
 from ..mesh import point_location
-from .solution_arrays import Array, Indices, PartSample, Sample
+from ..typing import Array, Integers
+from .solution_arrays import PartSample, Sample
 
 _PAIRS = 4_000_000
 """Of vertices and facets that are looked at together."""
@@ -40,14 +41,14 @@ def surface(source: PartSample, points: Array) -> sparse.csr_array:
     )
 
 
-def _nearest(corners: Array, points: Array) -> Indices:
+def _nearest(corners: Array, points: Array) -> Integers:
     """The facet (of k, each of d corners) nearest to each point."""
     weights = point_location.inside(point_location.weights(corners[None], points[:, None]))
     away = np.einsum("mkc,kcd->mkd", weights, corners) - points[:, None]
     return np.asarray(np.argmin(np.einsum("mkd,mkd->mk", away, away), axis=1))
 
 
-def _rows(corners: Indices, weights: Array, columns: int) -> sparse.csr_array:
+def _rows(corners: Integers, weights: Array, columns: int) -> sparse.csr_array:
     count, each = corners.shape
     starts = np.arange(0, count * each + 1, each)
     return sparse.csr_array((weights.ravel(), corners.ravel(), starts), (count, columns))

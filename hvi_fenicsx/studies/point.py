@@ -54,7 +54,7 @@ def _point(options: argparse.Namespace) -> None:
     scene = on_root(COMM, lambda: read_scene(options.scene))
     first = _solved(scene, options, Timer())
     record = summary(first)
-    if first.solved is not None:
+    if first.solve_result is not None:
         _keep(options, first, record)
     times = [record["time"]]
     converged = first.converged

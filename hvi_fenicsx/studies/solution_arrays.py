@@ -24,10 +24,8 @@ from ..effects.base import Direction
 from ..mesh.vertex_dofs import dof_of_node
 from ..problem import nodal_averaging
 from ..problem.scaling import Scales
+from ..typing import Array, Entities, Integers, Mask
 from ..workflow import Solution
-
-Array = npt.NDArray[np.float64]
-Indices = npt.NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -43,7 +41,7 @@ class PartSample:
         bounded: whether the part has contact.
     """
 
-    facets: Indices
+    facets: Integers
     points: Array
     weights: Array
     normals: Array
@@ -52,7 +50,7 @@ class PartSample:
     pressure: Array
     contact: Array
     drops: Array
-    bounded: npt.NDArray[np.bool_]
+    bounded: Mask
 
 
 @dataclass(frozen=True)
@@ -60,24 +58,24 @@ class Sample:
     """A solution: vertices (n, d) in m, cells (c, d+1), displacement (n, d) in m, and the parts of Γc by name."""
 
     points: Array
-    cells: Indices
+    cells: Integers
     u: Array
     parts: Mapping[str, PartSample]
 
 
 def take(solution: Solution) -> Sample | None:
     """The sample of a solution on rank 0; None elsewhere. Collective."""
-    assert solution.solved is not None
-    assert solution.examined is not None
+    assert solution.solve_result is not None
+    assert solution.examination is not None
     space, scales = solution.problem.space, solution.problem.scales
     comm, d = space.mesh.comm, scales.dimension
     index_map = space.dofmap.index_map
     owned = index_map.size_local
     cells = space.mesh.topology.index_map(space.mesh.topology.dim).size_local
     points = solution.problem.points[:owned, :d]
-    u = solution.solved.u.x.array.reshape(-1, d)[:owned] * scales.displacement
+    u = solution.solve_result.u.x.array.reshape(-1, d)[:owned] * scales.displacement
     corners = index_map.local_to_global(space.dofmap.list[:cells].ravel()).reshape(-1, d + 1)
-    parts = {s.surface.part: _part(solution, s) for s in solution.examined.states}
+    parts = {s.surface.part: _part(solution, s) for s in solution.examination.states}
     points, corners, u = (_joined(comm, a) for a in (points, corners, u))
     return None if comm.rank else Sample(points, corners, u, {k: p for k, p in parts.items() if p is not None})
 
@@ -102,7 +100,7 @@ def _part(solution: Solution, state: State) -> PartSample | None:
     )
 
 
-def _corners(space: fem.FunctionSpace, state: State) -> npt.NDArray[np.int32]:
+def _corners(space: fem.FunctionSpace, state: State) -> Entities:
     """The local vertices of a part's facets, (f, d)."""
     d, facets = space.mesh.geometry.dim, state.surface.facets
     if not len(facets):

@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 from petsc4py import PETSc
 
 from ..laws import Superpotential
@@ -14,9 +13,9 @@ from ..laws.base import Directional
 from ..problem.law_term import LawTerm
 from ..problem.problem import Problem
 from ..rigid import Body, Resistance, RigidProblem, analyse, rigid_fields
+from ..typing import Array
 from . import existence
 
-Array = npt.NDArray[np.float64]
 _INFINITE, _UNBOUNDED = 1e100, 1e30
 """A displacement beyond all scales, and a traction there that grows without bound."""
 

@@ -8,10 +8,11 @@ import numpy as np
 import numpy.typing as npt
 from petsc4py import PETSc
 
+from ..typing import Array
+
 if TYPE_CHECKING:
     from .system import System
 
-Array = npt.NDArray[np.float64]
 _MOVES = 0.2
 """Weight by which an unknown moves another, at least: of those that move a vertex, one in space has 1/4 or more."""
 

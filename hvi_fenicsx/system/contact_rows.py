@@ -15,9 +15,8 @@ from petsc4py import PETSc
 
 from ..problem.contact_surface import Surface
 from ..problem.law_term import LawTerm
+from ..typing import Array, Integers
 
-Array = npt.NDArray[np.float64]
-Indices = npt.NDArray[np.int64]
 _HOLD = 1e20
 """Times an elastic stiffness (about 1): what a held unknown moves is below rounding."""
 
@@ -32,7 +31,7 @@ class ContactRows:
     def __init__(self, matrix: PETSc.Mat, surfaces: Sequence[Surface]) -> None:
         d = matrix.getBlockSize()
         self._local = np.unique(np.concatenate([np.empty(0, np.int64), *(s.blocks for s in surfaces)])).astype(np.int64)
-        self.dofs: Indices = (self._local[:, None] * d + np.arange(d)).ravel()
+        self.dofs: Integers = (self._local[:, None] * d + np.arange(d)).ravel()
         start = matrix.getOwnershipRange()[0]
         rows = PETSc.IS().createGeneral((self.dofs + start).astype(PETSc.IntType), comm=matrix.comm)
         self.bulk = matrix.createSubMatrix(rows, None)

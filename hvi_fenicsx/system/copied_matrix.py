@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-import numpy.typing as npt
 from petsc4py import PETSc
 
+from ..typing import Entities
 from .petsc_options import PREFIX, below_the_users
 from .system import System
 
@@ -34,7 +34,7 @@ class Copied:
         if not direct:
             self.matrix.setNearNullSpace(system.near_null)
 
-    def prepare(self, held: npt.NDArray[np.int32]) -> None:
+    def prepare(self, held: Entities) -> None:
         """Make it that of the matrix as it stands with these unknowns (local, owned, sorted) held. Collective."""
         self._system.matrix.copy(self.matrix, structure=PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
         rows = np.union1d(held, self._system.pins) + self._system.load.owner_range[0]

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-import numpy.typing as npt
 from mpi4py import MPI
 from petsc4py import PETSc
 
@@ -27,9 +26,7 @@ from ..rigid import (
     kernel,
     rigid_fields,
 )
-
-Array = npt.NDArray[np.float64]
-Mask = npt.NDArray[np.bool_]
+from ..typing import Array, Entities, Mask
 
 
 def solvability(problem: Problem, forces: Mapping[str, PETSc.Vec]) -> Solvability:
@@ -105,7 +102,7 @@ def _bilateral(bounds: Bounds) -> bool:
     return bool(np.all(np.isfinite(bounds.lower) & np.isfinite(bounds.upper)))
 
 
-def inside(problem: Problem, body: Body, blocks: npt.NDArray[np.int32]) -> Mask:
+def inside(problem: Problem, body: Body, blocks: Entities) -> Mask:
     """Which of these local vertices are the body's."""
     return np.asarray(problem.bodies.labels[blocks] == body.index)
 

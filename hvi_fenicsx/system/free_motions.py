@@ -12,7 +12,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 import ufl
 from dolfinx import fem
 from mpi4py import MPI
@@ -22,8 +21,7 @@ from ..problem.problem import Problem
 from ..problem.vectors import null_space
 from ..rigid import Mode
 from ..runtime.mpi import total
-
-Array = npt.NDArray[np.float64]
+from ..typing import Array, Entities
 
 
 @dataclass(frozen=True)
@@ -37,7 +35,7 @@ class Freedom:
 
     modes: tuple[Mode, ...]
     null_space: PETSc.NullSpace
-    pins: npt.NDArray[np.int32]
+    pins: Entities
 
 
 def build(vectors: list[PETSc.Vec], modes: Sequence[Mode]) -> Freedom:
@@ -71,7 +69,7 @@ def _product(u: fem.Function, v: fem.Function) -> float:
     return total(u.function_space.mesh.comm, float(fem.assemble_scalar(fem.form(ufl.inner(u, v) * ufl.dx))))
 
 
-def _pins(comm: MPI.Comm, columns: list[Array]) -> npt.NDArray[np.int32]:
+def _pins(comm: MPI.Comm, columns: list[Array]) -> Entities:
     """Dofs at which the columns (orthonormal) are far from dependent: always the largest row of what is left.
 
     Collective.

@@ -14,17 +14,16 @@ from dataclasses import dataclass
 from typing import Literal, Protocol
 
 import numpy as np
-import numpy.typing as npt
 from mpi4py import MPI
 from petsc4py import PETSc
 
 from ..runtime.timing import Timer
+from ..typing import Array, Entities
 from . import multigrid, schur
 from .copied_matrix import Copied
 from .petsc_options import PREFIX, configure
 from .system import System
 
-Indices = npt.NDArray[np.int32]
 Kind = Literal["lu", "gamg", "mg"]
 _LARGEST_DIRECT = {2: 60_000, 3: 15_000}
 """Unknowns up to which a direct solve is the faster one, by dimension (docs/benchmarks.md)."""
@@ -95,7 +94,7 @@ class Prepared(Protocol):
     pc: PETSc.PC
     matrix: PETSc.Mat
 
-    def prepare(self, held: Indices) -> None:
+    def prepare(self, held: Entities) -> None:
         """Fit it to the system's matrix as it stands with these unknowns held. Collective."""
 
     def free(self) -> None:
@@ -111,8 +110,8 @@ class HeldPreconditioner:
 
     def __init__(self, system: System, settings: LinearSettings, timer: Timer) -> None:
         self.system, self.settings, self._timer = system, settings, timer
-        self._held: Indices | None = None
-        self._rates: list[npt.NDArray[np.float64]] = []
+        self._held: Entities | None = None
+        self._rates: list[Array] = []
         self._fresh, self._worn = 0, False
         self._made: Prepared | None = None
         self._kind: Kind | None = None
@@ -120,7 +119,7 @@ class HeldPreconditioner:
         self._in, self._out = system.load.duplicate(), system.load.duplicate()
         self._runs: list[tuple[slice, slice]] = []
 
-    def prepare(self, held: Indices) -> None:
+    def prepare(self, held: Entities) -> None:
         """Make it fit for these held dofs (local, owned, sorted). Collective."""
         self.system.hold(held if self.settings.kind == "mg" else held[:0])
         if self.system.comm.allreduce(self._fits(held), op=MPI.LAND):
@@ -130,7 +129,7 @@ class HeldPreconditioner:
         self._held, self._rates = held.copy(), self.system.rates
         self._fresh, self._worn = 0, False
 
-    def _fits(self, held: Indices) -> bool:
+    def _fits(self, held: Entities) -> bool:
         if self._held is None or self._worn:
             return False
         changed, drift = len(np.setxor1d(held, self._held, assume_unique=True)), self.system.drift(self._rates)
@@ -146,7 +145,7 @@ class HeldPreconditioner:
         if iterations > _SLOW and small:
             self.settings, self._worn = LinearSettings("lu"), True
 
-    def _build(self, held: Indices) -> None:
+    def _build(self, held: Entities) -> None:
         kind = self.settings.kind
         condensing = kind == "lu" and schur.pays(self.system, self._factorised)
         if self._made is None or kind != self._kind or (condensing and not isinstance(self._made, schur.SchurDirect)):
@@ -221,7 +220,7 @@ class HeldPreconditioner:
         return result
 
 
-def runs(chosen: Indices) -> Iterator[tuple[slice, slice]]:
+def runs(chosen: Entities) -> Iterator[tuple[slice, slice]]:
     """Runs of consecutive dofs, in the whole vector and in the reduced one: copied far faster than dof by dof."""
     breaks = np.flatnonzero(np.diff(chosen) != 1) + 1
     for run in np.split(np.arange(len(chosen)), breaks) if len(chosen) else []:

@@ -10,7 +10,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 from petsc4py import PETSc
 
 from ..errors import InputError
@@ -18,8 +17,8 @@ from ..problem.contact_surface import Surface
 from ..problem.law_term import LawTerm
 from ..problem.problem import Bounds, Problem
 from ..runtime.mpi import agree
+from ..typing import Array, Entities, Mask
 
-Array = npt.NDArray[np.float64]
 _PARALLEL = 1e-8
 
 
@@ -31,7 +30,7 @@ class Frames:
         blocks: local vertex indices (k,). axes: R, rows are the local axes, (k, d, d).
     """
 
-    blocks: npt.NDArray[np.int32]
+    blocks: Entities
     axes: Array
 
     def at(self, surface: Surface) -> Array:
@@ -114,7 +113,7 @@ def build(problem: Problem) -> Frames | None:
     return Frames(np.array(list(slanted), dtype=np.int32), np.array(axes).reshape(-1, d, d))
 
 
-def _slanted(normals: Array) -> npt.NDArray[np.bool_]:
+def _slanted(normals: Array) -> Mask:
     return np.asarray(np.max(np.abs(normals), axis=1, initial=0.0) < 1 - _PARALLEL)
 
 

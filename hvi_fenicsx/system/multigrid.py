@@ -10,10 +10,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
-import numpy as np
-import numpy.typing as npt
 from petsc4py import PETSc
 
+from ..typing import Entities
 from .coarser_level import Below
 from .petsc_options import PREFIX, below_the_users
 from .system import System
@@ -53,7 +52,7 @@ class Multigrid:
         with below_the_users(options):
             self.pc.setFromOptions()
 
-    def prepare(self, held: npt.NDArray[np.int32]) -> None:
+    def prepare(self, held: Entities) -> None:
         """Make the rungs below hold what the system holds, each what the one above does. Collective."""
         for finer, below in self._rungs:
             below.follow(finer)

@@ -10,15 +10,14 @@ import warnings
 from collections.abc import Mapping
 
 import numpy as np
-import numpy.typing as npt
 from petsc4py import PETSc
 from scipy.linalg import LinAlgWarning, block_diag, lu_factor, lu_solve
 from scipy.sparse import csr_matrix
 
+from ..typing import Array, Entities, Mask
 from .petsc_options import PREFIX, below_the_users
 from .system import System
 
-Array = npt.NDArray[np.float64]
 _COLUMNS = 64
 """Right-hand sides that are solved at once."""
 _WORTH = 30
@@ -54,8 +53,8 @@ class SchurDirect:
         self._coupling.eliminate_zeros()
         self._factor = self._interior(options)
         self._stiffness = rows[:, self._dofs].toarray() - self._carried()
-        self._lu: tuple[Array, npt.NDArray[np.int32]] | None = None
-        self._free: npt.NDArray[np.bool_] = np.ones(len(self._dofs), dtype=bool)
+        self._lu: tuple[Array, Entities] | None = None
+        self._free: Mask = np.ones(len(self._dofs), dtype=bool)
         self._work = system.load.duplicate()
         self.pc, self.matrix = PETSc.PC().create(system.comm), system.matrix
         self.pc.setType(PETSc.PC.Type.PYTHON)
@@ -90,7 +89,7 @@ class SchurDirect:
             x.destroy()
         return carried
 
-    def prepare(self, held: npt.NDArray[np.int32]) -> None:
+    def prepare(self, held: Entities) -> None:
         """Take the tangent in force, and hold these dofs, of which all but prescribed ones must be Γc's."""
         self._free = ~np.isin(self._dofs, held)
         matrix = self._stiffness + block_diag(*self._system.rows.tangent)

@@ -12,7 +12,6 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
-import numpy.typing as npt
 from dolfinx import fem
 from dolfinx.fem.petsc import assemble_matrix, assemble_vector, set_bc
 from mpi4py import MPI
@@ -23,14 +22,13 @@ from ..problem.problem import Problem
 from ..problem.vectors import assembled, new_vector, turn
 from ..rigid import Mode
 from ..runtime.timing import Timer
+from ..typing import Array, Entities
 from . import free_motions, local_frames, near_null_space
 from .contact_rows import ContactRows
 from .free_motions import Freedom
 
 if TYPE_CHECKING:
     from .coarser_level import Below
-
-Array = npt.NDArray[np.float64]
 
 
 class Model(Protocol):
@@ -90,7 +88,7 @@ class System:
             self.rotation = self._rotate()
             self.rows = ContactRows(self.matrix, [*(t.surface for t in self.terms), *(b.surface for b in self.bounds)])
         self._rates = [np.zeros((*t.free.shape, t.free.shape[1])) for t in self.terms]
-        self.held: npt.NDArray[np.int32] = np.empty(0, np.int32)
+        self.held: Entities = np.empty(0, np.int32)
         self._work = self.load.duplicate()
         self.lower, self.upper = self._box()
         free = self.load.copy()
@@ -117,7 +115,7 @@ class System:
         self.freedom.null_space.remove(self.load)
 
     @property
-    def pins(self) -> npt.NDArray[np.int32]:
+    def pins(self) -> Entities:
         """Dofs at which free motions are pinned: where all other equations hold, theirs do too."""
         return self.freedom.pins if self.freedom else np.empty(0, np.int32)
 
@@ -205,12 +203,12 @@ class System:
         else:
             self.hold(np.empty(0, np.int32))
 
-    def hold(self, held: npt.NDArray[np.int32]) -> None:
+    def hold(self, held: Entities) -> None:
         """Hold some unknowns of Γc (local, owned, sorted) in J where a solve finds them, and no others. Collective."""
         if self.comm.allreduce(not np.array_equal(held, self.held), op=MPI.LOR):
             self._write(held)
 
-    def take(self, tangent: Array, held: npt.NDArray[np.int32]) -> None:
+    def take(self, tangent: Array, held: Entities) -> None:
         """Take the tangent W K (m, d, d) of a finer rung, and hold these unknowns. Collective."""
         changed = not (np.array_equal(tangent, self.rows.tangent) and np.array_equal(held, self.held))
         if self.comm.allreduce(changed, op=MPI.LOR):
@@ -218,7 +216,7 @@ class System:
             self._rates = [np.full_like(k, np.nan) for k in self._rates]  # its own are no longer in force
             self._write(held)
 
-    def _write(self, held: npt.NDArray[np.int32]) -> None:
+    def _write(self, held: Entities) -> None:
         self.rows.write(self.matrix, held)
         self.held = held.copy()
 

@@ -45,10 +45,10 @@ def finer(rung: Rung, times: int) -> list[Rung]:
 
 def far_in_energy(rungs: list[Rung]) -> float:
     """Relative distance of the first solution from the last, energy norm."""
-    field = rungs[0].solution.solved.u  # type: ignore[union-attr]
+    field = rungs[0].solution.solve_result.u  # type: ignore[union-attr]
     for below, rung in itertools.pairwise(rungs):
         field = carried(field, rung, below)
-    problem, own = rungs[-1].prepared.problem, rungs[-1].solution.solved.u  # type: ignore[union-attr]
+    problem, own = rungs[-1].prepared.problem, rungs[-1].solution.solve_result.u  # type: ignore[union-attr]
     norms = []
     for sign in (1.0, 0.0):
         field.x.array[:] = own.x.array - sign * field.x.array

@@ -42,8 +42,8 @@ def vertex(solution: Solution, x: float, y: float) -> int:
 
 def on_floor(solution: Solution, closed: bool) -> int:
     """A vertex of the floor's interior, in contact or not."""
-    assert solution.examined is not None
-    state = solution.examined.states[0]
+    assert solution.examination is not None
+    state = solution.examination.states[0]
     inside = (state.surface.points[:, 0] > 0.01) & (state.surface.points[:, 0] < 0.99)
     return int(state.surface.blocks[np.flatnonzero(inside & (state.contact == closed))[0]])
 
@@ -112,18 +112,18 @@ def test_it_judges_the_displacement_not_the_word_of_the_solver(found: Solution) 
 def test_the_papers_smoothing_is_told_to_be_a_quarter_of_gamma1_off() -> None:
     """physics.md: at no slip S gives γ2/2 = 250 N/m² where the law gives 0; the first vertex off the wall has less."""
     found = solved(model(16, P, Q, quadratic_linear(1e3), smoothing="paper", epsilon_absolute=0.1))
-    assert found.examined is not None
+    assert found.examination is not None
     assert found.exit_code == 0
-    assert found.examined.certificate.inclusion < 1e-8
-    error = found.examined.smoothing_error * found.problem.scales.stress
+    assert found.examination.certificate.inclusion < 1e-8
+    error = found.examination.smoothing_error * found.problem.scales.stress
     assert 200 < error < 250
-    assert found.examined.certificate.inclusion_true == pytest.approx(error / (1e-3 * P), rel=1e-6)
+    assert found.examination.certificate.inclusion_true == pytest.approx(error / (1e-3 * P), rel=1e-6)
 
 
 def test_an_exact_run_is_off_by_nothing(found: Solution) -> None:
-    assert found.examined is not None
-    assert found.examined.certificate.inclusion_true == found.examined.certificate.inclusion
-    assert found.examined.smoothing_error < 1e-12
+    assert found.examination is not None
+    assert found.examination.certificate.inclusion_true == found.examination.certificate.inclusion
+    assert found.examination.smoothing_error < 1e-12
 
 
 def test_smoothed_solutions_approach_the_exact_one(found: Solution) -> None:

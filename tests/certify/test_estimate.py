@@ -94,8 +94,8 @@ def test_manufactured_the_index_is_near_1(cells: int, kind: str) -> None:
     solution = solved(table)
     exact = fem.Function(fem.functionspace(solution.problem.domain.mesh, ("Lagrange", 3, (2,))))
     exact.interpolate(lambda x: np.stack([0 * x[0], c * x[1] * (1 + x[0] - x[0] ** 2)]))
-    assert solution.solved is not None
-    away = exact / solution.problem.scales.displacement - solution.solved.u
+    assert solution.solve_result is not None
+    away = exact / solution.problem.scales.displacement - solution.solve_result.u
     test, trial = solution.problem.bilinear.arguments()
     form = fem.form(ufl.replace(solution.problem.bilinear, {test: away, trial: away}))
     true = float(np.sqrt(fem.assemble_scalar(form)))
@@ -162,10 +162,10 @@ def test_smoothing_is_what_it_changes_of_the_solution(strong: bool) -> None:
     width: Table = {"smoothing": "quadratic", "epsilon": 0.1} if strong else {"smoothing": "paper", "epsilon": 5.0}
     pull = 3e6 if strong else 1e6
     exact, smoothed = (solved(model(16, pull=pull, friction=laws, **options)) for options in ({}, width))
-    assert exact.solved is not None
-    assert smoothed.solved is not None
+    assert exact.solve_result is not None
+    assert smoothed.solve_result is not None
     away = fem.Function(exact.problem.space)
-    away.x.array[:] = exact.solved.u.x.array - smoothed.solved.u.x.array
+    away.x.array[:] = exact.solve_result.u.x.array - smoothed.solve_result.u.x.array
     true = energy_norm(exact.problem, away)
     assert true > 0.0
     assert 0.5 < estimated(smoothed).smoothing / true < 2.0
@@ -190,19 +190,19 @@ def test_slip_and_friction_against_a_mesh_far_finer(name: str, cells: int) -> No
     law = quadratic_linear(1e6 if name == "strong" else 1e3)
     prepared = prepare(Scene.model_validate(model(cells, 3e6, friction=law)))
     coarse, fine = finish(prepared), solved(model(128, 3e6, friction=law))
-    found = on_contact(prepared.system, coarse.solved.u, coarse.examined)
+    found = on_contact(prepared.system, coarse.solve_result.u, coarse.examination)
     true = [apart(read(coarse), read(fine), power) for read, power in ((slips, 2), (frictions, 1))]
     assert found.slip == pytest.approx(true[0], rel=0.45)
     assert found.friction == pytest.approx(true[1], rel=0.45)
 
 
 def slips(solution: Solution) -> npt.NDArray[np.float64]:
-    (state,) = solution.examined.states
+    (state,) = solution.examination.states
     return np.asarray(state.slip[np.argsort(state.surface.points[:, 0]), 0] * solution.problem.scales.displacement)
 
 
 def frictions(solution: Solution) -> npt.NDArray[np.float64]:
-    (state,) = solution.examined.states
+    (state,) = solution.examination.states
     return np.asarray(state.friction[np.argsort(state.surface.points[:, 0]), 0] * solution.problem.scales.stress)
 
 

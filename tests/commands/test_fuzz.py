@@ -53,7 +53,7 @@ def run(folder: Path, first: int, last: int, step: int, ranks: int = 1) -> list[
 
 def started(words: list[str]) -> str:
     """How a process ended; nothing if well."""
-    environment = os.environ | {"PYTHONPATH": f"{ROOT / 'tests' / 'support'}:{ROOT}:{os.environ.get('PYTHONPATH', '')}"}
+    environment = os.environ | {"PYTHONPATH": f"{ROOT}:{os.environ.get('PYTHONPATH', '')}"}
     try:
         done = subprocess.run(words, env=environment, capture_output=True, text=True, check=False, timeout=LIMIT)
     except subprocess.TimeoutExpired:

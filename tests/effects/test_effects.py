@@ -114,7 +114,7 @@ def test_patch_a_linear_field_is_exact_and_has_its_energy(name: str) -> None:
 
 def energy_of(solution: Any) -> float:
     """½ u·A u, nondimensional, from the reactions."""
-    forces, u = solution.examined.forces, solution.solved.u.x.array
+    forces, u = solution.examination.forces, solution.solve_result.u.x.array
     return 0.5 * float(u @ forces.reaction.ravel())
 
 
@@ -222,8 +222,8 @@ def test_a_held_bar_is_pressed_by_e_alpha_t() -> None:
     table = body("isotropic plane stress", thermal_expansion=ALPHA) | {"body": {"temperature": HEAT}}
     table["boundary"] = rollers("isotropic plane stress") | {"stop": {"on": "right", "contact": {"gap": 0.0}}}
     found = solved(table)
-    assert found.examined is not None
-    pressure = found.examined.states[0].pressure * found.problem.scales.stress
+    assert found.examination is not None
+    pressure = found.examination.states[0].pressure * found.problem.scales.stress
     np.testing.assert_allclose(pressure, -2.0e11 * ALPHA * HEAT, rtol=1e-9)
 
 
@@ -231,9 +231,9 @@ def test_two_materials_end_to_end_are_exact_where_their_widths_agree() -> None:
     """Without lateral contraction and with one α the plane field is that of the slender bar."""
     same = [f"material.{m}.{k}={v}" for m in ("aluminium", "steel") for k, v in BAR.items()]
     found = solve(read_scene(ROOT / "demos" / "thermal_bar.toml", same))
-    assert found.examined is not None
+    assert found.examination is not None
     stress = (ALPHA * 60.0 - 0.5e-3) / (0.4 / 7e10 + 0.6 / 2.1e11)
-    pressure = found.examined.states[0].pressure * found.problem.scales.stress
+    pressure = found.examination.states[0].pressure * found.problem.scales.stress
     np.testing.assert_allclose(pressure, -stress, rtol=1e-8)
 
 
@@ -308,8 +308,8 @@ def test_a_floor_bears_the_weight_of_any_shape(shape: str) -> None:
         }
     )
     assert found.exit_code == 0
-    assert found.examined is not None
-    state = found.examined.states[0]
+    assert found.examination is not None
+    state = found.examination.states[0]
     borne = -float(state.surface.weights @ state.pressure) * found.problem.scales.force
     assert borne == pytest.approx(8.0e4 * area, rel=1e-9 if shape in ("l_shape", "notched_strip") else 4e-3)
 

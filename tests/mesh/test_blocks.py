@@ -53,7 +53,7 @@ def test_ranks_have_as_many_cells_and_the_same_part_on_each_rung(cells: list[int
 @pytest.mark.parametrize(("ranks", "cells", "away"), [(2, (16, 24), 1), (3, (24, 36), 1), (3, (16, 20), 2)])
 def test_values_between_rungs_cross_ranks_at_the_cuts_only(ranks: int, cells: tuple[int, int], away: int) -> None:
     """A vertex next to a cut is the mean of one on it; where the rungs' cuts differ by a cell, so do the vertices."""
-    found = on_ranks(ranks, "tests/support/block_ranks.py", *cells)
+    found = on_ranks(ranks, "tests/mesh/block_ranks.py", *cells)
     assert sum(own for own, _, _ in found) == 2 * cells[0] * cells[1]
     assert max(own for own, _, _ in found) <= 1.1 * 2 * cells[0] * cells[1] / ranks
     assert 0 < sum(foreign for _, foreign, _ in found) <= ranks * sum(cells)

@@ -24,7 +24,7 @@ from hvi_fenicsx.mesh.thinned_outline import HalfEdges
 from hvi_fenicsx.scene import HalfDisk, NotchedStrip
 from hvi_fenicsx.system import assemble
 
-SUPPORT = Path(__file__).parents[1] / "support"
+HERE = Path(__file__).parent
 DEMOS = Path(__file__).parents[2] / "demos"
 COMM = MPI.COMM_WORLD
 POLYGONS = {
@@ -139,12 +139,12 @@ def test_a_start_from_another_mesh_ends_where_mumps_does(tmp_path: Path) -> None
     climbed = workflow.solve(scene(tmp_path, *convex))
     alone = scene(tmp_path, *convex, 'solver={linear_solver="lu"}')
     direct = workflow.finish(workflow.prepare(alone, body=domain.from_file(COMM, alone.domain.file, 2)))  # type: ignore[union-attr]
-    assert climbed.solved is not None
-    assert climbed.solved.levels > 1
+    assert climbed.solve_result is not None
+    assert climbed.solve_result.levels > 1
     assert climbed.converged
-    assert direct.solved is not None
-    assert direct.solved.levels == 1
-    assert climbed.examined.energy == pytest.approx(direct.examined.energy, rel=1e-9)  # type: ignore[union-attr]
+    assert direct.solve_result is not None
+    assert direct.solve_result.levels == 1
+    assert climbed.examination.energy == pytest.approx(direct.examination.energy, rel=1e-9)  # type: ignore[union-attr]
 
 
 def test_built_in_blocks_keep_their_own_ladder() -> None:
@@ -156,7 +156,7 @@ def test_ranks_make_the_same_meshes_and_prolong_alike(tmp_path: Path) -> None:
     told = []
     for ranks in (1, 2, 3):
         command = ["mpirun", "--oversubscribe", "-n", str(ranks), sys.executable, "coarsened_ranks.py", str(file)]
-        run = subprocess.run(command, cwd=SUPPORT, capture_output=True, text=True, timeout=120)
+        run = subprocess.run(command, cwd=HERE, capture_output=True, text=True, timeout=120)
         assert run.returncode == 0, run.stderr
         told.append([float(word) for word in run.stdout.split()])
     assert told[1] == pytest.approx(told[0], rel=1e-10)
@@ -172,6 +172,6 @@ def test_coarse_bodies_slide_along_a_curved_part_as_the_fine_one_does() -> None:
     floor = f'boundary.floor={{on="arc", contact={{gap=0.0}}, friction={law}}}'
     found = workflow.solve(read_scene(DEMOS / "hertz.toml", [*overrides, floor]))
     assert found.converged
-    assert found.solved is not None
-    assert found.solved.levels > 1
-    assert found.solved.counts.linear < 45
+    assert found.solve_result is not None
+    assert found.solve_result.levels > 1
+    assert found.solve_result.counts.linear < 45

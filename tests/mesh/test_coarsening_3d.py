@@ -14,13 +14,13 @@ import meshes
 import numpy as np
 import pytest
 from mpi4py import MPI
-from test_ladder import lost, space_on
+from test_transfer import lost, space_on
 
 from hvi_fenicsx import Scene, workflow
 from hvi_fenicsx.mesh import coarsening_2d, coarsening_3d, domain, transfer
 from hvi_fenicsx.mesh.domain import Domain
 
-SUPPORT = Path(__file__).parents[1] / "support"
+HERE = Path(__file__).parent
 COMM = MPI.COMM_WORLD
 LIFTED: dict[str, Any] = {
     "material": {"model": "three_dimensional", "youngs_modulus": 3e10, "poisson_ratio": 0.2},
@@ -76,10 +76,10 @@ def test_what_is_solved_does_not_change(bored: Path, monkeypatch: pytest.MonkeyP
     climbed = workflow.solve(scene)
     monkeypatch.setattr(coarsening_2d, "_WORTHWHILE", 10**9)
     alone = workflow.solve(scene)
-    assert [s.solved.levels for s in (climbed, alone)] == [2, 1]  # type: ignore[union-attr]
+    assert [s.solve_result.levels for s in (climbed, alone)] == [2, 1]  # type: ignore[union-attr]
     assert climbed.converged
     assert alone.converged
-    assert climbed.examined.energy == pytest.approx(alone.examined.energy, rel=1e-9)  # type: ignore[union-attr]
+    assert climbed.examination.energy == pytest.approx(alone.examination.energy, rel=1e-9)  # type: ignore[union-attr]
 
 
 @pytest.mark.parametrize("body", [meshes.BLOCKS.format(size=0.1, dimension=3, named=True)])
@@ -101,7 +101,7 @@ def test_a_coarse_mesh_of_another_size_is_given_up(bored: Path, monkeypatch: pyt
 @pytest.mark.parametrize("ranks", [2, 3])
 def test_the_coarse_mesh_is_the_same_on_several_ranks_shared_like_the_fine_one(ranks: int, bored: Path) -> None:
     command = ["mpirun", "--oversubscribe", "-n", str(ranks), sys.executable, "remeshed_ranks.py", str(bored)]
-    run = subprocess.run(command, cwd=SUPPORT, capture_output=True, text=True, timeout=120)
+    run = subprocess.run(command, cwd=HERE, capture_output=True, text=True, timeout=120)
     assert run.returncode == 0, run.stderr
     told = np.array([[float(word) for word in line.split()] for line in run.stdout.splitlines()])
     assert len(told) == ranks

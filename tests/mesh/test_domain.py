@@ -72,8 +72,8 @@ def test_a_force_in_one_region_weighs_as_much_as_that_region(tmp_path: Path) -> 
     table["material"] = {"a": STEEL | {"region": ["soft", "hard"]}}
     table["body"] = {"weight": {"region": "hard", "force": [0.0, -8.0e5]}, "all": {"force": [0.0, "-2e5 + 0*x"]}}
     found = solved(table)
-    assert found.examined is not None
-    state = found.examined.states[0]
+    assert found.examination is not None
+    state = found.examination.states[0]
     bearing = np.sum(state.surface.weights * state.pressure) * found.problem.scales.stress
     assert bearing == pytest.approx(-6.0e5, rel=1e-9)
 

@@ -20,7 +20,7 @@ from dolfinx import fem
 from dolfinx import mesh as dmesh
 from mpi4py import MPI
 from scenes import model, quadratic_linear
-from test_ladder import lost, rough
+from test_transfer import lost, rough
 
 from hvi_fenicsx import Scene, workflow
 from hvi_fenicsx.mesh import domain, refinement, transfer
@@ -212,6 +212,6 @@ def test_ranks_agree(ranks: int) -> None:
 def _run(ranks: int) -> list[float]:
     mpi = ["mpirun", "-n", str(ranks)] if ranks > 1 else []
     words = [*mpi, sys.executable, "-m", "mpi4py", "-m", "refined_ranks"]
-    root = Path(__file__).parents[1] / "support"
+    root = Path(__file__).parent
     out = subprocess.run(words, cwd=root, capture_output=True, text=True, check=True, timeout=300).stdout
     return [float(word) for word in out.split()]

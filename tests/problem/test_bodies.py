@@ -83,9 +83,9 @@ def told(folder: Path, comm: MPI.Comm) -> dict[str, Any]:
 
 def _slips(solution: Any) -> list[float]:
     """∫ u1 over the floor of each block, m² (m³ in space)."""
-    if solution.solved is None:
+    if solution.solve_result is None:
         return []
-    (state,) = solution.examined.states
+    (state,) = solution.examination.states
     right = state.surface.points[:, 0] > 1.5
     scales = solution.problem.scales
     area = state.surface.weights * scales.length ** (scales.dimension - 1)

@@ -20,7 +20,7 @@ from scenes import STEEL, Table, displacement, energy, model, quadratic_linear, 
 
 from hvi_fenicsx import Scene, prepare
 from hvi_fenicsx.solvers import nested_iteration
-from hvi_fenicsx.solvers.method import Solved, silent
+from hvi_fenicsx.solvers.method import SolveResult, silent
 from hvi_fenicsx.solvers.registry import choose
 from hvi_fenicsx.workflow import Prepared, finish
 
@@ -100,7 +100,7 @@ def calls(name: str) -> int:
     return int(PETSc.Log.Event(name).getPerfInfo()["count"])
 
 
-def found_by_solver(ready: Prepared) -> Solved:
+def found_by_solver(ready: Prepared) -> SolveResult:
     """The solve alone: certificate and error estimate have systems of their own."""
     return nested_iteration.solve(ready.scene, ready.system, ready.timer, silent, lambda: False)
 
@@ -120,9 +120,9 @@ def test_the_solver_follows_from_what_acts(name: str) -> None:
     assert bool(np.isfinite(box).any()) is bounds
     found = finish(ready)
     assert found.converged
-    assert found.solved is not None
-    assert found.solved.method == method
-    assert (found.solved.counts.branch > 0) is (method == "branch")
+    assert found.solve_result is not None
+    assert found.solve_result.method == method
+    assert (found.solve_result.counts.branch > 0) is (method == "branch")
 
 
 @pytest.mark.usefixtures("events")
@@ -148,8 +148,8 @@ def test_contact_alone_is_one_snes_solve_after_the_start() -> None:
 def test_the_simple_solvers_find_what_the_branch_iteration_finds(name: str) -> None:
     table = SCENES[name][0]
     one, other = solved(table), solved(table | {"solver": {"method": "branch"}})
-    assert other.solved is not None
-    assert other.solved.method == "branch"
+    assert other.solve_result is not None
+    assert other.solve_result.method == "branch"
     assert energy(one) == pytest.approx(energy(other), rel=1e-10)
     assert displacement(one) == pytest.approx(displacement(other), abs=1e-9 * np.abs(displacement(other)).max())
 
@@ -161,9 +161,9 @@ def test_a_linear_scene_takes_the_ladder_for_its_multigrid_only(monkeypatch: pyt
     table["domain"]["cells"] = [64, 64]
     found, direct = solved(table), solved(table | {"solver": {"linear_solver": "lu"}})
     assert found.converged
-    assert found.solved is not None
-    assert (found.solved.levels, found.solved.counts.newton) == (1, 0)
-    assert 1 < found.solved.counts.linear < 15
+    assert found.solve_result is not None
+    assert (found.solve_result.levels, found.solve_result.counts.newton) == (1, 0)
+    assert 1 < found.solve_result.counts.linear < 15
     assert energy(found) == pytest.approx(energy(direct), rel=1e-9)
 
 

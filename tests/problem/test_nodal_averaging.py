@@ -35,9 +35,9 @@ def scene(cells: int, nu: float = NU) -> Scene:
 
 def energy(cells: int) -> float:
     solution = solve(scene(cells))
-    assert solution.examined is not None
+    assert solution.examination is not None
     assert solution.converged
-    return solution.examined.energy * solution.problem.scales.energy
+    return solution.examination.energy * solution.problem.scales.energy
 
 
 def plain_energy(cells: int, degree: int) -> float:
@@ -93,7 +93,7 @@ def test_a_uniform_stress_is_reproduced(load: float) -> None:
     solution = solve(Scene.model_validate(tables))
     stiffness = (1 - nu) / ((1 + nu) * (1 - 2 * nu))
     assert solution.converged
-    assert solution.examined is not None
-    assert solution.examined.energy * solution.problem.scales.energy == pytest.approx(
+    assert solution.examination is not None
+    assert solution.examination.energy * solution.problem.scales.energy == pytest.approx(
         -(load**2) / stiffness / 2, rel=1e-9
     )

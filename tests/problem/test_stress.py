@@ -59,8 +59,8 @@ def wood(**more: Any) -> Table:
 
 
 def stresses(solution: Solution) -> Array:
-    assert solution.solved is not None
-    return stress.by_cell(solution.problem, solution.solved.u)
+    assert solution.solve_result is not None
+    return stress.by_cell(solution.problem, solution.solve_result.u)
 
 
 def assert_uniform(found: Array, *diagonal: float) -> None:

@@ -124,8 +124,8 @@ def test_between_the_two_a_local_minimiser_is_certified(name: str) -> None:
     make, _, held, _, _ = CASES[name]
     between = solve(Scene.model_validate(make(2, 1.02 * held)))
     assert (between.exit_code, between.solvability.state) == (0, "metastable")
-    assert between.examined is not None
-    assert between.examined.certificate.second_order == "local minimiser"
+    assert between.examination is not None
+    assert between.examination.certificate.second_order == "local minimiser"
 
 
 if __name__ == "__main__":

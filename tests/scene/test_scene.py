@@ -17,7 +17,7 @@ from pydantic import ValidationError
 
 from hvi_fenicsx import laws
 from hvi_fenicsx.effects import Effect, Place
-from hvi_fenicsx.effects.base import Contribution, Stage
+from hvi_fenicsx.effects.base import Contribution, FormContext
 from hvi_fenicsx.effects.contact import Contact
 from hvi_fenicsx.effects.friction import Friction
 from hvi_fenicsx.errors import InputError
@@ -482,7 +482,7 @@ def glue() -> Iterator[type[Effect]]:
         term: ClassVar[str] = "nothing"
         strength: float
 
-        def contribute(self, stage: Stage, where: str | None) -> Contribution:
+        def contribute(self, context: FormContext, where: str | None) -> Contribution:
             return Contribution()
 
     yield Glue

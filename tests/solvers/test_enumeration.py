@@ -151,8 +151,8 @@ def test_the_solver_ends_in_a_minimiser(case: Case) -> None:
     """The energy falls in each convex step and both sides of a kink are tried: a saddle is no place to stay."""
     found = solved(case.scene(tolerance=TOLERANCE))
     assert not listed(case, points(found), displacement(found))[0].on_concave_kink
-    assert found.examined is not None
-    assert found.examined.certificate.second_order == "local minimiser"
+    assert found.examination is not None
+    assert found.examination.certificate.second_order == "local minimiser"
 
 
 @pytest.mark.parametrize("case", [c for c in FAST if c.wall and c.cells > 1], ids=str)

@@ -44,7 +44,7 @@ def test_a_pushed_block_slips_as_far_as_its_friction_needs(share: float) -> None
 def test_a_push_beyond_the_peak_has_no_equilibrium(share: float, code: int) -> None:
     found = solved(block(4, share * GAMMA, 4 * Q, LAW))
     assert found.exit_code == code
-    assert (found.solved is None) == (code == 3)
+    assert (found.solve_result is None) == (code == 3)
 
 
 @pytest.mark.parametrize("push", [0.3e6, 0.8e6])
@@ -134,8 +134,8 @@ def test_in_space_too_a_support_does_not_show_in_the_friction() -> None:
         )
     )
     assert found.converged
-    assert found.examined is not None
-    state, scales = found.examined.states[0], found.problem.scales
+    assert found.examination is not None
+    state, scales = found.examination.states[0], found.problem.scales
     held = state.surface.points[:, 0] < 1e-9
     wanted = 1e6 / 9e-6 * state.slip[held] * scales.displacement / scales.stress
     assert np.allclose(state.friction[held], wanted, rtol=1e-9, atol=1e-12)
@@ -193,7 +193,7 @@ def test_an_obstacle_that_presses_a_free_body_up_moves_it_rigidly(gap: float | s
 def test_supports_that_agree_where_they_meet_are_fine() -> None:
     table = model(5)
     table["boundary"]["press"] = {"on": "top", "displacement": ["1e-5*x", "free"]}
-    table["boundary"]["stage"] = {"on": "bottom", "displacement": ["free", "0*x"]}
+    table["boundary"]["context"] = {"on": "bottom", "displacement": ["free", "0*x"]}
     del table["boundary"]["floor"]
     found = solved(table)
     assert found.exit_code == 0

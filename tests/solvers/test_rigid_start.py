@@ -85,7 +85,7 @@ def main() -> None:
     """One case on several ranks: exit code and energy."""
     found = solve(rolling("tresca", 0.08, 0.04, 2e4))
     if MPI.COMM_WORLD.rank == 0:
-        print(json.dumps([found.exit_code, found.examined.energy if found.examined else None]))
+        print(json.dumps([found.exit_code, found.examination.energy if found.examination else None]))
 
 
 def test_on_two_ranks_it_rests_where_it_does_on_one() -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import subprocess
 import sys
 from pathlib import Path
@@ -34,15 +33,8 @@ def hvi(*words: object, ranks: int = 1, cwd: Path = ROOT) -> subprocess.Complete
 def on_ranks(ranks: int, script: str, *words: object) -> Any:
     """What a script under mpirun prints in its last line, as JSON."""
     python = [sys.executable, "-m", "mpi4py", script, *map(str, words)]
-    paths = os.pathsep.join([str(Path(__file__).parent), os.environ.get("PYTHONPATH", "")])
     done = subprocess.run(
-        ["mpirun", "-n", str(ranks), *python],
-        cwd=ROOT,
-        env=os.environ | {"PYTHONPATH": paths},
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=300,
+        ["mpirun", "-n", str(ranks), *python], cwd=ROOT, capture_output=True, text=True, check=False, timeout=300
     )
     assert done.returncode == 0, done.stderr
     return json.loads(done.stdout.splitlines()[-1])

@@ -58,15 +58,15 @@ def points(solution: Solution) -> Array:
 
 def displacement(solution: Solution) -> Array:
     """The displacement at the vertices, m, shape (n, d)."""
-    assert solution.solved is not None
-    u = solution.solved.u.x.array.reshape(-1, solution.scene.dimension)
+    assert solution.solve_result is not None
+    u = solution.solve_result.u.x.array.reshape(-1, solution.scene.dimension)
     return np.asarray(u * solution.problem.scales.displacement)
 
 
 def energy(solution: Solution) -> float:
     """The energy, J/m."""
-    assert solution.examined is not None
-    return solution.examined.energy * solution.problem.scales.energy
+    assert solution.examination is not None
+    return solution.examination.energy * solution.problem.scales.energy
 
 
 def ordered(points: Array, values: Array) -> Array:

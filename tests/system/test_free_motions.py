@@ -71,8 +71,8 @@ def least(strain: Array) -> Array:
 def error(solution: Solution, gradient: Array, still: Array) -> float:
     """Largest difference from x ↦ gradient (x - still), relative. Collective."""
     d, comm = solution.scene.dimension, solution.problem.domain.mesh.comm
-    assert solution.solved is not None
-    u = solution.solved.u.x.array.reshape(-1, d) * solution.problem.scales.displacement
+    assert solution.solve_result is not None
+    u = solution.solve_result.u.x.array.reshape(-1, d) * solution.problem.scales.displacement
     x = solution.problem.space.tabulate_dof_coordinates()[:, :d] - still
     wanted = x @ gradient.T
     parts = comm.allgather((np.abs(u - wanted).max(initial=0.0), np.abs(wanted).max(initial=0.0)))
@@ -167,8 +167,8 @@ def test_contact_that_opens_leaves_a_motion_free(method: str) -> None:
     solution = solve(Scene.model_validate(table))
     assert (solution.exit_code, solution.solvability.state) == (0, "borderline")
     assert [mode.words for mode in solution.solvability.free] == ["translation along y"]
-    assert solution.examined is not None
-    (state,) = solution.examined.states
+    assert solution.examination is not None
+    (state,) = solution.examination.states
     assert 0 < np.count_nonzero(state.contact) < len(state.contact)
     assert _mean(solution, 1) == pytest.approx(0.0, abs=1e-10)
     pressure = float(state.surface.weights @ state.contact_pressure) * solution.problem.scales.length
@@ -177,8 +177,8 @@ def test_contact_that_opens_leaves_a_motion_free(method: str) -> None:
 
 def _mean(solution: Solution, component: int) -> float:
     """∫ u_i dx, nondimensional, by the corners of the cells."""
-    assert solution.solved is not None
-    mesh, u = solution.problem.domain.mesh, solution.solved.u.x.array.reshape(-1, 2)[:, component]
+    assert solution.solve_result is not None
+    mesh, u = solution.problem.domain.mesh, solution.solve_result.u.x.array.reshape(-1, 2)[:, component]
     cells = solution.problem.space.dofmap.list
     x = mesh.geometry.x[mesh.geometry.dofmap][:, :, :2]
     sides = x[:, 1:] - x[:, :1]

@@ -189,16 +189,16 @@ LAWS: dict[str, Table] = {
 def test_the_energy_falls_in_every_convex_step(law: str, pull: float, press: float) -> None:
     found = solved(model(12, pull, press, LAWS[law]))
     assert found.exit_code == 0
-    assert found.solved is not None
-    energies = np.array(found.solved.energies)
-    assert len(energies) == found.solved.counts.branch >= 1
+    assert found.solve_result is not None
+    energies = np.array(found.solve_result.energies)
+    assert len(energies) == found.solve_result.counts.branch >= 1
     assert np.all(np.diff(energies) <= 1e-10 * np.abs(energies[:-1]))
 
 
 def test_some_of_them_take_several_steps() -> None:
     found = solved(model(12, 6e6, 1e6, STRONG))
-    assert found.solved is not None
-    assert found.solved.counts.branch > 1
+    assert found.solve_result is not None
+    assert found.solve_result.counts.branch > 1
 
 
 def by_ufl(u: fem.Function, pull: float, gamma1: float) -> float:
@@ -218,9 +218,9 @@ def by_ufl(u: fem.Function, pull: float, gamma1: float) -> float:
 @pytest.mark.parametrize(("pull", "gamma1"), [(P, 1e3), (3e6, 1e6), (6e6, 3e6)])
 def test_the_certified_energy_is_that_of_the_papers_formulas(pull: float, gamma1: float) -> None:
     found = solved(model(8, pull, Q, quadratic_linear(gamma1)))
-    assert found.solved is not None
+    assert found.solve_result is not None
     u = fem.Function(found.problem.space)
-    u.x.array[:] = found.solved.u.x.array * found.problem.scales.displacement
+    u.x.array[:] = found.solve_result.u.x.array * found.problem.scales.displacement
     assert energy(found) == pytest.approx(by_ufl(u, pull, gamma1), rel=1e-12)
 
 

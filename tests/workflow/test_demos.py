@@ -31,8 +31,8 @@ def demo(name: str, *overrides: str) -> Solution:
 
 def state(solution: Solution, part: str) -> State:
     assert solution.exit_code == 0
-    assert solution.examined is not None
-    return next(s for s in solution.examined.states if s.surface.part == part)
+    assert solution.examination is not None
+    return next(s for s in solution.examination.states if s.surface.part == part)
 
 
 def mean(where: State, values: Array) -> Array:
@@ -127,9 +127,9 @@ def test_hertz_pressure_and_half_width_converge() -> None:
 def test_the_peeled_strip_obeys_the_j_integral() -> None:
     """F θ, as the work of the end's tractions on ∂u2/∂x, is the glue's fracture energy (Rice 1968)."""
     found = demo("peeling")
-    assert found.examined is not None
+    assert found.examination is not None
     glue, x, u = state(found, "glue"), points(found), displacement(found)
-    force = found.examined.forces.reaction[:, 1] * found.problem.scales.force
+    force = found.examination.forces.reaction[:, 1] * found.problem.scales.force
     end = np.flatnonzero(x[:, 0] < 1e-9)
     beside = [int(np.argmin(np.hypot(x[:, 0] - 1e-3, x[:, 1] - x[i, 1]))) for i in end]
     slope = -(u[beside, 1] - u[end, 1]) / 1e-3
@@ -186,8 +186,8 @@ def test_the_giving_support_has_the_solutions_of_its_header(start: str, broken: 
     found = demo("jureczka_ochal", f"solver.start={start}")
     assert energy(found) == pytest.approx(giving(broken), rel=1e-8)
     assert energy(found) == pytest.approx(wanted, abs=1e-4)
-    assert found.examined is not None
-    assert found.examined.certificate.second_order == "local minimiser"
+    assert found.examination is not None
+    assert found.examination.certificate.second_order == "local minimiser"
     sunk = state(found, "ground").normal * found.problem.scales.displacement > 0.1
     assert np.count_nonzero(sunk) == broken
 

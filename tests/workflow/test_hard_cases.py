@@ -112,6 +112,6 @@ def test_where_the_naive_iteration_cycles_for_ever_the_energy_falls_to_a_solutio
     assert states[-1] in states[-10:-1]
     found = solved(model(8, 1e6, friction=quadratic_linear(gamma1), start="broken"))
     assert found.converged
-    energies = found.solved.energies if found.solved else ()
+    energies = found.solve_result.energies if found.solve_result else ()
     assert len(energies) > 1
     assert np.all(np.diff(energies) <= 1e-10 * np.abs(energies[:-1]))

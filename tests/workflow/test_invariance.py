@@ -46,8 +46,8 @@ def converted(value: Any, length: float, stress: float, deflection: float, key: 
 
 def nondimensional(found: Solution) -> Array:
     assert found.exit_code == 0
-    assert found.solved is not None
-    return np.asarray(found.solved.u.x.array)
+    assert found.solve_result is not None
+    return np.asarray(found.solve_result.u.x.array)
 
 
 def assert_same(one: Table, other: Table, energy_factor: float) -> None:
@@ -201,7 +201,7 @@ def test_a_slot_without_play_is_a_support(mesh: Path) -> None:
 def test_delta_is_passed_where_it_should_be() -> None:
     """The scenes mean something: slips on both sides of the drop, and lifted vertices in one of them."""
     found = solved(SCENES["lift-off"])
-    assert found.examined is not None
-    slips = np.abs(found.examined.states[0].slip) * found.problem.scales.displacement
+    assert found.examination is not None
+    slips = np.abs(found.examination.states[0].slip) * found.problem.scales.displacement
     assert slips.min() < DELTA < slips.max()
-    assert 0 < np.count_nonzero(found.examined.states[0].contact) < 7
+    assert 0 < np.count_nonzero(found.examination.states[0].contact) < 7

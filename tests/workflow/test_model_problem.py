@@ -22,8 +22,8 @@ FLOOR = {"contact": {"gap": 0.0}}
 
 def pressure(solution: Solution) -> Array:
     """σ_n on the floor, N/m²."""
-    assert solution.examined is not None
-    return np.asarray(solution.examined.states[0].pressure * solution.problem.scales.stress)
+    assert solution.examination is not None
+    return np.asarray(solution.examination.states[0].pressure * solution.problem.scales.stress)
 
 
 def assert_uniform(solution: Solution, wanted: Array, joules: float, contact: float = -Q) -> None:
@@ -78,15 +78,15 @@ def test_a_body_above_its_floor_comes_down_on_it(gap: Any) -> None:
     fall = gap if isinstance(gap, float) else 2e-6
     found = solved(model(gap=gap))
     assert_uniform(found, exact(found) - [0.0, fall], -6.0 - Q * fall)
-    assert found.examined is not None
-    assert np.all(found.examined.states[0].contact)
+    assert found.examination is not None
+    assert np.all(found.examination.states[0].contact)
 
 
 def test_an_inclined_gap_lets_the_body_rest_on_its_nearest_end_only() -> None:
     """Statics: the wall bears no vertical force, so the floor bears Q; a rigid body would touch at one end."""
     found = solved(model(8, pull=0.0, gap="1e-3*x"))
-    assert found.examined is not None
-    state = found.examined.states[0]
+    assert found.examination is not None
+    state = found.examination.states[0]
     force = state.surface.weights * state.pressure
     assert found.exit_code == 0
     assert np.sum(force) == pytest.approx(-1.0, rel=1e-9)
@@ -135,8 +135,8 @@ def test_a_traction_may_be_a_formula_and_two_tables_may_share_a_side() -> None:
     table["boundary"]["more"] = {"on": "top", "traction": [0.0, "-1e6*y**2"]}
     found = solved(table)
     assert found.exit_code == 0
-    assert found.examined is not None
-    weights = found.examined.states[0].surface.weights
+    assert found.examination is not None
+    weights = found.examination.states[0].surface.weights
     assert np.sum(weights * pressure(found)) == pytest.approx(-2.5e6, rel=1e-9)
 
 
@@ -154,8 +154,10 @@ def test_own_weight_is_borne_by_the_floor_and_its_energy_converges_like_h_square
     wanted = -13 / 6 * (1 - NU**2) * Q**2 / E
     runs = [solved(heavy(cells)) for cells in (4, 8, 16)]
     for found in runs:
-        assert found.examined is not None
-        assert np.sum(found.examined.states[0].surface.weights * pressure(found)) == pytest.approx(-3.0 * Q, rel=1e-9)
+        assert found.examination is not None
+        assert np.sum(found.examination.states[0].surface.weights * pressure(found)) == pytest.approx(
+            -3.0 * Q, rel=1e-9
+        )
     errors = [energy(found) / wanted - 1 for found in runs]
     assert all(e < 0 for e in errors)  # a conforming method has more energy than the exact solution
     assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.1)

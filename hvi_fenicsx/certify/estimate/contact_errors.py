@@ -9,7 +9,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 import ufl
 from dolfinx import fem, la
 
@@ -17,14 +16,14 @@ from ...effects.base import Direction
 from ...problem.problem import Problem
 from ...runtime.mpi import total
 from ...system.system import System
-from ..certificate import Examined
+from ...typing import Array
+from ..certificate import Examination
 from ..contact_state import State
 from . import defect, edge_bubbles
 from .dual_norm import Dual
 from .edge_bubbles import assembled
 from .law_traces import Along, Change, law, pointwise
 
-Array = npt.NDArray[np.float64]
 _TIMES, _ROUNDS = 2, 4
 _PLACE = 1 / (2 * np.sqrt(12))
 """Of a facet: the standard deviation of a drop's place, which may be anywhere in half of it."""
@@ -44,22 +43,22 @@ class OnContact:
     moved: fem.Function
 
 
-def on_contact(system: System, u: fem.Function, examined: Examined) -> OnContact:
+def on_contact(system: System, u: fem.Function, examination: Examination) -> OnContact:
     """Estimate the errors of slip and -σ_t, what smoothing changes included. Collective.
 
     Args:
-        system, u, examined: as in :func:`.estimate`.
+        system, u, examination: as in :func:`.estimate`.
 
     Nearly incompressible regions are not for this: their averaged pressure is not in the bubbles' force.
     """
     inverse = Dual(system, u)
-    change = _change(system, u, examined, inverse)
-    unsure = _unsure(system.problem, u, examined, inverse, change)
+    change = _change(system, u, examination, inverse)
+    unsure = _unsure(system.problem, u, examination, inverse, change)
     inverse.destroy()
-    slips = [_slip(system.problem, state, u, change, unsure) for state in examined.states]
+    slips = [_slip(system.problem, state, u, change, unsure) for state in examination.states]
     tractions = [
         _traction(system.problem, state, number, u, change, unsure)
-        for state in examined.states
+        for state in examination.states
         for number, term in enumerate(state.terms)
         if term.direction is Direction.SLIP
     ]
@@ -76,25 +75,25 @@ def ratio(part: float, whole: float) -> float:
     return part / whole if whole > 0 else (np.inf if part > 0 else 0.0)
 
 
-def _change(system: System, u: fem.Function, examined: Examined, inverse: Dual) -> Change:
+def _change(system: System, u: fem.Function, examination: Examination, inverse: Dual) -> Change:
     """The defect with its influence on the vertices and, from the second time on, theirs on it. Collective."""
     problem = system.problem
     space, moved = edge_bubbles.space(problem.domain.mesh), fem.Function(problem.space)
     change, residual, stiffness = None, defect.residual(problem, u, space), edge_bubbles.Stiffness(problem, space)
     for _ in range(_TIMES):
-        edges, _ = pointwise(problem, space, u, examined.states, change)
+        edges, _ = pointwise(problem, space, u, examination.states, change)
         load = residual - edges - _internal(problem, space, moved)
         change = Change(moved, defect.least(stiffness, u, load))
-        _answer(problem, u, examined, inverse, change)
+        _answer(problem, u, examination, inverse, change)
     assert change is not None
     return change
 
 
-def _answer(problem: Problem, u: fem.Function, examined: Examined, inverse: Dual, change: Change) -> None:
+def _answer(problem: Problem, u: fem.Function, examination: Examination, inverse: Dual, change: Change) -> None:
     """Move the vertices as the bubbles ask; the laws answer that, so it takes a few rounds. Collective."""
     size, bubbling = 0.0, _internal(problem, problem.space, change.edges)
     for _ in range(_ROUNDS):
-        _, laws = pointwise(problem, change.edges.function_space, u, examined.states, change)
+        _, laws = pointwise(problem, change.edges.function_space, u, examination.states, change)
         step, length = inverse.solve(laws - _internal(problem, problem.space, change.vertices) - bubbling)
         change.vertices.x.array[:] += step.x.array
         size = max(size, length)
@@ -102,14 +101,14 @@ def _answer(problem: Problem, u: fem.Function, examined: Examined, inverse: Dual
             break
 
 
-def _unsure(problem: Problem, u: fem.Function, examined: Examined, inverse: Dual, change: Change) -> fem.Function:
+def _unsure(problem: Problem, u: fem.Function, examination: Examination, inverse: Dual, change: Change) -> fem.Function:
     """What the vertices may move because bubbles do not see where in half an edge a drop lies, P1. Collective.
 
     The facets' places are independent of each other, so n of them add up to a root of n times the effect of one.
     """
     d, comm = problem.scales.dimension, problem.domain.mesh.comm
     force, count = fem.Function(problem.space), 0
-    for state in examined.states:
+    for state in examination.states:
         for number in range(len(state.terms)):
             along, tau = _drops(problem, change.edges.function_space, u, state, number)
             force.x.array[:] += along.tested(tau)[1].ravel()

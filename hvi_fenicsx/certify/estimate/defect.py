@@ -19,10 +19,9 @@ from mpi4py import MPI
 
 from ...problem import nodal_averaging
 from ...problem.problem import Bounds, Problem
+from ...typing import Array, Entities, Mask
 from .edge_bubbles import Stiffness, assembled, by_cells
 
-Array = npt.NDArray[np.float64]
-Flags = npt.NDArray[np.bool_]
 _RTOL = 0.1
 """Of the bubbles' solve, in the energy norm: their energy is right to about its square."""
 _ROUNDS = 4
@@ -37,7 +36,7 @@ class Midpoints:
     ``side`` is 1 where e is held on the upper bound, -1 on the lower one, else 0.
     """
 
-    blocks: npt.NDArray[np.int32]
+    blocks: Entities
     normals: Array
     lower: Array
     upper: Array
@@ -90,7 +89,7 @@ def pressures(problem: Problem, u: fem.Function) -> list[fem.Function]:
     return found
 
 
-def prescribed(problem: Problem, u: fem.Function, space: fem.FunctionSpace) -> tuple[Flags, Array]:
+def prescribed(problem: Problem, u: fem.Function, space: fem.FunctionSpace) -> tuple[Mask, Array]:
     """Whether a bubble is free (n, d), and what prescribed displacements ask of the others (n, d). Collective."""
     d, owned = problem.scales.dimension, space.dofmap.index_map.size_local
     free, value = np.ones((owned, d), dtype=np.bool_), np.zeros((owned, d))
@@ -125,7 +124,7 @@ def midpoints(problem: Problem, u: fem.Function, bounds: Bounds, space: fem.Func
     return Midpoints(blocks, normals, np.minimum(lower, 0.0), np.maximum(upper, 0.0), np.zeros(len(blocks), np.int8))
 
 
-def _on(space: fem.FunctionSpace, facets: npt.NDArray[np.int32]) -> npt.NDArray[np.int32]:
+def _on(space: fem.FunctionSpace, facets: Entities) -> Entities:
     """Owned blocks on facets, those of a facet of another rank included. Collective."""
     found = fem.locate_dofs_topological(space, space.mesh.topology.dim - 1, facets)
     return np.unique(found[found < space.dofmap.index_map.size_local]).astype(np.int32)
@@ -142,7 +141,7 @@ def least(stiffness: Stiffness, u: fem.Function, load: Array) -> fem.Function:
     return e
 
 
-def solve(stiffness: Stiffness, load: Array, free: Flags, e: Array, parts: Sequence[Midpoints], rtol: float) -> None:
+def solve(stiffness: Stiffness, load: Array, free: Mask, e: Array, parts: Sequence[Midpoints], rtol: float) -> None:
     """The admissible bubbles of least energy, an active set method, a few rounds. Collective.
 
     Args:
@@ -163,7 +162,7 @@ def solve(stiffness: Stiffness, load: Array, free: Flags, e: Array, parts: Seque
             break
 
 
-def _project(free: Flags, parts: Sequence[Midpoints], r: Array) -> None:
+def _project(free: Mask, parts: Sequence[Midpoints], r: Array) -> None:
     """Take out of r (n, d) what is prescribed and what the bounds hold."""
     r *= free
     for part in parts:

@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 from dolfinx import fem
 from petsc4py import PETSc
 
@@ -19,13 +18,13 @@ from ...runtime.mpi import total
 from ...runtime.timing import Timer
 from ...system.held_solver import HeldPreconditioner, LinearSettings
 from ...system.system import System
+from ...typing import Array, Entities, Integers
 from .. import contact_state
-from ..certificate import Examined
+from ..certificate import Examination
 from ..contact_state import State
 from ..force_attribution import components, on_bounds, on_kink, touches
 from .law_traces import nearest, tractions
 
-Array = npt.NDArray[np.float64]
 RTOL = 0.1
 """Of the residual: the energy is then right to about its square."""
 
@@ -69,10 +68,10 @@ class Dual:
         self.system.set_rates(self._before)
 
 
-def _held(system: System, x: PETSc.Vec) -> npt.NDArray[np.int32]:
+def _held(system: System, x: PETSc.Vec) -> Entities:
     """Owned scalar dofs on a bound, or on a convex kink of a law."""
     u = x.array_r
-    found: list[npt.NDArray[np.int64]] = [np.empty(0, np.int64)]
+    found: list[Integers] = [np.empty(0, np.int64)]
     for bounds in system.bounds:
         dofs, sign = bounds.component()
         found.append(dofs[touches(bounds, sign * u[dofs])])
@@ -95,11 +94,11 @@ def smoothing(problem: Problem, states: Sequence[State]) -> Array:
     return _law_forces(problem, states, exact=True)
 
 
-def algebraic(problem: Problem, examined: Examined) -> Array:
+def algebraic(problem: Problem, examination: Examination) -> Array:
     """Nodal forces that nothing accounts for: off the carriers, beyond the laws, pulling or distant contact; (n, d)."""
-    rest = contact_state.balanced(problem, examined.forces.reaction, examined.states)
-    rest = rest - _law_forces(problem, examined.states, exact=False)  # a law's force is minus its residual
-    for state in examined.states:
+    rest = contact_state.balanced(problem, examination.forces.reaction, examination.states)
+    rest = rest - _law_forces(problem, examination.states, exact=False)  # a law's force is minus its residual
+    for state in examination.states:
         if state.bounds is not None:
             force = state.surface.weights * _unfounded(state.bounds, state)
             rest[state.surface.blocks] += force[:, None] * state.surface.normals

@@ -14,7 +14,6 @@ from typing import Any
 import basix
 import basix.ufl
 import numpy as np
-import numpy.typing as npt
 import ufl
 from dolfinx import fem, la
 from dolfinx import mesh as dmesh
@@ -22,8 +21,8 @@ from mpi4py import MPI
 
 from ...problem.problem import Problem
 from ...problem.vectors import nodal
+from ...typing import Array
 
-Array = npt.NDArray[np.float64]
 _MOST_STEPS = 30
 
 

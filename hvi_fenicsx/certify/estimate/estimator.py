@@ -10,17 +10,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 from dolfinx import fem
 
 from ...problem.problem import Problem
 from ...runtime.mpi import total
 from ...system.system import System
-from ..certificate import Examined
+from ...typing import Array
+from ..certificate import Examination
 from . import defect, dual_norm, edge_bubbles, law_traces
 from .contact_errors import OnContact, on_contact, ratio
 
-Array = npt.NDArray[np.float64]
 _ROUNDING = 1e-12
 """Nondimensional norms up to this are rounding: a body that meets no force has no error, not 100 % of nothing."""
 
@@ -57,28 +56,28 @@ class Estimate:
         return {name: float(getattr(self, name)) for name in names}
 
 
-def estimate(system: System, u: fem.Function, examined: Examined) -> Estimate:
+def estimate(system: System, u: fem.Function, examination: Examination) -> Estimate:
     """Estimate the error of a displacement. Collective.
 
     Args:
-        system: what was solved. u: its solution, nondimensional, ghosts updated. examined: of the same u.
+        system: what was solved. u: its solution, nondimensional, ghosts updated. examination: of the same u.
     """
     problem = system.problem
-    cells, unmet = _between_vertices(problem, u, examined)
+    cells, unmet = _between_vertices(problem, u, examination)
     inverse = dual_norm.Dual(system, u)
     if problem.terms:
         cells += defect.by_cell(problem, inverse.solve(unmet)[0])
-    smoothing = inverse.solve(dual_norm.smoothing(problem, examined.states))[1] if _smoothed(problem) else 0.0
-    _, algebraic = inverse.solve(dual_norm.algebraic(problem, examined))
+    smoothing = inverse.solve(dual_norm.smoothing(problem, examination.states))[1] if _smoothed(problem) else 0.0
+    _, algebraic = inverse.solve(dual_norm.algebraic(problem, examination))
     inverse.destroy()
     comm = problem.domain.mesh.comm
-    beyond = dual_norm.penetration_energy(problem, examined.states)
+    beyond = dual_norm.penetration_energy(problem, examination.states)
     return Estimate(
         np.sqrt(cells),
         _norm(total(comm, float(cells.sum()))),
         _norm(smoothing**2),
         _norm(algebraic**2 + beyond),
-        _norm(_energy(problem, u, examined)),
+        _norm(_energy(problem, u, examination)),
     )
 
 
@@ -87,10 +86,10 @@ def _norm(square: float) -> float:
     return float(np.sqrt(square)) if square > _ROUNDING**2 else 0.0
 
 
-def _between_vertices(problem: Problem, u: fem.Function, examined: Examined) -> tuple[Array, Array]:
+def _between_vertices(problem: Problem, u: fem.Function, examination: Examination) -> tuple[Array, Array]:
     """η_K² of the owned cells that P1 does not see; nodal forces (n, d) that it takes the laws' for. Collective."""
     space = edge_bubbles.space(problem.domain.mesh)
-    edges, vertices = law_traces.pointwise(problem, space, u, examined.states)
+    edges, vertices = law_traces.pointwise(problem, space, u, examination.states)
     edges *= -1.0
     edges += defect.residual(problem, u, space)
     cells = defect.by_cell(problem, defect.least(edge_bubbles.Stiffness(problem, space), u, edges))
@@ -103,9 +102,9 @@ def _smoothed(problem: Problem) -> bool:
     return any(term.law != term.exact for term in problem.terms)
 
 
-def _energy(problem: Problem, u: fem.Function, examined: Examined) -> float:
+def _energy(problem: Problem, u: fem.Function, examination: Examination) -> float:
     """a(u, u). Collective."""
-    internal = examined.forces.reaction + examined.forces.load
+    internal = examination.forces.reaction + examination.forces.load
     return total(problem.domain.mesh.comm, float(u.x.array[: internal.size] @ internal.ravel()))
 
 

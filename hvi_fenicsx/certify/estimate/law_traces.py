@@ -11,18 +11,16 @@ from dataclasses import dataclass
 
 import basix
 import numpy as np
-import numpy.typing as npt
 from dolfinx import fem, la
 
 from ...laws import Superpotential
 from ...problem.contact_surface import Surface
 from ...problem.problem import Problem
+from ...typing import Array, Entities
 from ..contact_state import State
 from ..force_attribution import NEAR, on_kink
 from .edge_bubbles import quadrature
 
-Array = npt.NDArray[np.float64]
-Indices = npt.NDArray[np.int32]
 _DEGREE = 12
 """Of the facet rule: a drop inside an edge is met to a fourteenth of its length."""
 
@@ -36,13 +34,13 @@ class Facets:
         areas: over L^(d-1), (f,).
     """
 
-    vertices: Indices
-    edges: Indices
+    vertices: Entities
+    edges: Entities
     pairs: Sequence[tuple[int, int]]
     areas: Array
 
 
-def facets(problem: Problem, bubbles: fem.FunctionSpace, local: Indices) -> Facets:
+def facets(problem: Problem, bubbles: fem.FunctionSpace, local: Entities) -> Facets:
     """The vertices and edges of boundary facets whose cell this rank owns."""
     topology, d = problem.domain.mesh.topology, problem.scales.dimension
     topology.create_connectivity(d - 1, d)

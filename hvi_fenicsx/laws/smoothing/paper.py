@@ -16,7 +16,8 @@ import numpy as np
 from typing_extensions import override
 
 from ...errors import InputError
-from ..base import ConvexPart, DifferentiablePart, FloatArray, Superpotential
+from ...typing import Array
+from ..base import ConvexPart, DifferentiablePart, Superpotential
 from ..catalogue import QuadraticLinear
 from .plus_functions import QUADRATIC
 from .smoothed_law import Smoothing
@@ -47,7 +48,7 @@ class PaperSmoothing(Smoothing, register=False):
         return QUADRATIC.kappa * self.epsilon_absolute
 
     @override
-    def value(self, x: FloatArray) -> FloatArray:
+    def value(self, x: Array) -> Array:
         y, law = np.abs(x), self.law
         with np.errstate(over="ignore"):
             exact = np.minimum(0.5 * self.slope * y * y, law.gamma2 * y)
@@ -69,16 +70,16 @@ class PaperSmoothing(Smoothing, register=False):
         """The stiffness γ1/δ of the rising branch, N/m³."""
         return self.law.gamma1 / self.law.delta
 
-    def gap(self, y: FloatArray) -> FloatArray:
+    def gap(self, y: Array) -> Array:
         """D = g2 - g1 at slips y ≥ 0, in N/m; inf where beyond the largest float."""
         with np.errstate(over="ignore"):
             return 0.5 * self.slope * y * (y - self.law.delta)
 
-    def share(self, y: FloatArray) -> FloatArray:
+    def share(self, y: Array) -> Array:
         """p'(d) at slips y ≥ 0: how far the law has passed to its second piece, from 0 to 1."""
         return QUADRATIC.derivative(self.gap(y), self.epsilon_absolute)
 
-    def traction(self, y: FloatArray) -> FloatArray:
+    def traction(self, y: Array) -> Array:
         """Right derivative at slips y ≥ 0, in N/m²: γ2/2 at 0."""
         share = self.share(y)
         with np.errstate(over="ignore"):
@@ -103,7 +104,7 @@ class _Band:
     high: float
     middle: float
 
-    def integrals(self, y: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def integrals(self, y: Array) -> tuple[Array, Array]:
         """∫∫ and ∫ of (y - δ/2)² over the part of the band below y."""
         start = (self.kink - self.middle) + self.low
         t = y - self.kink
@@ -130,21 +131,21 @@ class _PaperConcave(DifferentiablePart):
             _Band(self.law.law.delta, -inner, width / (middle + w2), middle),
         )
 
-    def _integrals(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def _integrals(self, x: Array) -> tuple[Array, Array]:
         factor = self.law.slope * (self.law.slope / self.law.epsilon_absolute)
         near, far = (band.integrals(np.abs(x)) for band in self._bands)
         return factor * (near[0] + far[0]), factor * (near[1] + far[1])
 
     @override
-    def value(self, x: FloatArray) -> FloatArray:
+    def value(self, x: Array) -> Array:
         return self._integrals(x)[0]
 
     @override
-    def right(self, x: FloatArray) -> FloatArray:
+    def right(self, x: Array) -> Array:
         return np.asarray(np.sign(x) * self._integrals(x)[1])
 
     @override
-    def second(self, x: FloatArray) -> FloatArray:
+    def second(self, x: Array) -> Array:
         y, s, law = np.abs(x), self.law.slope, self.law.law
         inside = np.abs(self.law.gap(y)) < 0.5 * self.law.epsilon_absolute
         rate = np.where(inside, s * y - law.gamma2, 0.0)
@@ -159,22 +160,22 @@ class _PaperConvex(ConvexPart):
 
     @property
     @override
-    def kinks(self) -> FloatArray:
+    def kinks(self) -> Array:
         return np.zeros(1)
 
     @override
-    def value(self, x: FloatArray) -> FloatArray:
+    def value(self, x: Array) -> Array:
         return self.law.value(x) + self.law.concave.value(x)
 
     @override
-    def left(self, x: FloatArray) -> FloatArray:
+    def left(self, x: Array) -> Array:
         return -self.right(-x)
 
     @override
-    def right(self, x: FloatArray) -> FloatArray:
+    def right(self, x: Array) -> Array:
         y = np.abs(x)
         return np.where(x >= 0.0, 1.0, -1.0) * (self.law.traction(y) + self.law.concave.right(y))
 
     @override
-    def second(self, x: FloatArray) -> FloatArray:
+    def second(self, x: Array) -> Array:
         return self.law.slope * (1.0 - self.law.share(np.abs(x)))

@@ -15,7 +15,8 @@ from typing import ClassVar
 import numpy as np
 from typing_extensions import override
 
-from ..base import FloatArray, quotient
+from ...typing import Array
+from ..base import quotient
 
 
 @dataclass(frozen=True)
@@ -29,24 +30,24 @@ class PlusFunction(ABC):
     """How the difference behaves away from the kink."""
 
     @abstractmethod
-    def profile(self, z: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def profile(self, z: Array) -> tuple[Array, Array, Array]:
         """D, D' and D'' at z = |t|/e ≥ 0, inf included."""
 
-    def value(self, t: FloatArray, e: float) -> FloatArray:
+    def value(self, t: Array, e: float) -> Array:
         """The function p(t; e)."""
         return np.asarray(np.maximum(t, 0.0) + e * self._at(t, e)[0])
 
-    def derivative(self, t: FloatArray, e: float) -> FloatArray:
+    def derivative(self, t: Array, e: float) -> Array:
         """Its derivative by t, from 0 to 1, and 1/2 at 0."""
         slope = self._at(t, e)[1]
         return np.where(t >= 0.0, 1.0 + slope, -slope)
 
-    def second(self, t: FloatArray, e: float) -> FloatArray:
+    def second(self, t: Array, e: float) -> Array:
         """Its second derivative by t."""
         with np.errstate(over="ignore"):
             return np.asarray(self._at(t, e)[2] / e)
 
-    def _at(self, t: FloatArray, e: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def _at(self, t: Array, e: float) -> tuple[Array, Array, Array]:
         with np.errstate(over="ignore"):
             return self.profile(np.abs(t) / e)
 
@@ -60,7 +61,7 @@ class Quadratic(PlusFunction):
     decay = "zero for |t| >= e/2"
 
     @override
-    def profile(self, z: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def profile(self, z: Array) -> tuple[Array, Array, Array]:
         rest = np.maximum(0.5 - z, 0.0)
         return 0.5 * rest**2, -rest, np.where(z < 0.5, 1.0, 0.0)
 
@@ -74,7 +75,7 @@ class Chks(PlusFunction):
     decay = "at most e^2/|t|"
 
     @override
-    def profile(self, z: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def profile(self, z: Array) -> tuple[Array, Array, Array]:
         root = np.hypot(z, 2.0)
         # (√(z² + 4) - z)/2 and its derivative, written without the difference of near equals.
         difference = quotient(np.full_like(z, 2.0), root + z)
@@ -90,7 +91,7 @@ class LogExp(PlusFunction):
     decay = "at most e exp(-|t|/e)"
 
     @override
-    def profile(self, z: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def profile(self, z: Array) -> tuple[Array, Array, Array]:
         small = np.exp(-z)
         share = small / (1.0 + small)
         return np.log1p(small), -share, share / (1.0 + small)

@@ -13,7 +13,8 @@ from functools import cached_property
 import numpy as np
 from typing_extensions import override
 
-from ..base import ConvexPart, DifferentiablePart, Directional, FloatArray, IntArray, Superpotential
+from ...typing import Array, Integers
+from ..base import ConvexPart, DifferentiablePart, Directional, Superpotential
 from .checks import require_epsilon
 from .plus_functions import QUADRATIC, PlusFunction
 
@@ -33,11 +34,11 @@ class SmoothedPart(DifferentiablePart):
     even: bool
 
     @override
-    def value(self, x: FloatArray) -> FloatArray:
+    def value(self, x: Array) -> Array:
         return self.part.value(x) + self.correction(x)
 
     @override
-    def right(self, x: FloatArray) -> FloatArray:
+    def right(self, x: Array) -> Array:
         folded, sign = self._fold(x)
         _, slopes, _ = self._profiles(folded)
         # Right of a kink the plus function's slope is 1 + D', left of it -D'; the 1 is the part's own jump.
@@ -45,30 +46,30 @@ class SmoothedPart(DifferentiablePart):
         return np.asarray(sign * (self.part.right(folded) + turned @ self._heights))
 
     @override
-    def second(self, x: FloatArray) -> FloatArray:
+    def second(self, x: Array) -> Array:
         folded, _ = self._fold(x)
         _, _, curvatures = self._profiles(folded)
         with np.errstate(over="ignore"):
             stiffness = np.minimum(self._heights / self.epsilon * self._heights, _LARGEST)
             return np.asarray(self.part.second(folded) + (curvatures * stiffness).sum(axis=1))
 
-    def correction(self, x: FloatArray) -> FloatArray:
+    def correction(self, x: Array) -> Array:
         """What the smoothing adds to the part, from 0 to κ ε for each kink."""
         values, _, _ = self._profiles(self._fold(x)[0])
         return np.asarray(self.epsilon * values.sum(axis=1))
 
-    def _fold(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def _fold(self, x: Array) -> tuple[Array, Array]:
         return (np.abs(x), np.sign(x)) if self.even else (x, np.ones_like(x))
 
     @cached_property
-    def _places(self) -> FloatArray:
+    def _places(self) -> Array:
         return self.part.kinks
 
     @cached_property
-    def _heights(self) -> FloatArray:
+    def _heights(self) -> Array:
         return self.part.jumps
 
-    def _profiles(self, x: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def _profiles(self, x: Array) -> tuple[Array, Array, Array]:
         """D, D', D'' (m, k) of each point and kink, at their distance in units of the kink's width ε/jump."""
         with np.errstate(over="ignore"):
             return self.plus.profile(np.abs(x[:, None] - self._places) / self.epsilon * self._heights)
@@ -110,7 +111,7 @@ class Smoothing(Superpotential, register=False):
         return self.law.even
 
     @override
-    def piece(self, x: FloatArray) -> IntArray:
+    def piece(self, x: Array) -> Integers:
         return self.law.piece(x)
 
 
@@ -141,7 +142,7 @@ class SmoothedLaw(Smoothing, register=False):
         return self.plus.kappa * self.epsilon_absolute * kinks
 
     @override
-    def value(self, x: FloatArray) -> FloatArray:
+    def value(self, x: Array) -> Array:
         # From the law itself, not H - G: at large x that would be a difference of large numbers.
         return self.law.value(x) + (self._smooth_convex.correction(x) - self._smooth_concave.correction(x))
 

@@ -12,9 +12,10 @@ from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
 from matplotlib.patches import PathPatch
 
+from ...typing import Array, Integers
 from ..reader import Result
 from ..units import times, unit_for
-from ..vtu import Array, Body, Ints
+from ..vtu import Body
 from . import plane_marks as marks
 from .boundary_chains import chains, closed_path
 from .deformed import Deformed, deform, footings, largest_stress
@@ -68,7 +69,7 @@ def canvas(points: Array) -> tuple[Figure, Axes]:
 
 
 def paint(
-    axes: Axes, shape: Deformed, triangles: Ints, corners: Array, values: Array, colours: Colormap, end: float
+    axes: Axes, shape: Deformed, triangles: Integers, corners: Array, values: Array, colours: Colormap, end: float
 ) -> None:
     """The body over its undeformed outline, in the colours of values at the corners of triangles, from zero."""
     body, points = shape.body, shape.points
@@ -92,7 +93,7 @@ def _pixels_between_lines(axes: Axes, body: Body) -> float:
     return per_metre * float(np.sqrt(np.prod(np.ptp(body.points[:, :2], axis=0)) / len(body.cells)))
 
 
-def _shading(axes: Axes, corners: Array, triangles: Ints, values: Array) -> AxesImage:
+def _shading(axes: Axes, corners: Array, triangles: Integers, values: Array) -> AxesImage:
     """Values as an image of the picture's own pixels."""
     (left, right), (bottom, top) = axes.get_xlim(), axes.get_ylim()
     wide = round(SIDE * DPI)

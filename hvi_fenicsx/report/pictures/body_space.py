@@ -16,9 +16,10 @@ from matplotlib.axes import Axes
 from matplotlib.colors import Colormap
 from matplotlib.figure import Figure
 
+from ...typing import Array
 from ..reader import Result
 from ..units import quantity, times, unit_for
-from ..vtu import Array, Body
+from ..vtu import Body
 from . import vtk_loads
 from .body_plane import canvas
 from .deformed import Deformed, Footing, deform, footings, largest_stress
@@ -79,7 +80,7 @@ def draw(path: Path, result: Result, body: Body) -> None:
 
 def placed(shape: Deformed, view: View, foot: Footing, normal: Array) -> Patched:
     """A part where it is if it is seen there, else so far out along its normal that the body does not hide it."""
-    unit = normal / (float(np.linalg.norm(normal)) or 1.0)
+    unit = np.asarray(normal / (float(np.linalg.norm(normal)) or 1.0), dtype=np.float64)
     if float(unit @ view.toward) > FACING:
         return Patched(foot, shape.points + 1e-3 * shape.body.size * view.toward, np.zeros(3))
     seen = view.project(unit[None])[0]

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.path import Path as DrawnPath
 
-from ..vtu import Array, Ints
+from ...typing import Array, Integers
 
 
-def chains(edges: Ints) -> list[Ints]:
+def chains(edges: Integers) -> list[Integers]:
     """Oriented edges (k, 2) as chains of vertices; a closed one ends where it starts."""
     after: dict[int, list[int]] = {}
     for a, b in zip(map(int, edges[:, 0]), map(int, edges[:, 1]), strict=True):
@@ -29,13 +29,13 @@ def chains(edges: Ints) -> list[Ints]:
     return found
 
 
-def closed_path(points: Array, loops: list[Ints]) -> DrawnPath:
+def closed_path(points: Array, loops: list[Integers]) -> DrawnPath:
     """The outline as one path, holes included, fit for clipping."""
     paths = [DrawnPath(points[loop, :2], closed=True) for loop in loops]
     return DrawnPath.make_compound_path(*paths)
 
 
-def normals(points: Array, chain: Ints) -> Array:
+def normals(points: Array, chain: Integers) -> Array:
     """Outward unit normals (m, 2) at a chain's vertices: the body is on the left of its edges."""
     along = np.diff(points[chain, :2], axis=0)
     outward = np.column_stack([along[:, 1], -along[:, 0]])

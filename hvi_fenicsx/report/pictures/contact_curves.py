@@ -8,11 +8,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 
-from ..reader import Array, Part, Result
+from ...typing import Array, Mask
+from ..reader import Part, Result
 from ..units import Unit, quantity, unit_for
 from .style import BLUE, GREEN, GREY, HEADING, INK, ORANGE, VERMILION, area, figure, heading, save
 
@@ -177,7 +177,7 @@ def _lifted_spans(part: Part) -> list[tuple[float, float]]:
     return [(float(middles[a]), float(middles[b])) for a, b in _runs(part.lifted)]
 
 
-def _runs(flags: npt.NDArray[np.bool_]) -> Iterator[tuple[int, int]]:
+def _runs(flags: Mask) -> Iterator[tuple[int, int]]:
     """Where flags are set, as half-open ranges."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(int), [0]])))
     yield from zip(map(int, edges[::2]), map(int, edges[1::2]), strict=True)

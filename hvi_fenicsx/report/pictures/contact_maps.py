@@ -13,9 +13,10 @@ from matplotlib.colors import Colormap
 from matplotlib.figure import Figure
 from matplotlib.tri import Triangulation
 
+from ...typing import Array, Integers
 from ..reader import Part, Result
 from ..units import Unit, quantity, unit_for
-from ..vtu import Array, Body, Ints
+from ..vtu import Body
 from .deformed import Footing, footings
 from .raster import shade
 from .style import BLUE, GREEN, GREY, HEADING, INK, WIDTH, area, figure, heading, pressure_scale, save, shades
@@ -35,7 +36,7 @@ class Flat:
     """A part laid flat: its vertices (m, 2), m, triangles between them, the two axes (2, 3) and their names."""
 
     points: Array
-    triangles: Ints
+    triangles: Integers
     axes: Array
     names: tuple[str, str]
 
@@ -56,7 +57,7 @@ def draw(path: Path, result: Result, part: Part, body: Body) -> None:
     for above, (words, name, values, arrows, colours) in enumerate(reversed(rows)):
         axes = area(made, LEFT, FOOT + above * (height + GAP), width, height)
         unit = unit_for(float(np.nanmax(np.abs(values), initial=0.0)), name)
-        _map(made, axes, flat, values / unit.size, colours, _symbol(words, unit))
+        _map(made, axes, flat, np.asarray(values / unit.size), colours, _symbol(words, unit))
         _grey_where_lifted(axes, flat, part)
         if arrows is not None:
             _arrows(axes, flat, arrows)

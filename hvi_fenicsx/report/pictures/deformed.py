@@ -8,9 +8,10 @@ from functools import cached_property
 
 import numpy as np
 
+from ...typing import Array, Integers
 from ..reader import Part, Result
 from ..units import round_below
-from ..vtu import Array, Body, Ints
+from ..vtu import Body
 
 VISIBLE = 0.08
 """How large the largest displacement is drawn, of the body's size."""
@@ -47,12 +48,12 @@ class Footing:
     """
 
     part: Part
-    vertices: Ints
-    facets: Ints
-    row: Ints
+    vertices: Integers
+    facets: Integers
+    row: Integers
     obstacle: Array | None
 
-    def values(self, column: Array, vertices: Ints) -> Array:
+    def values(self, column: Array, vertices: Integers) -> Array:
         """A column of the table at some of its vertices."""
         return np.asarray(column[self.row[vertices]])
 

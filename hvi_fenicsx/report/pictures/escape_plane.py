@@ -12,8 +12,9 @@ from matplotlib.figure import Figure
 from matplotlib.patches import FancyArrowPatch, Patch, PathPatch
 from matplotlib.path import Path as DrawnPath
 
+from ...typing import Array
 from ..reader import Result
-from ..vtu import Array, Body
+from ..vtu import Body
 from . import plane_marks as marks
 from .body_plane import canvas
 from .boundary_chains import chains, closed_path

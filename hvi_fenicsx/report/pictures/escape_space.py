@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...typing import Array
 from ..reader import Result
-from ..vtu import Array, Body
+from ..vtu import Body
 from . import vtk_loads
 from .body_plane import canvas
 from .deformed import Deformed

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..vtu import Array, Body
+from ...typing import Array
+from ..vtu import Body
 
 REACH = 0.3
 """How far the ghost goes, of the body's size."""
@@ -47,7 +48,7 @@ def fitted(body: Body, mode: Array) -> Motion:
         return Motion(middle, shift * REACH * body.size / (float(np.linalg.norm(shift)) or 1.0), np.zeros(3))
     pole = middle + np.cross(spin, shift) / square
     reach = REACH * body.size / float(np.linalg.norm(mode, axis=1).max())
-    return Motion(pole, reach * spin * float(shift @ spin) / square, reach * spin)
+    return Motion(pole, reach * float(shift @ spin) / float(square) * spin, reach * spin)
 
 
 def _spin(arms: Array, field: Array) -> Array:

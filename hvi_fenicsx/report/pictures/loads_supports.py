@@ -10,8 +10,9 @@ import numpy as np
 
 from ...errors import HviError
 from ...formula import Formula
+from ...typing import Array, Integers
 from ..reader import Result
-from ..vtu import Array, Body, Ints
+from ..vtu import Body
 from .boundary_chains import chains, normals
 from .vtk_view import area_vectors
 
@@ -25,8 +26,8 @@ class Side:
     """
 
     part: str
-    vertices: Ints
-    facets: Ints
+    vertices: Integers
+    facets: Integers
     normals: Array
 
     @property
@@ -82,14 +83,14 @@ def tables(result: Result, body: Body) -> Iterator[tuple[Side, Mapping[str, Any]
             yield side, table
 
 
-def _lines(name: str, body: Body, facets: Ints) -> Iterator[Side]:
+def _lines(name: str, body: Body, facets: Integers) -> Iterator[Side]:
     for chain in chains(facets):
         edges = np.column_stack([chain[:-1], chain[1:]])
         outward = np.pad(normals(body.points, chain), ((0, 0), (0, 1)))
         yield Side(name, chain, edges, outward)
 
 
-def _faces(name: str, body: Body, facets: Ints) -> Iterator[Side]:
+def _faces(name: str, body: Body, facets: Integers) -> Iterator[Side]:
     if not len(facets):
         return
     vertices, index = np.unique(facets, return_inverse=True)

@@ -7,14 +7,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
+from ...typing import Array, Mask
 from ..units import quantity
-from ..vtu import Array
 from .boundary_chains import chains, normals
 from .deformed import Deformed, Footing
 from .loads_supports import Load, Support
@@ -55,7 +54,7 @@ def loads(shape: Deformed, found: list[Load]) -> Iterator[Mark]:
         points = shape.points[load.side.vertices, :2]
         largest = float(np.linalg.norm(load.traction, axis=1).max())
         at = _spread(points, size)
-        arrows = _along(points, load.traction[:, :2], at) * LOAD * size / largest
+        arrows = _along(points, load.traction[:, :2], at) * float(LOAD * size / largest)
         feet, outward = _along(points, points, at), _along(points, load.side.normals[:, :2], at)
         pushed = np.einsum("ki,ki->k", arrows, outward) < -1e-6 * LOAD * size
         tails = feet - np.where(pushed[:, None], arrows, 0.0)
@@ -86,7 +85,7 @@ def _lengths(points: Array) -> Array:
 def _spread(points: Array, size: float, fewest: int = 2) -> Array:
     """Where to put arrows on a line, as lengths along it."""
     length = float(_lengths(points)[-1])
-    return np.linspace(0.0, length, max(fewest, round(ARROWS * length / size)))
+    return np.linspace(0.0, length, max(fewest, round(ARROWS * length / size)), dtype=np.float64)
 
 
 def _along(points: Array, values: Array, at: Array) -> Array:
@@ -143,7 +142,7 @@ def _support(wall: Array, rollers: Array, outward: Array, size: float) -> Mark:
 def _hatched(axes: Axes, line: Array, outward: Array, size: float) -> None:
     """A line with the short strokes behind it by which drawings tell a wall."""
     axes.plot(*line.T, color=INK, lw=2.2, solid_capstyle="butt", clip_on=False, zorder=3)
-    places = np.arange(0.0, float(_lengths(line)[-1]), 0.02 * size)
+    places = np.arange(0.0, float(_lengths(line)[-1]), 0.02 * size, dtype=np.float64)
     at, normal = _along(line, line, places), _along(line, outward, places)
     tips = at + 0.02 * size * (normal + np.column_stack([-normal[:, 1], normal[:, 0]]))
     strokes = np.stack([at, tips, np.full_like(at, np.nan)], axis=1).reshape(-1, 2)
@@ -174,7 +173,7 @@ def _obstacle(base: Array) -> Mark:
     return Mark(base, draw, lambda: Line2D([], [], color=GREY, lw=4, label="obstacle"), "obstacle")
 
 
-def _lifted(points: Array, off: npt.NDArray[np.bool_], gap: float) -> Mark:
+def _lifted(points: Array, off: Mask, gap: float) -> Mark:
     """The part's own line where it is off the obstacle; points that are not are left out of it."""
     line, words = np.where(off[:, None], points, np.nan), f"lifted, up to {quantity(gap, 'm')}"
     style: dict[str, Any] = {"color": ORANGE, "lw": 4.5, "marker": "o", "ms": 2.5, "solid_capstyle": "butt"}

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from ..vtu import Array, Ints
+from ...typing import Array, Integers
 
 _AT_ONCE = 100_000
 """Candidate pixels handled at a time: what fits a cache is twice as fast."""
@@ -19,7 +19,7 @@ _LARGEST = 1 << 20
 """More pixels than an image has on a side."""
 
 
-def shade(points: Array, triangles: Ints, values: Array, shape: tuple[int, int]) -> Array:
+def shade(points: Array, triangles: Integers, values: Array, shape: tuple[int, int]) -> Array:
     """Values (n,) at points (n, 2) in pixels, the image's lower left corner being (0, 0), as an image.
 
     Returns:
@@ -34,7 +34,7 @@ def shade(points: Array, triangles: Ints, values: Array, shape: tuple[int, int])
     return image
 
 
-def _by_box(sizes: Ints) -> Iterator[tuple[Ints, tuple[int, int]]]:
+def _by_box(sizes: Integers) -> Iterator[tuple[Integers, tuple[int, int]]]:
     """Triangles grouped by the width and height of their boxes, in portions; those that hold no pixel left out."""
     full = np.flatnonzero((sizes > 0).all(axis=1))
     width, height = _coarser(sizes[full]).T
@@ -46,14 +46,14 @@ def _by_box(sizes: Ints) -> Iterator[tuple[Ints, tuple[int, int]]]:
             yield group[start : start + portion], (w, h)
 
 
-def _coarser(sizes: Ints) -> Ints:
+def _coarser(sizes: Integers) -> Integers:
     """Sizes rounded up, so that there are few groups: to 1, 2, 3, 4, 6, 8, 12, 16, ..."""
     power = 2 ** np.floor(np.log2(sizes)).astype(np.int64)
     half = np.maximum(power // 2, 1)
     return power + half * -((power - sizes) // half)
 
 
-def _fill(image: Array, corners: Array, values: Array, low: Ints, box: tuple[int, int]) -> None:
+def _fill(image: Array, corners: Array, values: Array, low: Integers, box: tuple[int, int]) -> None:
     """Set the pixels of triangles whose boxes start at ``low`` and are of a common size."""
     x, y = (a.ravel() for a in np.meshgrid(np.arange(box[0]), np.arange(box[1])))
     columns, rows = low[:, :1] + x, low[:, 1:] + y

@@ -12,8 +12,9 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.patches import Patch
 
+from ...typing import Array
 from ..reader import Result
-from ..vtu import Array, Body
+from ..vtu import Body
 from . import vtk_loads
 from .body_plane import canvas
 from .deformed import Deformed

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...typing import Array, Integers
 from ..reader import Result
 from ..units import times
-from ..vtu import Array, Body, Ints
+from ..vtu import Body
 from . import vtk_loads
 from .body_plane import canvas
 from .body_space import Patched, guides, placed
@@ -68,7 +69,7 @@ def _fill(
         vtk_loads.fill(plotter, tails, ways)
 
 
-def _paint(plotter: pyvista.Plotter, points: Array, facets: Ints, values: Array, end: float) -> None:
+def _paint(plotter: pyvista.Plotter, points: Array, facets: Integers, values: Array, end: float) -> None:
     """Facets in the colours of the scale itself: no light changes them."""
     skin = surface(points, facets)
     skin.cell_data[FIELD] = values

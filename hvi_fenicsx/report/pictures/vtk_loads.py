@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.axes import Axes
 
+from ...typing import Array, Integers
 from ..units import quantity
-from ..vtu import Array, Ints
 from .deformed import Deformed
 from .loads_supports import Load
 from .style import INK
@@ -43,7 +43,7 @@ def arrows(shape: Deformed, load: Load) -> tuple[Array, Array]:
     return tails[visible], ways[visible]
 
 
-def _sparse(points: Array, size: float) -> Ints:
+def _sparse(points: Array, size: float) -> Integers:
     """Of points on a face, one near each node of a coarse grid."""
     low = points.min(axis=0)
     extent = np.ptp(points, axis=0)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.axes import Axes
 
-from ..vtu import Array, Ints
+from ...typing import Array, Integers
 
 if TYPE_CHECKING:
     import pyvista
@@ -56,13 +56,14 @@ def best_view(normals: Sequence[Array]) -> View:
     return views[int(np.argmax(np.round(seen, 6)))]
 
 
-def area_vectors(points: Array, facets: Ints) -> Array:
+def area_vectors(points: Array, facets: Integers) -> Array:
     """Outward normals (k, 3) of facets, as long as their areas."""
     corner = points[facets[:, 0]]
-    return np.cross(points[facets[:, 1]] - corner, points[facets[:, 2]] - corner) / 2.0
+    normals = np.cross(points[facets[:, 1]] - corner, points[facets[:, 2]] - corner)
+    return np.asarray(normals / 2.0, dtype=np.float64)
 
 
-def surface(points: Array, facets: Ints) -> pyvista.PolyData:
+def surface(points: Array, facets: Integers) -> pyvista.PolyData:
     """Facets as VTK's, without the points that none of them has."""
     import pyvista
 
@@ -72,7 +73,7 @@ def surface(points: Array, facets: Ints) -> pyvista.PolyData:
     return made
 
 
-def creases(points: Array, facets: Ints, angle: float = 25.0) -> pyvista.PolyData:
+def creases(points: Array, facets: Integers, angle: float = 25.0) -> pyvista.PolyData:
     """The edges at which facets meet at an angle (degrees), and those of one facet only."""
     return surface(points, facets).extract_feature_edges(angle, manifold_edges=False, non_manifold_edges=False)
 

@@ -8,7 +8,6 @@ from typing import Any
 
 import dolfinx
 import numpy as np
-import numpy.typing as npt
 import ufl
 from dolfinx import fem
 from petsc4py import PETSc
@@ -18,11 +17,12 @@ from ..formula import Formula, ufl_algebra
 from ..mesh import vertex_dofs
 from ..mesh.domain import Domain
 from ..runtime.mpi import agree
+from ..typing import Array
 from .scaling import Placed, Scales
 
 
-class Stage:
-    """What effects see of the problem while it is composed (:class:`.effects.base.Stage`)."""
+class FormContext:
+    """What effects see of the problem while it is composed (:class:`.effects.base.FormContext`)."""
 
     def __init__(
         self, domain: Domain, parts: Mapping[str, Sequence[str]], scales: Scales, effects: Sequence[Placed]
@@ -36,7 +36,7 @@ class Stage:
         self.part_facets = {name: domain.facets(on) for name, on in parts.items()}
 
     @functools.cached_property
-    def points(self) -> npt.NDArray[np.float64]:
+    def points(self) -> Array:
         """The local vertices (owned and ghost), m, (n, 3)."""
         return vertex_dofs.points(self.space)
 

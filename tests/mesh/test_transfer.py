@@ -94,8 +94,8 @@ def test_odd_and_small_meshes_have_no_ladder() -> None:
 def test_nested_solutions_are_certified(demo: str) -> None:
     found = workflow.solve(read_scene(DEMOS / f"{demo}.toml", ["domain.cells=[64, 64]"]))
     assert found.converged
-    assert found.solved is not None
-    assert found.solved.levels == 3
+    assert found.solve_result is not None
+    assert found.solve_result.levels == 3
 
 
 @pytest.mark.usefixtures("everything_nested")
@@ -104,7 +104,7 @@ def test_a_convex_scene_ends_where_the_direct_solve_ends() -> None:
     overrides = ["domain.cells=[64, 64]", 'boundary.press.traction=[0.0, "-1e6*(1 - 1.5*x)"]']
     scene = read_scene(DEMOS / "strong_law.toml", [*overrides, 'boundary.floor={on="bottom", contact={gap=0.0}}'])
     direct = scene.model_copy(update={"solver": scene.solver.model_copy(update={"linear_solver": "lu"})})
-    energies = [workflow.solve(s).examined.energy for s in (scene, direct)]  # type: ignore[union-attr]
+    energies = [workflow.solve(s).examination.energy for s in (scene, direct)]  # type: ignore[union-attr]
     assert energies[0] == pytest.approx(energies[1], rel=1e-9)
 
 
@@ -173,8 +173,8 @@ def test_only_what_stood_on_every_rung_is_solved_in_one_step(demo: str, steady: 
     """The floor stays closed and its pieces stand, or the end of contact and the drop move from rung to rung."""
     found = workflow.solve(read_scene(DEMOS / f"{demo}.toml", ["domain.cells=[128, 128]"]))
     assert found.converged
-    assert found.solved is not None
-    assert found.solved.steady is steady
+    assert found.solve_result is not None
+    assert found.solve_result.steady is steady
 
 
 @pytest.mark.parametrize("body", [meshes.GOOD, meshes.SLANTED], ids=["straight", "slanted"])
@@ -189,10 +189,10 @@ def test_a_refined_file_goes_up_the_ladder_of_its_meshes(body: str, tmp_path: Pa
     )
     mesh = replace(assemble.mesh(scene, MPI.COMM_WORLD), origin=None)
     direct, found = workflow.finish(workflow.prepare(alone, body=mesh)), workflow.solve(scene)
-    assert found.solved is not None
-    assert found.solved.levels > 1
+    assert found.solve_result is not None
+    assert found.solve_result.levels > 1
     assert found.dofs == direct.dofs
-    assert found.examined.energy == pytest.approx(direct.examined.energy, rel=1e-9)  # type: ignore[union-attr]
+    assert found.examination.energy == pytest.approx(direct.examination.energy, rel=1e-9)  # type: ignore[union-attr]
 
 
 def test_refinements_that_memory_cannot_hold_are_refused(tmp_path: Path) -> None:
