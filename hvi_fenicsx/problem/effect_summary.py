@@ -12,7 +12,7 @@ import numpy as np
 
 from ..effects.base import Contribution, Direction, Effect, Place
 from .contact_surface import Surface
-from .problem import Made, Problem
+from .problem import PlacedContribution, Problem
 
 _BOUNDS = ("gap", "sigma_n", "contact")
 _LAWS = {
@@ -52,7 +52,7 @@ def shares(problem: Problem) -> list[Share]:
     return [_share(problem, made, brings=i == first) for i, made in enumerate(problem.made)]
 
 
-def _share(problem: Problem, made: Made, *, brings: bool) -> Share:
+def _share(problem: Problem, made: PlacedContribution, *, brings: bool) -> Share:
     where, effect, contribution = made
     total = problem.space.dofmap.index_map.size_global * problem.space.dofmap.index_map_bs
     return Share(
