@@ -162,8 +162,9 @@ def _dispatch(options: argparse.Namespace, words: Sequence[str]) -> int:
         processes.die_with_parent(signal.SIGKILL)
     with _undisturbed():
         from . import commands
+        from .runtime.mpi import ended_together
 
-    with commands.ended_together():
+    with ended_together(commands.COMM):
         return commands.run(options) if options.command == "run" else commands.check(options)
 
 

@@ -4,10 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
-import sys
-import traceback
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -30,21 +27,6 @@ from .system import petsc_options
 from .workflow import NO_SOLUTION, NOT_CONVERGED, Prepared, Solution, finish, prepare
 
 COMM = MPI.COMM_WORLD
-
-
-@contextmanager
-def ended_together() -> Iterator[None]:
-    """An error that was not foreseen on one rank ends all of them: the others would wait for it for ever."""
-    try:
-        yield
-    except (HviError, KeyboardInterrupt):
-        raise  # all ranks alike
-    except Exception:
-        if COMM.size > 1:
-            traceback.print_exc()
-            sys.stderr.flush()
-            COMM.Abort(1)
-        raise
 
 
 def run(options: argparse.Namespace) -> int:

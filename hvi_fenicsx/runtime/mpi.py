@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import sys
+import traceback
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any, TypeVar
 
 from mpi4py import MPI
@@ -35,6 +38,21 @@ def on_root(comm: MPI.Comm, action: Callable[[], T]) -> T:
     error, result = comm.bcast((error, result), root=0)
     _raise_first([error])
     return result
+
+
+@contextmanager
+def ended_together(comm: MPI.Comm) -> Iterator[None]:
+    """An error that was not foreseen on one rank ends all of them: the others would wait for it for ever."""
+    try:
+        yield
+    except (HviError, KeyboardInterrupt):
+        raise  # all ranks alike
+    except Exception:
+        if comm.size > 1:
+            traceback.print_exc()
+            sys.stderr.flush()
+            comm.Abort(1)
+        raise
 
 
 def _raise_first(errors: list[HviError | None]) -> None:

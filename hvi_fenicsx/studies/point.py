@@ -18,10 +18,9 @@ from scipy import sparse
 
 from ..accuracy.adaptive import Climber
 from ..accuracy.control import Goal, reach
-from ..commands import ended_together
 from ..errors import HviError
 from ..results.summary import summary
-from ..runtime.mpi import on_root
+from ..runtime.mpi import ended_together, on_root
 from ..runtime.timing import Timer
 from ..scene import Scene, read_scene
 from ..workflow import Solution, finish, prepare
@@ -41,7 +40,7 @@ def main() -> int:
     parser.add_argument("--accuracy", type=float, help="of an adaptive mesh, in the energy norm")
     options = parser.parse_args()
     try:
-        with ended_together():
+        with ended_together(COMM):
             _point(options)
     except HviError as error:
         if COMM.rank == 0:
