@@ -10,9 +10,9 @@ from ..effects import Effect
 from ..effects.contact import Contact
 from ..effects.loads import PrescribedDisplacement, Traction
 from ..errors import InputError
-from .messages import shown, unknown
+from ..schema import Mistake, shown, unknown
+from .named_tables import WHOLE
 from .shapes import MeshFile
-from .tables import WHOLE, Problem
 
 if TYPE_CHECKING:
     from .effect_tables import Boundary
@@ -23,19 +23,19 @@ _Item = tuple[_Key, tuple[str, ...], Effect]
 """The place in the scene, the sides, the effect."""
 
 
-def contradictions(scene: Scene) -> list[Problem]:
+def contradictions(scene: Scene) -> list[Mistake]:
     """All that does not fit; the finer checks only where the coarse ones find nothing."""
     return list(_coarse(scene)) or list(_fine(scene))
 
 
-def _coarse(scene: Scene) -> Iterator[Problem]:
+def _coarse(scene: Scene) -> Iterator[Mistake]:
     yield from _unknown_sides(scene)
     yield from _regions(scene)
     yield from _one_by_one(scene)
     yield from _start(scene)
 
 
-def _fine(scene: Scene) -> Iterator[Problem]:
+def _fine(scene: Scene) -> Iterator[Mistake]:
     yield from _smoothing(scene)
     items = [*_on_boundary(scene.boundary)]
     yield from _exclusive(items)
@@ -43,7 +43,7 @@ def _fine(scene: Scene) -> Iterator[Problem]:
         yield from _on_side(side, [(key, effect) for key, on, effect in items if side in on], scene)
 
 
-def _unknown_sides(scene: Scene) -> Iterator[Problem]:
+def _unknown_sides(scene: Scene) -> Iterator[Mistake]:
     if isinstance(scene.domain, MeshFile):
         return  # only the mesh knows its groups
     known = list(scene.domain.normals)
@@ -51,33 +51,33 @@ def _unknown_sides(scene: Scene) -> Iterator[Problem]:
         for side in boundary.on:
             if side not in known:
                 text = f"{unknown('side', side, known)} (a {scene.domain.shape})"
-                yield Problem(("boundary", name, "on"), text)
+                yield Mistake(("boundary", name, "on"), text)
 
 
-def _regions(scene: Scene) -> Iterator[Problem]:
+def _regions(scene: Scene) -> Iterator[Mistake]:
     seen: dict[str, str] = {}
     for name, material in scene.material.items():
         if material.region is None and len(scene.material) > 1:
             text = 'region is missing: with several materials each says where it is, region = "..."'
-            yield Problem(("material", name), text)
+            yield Mistake(("material", name), text)
         for region in material.region or ():
             if region in seen:
                 text = f"{shown(region)} has a material already, {seen[region]}; name it once"
-                yield Problem(("material", name, "region"), text)
+                yield Mistake(("material", name, "region"), text)
             seen[region] = name
     if not isinstance(scene.domain, MeshFile):
         yield from _no_regions("material", scene.material)
         yield from _no_regions("body", scene.body)
 
 
-def _no_regions(table: str, entries: Mapping[str, Any]) -> Iterator[Problem]:
+def _no_regions(table: str, entries: Mapping[str, Any]) -> Iterator[Mistake]:
     for name, entry in entries.items():
         if entry.region is not None:
             text = 'a built-in shape has no regions; leave region out, or use shape = "file"'
-            yield Problem((table, name, "region"), text)
+            yield Mistake((table, name, "region"), text)
 
 
-def _one_by_one(scene: Scene) -> Iterator[Problem]:
+def _one_by_one(scene: Scene) -> Iterator[Mistake]:
     """What each effect itself refuses in this dimension."""
     materials = [(("material", n), m.elasticity) for n, m in scene.material.items()]
     bodies = [(("body", n, e.key), e) for n, b in scene.body.items() for e in b.effects]
@@ -86,14 +86,14 @@ def _one_by_one(scene: Scene) -> Iterator[Problem]:
         try:
             effect.check(scene.dimension)
         except InputError as error:
-            yield Problem(key, str(error))
+            yield Mistake(key, str(error))
 
 
-def _start(scene: Scene) -> Iterator[Problem]:
+def _start(scene: Scene) -> Iterator[Mistake]:
     start = scene.solver.start
     if not isinstance(start, str) and len(start) != scene.dimension:
         text = f"has {len(start)} components; a {scene.dimension}D scene wants {scene.dimension}"
-        yield Problem(("solver", "start"), text)
+        yield Mistake(("solver", "start"), text)
 
 
 def _on_boundary(boundary: Mapping[str, Boundary]) -> Iterator[_Item]:
@@ -101,30 +101,30 @@ def _on_boundary(boundary: Mapping[str, Boundary]) -> Iterator[_Item]:
         yield from ((("boundary", name, effect.key), part.on, effect) for effect in part.effects)
 
 
-def _smoothing(scene: Scene) -> Iterator[Problem]:
+def _smoothing(scene: Scene) -> Iterator[Mistake]:
     laws = [(key, getattr(effect, "law", None)) for key, _, effect in _on_boundary(scene.boundary)]
     names = sorted({law.name for _, law in laws if law is not None})
     if scene.solver.smoothing == "paper" and (others := [n for n in names if n != "quadratic_linear"]):
         text = f'"paper" is made for law = "quadratic_linear", not for {_quoted(others)}; use "quadratic"'
-        yield Problem(("solver", "smoothing"), text)
+        yield Mistake(("solver", "smoothing"), text)
 
 
-def _exclusive(items: Iterable[_Item]) -> Iterator[Problem]:
+def _exclusive(items: Iterable[_Item]) -> Iterator[Mistake]:
     """Of an exclusive kind, a side bears one."""
     for (key, on, effect), (other, sides, second) in combinations(items, 2):
         shared = sorted(set(on) & set(sides))
         if effect.key == second.key and effect.exclusive and shared:
             text = f"{_quoted(shared)} has {effect.key} already, from {_dotted(key)}; give it once"
-            yield Problem(other, text)
+            yield Mistake(other, text)
 
 
-def _on_side(side: str, effects: list[tuple[_Key, Effect]], scene: Scene) -> Iterator[Problem]:
+def _on_side(side: str, effects: list[tuple[_Key, Effect]], scene: Scene) -> Iterator[Mistake]:
     prescribed: dict[int, _Key] = {}
     for key, effect in effects:
         for axis in effect.prescribed() if isinstance(effect, PrescribedDisplacement) else ():
             if axis in prescribed:
                 text = f'"{side}" has {_axis(axis)} prescribed already, by {_dotted(prescribed[axis])}'
-                yield Problem(key, f'{text}; write "free" in one')
+                yield Mistake(key, f'{text}; write "free" in one')
             prescribed[axis] = key
     normal = None if isinstance(scene.domain, MeshFile) else scene.domain.normals[side]
     for key, effect in effects:
@@ -133,18 +133,18 @@ def _on_side(side: str, effects: list[tuple[_Key, Effect]], scene: Scene) -> Ite
 
 def _against(
     key: _Key, effect: Effect, side: str, prescribed: Mapping[int, _Key], normal: int | None, dimension: int
-) -> Iterator[Problem]:
+) -> Iterator[Mistake]:
     """Contact and tractions in a direction that is prescribed anyway."""
     blocking = normal if normal in prescribed else (0 if len(prescribed) == dimension else None)
     if isinstance(effect, Contact) and blocking is not None:
         text = f'the displacement normal to "{side}" is prescribed by {_dotted(prescribed[blocking])}'
-        yield Problem(key, f'{text}; leave contact out or write "free" there')
+        yield Mistake(key, f'{text}; leave contact out or write "free" there')
     if isinstance(effect, Traction):
         idle = [i for i, formula in enumerate(effect.values) if i in prescribed and formula.source != 0.0]
         for axis in idle:
             reason = f'{_axis(axis)} is prescribed on "{side}" by {_dotted(prescribed[axis])}'
             mend = 'write 0 here or "free" there'
-            yield Problem(key, f"component {axis + 1} does nothing: {reason}; {mend}")
+            yield Mistake(key, f"component {axis + 1} does nothing: {reason}; {mend}")
 
 
 def _axis(axis: int) -> str:

@@ -20,8 +20,8 @@ from pydantic import (
 )
 
 from ..effects import Effect, Place
-from .messages import unknown
-from .tables import WHOLE, Names, Problem, Step, Table, named_or_whole, problems_of, refuse
+from ..schema import Key, Mistake, Names, Table, mistakes_of, unknown, validation_error
+from .named_tables import WHOLE, named_or_whole
 
 DEFAULT_ELASTICITY = "isotropic"
 
@@ -46,43 +46,43 @@ class Holder(Table):
     @classmethod
     def _in_plain_words(cls, data: Any, handler: ModelWrapValidatorHandler[Any]) -> Any:
         if not isinstance(data, dict):
-            return cls._or_refuse(lambda: handler(data), [])
-        problems: list[Problem] = []
-        made = {key: cls._read(key, value, problems) for key, value in data.items()}
-        return cls._or_refuse(lambda: handler(made), problems)
+            return cls._read_or_refuse(lambda: handler(data), [])
+        mistakes: list[Mistake] = []
+        made = {key: cls._read(key, value, mistakes) for key, value in data.items()}
+        return cls._read_or_refuse(lambda: handler(made), mistakes)
 
     @classmethod
-    def _read(cls, key: str, value: Any, problems: list[Problem]) -> Any:
+    def _read(cls, key: str, value: Any, mistakes: list[Mistake]) -> Any:
         if key in cls.model_fields:
             return value
         if key not in Effect.registry[cls.place]:
-            problems.append(Problem((key,), unknown("key", key, cls.keys())))
+            mistakes.append(Mistake((key,), unknown("key", key, cls.keys())))
             return value
-        return read_effect(Effect.registry[cls.place][key], value, (key,), problems)
+        return read_effect(Effect.registry[cls.place][key], value, (key,), mistakes)
 
 
 def read_effect(
     kind: type[Effect],
     value: Any,
     where: tuple[str, ...],
-    problems: list[Problem],
+    mistakes: list[Mistake],
     also: tuple[str, ...] = (),
 ) -> Any:
-    """An effect read by its class; what is wrong joins ``problems``. ``also``: keys beside its own."""
+    """An effect read by its class; what is wrong joins ``mistakes``. ``also``: keys beside its own."""
     try:
         return kind.model_validate(value)
     except ValidationError as error:
-        found = problems_of(error, kind, also)
-    for problem in found:
-        problems.append(Problem((*where, *_inside(problem, value)), problem.text))
+        found = mistakes_of(error, kind, also)
+    for mistake in found:
+        mistakes.append(Mistake((*where, *_inside(mistake, value)), mistake.text))
     return value
 
 
-def _inside(problem: Problem, value: Any) -> tuple[Step, ...]:
+def _inside(mistake: Mistake, value: Any) -> tuple[Key, ...]:
     """The place within the effect as the scene file has it."""
     if not isinstance(value, dict):
-        return problem.where[1:]  # a bare list is kept in a field that the file does not name
-    return problem.where or _parameter(problem.text, value)
+        return mistake.where[1:]  # a bare list is kept in a field that the file does not name
+    return mistake.where or _parameter(mistake.text, value)
 
 
 def _parameter(text: str, table: Mapping[str, Any]) -> tuple[str, ...]:
@@ -138,21 +138,21 @@ class Material(Table):
     @classmethod
     def _in_plain_words(cls, data: Any, handler: ModelWrapValidatorHandler[Any]) -> Any:
         if not isinstance(data, dict) or isinstance(data.get("elasticity"), Effect):
-            return cls._or_refuse(lambda: handler(data), [])
+            return cls._read_or_refuse(lambda: handler(data), [])
         own = {key: value for key, value in data.items() if key == "region"}
-        problems: list[Problem] = []
-        made = _elasticity({key: value for key, value in data.items() if key != "region"}, problems)
-        if problems:  # the region is looked at even so: both are reported together
-            cls._check_region(own, problems)
-            raise refuse(problems)
-        return cls._or_refuse(lambda: handler({**own, "elasticity": made}), [])
+        mistakes: list[Mistake] = []
+        made = _elasticity({key: value for key, value in data.items() if key != "region"}, mistakes)
+        if mistakes:  # the region is looked at even so: both are reported together
+            cls._check_region(own, mistakes)
+            raise validation_error(mistakes)
+        return cls._read_or_refuse(lambda: handler({**own, "elasticity": made}), [])
 
     @classmethod
-    def _check_region(cls, own: Mapping[str, Any], problems: list[Problem]) -> None:
+    def _check_region(cls, own: Mapping[str, Any], mistakes: list[Mistake]) -> None:
         try:
             Body.model_validate(dict(own))
         except ValidationError as error:
-            problems.extend(problems_of(error))
+            mistakes.extend(mistakes_of(error))
 
     @model_serializer(mode="wrap")
     def _flat(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
@@ -160,13 +160,13 @@ class Material(Table):
         return {**region, "elasticity": self.elasticity.key, **self.elasticity.model_dump()}
 
 
-def _elasticity(data: dict[str, Any], problems: list[Problem]) -> Any:
+def _elasticity(data: dict[str, Any], mistakes: list[Mistake]) -> Any:
     kinds = Effect.registry[Place.MATERIAL]
     name = data.pop("elasticity", DEFAULT_ELASTICITY)
     if not isinstance(name, str) or name not in kinds:
-        problems.append(Problem(("elasticity",), unknown("elasticity", name, kinds)))
+        mistakes.append(Mistake(("elasticity",), unknown("elasticity", name, kinds)))
         return None
-    return read_effect(kinds[name], data, (), problems, also=("region", "elasticity"))
+    return read_effect(kinds[name], data, (), mistakes, also=("region", "elasticity"))
 
 
 def _whole_or_named(own_keys: Any) -> BeforeValidator:
@@ -186,7 +186,7 @@ def _material_keys() -> Iterator[str]:
 
 def _at_least_one(materials: dict[str, Material]) -> dict[str, Material]:
     if not materials:
-        raise refuse([Problem((), "is empty; give model, youngs_modulus and poisson_ratio")])
+        raise validation_error([Mistake((), "is empty; give model, youngs_modulus and poisson_ratio")])
     return materials
 
 

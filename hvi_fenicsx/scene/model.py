@@ -10,12 +10,12 @@ from pydantic import AfterValidator, Field, ValidationInfo, model_validator
 from pydantic_core import PydanticCustomError
 
 from ..effects import Effect, Place
+from ..schema import Mistake, Names, Table, refusal, validation_error
 from . import plugins
 from .consistency import contradictions
 from .effect_tables import Bodies, Boundary, Materials
 from .shapes import Domain, MeshFile
 from .solver_table import Solver
-from .tables import Names, Problem, Table, refuse
 
 _NAME = re.compile(r"\w[\w.-]{0,99}")
 
@@ -31,7 +31,7 @@ class Placed(NamedTuple):
 
 def _title(text: str) -> str:
     if not text.isprintable():
-        raise PydanticCustomError("scene", "must be a single line of printable characters")
+        raise refusal("must be a single line of printable characters")
     return text
 
 
@@ -71,7 +71,7 @@ class Scene(Table):
         try:
             return {**data, "plugins": plugins.load(data["plugins"], (info.context or {}).get("folder", "."))}
         except PydanticCustomError as error:
-            raise refuse([Problem(("plugins",), error.message())]) from None
+            raise validation_error([Mistake(("plugins",), error.message())]) from None
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickled as its tables: another rank must load the plugins before it can know their classes."""
@@ -79,9 +79,9 @@ class Scene(Table):
 
     @model_validator(mode="after")
     def _consistent(self) -> Scene:
-        problems = [*_bad_names(self.boundary)] or contradictions(self)
-        if problems:
-            raise refuse(problems)
+        mistakes = [*_bad_names(self.boundary)] or contradictions(self)
+        if mistakes:
+            raise validation_error(mistakes)
         return self
 
     @property
@@ -113,7 +113,7 @@ def _again(tables: dict[str, Any]) -> Scene:
     return Scene.model_validate(tables)
 
 
-def _bad_names(boundary: Mapping[str, Any]) -> Iterator[Problem]:
+def _bad_names(boundary: Mapping[str, Any]) -> Iterator[Mistake]:
     """Names go into tables and file names."""
     text = "is no usable name for a part; use letters, digits, _ - . only"
-    return (Problem(("boundary", name), text) for name in boundary if not _NAME.fullmatch(name))
+    return (Mistake(("boundary", name), text) for name in boundary if not _NAME.fullmatch(name))

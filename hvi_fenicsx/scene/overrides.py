@@ -6,7 +6,7 @@ import tomllib
 from typing import Any
 
 from ..errors import InputError
-from .messages import shown, unknown
+from ..schema import shown, unknown
 
 Path = tuple[str | int, ...]
 

@@ -7,7 +7,7 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import model_validator
 
-from .tables import Length, Problem, Table, refuse, vector
+from ..schema import Length, Mistake, Table, validation_error, vector
 
 _MOST_CELLS = 2e8
 """Beyond this gmsh, which meshes on one rank, needs more memory than machines have."""
@@ -28,7 +28,9 @@ class Meshed(Table):
     def _affordable(self) -> Any:
         h: float = getattr(self, "mesh_size")  # noqa: B009 (each shape says where it stands among its keys)
         if self.area() / h**2 > _MOST_CELLS:
-            raise refuse([Problem(("mesh_size",), f"makes more than {_MOST_CELLS:.0e} cells; make it larger")])
+            raise validation_error(
+                [Mistake(("mesh_size",), f"makes more than {_MOST_CELLS:.0e} cells; make it larger")]
+            )
         return self
 
 
@@ -56,7 +58,7 @@ class LShape(Meshed):
     @model_validator(mode="after")
     def _leaves_an_l(self) -> LShape:
         if self.cut[0] >= self.size[0] or self.cut[1] >= self.size[1]:
-            raise refuse([Problem(("cut",), "must be smaller than size in both directions")])
+            raise validation_error([Mistake(("cut",), "must be smaller than size in both directions")])
         return self
 
 
@@ -119,5 +121,5 @@ class NotchedStrip(Meshed):
     @model_validator(mode="after")
     def _leaves_a_strip(self) -> NotchedStrip:
         if self.notch[0] >= self.size[0] or self.notch[1] >= self.size[1]:
-            raise refuse([Problem(("notch",), "must be smaller than size in both directions")])
+            raise validation_error([Mistake(("notch",), "must be smaller than size in both directions")])
         return self

@@ -10,7 +10,7 @@ from typing import Any
 
 from pydantic_core import PydanticCustomError
 
-from .messages import shown
+from ..schema import refusal, shown
 
 
 def load(names: Any, folder: str | os.PathLike[str]) -> tuple[str, ...]:
@@ -33,27 +33,27 @@ def _load(name: Any, folder: Path) -> str:
         raise _named_wrongly(name)
     path = Path(os.path.abspath(folder / name))
     if not path.is_file():
-        raise _refusal(f"{path} does not exist; it is looked for beside the scene file")
+        raise refusal(f"{path} does not exist; it is looked for beside the scene file")
     module = f"hvi_plugin_{path.stem}"
     known = sys.modules.get(module)
     if known is None:
         _execute(module, path)
     elif known.__file__ != str(path):
-        raise _refusal(f"{path}: another file of this name is loaded already, {known.__file__}; rename one of them")
+        raise refusal(f"{path}: another file of this name is loaded already, {known.__file__}; rename one of them")
     return str(path)
 
 
 def _execute(module: str, path: Path) -> None:
     spec = importlib.util.spec_from_file_location(module, path)
     if spec is None or spec.loader is None:
-        raise _refusal(f"{path} cannot be loaded")
+        raise refusal(f"{path} cannot be loaded")
     made = importlib.util.module_from_spec(spec)
     sys.modules[module] = made  # dataclasses and pydantic look their own module up
     try:
         spec.loader.exec_module(made)
     except Exception as error:
         del sys.modules[module]
-        raise _refusal(f"{path}{_line(error, path)}: {type(error).__name__}: {error}") from None
+        raise refusal(f"{path}{_line(error, path)}: {type(error).__name__}: {error}") from None
 
 
 def _line(error: Exception, path: Path) -> str:
@@ -68,8 +68,4 @@ def _line(error: Exception, path: Path) -> str:
 
 
 def _named_wrongly(value: Any) -> PydanticCustomError:
-    return _refusal(f'must name Python files, like "my_laws.py" (is {shown(value)})')
-
-
-def _refusal(text: str) -> PydanticCustomError:
-    return PydanticCustomError("scene", "{text}", {"text": text})
+    return refusal(f'must name Python files, like "my_laws.py" (is {shown(value)})')

@@ -13,9 +13,10 @@ from typing import Any
 from pydantic import ValidationError
 
 from ..errors import InputError
+from ..schema import Mistake, mistakes_of
 from .model import Scene
+from .named_tables import WHOLE
 from .overrides import override
-from .tables import WHOLE, Problem, problems_of
 from .toml_lines import line_of, lines_of
 
 _LARGEST = 1_000_000
@@ -31,7 +32,7 @@ def read_scene(path: str | os.PathLike[str], overrides: Sequence[str] = ()) -> S
         overrides: ``dotted.key=TOML-VALUE`` each, in order; a list's entries go by number from 0.
 
     Raises:
-        InputError: the file cannot be read or is no valid scene; up to ten problems, one a line, each
+        InputError: the file cannot be read or is no valid scene; up to ten mistakes, one a line, each
             with its line in the file, the key, what is allowed and how to mend it.
     """
     file = Path(path)
@@ -107,12 +108,12 @@ def _scene(file: Path, text: str, data: dict[str, Any], changed: Sequence[_Place
     try:
         return Scene.model_validate(data, context={"folder": file.absolute().parent})
     except ValidationError as error:
-        problems = problems_of(error, Scene)
-    raise InputError(_listed(file, lines_of(text), problems, changed))
+        mistakes = mistakes_of(error, Scene)
+    raise InputError(_listed(file, lines_of(text), mistakes, changed))
 
 
-def _listed(file: Path, lines: Mapping[_Place, int], problems: Iterable[Problem], changed: Sequence[_Place]) -> str:
-    found = [(Problem(tuple(s for s in p.where if s != WHOLE), p.text)) for p in problems]
+def _listed(file: Path, lines: Mapping[_Place, int], mistakes: Iterable[Mistake], changed: Sequence[_Place]) -> str:
+    found = [(Mistake(tuple(s for s in p.where if s != WHOLE), p.text)) for p in mistakes]
     found.sort(key=lambda p: line_of(lines, p.where) or 0)
     texts = [f"{_where(file, lines, p.where, changed)}: {p.text}" for p in found]
     rest = len(texts) - _MOST_PROBLEMS

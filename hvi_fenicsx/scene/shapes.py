@@ -9,10 +9,9 @@ from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import BeforeValidator, Field, PlainSerializer, ValidationInfo, model_validator
-from pydantic_core import PydanticCustomError
 
+from ..schema import Count, Length, Mistake, Positive, Table, choose, refusal, validation_error, vector
 from .plane_shapes import Disk, HalfDisk, LShape, NotchedStrip
-from .tables import Count, Length, Positive, Problem, Table, choose, refuse, vector
 
 _MOST_UNKNOWNS = 2**31 - 1  # PETSc's default integers
 MOST_REFINEMENTS = 10
@@ -32,7 +31,7 @@ class _Block(Table):
         unknowns = self.dimension * math.prod(n + 1 for n in cells)
         if unknowns > _MOST_UNKNOWNS:
             text = f"make {unknowns:.1e} unknowns; {_MOST_UNKNOWNS:.1e} at most: use fewer cells"
-            raise refuse([Problem(("cells",), text)])
+            raise validation_error([Mistake(("cells",), text)])
         return self
 
 
@@ -73,12 +72,12 @@ class Box(_Block):
 
 def _mesh_path(value: Any, info: ValidationInfo) -> Path:
     if not isinstance(value, str | Path) or not str(value).strip() or "\0" in str(value):
-        raise PydanticCustomError("scene", 'must be the name of a mesh file in quotes, like "part.msh"')
+        raise refusal('must be the name of a mesh file in quotes, like "part.msh"')
     folder = (info.context or {}).get("folder", ".")
     path = Path(os.path.abspath(Path(folder) / value))
     if not path.is_file():
         reason = "is a folder" if path.is_dir() else "does not exist"
-        raise PydanticCustomError("scene", "{path} {reason}", {"path": str(path), "reason": reason})
+        raise refusal(f"{path} {reason}")
     return path
 
 

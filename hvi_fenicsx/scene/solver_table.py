@@ -5,13 +5,11 @@ from __future__ import annotations
 from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Field, PlainSerializer, model_validator
-from pydantic_core import PydanticCustomError
 
 from .. import method_names
 from ..errors import InputError
 from ..formula import Formula
-from .messages import shown, unknown
-from .tables import Count, Positive, Problem, Table, refuse
+from ..schema import Count, Mistake, Positive, Table, refusal, shown, unknown, validation_error
 
 Smoothing = Literal["paper", "quadratic", "chks", "log_exp"]
 
@@ -19,7 +17,7 @@ Smoothing = Literal["paper", "quadratic", "chks", "log_exp"]
 def _method(name: str) -> str:
     if name not in method_names.available():
         text = unknown("method", name, method_names.available())
-        raise PydanticCustomError("scene", "{text}", {"text": text})
+        raise refusal(text)
     return name
 
 
@@ -32,7 +30,7 @@ def _start(value: Any) -> Any:
     if value not in _STARTS:
         words = ", ".join(map(shown, _STARTS))
         text = f"must be one of {words}, or a list of formulas, one for each component (is {shown(value)})"
-        raise PydanticCustomError("scene", "{text}", {"text": text})
+        raise refusal(text)
     return value
 
 
@@ -40,7 +38,7 @@ def _formula(value: Any) -> Formula:
     try:
         return Formula(value)
     except InputError as error:
-        raise PydanticCustomError("scene", "{text}", {"text": str(error)}) from None
+        raise refusal(str(error)) from None
 
 
 Start = Annotated[
@@ -83,22 +81,22 @@ class Solver(Table):
 
     @model_validator(mode="after")
     def _fits(self) -> Solver:
-        if problems := self._contradictions():
-            raise refuse(problems)
+        if mistakes := self._contradictions():
+            raise validation_error(mistakes)
         return self
 
-    def _contradictions(self) -> list[Problem]:
+    def _contradictions(self) -> list[Mistake]:
         found = []
         if self.epsilon is not None and self.epsilon_absolute is not None:
-            found.append(Problem(("epsilon_absolute",), "epsilon is given too; leave one of them out"))
+            found.append(Mistake(("epsilon_absolute",), "epsilon is given too; leave one of them out"))
         if self.smoothing and self.epsilon is None and self.epsilon_absolute is None:
-            found.append(Problem(("smoothing",), _HOW_WIDE))
+            found.append(Mistake(("smoothing",), _HOW_WIDE))
         if self.smoothing and self.method == "branch":
             text = '"branch" solves the law without smoothing; leave out smoothing and epsilon, or use "auto"'
-            found.append(Problem(("method",), text))
+            found.append(Mistake(("method",), text))
         if self.start != "unbroken" and self.method in ("snes_vi", "tao", "ssls", "condensed"):
             text = f'is for the branch iteration; leave it out, or use method = "auto", not {shown(self.method)}'
-            found.append(Problem(("start",), text))
+            found.append(Mistake(("start",), text))
         return found
 
 

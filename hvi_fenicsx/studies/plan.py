@@ -14,8 +14,7 @@ from pydantic import ValidationError
 from ..errors import InputError
 from ..laws.smoothing import create
 from ..scene import Scene, dump_scene
-from ..scene.messages import unknown
-from ..scene.tables import problems_of
+from ..schema import mistakes_of, unknown
 from ..solvers.registry import METHODS
 from . import meshes
 from .meshes import Setting
@@ -192,7 +191,7 @@ def _setting(tables: Tables) -> Setting:
     try:
         scene = Scene.model_validate(tables)
     except ValidationError as error:
-        raise InputError("; ".join(p.text for p in problems_of(error, Scene))) from None
+        raise InputError("; ".join(p.text for p in mistakes_of(error, Scene))) from None
     wanted = scene.solver
     for law in laws(scene) if wanted.smoothing else ():
         create.create(str(wanted.smoothing), law, epsilon=wanted.epsilon, epsilon_absolute=wanted.epsilon_absolute)

@@ -1,4 +1,4 @@
-"""Pydantic's findings in the words of someone who writes scene files."""
+"""What pydantic finds, in plain words for someone who writes scene files."""
 
 from __future__ import annotations
 
@@ -9,9 +9,16 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import Any, get_args
 
 from pydantic import BaseModel
-from pydantic_core import ErrorDetails
+from pydantic_core import ErrorDetails, PydanticCustomError
 
 _LONGEST = 60
+"""Characters of a value that a message shows."""
+
+
+def refusal(text: str) -> PydanticCustomError:
+    """An error for a validator to raise; the reader of the scene adds its place."""
+    # Through the context, since braces in the text itself would be taken for places to fill.
+    return PydanticCustomError("scene", "{text}", {"text": text})
 
 
 def shown(value: Any) -> str:
@@ -35,7 +42,13 @@ def _plain(value: Any) -> str:
 
 
 def unknown(kind: str, name: Any, allowed: Iterable[str]) -> str:
-    """An unknown name: the closest known one, and all that are allowed."""
+    """The message on an unknown name: the closest known one, and all that are allowed.
+
+    Args:
+        kind: what the name is of, like "shape".
+        name: the name, or what stands in its place.
+        allowed: the names that are known.
+    """
     known = list(allowed)
     if not isinstance(name, str):
         return f"must be one of {', '.join(known)} in quotes (is {shown(name)})"
@@ -45,17 +58,33 @@ def unknown(kind: str, name: Any, allowed: Iterable[str]) -> str:
 
 
 def closest(name: str, known: Iterable[str]) -> str | None:
-    """The known name that was probably meant."""
+    """The known name that was probably meant.
+
+    Args:
+        name: as it was written.
+        known: the names to choose from.
+    """
     return next(iter(difflib.get_close_matches(name.lower(), list(known), 1, 0.5)), None)
 
 
 def suggestion(error: ErrorDetails, model: type[BaseModel] | None) -> str | None:
-    """The key that was probably meant by an unknown one."""
+    """The key that was probably meant by an unknown one.
+
+    Args:
+        error: pydantic's, of the kind "extra_forbidden".
+        model: the table that was read.
+    """
     return closest(str(error["loc"][-1]), _keys(model, error["loc"][:-1]))
 
 
-def in_words(error: ErrorDetails, model: type[BaseModel] | None, also: Iterable[str] = ()) -> str:
-    """One finding: what is allowed and what is there, without pydantic's own terms."""
+def message_of(error: ErrorDetails, model: type[BaseModel] | None, also: Iterable[str] = ()) -> str:
+    """The message on one finding: what is allowed and what is there, without pydantic's own terms.
+
+    Args:
+        error: pydantic's.
+        model: the table that was read, for its allowed keys.
+        also: keys that the table allows beside those of the model.
+    """
     kind, value, context = error["type"], error.get("input"), error.get("ctx", {})
     if kind == "missing":
         return "is missing" + _described(model, error["loc"])
@@ -63,6 +92,8 @@ def in_words(error: ErrorDetails, model: type[BaseModel] | None, also: Iterable[
         return unknown("key", str(error["loc"][-1]), [*_keys(model, error["loc"][:-1]), *also])
     if kind == "literal_error":
         return unknown("value", value, re.findall(r"'([^']*)'", context.get("expected", "")))
+    if kind == "value_error":
+        return str(context["error"])
     if kind in _TEXTS:
         return f"{_TEXTS[kind](context)} (is {shown(value)}){_mend(kind, value)}"
     return str(error["msg"])
@@ -115,7 +146,12 @@ def _keys(model: type[BaseModel] | None, loc: tuple[str | int, ...]) -> list[str
 
 
 def model_at(model: type[BaseModel] | None, loc: tuple[str | int, ...]) -> type[BaseModel] | None:
-    """The table that stands at a place within another, as far as the fields' types tell."""
+    """The table that stands at a place within another, as far as the fields' types tell.
+
+    Args:
+        model: the outermost table.
+        loc: the keys down to the place.
+    """
     for step in loc:
         field = model.model_fields.get(str(step)) if model else None
         model = _inner(field.annotation) if field else None

@@ -1,0 +1,25 @@
+"""What all tables of a scene file share: strict and frozen, with refusals in plain words at the right place.
+
+Light: it loads pydantic and nothing heavier, and knows no particular table.
+"""
+
+from .fields import Count, Length, Names, Positive, vector
+from .messages import refusal, shown, unknown
+from .tables import Key, Mistake, Table, choose, mistakes_of, validation_error
+
+__all__ = [
+    "Count",
+    "Key",
+    "Length",
+    "Mistake",
+    "Names",
+    "Positive",
+    "Table",
+    "choose",
+    "mistakes_of",
+    "refusal",
+    "shown",
+    "unknown",
+    "validation_error",
+    "vector",
+]

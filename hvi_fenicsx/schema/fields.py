@@ -1,0 +1,47 @@
+"""Types of fields that several tables have: names, lengths, counts, vectors."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+from pydantic import BeforeValidator, Field, PlainSerializer
+
+from .messages import refusal, shown
+
+
+def vector(length: int) -> BeforeValidator:
+    """A validator that reads TOML's list of ``length`` entries as a tuple."""
+
+    def read(value: Any) -> Any:
+        if not isinstance(value, list | tuple):
+            raise refusal(f"must be a list of {length} in square brackets (is {shown(value)})")
+        if len(value) != length:
+            raise refusal(f"must have {length} entries, not {len(value)}")
+        return tuple(value)
+
+    return BeforeValidator(read)
+
+
+def _names(value: Any) -> Any:
+    names = (value,) if isinstance(value, str) else value
+    if not isinstance(names, list | tuple) or not all(isinstance(n, str) and n.strip() for n in names):
+        raise refusal('must be a name or a list of names in quotes, like "left" or ["left", "top"]')
+    if not names:
+        raise refusal("is an empty list; name at least one")
+    if len(set(names)) < len(names):
+        raise refusal("names the same thing twice")
+    return tuple(names)
+
+
+Names = Annotated[
+    tuple[str, ...],
+    BeforeValidator(_names),
+    PlainSerializer(lambda names: names[0] if len(names) == 1 else list(names)),
+]
+"""One name or a list of names."""
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+"""A finite number above 0."""
+Length = Annotated[float, Field(ge=1e-9, le=1e9)]
+"""A length of a body, m: beyond these limits, squares and cubes of lengths exceed what double precision resolves."""
+Count = Annotated[int, Field(gt=0)]
+"""A whole number above 0."""
