@@ -69,12 +69,12 @@ def distance(rung: Rung, finer: Sequence[Rung]) -> float:
     """|||u_h - u||| for u on the last of the finer rungs. Collective."""
     fine = finer[-1].system.problem
     away = _raised(rung.solve_result.u, rung, finer)
-    away.x.array[:] = finer[-1].solved.u.x.array - away.x.array
+    away.x.array[:] = finer[-1].solve_result.u.x.array - away.x.array
     force = fem.assemble_scalar(fem.form(ufl.action(ufl.action(fine.bilinear, away), away)))
     pressures = zip(
         fine.averaged,
         defect.pressures(rung.system.problem, rung.solve_result.u),
-        defect.pressures(fine, finer[-1].solved.u),
+        defect.pressures(fine, finer[-1].solve_result.u),
         strict=True,
     )
     for part, coarse, exact in pressures:

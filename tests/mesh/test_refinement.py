@@ -194,7 +194,7 @@ def test_multigrid_and_starts_on_a_refined_hierarchy(scene: Scene, monkeypatch: 
     assert found.converged
     assert found.levels == 4
     monkeypatch.undo()
-    direct = workflow.finish(workflow.prepare(scene, COMM, body=step.domain)).solved
+    direct = workflow.finish(workflow.prepare(scene, COMM, body=step.domain)).solve_result
     assert direct is not None
     assert np.max(np.abs(found.u.x.array - direct.u.x.array)) < 1e-6 * np.max(np.abs(direct.u.x.array))
     assert found.counts.newton <= 4 * direct.counts.newton

@@ -85,25 +85,25 @@ def jobs(folder: Path) -> Iterator[Job]:
         yield _of_body(result, body)
     if body is not None and "von_mises" in body.by_cell:
         solid = body.dimension == 3
-        yield Job(folder / "stress.png", "solid_stress" if solid else "stress", (result, body), solid)
+        yield Job(folder / "stress.png", "stress_space" if solid else "stress_plane", (result, body), solid)
     if body is not None and result.sides:
         solid = body.dimension == 3
-        yield Job(folder / "scene.png", "solid_setting" if solid else "setting", (result, body), solid)
+        yield Job(folder / "scene.png", "scene_space" if solid else "scene_plane", (result, body), solid)
     for part in result.parts:
         path = folder / ("contact.png" if len(result.parts) == 1 else f"contact_{part.name}.png")
         if not part.spatial:
-            yield Job(path, "curves", (result, part))
+            yield Job(path, "contact_curves", (result, part))
         elif body is not None:
-            yield Job(path, "maps", (result, part, body))
+            yield Job(path, "contact_maps", (result, part, body))
 
 
 def _of_body(result: Result, body: Body) -> Job:
     solid = body.dimension == 3
     if "escape_mode" in body.fields:
-        return Job(result.folder / "escape.png", "solid_escape" if solid else "escape", (result, body), solid)
+        return Job(result.folder / "escape.png", "escape_space" if solid else "escape_plane", (result, body), solid)
     if "displacement" not in body.fields:
         raise PictureError(f"{result.folder / 'displacement.pvd'}: has neither displacement nor escape_mode")
-    return Job(result.folder / "body.png", "solid" if solid else "plane", (result, body), solid)
+    return Job(result.folder / "body.png", "body_space" if solid else "body_plane", (result, body), solid)
 
 
 def draw_all(found: Sequence[Job]) -> list[str]:
