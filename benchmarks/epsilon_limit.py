@@ -17,13 +17,14 @@ import matplotlib
 import numpy as np
 
 from hvi_fenicsx import Solution, read_scene, solve
-from hvi_fenicsx.laws.smoothing.plus_functions import PLUS_FUNCTIONS
+from hvi_fenicsx.laws.smoothing import QUADRATIC, Chks, LogExp
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 
 SCENE = Path(__file__).parents[1] / "demos" / "strong_law.toml"
 WIDTHS = 10.0 ** np.arange(0, -6.5, -0.5)
+PLUS_FUNCTIONS = {plus.name: plus for plus in (QUADRATIC, Chks(), LogExp())}
 COLOURS = {"quadratic": "#0072B2", "chks": "#D55E00", "log_exp": "#009E73"}
 
 

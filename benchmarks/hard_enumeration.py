@@ -24,7 +24,7 @@ from scipy.sparse import csr_matrix
 
 from hvi_fenicsx.laws import Superpotential
 from hvi_fenicsx.laws.polyline import PolylineLaw
-from hvi_fenicsx.laws.smoothing.smoothed_law import SmoothedLaw
+from hvi_fenicsx.laws.smoothing import PlusSmoothedLaw
 from hvi_fenicsx.problem.contact_surface import component_dofs
 from hvi_fenicsx.system.system import System
 
@@ -208,7 +208,7 @@ def _breaks(law: Superpotential) -> Array:
     """Where the traction's slope changes or it jumps, ascending."""
     if isinstance(law, PolylineLaw):
         return np.asarray(law.graph.breaks)
-    assert isinstance(law, SmoothedLaw)
+    assert isinstance(law, PlusSmoothedLaw)
     parts = (law.law.convex, law.law.concave)
     kinks, jumps = (np.concatenate([getattr(p, name) for p in parts]) for name in ("kinks", "jumps"))
     half = law.epsilon_absolute / jumps / 2

@@ -22,8 +22,7 @@ import numpy.typing as npt
 from mpi4py import MPI
 
 from hvi_fenicsx import Solution, read_scene, solve
-from hvi_fenicsx.laws import QuadraticLinear, create
-from hvi_fenicsx.laws.smoothing import create as smoothing
+from hvi_fenicsx.laws import QuadraticLinear, create, smoothing
 from hvi_fenicsx.results.contact_table import rows
 
 Array = npt.NDArray[np.float64]

@@ -20,6 +20,7 @@ from typing_extensions import override
 
 from ..errors import InputError
 from ..typing import Array, Integers
+from .class_registry import enter
 from .traction_bounds import Extremes, extremes
 
 
@@ -29,7 +30,7 @@ def quotient(a: Array, b: Array | float) -> Array:
     return result
 
 
-_REGISTRY: dict[str, type[Superpotential]] = {}
+_REGISTRY: dict[str, type] = {}
 
 
 @dataclass(frozen=True)
@@ -97,7 +98,7 @@ class Superpotential(ABC):
         super().__init_subclass__(**kwargs)
         _refuse_hidden_properties(cls)
         if register and "name" in cls.__dict__:
-            _register(cls)
+            enter(_REGISTRY, cls, cls.name, "law")
 
     @abstractmethod
     def value(self, x: Array) -> Array:
@@ -233,17 +234,6 @@ def _refuse_hidden_properties(cls: type[Superpotential]) -> None:
             f"law class {cls.__name__}: the parameter name {hidden[0]!r} is taken by a property that "
             f"every law has; choose another, for example {hidden[0] + '_parameter'!r}"
         )
-
-
-def _register(cls: type[Superpotential]) -> None:
-    """Enter the class under its name; the same class again (a notebook's cell run twice) replaces it."""
-    old = _REGISTRY.get(cls.name)
-    if old is not None and (old.__module__, old.__qualname__) != (cls.__module__, cls.__qualname__):
-        raise InputError(
-            f"law class {cls.__name__}: the name {cls.name!r} is taken by "
-            f"{old.__module__}.{old.__qualname__}; choose another name"
-        )
-    _REGISTRY[cls.name] = cls
 
 
 def registered() -> dict[str, type[Superpotential]]:

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import difflib
 import inspect
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import Any, get_type_hints
 
 from pydantic import ConfigDict, ValidationError, create_model
 
 from ..errors import InputError
 from .base import Superpotential, registered
+from .class_registry import closest
 
 _STRICT = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False, arbitrary_types_allowed=True)
 
@@ -29,7 +29,7 @@ def create(name: str, parameters: Mapping[str, Any]) -> Superpotential:
     """
     law = registered().get(name)
     if law is None:
-        raise InputError(f"unknown law {name!r}{_closest(name, available())}; available: {', '.join(available())}")
+        raise InputError(f"unknown law {name!r}{closest(name, available())}; available: {', '.join(available())}")
     allowed = inspect.signature(law).parameters
     _check_keys(name, parameters, allowed)
     return law(**_checked(law, parameters, allowed))
@@ -49,7 +49,7 @@ def _check_keys(name: str, given: Mapping[str, Any], allowed: Mapping[str, inspe
     listing = f"law {name!r} takes {', '.join(allowed) or 'no parameters'}"
     for key in given:
         if key not in allowed:
-            raise InputError(f"law {name!r}: unknown parameter {key!r}{_closest(key, allowed)}; {listing}")
+            raise InputError(f"law {name!r}: unknown parameter {key!r}{closest(key, allowed)}; {listing}")
     missing = [key for key, p in allowed.items() if p.default is p.empty and key not in given]
     if missing:
         raise InputError(f"law {name!r}: {', '.join(missing)} missing; {listing}")
@@ -82,8 +82,3 @@ def _message(name: str, error: ValidationError) -> str:
     first = error.errors()[0]
     where = "".join(f"[{part}]" if isinstance(part, int) else str(part) for part in first["loc"])
     return f"law {name!r}: {where} = {first['input']!r} is not usable: {first['msg']}"
-
-
-def _closest(name: str, names: Iterable[str]) -> str:
-    match = difflib.get_close_matches(str(name), list(names), n=1)
-    return f" (did you mean {match[0]!r}?)" if match else ""

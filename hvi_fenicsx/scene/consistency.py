@@ -10,6 +10,7 @@ from ..effects import Effect
 from ..effects.contact import Contact
 from ..effects.loads import PrescribedDisplacement, Traction
 from ..errors import InputError
+from ..laws import smoothing
 from ..schema import Mistake, shown, unknown
 from .named_tables import WHOLE
 from .shapes import MeshFile
@@ -104,8 +105,10 @@ def _on_boundary(boundary: Mapping[str, Boundary]) -> Iterator[_Item]:
 def _smoothing(scene: Scene) -> Iterator[Mistake]:
     laws = [(key, getattr(effect, "law", None)) for key, _, effect in _on_boundary(scene.boundary)]
     names = sorted({law.name for _, law in laws if law is not None})
-    if scene.solver.smoothing == "paper" and (others := [n for n in names if n != "quadratic_linear"]):
-        text = f'"paper" is made for law = "quadratic_linear", not for {_quoted(others)}; use "quadratic"'
+    wanted = scene.solver.smoothing
+    fitting = None if wanted is None else smoothing.registered()[wanted].laws
+    if fitting is not None and (others := [n for n in names if n not in fitting]):
+        text = f'{shown(wanted)} is made for law = {_quoted(fitting)}, not for {_quoted(others)}; use "quadratic"'
         yield Mistake(("solver", "smoothing"), text)
 
 

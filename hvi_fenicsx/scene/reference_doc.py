@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import inspect
 import math
-from collections.abc import Iterable, Iterator
-from typing import Any
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any, TypeVar
 
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
@@ -18,7 +18,9 @@ from ..laws.base import registered
 from .effect_tables import DEFAULT_ELASTICITY, Body, Boundary, Material
 from .model import Scene
 from .shapes import SHAPES
-from .solver_table import Solver
+from .solver_table import OneOf, Solver
+
+T = TypeVar("T")
 
 _INTRODUCTION = """\
 # Scene reference
@@ -76,8 +78,7 @@ def _effects(place: Place, title: str) -> Iterator[str]:
 
 def _laws() -> Iterator[str]:
     yield from ("## Laws", "", "| `law =` | parameters | |", "|---|---|---|")
-    own = {name: law for name, law in registered().items() if law.__module__.startswith(__package__.split(".")[0])}
-    for name, law in own.items():
+    for name, law in _provided(registered()).items():
         parameters = (_parameter(p) for p in inspect.signature(law).parameters.values())
         yield f"| `{name}` | {', '.join(parameters)} | {_escaped(_summary(law))} |"
     yield ""
@@ -102,11 +103,22 @@ def _limits(field: FieldInfo) -> str:
 
 
 def _choices(field: FieldInfo) -> str:
-    """The names of a Literal, also within ``Literal[...] | None``."""
+    """The names of a registry, or of a Literal, also within ``Literal[...] | None``."""
+    registries = [m.registered() for m in field.metadata if isinstance(m, OneOf)]
+    names = [name for registry in registries for name in _provided(registry)] or _literals(field)
+    return "one of " + " ".join(f"`{n}`" for n in names) if len(names) > 1 else ""
+
+
+def _literals(field: FieldInfo) -> list[str]:
     options = getattr(field.annotation, "__args__", ())
     nested = [a for option in options for a in getattr(option, "__args__", (option,))]
-    names = [a for a in nested if isinstance(a, str)]
-    return "one of " + " ".join(f"`{n}`" for n in names) if len(names) > 1 else ""
+    return [a for a in nested if isinstance(a, str)]
+
+
+def _provided(registry: Mapping[str, type[T]]) -> dict[str, type[T]]:
+    """Those of the program itself; a user's own may be registered too."""
+    program = __package__.split(".")[0]
+    return {name: kind for name, kind in registry.items() if kind.__module__.startswith(program)}
 
 
 def _toml(value: Any) -> str:

@@ -2,16 +2,38 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BeforeValidator, Field, PlainSerializer, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, GetCoreSchemaHandler, PlainSerializer, model_validator
+from pydantic_core import CoreSchema, core_schema
 
 from .. import method_names
 from ..errors import InputError
 from ..formula import Formula
+from ..laws.smoothing import registered as smoothings
 from ..schema import Count, Mistake, Positive, Table, refusal, shown, unknown, validation_error
 
-Smoothing = Literal["paper", "quadratic", "chks", "log_exp"]
+
+@dataclass(frozen=True)
+class OneOf:
+    """Marks a field whose value is the name of a registered class; plugins may have registered more.
+
+    Attributes:
+        registered: the classes by their names, asked for whenever a scene is read.
+    """
+
+    registered: Callable[[], Mapping[str, type]]
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        return core_schema.no_info_before_validator_function(self._check, handler(source))
+
+    def _check(self, value: Any) -> Any:
+        names = tuple(self.registered())
+        if value is not None and value not in names:
+            raise refusal(unknown("value", value, names))
+        return value
 
 
 def _method(name: str) -> str:
@@ -55,7 +77,7 @@ class Solver(Table):
     method: Annotated[str, AfterValidator(_method)] = "auto"
     """auto chooses by the effects: linear, convex or branch; branch is exact; condensed is the paper's own;
     snes_vi, tao, ssls are to compare with; or the name of a method of one's own"""
-    smoothing: Smoothing | None = None
+    smoothing: Annotated[str | None, OneOf(smoothings)] = None
     """the plus function that rounds the law's kinks; paper is the paper's S; without it the law is exact"""
     epsilon: Positive | None = None
     """width of the smoothing, relative to the law's energy at its kink"""

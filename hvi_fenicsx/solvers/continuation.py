@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from ..laws.smoothing.smoothed_law import SmoothedLaw
+from ..laws.smoothing import QUADRATIC
 from .active_set import ActiveSetSolver
 from .branch import BranchIteration
 from .method import Counts, Settings, SolveResult
@@ -31,7 +31,7 @@ class Continuation:
         counts, start = Counts(), None
         loose = replace(self.settings, tolerance=max(1e-4, self.settings.tolerance))
         for width in (w for w in _WIDTHS if w > (self.settings.epsilon or 0.0)):
-            laws = [SmoothedLaw.relative(t.exact, width) for t in self.solver.system.terms]
+            laws = [QUADRATIC.relative(t.exact, width) for t in self.solver.system.terms]
             found = BranchIteration(self.solver, loose, laws, width, wary=True).solve(start)
             counts.add(found.counts)
             if found.converged:

@@ -5,14 +5,14 @@ from __future__ import annotations
 import itertools
 import math
 import tomllib
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 from pydantic import ValidationError
 
 from ..errors import InputError
-from ..laws.smoothing import create
+from ..laws import smoothing
 from ..scene import Scene, dump_scene
 from ..schema import mistakes_of, unknown
 from ..solvers.registry import METHODS
@@ -21,10 +21,10 @@ from .meshes import Setting
 
 Tables = dict[str, Any]
 EXACT = "exact"
-_CHOICES: Mapping[str, Sequence[str]] = {
-    "smoothing": create.available(),
-    "method": tuple(METHODS),
-    "linear_solver": ("auto", "lu", "gamg"),
+_CHOICES: Mapping[str, Callable[[], Sequence[str]]] = {
+    "smoothing": smoothing.available,
+    "method": lambda: tuple(METHODS),
+    "linear_solver": lambda: ("auto", "lu", "gamg"),
 }
 _NUMBERS = ("epsilon", "epsilon_absolute", "tolerance", "accuracy")
 _SHARES = ("tolerance", "accuracy")
@@ -86,8 +86,8 @@ def axis(text: str) -> Axis:
 
 
 def _check(name: str, value: str) -> None:
-    if name in _CHOICES and value not in _CHOICES[name]:
-        raise InputError(f"--axis {name}: {unknown(name, value, _CHOICES[name])}")
+    if name in _CHOICES and value not in _CHOICES[name]():
+        raise InputError(f"--axis {name}: {unknown(name, value, _CHOICES[name]())}")
     if name in _NUMBERS and not (value == EXACT and name.startswith("epsilon")):
         try:
             good = 0.0 < float(value) < (1.0 if name in _SHARES else math.inf)
@@ -194,7 +194,7 @@ def _setting(tables: Tables) -> Setting:
         raise InputError("; ".join(p.text for p in mistakes_of(error, Scene))) from None
     wanted = scene.solver
     for law in laws(scene) if wanted.smoothing else ():
-        create.create(str(wanted.smoothing), law, epsilon=wanted.epsilon, epsilon_absolute=wanted.epsilon_absolute)
+        smoothing.create(str(wanted.smoothing), law, epsilon=wanted.epsilon, epsilon_absolute=wanted.epsilon_absolute)
     return Setting(scene)
 
 
@@ -210,7 +210,7 @@ def _default(scene: Scene, tables: Tables, left_out: list[str]) -> Iterator[Sett
         yield _setting(rung)
     if laws(scene):
         yield from _product(tables, [Axis("epsilon", _WIDTHS)], left_out)
-        yield from _product(tables, [few, Axis("smoothing", tuple(create.available()))], left_out)
+        yield from _product(tables, [few, Axis("smoothing", smoothing.available())], left_out)
     if meshes.unknowns(Setting(scene)) <= _MOST_OF_METHODS:
         yield from _product(tables, [Axis("method", _METHODS)], left_out)
     yield from _product(_unsmoothed(tables), [Axis("tolerance", _TOLERANCES)], left_out)

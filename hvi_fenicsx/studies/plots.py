@@ -36,6 +36,7 @@ if TYPE_CHECKING:
 PANEL, GAP, FOOT = 2.6, 0.6, 0.85
 """Inches: a panel, the room for its title, the axis below the last."""
 _SMOOTHINGS = {None: GREEN, "quadratic": BLUE, "chks": PURPLE, "log_exp": ORANGE, "paper": VERMILION}
+_OWN_SMOOTHING = "#56B4E9"
 _PHASE_COLOURS = dict(zip(PHASES, (PALE, "#8fb8d6", ORANGE, BLUE, GREEN), strict=True))
 _BARS = 12
 """Bars of the picture of time, at most."""
@@ -90,7 +91,7 @@ def _cost_panel(axes: Axes, study: Study, quantity: str) -> None:
     known = [(r.seconds, e, r) for r in study.rows if (e := r.error(quantity)) is not None and r.seconds]
     for s, e, r in known:
         here = "o" if r.method == "auto" else "D"
-        axes.plot(s, max(e, LEAST), here, color=_SMOOTHINGS[r.smoothing], ms=6.5, alpha=0.85, mec="white", mew=0.6)
+        axes.plot(s, max(e, LEAST), here, color=_colour(r.smoothing), ms=6.5, alpha=0.85, mec="white", mew=0.6)
     own = study.own
     if (error := own.error(quantity)) is not None and own.seconds:
         axes.plot(own.seconds, max(error, LEAST), "*", ms=19, mfc="none", mec=INK, mew=1.5, zorder=6)
@@ -113,6 +114,11 @@ def _front_line(axes: Axes, best: Sequence[Row], quantity: str) -> None:
             )  # fmt: skip
 
 
+def _colour(smoothing: str | None) -> str:
+    """A smoothing's colour; those of a user's own share one."""
+    return _SMOOTHINGS.get(smoothing, _OWN_SMOOTHING)
+
+
 def _short(found: Row) -> str:
     return f"{found.mesh.removesuffix(' cells')}, {found.law.replace('exact law', 'exact')}"
 
@@ -120,7 +126,8 @@ def _short(found: Row) -> str:
 def _kinds(study: Study) -> list[tuple[str, str, str]]:
     """Marker, colour and words of each kind of point that there is."""
     there = {r.smoothing for r in study.rows if r.converged}
-    kinds = [("o", _SMOOTHINGS[s], "exact law" if s is None else s) for s in _SMOOTHINGS if s in there]
+    ordered = [*(s for s in _SMOOTHINGS if s in there), *sorted(s for s in there if s and s not in _SMOOTHINGS)]
+    kinds = [("o", _colour(s), "exact law" if s is None else s) for s in ordered]
     if any(r.method != "auto" for r in study.rows if r.converged):
         kinds.append(("D", GREY, "another method"))
     return [*kinds, ("*", INK, "the scene's own")]
@@ -170,7 +177,7 @@ def _lines_over_h(axes: Axes, study: Study, quantity: str) -> tuple[list[float],
         if len(points) < 2:
             continue
         xs, ys = zip(*points, strict=True)
-        colour = _SMOOTHINGS[like.smoothing if like else None]
+        colour = _colour(like.smoothing if like else None)
         shown = [max(y, LEAST) for y in ys]
         thin: dict[str, Any] = {"lw": 1.5, "alpha": 0.35 + 0.6 * i / (len(ordered) or 1)}
         style = thin if like is not None else {"lw": 2.6, "zorder": 5}
@@ -234,7 +241,7 @@ def _over_epsilon(study: Study, quantity: str) -> list[tuple[str, str, list[tupl
             and (e := r.error(quantity)) is not None
         }
         if points:
-            found.append((kind, _SMOOTHINGS[kind], sorted(points.items())))
+            found.append((kind, _colour(kind), sorted(points.items())))
     return found
 
 

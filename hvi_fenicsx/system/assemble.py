@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 
 from mpi4py import MPI
 
-from ..laws import Superpotential
-from ..laws.smoothing import create
+from ..laws import Superpotential, smoothing
 from ..mesh import coarsening_2d, domain, refinement
 from ..mesh.domain import Domain
 from ..problem import problem
@@ -55,5 +54,5 @@ def modification(scene: Scene) -> Callable[[Superpotential], Superpotential]:
     if wanted.smoothing is None:
         return lambda law: law
     return functools.partial(
-        create.create, wanted.smoothing, epsilon=wanted.epsilon, epsilon_absolute=wanted.epsilon_absolute
+        smoothing.create, wanted.smoothing, epsilon=wanted.epsilon, epsilon_absolute=wanted.epsilon_absolute
     )

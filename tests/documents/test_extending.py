@@ -24,7 +24,7 @@ PLAIN = {
     'law = "plateau", strength = 1.0e6, slip = 3.0e-6': 'law = "graph", points = [[0, 0], [3e-6, 1e6], [9e-6, 1e6], '
     "[9e-6, 0.5e6]]",
     'pressure = { value = "1e6*(1 + x)" }': 'traction = [0.0, "-1e6*(1 + x)"]',
-    'plugins = ["my_law.py", "my_effect.py", "my_method.py"]': "",
+    'plugins = ["my_law.py", "my_smoothing.py", "my_effect.py", "my_method.py"]': "",
     'method = "lowest"': 'method = "auto"',
 }
 
@@ -77,6 +77,22 @@ def test_check_tells_what_they_add(files: Path) -> None:
     assert "the lower energy" in data["solver"]
 
 
+def test_the_users_smoothing_gives_what_a_narrow_one_of_the_programs_gives(files: Path) -> None:
+    for name in ("cubic", "quadratic"):
+        wanted = f'solver={{smoothing="{name}", epsilon=1e-3}}'
+        done = hvi("run", "pressed.toml", "--set", wanted, "--out", name, "--no-pictures", cwd=files)
+        assert done.returncode == 0, done.stderr
+    own, program = (summary(files / name) for name in ("cubic", "quadratic"))
+    assert (own["smoothing"], own["certificate"]["passed"]) == ("cubic", True)
+    assert own["energy"] == pytest.approx(program["energy"], rel=1e-6)
+
+
+def test_a_misspelt_smoothing_is_told_with_the_users_own(files: Path) -> None:
+    done = hvi("check", "pressed.toml", "--set", 'solver={smoothing="cubik", epsilon=0.01}', cwd=files)
+    assert done.returncode == 2
+    assert 'unknown value "cubik"; did you mean "cubic"? allowed: chks, cubic, log_exp' in " ".join(done.stderr.split())
+
+
 def test_the_result_runs_again_from_its_own_scene(files: Path) -> None:
     assert hvi("run", "pressed.toml", "--no-pictures", cwd=files).returncode == 0
     again = hvi("run", "results/pressed/scene.toml", "--out", "again", "--no-pictures", cwd=files)
@@ -111,7 +127,9 @@ def test_a_plugin_that_cannot_be_loaded_is_told_with_its_place(name: str, files:
     text, told = WRONG[name]
     if text is not None:
         (files / name).write_text(text, encoding="utf-8")
-    scene = BLOCKS["pressed.toml"].replace('["my_law.py", "my_effect.py", "my_method.py"]', f'"{name}"')
+    scene = BLOCKS["pressed.toml"].replace(
+        '["my_law.py", "my_smoothing.py", "my_effect.py", "my_method.py"]', f'"{name}"'
+    )
     (files / "pressed.toml").write_text(scene, encoding="utf-8")
     with pytest.raises(InputError) as caught:
         read_scene(files / "pressed.toml")

@@ -14,10 +14,16 @@ from hvi_fenicsx import laws
 from hvi_fenicsx.errors import InputError
 from hvi_fenicsx.laws.base import Superpotential
 from hvi_fenicsx.laws.scaled import ScaledLaw
-from hvi_fenicsx.laws.smoothing import create
-from hvi_fenicsx.laws.smoothing.paper import PaperSmoothing
-from hvi_fenicsx.laws.smoothing.plus_functions import PLUS_FUNCTIONS, PlusFunction
-from hvi_fenicsx.laws.smoothing.smoothed_law import SmoothedLaw
+from hvi_fenicsx.laws.smoothing import (
+    QUADRATIC,
+    Chks,
+    LogExp,
+    PaperSmoothedLaw,
+    PlusFunction,
+    PlusSmoothedLaw,
+    available,
+    create,
+)
 
 GAMMA1, GAMMA2, DELTA = 1.0e3, 0.5e3, 9.0e-6
 MODEL = laws.QuadraticLinear(GAMMA1, GAMMA2, DELTA)
@@ -32,6 +38,7 @@ LAWS: dict[str, Superpotential] = {
     "one-sided": laws.Graph(((0.0, 0.0), (1e-6, 5.0), (1e-6, 1.0), (2e-6, 1.0), (2e-6, 4.0)), one_sided=True),
     "scaled": ScaledLaw(MODEL, 3e-6, 7.0),
 }
+PLUS_FUNCTIONS: dict[str, PlusFunction] = {plus.name: plus for plus in (QUADRATIC, Chks(), LogExp())}
 each_law = pytest.mark.parametrize("law", LAWS.values(), ids=LAWS.keys())
 each_plus = pytest.mark.parametrize("plus", PLUS_FUNCTIONS.values(), ids=PLUS_FUNCTIONS.keys())
 each_epsilon = pytest.mark.parametrize("epsilon", [1e-12, 1e-6, 1e-2, 1.0, 1e3])
@@ -95,7 +102,7 @@ def test_kappa_is_attained_at_the_kink(plus: PlusFunction) -> None:
 @each_plus
 @each_epsilon
 def test_error_bound(law: Superpotential, plus: PlusFunction, epsilon: float) -> None:
-    smooth = SmoothedLaw.relative(law, epsilon, plus)
+    smooth = plus.relative(law, epsilon)
     for width in (1e-3, epsilon):
         x = around(law, width)
         error = np.abs(smooth.value(x) - law.value(x))
@@ -111,7 +118,7 @@ def test_error_bound(law: Superpotential, plus: PlusFunction, epsilon: float) ->
     st.floats(-1e3, 1e3),
 )
 def test_error_bound_at_random(law: Superpotential, plus: PlusFunction, exponent: float, place: float) -> None:
-    smooth = SmoothedLaw.relative(law, 10.0**exponent, plus)
+    smooth = plus.relative(law, 10.0**exponent)
     x = np.append(place * law.length_scale, law.kinks + place * 10.0**exponent * law.length_scale)
     error = np.abs(smooth.value(x) - law.value(x))
     assert np.all(error <= smooth.bound * (1 + 1e-12) + 1e-15 * np.abs(law.value(x)))
@@ -121,7 +128,7 @@ def test_error_bound_at_random(law: Superpotential, plus: PlusFunction, exponent
 @each_plus
 @pytest.mark.parametrize("epsilon", [1e-2, 1.0, 1e3])
 def test_derivatives_of_the_smoothed_law(law: Superpotential, plus: PlusFunction, epsilon: float) -> None:
-    smooth = SmoothedLaw.relative(law, epsilon, plus)
+    smooth = plus.relative(law, epsilon)
     h = 1e-6 * law.length_scale
     x = around(law)
     x = x[np.abs(x) < 10 * law.length_scale]
@@ -136,7 +143,7 @@ def test_derivatives_of_the_smoothed_law(law: Superpotential, plus: PlusFunction
 @each_plus
 @each_epsilon
 def test_split_of_the_smoothed_law(law: Superpotential, plus: PlusFunction, epsilon: float) -> None:
-    smooth = SmoothedLaw.relative(law, epsilon, plus)
+    smooth = plus.relative(law, epsilon)
     x = np.union1d(around(law), around(law, epsilon))
     h, g = smooth.convex, smooth.concave
     size = np.abs(h.value(x)) + np.abs(g.value(x)) + law.energy_scale
@@ -151,7 +158,7 @@ def test_split_of_the_smoothed_law(law: Superpotential, plus: PlusFunction, epsi
 @each_law
 @each_plus
 def test_second_derivative_of_the_smoothed_parts(law: Superpotential, plus: PlusFunction) -> None:
-    smooth = SmoothedLaw.relative(law, 0.5, plus)
+    smooth = plus.relative(law, 0.5)
     h = 1e-6 * law.length_scale
     x = np.random.default_rng(3).uniform(-8, 8, 200) * law.length_scale
     for part in (smooth.convex, smooth.concave):
@@ -168,7 +175,7 @@ def test_gradients_tend_into_the_subdifferential(law: Superpotential, plus: Plus
     for place in law.kinks:
         gaps = []
         for epsilon in (1e-2, 1e-4, 1e-6, 1e-8):
-            smooth = SmoothedLaw.relative(law, epsilon, plus)
+            smooth = plus.relative(law, epsilon)
             x = place + epsilon * law.length_scale * np.linspace(-2, 2, 41)
             (lo,), (hi,) = law.interval(np.array([place]))
             gaps.append(np.maximum(np.maximum(lo - smooth.right(x), smooth.right(x) - hi), 0.0).max())
@@ -176,7 +183,7 @@ def test_gradients_tend_into_the_subdifferential(law: Superpotential, plus: Plus
         assert gaps[-1] <= gaps[0] + 1e-12 * law.peak.plus
     x = around(law)
     x = x[np.all(np.abs(x[:, None] - law.kinks) > 1e-4 * law.length_scale, axis=1)] if law.kinks.size else x
-    smooth = SmoothedLaw.relative(law, 1e-9, plus)
+    smooth = plus.relative(law, 1e-9)
     assert law.distance(x, smooth.right(x)).max() <= 1e-6 * law.traction_scale
 
 
@@ -184,7 +191,7 @@ def test_gradients_tend_into_the_subdifferential(law: Superpotential, plus: Plus
 @each_plus
 @each_epsilon
 def test_untouched_at_zero_slip(law: Superpotential, plus: PlusFunction, epsilon: float) -> None:
-    smooth = SmoothedLaw.relative(law, epsilon, plus)
+    smooth = plus.relative(law, epsilon)
     assert smooth.even == law.even
     if not law.even:
         return
@@ -196,7 +203,7 @@ def test_untouched_at_zero_slip(law: Superpotential, plus: PlusFunction, epsilon
 
 
 def test_the_quadratic_smoothing_leaves_the_law_alone_away_from_the_drop() -> None:
-    smooth = SmoothedLaw.relative(MODEL, 0.01)
+    smooth = QUADRATIC.relative(MODEL, 0.01)
     reach = 0.5 * smooth.epsilon_absolute / (GAMMA1 - GAMMA2)
     x = np.concatenate([np.linspace(0, DELTA - reach, 50), np.linspace(DELTA + reach * 1.001, 5 * DELTA, 50)])
     np.testing.assert_array_equal(smooth.value(x), MODEL.value(x))
@@ -207,7 +214,7 @@ def test_the_quadratic_smoothing_leaves_the_law_alone_away_from_the_drop() -> No
 @each_plus
 @pytest.mark.parametrize("absolute", [1e-300, 1e-12, 1.0, 1e3, 1e300])
 def test_no_overflow(law: Superpotential, plus: PlusFunction, absolute: float) -> None:
-    smooth = SmoothedLaw(law, absolute, plus)
+    smooth = PlusSmoothedLaw(law, absolute, plus)
     x = np.concatenate([[0.0], law.kinks, np.geomspace(1e-300, 1e300, 200), -np.geomspace(1e-300, 1e300, 200)])
     if isinstance(law, ScaledLaw):
         x = x[np.abs(x) < 1e290]
@@ -222,7 +229,7 @@ def test_no_overflow(law: Superpotential, plus: PlusFunction, absolute: float) -
 @each_plus
 @each_epsilon
 def test_bounds_of_the_smoothed_law_hold(law: Superpotential, plus: PlusFunction, epsilon: float) -> None:
-    smooth = SmoothedLaw.relative(law, epsilon, plus).scaled(law.length_scale, 1.0)
+    smooth = plus.relative(law, epsilon).scaled(law.length_scale, 1.0)
     x = np.union1d(around(smooth), around(smooth, epsilon))
     slope, slack = smooth.right(x), 1e-9 * smooth.traction_scale
     assert smooth.growth == law.scaled(law.length_scale, 1.0).growth
@@ -236,16 +243,16 @@ def test_bounds_of_the_smoothed_law_hold(law: Superpotential, plus: PlusFunction
 
 def test_an_opposing_traction_never_appears_by_smoothing_the_model() -> None:
     for plus in PLUS_FUNCTIONS.values():
-        assert SmoothedLaw.relative(MODEL, 0.1, plus).c4 == 0.0
-    assert SmoothedLaw.relative(LAWS["literal"], 1e-6).c4 == pytest.approx(GAMMA2, rel=1e-5)
+        assert plus.relative(MODEL, 0.1).c4 == 0.0
+    assert QUADRATIC.relative(LAWS["literal"], 1e-6).c4 == pytest.approx(GAMMA2, rel=1e-5)
 
 
 @each_law
 @each_plus
 def test_scaled_smoothing(law: Superpotential, plus: PlusFunction) -> None:
-    smooth, length, traction = SmoothedLaw.relative(law, 0.3, plus), 2.5e-6, 17.0
+    smooth, length, traction = plus.relative(law, 0.3), 2.5e-6, 17.0
     scaled = smooth.scaled(length, traction)
-    assert isinstance(scaled, SmoothedLaw)
+    assert isinstance(scaled, PlusSmoothedLaw)
     assert scaled.epsilon == pytest.approx(0.3)
     x = np.random.default_rng(4).uniform(-8, 8, 300) * law.length_scale
     np.testing.assert_allclose(scaled.value(x / length) * length * traction, smooth.value(x), rtol=1e-9)
@@ -270,7 +277,7 @@ PAPER_EPSILONS = (1e-8, 1e-5, 1e-3, 2.25e-3, 2.3e-3, 0.1, 10.0)
 
 @pytest.mark.parametrize("epsilon", PAPER_EPSILONS)
 def test_papers_smoothing_is_the_papers_formula(epsilon: float) -> None:
-    law = PaperSmoothing(MODEL, epsilon)
+    law = PaperSmoothedLaw(MODEL, epsilon)
     x = np.linspace(-4 * DELTA, 4 * DELTA, 2001)
     expected = -np.array([papers_s(float(v), epsilon) for v in x])
     np.testing.assert_allclose(law.value(x), expected, rtol=1e-10, atol=1e-12 * law.energy_scale)
@@ -283,7 +290,7 @@ def test_papers_smoothing_is_the_papers_formula(epsilon: float) -> None:
 
 
 def test_papers_own_data_return_250_at_zero_slip() -> None:
-    law = PaperSmoothing(MODEL, 0.1)
+    law = PaperSmoothedLaw(MODEL, 0.1)
     np.testing.assert_allclose(law.right(np.array([0.0, 1e-12])), 250.0, rtol=1e-6)
     x = np.linspace(1e-9, 6e-6, 100)
     np.testing.assert_allclose(law.right(x), (GAMMA1 * x / DELTA + GAMMA2) / 2, rtol=0.05)
@@ -291,7 +298,7 @@ def test_papers_own_data_return_250_at_zero_slip() -> None:
 
 @pytest.mark.parametrize("epsilon", PAPER_EPSILONS)
 def test_papers_smoothing_has_a_false_kink_at_zero_for_every_epsilon(epsilon: float) -> None:
-    law = PaperSmoothing(MODEL, epsilon)
+    law = PaperSmoothedLaw(MODEL, epsilon)
     (lo,), (hi,) = law.interval(np.zeros(1))
     assert (lo, hi) == pytest.approx((-GAMMA2 / 2, GAMMA2 / 2))
     np.testing.assert_array_equal(law.convex.kinks, [0.0])
@@ -303,7 +310,7 @@ def test_papers_smoothing_has_a_false_kink_at_zero_for_every_epsilon(epsilon: fl
 
 @pytest.mark.parametrize("epsilon", [1e-14, *PAPER_EPSILONS])
 def test_papers_split(epsilon: float) -> None:
-    law = PaperSmoothing(MODEL, epsilon)
+    law = PaperSmoothedLaw(MODEL, epsilon)
     x = np.union1d(around(MODEL), DELTA + epsilon / GAMMA2 * np.linspace(-2, 2, 81))
     h, g = law.convex, law.concave
     np.testing.assert_allclose(h.value(x) - g.value(x), law.value(x), atol=1e-12 * (1 + h.value(x).max()))
@@ -328,7 +335,7 @@ def test_papers_split(epsilon: float) -> None:
 def test_papers_smoothing_integrates_its_second_derivative() -> None:
     """G and G' in closed form against quadrature of G''."""
     for epsilon in (1e-3, 4e-3, 0.1):
-        g = PaperSmoothing(MODEL, epsilon).concave
+        g = PaperSmoothedLaw(MODEL, epsilon).concave
         x = np.linspace(0, 30e-6, 600_001)
         rate = np.concatenate([[0], np.cumsum(0.5 * (g.second(x[1:]) + g.second(x[:-1])) * np.diff(x))])
         np.testing.assert_allclose(g.right(x), rate, atol=1e-4 * GAMMA1)
@@ -337,7 +344,7 @@ def test_papers_smoothing_integrates_its_second_derivative() -> None:
 
 
 def test_papers_smoothing_far_out_and_scaled() -> None:
-    law = PaperSmoothing(MODEL, 0.1)
+    law = PaperSmoothedLaw(MODEL, 0.1)
     x = np.concatenate([[0.0], np.geomspace(1e-300, 1e300, 100)])
     with np.errstate(over="raise", invalid="raise", divide="raise"):
         for y in (x, -x):
@@ -355,12 +362,12 @@ def test_papers_smoothing_far_out_and_scaled() -> None:
 
 
 def test_create() -> None:
-    law = create.create("chks", MODEL, epsilon=0.01)
-    assert isinstance(law, SmoothedLaw)
+    law = create("chks", MODEL, epsilon=0.01)
+    assert isinstance(law, PlusSmoothedLaw)
     assert law.epsilon_absolute == pytest.approx(0.01 * GAMMA2 * DELTA)
-    paper = create.create("paper", MODEL, epsilon_absolute=0.1)
-    assert paper == PaperSmoothing(MODEL, 0.1)
-    assert set(create.available()) == {"quadratic", "chks", "log_exp", "paper"}
+    paper = create("paper", MODEL, epsilon_absolute=0.1)
+    assert paper == PaperSmoothedLaw(MODEL, 0.1)
+    assert set(available()) == {"quadratic", "chks", "log_exp", "paper"}
 
 
 @pytest.mark.parametrize(
@@ -380,9 +387,9 @@ def test_create() -> None:
 )
 def test_refusals(kind: str, given_epsilon: dict[str, Any], said: str) -> None:
     with pytest.raises(InputError, match=said):
-        create.create(kind, MODEL, **given_epsilon)
+        create(kind, MODEL, **given_epsilon)
 
 
 def test_papers_smoothing_refuses_other_laws() -> None:
     with pytest.raises(InputError, match=r'"quadratic_linear" only.*"log_exp"'):
-        create.create("paper", laws.Tresca(1.0), epsilon=0.1)
+        create("paper", laws.Tresca(1.0), epsilon=0.1)

@@ -3,7 +3,7 @@
 -j = max{g1, g2} with g1 = -γ1/(2δ) x², g2 = -γ2 |x| is replaced by S = g1 + p(d; ε), where d = g2 - g1 and
 p is the quadratic plus function. Both pieces also meet at x = 0, so S acts there too, for every ε, however
 small: the smoothed even law has a false kink at zero slip, where its subdifferential is [-γ2/2, γ2/2]. For
-results as the paper's, use this; for results as the law's, `SmoothedLaw`.
+results as the paper's, use this; for results as the law's, a plus function.
 """
 
 from __future__ import annotations
@@ -19,30 +19,38 @@ from ...errors import InputError
 from ...typing import Array
 from ..base import ConvexPart, DifferentiablePart, Superpotential
 from ..catalogue import QuadraticLinear
+from .base import SmoothedLaw, Smoothing
 from .plus_functions import QUADRATIC
-from .smoothed_law import Smoothing
+
+
+class PaperSmoothing(Smoothing):
+    """The paper's S, for its quadratic-linear law."""
+
+    name = "paper"
+    laws = (QuadraticLinear.name,)
+
+    @override
+    def smooth(self, law: Superpotential, epsilon_absolute: float) -> PaperSmoothedLaw:
+        if not isinstance(law, QuadraticLinear):
+            raise InputError(
+                f'smoothing = "paper" is defined for the law "quadratic_linear" only, not for '
+                f'{law.name!r}; take "quadratic" (the same plus function), "chks" or "log_exp"'
+            )
+        return PaperSmoothedLaw(law, epsilon_absolute)
 
 
 @dataclass(frozen=True)
-class PaperSmoothing(Smoothing, register=False):
+class PaperSmoothedLaw(SmoothedLaw, register=False):
     """j ≈ -S(x, ε) for the quadratic-linear law, even, ε in N/m.
 
     Split: -S'' = s (1 - p'(d)) - d'² p''(d) with s = γ1/δ; G'' is the second term, H the rest, with the kink.
-    InputError for any other law.
     """
 
     name = "paper_smoothing"
     law: QuadraticLinear
 
-    def __post_init__(self) -> None:
-        if not isinstance(self.law, QuadraticLinear):
-            raise InputError(
-                f'smoothing = "paper" is defined for the law "quadratic_linear" only, not for '
-                f'{self.law.name!r}; take "quadratic" (the same plus function), "chks" or "log_exp"'
-            )
-        super().__post_init__()
-
     @property
+    @override
     def bound(self) -> float:
         """Bound of |S + j|, N/m: ε/8, attained at x = 0 and δ."""
         return QUADRATIC.kappa * self.epsilon_absolute
@@ -89,7 +97,7 @@ class PaperSmoothing(Smoothing, register=False):
     @override
     def scaled(self, length: float, traction: float) -> Superpotential:
         law = QuadraticLinear(self.law.gamma1 / traction, self.law.gamma2 / traction, self.law.delta / length)
-        return PaperSmoothing(law, self.epsilon_absolute / (length * traction))
+        return PaperSmoothedLaw(law, self.epsilon_absolute / (length * traction))
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,7 +126,7 @@ class _Band:
 class _PaperConcave(DifferentiablePart):
     """G: even, smooth, with the second derivative d'² p''(d)."""
 
-    law: PaperSmoothing
+    law: PaperSmoothedLaw
 
     @cached_property
     def _bands(self) -> tuple[_Band, _Band]:
@@ -156,7 +164,7 @@ class _PaperConcave(DifferentiablePart):
 class _PaperConvex(ConvexPart):
     """H = -S + G: even, with the second derivative s (1 - p'(d)) and the false kink of height γ2 at 0."""
 
-    law: PaperSmoothing
+    law: PaperSmoothedLaw
 
     @property
     @override

@@ -1,4 +1,8 @@
-"""A law with its kinks smoothed, and nothing else changed.
+"""Smoothing by a plus function: the kinks of a law are smoothed, and nothing else is changed.
+
+A plus function is p(t; e) = max(t, 0) + e D(|t|/e) with one profile D: convex, decreasing, D(0) = κ, D'(0) = -1/2. So
+the error is at most κ e, largest at the kink and alike on both sides of it, and as D decays, so does the error away
+from the kink. Computing D, and not p, keeps the difference p - max(t, 0) exact where it is tiny.
 
 A jump c of the traction at a is a summand c (x - a)₊ of j. Replacing (x - a)₊ by p(x - a; ε/|c|) adds
 sign(c) ε D(|c| |x - a|/ε): up to κ ε, an energy per area, whatever the jump. Upward jumps are those of H,
@@ -7,18 +11,71 @@ downward ones those of G, so H + ε ΣD and G + ε ΣD are convex again: the smo
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from dataclasses import dataclass
 from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 from typing_extensions import override
 
-from ...typing import Array, Integers
-from ..base import ConvexPart, DifferentiablePart, Directional, Superpotential
-from .checks import require_epsilon
-from .plus_functions import QUADRATIC, PlusFunction
+from ...typing import Array
+from ..base import ConvexPart, DifferentiablePart, Superpotential
+from .base import SmoothedLaw, Smoothing
 
 _LARGEST = float(np.finfo(np.float64).max)
+
+
+@dataclass(frozen=True)
+class PlusFunction(Smoothing):
+    """One smoothing of max(t, 0), and of laws by it: a subclass gives a name, κ and the profile.
+
+    Class attributes:
+        kappa: the constant of |p(t; e) - max(t, 0)| ≤ κ e; it is attained at t = 0.
+    """
+
+    kappa: ClassVar[float]
+
+    @abstractmethod
+    def profile(self, z: Array) -> tuple[Array, Array, Array]:
+        """D, D' and D'' at z = |t|/e ≥ 0, inf included; each of shape (m,)."""
+
+    @override
+    def smooth(self, law: Superpotential, epsilon_absolute: float) -> PlusSmoothedLaw:
+        return PlusSmoothedLaw(law, epsilon_absolute, self)
+
+    def value(self, t: Array, e: float) -> Array:
+        """The function p(t; e), (m,).
+
+        Args:
+            t: arguments (m,).
+            e: width > 0 in the unit of t.
+        """
+        return np.asarray(np.maximum(t, 0.0) + e * self._at(t, e)[0])
+
+    def derivative(self, t: Array, e: float) -> Array:
+        """The derivative of p(t; e) by t, (m,): from 0 to 1, and 1/2 at 0.
+
+        Args:
+            t: arguments (m,).
+            e: width > 0 in the unit of t.
+        """
+        slope = self._at(t, e)[1]
+        return np.where(t >= 0.0, 1.0 + slope, -slope)
+
+    def second(self, t: Array, e: float) -> Array:
+        """The second derivative of p(t; e) by t, (m,).
+
+        Args:
+            t: arguments (m,).
+            e: width > 0 in the unit of t.
+        """
+        with np.errstate(over="ignore"):
+            return np.asarray(self._at(t, e)[2] / e)
+
+    def _at(self, t: Array, e: float) -> tuple[Array, Array, Array]:
+        with np.errstate(over="ignore"):
+            return self.profile(np.abs(t) / e)
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,47 +133,7 @@ class SmoothedPart(DifferentiablePart):
 
 
 @dataclass(frozen=True)
-class Smoothing(Superpotential, register=False):
-    """A law smoothed with a width ε (N/m): what all smoothings leave as the law has it."""
-
-    law: Superpotential
-    epsilon_absolute: float
-
-    def __post_init__(self) -> None:
-        require_epsilon("epsilon_absolute", self.epsilon_absolute)
-
-    @property
-    def epsilon(self) -> float:
-        """ε relative to the law's energy scale."""
-        return self.epsilon_absolute / self.law.energy_scale
-
-    @property
-    @override
-    def growth(self) -> Directional:
-        return self.law.growth
-
-    @property
-    @override
-    def energy_scale(self) -> float:
-        return self.law.energy_scale
-
-    @property
-    @override
-    def length_scale(self) -> float:
-        return self.law.length_scale
-
-    @property
-    @override
-    def even(self) -> bool:
-        return self.law.even
-
-    @override
-    def piece(self, x: Array) -> Integers:
-        return self.law.piece(x)
-
-
-@dataclass(frozen=True)
-class SmoothedLaw(Smoothing, register=False):
+class PlusSmoothedLaw(SmoothedLaw, register=False):
     """A law smoothed at its kinks by one plus function, with ε (N/m) the same for every kink.
 
     An even law stays even, with traction exactly 0 at zero slip; a kink at zero slip is smoothed like any.
@@ -124,15 +141,10 @@ class SmoothedLaw(Smoothing, register=False):
     """
 
     name = "smoothed"
-    plus: PlusFunction = QUADRATIC
-
-    @classmethod
-    def relative(cls, law: Superpotential, epsilon: float, plus: PlusFunction = QUADRATIC) -> SmoothedLaw:
-        """With ε = epsilon times the law's energy scale."""
-        require_epsilon("epsilon", epsilon)
-        return cls(law, epsilon * law.energy_scale, plus)
+    plus: PlusFunction
 
     @property
+    @override
     def bound(self) -> float:
         """Bound of |S - j|, N/m: κ ε times the number of upward or of downward jumps, whichever is larger.
 
@@ -166,4 +178,6 @@ class SmoothedLaw(Smoothing, register=False):
 
     @override
     def scaled(self, length: float, traction: float) -> Superpotential:
-        return SmoothedLaw(self.law.scaled(length, traction), self.epsilon_absolute / (length * traction), self.plus)
+        return PlusSmoothedLaw(
+            self.law.scaled(length, traction), self.epsilon_absolute / (length * traction), self.plus
+        )

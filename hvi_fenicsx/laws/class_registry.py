@@ -1,0 +1,40 @@
+"""Classes that are known by their name as soon as they are defined: laws and smoothings."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+
+from ..errors import InputError
+
+
+def enter(known: dict[str, type], cls: type, name: str, kind: str) -> None:
+    """Enter a class under its name; the same class again (a notebook's cell run twice) replaces it.
+
+    Args:
+        known: the classes of this kind by their names; the class joins them.
+        cls: the class.
+        name: its name.
+        kind: what it is, for the message.
+
+    Raises:
+        InputError: another class has that name.
+    """
+    old = known.get(name)
+    if old is not None and (old.__module__, old.__qualname__) != (cls.__module__, cls.__qualname__):
+        raise InputError(
+            f"{kind} class {cls.__name__}: the name {name!r} is taken by {old.__module__}.{old.__qualname__}; "
+            "choose another name"
+        )
+    known[name] = cls
+
+
+def closest(name: object, names: Iterable[str]) -> str:
+    """The name that was probably meant, as the end of a message: `` (did you mean 'graph'?)``, or nothing.
+
+    Args:
+        name: what was given.
+        names: all that are known.
+    """
+    match = difflib.get_close_matches(str(name), list(names), n=1)
+    return f" (did you mean {match[0]!r}?)" if match else ""
