@@ -23,7 +23,6 @@ from petsc4py import PETSc
 
 from hvi_fenicsx import Scene, read_scene
 from hvi_fenicsx.certify.certificate import examine
-from hvi_fenicsx.certify.estimate import defect
 from hvi_fenicsx.certify.estimate.estimator import Estimate, estimate
 from hvi_fenicsx.mesh import refinement, transfer
 from hvi_fenicsx.problem.problem import Problem
@@ -70,11 +69,11 @@ def distance(rung: Rung, finer: Sequence[Rung]) -> float:
     fine = finer[-1].system.problem
     away = _raised(rung.solve_result.u, rung, finer)
     away.x.array[:] = finer[-1].solve_result.u.x.array - away.x.array
-    force = fem.assemble_scalar(fem.form(ufl.action(ufl.action(fine.bilinear, away), away)))
+    force = fem.assemble_scalar(fem.form(fine.bulk.between(away, away)))
     pressures = zip(
-        fine.averaged,
-        defect.pressures(rung.system.problem, rung.solve_result.u),
-        defect.pressures(fine, finer[-1].solve_result.u),
+        fine.bulk.averaged,
+        rung.system.problem.bulk.pressures(rung.solve_result.u),
+        fine.bulk.pressures(finer[-1].solve_result.u),
         strict=True,
     )
     for part, coarse, exact in pressures:

@@ -90,7 +90,7 @@ class Watched(ABC):
 
 def watched(name: str, rung: Rung) -> Watched:
     """A quantity, from its first rung on: by the estimate's defect where that tells it, else by its changes."""
-    told = name in _SAFETY and not rung.prepared.problem.averaged
+    told = name in _SAFETY and not rung.prepared.problem.bulk.averages_dilatation
     return Estimated(name) if told else History(name)
 
 

@@ -10,11 +10,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import ufl
 from dolfinx import fem
 
 from ..effects.base import Direction
-from ..problem import nodal_averaging
 from ..problem.contact_surface import Surface
 from ..problem.law_term import LawTerm
 from ..problem.problem import Bounds, Problem
@@ -74,10 +72,7 @@ class State:
 
 def forces(problem: Problem, u: fem.Function) -> Forces:
     """Reassembled from the forms, whatever a solver believes. Collective."""
-    d = problem.scales.dimension
-    internal = nodal(ufl.action(problem.bilinear, u))
-    for part in nodal_averaging.assemble(problem.averaged):
-        internal += part.force(u).reshape(-1, d)
+    internal = problem.bulk.force(u)
     load = sum((nodal(form) for form in problem.linear.values()), np.zeros_like(internal))
     return Forces(internal - load, load)
 

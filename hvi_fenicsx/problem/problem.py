@@ -16,17 +16,18 @@ import numpy as np
 import ufl
 from dolfinx import fem
 
-from ..effects.base import Averaged, BoundaryLaw, Contribution, Direction, Effect, NormalBounds, Place
+from ..effects.base import BoundaryLaw, Contribution, Direction, Effect, NormalBounds, Place
 from ..errors import InputError
 from ..formula import Formula
 from ..laws import Superpotential
 from ..mesh.domain import Domain
 from ..runtime.mpi import agree
 from ..typing import Array, Entities, Integers
-from . import bodies, scaling
+from . import bodies, bulk, scaling
 from . import contact_surface as surface
 from . import dirichlet as conditions
 from .bodies import Bodies
+from .bulk import Bulk
 from .contact_surface import Surface
 from .form_context import FormContext, Scaled
 from .law_term import LawTerm
@@ -69,9 +70,8 @@ class Problem:
 
     Attributes:
         domain, scales: as they are. space: P1 vectors. points: its local vertices (owned and ghost), m, (n, 3).
-        bilinear, linear: UFL forms a(u, v) and <g, v>, the latter by name of its part.
-        strains: names of linear forms that no rigid motion feels (thermal strain).
-        averaged: volumetric parts of a(u, v) that are averaged by vertex.
+        bulk: the elastic operator, a(u, v).
+        linear: UFL forms <g, v> of the loads, by name of their part.
         conditions: Dirichlet conditions, nondimensional values.
         fixed: local scalar dofs (owned and ghost) that they prescribe. prescribed: where and what they prescribe.
         bounds: by part. terms: the laws at their vertices.
@@ -83,10 +83,8 @@ class Problem:
     scales: Scales
     space: fem.FunctionSpace
     points: Array
-    bilinear: Any
-    averaged: tuple[Averaged, ...]
+    bulk: Bulk
     linear: dict[str, Any]
-    strains: frozenset[str]
     conditions: tuple[fem.DirichletBC, ...]
     fixed: Entities
     prescribed: tuple[Prescribed, ...]
@@ -182,17 +180,14 @@ def _sum(
     terms = [
         _term(context, surfaces[w], law, modify, scales, fixed) for w, _, c in made if w is not None for law in c.laws
     ]
-    bilinear = [form for _, _, c in made for form in c.bilinear]
     linear, strains = (_by_name(made, kind) for kind in ("linear", "strains"))
     return Problem(
         context.domain,
         scales,
         context.space,
         context.points,
-        sum(bilinear),
-        tuple(a for _, _, c in made for a in c.averaged),
+        bulk.build(context.space, scales, made, strains),
         {**linear, **strains},
-        frozenset(strains),
         prescribed,
         fixed,
         _prescribed(context, made),

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+import ufl
 from dolfinx import fem, la
 from dolfinx.fem.petsc import assemble_vector
 from petsc4py import PETSc
@@ -34,6 +35,26 @@ def nodal(form: Any) -> Array:
     vector = fem.assemble_vector(compiled)
     vector.scatter_reverse(la.InsertMode.add)
     return np.asarray(vector.array.reshape(-1, dofs.index_map_bs)[: dofs.index_map.size_local], dtype=np.float64)
+
+
+def nodal_sum(form: Any) -> Array:
+    """As :func:`nodal`, of a form whose integrals may have different subdomain data. Collective."""
+    return np.asarray(sum(nodal(ufl.Form(integrals)) for integrals in _alike(form)))
+
+
+def _alike(form: Any) -> list[list[Any]]:
+    """A form's integrals in groups: within one, dolfinx wants all of a type to have the same subdomain data."""
+    seen: dict[str, list[Any]] = {}
+    groups: list[list[Any]] = []
+    for integral in form.integrals():
+        known, data = seen.setdefault(integral.integral_type(), []), integral.subdomain_data()
+        place = next((i for i, other in enumerate(known) if other is data), len(known))
+        if place == len(known):
+            known.append(data)
+        if place == len(groups):
+            groups.append([])
+        groups[place].append(integral)
+    return groups
 
 
 def turn(vector: PETSc.Vec, rotation: PETSc.Mat | None) -> None:

@@ -26,7 +26,7 @@ def write_body(path: Path, problem: Problem, u: fem.Function, estimate: Estimate
     """The displacement, m; by cell the von Mises stress, N/m², and the estimated error, over the energy norm of u."""
     field = fem.Function(problem.space, name="displacement")
     field.x.array[:] = u.x.array * problem.scales.displacement
-    by_cell: dict[str, Array] = {"von_mises": stress.von_mises(stress.by_cell(problem, u))}
+    by_cell: dict[str, Array] = {"von_mises": stress.von_mises(problem.bulk.stress(u))}
     if estimate is not None:
         by_cell["error"] = np.asarray(estimate.cells / (estimate.energy_norm or 1.0), dtype=np.float64)
     space = fem.functionspace(problem.domain.mesh, ("Discontinuous Lagrange", 0))

@@ -15,14 +15,12 @@ import dolfinx
 import numpy as np
 import numpy.typing as npt
 from dolfinx import fem
-from dolfinx.fem.petsc import assemble_matrix
 from mpi4py import MPI
 from scipy import sparse
 
 from ..certify.contact_state import State
 from ..effects.base import Direction
 from ..mesh.vertex_dofs import dof_of_node
-from ..problem import nodal_averaging
 from ..problem.scaling import Scales
 from ..typing import Array, Entities, Integers, Mask
 from ..workflow import Solution
@@ -167,9 +165,7 @@ def stiffness(solution: Solution) -> sparse.csr_array | None:
     Its energy norm does not feel rigid motions.
     """
     problem = solution.problem
-    matrix = assemble_matrix(fem.form(problem.bilinear))
-    matrix.assemble()
-    matrix = nodal_averaging.add(matrix, nodal_averaging.assemble(problem.averaged))
+    matrix = problem.bulk.matrix()
     starts, columns, values = matrix.getValuesCSR()
     size = matrix.getSize()[0]
     matrix.destroy()

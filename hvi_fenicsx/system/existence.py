@@ -80,7 +80,7 @@ def moves_with_contact_closed(problem: Problem) -> bool:
 
 def felt(problem: Problem, forces: Mapping[str, PETSc.Vec]) -> dict[str, PETSc.Vec]:
     """The loads that rigid motions feel: the work of the others on them is rounding only."""
-    return {name: force for name, force in forces.items() if name not in problem.strains}
+    return {name: force for name, force in forces.items() if name not in problem.bulk.strains}
 
 
 def of_body(problem: Problem, forces: Mapping[str, PETSc.Vec], body: Body) -> RigidProblem:

@@ -67,7 +67,7 @@ class LinearSettings:
         """
         if wanted != "auto":
             return cls(wanted)
-        if system.problem.averaged:
+        if system.problem.bulk.averages_dilatation:
             return cls("lu")
         if (ladder or system.below is not None) and system.freedom is None:
             return cls("mg")

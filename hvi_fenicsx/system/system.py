@@ -13,11 +13,10 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from dolfinx import fem
-from dolfinx.fem.petsc import assemble_matrix, assemble_vector, set_bc
+from dolfinx.fem.petsc import assemble_vector, set_bc
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from ..problem import nodal_averaging
 from ..problem.problem import Problem
 from ..problem.vectors import assembled, new_vector, turn
 from ..rigid import Mode
@@ -54,7 +53,7 @@ class Compiled:
 
 def compile_forms(problem: Problem) -> Compiled:
     """Compile (or take from the cache) what the assembly needs. Collective."""
-    return Compiled(fem.form(problem.bilinear), {name: fem.form(f) for name, f in problem.linear.items()})
+    return Compiled(problem.bulk.compiled, {name: fem.form(f) for name, f in problem.linear.items()})
 
 
 class System:
@@ -82,7 +81,7 @@ class System:
         self.terms, self.bounds = problem.terms, problem.bounds
         with timer("assembly"):
             self.forces = {name: assembled(form) for name, form in compiled.linear.items()}
-            self.matrix, self.load = self._constrained(compiled)
+            self.matrix, self.load = self._constrained()
             self.matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
             self.matrix.setOption(PETSc.Mat.Option.SPD, True)
             self.rotation = self._rotate()
@@ -165,11 +164,9 @@ class System:
         self.prescribe(x)
         return x
 
-    def _constrained(self, compiled: Compiled) -> tuple[PETSc.Mat, PETSc.Vec]:
+    def _constrained(self) -> tuple[PETSc.Mat, PETSc.Vec]:
         """Stiffness and load with the prescribed values: rows and columns of the identity, the load lifted."""
-        matrix = assemble_matrix(compiled.bilinear)
-        matrix.assemble()
-        matrix = nodal_averaging.add(matrix, nodal_averaging.assemble(self.problem.averaged))
+        matrix = self.problem.bulk.matrix()
         load, prescribed = new_vector(self.problem.space), new_vector(self.problem.space)
         for force in self.forces.values():
             load.axpy(1.0, force)

@@ -318,9 +318,9 @@ def test_what_a_scene_does_not_name_is_not_there() -> None:
     table = body("isotropic plane stress")
     table["boundary"] = rollers("isotropic plane stress") | {"pull": {"on": "right", "traction": [P, 0.0]}}
     problem = prepare(Scene.model_validate(table)).problem
-    assert (problem.bounds, problem.terms, problem.surfaces, problem.averaged) == ((), (), (), ())
+    assert (problem.bounds, problem.terms, problem.surfaces, problem.bulk.averaged) == ((), (), (), ())
     assert list(problem.linear) == ["pull.traction"]
-    assert not problem.strains
+    assert not problem.bulk.strains
 
 
 # --- what makes no sense

@@ -14,8 +14,6 @@ import meshes
 import numpy as np
 import numpy.typing as npt
 import pytest
-from dolfinx import fem
-from dolfinx.fem.petsc import assemble_matrix
 from mpi4py import MPI
 from runs import hvi, on_ranks, summary, write_scene
 from scenes import NU, E, Table, quadratic_linear
@@ -153,8 +151,7 @@ def test_the_kernel_is_the_null_space_of_the_matrix(conditions: dict[str, Any], 
     prepared = prepare(Scene.model_validate(table))
     problem, modes = prepared.problem, prepared.solvability.kernel
     assert len(modes) == left
-    matrix = assemble_matrix(fem.form(problem.bilinear))
-    matrix.assemble()
+    matrix = problem.bulk.matrix()
     dense = matrix.convert("dense").getDenseArray()
     free = np.setdiff1d(np.arange(len(dense)), problem.fixed)
     points = problem.space.tabulate_dof_coordinates() / problem.scales.length

@@ -60,7 +60,7 @@ def wood(**more: Any) -> Table:
 
 def stresses(solution: Solution) -> Array:
     assert solution.solve_result is not None
-    return stress.by_cell(solution.problem, solution.solve_result.u)
+    return solution.problem.bulk.stress(solution.solve_result.u)
 
 
 def assert_uniform(found: Array, *diagonal: float) -> None:

@@ -9,7 +9,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import ufl
 from dolfinx import fem, la
 
 from ...effects.base import Direction
@@ -21,7 +20,6 @@ from ..certificate import Examination
 from ..contact_state import State
 from . import defect, edge_bubbles
 from .dual_norm import Dual
-from .edge_bubbles import assembled
 from .law_traces import Along, Change, law, pointwise
 
 _TIMES, _ROUNDS = 2, 4
@@ -79,10 +77,14 @@ def _change(system: System, u: fem.Function, examination: Examination, inverse: 
     """The defect with its influence on the vertices and, from the second time on, theirs on it. Collective."""
     problem = system.problem
     space, moved = edge_bubbles.space(problem.domain.mesh), fem.Function(problem.space)
-    change, residual, stiffness = None, defect.residual(problem, u, space), edge_bubbles.Stiffness(problem, space)
+    change, residual, stiffness = (
+        None,
+        problem.bulk.residual_in(space, u, problem.linear.values()),
+        edge_bubbles.Stiffness(problem, space),
+    )
     for _ in range(_TIMES):
         edges, _ = pointwise(problem, space, u, examination.states, change)
-        load = residual - edges - _internal(problem, space, moved)
+        load = residual - edges - problem.bulk.force_in(space, moved)
         change = Change(moved, defect.least(stiffness, u, load))
         _answer(problem, u, examination, inverse, change)
     assert change is not None
@@ -91,10 +93,10 @@ def _change(system: System, u: fem.Function, examination: Examination, inverse: 
 
 def _answer(problem: Problem, u: fem.Function, examination: Examination, inverse: Dual, change: Change) -> None:
     """Move the vertices as the bubbles ask; the laws answer that, so it takes a few rounds. Collective."""
-    size, bubbling = 0.0, _internal(problem, problem.space, change.edges)
+    size, bubbling = 0.0, problem.bulk.force_in(problem.space, change.edges)
     for _ in range(_ROUNDS):
         _, laws = pointwise(problem, change.edges.function_space, u, examination.states, change)
-        step, length = inverse.solve(laws - _internal(problem, problem.space, change.vertices) - bubbling)
+        step, length = inverse.solve(laws - problem.bulk.force_in(problem.space, change.vertices) - bubbling)
         change.vertices.x.array[:] += step.x.array
         size = max(size, length)
         if length <= _SETTLED * size:
@@ -134,13 +136,6 @@ def _drops(
     length = np.linalg.norm(slip, axis=2, keepdims=True)
     unit = np.divide(slip, length, out=np.zeros_like(slip), where=length > 0)
     return along, _PLACE * height[:, None, None] * unit
-
-
-def _internal(problem: Problem, space: fem.FunctionSpace, u: fem.Function) -> Array:
-    """a(u, v) for the test functions of a space, owned blocks (n, d). Collective."""
-    test, trial = problem.bilinear.arguments()
-    form = ufl.replace(problem.bilinear, {test: ufl.TestFunction(space), trial: u})
-    return assembled(form)
 
 
 def _slip(problem: Problem, state: State, u: fem.Function, change: Change, unsure: fem.Function) -> tuple[float, float]:

@@ -13,14 +13,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
-import ufl
 from dolfinx import fem
 from mpi4py import MPI
 
-from ...problem import nodal_averaging
 from ...problem.problem import Bounds, Problem
 from ...typing import Array, Entities, Mask
-from .edge_bubbles import Stiffness, assembled, by_cells
+from .edge_bubbles import Stiffness
 
 _RTOL = 0.1
 """Of the bubbles' solve, in the energy norm: their energy is right to about its square."""
@@ -63,30 +61,6 @@ class Midpoints:
         """Take out of r what the bounds carry."""
         carried = np.where(self.side == 0, 0.0, self.component(r))
         r[self.blocks] -= carried[:, None] * self.normals
-
-
-def residual(problem: Problem, u: fem.Function, space: fem.FunctionSpace) -> Array:
-    """<g, v> - a(u, v) of vector-valued test functions of a space, owned blocks (n, d). Collective."""
-    test, trial = problem.bilinear.arguments()
-    v = ufl.TestFunction(space)
-    form = -ufl.replace(problem.bilinear, {test: v, trial: u})
-    for load in problem.linear.values():
-        form += ufl.replace(load, {test: v})
-    for part, pressure in zip(problem.averaged, pressures(problem, u), strict=True):
-        scalar, vector = part.divergence.arguments()
-        form -= ufl.replace(part.divergence, {scalar: pressure, vector: v})
-    return assembled(form)
-
-
-def pressures(problem: Problem, u: fem.Function) -> list[fem.Function]:
-    """The averaged volumetric stress of each locking-free region, a P1 field. Collective."""
-    found = []
-    for part, averages in zip(problem.averaged, nodal_averaging.assemble(problem.averaged), strict=True):
-        pressure = fem.Function(part.volume.arguments()[0].ufl_function_space())
-        pressure.x.array[: averages.stiffness.local_size] = averages.pressure(u)
-        pressure.x.scatter_forward()
-        found.append(pressure)
-    return found
 
 
 def prescribed(problem: Problem, u: fem.Function, space: fem.FunctionSpace) -> tuple[Mask, Array]:
@@ -167,30 +141,3 @@ def _project(free: Mask, parts: Sequence[Midpoints], r: Array) -> None:
     r *= free
     for part in parts:
         part.project(r)
-
-
-def compressibility(problem: Problem, u: fem.Function) -> Array:
-    """2μ/d ∫ (div u_h - p_h/λ)² of every owned cell, p_h being the averaged volumetric stress. Collective.
-
-    Where div u is averaged, a(e, e) has the shear part only, and the volumetric stress is an unknown of its own. This
-    is the residual of its equation, by the least shear energy of a strain with that trace.
-    """
-    q = ufl.TestFunction(fem.functionspace(problem.domain.mesh, ("Discontinuous Lagrange", 0)))
-    d, result = problem.scales.dimension, 0.0
-    for part, pressure in zip(problem.averaged, pressures(problem, u), strict=True):
-        scalar, vector = part.divergence.arguments()
-        volume = assembled(ufl.replace(part.volume, {scalar: q}))
-        dilated = assembled(ufl.replace(part.divergence, {scalar: q, vector: u}))
-        mean = np.divide(dilated, volume, out=np.zeros_like(dilated), where=volume > 0)
-        at = mean - pressure.x.array[pressure.function_space.dofmap.list[: len(mean)]] / part.modulus
-        squares = np.sum(at**2, axis=1) + np.sum(at, axis=1) ** 2
-        result = result + part.shear / d * volume[:, 0] * squares / ((d + 1) * (d + 2))
-    return np.asarray(result)
-
-
-def by_cell(problem: Problem, e: fem.Function) -> Array:
-    """a(e, e) of every owned cell. Collective."""
-    test, trial = problem.bilinear.arguments()
-    q = ufl.TestFunction(fem.functionspace(problem.domain.mesh, ("Discontinuous Lagrange", 0)))
-    form = ufl.replace(problem.bilinear, {test: e, trial: e})
-    return np.maximum(assembled(by_cells(form, q))[:, 0], 0.0)

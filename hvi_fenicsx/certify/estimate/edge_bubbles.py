@@ -20,7 +20,6 @@ from dolfinx import mesh as dmesh
 from mpi4py import MPI
 
 from ...problem.problem import Problem
-from ...problem.vectors import nodal
 from ...typing import Array
 
 _MOST_STEPS = 30
@@ -78,8 +77,7 @@ class Stiffness:
         self.problem, self.space = problem, bubbles
         self.comm: MPI.Comm = bubbles.mesh.comm
         self._in, self._out = fem.Function(bubbles), fem.Function(bubbles)
-        test, trial = problem.bilinear.arguments()
-        self._action = fem.form(ufl.replace(problem.bilinear, {test: ufl.TestFunction(bubbles), trial: self._in}))
+        self._action = fem.form(problem.bulk.between(self._in, ufl.TestFunction(bubbles)))
         self._inverse: Array = np.reciprocal(diagonal(problem, bubbles))
 
     def times(self, e: Array) -> Array:
@@ -160,10 +158,10 @@ class _Affine:
         cells = np.arange(len(space.dofmap.list), dtype=np.int32)
         middle.x.array[:] = dmesh.compute_midpoints(mesh, d, cells)[:, :d].ravel()
         height = ufl.dot(self._slopes, ufl.JacobianInverse(mesh) * (ufl.SpatialCoordinate(mesh) - middle))
-        q, both, whole = ufl.TestFunction(space), problem.bilinear.arguments(), ufl.Form([])
+        q, whole = ufl.TestFunction(space), ufl.Form([])
         for i, axis in enumerate(np.eye(d)):
             v = height * ufl.as_vector(axis.tolist())
-            whole += by_cells(ufl.replace(problem.bilinear, dict.fromkeys(both, v)), q[i])
+            whole += problem.bulk.energy_form(v, q[i])
         self._form = fem.form(whole)
 
     def energies(self, slopes: Array) -> Array:
@@ -173,26 +171,3 @@ class _Affine:
         fem.assemble_vector(self._sums.x.array, self._form)
         d, cells = len(slopes), self._sums.function_space.mesh.topology.index_map(len(slopes)).size_local
         return np.array(self._sums.x.array[: cells * d]).reshape(-1, d)
-
-
-def by_cells(form: Any, q: Any) -> Any:
-    """A functional's integrals with a test function q of the cells, which tells the cells' shares of it."""
-    return ufl.Form([integral.reconstruct(integrand=integral.integrand() * q) for integral in form.integrals()])
-
-
-def assembled(form: Any) -> Array:
-    """A linear form's vector at the blocks that this rank owns, (n, d). Collective."""
-    return np.asarray(sum(nodal(ufl.Form(integrals)) for integrals in _alike(form)))
-
-
-def _alike(form: Any) -> list[list[Any]]:
-    """A form's integrals in groups: within one, dolfinx wants all of a type to have the same subdomain data."""
-    seen: dict[str, list[Any]] = {}
-    groups: list[list[Any]] = []
-    for integral in form.integrals():
-        known, data = seen.setdefault(integral.integral_type(), []), integral.subdomain_data()
-        place = next((i for i, other in enumerate(known) if other is data), len(known))
-        known += [data] * (place == len(known))
-        groups += [[]] * (place == len(groups))
-        groups[place] = [*groups[place], integral]
-    return groups

@@ -66,7 +66,7 @@ def estimate(system: System, u: fem.Function, examination: Examination) -> Estim
     cells, unmet = _between_vertices(problem, u, examination)
     inverse = dual_norm.Dual(system, u)
     if problem.terms:
-        cells += defect.by_cell(problem, inverse.solve(unmet)[0])
+        cells += problem.bulk.energy_by_cell(inverse.solve(unmet)[0])
     smoothing = inverse.solve(dual_norm.smoothing(problem, examination.states))[1] if _smoothed(problem) else 0.0
     _, algebraic = inverse.solve(dual_norm.algebraic(problem, examination))
     inverse.destroy()
@@ -91,10 +91,11 @@ def _between_vertices(problem: Problem, u: fem.Function, examination: Examinatio
     space = edge_bubbles.space(problem.domain.mesh)
     edges, vertices = law_traces.pointwise(problem, space, u, examination.states)
     edges *= -1.0
-    edges += defect.residual(problem, u, space)
-    cells = defect.by_cell(problem, defect.least(edge_bubbles.Stiffness(problem, space), u, edges))
-    if problem.averaged:
-        cells += defect.compressibility(problem, u)
+    edges += problem.bulk.residual_in(space, u, problem.linear.values())
+    cells = problem.bulk.energy_by_cell(defect.least(edge_bubbles.Stiffness(problem, space), u, edges))
+    if problem.bulk.averages_dilatation:
+        # a(e, e) has the shear part only; the volumetric stress is an unknown of its own
+        cells += problem.bulk.dilatation_error(u)
     return cells, vertices
 
 

@@ -1,0 +1,189 @@
+"""The elastic operator a(u, v): matrix, force, energy by cell, residual in other test spaces, stress by cell.
+
+How the volumetric part is treated, and of which degree the elements are, is known here and nowhere else.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import basix.ufl
+import numpy as np
+import ufl
+from dolfinx import fem
+from dolfinx.fem.petsc import assemble_matrix
+from petsc4py import PETSc
+
+from ..effects.base import Averaged, Contribution, Effect, Place
+from ..typing import Array
+from . import nodal_averaging, stress
+from .nodal_averaging import Dilatation
+from .scaling import Scales
+from .vectors import nodal, nodal_sum
+
+
+@dataclass(frozen=True, kw_only=True)
+class Bulk:
+    """The elastic operator of a problem, nondimensional.
+
+    Attributes:
+        space: the displacements, P1 vectors.
+        scales: what one unit is in SI.
+        form: a(u, v) in UFL, but for the volumetric part that is averaged by vertex.
+        material: the part of ``form`` that depends on ε(u) and ε(v) only: a material's, not an elastic support's.
+        averaged: the volumetric parts that are averaged by vertex.
+        strains: linear forms of ε(v) (thermal strain) by the name of their load; no rigid motion feels them.
+        across: parts of ∫ σ_33 q dx in a plane body (:attr:`.Contribution.across`).
+    """
+
+    space: fem.FunctionSpace
+    scales: Scales
+    form: Any
+    material: Any
+    averaged: tuple[Averaged, ...]
+    strains: Mapping[str, Any]
+    across: tuple[Any, ...]
+
+    @functools.cached_property
+    def compiled(self) -> fem.Form:
+        """The compiled ``form``. Collective when first used."""
+        return fem.form(self.form)
+
+    @functools.cached_property
+    def _dilatations(self) -> list[Dilatation]:
+        return nodal_averaging.assemble(self.averaged)
+
+    @property
+    def averages_dilatation(self) -> bool:
+        """Whether div u is averaged by vertex anywhere (nearly incompressible regions)."""
+        return bool(self.averaged)
+
+    def matrix(self) -> PETSc.Mat:
+        """The stiffness matrix, a new one without conditions; block size d. Collective."""
+        matrix = assemble_matrix(self.compiled)
+        matrix.assemble()
+        return nodal_averaging.add(matrix, self._dilatations)
+
+    def between(self, u: Any, v: Any) -> Any:
+        """The UFL form a(u, v) of any functions or arguments, without what is averaged by vertex."""
+        test, trial = self.form.arguments()
+        return ufl.replace(self.form, {test: v, trial: u})
+
+    def force(self, u: fem.Function) -> Array:
+        """a(u, v) of the P1 test functions v at the blocks that this rank owns, (n, d). Collective."""
+        internal = nodal(ufl.action(self.form, u))
+        for part in self._dilatations:
+            internal += part.force(u).reshape(internal.shape)
+        return internal
+
+    def force_in(self, space: fem.FunctionSpace, u: fem.Function) -> Array:
+        """a(u, v) of the test functions v of any vector space, without what is averaged; owned blocks (n, d).
+
+        Collective.
+        """
+        return nodal_sum(self.between(u, ufl.TestFunction(space)))
+
+    def residual_in(self, space: fem.FunctionSpace, u: fem.Function, loads: Iterable[Any]) -> Array:
+        """<g, v> - a(u, v) of the test functions v of any vector space. Collective.
+
+        Args:
+            space: of the test functions.
+            u: P1, ghosts updated.
+            loads: UFL linear forms, whose sum is g.
+
+        Returns:
+            The residual at the blocks that this rank owns, (n, d).
+        """
+        v, test = ufl.TestFunction(space), self.form.arguments()[0]
+        form = -self.between(u, v)
+        for load in loads:
+            form += ufl.replace(load, {test: v})
+        for part in self._dilatations:
+            form -= part.work(part.pressure(u), v)
+        return nodal_sum(form)
+
+    def energy_form(self, v: Any, q: Any) -> Any:
+        """The UFL form of a(v, v), without what is averaged, times a test function q that is constant in cells."""
+        integrals = self.between(v, v).integrals()
+        return ufl.Form([integral.reconstruct(integrand=integral.integrand() * q) for integral in integrals])
+
+    def energy_by_cell(self, v: fem.Function) -> Array:
+        """a(v, v) of every owned cell, without what is averaged, (cells,). Collective."""
+        q = ufl.TestFunction(fem.functionspace(self.space.mesh, ("Discontinuous Lagrange", 0)))
+        return np.maximum(nodal_sum(self.energy_form(v, q))[:, 0], 0.0)
+
+    def pressures(self, u: fem.Function) -> list[fem.Function]:
+        """The averaged volumetric stress of each region in ``averaged``, P1 fields. Collective."""
+        return [part.pressure(u) for part in self._dilatations]
+
+    def dilatation_error(self, u: fem.Function) -> Array:
+        """2μ/d ∫ (div u - p/λ)² of every owned cell, p being the averaged volumetric stress, (cells,). Collective.
+
+        It is the residual of the equation that says what p is, by the least shear energy of a strain with that trace.
+        """
+        cells = self.space.mesh.topology.index_map(self.scales.dimension).size_local
+        return sum((part.error(u) for part in self._dilatations), np.zeros(cells))
+
+    def stress(self, u: fem.Function) -> Array:
+        """The mean stress of every owned cell, N/m², tension positive; shape (cells, 3, 3). Collective.
+
+        The energy itself tells it, so that a new material needs nothing here: with v = q·x, q being constant in one
+        cell and zero elsewhere, ε(v) is the symmetric part of q, and the stress does the work |K| σ:q in it. σ_33 is
+        zero in plane stress, and what holds the thickness in plane strain. Where div u is averaged by vertex, so is the
+        volumetric stress.
+        """
+        mesh, scales = self.space.mesh, self.scales
+        one = basix.ufl.element("Discontinuous Lagrange", mesh.topology.cell_name(), 0)
+        count = len(stress.COMPONENTS[scales.dimension]) + 2
+        *q, across, volume = ufl.TestFunction(fem.functionspace(mesh, basix.ufl.blocked_element(one, (count,))))
+        pressures = self.pressures(u)
+        v = stress.linear_field(q, ufl.SpatialCoordinate(mesh)) / scales.length
+        found = nodal_sum(sum(self._across(u, pressures, across), self._work(u, pressures, v)))
+        found /= nodal_sum(volume * ufl.dx)[:, -1:]
+        sigma = stress.tensors(found[:, :-2], found[:, -2])
+        return np.asarray(sigma * scales.stress * scales.length**scales.dimension)
+
+    def _work(self, u: fem.Function, pressures: Sequence[fem.Function], v: Any) -> Any:
+        """The UFL form of the work of the stresses in v."""
+        test, trial = self.form.arguments()
+        form = ufl.replace(self.material, {test: v, trial: u})
+        for name in sorted(self.strains):
+            form -= ufl.replace(self.strains[name], {test: v})
+        for part, pressure in zip(self._dilatations, pressures, strict=True):
+            form += part.work(pressure, v)
+        return form
+
+    def _across(self, u: fem.Function, pressures: Sequence[fem.Function], q: Any) -> list[Any]:
+        """Forms of ∫ σ_33 q dx, which the energy of a plane body does not know; none in space and in plane stress."""
+        if self.scales.dimension == 3:
+            return []
+        found = [ufl.replace(form, dict(zip(form.arguments(), (q, u), strict=False))) for form in self.across]
+        return found + [part.across(p, q) for part, p in zip(self._dilatations, pressures, strict=True)]
+
+
+def build(
+    space: fem.FunctionSpace,
+    scales: Scales,
+    made: Sequence[tuple[str | None, Effect, Contribution]],
+    strains: Mapping[str, Any],
+) -> Bulk:
+    """The elastic operator that effects contribute.
+
+    Args:
+        space: the displacements, P1 vectors.
+        scales: what one unit is in SI.
+        made: the effects, each with its place and what it contributes.
+        strains: their linear forms of ε(v), by the name of the load.
+    """
+    return Bulk(
+        space=space,
+        scales=scales,
+        form=sum(form for _, _, c in made for form in c.bilinear),
+        material=sum(form for _, effect, c in made if effect.place is Place.MATERIAL for form in c.bilinear),
+        averaged=tuple(part for _, _, c in made for part in c.averaged),
+        strains=strains,
+        across=tuple(form for _, _, c in made for form in c.across),
+    )
