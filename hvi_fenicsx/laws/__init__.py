@@ -1,7 +1,8 @@
 """Nonmonotone laws: superpotentials as objects, the catalogue, and laws of one's own (docs/laws.md)."""
 
-from .base import ConvexPart, Directional, Superpotential
+from .base import Superpotential
 from .catalogue import Graph, LinearSpring, QuadraticLinear, QuadraticLinearLiteral, Sawtooth, Tresca
+from .convex_parts import ConvexPart, DifferentiablePart, Directional
 from .polyline import PolylineLaw, PolylinePart
 from .registry import available, create, describe
 from .sampled import SampledLaw, sample_traction
@@ -10,6 +11,7 @@ from .weakening import Exponential, WeakeningLaw
 
 __all__ = [
     "ConvexPart",
+    "DifferentiablePart",
     "Directional",
     "Exponential",
     "Graph",

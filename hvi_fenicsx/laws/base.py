@@ -21,67 +21,11 @@ from typing_extensions import override
 from ..errors import InputError
 from ..typing import Array, Integers
 from .class_registry import enter
+from .convex_parts import ConvexPart, Directional, ScaledPart, quotient
+from .parameter_checks import require_positive
 from .traction_bounds import Extremes, extremes
 
-
-def quotient(a: Array, b: Array | float) -> Array:
-    """The quotient a / b; numpy's stubs do not know that of doubles it is one."""
-    result: Array = np.divide(a, b)
-    return result
-
-
 _REGISTRY: dict[str, type] = {}
-
-
-@dataclass(frozen=True)
-class Directional:
-    """A positively homogeneous function on the line: its values in the directions -1 and +1 (may be inf)."""
-
-    minus: float
-    plus: float
-
-
-class ConvexPart(ABC):
-    """A convex function on the line; H or G of a law's split j = H - G. Arrays in and out have shape (m,)."""
-
-    @property
-    @abstractmethod
-    def kinks(self) -> Array:
-        """Positions (k,), ascending, at which the derivative jumps upwards."""
-
-    @abstractmethod
-    def value(self, x: Array) -> Array:
-        """The function."""
-
-    @abstractmethod
-    def left(self, x: Array) -> Array:
-        """Left derivative, nondecreasing."""
-
-    @abstractmethod
-    def right(self, x: Array) -> Array:
-        """Right derivative, nondecreasing; equals `left` off the kinks."""
-
-    @abstractmethod
-    def second(self, x: Array) -> Array:
-        """Second derivative off the kinks; the larger one-sided one where the derivative's slope breaks."""
-
-    @property
-    def jumps(self) -> Array:
-        """Heights (k,) of the jumps of the derivative at the kinks, all positive."""
-        return self.right(self.kinks) - self.left(self.kinks)
-
-
-class DifferentiablePart(ConvexPart):
-    """A convex function without kinks: a subclass gives `value`, `right` and `second`."""
-
-    @property
-    @override
-    def kinks(self) -> Array:
-        return np.empty(0)
-
-    @override
-    def left(self, x: Array) -> Array:
-        return self.right(x)
 
 
 class Superpotential(ABC):
@@ -207,8 +151,6 @@ class Superpotential(ABC):
 
     def scaled(self, length: float, traction: float) -> Superpotential:
         """The same law in units of `length` and `traction`: j(length x) / (length traction)."""
-        from .scaled import ScaledLaw
-
         return ScaledLaw(self, length, traction)
 
     @cached_property
@@ -239,3 +181,68 @@ def _refuse_hidden_properties(cls: type[Superpotential]) -> None:
 def registered() -> dict[str, type[Superpotential]]:
     """All laws that can be created by name, sorted by it."""
     return dict(sorted(_REGISTRY.items()))
+
+
+@dataclass(frozen=True)
+class ScaledLaw(Superpotential, register=False):
+    """A law with displacements measured in `length` and tractions in `traction`."""
+
+    name = "scaled"
+    law: Superpotential
+    length: float
+    traction: float
+
+    def __post_init__(self) -> None:
+        require_positive(self.name, length=self.length, traction=self.traction)
+
+    @override
+    def value(self, x: Array) -> Array:
+        return quotient(self.law.value(x * self.length), self.length * self.traction)
+
+    @override
+    @cached_property
+    def convex(self) -> ConvexPart:
+        return ScaledPart(self.law.convex, self.length, self.traction)
+
+    @override
+    @cached_property
+    def concave(self) -> ConvexPart:
+        return ScaledPart(self.law.concave, self.length, self.traction)
+
+    @override
+    @property
+    def growth(self) -> Directional:
+        return Directional(self.law.growth.minus / self.traction, self.law.growth.plus / self.traction)
+
+    @override
+    @property
+    def peak(self) -> Directional:
+        return Directional(self.law.peak.minus / self.traction, self.law.peak.plus / self.traction)
+
+    @override
+    @property
+    def energy_scale(self) -> float:
+        return self.law.energy_scale / (self.length * self.traction)
+
+    @override
+    @property
+    def length_scale(self) -> float:
+        return self.law.length_scale / self.length
+
+    @override
+    @property
+    def even(self) -> bool:
+        return self.law.even
+
+    @override
+    @property
+    def is_linear(self) -> bool:
+        return self.law.is_linear
+
+    @override
+    def piece(self, x: Array) -> Integers:
+        return self.law.piece(x * self.length)
+
+    @override
+    def scaled(self, length: float, traction: float) -> Superpotential:
+        return ScaledLaw(self.law, self.length * length, self.traction * traction)

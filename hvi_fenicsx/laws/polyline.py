@@ -12,7 +12,8 @@ from typing_extensions import override
 
 from ..errors import InputError
 from ..typing import Array, Integers
-from .base import ConvexPart, Directional, Superpotential
+from .base import Superpotential
+from .convex_parts import ConvexPart, Directional
 from .traction_bounds import Extremes
 from .traction_graph import TractionGraph
 

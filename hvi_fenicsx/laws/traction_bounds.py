@@ -9,14 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import numpy as np
 
 from ..typing import Array
-
-if TYPE_CHECKING:
-    from .base import Superpotential
+from .convex_parts import ConvexPart, Directional
 
 _Array = Array
 _Objective = Callable[[_Array, _Array, _Array], _Array]
@@ -25,6 +23,33 @@ _Objective = Callable[[_Array, _Array, _Array], _Array]
 _RESOLUTION = 1e-6
 _FAR = 1e12
 _MOST_CELLS = 200_000
+
+
+class SplitLaw(Protocol):
+    """What is asked of a law: a :class:`~.base.Superpotential` has it all."""
+
+    @property
+    def convex(self) -> ConvexPart:
+        """H of the split."""
+
+    @property
+    def concave(self) -> ConvexPart:
+        """G of the split."""
+
+    @property
+    def growth(self) -> Directional:
+        """The traction far out."""
+
+    @property
+    def kinks(self) -> Array:
+        """Where the traction jumps, (k,)."""
+
+    @property
+    def length_scale(self) -> float:
+        """A displacement typical of the law."""
+
+    def interval(self, x: Array) -> tuple[Array, Array]:
+        """Clarke's subdifferential at x (m,)."""
 
 
 @dataclass(frozen=True)
@@ -37,7 +62,7 @@ class Extremes:
     c4: float
 
 
-def extremes(law: Superpotential) -> Extremes:
+def extremes(law: SplitLaw) -> Extremes:
     """Bounds from above, sharp to a relative 1e-6; beyond 1e12 length scales the law's growth is trusted."""
     right = _grid(law)
     left = -right[::-1]
@@ -54,7 +79,7 @@ def extremes(law: Superpotential) -> Extremes:
     )
 
 
-def _grid(law: Superpotential) -> _Array:
+def _grid(law: SplitLaw) -> _Array:
     """Displacements ≥ 0: zero, every kink, and a geometric progression out to where nothing happens."""
     unit = law.length_scale
     kinks = np.abs(law.kinks)
@@ -62,7 +87,7 @@ def _grid(law: Superpotential) -> _Array:
     return np.asarray(np.unique(np.concatenate([[0.0], kinks, np.geomspace(1e-6 * unit, reach, 400)])))
 
 
-def _supremum(law: Superpotential, grid: _Array, objective: _Objective) -> float:
+def _supremum(law: SplitLaw, grid: _Array, objective: _Objective) -> float:
     """A bound from above of the objective's supremum over the range of the grid."""
     a, b = grid[:-1], grid[1:]
     best = _sample(law, grid, objective)
@@ -84,19 +109,19 @@ def _supremum(law: Superpotential, grid: _Array, objective: _Objective) -> float
     return best + tolerance if best > 0 else best
 
 
-def _sample(law: Superpotential, x: _Array, objective: _Objective) -> float:
+def _sample(law: SplitLaw, x: _Array, objective: _Objective) -> float:
     lo, hi = law.interval(x)
     return float(objective(lo, hi, np.abs(x)).max())
 
 
-def _typical(law: Superpotential, x: _Array, objective: _Objective) -> float:
+def _typical(law: SplitLaw, x: _Array, objective: _Objective) -> float:
     """The objective's size on tractions of the law's own size, so that the tolerance is never zero."""
     lo, hi = law.interval(x)
     size = np.maximum(np.abs(lo), np.abs(hi))
     return float(np.abs(objective(-size, size, np.abs(x))).max())
 
 
-def _bound(law: Superpotential, a: _Array, b: _Array, objective: _Objective) -> _Array:
+def _bound(law: SplitLaw, a: _Array, b: _Array, objective: _Objective) -> _Array:
     lo = law.convex.right(a) - law.concave.left(b)
     hi = law.convex.left(b) - law.concave.right(a)
     nearest = np.minimum(np.abs(a), np.abs(b))

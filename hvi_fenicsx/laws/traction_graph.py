@@ -9,7 +9,6 @@ from functools import cached_property
 import numpy as np
 
 from ..typing import Array, Integers
-from .base import quotient
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,15 +126,6 @@ class TractionGraph:
             self.breaks, np.maximum(-self.slopes, 0.0), np.maximum(-self.jumps, 0.0), none if up else -at_zero
         )
         return rising, falling
-
-    def scaled(self, length: float, traction: float) -> TractionGraph:
-        """The same graph with displacements measured in `length` and tractions in `traction`."""
-        return TractionGraph(
-            quotient(self.breaks, length),
-            quotient(self.left, traction),
-            quotient(self.right, traction),
-            self.slopes * (length / traction),
-        )
 
 
 def _outward(breaks: Array, slopes: Array, jumps: Array, start: float) -> tuple[Array, Array]:

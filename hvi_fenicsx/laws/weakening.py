@@ -10,7 +10,8 @@ import numpy as np
 from typing_extensions import override
 
 from ..typing import Array
-from .base import ConvexPart, DifferentiablePart, Directional, Superpotential
+from .base import Superpotential
+from .convex_parts import ConvexPart, DifferentiablePart, Directional
 from .parameter_checks import require_ordered, require_positive
 from .polyline import PolylinePart
 from .traction_bounds import Extremes

@@ -1,6 +1,6 @@
 """Rigid motions: the kernel of a scene in words, and whether its load can be borne."""
 
-from ..laws.base import Directional
+from ..laws.convex_parts import Directional
 from .kernel import Fixed, kernel, modes
 from .motions import Body, Mode, describe, motion_at, rigid_fields
 from .reduction import ContactCone, Resistance, RigidProblem

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ..laws.base import Directional
+from ..laws.convex_parts import Directional
 from .cutting_planes import Functional, Minimum, Programme, Region, ball, cross
 from .kernel import modes, natural_basis, null_space, triangle
 from .motions import Mode, named

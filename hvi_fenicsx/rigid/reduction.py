@@ -14,7 +14,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..laws.base import Directional
+from ..laws.convex_parts import Directional
 from .cutting_planes import Functional, SlipIntegral
 from .kernel import Fixed, kernel
 from .motions import Body, rigid_fields

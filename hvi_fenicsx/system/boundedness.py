@@ -9,7 +9,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from ..laws import Superpotential
-from ..laws.base import Directional
+from ..laws.convex_parts import Directional
 from ..problem.law_term import LawTerm
 from ..problem.problem import Problem
 from ..rigid import Body, Resistance, RigidProblem, analyse, rigid_fields

@@ -12,8 +12,7 @@ from hypothesis import strategies as st
 
 from hvi_fenicsx import laws
 from hvi_fenicsx.errors import InputError
-from hvi_fenicsx.laws.base import Superpotential
-from hvi_fenicsx.laws.scaled import ScaledLaw
+from hvi_fenicsx.laws.base import ScaledLaw, Superpotential
 from hvi_fenicsx.laws.traction_bounds import extremes
 
 GAMMA1, GAMMA2, DELTA = 1.0e3, 0.5e3, 9.0e-6

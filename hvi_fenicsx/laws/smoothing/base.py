@@ -12,8 +12,9 @@ from typing_extensions import override
 
 from ...errors import InputError
 from ...typing import Array, Integers
-from ..base import Directional, Superpotential
+from ..base import Superpotential
 from ..class_registry import enter
+from ..convex_parts import Directional
 
 _REGISTRY: dict[str, type] = {}
 

@@ -17,8 +17,9 @@ from typing_extensions import override
 
 from ...errors import InputError
 from ...typing import Array
-from ..base import ConvexPart, DifferentiablePart, Superpotential
+from ..base import Superpotential
 from ..catalogue import QuadraticLinear
+from ..convex_parts import ConvexPart, DifferentiablePart
 from .base import SmoothedLaw, Smoothing
 from .plus_functions import QUADRATIC
 

@@ -9,7 +9,7 @@ import numpy as np
 from typing_extensions import override
 
 from ...typing import Array
-from ..base import quotient
+from ..convex_parts import quotient
 from .smoothed_law import PlusFunction
 
 

@@ -20,7 +20,8 @@ import numpy as np
 from typing_extensions import override
 
 from ...typing import Array
-from ..base import ConvexPart, DifferentiablePart, Superpotential
+from ..base import Superpotential
+from ..convex_parts import ConvexPart, DifferentiablePart
 from .base import SmoothedLaw, Smoothing
 
 _LARGEST = float(np.finfo(np.float64).max)
