@@ -113,8 +113,7 @@ def measured(name: str, quantity: str, requested: float, largest: int) -> Row:
 
 def exact(scene: Scene) -> Scene:
     """The scene for the reference: the unsmoothed law, a tight tolerance."""
-    keys = {"smoothing": None, "epsilon": None, "epsilon_absolute": None, "tolerance": 1e-8}
-    return scene.model_copy(update={"solver": scene.solver.model_copy(update=keys)})
+    return scene.with_solver(smoothing=None, epsilon=None, epsilon_absolute=None, tolerance=1e-8)
 
 
 def true_error(reached: Reached, scene: Scene, requested: float, largest: int) -> tuple[float | None, float]:

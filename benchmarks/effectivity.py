@@ -134,8 +134,7 @@ def _row(rung: Rung, finer: Sequence[Rung], scene: Scene) -> Row:
 
 
 def _exact(scene: Scene) -> Scene:
-    unsmoothed = {"smoothing": None, "epsilon": None, "epsilon_absolute": None}
-    return scene.model_copy(update={"solver": scene.solver.model_copy(update=unsmoothed)})
+    return scene.with_solver(smoothing=None, epsilon=None, epsilon_absolute=None)
 
 
 def l_shape() -> dict[str, Any]:

@@ -149,7 +149,7 @@ def _adhesion(f: Frame) -> Plain:
 def prepare(case: Case, data: Mapping[str, Any], method: str, comm: MPI.Comm) -> workflow.Prepared:
     """As :func:`hvi_fenicsx.workflow.prepare`, on a mesh whose vertices are moved first. Collective."""
     made, timer = scene(case, data, method), Timer()
-    body = domain.build(comm, made.domain, made.dimension)
+    body = made.domain.build(comm, made.dimension)
     distort(body, case)
     placed = [(p.where, p.effect) for p in made.effects()]
     composed = problem.compose(body, made.parts, placed, assemble.modification(made))

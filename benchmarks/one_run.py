@@ -101,7 +101,7 @@ def warm(task: Figures) -> None:
         scene = read_scene(Path(task["scene"]), task["overrides"])
         cells = (16, 16) if scene.dimension == 2 else (4, 4, 4)
         if scene.domain.shape != "file":
-            scene = scene.model_copy(update={"domain": scene.domain.model_copy(update={"cells": cells})})
+            scene = scene.with_domain(cells=cells)
         contact(scene)
 
 

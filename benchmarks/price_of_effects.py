@@ -75,7 +75,6 @@ def by_program(name: str, cells: int, clock: Callable[[], float]) -> dict[str, f
     from mpi4py import MPI
 
     from hvi_fenicsx import Scene
-    from hvi_fenicsx.mesh import domain
     from hvi_fenicsx.runtime.timing import Timer
     from hvi_fenicsx.solvers import nested_iteration
     from hvi_fenicsx.solvers.method import silent
@@ -88,7 +87,7 @@ def by_program(name: str, cells: int, clock: Callable[[], float]) -> dict[str, f
         return forms[-1]
 
     wanted = Scene.model_validate(scene(name, cells))
-    body = domain.build(MPI.COMM_WORLD, wanted.domain, wanted.dimension)
+    body = wanted.domain.build(MPI.COMM_WORLD, wanted.dimension)
     dolfinx.fem.form = counted
     start = clock()
     system = assemble.assemble(wanted, MPI.COMM_WORLD, Timer(), body)

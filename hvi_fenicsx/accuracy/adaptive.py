@@ -5,7 +5,6 @@ Cells are marked by Dörfler's bulk criterion (Dörfler 1996) on the estimated e
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -24,10 +23,6 @@ from ..solvers.method import Progress, silent
 from ..typing import Entities
 from ..workflow import Prepared, Solution, finish, prepare
 
-_FEWEST = 3
-"""Cells each way that the coarsest block has at least."""
-_LARGEST_PART = 1 / 6
-"""Of a shape's extent, that the cells of the coarsest mesh of it have at most."""
 _CLOSE, _CORRECTIONS = 1.05, 2
 """How near to the share wanted is near enough, and how often the marking is corrected for it."""
 
@@ -162,23 +157,5 @@ def marked(comm: MPI.Comm, estimate: Estimate, bulk: float) -> Entities:
 
 
 def coarsest(scene: Scene) -> Scene:
-    """The scene on the mesh to begin with: its own, made coarser as far as its shape allows.
-
-    Blocks keep at least three cells each way, gmsh's shapes cells of a sixth of their extent; a file is taken as it is.
-    """
-    cells = getattr(scene.domain, "cells", None)
-    if cells is not None:
-        while min(halved := tuple(math.ceil(n / 2) for n in cells)) >= _FEWEST:
-            cells = halved
-        return _with(scene, cells=cells)
-    size = getattr(scene.domain, "mesh_size", None)
-    if size is None:
-        return _with(scene, refinements=0)
-    largest = math.sqrt(scene.domain.area()) * _LARGEST_PART  # type: ignore[union-attr]
-    factor = 2.0 ** max(0, math.floor(math.log2(largest / size)))
-    below = getattr(scene.domain, "mesh_size_below", None)
-    return _with(scene, mesh_size=factor * size, **({"mesh_size_below": factor * below} if below else {}))
-
-
-def _with(scene: Scene, **domain: object) -> Scene:
-    return scene.model_copy(update={"domain": scene.domain.model_copy(update=domain)})
+    """The scene on the mesh to begin with: its own, made coarser as far as its shape allows."""
+    return scene.changed(domain=scene.domain.coarsest())

@@ -307,7 +307,7 @@ class _Climb:
 
 
 def _solved_with(scene: Scene, tolerance: float) -> Scene:
-    return scene.model_copy(update={"solver": scene.solver.model_copy(update={"tolerance": tolerance})})
+    return scene.with_solver(tolerance=tolerance)
 
 
 def _narrowed(scene: Scene, factor: float) -> Scene:
@@ -315,7 +315,7 @@ def _narrowed(scene: Scene, factor: float) -> Scene:
     solver = scene.solver
     widths = {name: getattr(solver, name) for name in ("epsilon", "epsilon_absolute")}
     changed = {name: factor * width for name, width in widths.items() if width is not None}
-    return scene.model_copy(update={"solver": solver.model_copy(update=changed)})
+    return scene.with_solver(**changed)
 
 
 def _line(level: int, step: Step, elapsed: float) -> str:

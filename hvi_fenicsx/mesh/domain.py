@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -14,14 +12,11 @@ from dolfinx import mesh as dmesh
 from mpi4py import MPI
 
 from ..errors import InputError
+from ..geometry import Arc
 from ..runtime import memory
 from ..runtime.mpi import agree
 from ..typing import Array, Entities
-from . import blocks, gmsh_model, gmsh_shapes
-from .gmsh_shapes import Arc
-
-if TYPE_CHECKING:
-    from ..scene.shapes import Shape
+from . import blocks, gmsh_model
 
 _LEAST_MEMORY = 300.0
 """Bytes for one unknown: its row of the matrix and its share of the mesh, without any solver."""
@@ -54,6 +49,27 @@ class Domain:
     curves: Mapping[str, Arc] = field(default_factory=dict)
     one_piece: bool = False
     origin: tuple[Domain, Refinement | None] | None = None
+
+    @classmethod
+    def from_mesh(
+        cls,
+        mesh: dmesh.Mesh,
+        sides: Mapping[str, Entities],
+        regions: Mapping[str, Entities] | None = None,
+        curves: Mapping[str, Arc] | None = None,
+        *,
+        one_piece: bool = False,
+    ) -> Domain:
+        """The domain of a mesh. Collective.
+
+        Args:
+            mesh: SI coordinates.
+            sides: local facet indices by name.
+            regions: local cell indices by name.
+            curves: the true curve of a side by its name, where that is known and not straight.
+            one_piece: whether the mesh is known to be connected.
+        """
+        return cls(mesh, sides, regions or {}, *_bounding_box(mesh), curves or {}, one_piece)
 
     @property
     def dimension(self) -> int:
@@ -116,21 +132,6 @@ def block(comm: MPI.Comm, size: Sequence[float], cells: Sequence[int]) -> Domain
     return Domain(mesh, _block_sides(mesh, upper), {}, np.zeros(len(upper)), upper, one_piece=True)
 
 
-def build(comm: MPI.Comm, shape: Shape, dimension: int) -> Domain:
-    """The domain that a scene's ``[domain]`` table describes. Collective.
-
-    Raises:
-        InputError: on all ranks alike, when a file cannot be read or is no usable mesh, or memory cannot suffice.
-    """
-    if shape.shape == "file":
-        return from_file(comm, shape.file, dimension, shape.scale)
-    if shape.shape == "rectangle" or shape.shape == "box":
-        check_affordable(comm, dimension * math.prod(n + 1 for n in shape.cells), "cells")
-        return block(comm, shape.size, shape.cells)
-    mesh, sides = gmsh_shapes.build(comm, shape)
-    return Domain(mesh, sides, {}, *_bounding_box(mesh), gmsh_shapes.curves(shape), one_piece=True)
-
-
 def check_affordable(comm: MPI.Comm, unknowns: int, key: str) -> None:
     """Refuse what would be killed for want of memory, half an hour later. Collective.
 
@@ -156,7 +157,7 @@ def from_file(comm: MPI.Comm, path: Path, dimension: int, scale: float = 1.0) ->
     """
     mesh, sides, regions = gmsh_model.read(comm, path, dimension)
     mesh.geometry.x[:] *= scale
-    return Domain(mesh, sides, regions, *_bounding_box(mesh))
+    return Domain.from_mesh(mesh, sides, regions)
 
 
 def _block_sides(mesh: dmesh.Mesh, size: Array) -> dict[str, Entities]:

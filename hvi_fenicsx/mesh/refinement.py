@@ -15,9 +15,9 @@ from dolfinx import la
 from dolfinx import mesh as dmesh
 
 from .. import compat
+from ..geometry import Arc
 from ..typing import Array, Entities
 from .domain import Domain, Halves, Refinement, check_affordable
-from .gmsh_shapes import Arc
 
 _LONG = {2: 0.0, 3: 0.76}
 """Of a cell's longest edge, what is bisected with it, by dimension: in space all six would make a step of 4 to 5 times

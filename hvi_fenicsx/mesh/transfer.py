@@ -39,8 +39,7 @@ def coarser(scene: Scene) -> Scene | None:
     cells = getattr(scene.domain, "cells", None)
     if cells is None or any(n % 2 or n // 2 < _COARSEST for n in cells):
         return None
-    domain = scene.domain.model_copy(update={"cells": tuple(n // 2 for n in cells)})
-    return scene.model_copy(update={"domain": domain})
+    return scene.with_domain(cells=tuple(n // 2 for n in cells))
 
 
 def prolongation(
@@ -115,7 +114,7 @@ def _parents_on_grid(points: Array, coarse: fem.FunctionSpace, far: Array, scene
 
     Odd coordinates run along a coarse edge from its lower to its upper end: an axis, or the diagonal of a face or cell.
     """
-    cells = np.array(scene.domain.cells, dtype=PETSc.IntType)  # type: ignore[union-attr]
+    cells = np.array(scene.domain.cells, dtype=PETSc.IntType)  # type: ignore[attr-defined]
     place = _grid(points, cells, scene)
     parents = np.stack([_flat(end, cells // 2) for end in (place // 2, (place + 1) // 2)], axis=1)
     return np.asarray(_numbers(coarse, far, cells // 2, scene).app2petsc(parents.ravel()).reshape(-1, 2))
@@ -156,7 +155,7 @@ def _sizes(space: fem.FunctionSpace) -> tuple[int, int]:
 
 def _grid(points: Array, cells: Indices, scene: Scene) -> Indices:
     """Integer grid coordinates of vertices, (n, dim)."""
-    size = np.array(scene.domain.size)  # type: ignore[union-attr]
+    size = np.array(scene.domain.size)  # type: ignore[attr-defined]
     return np.rint(points[:, : len(size)] * (cells / size)).astype(PETSc.IntType)
 
 

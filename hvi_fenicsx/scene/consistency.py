@@ -1,42 +1,68 @@
-"""What no single table can know: whether the tables of a scene fit together."""
+"""Whether the tables of a scene fit together, which no single table can know."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from itertools import chain, combinations
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 from ..effects import Effect
 from ..effects.contact import Contact
 from ..effects.loads import PrescribedDisplacement, Traction
 from ..errors import InputError
 from ..laws import smoothing
+from ..mesh.shapes import DomainShape
 from ..schema import Mistake, shown, unknown
+from .effect_tables import BodyTable, BoundaryTable, MaterialTable
 from .named_tables import WHOLE
-from .shapes import MeshFile
+from .solver_table import SolverTable
 
-if TYPE_CHECKING:
-    from .effect_tables import Boundary
-    from .model import Scene
-
-_Key = tuple[str, ...]
-_Item = tuple[_Key, tuple[str, ...], Effect]
+_Keys = tuple[str, ...]
+_Item = tuple[_Keys, tuple[str, ...], Effect]
 """The place in the scene, the sides, the effect."""
 
 
-def contradictions(scene: Scene) -> list[Mistake]:
-    """All that does not fit; the finer checks only where the coarse ones find nothing."""
+class Tables(Protocol):
+    """The tables of a scene, each of which is right for itself."""
+
+    @property
+    def domain(self) -> DomainShape:
+        """The body's shape."""
+
+    @property
+    def dimension(self) -> int:
+        """2 or 3."""
+
+    @property
+    def material(self) -> Mapping[str, MaterialTable]:
+        """Materials by name."""
+
+    @property
+    def body(self) -> Mapping[str, BodyTable]:
+        """What acts in the volume, by name."""
+
+    @property
+    def boundary(self) -> Mapping[str, BoundaryTable]:
+        """Boundary parts by name."""
+
+    @property
+    def solver(self) -> SolverTable:
+        """How to solve."""
+
+
+def contradictions(scene: Tables) -> list[Mistake]:
+    """All that does not fit; the finer checks are made only where the coarse ones find nothing."""
     return list(_coarse(scene)) or list(_fine(scene))
 
 
-def _coarse(scene: Scene) -> Iterator[Mistake]:
+def _coarse(scene: Tables) -> Iterator[Mistake]:
     yield from _unknown_sides(scene)
     yield from _regions(scene)
     yield from _one_by_one(scene)
     yield from _start(scene)
 
 
-def _fine(scene: Scene) -> Iterator[Mistake]:
+def _fine(scene: Tables) -> Iterator[Mistake]:
     yield from _smoothing(scene)
     items = [*_on_boundary(scene.boundary)]
     yield from _exclusive(items)
@@ -44,9 +70,9 @@ def _fine(scene: Scene) -> Iterator[Mistake]:
         yield from _on_side(side, [(key, effect) for key, on, effect in items if side in on], scene)
 
 
-def _unknown_sides(scene: Scene) -> Iterator[Mistake]:
-    if isinstance(scene.domain, MeshFile):
-        return  # only the mesh knows its groups
+def _unknown_sides(scene: Tables) -> Iterator[Mistake]:
+    if scene.domain.normals is None:
+        return
     known = list(scene.domain.normals)
     for name, boundary in scene.boundary.items():
         for side in boundary.on:
@@ -55,30 +81,34 @@ def _unknown_sides(scene: Scene) -> Iterator[Mistake]:
                 yield Mistake(("boundary", name, "on"), text)
 
 
-def _regions(scene: Scene) -> Iterator[Mistake]:
+def _regions(scene: Tables) -> Iterator[Mistake]:
     seen: dict[str, str] = {}
     for name, material in scene.material.items():
         if material.region is None and len(scene.material) > 1:
-            text = 'region is missing: with several materials each says where it is, region = "..."'
+            text = 'region is missing: each of several materials must say where it is, region = "..."'
             yield Mistake(("material", name), text)
         for region in material.region or ():
             if region in seen:
-                text = f"{shown(region)} has a material already, {seen[region]}; name it once"
+                text = f"{shown(region)} has a material already, material.{seen[region]}; name it in one of them"
                 yield Mistake(("material", name, "region"), text)
             seen[region] = name
-    if not isinstance(scene.domain, MeshFile):
-        yield from _no_regions("material", scene.material)
-        yield from _no_regions("body", scene.body)
+    if scene.domain.regions is not None:
+        yield from _unknown_regions("material", scene.material, scene.domain)
+        yield from _unknown_regions("body", scene.body, scene.domain)
 
 
-def _no_regions(table: str, entries: Mapping[str, Any]) -> Iterator[Mistake]:
+def _unknown_regions(table: str, entries: Mapping[str, Any], shape: DomainShape) -> Iterator[Mistake]:
+    known = shape.regions or ()
     for name, entry in entries.items():
-        if entry.region is not None:
-            text = 'a built-in shape has no regions; leave region out, or use shape = "file"'
-            yield Mistake((table, name, "region"), text)
+        for region in entry.region or ():
+            if not known:
+                text = f'a {shape.shape} has no regions; leave region out, or use shape = "file"'
+                yield Mistake((table, name, "region"), text)
+            elif region not in known:
+                yield Mistake((table, name, "region"), f"{unknown('region', region, known)} (a {shape.shape})")
 
 
-def _one_by_one(scene: Scene) -> Iterator[Mistake]:
+def _one_by_one(scene: Tables) -> Iterator[Mistake]:
     """What each effect itself refuses in this dimension."""
     materials = [(("material", n), m.elasticity) for n, m in scene.material.items()]
     bodies = [(("body", n, e.key), e) for n, b in scene.body.items() for e in b.effects]
@@ -90,19 +120,19 @@ def _one_by_one(scene: Scene) -> Iterator[Mistake]:
             yield Mistake(key, str(error))
 
 
-def _start(scene: Scene) -> Iterator[Mistake]:
+def _start(scene: Tables) -> Iterator[Mistake]:
     start = scene.solver.start
     if not isinstance(start, str) and len(start) != scene.dimension:
         text = f"has {len(start)} components; a {scene.dimension}D scene wants {scene.dimension}"
         yield Mistake(("solver", "start"), text)
 
 
-def _on_boundary(boundary: Mapping[str, Boundary]) -> Iterator[_Item]:
+def _on_boundary(boundary: Mapping[str, BoundaryTable]) -> Iterator[_Item]:
     for name, part in boundary.items():
         yield from ((("boundary", name, effect.key), part.on, effect) for effect in part.effects)
 
 
-def _smoothing(scene: Scene) -> Iterator[Mistake]:
+def _smoothing(scene: Tables) -> Iterator[Mistake]:
     laws = [(key, getattr(effect, "law", None)) for key, _, effect in _on_boundary(scene.boundary)]
     names = sorted({law.name for _, law in laws if law is not None})
     wanted = scene.solver.smoothing
@@ -113,7 +143,7 @@ def _smoothing(scene: Scene) -> Iterator[Mistake]:
 
 
 def _exclusive(items: Iterable[_Item]) -> Iterator[Mistake]:
-    """Of an exclusive kind, a side bears one."""
+    """A side bears one effect of an exclusive kind."""
     for (key, on, effect), (other, sides, second) in combinations(items, 2):
         shared = sorted(set(on) & set(sides))
         if effect.key == second.key and effect.exclusive and shared:
@@ -121,24 +151,24 @@ def _exclusive(items: Iterable[_Item]) -> Iterator[Mistake]:
             yield Mistake(other, text)
 
 
-def _on_side(side: str, effects: list[tuple[_Key, Effect]], scene: Scene) -> Iterator[Mistake]:
-    prescribed: dict[int, _Key] = {}
+def _on_side(side: str, effects: list[tuple[_Keys, Effect]], scene: Tables) -> Iterator[Mistake]:
+    prescribed: dict[int, _Keys] = {}
     for key, effect in effects:
         for axis in effect.prescribed() if isinstance(effect, PrescribedDisplacement) else ():
             if axis in prescribed:
                 text = f'"{side}" has {_axis(axis)} prescribed already, by {_dotted(prescribed[axis])}'
-                yield Mistake(key, f'{text}; write "free" in one')
+                yield Mistake(key, f'{text}; write "free" in one of them')
             prescribed[axis] = key
-    normal = None if isinstance(scene.domain, MeshFile) else scene.domain.normals[side]
+    normal = scene.domain.normals[side] if scene.domain.normals else None
     for key, effect in effects:
         yield from _against(key, effect, side, prescribed, normal, scene.dimension)
 
 
 def _against(
-    key: _Key, effect: Effect, side: str, prescribed: Mapping[int, _Key], normal: int | None, dimension: int
+    key: _Keys, effect: Effect, side: str, prescribed: Mapping[int, _Keys], normal: int | None, dimension: int
 ) -> Iterator[Mistake]:
     """Contact and tractions in a direction that is prescribed anyway."""
-    blocking = normal if normal in prescribed else (0 if len(prescribed) == dimension else None)
+    blocking = normal if normal in prescribed else 0 if len(prescribed) == dimension else None
     if isinstance(effect, Contact) and blocking is not None:
         text = f'the displacement normal to "{side}" is prescribed by {_dotted(prescribed[blocking])}'
         yield Mistake(key, f'{text}; leave contact out or write "free" there')
@@ -146,8 +176,8 @@ def _against(
         idle = [i for i, formula in enumerate(effect.values) if i in prescribed and formula.source != 0.0]
         for axis in idle:
             reason = f'{_axis(axis)} is prescribed on "{side}" by {_dotted(prescribed[axis])}'
-            mend = 'write 0 here or "free" there'
-            yield Mistake(key, f"component {axis + 1} does nothing: {reason}; {mend}")
+            text = f'component {axis + 1} does nothing: {reason}; write 0 here or "free" there'
+            yield Mistake(key, text)
 
 
 def _axis(axis: int) -> str:
@@ -158,5 +188,5 @@ def _quoted(names: Iterable[str]) -> str:
     return ", ".join(map(shown, names))
 
 
-def _dotted(key: _Key) -> str:
+def _dotted(key: _Keys) -> str:
     return ".".join(step for step in key if step != WHOLE)

@@ -26,7 +26,7 @@ from .named_tables import WHOLE, named_or_whole
 DEFAULT_ELASTICITY = "isotropic"
 
 
-class Holder(Table):
+class EffectTable(Table):
     """A table whose further keys are effects, read by the classes registered for its place."""
 
     model_config = ConfigDict(extra="allow")
@@ -48,8 +48,8 @@ class Holder(Table):
         if not isinstance(data, dict):
             return cls._read_or_refuse(lambda: handler(data), [])
         mistakes: list[Mistake] = []
-        made = {key: cls._read(key, value, mistakes) for key, value in data.items()}
-        return cls._read_or_refuse(lambda: handler(made), mistakes)
+        read = {key: cls._read(key, value, mistakes) for key, value in data.items()}
+        return cls._read_or_refuse(lambda: handler(read), mistakes)
 
     @classmethod
     def _read(cls, key: str, value: Any, mistakes: list[Mistake]) -> Any:
@@ -68,7 +68,15 @@ def read_effect(
     mistakes: list[Mistake],
     also: tuple[str, ...] = (),
 ) -> Any:
-    """An effect read by its class; what is wrong joins ``mistakes``. ``also``: keys beside its own."""
+    """An effect read by its class; the value as it is where that refuses it.
+
+    Args:
+        kind: the effect's class.
+        value: what the scene has for it.
+        where: its keys in the table around it.
+        mistakes: what is wrong is added to these.
+        also: keys that the table may have beside the effect's own.
+    """
     try:
         return kind.model_validate(value)
     except ValidationError as error:
@@ -79,21 +87,21 @@ def read_effect(
 
 
 def _inside(mistake: Mistake, value: Any) -> tuple[Key, ...]:
-    """The place within the effect as the scene file has it."""
+    """The keys within the effect, as the scene file has it."""
     if not isinstance(value, dict):
         return mistake.where[1:]  # a bare list is kept in a field that the file does not name
     return mistake.where or _parameter(mistake.text, value)
 
 
 def _parameter(text: str, table: Mapping[str, Any]) -> tuple[str, ...]:
-    """A law refuses its parameters as a whole: the one that its message names first is the place."""
+    """The parameter that a law's message names first: a law refuses its parameters as a whole."""
     if text.startswith("unknown law "):
         return ("law",)
     named = re.findall(r"(\w+) = |'(\w+)'", text)
     return next(((name,) for pair in named for name in pair if name in table), ())
 
 
-class Boundary(Holder):
+class BoundaryTable(EffectTable):
     """A boundary part and what acts on it."""
 
     place: ClassVar[Place] = Place.BOUNDARY
@@ -104,10 +112,10 @@ class Boundary(Holder):
     if TYPE_CHECKING:
 
         def __init__(self, **keys: Any) -> None:
-            """The keys of the scene file; effects as objects or as the scene file writes them."""
+            """The keys of the scene file, the effects as objects or as the scene file writes them."""
 
 
-class Body(Holder):
+class BodyTable(EffectTable):
     """What acts in the body, or in a region of it."""
 
     place: ClassVar[Place] = Place.BODY
@@ -118,10 +126,10 @@ class Body(Holder):
     if TYPE_CHECKING:
 
         def __init__(self, **keys: Any) -> None:
-            """The keys of the scene file; effects as objects or as the scene file writes them."""
+            """The keys of the scene file, the effects as objects or as the scene file writes them."""
 
 
-class Material(Table):
+class MaterialTable(Table):
     """The elasticity of the body, or of a region of it: the further keys are those of the model."""
 
     region: Names | None = None
@@ -141,16 +149,16 @@ class Material(Table):
             return cls._read_or_refuse(lambda: handler(data), [])
         own = {key: value for key, value in data.items() if key == "region"}
         mistakes: list[Mistake] = []
-        made = _elasticity({key: value for key, value in data.items() if key != "region"}, mistakes)
+        elasticity = _elasticity({key: value for key, value in data.items() if key != "region"}, mistakes)
         if mistakes:  # the region is looked at even so: both are reported together
             cls._check_region(own, mistakes)
             raise validation_error(mistakes)
-        return cls._read_or_refuse(lambda: handler({**own, "elasticity": made}), [])
+        return cls._read_or_refuse(lambda: handler({**own, "elasticity": elasticity}), [])
 
     @classmethod
     def _check_region(cls, own: Mapping[str, Any], mistakes: list[Mistake]) -> None:
         try:
-            Body.model_validate(dict(own))
+            BodyTable.model_validate(dict(own))
         except ValidationError as error:
             mistakes.extend(mistakes_of(error))
 
@@ -184,18 +192,18 @@ def _material_keys() -> Iterator[str]:
         yield from kind.model_fields
 
 
-def _at_least_one(materials: dict[str, Material]) -> dict[str, Material]:
+def _at_least_one(materials: dict[str, MaterialTable]) -> dict[str, MaterialTable]:
     if not materials:
         raise validation_error([Mistake((), "is empty; give model, youngs_modulus and poisson_ratio")])
     return materials
 
 
 Materials = Annotated[
-    dict[str, Material],
+    dict[str, MaterialTable],
     AfterValidator(_at_least_one),
     _whole_or_named(_material_keys),
     PlainSerializer(_as_written),
 ]
 """``[material]``, or ``[material.NAME]`` by name."""
-Bodies = Annotated[dict[str, Body], _whole_or_named(Body.keys), PlainSerializer(_as_written)]
+Bodies = Annotated[dict[str, BodyTable], _whole_or_named(BodyTable.keys), PlainSerializer(_as_written)]
 """``[body]``, or ``[body.NAME]`` by name."""

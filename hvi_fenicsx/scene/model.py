@@ -4,28 +4,33 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, Self
 
-from pydantic import AfterValidator, Field, ValidationInfo, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, SerializeAsAny, ValidationInfo, model_validator
 from pydantic_core import PydanticCustomError
 
 from ..effects import Effect, Place
-from ..schema import Mistake, Names, Table, refusal, validation_error
+from ..mesh.shapes import DomainShape
+from ..schema import Mistake, Names, Table, choose, refusal, validation_error
 from . import plugins
 from .consistency import contradictions
-from .effect_tables import Bodies, Boundary, Materials
-from .shapes import Domain, MeshFile
-from .solver_table import Solver
+from .effect_tables import Bodies, BoundaryTable, Materials
+from .solver_table import SolverTable
 
 _NAME = re.compile(r"\w[\w.-]{0,99}")
 
 
-class Placed(NamedTuple):
-    """An effect with its place in the scene."""
+class PlacedEffect(NamedTuple):
+    """An effect with its place in the scene.
+
+    Attributes:
+        place: the kind of its table.
+        where: the name of a boundary table, of a region of the mesh, or None for the whole body.
+        effect: the effect.
+    """
 
     place: Place
     where: str | None
-    """The name of a boundary table, of a region of the mesh, or None for the whole body."""
     effect: Effect
 
 
@@ -33,6 +38,10 @@ def _title(text: str) -> str:
     if not text.isprintable():
         raise refusal("must be a single line of printable characters")
     return text
+
+
+def _shape(value: Any, info: ValidationInfo) -> Any:
+    return choose(value, "shape", DomainShape.registry, info.context)
 
 
 class Scene(Table):
@@ -45,16 +54,17 @@ class Scene(Table):
     title: Annotated[str, Field(max_length=200), AfterValidator(_title)] = ""
     """one line that says what this is"""
     plugins: Names | None = None
-    """Python files with laws, effects and methods of one's own, relative to the scene file; see docs/extending.md"""
-    domain: Domain
+    """Python files with your own laws, effects, methods and domain shapes, relative to the scene file; see
+    docs/extending.md"""
+    domain: Annotated[SerializeAsAny[DomainShape], BeforeValidator(_shape)]
     """the body's shape"""
     material: Materials
     """what the body is made of"""
     body: Bodies = Field(default_factory=dict)
     """what acts in the body's volume"""
-    boundary: dict[str, Boundary] = Field(default_factory=dict)
+    boundary: dict[str, BoundaryTable] = Field(default_factory=dict)
     """parts of the boundary and what acts on them"""
-    solver: Solver = Solver()
+    solver: SolverTable = SolverTable()
     """how to solve"""
 
     if TYPE_CHECKING:
@@ -75,7 +85,7 @@ class Scene(Table):
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickled as its tables: another rank must load the plugins before it can know their classes."""
-        return _again, (self.model_dump(exclude_none=True),)
+        return _read_again, (self.model_dump(exclude_none=True),)
 
     @model_validator(mode="after")
     def _consistent(self) -> Scene:
@@ -86,8 +96,8 @@ class Scene(Table):
 
     @property
     def dimension(self) -> int:
-        """2 or 3. A mesh file's is that of its material models."""
-        if not isinstance(self.domain, MeshFile):
+        """2 or 3: the shape's, or that of the material models where only the mesh knows."""
+        if self.domain.dimension is not None:
             return self.domain.dimension
         known = (material.elasticity.dimension() for material in self.material.values())
         return next((dimension for dimension in known if dimension), 2)
@@ -97,23 +107,45 @@ class Scene(Table):
         """The sides (or physical groups) that each boundary table stands on."""
         return {name: boundary.on for name, boundary in self.boundary.items()}
 
-    def effects(self) -> Iterator[Placed]:
-        """All effects with their places; one that stands on several regions comes once for each."""
+    def with_domain(self, **values: Any) -> Self:
+        """The scene with other values in ``[domain]``, validated again.
+
+        Args:
+            **values: the new values by their keys.
+
+        Raises:
+            ValidationError: the values are not allowed, or do not fit the rest.
+        """
+        return self.changed(domain=self.domain.changed(**values))
+
+    def with_solver(self, **values: Any) -> Self:
+        """The scene with other values in ``[solver]``, validated again.
+
+        Args:
+            **values: the new values by their keys.
+
+        Raises:
+            ValidationError: the values are not allowed, or do not fit the rest.
+        """
+        return self.changed(solver=self.solver.changed(**values))
+
+    def effects(self) -> Iterator[PlacedEffect]:
+        """All effects with their places; one on several regions comes once for each."""
         for material in self.material.values():
             for region in material.region or (None,):
-                yield Placed(Place.MATERIAL, region, material.elasticity)
+                yield PlacedEffect(Place.MATERIAL, region, material.elasticity)
         for body in self.body.values():
             for region in body.region or (None,):
-                yield from (Placed(Place.BODY, region, effect) for effect in body.effects)
+                yield from (PlacedEffect(Place.BODY, region, effect) for effect in body.effects)
         for name, boundary in self.boundary.items():
-            yield from (Placed(Place.BOUNDARY, name, effect) for effect in boundary.effects)
+            yield from (PlacedEffect(Place.BOUNDARY, name, effect) for effect in boundary.effects)
 
 
-def _again(tables: dict[str, Any]) -> Scene:
+def _read_again(tables: dict[str, Any]) -> Scene:
     return Scene.model_validate(tables)
 
 
 def _bad_names(boundary: Mapping[str, Any]) -> Iterator[Mistake]:
     """Names go into tables and file names."""
-    text = "is no usable name for a part; use letters, digits, _ - . only"
+    text = "cannot be the name of a part; use letters, digits, _ - . only"
     return (Mistake(("boundary", name), text) for name in boundary if not _NAME.fullmatch(name))

@@ -15,10 +15,10 @@ from pydantic.fields import FieldInfo
 
 from ..effects import Effect, Place
 from ..laws.base import registered
-from .effect_tables import DEFAULT_ELASTICITY, Body, Boundary, Material
+from ..mesh.shapes import DomainShape
+from .effect_tables import DEFAULT_ELASTICITY, BodyTable, BoundaryTable, MaterialTable
 from .model import Scene
-from .shapes import SHAPES
-from .solver_table import OneOf, Solver
+from .solver_table import OneOf, SolverTable
 
 T = TypeVar("T")
 
@@ -47,16 +47,16 @@ def reference() -> str:
 def _document() -> Iterator[str]:
     yield _INTRODUCTION
     yield from _table("Top level", Scene, ["title", "plugins"])
-    for name, shape in SHAPES.items():
+    for name, shape in _provided(DomainShape.registry).items():
         yield from _table(f'`[domain]` with `shape = "{name}"`', shape)
-    yield from _table("`[material]`, or `[material.NAME]` where there are several", Material)
+    yield from _table("`[material]`, or `[material.NAME]` where there are several", MaterialTable)
     yield from _effects(Place.MATERIAL, 'The keys of `elasticity = "{key}"`')
-    yield from _table("`[body]`, or `[body.NAME]`", Body)
+    yield from _table("`[body]`, or `[body.NAME]`", BodyTable)
     yield from _effects(Place.BODY, "`{key}` in a body table")
-    yield from _table("`[boundary.NAME]`", Boundary)
+    yield from _table("`[boundary.NAME]`", BoundaryTable)
     yield from _effects(Place.BOUNDARY, "`{key}` in a boundary table")
     yield from _laws()
-    yield from _table("`[solver]`", Solver)
+    yield from _table("`[solver]`", SolverTable)
 
 
 def _table(title: str, model: type[BaseModel], only: Iterable[str] | None = None) -> Iterator[str]:
@@ -67,7 +67,7 @@ def _table(title: str, model: type[BaseModel], only: Iterable[str] | None = None
 
 
 def _effects(place: Place, title: str) -> Iterator[str]:
-    for key, kind in Effect.registry[place].items():
+    for key, kind in _provided(Effect.registry[place]).items():
         yield from (f"### {title.format(key=key)}", "", f"{_summary(kind)} Adds `{kind.term}`.", "")
         fields = {n: f for n, f in kind.model_fields.items() if f.description}
         if fields:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import AfterValidator, BeforeValidator, Field, GetCoreSchemaHandler, PlainSerializer, model_validator
 from pydantic_core import CoreSchema, core_schema
@@ -71,12 +71,12 @@ Start = Annotated[
 """The name of a start, or a displacement by component."""
 
 
-class Solver(Table):
+class SolverTable(Table):
     """Method and accuracy. Without smoothing and epsilon the law itself is solved, not a smoothed one."""
 
     method: Annotated[str, AfterValidator(_method)] = "auto"
     """auto chooses by the effects: linear, convex or branch; branch is exact; condensed is the paper's own;
-    snes_vi, tao, ssls are to compare with; or the name of a method of one's own"""
+    snes_vi, tao, ssls are there to compare with; or the name of your own method"""
     smoothing: Annotated[str | None, OneOf(smoothings)] = None
     """the plus function that rounds the law's kinks; paper is the paper's S; without it the law is exact"""
     epsilon: Positive | None = None
@@ -84,14 +84,14 @@ class Solver(Table):
     epsilon_absolute: Positive | None = None
     """the same in N/m (J/m²), as in the paper; one of the two, not both"""
     start: Start = "unbroken"
-    """where there are several solutions: the pieces of the laws to begin on: "unbroken", "resting" (of the slips with
-    every bond a spring), "broken" (beyond every drop), or those of a displacement (m), a list of formulas"""
+    """where there are several solutions, where to begin: "unbroken" (no slip), "resting" (as the body lies when every
+    bond is a spring), "broken" (beyond every drop), or at a displacement (m), a list of formulas"""
     tolerance: Annotated[float, Field(gt=0, lt=1, allow_inf_nan=False)] = 1e-8
     """relative residual of the inequality at which the iteration ends"""
     linear_solver: Literal["auto", "lu", "gamg"] = "auto"
     """auto chooses by size; any PETSc option overrides it"""
     second_order: bool = False
-    """whether to factorise the Hessian where a falling law leaves open if the solution is a local minimum"""
+    """true: where a falling law leaves open whether the solution is a local minimum, factorise the Hessian to know"""
     max_iterations: Count = 100
     """Newton iterations at most"""
 
@@ -102,7 +102,7 @@ class Solver(Table):
         return {"smoothing": "quadratic", **data} if smoothed else data
 
     @model_validator(mode="after")
-    def _fits(self) -> Solver:
+    def _fits(self) -> Self:
         if mistakes := self._contradictions():
             raise validation_error(mistakes)
         return self

@@ -5,7 +5,7 @@ Light: it loads pydantic and nothing heavier, and knows no particular table.
 
 from .fields import Count, Length, Names, Positive, vector
 from .messages import refusal, shown, unknown
-from .tables import Key, Mistake, Table, choose, mistakes_of, validation_error
+from .tables import Key, Mistake, Table, choose, input_error, mistakes_of, validation_error
 
 __all__ = [
     "Count",
@@ -16,6 +16,7 @@ __all__ = [
     "Positive",
     "Table",
     "choose",
+    "input_error",
     "mistakes_of",
     "refusal",
     "shown",

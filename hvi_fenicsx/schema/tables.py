@@ -8,6 +8,7 @@ from typing import Any, NamedTuple, Self, TypeVar
 from pydantic import BaseModel, ConfigDict, ModelWrapValidatorHandler, ValidationError, model_validator
 from pydantic_core import InitErrorDetails
 
+from ..errors import InputError
 from .messages import message_of, refusal, shown, suggestion, unknown
 
 Key = str | int
@@ -48,6 +49,16 @@ def mistakes_of(
     # A misspelt key is one mistake: that the right one is missing then goes without saying.
     found = [e for e in found if e["type"] != "missing" or e["loc"] not in meant]
     return [Mistake(tuple(e["loc"]), message_of(e, model, also)) for e in found]
+
+
+def input_error(error: ValidationError, model: type[BaseModel] | None = None) -> InputError:
+    """What pydantic found as one line for the user.
+
+    Args:
+        error: pydantic's error.
+        model: the table that was read, for its allowed keys.
+    """
+    return InputError("; ".join(m.text for m in mistakes_of(error, model)))
 
 
 class Table(BaseModel):

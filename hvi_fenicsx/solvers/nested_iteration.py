@@ -110,7 +110,7 @@ def _assembled(coarse: Scene, scene: Scene, system: System, timer: Timer) -> tup
 def _loosened(scene: Scene) -> Scene:
     """The scene at a tolerance that suits a start."""
     tolerance = max(_COARSE_TOLERANCE, scene.solver.tolerance)
-    return scene.model_copy(update={"solver": scene.solver.model_copy(update={"tolerance": tolerance})})
+    return scene.with_solver(tolerance=tolerance)
 
 
 def _prolonged(step: PETSc.Mat, below: System, found: SolveResult, system: System) -> PETSc.Vec:

@@ -20,7 +20,7 @@ from .ssls import SemismoothNewton
 from .tao import BoundedNewton
 
 if TYPE_CHECKING:
-    from ..scene import Solver
+    from ..scene import SolverTable
 
 
 class Method(Protocol):
@@ -51,7 +51,7 @@ METHODS: Mapping[str, type[Method]] = {
 }
 
 
-def relative_width(wanted: Solver, system: System) -> float | None:
+def relative_width(wanted: SolverTable, system: System) -> float | None:
     """ε relative to the first law's energy scale; None for exact laws, or without a law."""
     if wanted.epsilon_absolute is None or not system.terms:
         return wanted.epsilon
@@ -59,7 +59,7 @@ def relative_width(wanted: Solver, system: System) -> float | None:
     return wanted.epsilon_absolute / (system.terms[0].exact.energy_scale * scales.stress * scales.displacement)
 
 
-def choose(wanted: Solver, system: System) -> type[Method]:
+def choose(wanted: SolverTable, system: System) -> type[Method]:
     """The class that solves a system: the one that the scene names, or the simplest that what it holds allows."""
     if wanted.method == "auto" and is_quadratic(system):
         return LinearSolve if is_equation(system) else ConvexProgramme
@@ -67,7 +67,7 @@ def choose(wanted: Solver, system: System) -> type[Method]:
 
 
 def create(
-    wanted: Solver,
+    wanted: SolverTable,
     system: System,
     timer: Timer,
     progress: Progress,

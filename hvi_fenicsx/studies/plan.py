@@ -14,7 +14,7 @@ from pydantic import ValidationError
 from ..errors import InputError
 from ..laws import smoothing
 from ..scene import Scene, dump_scene
-from ..schema import mistakes_of, unknown
+from ..schema import input_error, unknown
 from ..solvers.registry import METHODS
 from . import meshes
 from .meshes import Setting
@@ -111,7 +111,7 @@ def make(scene: Scene, axes: Sequence[Axis]) -> Plan:
         InputError: an axis that the scene has not, or named twice; or none of the combinations is a scene.
     """
     _fits(scene, axes)
-    tables = tomllib.loads(dump_scene(scene))
+    tables = _tables(scene)
     left_out: list[str] = []
     uniform = [a for a in axes if a.name != "accuracy"]
     targets = [float(v) for a in axes if a.name == "accuracy" for v in a.values] if axes else _ACCURACIES
@@ -120,10 +120,15 @@ def make(scene: Scene, axes: Sequence[Axis]) -> Plan:
     if not wanted:
         raise InputError("--axis: no combination of these is a scene:\n" + "\n".join(left_out))
     own, exact = Setting(scene), _setting(_unsmoothed(tables))
-    on_each = [replace(s, scene=exact.scene.model_copy(update={"domain": s.scene.domain})) for s in wanted]
+    on_each = [replace(s, scene=exact.scene.changed(domain=s.scene.domain)) for s in wanted]
     points = sorted(_distinct([*wanted, own, exact, *on_each, *adaptive]), key=meshes.unknowns)
     finest = max([*wanted, own], key=meshes.unknowns)
     return Plan(own, exact, tuple(points), tuple(_reference(finest)), tuple(dict.fromkeys(left_out)))
+
+
+def _tables(scene: Scene) -> Tables:
+    """The scene's tables as they stand in a file, but the domain as an object."""
+    return {**tomllib.loads(dump_scene(scene)), "domain": scene.domain}
 
 
 def _fits(scene: Scene, axes: Sequence[Axis]) -> None:
@@ -191,7 +196,7 @@ def _setting(tables: Tables) -> Setting:
     try:
         scene = Scene.model_validate(tables)
     except ValidationError as error:
-        raise InputError("; ".join(p.text for p in mistakes_of(error, Scene))) from None
+        raise input_error(error, Scene) from None
     wanted = scene.solver
     for law in laws(scene) if wanted.smoothing else ():
         smoothing.create(str(wanted.smoothing), law, epsilon=wanted.epsilon, epsilon_absolute=wanted.epsilon_absolute)
@@ -219,7 +224,7 @@ def _default(scene: Scene, tables: Tables, left_out: list[str]) -> Iterator[Sett
 
 def _reference(finest: Setting) -> Iterator[Setting]:
     """The unsmoothed law, by the default method, on finer meshes."""
-    tables = _unsmoothed(tomllib.loads(dump_scene(finest.scene)))
+    tables = _unsmoothed(_tables(finest.scene))
     solver = {**tables.get("solver", {}), "method": "auto", "linear_solver": "auto", "tolerance": REFERENCE_TOLERANCE}
     for rung in meshes.reference({**tables, "solver": solver}, _setting):
         yield _setting(rung)

@@ -39,9 +39,8 @@ class Store:
     def name(self, setting: Setting) -> str:
         """Of a setting's point."""
         digest = hashlib.sha256(f"{__version__} {self.ranks} {setting.accuracy}\n{dump_scene(setting.scene)}".encode())
-        file = getattr(setting.scene.domain, "file", None)
-        if file is not None:
-            digest.update(Path(file).read_bytes())
+        for file in setting.scene.domain.files():
+            digest.update(file.read_bytes())
         return digest.hexdigest()[:16]
 
     def path(self, setting: Setting) -> Path:

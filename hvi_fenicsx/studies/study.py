@@ -147,9 +147,7 @@ def _errors(yardstick: Yardstick, store: Store, setting: Setting) -> Errors | No
 def _rows(plan: Plan, store: Store, yardstick: Yardstick, certain: Mapping[str, Certainty]) -> Iterator[Row]:
     partner: tuple[Setting | None, Moved | None] = (None, None)
     for setting in plan.points:
-        alone = replace(
-            setting, accuracy=None, scene=plan.exact.scene.model_copy(update={"domain": setting.scene.domain})
-        )
+        alone = replace(setting, accuracy=None, scene=plan.exact.scene.changed(domain=setting.scene.domain))
         if partner[0] != alone:
             partner = (alone, _moved(yardstick, store, alone))
         moved = _moved(yardstick, store, setting)

@@ -99,7 +99,7 @@ def row(
     return Row(
         point=point,
         mesh=meshes.words(setting),
-        h=None if setting.accuracy is not None else meshes.width(setting.scene) or record.get("h"),
+        h=None if setting.accuracy is not None else setting.scene.domain.width() or record.get("h"),
         smoothing=wanted.smoothing,
         epsilon=record.get("epsilon", wanted.epsilon) if wanted.smoothing else None,
         epsilon_absolute=wanted.epsilon_absolute,

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from mpi4py import MPI
 
 from ..laws import Superpotential, smoothing
-from ..mesh import coarsening_2d, domain, refinement
+from ..mesh import coarsening_2d, refinement
 from ..mesh.domain import Domain
 from ..problem import problem
 from ..runtime.timing import Timer
@@ -42,7 +42,7 @@ def mesh(scene: Scene, comm: MPI.Comm) -> Domain:
     Raises:
         InputError: on all ranks alike, when a file cannot be read or is no usable mesh, or memory cannot suffice.
     """
-    whole = domain.build(comm, scene.domain, scene.dimension)
+    whole = scene.domain.build(comm, scene.dimension)
     if not hasattr(scene.domain, "cells"):
         whole = coarsening_2d.founded(whole)
     return refinement.repeated(whole, getattr(scene.domain, "refinements", 0))

@@ -111,8 +111,8 @@ def test_smoothing_is_narrowed_as_far_as_asked_for_without_a_finer_mesh() -> Non
     assert widths[-1] < widths[0] / 10  # type: ignore[operator]
     assert reached.rung.dofs < 100
     found = quantities.READERS["sigma_t"](reached.rung)
-    exact = reached.rung.solution.scene.solver.model_copy(update={"smoothing": None, "epsilon_absolute": None})
-    law = Climber(Timer()).again(reached.rung, reached.rung.solution.scene.model_copy(update={"solver": exact}))
+    exact = reached.rung.solution.scene.with_solver(smoothing=None, epsilon_absolute=None)
+    law = Climber(Timer()).again(reached.rung, exact)
     true = quantities.READERS["sigma_t"](law)
     apart = quantities.on_contact(law, true.x.array - found.x.array, 1)  # type: ignore[union-attr]
     assert apart < 2e-2 * quantities.on_contact(law, true.x.array, 1)  # type: ignore[union-attr]

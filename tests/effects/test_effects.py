@@ -392,7 +392,7 @@ REFUSED: dict[str, tuple[Table, str]] = {
     ),
     "a region of a shape that has none": (
         changed(body={"region": "core", "force": [0.0, -1.0]}),
-        "a built-in shape has no regions",
+        "a rectangle has no regions",
     ),
     "two laws of friction": (
         changed(

@@ -20,8 +20,8 @@ from test_refinement import measure, volume
 from hvi_fenicsx import Scene, read_scene, workflow
 from hvi_fenicsx.mesh import coarsening_2d, domain, gmsh_model, thinned_outline, transfer
 from hvi_fenicsx.mesh.domain import Domain
+from hvi_fenicsx.mesh.shapes import HalfDisk, NotchedStrip
 from hvi_fenicsx.mesh.thinned_outline import HalfEdges
-from hvi_fenicsx.scene import HalfDisk, NotchedStrip
 from hvi_fenicsx.system import assemble
 
 HERE = Path(__file__).parent
@@ -79,7 +79,7 @@ def test_what_is_round_stays_nearly_so(tmp_path: Path) -> None:
 
 
 def test_known_curves_are_met_by_all_rungs() -> None:
-    body = below(domain.build(COMM, HalfDisk(radius=0.5, mesh_size=0.02), 2))
+    body = below(HalfDisk(radius=0.5, mesh_size=0.02).build(COMM, 2))
     x = body.mesh.geometry.x[np.unique(entities_to_geometry(body.mesh, 1, body.sides["arc"]))]
     assert np.hypot(x[:, 0], x[:, 1] - 0.5) == pytest.approx(0.5, rel=1e-12)
 
@@ -93,7 +93,7 @@ def test_what_is_finer_stays_finer(tmp_path: Path) -> None:
 
 def test_a_notch_is_not_lost() -> None:
     strip = NotchedStrip(size=(1.0, 0.5), notch=(0.1, 0.2), mesh_size=0.02)
-    body = domain.build(COMM, strip, 2)
+    body = strip.build(COMM, 2)
     assert measure(below(body), "notch") == pytest.approx(measure(body, "notch"), rel=1e-12)
 
 
@@ -113,7 +113,7 @@ def test_outlines_that_cross_themselves_are_given_up() -> None:
 
 def test_a_coarse_mesh_of_another_area_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(thinned_outline, "_DIFFERENT", 1e-6)
-    assert coarsening_2d.founded(domain.build(COMM, HalfDisk(radius=0.5, mesh_size=0.02), 2)).origin is None
+    assert coarsening_2d.founded(HalfDisk(radius=0.5, mesh_size=0.02).build(COMM, 2)).origin is None
 
 
 @pytest.mark.parametrize("name", POLYGONS)

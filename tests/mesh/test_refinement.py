@@ -25,8 +25,8 @@ from test_transfer import lost, rough
 from hvi_fenicsx import Scene, workflow
 from hvi_fenicsx.mesh import domain, refinement, transfer
 from hvi_fenicsx.mesh.domain import Domain, Refinement
+from hvi_fenicsx.mesh.shapes import HalfDisk
 from hvi_fenicsx.runtime.timing import Timer
-from hvi_fenicsx.scene import HalfDisk
 from hvi_fenicsx.solvers import nested_iteration
 from hvi_fenicsx.solvers.method import silent
 from hvi_fenicsx.system import assemble
@@ -43,7 +43,7 @@ def box() -> Domain:
 
 
 def half_disk() -> Domain:
-    return domain.build(COMM, HalfDisk(radius=0.5, mesh_size=0.2), 2)
+    return HalfDisk(radius=0.5, mesh_size=0.2).build(COMM, 2)
 
 
 BODIES: list[Callable[[], Domain]] = [rectangle, box, half_disk]

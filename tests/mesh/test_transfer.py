@@ -18,7 +18,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from hvi_fenicsx import InputError, Scene, read_scene, workflow
-from hvi_fenicsx.mesh import domain, transfer
+from hvi_fenicsx.mesh import transfer
 from hvi_fenicsx.runtime.timing import Timer
 from hvi_fenicsx.solvers import nested_iteration
 from hvi_fenicsx.solvers.active_set import ActiveSetSolver
@@ -68,7 +68,7 @@ def lost(step: PETSc.Mat, fine: fem.FunctionSpace, coarse: fem.FunctionSpace, *,
 
 
 def space(scene: Scene, dimension: int) -> fem.FunctionSpace:
-    return space_on(domain.build(MPI.COMM_WORLD, scene.domain, dimension).mesh)
+    return space_on(scene.domain.build(MPI.COMM_WORLD, dimension).mesh)
 
 
 def space_on(mesh: Mesh) -> fem.FunctionSpace:
@@ -103,7 +103,7 @@ def test_a_convex_scene_ends_where_the_direct_solve_ends() -> None:
     """Without friction the minimiser is unique, whatever the start and the linear solver."""
     overrides = ["domain.cells=[64, 64]", 'boundary.press.traction=[0.0, "-1e6*(1 - 1.5*x)"]']
     scene = read_scene(DEMOS / "strong_law.toml", [*overrides, 'boundary.floor={on="bottom", contact={gap=0.0}}'])
-    direct = scene.model_copy(update={"solver": scene.solver.model_copy(update={"linear_solver": "lu"})})
+    direct = scene.with_solver(linear_solver="lu")
     energies = [workflow.solve(s).examination.energy for s in (scene, direct)]  # type: ignore[union-attr]
     assert energies[0] == pytest.approx(energies[1], rel=1e-9)
 

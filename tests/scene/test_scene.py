@@ -21,7 +21,8 @@ from hvi_fenicsx.effects.base import Contribution, FormContext
 from hvi_fenicsx.effects.contact import Contact
 from hvi_fenicsx.effects.friction import Friction
 from hvi_fenicsx.errors import InputError
-from hvi_fenicsx.scene import Boundary, MeshFile, Rectangle, Scene, Solver, dump_scene, read_scene
+from hvi_fenicsx.mesh.shapes import MeshFile, Rectangle
+from hvi_fenicsx.scene import BoundaryTable, Scene, SolverTable, dump_scene, read_scene
 from hvi_fenicsx.scene.reference_doc import reference
 from hvi_fenicsx.scene.toml_lines import lines_of
 
@@ -192,7 +193,7 @@ REFUSED = {
     "region of a built-in shape": (
         "[material]",
         '[material]\nregion = "a"',
-        's.toml:7: material.region: a built-in shape has no regions; leave region out, or use shape = "file"',
+        's.toml:7: material.region: a rectangle has no regions; leave region out, or use shape = "file"',
     ),
     "friction without a law's name": (
         'law = "quadratic_linear", ',
@@ -210,7 +211,7 @@ REFUSED = {
         'on = ["left", "right"]\ndisplacement = [0, 0]',
         's.toml:15: boundary.pull.displacement: "left" has u_x prescribed already, by '
         "boundary.wall.displacement; "
-        'write "free" in one',
+        'write "free" in one of them',
     ),
     "contact where nothing can close": (
         'on = "bottom"',
@@ -272,7 +273,7 @@ REFUSED = {
     "name that no file can have": (
         "[boundary.wall]",
         '[boundary."a,b"]',
-        "s.toml:10: boundary.a,b: is no usable name for a part; use letters, digits, _ - . only",
+        "s.toml:10: boundary.a,b: cannot be the name of a part; use letters, digits, _ - . only",
     ),
     "missing mesh file": (
         'shape = "rectangle"\nsize = [1.0, 1.0]\ncells = [32, 32]',
@@ -331,7 +332,7 @@ OVERRIDES: dict[str, Callable[[Any], bool]] = {
     "solver.tolerance=1e-12": lambda s: s.solver.tolerance == 1e-12,
     "domain.cells.1=8": lambda s: s.domain.cells == (32, 8),
     'solver.linear_solver="lu"': lambda s: s.solver.linear_solver == "lu",
-    "solver={}": lambda s: s.solver == Solver(),
+    "solver={}": lambda s: s.solver == SolverTable(),
     "boundary.floor.friction.delta=1e-5": lambda s: s.boundary["floor"].effects[1].law.delta == 1e-5,
     'boundary.lid={on="top", traction=[0, "x"]}': lambda s: s.parts["lid"] == ("top",),
 }
@@ -442,10 +443,10 @@ def test_materials_need_regions_of_their_own(tmp_path: Path, write: Callable[...
     (tmp_path / "part.msh").touch()
     steel = 'model = "plane_strain"\nyoungs_modulus = 2e11\npoisson_ratio = 0.3\n'
     head = '[domain]\nshape = "file"\nfile = "part.msh"\n'
-    assert "material.b: region is missing" in message(
+    assert "material.b: region is missing: each of several materials" in message(
         write(f'{head}[material.a]\nregion = "r"\n{steel}[material.b]\n{steel}')
     )
-    assert 'material.b.region: "r" has a material already, a; name it once' in message(
+    assert 'material.b.region: "r" has a material already, material.a; name it in one of them' in message(
         write(f'{head}[material.a]\nregion = "r"\n{steel}[material.b]\nregion = "r"\n{steel}')
     )
 
@@ -455,7 +456,7 @@ def test_a_scene_from_python() -> None:
     scene = Scene(
         domain=Rectangle(size=(1.0, 1.0), cells=(4, 4)),
         material={"model": "plane_stress", "youngs_modulus": 1.0, "poisson_ratio": 0.0},
-        boundary={"floor": Boundary(on="bottom", contact=Contact.model_validate({"gap": 0.0}), friction=friction)},
+        boundary={"floor": BoundaryTable(on="bottom", contact=Contact.model_validate({"gap": 0.0}), friction=friction)},
     )
     assert scene.dimension == 2
     assert [(p.place, p.where, p.effect.key) for p in scene.effects()] == [
@@ -468,8 +469,8 @@ def test_a_scene_from_python() -> None:
 
 
 def test_epsilon_alone_means_quadratic_smoothing() -> None:
-    assert Solver(epsilon=0.01).smoothing == "quadratic"
-    assert Solver().smoothing is None
+    assert SolverTable(epsilon=0.01).smoothing == "quadratic"
+    assert SolverTable().smoothing is None
 
 
 @pytest.fixture

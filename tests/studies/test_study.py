@@ -23,6 +23,7 @@ from scenes import model, quadratic_linear
 
 from hvi_fenicsx import InputError, Scene, compat, solve
 from hvi_fenicsx.mesh import domain, refinement, transfer
+from hvi_fenicsx.mesh.shapes import Rectangle
 from hvi_fenicsx.studies import cost, interpolation, meshes, plan, reference, sentences, solution_arrays, table
 from hvi_fenicsx.studies.errors import QUANTITIES, Yardstick
 from hvi_fenicsx.studies.reference import Certainty
@@ -51,7 +52,6 @@ def yardstick() -> Yardstick:
 
 @pytest.mark.parametrize("shape", ["rectangle", "box"])
 def test_interpolation_between_nested_meshes_is_the_ladders_prolongation(shape: str) -> None:
-    from hvi_fenicsx.mesh import domain
 
     size, cells = ([1.0, 2.0], [4, 6]) if shape == "rectangle" else ([1.0, 2.0, 0.5], [4, 6, 2])
     table_of = model(4)
@@ -63,11 +63,11 @@ def test_interpolation_between_nested_meshes_is_the_ladders_prolongation(shape: 
             "boundary": {"low": {"on": "bottom", "displacement": [0.0] * 3}},
         }
     fine = Scene.model_validate(table_of)
-    coarse = fine.model_copy(update={"domain": fine.domain.model_copy(update={"cells": tuple(n // 2 for n in cells)})})
+    coarse = fine.with_domain(cells=tuple(n // 2 for n in cells))
     from dolfinx import fem
 
     spaces = [
-        fem.functionspace(domain.build(MPI.COMM_SELF, s.domain, s.dimension).mesh, ("Lagrange", 1, (s.dimension,)))
+        fem.functionspace(s.domain.build(MPI.COMM_SELF, s.dimension).mesh, ("Lagrange", 1, (s.dimension,)))
         for s in (fine, coarse)
     ]
     step = transfer.prolongation(*spaces, fine)
@@ -264,7 +264,7 @@ def test_the_unknowns_of_a_graded_mesh_are_foreseen(shape: str, mesh_size: float
     """What a plan may afford is decided on them; a mesh fine at one point only is not fine everywhere."""
     table = {"shape": shape, "radius": 0.1, "mesh_size": mesh_size, **({"mesh_size_below": below} if below else {})}
     made = Scene.model_validate({**model(4, 1e6), "domain": table, "boundary": {}})
-    body = domain.build(MPI.COMM_SELF, made.domain, 2)
+    body = made.domain.build(MPI.COMM_SELF, 2)
     true = 2 * body.mesh.topology.index_map(0).size_global
     assert 0.6 < meshes.unknowns(meshes.Setting(made)) / true < 1.4
 
@@ -273,7 +273,7 @@ def test_the_unknowns_of_a_graded_mesh_are_foreseen(shape: str, mesh_size: float
 def test_the_mesh_width_halves_where_a_mesh_is_refined(shape: str) -> None:
     """Whatever the angles of its cells: an order in h is a slope over it."""
     size = (1.0, 0.3, 0.7)[: 2 if shape == "rectangle" else 3]
-    body = domain.build(MPI.COMM_SELF, scene_of(shape, size), len(size))
+    body = scene_of(shape, size).build(MPI.COMM_SELF, len(size))
     widths = [solution_arrays.width(cells_of(b)) for b in (body, refinement.uniform(body).domain)]
     assert widths[1] == pytest.approx(widths[0] / 2, rel=1e-9)
 
@@ -331,10 +331,10 @@ def test_a_bad_plan_says_how_to_mend_it(axes: list[str], words: str) -> None:
 
 
 def test_cells_that_do_not_come_out_whole_are_refused_with_those_that_do() -> None:
-    tables = {"domain": {"cells": [150, 6]}}
+    tables = {"domain": Rectangle(size=(1.0, 1.0), cells=(150, 6))}
     with pytest.raises(InputError, match="possible: 75, 150, 300, 600"):
         meshes.at(tables, "60")
-    assert meshes.refined(tables, Fraction(1, 2)) == {"domain": {"cells": [75, 3]}}
+    assert meshes.refined(tables, Fraction(1, 2)) == {"domain": Rectangle(size=(1.0, 1.0), cells=(75, 3))}
     assert meshes.refined(tables, Fraction(1, 4)) is None
 
 

@@ -1,0 +1,68 @@
+"""Plane geometry: outlines of bodies, and the curves that their sides lie on."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from .typing import Array
+
+Point = tuple[float, float]
+"""Coordinates, m."""
+
+
+@dataclass(frozen=True, slots=True)
+class Arc:
+    """A circle that a side lies on.
+
+    Attributes:
+        centre: m.
+        radius: m.
+    """
+
+    centre: Point
+    radius: float
+
+    def nearest(self, x: Array) -> Array:
+        """The points of the circle nearest to the points x, both of shape (n, 2), m."""
+        away = x - np.asarray(self.centre)
+        return np.asarray(self.centre + self.radius * away / np.linalg.norm(away, axis=1, keepdims=True))
+
+
+@dataclass(frozen=True, slots=True)
+class Outline:
+    """The closed boundary of a plane body, counterclockwise, with the mesh size wanted at its corners.
+
+    Attributes:
+        points: the corners, m.
+        sides: name and centre of the edge from each corner to the next; a centre (m) makes it an arc, None a line.
+        sizes: edge length of the cells at each corner, m.
+    """
+
+    points: Sequence[Point]
+    sides: Sequence[tuple[str, Point | None]]
+    sizes: Sequence[float]
+
+    @classmethod
+    def polygon(cls, points: Sequence[Point], names: Sequence[str], size: float) -> Outline:
+        """A polygon with cells of one size.
+
+        Args:
+            points: the corners, m, counterclockwise.
+            names: of the side from each corner to the next.
+            size: edge length of the cells, m.
+        """
+        return cls(points, [(name, None) for name in names], [size] * len(points))
+
+    @property
+    def box_area(self) -> float:
+        """Area of the box around the corners, m²."""
+        x, y = zip(*self.points, strict=True)
+        return (max(x) - min(x)) * (max(y) - min(y))
+
+    def arcs(self) -> dict[str, Arc]:
+        """The curved sides by name."""
+        starts = zip(self.points, self.sides, strict=True)
+        return {name: Arc(c, float(np.hypot(p[0] - c[0], p[1] - c[1]))) for p, (name, c) in starts if c is not None}

@@ -1,0 +1,25 @@
+"""The shapes of bodies: importing this registers those that come with the program, in the order users see them in."""
+
+# isort: off
+from .base import DomainShape, Thresholds
+from .block import Box, Rectangle
+from .l_shape import LShape
+from .disk import Disk, HalfDisk
+from .notched_strip import NotchedStrip
+from .fixed_mesh import FixedMesh, MeshFile
+from .plane import PlaneShape
+# isort: on
+
+__all__ = [
+    "Box",
+    "Disk",
+    "DomainShape",
+    "FixedMesh",
+    "HalfDisk",
+    "LShape",
+    "MeshFile",
+    "NotchedStrip",
+    "PlaneShape",
+    "Rectangle",
+    "Thresholds",
+]

@@ -1,0 +1,141 @@
+"""What a domain shape is: all that is known about a shape of a body stands on its class.
+
+A new shape is a new subclass of :class:`DomainShape`, best of :class:`.plane.PlaneShape` or
+:class:`.fixed_mesh.FixedMesh`. It registers itself under the default of its field ``shape``, which is then a value of
+``[domain]`` in scene files. Nothing else is edited. Light: what builds meshes is loaded when a mesh is built.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar, Self
+
+from ...errors import InputError
+from ...schema import Table
+
+if TYPE_CHECKING:
+    from mpi4py import MPI
+
+    from ..domain import Domain
+
+
+@dataclass(frozen=True, slots=True)
+class Thresholds:
+    """How coarse a mesh may be, and how large one is taken to be before it is made.
+
+    Attributes:
+        fewest_adaptive: cells each way that the coarsest block of an adaptive solve has at least.
+        fewest_study: cells each way that a block of a study has at least.
+        largest_part: of the extent of a shape, that the cells of its coarsest mesh have at most.
+        unknowns_of_file: what a mesh file is taken to have, unrefined; it is not opened for that.
+    """
+
+    fewest_adaptive: int = 3
+    fewest_study: int = 2
+    largest_part: float = 1 / 6
+    unknowns_of_file: float = 5_000.0
+
+
+DEFAULT = Thresholds()
+
+
+class DomainShape(Table):
+    """The shape of a body with its mesh: what one kind of ``[domain]`` table says, in SI.
+
+    Class attributes:
+        dimension: 2 or 3; None where only the mesh knows it.
+        normals: the axis normal to each named side, None where that is slanted or curved; None as a whole where only
+            the mesh knows its sides.
+        regions: names of the regions; None where only the mesh knows them.
+    """
+
+    dimension: ClassVar[int | None]
+    normals: ClassVar[Mapping[str, int | None] | None]
+    regions: ClassVar[tuple[str, ...] | None] = ()
+    registry: ClassVar[dict[str, type[DomainShape]]] = {}
+
+    shape: str
+    """the name of the shape; a subclass gives it as ``Literal["name"] = "name"``"""
+
+    @classmethod
+    def __pydantic_init_subclass__(cls, **kwargs: Any) -> None:
+        super().__pydantic_init_subclass__(**kwargs)
+        if "shape" not in cls.__annotations__:
+            return
+        name = cls.model_fields["shape"].default
+        if not isinstance(name, str):
+            raise InputError(f'domain shape {cls.__name__}: name it by shape: Literal["name"] = "name"')
+        known = DomainShape.registry.get(name, cls)
+        if (known.__module__, known.__qualname__) != (cls.__module__, cls.__qualname__):
+            raise InputError(f"domain shape {cls.__name__}: the name {name!r} is taken; choose another")
+        DomainShape.registry[name] = cls
+
+    @abstractmethod
+    def build(self, comm: MPI.Comm, dimension: int) -> Domain:
+        """The meshed body. Collective.
+
+        Args:
+            comm: the ranks that share the mesh.
+            dimension: of the scene, 2 or 3; the shape's own where it has one.
+
+        Raises:
+            InputError: on all ranks alike, when the mesh cannot be made, or memory cannot suffice.
+        """
+
+    @abstractmethod
+    def coarsest(self, thresholds: Thresholds = DEFAULT) -> Self:
+        """The shape with the mesh that an adaptive solve begins with."""
+
+    @abstractmethod
+    def refined(self, factor: Fraction, thresholds: Thresholds = DEFAULT) -> Self | None:
+        """The shape with cells ``factor`` times finer each way; None where there is no such mesh.
+
+        Args:
+            factor: above 1 finer, below 1 coarser.
+            thresholds: how coarse a mesh may be.
+
+        Raises:
+            ValidationError: the mesh would be finer than the shape allows.
+        """
+
+    @abstractmethod
+    def with_mesh(self, text: str, thresholds: Thresholds = DEFAULT) -> Self:
+        """The shape with the mesh that a value of ``--axis mesh=`` names.
+
+        Args:
+            text: what the user wrote.
+            thresholds: how coarse a mesh may be.
+
+        Raises:
+            InputError: the text names no mesh of this shape; the message says what would.
+            ValidationError: the mesh would be finer than the shape allows.
+        """
+
+    @abstractmethod
+    def mesh_text(self, length: Callable[[float], str]) -> str:
+        """The mesh as people name it, like "64 × 64 cells".
+
+        Args:
+            length: writes a length (m) with a unit that suits it.
+        """
+
+    def width(self) -> float | None:
+        """The mesh width h, m; None where only the mesh knows it."""
+        return None
+
+    @abstractmethod
+    def unknowns(self, dimension: int, thresholds: Thresholds = DEFAULT) -> float:
+        """About how many unknowns the mesh has; it is not made for that.
+
+        Args:
+            dimension: of the scene, 2 or 3.
+            thresholds: what a mesh file is taken to have.
+        """
+
+    def files(self) -> tuple[Path, ...]:
+        """The files whose content the mesh depends on."""
+        return ()

@@ -1,0 +1,95 @@
+"""Shapes whose mesh is given and can only be refined, each cell in all: mesh files."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from fractions import Fraction
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
+
+from pydantic import BeforeValidator, Field, PlainSerializer, ValidationInfo
+
+from ...errors import InputError
+from ...schema import Positive, refusal
+from .base import DEFAULT, DomainShape, Thresholds
+
+if TYPE_CHECKING:
+    from mpi4py import MPI
+
+    from ..domain import Domain
+
+MOST_REFINEMENTS = 10
+"""A million cells or more from each of the mesh's own."""
+Refinements = Annotated[int, Field(ge=0, le=MOST_REFINEMENTS)]
+"""How often each cell of a given mesh is cut."""
+
+
+class FixedMesh(DomainShape):
+    """A given mesh, refined so often. A subclass has the field ``refinements``."""
+
+    if TYPE_CHECKING:  # each shape says where it stands among its keys
+        refinements: int
+
+    def coarsest(self, thresholds: Thresholds = DEFAULT) -> Self:
+        """The mesh as it is given."""
+        return self.changed(refinements=0)
+
+    def refined(self, factor: Fraction, thresholds: Thresholds = DEFAULT) -> Self | None:
+        """The mesh refined more or less often; ``factor`` is a power of two."""
+        often = self.refinements + factor.numerator.bit_length() - factor.denominator.bit_length()
+        return self.changed(refinements=often) if 0 <= often <= MOST_REFINEMENTS else None
+
+    def with_mesh(self, text: str, thresholds: Thresholds = DEFAULT) -> Self:
+        """The mesh refined so often."""
+        if not text.isdigit() or int(text) > MOST_REFINEMENTS:
+            raise InputError(f"{text!r} is no number of refinements (0 to {MOST_REFINEMENTS})")
+        return self.changed(refinements=int(text))
+
+    def mesh_text(self, length: Callable[[float], str]) -> str:
+        """How often it is refined."""
+        often = self.refinements
+        if often < 2:
+            return f"{self.shape}, {'refined once' if often else 'as it is'}"
+        return f"{self.shape}, refined {often} times"
+
+    def unknowns(self, dimension: int, thresholds: Thresholds = DEFAULT) -> float:
+        """A guess: the mesh is not opened for it."""
+        return thresholds.unknowns_of_file * 2.0 ** (dimension * self.refinements)
+
+
+def _mesh_path(value: Any, info: ValidationInfo) -> Path:
+    if not isinstance(value, str | Path) or not str(value).strip() or "\0" in str(value):
+        raise refusal('must be the name of a mesh file in quotes, like "part.msh"')
+    folder = (info.context or {}).get("folder", ".")
+    path = Path(os.path.abspath(Path(folder) / value))
+    if not path.is_file():
+        raise refusal(f"{path} {'is a folder' if path.is_dir() else 'does not exist'}")
+    return path
+
+
+class MeshFile(FixedMesh):
+    """A gmsh file; its physical groups are the boundary parts and regions."""
+
+    dimension: ClassVar[None] = None
+    normals: ClassVar[None] = None
+    regions: ClassVar[None] = None
+
+    shape: Literal["file"] = "file"
+    """a gmsh file"""
+    file: Annotated[Path, BeforeValidator(_mesh_path), PlainSerializer(str)]
+    """name of the gmsh file (.msh, or .geo, which is meshed then), relative to the scene file"""
+    scale: Positive = 1.0
+    """m per unit of the file's coordinates: 1e-3 for a mesh in mm"""
+    refinements: Refinements = 0
+    """how often each cell is cut, in 4 triangles or 8 tetrahedra; the coarser meshes make the fine one fast to solve"""
+
+    def build(self, comm: MPI.Comm, dimension: int) -> Domain:
+        """The mesh of the file, unrefined. Collective."""
+        from .. import domain
+
+        return domain.from_file(comm, self.file, dimension, self.scale)
+
+    def files(self) -> tuple[Path, ...]:
+        """The mesh file."""
+        return (self.file,)
