@@ -110,6 +110,7 @@ class Recorder:
         self.failed |= report.failed
 
     def pytest_sessionfinish(self) -> None:
+        sys.monitoring.set_events(_TOOL, 0)
         shutil.rmtree(self.folder)
         tests = {name: self._whole(one) for name, one in self.found.items() if "failed" in one}
         self.target.write_text(json.dumps(tests), encoding="utf-8")

@@ -39,7 +39,7 @@ PACKAGE = "hvi_fenicsx"
 TABLE = HERE / "seeded_faults_result.md"
 BATCHES = (5.0, 20.0, 60.0, 200.0, float("inf"))
 """Seconds of tests that are run together: what is caught early shall not wait for all tests to be collected."""
-_LEFT_OUT = shutil.ignore_patterns(".git", "__pycache__", ".pytest_cache", ".hypothesis", "build", "results")
+_LEFT_OUT = ("/.git", "/build", "/results", "/.hypothesis", "/.pytest_cache", "__pycache__")
 
 
 @dataclass(frozen=True)
@@ -110,6 +110,16 @@ def _code(output: str, process: subprocess.Popen[str]) -> tuple[int, str]:
     return process.wait(), output
 
 
+def _copy(source: Path, target: Path) -> None:
+    """A tree without what is not of its sources; patterns that begin with a slash are of its top level."""
+
+    def left_out(folder: str, names: list[str]) -> list[str]:
+        top = Path(folder) == source
+        return [name for name in names if name in _LEFT_OUT or (top and f"/{name}" in _LEFT_OUT)]
+
+    shutil.copytree(source, target, ignore=left_out)
+
+
 def recorded(tree: Path, work: Path) -> dict[str, Any]:
     """Seconds, lines and ranks of each test on a tree as it is; recorded anew where the folder has no record."""
     target = work / "lines.json"
@@ -118,7 +128,11 @@ def recorded(tree: Path, work: Path) -> dict[str, Any]:
         more = {"HVI_RECORDED_TARGET": str(target), "HVI_RECORDED_ROOT": str(tree / PACKAGE)}
         _, output = pytest(tree, ["tests"], 7200.0, **more)
         print("\n".join(output.splitlines()[-20:]), flush=True)
-    return {name: test for name, test in json.loads(target.read_text("utf-8")).items() if not test["failed"]}
+    found = json.loads(target.read_text("utf-8"))
+    if failed := [name for name, test in found.items() if test["failed"]] or not found:
+        target.unlink()
+        raise SystemExit(f"the tests fail on the tree as it is: {failed}")
+    return dict(found)
 
 
 def lines_of(fault: Fault, file: Path) -> set[int]:
@@ -202,7 +216,7 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
     wanted = faults(options.names, old=options.old)
     with tempfile.TemporaryDirectory(prefix="faults-") as folder:
         tree = Path(folder, "tree")
-        shutil.copytree(options.tree, tree, ignore=_LEFT_OUT)
+        _copy(options.tree, tree)
         tests = recorded(tree, work)
         for i, fault in enumerate(wanted):
             if fault.name in results and fault.name not in options.names:
