@@ -18,6 +18,8 @@ for name, value in {
     "PRTE_MCA_rmaps_default_mapping_policy": ":oversubscribe",
     "PRTE_MCA_mapby": ":oversubscribe",
     "OMPI_MCA_rmaps_base_oversubscribe": "1",
+    # One machine: libfabric would take a second of each start to look for networks.
+    "OMPI_MCA_btl": "^tcp,ofi",
     # Ranks that wait beside another test's would take its core.
     "OMPI_MCA_mpi_yield_when_idle": "1",
     "OMP_NUM_THREADS": "1",
