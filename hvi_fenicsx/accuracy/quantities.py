@@ -18,7 +18,7 @@ from scipy.optimize import brentq
 from ..certify.contact_state import State
 from ..certify.estimate import estimator
 from ..certify.force_attribution import NEAR
-from ..effects.base import Direction
+from ..effects import Direction
 from ..errors import InputError
 from ..runtime.mpi import total
 from ..typing import Array

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from dolfinx import fem
 
-from ..effects.base import Direction
+from ..effects import Direction
 from ..problem.contact_surface import Surface
 from ..problem.law_term import LawTerm
 from ..problem.problem import Bounds, Problem

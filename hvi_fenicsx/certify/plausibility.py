@@ -13,7 +13,7 @@ import numpy as np
 from dolfinx import fem
 from petsc4py import PETSc
 
-from ..effects.base import Direction
+from ..effects import Direction
 from ..problem.law_term import LawTerm
 from ..problem.problem import Problem
 from ..rigid import kernel, rigid_fields

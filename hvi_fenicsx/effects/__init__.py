@@ -1,6 +1,33 @@
-"""The box of effects: importing it registers those that come with the program."""
+"""The effects: importing the package registers those that come with the program."""
 
 from . import anisotropic, contact, elasticity, friction, loads, normal, thermal
-from .base import Effect, Place
+from .base import Drive, Effect, Evaluate, FormContext, Place, Sizes, SurfaceLoad
+from .contribution import Averaged, BoundaryLaw, Condition, Contribution, Direction, NormalBounds
+from .fields import FormulaField
+from .role import Role, role_of
 
-__all__ = ["Effect", "Place", "anisotropic", "contact", "elasticity", "friction", "loads", "normal", "thermal"]
+__all__ = [
+    "Averaged",
+    "BoundaryLaw",
+    "Condition",
+    "Contribution",
+    "Direction",
+    "Drive",
+    "Effect",
+    "Evaluate",
+    "FormContext",
+    "FormulaField",
+    "NormalBounds",
+    "Place",
+    "Role",
+    "Sizes",
+    "SurfaceLoad",
+    "anisotropic",
+    "contact",
+    "elasticity",
+    "friction",
+    "loads",
+    "normal",
+    "role_of",
+    "thermal",
+]

@@ -7,8 +7,10 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
+from ..schema import refusal
 from ..typing import Array
-from .base import Contribution, FormContext, refusal
+from .base import FormContext
+from .contribution import Contribution
 from .elasticity import Elasticity, strain
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]

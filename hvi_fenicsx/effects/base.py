@@ -6,18 +6,18 @@ its ``key``, which is then a key of the scene file at its ``place``. Nothing els
 
 from __future__ import annotations
 
+import inspect
 from abc import abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import Enum
-from typing import Annotated, Any, ClassVar, Protocol
+from typing import Any, ClassVar, Protocol
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, PlainSerializer
-from pydantic_core import PydanticCustomError
+from pydantic import BaseModel, ConfigDict
 
-from ..errors import InputError
 from ..formula import Formula
 from ..laws import Superpotential
+from .contribution import Contribution
 
 
 class Place(Enum):
@@ -36,99 +36,15 @@ class Drive(Enum):
     RESISTANCE = "none: it only resists"
 
 
-def _formula(value: Any) -> Formula:
-    try:
-        return value if isinstance(value, Formula) else Formula(value)
-    except InputError as error:
-        raise refusal(str(error)) from None
-
-
-FormulaField = Annotated[
-    Formula,
-    BeforeValidator(_formula),
-    PlainSerializer(lambda f: f.source),
-]
-"""A number or a formula in x, y, z (SI), as a field of a scene model."""
-
-
-def refusal(text: str) -> PydanticCustomError:
-    """A refusal for a validator to raise; the scene reports it with its place."""
-    # Through the context, since braces in the text itself would be taken for places to fill.
-    return PydanticCustomError("effect", "{reason}", {"reason": text})
-
-
-class Direction(Enum):
-    """The scalar displacement that a law of Γc acts on."""
-
-    SLIP = "slip"
-    """u_t; in 3D |u_t|."""
-    OPENING = "opening"
-    """-u·n, n outward: positive when the body lifts off."""
-    PENETRATION = "penetration"
-    """u·n: positive when the body is pressed into its support."""
-
-
-@dataclass(frozen=True, slots=True)
-class Condition:
-    """A prescribed displacement component (SI) on a part."""
-
-    component: int
-    value: Formula
-
-
-@dataclass(frozen=True, slots=True)
-class NormalBounds:
-    """lower ≤ -u·n ≤ upper on a part (SI; None: no bound). Unilateral contact with gap g has lower = -g.
-
-    ``direction`` stands for n where it is given: the unit vector towards a flat obstacle.
-    """
-
-    lower: Formula | None
-    upper: Formula | None
-    direction: tuple[float, ...] | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class BoundaryLaw:
-    """A superpotential (SI) acting on one scalar displacement of a part."""
-
-    direction: Direction
-    law: Superpotential
-
-
-@dataclass(frozen=True, slots=True)
-class Averaged:
-    """A volumetric energy ½ modulus Σ_i (∫ φ_i div u dx)² / ∫ φ_i dx over a region's vertices, nondimensional.
+class FormContext(Protocol):
+    """What an effect may see of the problem that is being composed.
 
     Attributes:
-        modulus: λ. shear: 2μ of the same material.
-        divergence: UFL form of the scalar test function and the trial function. volume: of the scalar test function.
+        dimension: of space, 2 or 3.
+        trial: UFL argument, the displacement u.
+        test: UFL argument, the test function v.
+        normal: UFL's outward normal of the boundary.
     """
-
-    modulus: float
-    shear: float
-    divergence: Any
-    volume: Any
-
-
-@dataclass(frozen=True, slots=True)
-class Contribution:
-    """What one effect adds to the problem; forms are nondimensional UFL in the context's arguments."""
-
-    bilinear: tuple[Any, ...] = ()
-    averaged: tuple[Averaged, ...] = ()
-    linear: tuple[Any, ...] = ()
-    strains: tuple[Any, ...] = ()
-    """Linear forms of ε(v): no rigid motion feels them."""
-    across: tuple[Any, ...] = ()
-    """Parts of ∫ σ_33 q dx in a plane body, over p0: forms of the scalar test function q and, where they need it, u."""
-    conditions: tuple[Condition, ...] = ()
-    bounds: tuple[NormalBounds, ...] = ()
-    laws: tuple[BoundaryLaw, ...] = ()
-
-
-class FormContext(Protocol):
-    """What an effect may see of the problem that is being composed."""
 
     dimension: int
     trial: Any
@@ -173,7 +89,9 @@ class Sizes:
     """What an effect's scale may depend on.
 
     Attributes:
-        length: of the body, m. modulus: the largest Young's modulus, N/m². expansion: the largest |α|, 1/K.
+        length: of the body, m.
+        modulus: the largest Young's modulus, N/m².
+        expansion: the largest |α|, 1/K.
     """
 
     length: float
@@ -185,12 +103,30 @@ Evaluate = Callable[[Formula], float]
 """Largest absolute value of a formula over the place of an effect."""
 
 
+@dataclass(frozen=True, slots=True)
+class SurfaceLoad:
+    """A load on a boundary part as pictures show it: its components, less a pressure along the outward normal.
+
+    Attributes:
+        components: N/m², one for each dimension; empty: none.
+        pressure: N/m², against the boundary; None: none.
+    """
+
+    components: tuple[Formula, ...] = ()
+    pressure: Formula | None = None
+
+
 class Effect(BaseModel):
     """One physical contribution: validated data (SI) and what it adds.
 
     Class attributes:
-        key: the scene file's key. place: where the key stands. term: what it adds, in words and symbols.
-        drive: how it drives the body. exclusive: whether a side of the body bears only one of its kind.
+        key: the scene file's key.
+        place: where the key stands.
+        term: what it adds, in words and symbols.
+        label: what it is, in a few words for a legend; the key where it is empty.
+        drive: how it drives the body.
+        exclusive: whether a side of the body bears only one of its kind.
+        bounds_normal: whether it bounds the normal displacement, as contact does.
     """
 
     model_config = ConfigDict(
@@ -200,8 +136,10 @@ class Effect(BaseModel):
     key: ClassVar[str]
     place: ClassVar[Place]
     term: ClassVar[str]
+    label: ClassVar[str] = ""
     drive: ClassVar[Drive] = Drive.RESISTANCE
     exclusive: ClassVar[bool] = False
+    bounds_normal: ClassVar[bool] = False
     registry: ClassVar[dict[Place, dict[str, type[Effect]]]] = {place: {} for place in Place}
 
     @classmethod
@@ -214,10 +152,20 @@ class Effect(BaseModel):
 
     @abstractmethod
     def contribute(self, context: FormContext, where: str | None) -> Contribution:
-        """What it adds on ``where`` (a boundary part, a region, or None for the whole body)."""
+        """What it adds.
+
+        Args:
+            context: what it may see of the problem.
+            where: a boundary part, a region, or None for the whole body.
+        """
 
     def stress_scale(self, largest: Evaluate, sizes: Sizes) -> float:
-        """The largest stress (N/m²) it brings."""
+        """The largest stress (N/m²) it brings.
+
+        Args:
+            largest: gives the largest absolute value of a formula where the effect acts. Collective.
+            sizes: of the body and its materials.
+        """
         return 0.0
 
     def modulus_scale(self) -> float:
@@ -239,12 +187,30 @@ class Effect(BaseModel):
             InputError: with the reason and the mend.
         """
 
+    def implausible(self, largest: Evaluate, sizes: Sizes) -> tuple[str, ...]:
+        """What may be mistakes in its numbers, in sentences. Advice: nothing is refused.
 
-def components(formulas: tuple[Any, ...], dimension: int, key: str) -> None:
-    """Refuse a vector of the wrong length.
+        Args:
+            largest: gives the largest absolute value of a formula where the effect acts. Collective.
+            sizes: of the body and its materials.
+        """
+        return ()
 
-    Raises:
-        InputError: with the number of components wanted.
-    """
-    if len(formulas) != dimension:
-        raise InputError(f"{key} has {len(formulas)} components; a {dimension}D scene wants {dimension}")
+    def prescribed(self) -> tuple[int, ...]:
+        """The displacement components, from 0, that it prescribes."""
+        return ()
+
+    def surface_load(self) -> SurfaceLoad | None:
+        """The load that it puts on its part, for pictures; None: none that has a formula."""
+        return None
+
+    def superpotentials(self) -> tuple[Superpotential, ...]:
+        """The laws that it brings: those among its fields."""
+        values = (getattr(self, name) for name in type(self).model_fields)
+        return tuple(value for value in values if isinstance(value, Superpotential))
+
+    @classmethod
+    def meaning(cls) -> str:
+        """What it is, in a sentence or two: the first paragraph of its docstring."""
+        text = inspect.cleandoc(cls.__doc__ or "")
+        return text.split("\n\n")[0].replace("\n", " ").replace("`", "")

@@ -8,19 +8,10 @@ from typing import Annotated, Any, ClassVar
 from pydantic import BaseModel, ConfigDict, Field, model_serializer, model_validator
 
 from ..formula import COORDINATES, Formula
-from .base import (
-    Contribution,
-    Drive,
-    Effect,
-    Evaluate,
-    FormContext,
-    FormulaField,
-    NormalBounds,
-    Place,
-    Sizes,
-    components,
-    refusal,
-)
+from ..schema import refusal
+from .base import Drive, Effect, Evaluate, FormContext, Place, Sizes
+from .contribution import Contribution, NormalBounds
+from .fields import FormulaField, require_components
 
 Coordinate = Annotated[float, Field(allow_inf_nan=False)]
 
@@ -45,6 +36,7 @@ class Contact(Effect):
     key: ClassVar[str] = "contact"
     place: ClassVar[Place] = Place.BOUNDARY
     exclusive: ClassVar[bool] = True
+    bounds_normal: ClassVar[bool] = True
     drive: ClassVar[Drive] = Drive.KINEMATIC
     term: ClassVar[str] = "K: gap - u·n ≥ 0 on Γc, or lower ≤ -u·n ≤ upper"
 
@@ -96,8 +88,8 @@ class Contact(Effect):
     def check(self, dimension: int) -> None:
         """An obstacle has as many components as the scene has dimensions."""
         if self.obstacle is not None:
-            components(self.obstacle.point, dimension, "contact.obstacle.point")
-            components(self.obstacle.normal, dimension, "contact.obstacle.normal")
+            require_components(self.obstacle.point, dimension, "contact.obstacle.point")
+            require_components(self.obstacle.normal, dimension, "contact.obstacle.normal")
 
 
 def _towards(obstacle: Obstacle) -> NormalBounds:

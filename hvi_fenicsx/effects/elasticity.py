@@ -10,7 +10,8 @@ from pydantic import Field
 
 from ..errors import InputError
 from ..typing import Array
-from .base import Averaged, Contribution, Effect, FormContext, Place
+from .base import Effect, FormContext, Place
+from .contribution import Averaged, Contribution
 
 _LOCKING = 0.45
 """Poisson's ratio above which P1 cells answer too stiffly (docs/methods.md)."""

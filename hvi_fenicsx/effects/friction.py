@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import ClassVar
 
 from ..errors import InputError
-from .base import Direction
+from .contribution import Direction
 from .law_effect import LawEffect
 
 

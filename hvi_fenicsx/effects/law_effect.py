@@ -15,7 +15,9 @@ from pydantic import (
 
 from .. import laws
 from ..errors import InputError
-from .base import BoundaryLaw, Contribution, Direction, Effect, Evaluate, FormContext, Place, Sizes, refusal
+from ..schema import refusal
+from .base import Effect, Evaluate, FormContext, Place, Sizes
+from .contribution import BoundaryLaw, Contribution, Direction
 
 
 def _law(value: Any) -> laws.Superpotential:

@@ -14,19 +14,10 @@ from pydantic import (
 
 from ..errors import InputError
 from ..formula import Formula
-from .base import (
-    Condition,
-    Contribution,
-    Drive,
-    Effect,
-    Evaluate,
-    FormContext,
-    FormulaField,
-    Place,
-    Sizes,
-    components,
-    refusal,
-)
+from ..schema import refusal
+from .base import Drive, Effect, Evaluate, FormContext, Place, Sizes, SurfaceLoad
+from .contribution import Condition, Contribution
+from .fields import FormulaField, require_components
 
 
 class _Listed(Effect):
@@ -49,7 +40,7 @@ class _Listed(Effect):
 
     def check(self, dimension: int) -> None:
         """As many components as the scene has dimensions."""
-        components(self.values, dimension, self.key)
+        require_components(self.values, dimension, self.key)
 
 
 class Traction(_Listed):
@@ -71,6 +62,10 @@ class Traction(_Listed):
         vector = ufl.as_vector([context.render(f) for f in self.values]) / context.number(context.stress)
         return Contribution(linear=(ufl.inner(vector, context.test) * context.facets(where),))
 
+    def surface_load(self) -> SurfaceLoad:
+        """Its components."""
+        return SurfaceLoad(self.values)
+
     def stress_scale(self, largest: Evaluate, sizes: Sizes) -> float:
         """The largest component."""
         return max(largest(f) for f in self.values)
@@ -80,6 +75,7 @@ class BodyForce(_Listed):
     """Force per volume f (N/m³), a list of formulas, one for each component."""
 
     key: ClassVar[str] = "force"
+    label: ClassVar[str] = "a force on the body itself"
     place: ClassVar[Place] = Place.BODY
     drive: ClassVar[Drive] = Drive.LOAD
     term: ClassVar[str] = "<g, v> += ∫ f·v dx"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from .base import Direction
+from .contribution import Direction
 from .law_effect import LawEffect
 
 

@@ -8,8 +8,10 @@ from typing import Any, ClassVar
 from pydantic import SerializerFunctionWrapHandler, model_serializer, model_validator
 
 from ..errors import InputError
-from .base import Contribution, Drive, Effect, Evaluate, FormContext, FormulaField, Place, Sizes
+from .base import Drive, Effect, Evaluate, FormContext, Place, Sizes
+from .contribution import Contribution
 from .elasticity import Elasticity, strain
+from .fields import FormulaField
 
 
 class Temperature(Effect):
@@ -19,6 +21,7 @@ class Temperature(Effect):
     """
 
     key: ClassVar[str] = "temperature"
+    label: ClassVar[str] = "a change of temperature"
     place: ClassVar[Place] = Place.BODY
     drive: ClassVar[Drive] = Drive.KINEMATIC
     term: ClassVar[str] = "<g, v> += ∫ C:(α ΔT I):ε(v) dx"

@@ -17,7 +17,7 @@ from dolfinx import fem
 from dolfinx.fem.petsc import assemble_matrix
 from petsc4py import PETSc
 
-from ..effects.base import Averaged, Contribution, Effect, Place
+from ..effects import Averaged, Contribution, Effect, Place
 from ..typing import Array
 from . import nodal_averaging, stress
 from .nodal_averaging import Dilatation

@@ -9,7 +9,7 @@ import numpy as np
 from dolfinx import fem
 from petsc4py import PETSc
 
-from ..effects.base import Condition
+from ..effects import Condition
 from ..errors import InputError
 from ..runtime.mpi import agree
 from ..typing import Array, Entities

@@ -10,7 +10,7 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
-from ..effects.base import Contribution, Direction, Effect, Place
+from ..effects import Contribution, Direction, Effect, Place
 from .contact_surface import Surface
 from .problem import PlacedContribution, Problem
 

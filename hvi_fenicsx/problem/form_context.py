@@ -12,7 +12,7 @@ import ufl
 from dolfinx import fem
 from petsc4py import PETSc
 
-from ..effects.base import Place
+from ..effects import Place
 from ..formula import Formula, ufl_algebra
 from ..mesh import vertex_dofs
 from ..mesh.domain import Domain
@@ -22,7 +22,7 @@ from .scaling import Placed, Scales
 
 
 class FormContext:
-    """What effects see of the problem while it is composed (:class:`.effects.base.FormContext`)."""
+    """What effects see of the problem while it is composed (:class:`.effects.FormContext`)."""
 
     def __init__(
         self, domain: Domain, parts: Mapping[str, Sequence[str]], scales: Scales, effects: Sequence[Placed]

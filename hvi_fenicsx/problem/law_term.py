@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from dolfinx import fem
 
-from ..effects.base import Direction
+from ..effects import Direction
 from ..laws import Superpotential
 from ..typing import Array
 from .contact_surface import Surface

@@ -18,7 +18,7 @@ from dolfinx import fem
 from dolfinx.fem.petsc import assemble_matrix
 from petsc4py import PETSc
 
-from ..effects.base import Averaged
+from ..effects import Averaged
 from ..typing import Array
 from .vectors import assembled, nodal_sum
 

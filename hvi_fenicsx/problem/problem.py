@@ -16,7 +16,7 @@ import numpy as np
 import ufl
 from dolfinx import fem
 
-from ..effects.base import BoundaryLaw, Contribution, Direction, Effect, NormalBounds, Place
+from ..effects import BoundaryLaw, Contribution, Direction, Effect, NormalBounds, Place
 from ..errors import InputError
 from ..formula import Formula
 from ..laws import Superpotential

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from ..effects.base import Drive, Effect, Evaluate, Sizes
+from ..effects import Drive, Effect, Evaluate, Sizes
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,7 +11,7 @@ import numpy as np
 from mpi4py import MPI
 
 from ..certify.contact_state import State
-from ..effects.base import Direction
+from ..effects import Direction
 from ..problem.problem import Problem
 from ..typing import Array, Integers
 from . import arc_length

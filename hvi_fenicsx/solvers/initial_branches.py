@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 from petsc4py import PETSc
 
-from ..effects.base import Direction
+from ..effects import Direction
 from ..formula import Formula
 from ..problem.law_term import LawTerm
 from ..system.system import System

@@ -19,7 +19,7 @@ from mpi4py import MPI
 from scipy import sparse
 
 from ..certify.contact_state import State
-from ..effects.base import Direction
+from ..effects import Direction
 from ..mesh.vertex_dofs import dof_of_node
 from ..problem.scaling import Scales
 from ..typing import Array, Entities, Integers, Mask

@@ -16,8 +16,7 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from hvi_fenicsx import laws
-from hvi_fenicsx.effects import Effect, Place
-from hvi_fenicsx.effects.base import Contribution, FormContext
+from hvi_fenicsx.effects import Contribution, Effect, FormContext, Place
 from hvi_fenicsx.effects.contact import Contact
 from hvi_fenicsx.effects.friction import Friction
 from hvi_fenicsx.errors import InputError

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from dolfinx import fem, la
 
-from ...effects.base import Direction
+from ...effects import Direction
 from ...problem.problem import Problem
 from ...runtime.mpi import total
 from ...system.system import System

@@ -1,0 +1,41 @@
+"""Types of fields that several effects have, and the checks they share."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+from pydantic import BeforeValidator, PlainSerializer
+
+from ..errors import InputError
+from ..formula import Formula
+from ..schema import refusal
+
+
+def _formula(value: Any) -> Formula:
+    try:
+        return value if isinstance(value, Formula) else Formula(value)
+    except InputError as error:
+        raise refusal(str(error)) from None
+
+
+FormulaField = Annotated[
+    Formula,
+    BeforeValidator(_formula),
+    PlainSerializer(lambda f: f.source),
+]
+"""A number or a formula in x, y, z (SI), as a field of a scene model."""
+
+
+def require_components(formulas: tuple[Any, ...], dimension: int, key: str) -> None:
+    """Refuse a vector of the wrong length.
+
+    Args:
+        formulas: its components.
+        dimension: how many there must be.
+        key: its name in the message.
+
+    Raises:
+        InputError: with the number of components wanted.
+    """
+    if len(formulas) != dimension:
+        raise InputError(f"{key} has {len(formulas)} components; a {dimension}D scene wants {dimension}")

@@ -1,0 +1,76 @@
+"""What an effect does, as plain data: for those who tell of it or draw it and have only a result folder."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from typing import Any
+
+from ..laws import Superpotential, describe
+from .base import Effect
+from .contribution import BoundaryLaw, Contribution
+
+
+@dataclass(frozen=True, kw_only=True)
+class Role:
+    """One effect's role, ready for JSON.
+
+    Attributes:
+        place: where it stands in the scene: "boundary", "body" or "material".
+        drive: how it drives the body: "load", "kinematic" or "resistance".
+        meaning: what it is, in a sentence or two.
+        label: the same in a few words.
+        traction: a load on its part by component, numbers or formulas, N/m²; empty: none.
+        pressure: a load against its part, a number or a formula, N/m²; None: none.
+        prescribed: the displacement components, from 0, that it prescribes.
+        bounded: whether it bounds the normal displacement.
+        obstacle: the unit vector towards a flat obstacle, where it has one.
+        laws: the displacement that each of its laws acts on, and the law as a scene writes it.
+    """
+
+    place: str
+    drive: str
+    meaning: str
+    label: str
+    traction: tuple[float | str, ...]
+    pressure: float | str | None
+    prescribed: tuple[int, ...]
+    bounded: bool
+    obstacle: tuple[float, ...] | None
+    laws: tuple[dict[str, Any], ...]
+
+
+def role_of(effect: Effect, contribution: Contribution) -> Role:
+    """The role of an effect.
+
+    Args:
+        effect: the effect.
+        contribution: what it added to the problem.
+    """
+    load = effect.surface_load()
+    return Role(
+        place=effect.place.value,
+        drive=effect.drive.name.lower(),
+        meaning=effect.meaning(),
+        label=effect.label or effect.key.replace("_", " "),
+        traction=tuple(f.source for f in load.components) if load else (),
+        pressure=load.pressure.source if load and load.pressure else None,
+        prescribed=tuple(sorted({c.component for c in contribution.conditions})),
+        bounded=bool(contribution.bounds),
+        obstacle=next((b.direction for b in contribution.bounds), None),
+        laws=tuple(map(_law, contribution.laws)),
+    )
+
+
+def _law(brought: BoundaryLaw) -> dict[str, Any]:
+    return {"direction": brought.direction.value, "law": _table(brought.law)}
+
+
+def _table(law: Superpotential) -> dict[str, Any]:
+    """The table that a scene would have; its name alone where a parameter is not plain data."""
+    try:
+        table = describe(law)
+        json.dumps(table)
+    except (TypeError, ValueError, AttributeError):
+        return {"law": law.name}
+    return table
