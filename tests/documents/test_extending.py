@@ -46,7 +46,7 @@ def package() -> dict[str, str]:
 def test_the_document_has_the_files_and_counts_their_lines() -> None:
     told = {name: int(lines) for name, lines in re.findall(r"\| `(\w+\.py)` \| (\d+) \|", DOCUMENT)}
     assert told == {name: len([x for x in BLOCKS[name].splitlines() if x.strip()]) for name in told}
-    assert set(BLOCKS) == {*told, "pressed.toml", "pressed.py"}
+    assert set(BLOCKS) == {*told, "pressed.toml", "pressed.py", "standing.toml"}
 
 
 @pytest.mark.parametrize("ranks", [1, 2])
@@ -68,6 +68,18 @@ def test_the_users_scene_is_that_of_the_programs_own_words(ranks: int, files: Pa
     assert own["solvability"]["margin"] == pytest.approx(program["solvability"]["margin"])
     assert own["solvability"]["kernel"] == program["solvability"]["kernel"]
     assert package() == before
+
+
+def test_a_body_of_the_users_shape_stands_on_its_floor_with_its_weight(files: Path) -> None:
+    before = package()
+    done = hvi("run", "standing.toml", "--no-pictures", cwd=files)
+    assert done.returncode == 0, done.stderr
+    assert summary(files / "results" / "standing")["contact"]["resultant"] == pytest.approx(
+        [0.0, 1.5 * 2.0e4], abs=1e-4
+    )
+    refused = hvi("check", "standing.toml", "--set", 'boundary.floor.on="botom"', cwd=files)
+    assert (refused.returncode, package()) == (2, before)
+    assert 'unknown side "botom"; did you mean "bottom"? allowed: bottom, right, top, left' in refused.stderr
 
 
 def test_check_tells_what_they_add(files: Path) -> None:

@@ -6,7 +6,7 @@ from .block import Box, Rectangle
 from .l_shape import LShape
 from .disk import Disk, HalfDisk
 from .notched_strip import NotchedStrip
-from .fixed_mesh import FixedMesh, MeshFile
+from .fixed_mesh import FixedMesh, MeshFile, Refinements
 from .plane import PlaneShape
 # isort: on
 
@@ -21,5 +21,6 @@ __all__ = [
     "NotchedStrip",
     "PlaneShape",
     "Rectangle",
+    "Refinements",
     "Thresholds",
 ]

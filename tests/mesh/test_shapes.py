@@ -1,0 +1,166 @@
+"""Domain shapes: one class each, also from outside; and what a study or an adaptive solve makes of their meshes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from fractions import Fraction
+from pathlib import Path
+from typing import Any, ClassVar, Literal
+
+import numpy as np
+import pytest
+from dolfinx import mesh as dmesh
+from mpi4py import MPI
+from pydantic import ValidationError
+from scenes import STEEL, solved
+
+from hvi_fenicsx import InputError, Scene
+from hvi_fenicsx.geometry import Outline
+from hvi_fenicsx.mesh.domain import Domain
+from hvi_fenicsx.mesh.shapes import (
+    Box,
+    Disk,
+    DomainShape,
+    FixedMesh,
+    HalfDisk,
+    LShape,
+    MeshFile,
+    PlaneShape,
+    Rectangle,
+    Refinements,
+    Thresholds,
+)
+from hvi_fenicsx.schema import Length
+
+WEIGHT = 2.0e4
+
+
+@pytest.fixture
+def wedge() -> Iterator[type[DomainShape]]:
+    """A shape of a user's own, its mesh made by moving the vertices of dolfinx's square; with two regions."""
+
+    class Wedge(FixedMesh):
+        """A unit square whose top rises to the right."""
+
+        dimension = 2
+        normals: ClassVar[Mapping[str, int | None]] = {"bottom": 1, "left": 0, "right": 0, "top": None}
+        regions = ("west", "east")
+
+        shape: Literal["wedge"] = "wedge"
+        rise: Length
+        refinements: Refinements = 0
+
+        def build(self, comm: MPI.Comm, dimension: int) -> Domain:
+            mesh = dmesh.create_unit_square(comm, 4, 4)
+            near: dict[str, Any] = {"bottom": (1, 0.0), "left": (0, 0.0), "right": (0, 1.0), "top": (1, 1.0)}
+            sides = {
+                name: dmesh.locate_entities_boundary(mesh, 1, lambda x, i=i, at=at: np.isclose(x[i], at))
+                for name, (i, at) in near.items()
+            }
+            west = dmesh.locate_entities(mesh, 2, lambda x: x[0] < 0.5 + 1e-9)
+            east = dmesh.locate_entities(mesh, 2, lambda x: x[0] > 0.5 - 1e-9)
+            mesh.geometry.x[:, 1] *= 1.0 + self.rise * mesh.geometry.x[:, 0]
+            return Domain.from_mesh(mesh, sides, {"west": west, "east": east}, one_piece=True)
+
+    yield Wedge
+    del DomainShape.registry["wedge"]
+
+
+def on_wedge(**domain: Any) -> dict[str, Any]:
+    return {
+        "domain": {"shape": "wedge", "rise": 1.0, **domain},
+        "material": {"a": STEEL | {"region": "west"}, "b": STEEL | {"region": "east"}},
+        "body": {"force": [0.0, -WEIGHT]},
+        "boundary": {"floor": {"on": "bottom", "displacement": [0.0, "free"], "contact": {"gap": 0.0}}},
+    }
+
+
+@pytest.mark.parametrize("refinements", [0, 2])
+def test_a_shape_with_a_mesh_of_its_own_is_solved_on_and_refined(wedge: type[DomainShape], refinements: int) -> None:
+    found = solved(on_wedge(refinements=refinements))
+    assert found.examination is not None
+    state = found.examination.states[0]
+    assert float(state.surface.weights @ state.pressure) * found.problem.scales.force == pytest.approx(-1.5 * WEIGHT)
+    assert found.dofs == 2 * (4 * 2**refinements + 1) ** 2
+
+
+def test_sides_and_regions_of_a_users_shape_are_checked(wedge: type[DomainShape]) -> None:
+    table = on_wedge()
+    table["material"]["b"]["region"] = "easst"
+    with pytest.raises(ValidationError, match='unknown region "easst"; did you mean "east"') as caught:
+        Scene.model_validate(table)
+    assert "(a wedge)" in str(caught.value)
+    table = on_wedge()
+    table["boundary"]["floor"]["on"] = "floor"
+    with pytest.raises(ValidationError, match='unknown side "floor"; allowed: bottom, left, right, top'):
+        Scene.model_validate(table)
+
+
+def test_a_shape_needs_a_name_that_is_free() -> None:
+    with pytest.raises(InputError, match="domain shape Again: the name 'disk' is taken; choose another"):
+
+        class Again(Disk):
+            shape: Literal["disk"] = "disk"
+
+    with pytest.raises(InputError, match="domain shape Nameless: name it by shape: Literal"):
+
+        class Nameless(PlaneShape):
+            shape: Literal["nameless"]
+
+            def outline(self) -> Outline:
+                raise NotImplementedError
+
+    assert DomainShape.registry["disk"] is Disk
+    assert "nameless" not in DomainShape.registry
+
+
+SQUARE = Rectangle(size=(3.0, 1.0), cells=(48, 16))
+ROUND = HalfDisk(radius=1.0, mesh_size=0.05, mesh_size_below=0.01)
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> MeshFile:
+    (tmp_path / "m.msh").touch()
+    return MeshFile(file=str(tmp_path / "m.msh"), refinements=2)  # type: ignore[arg-type]
+
+
+def test_the_coarsest_mesh_of_a_shape(file: MeshFile) -> None:
+    assert SQUARE.coarsest().cells == (12, 4)
+    assert SQUARE.coarsest(Thresholds(fewest_adaptive=5)).cells == (24, 8)
+    assert Box(size=(1.0, 1.0, 1.0), cells=(5, 20, 20)).coarsest().cells == (3, 10, 10)
+    assert (ROUND.coarsest().mesh_size, ROUND.coarsest().mesh_size_below) == (0.2, 0.04)
+    assert LShape(size=(1.0, 1.0), cut=(0.5, 0.5), mesh_size=0.2).coarsest().mesh_size == 0.2
+    assert file.coarsest().refinements == 0
+
+
+def test_finer_and_coarser_meshes_of_a_shape(file: MeshFile) -> None:
+    double, third = Fraction(2), Fraction(1, 3)
+    assert SQUARE.refined(double) == SQUARE.changed(cells=(96, 32))
+    assert SQUARE.refined(third) is None
+    assert ROUND.refined(double) == ROUND.changed(mesh_size=0.025, mesh_size_below=0.005)
+    assert [s and s.refinements for s in (file.refined(double), file.refined(Fraction(1, 8)))] == [3, None]
+    with pytest.raises(ValidationError, match="makes more than 2e"):
+        ROUND.refined(Fraction(10_000))
+
+
+def test_a_mesh_by_the_text_of_an_axis(file: MeshFile) -> None:
+    assert SQUARE.with_mesh("24").cells == (24, 8)
+    assert ROUND.with_mesh("0.1").mesh_size == 0.1
+    assert file.with_mesh("0").refinements == 0
+    wrong: dict[str, DomainShape] = {
+        "'1' is no number of cells along x": SQUARE,
+        "possible: 12, 24, 48, 96, 192": SQUARE,
+        "is no mesh size in m, like 0.05": ROUND,
+        "is no number of refinements": file,
+    }
+    for (reason, shape), text in zip(wrong.items(), ("1", "25", "-1", "11"), strict=True):
+        with pytest.raises(InputError, match=reason):
+            shape.with_mesh(text)
+
+
+def test_a_mesh_in_words(file: MeshFile) -> None:
+    shapes = [SQUARE, ROUND, *(file.changed(refinements=n) for n in range(3))]
+    found = [shape.mesh_text(lambda metres: f"{1e3 * metres:g} mm") for shape in shapes]
+    assert found[:2] == ["48 × 16 cells", "mesh size 50 mm"]
+    assert found[2:] == ["file, as it is", "file, refined once", "file, refined 2 times"]
+    assert [shape.width() for shape in (SQUARE, ROUND, file)] == [0.0625, 0.05, None]
