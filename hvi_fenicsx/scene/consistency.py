@@ -7,8 +7,6 @@ from itertools import chain, combinations
 from typing import Any, Protocol
 
 from ..effects import Effect
-from ..effects.contact import Contact
-from ..effects.loads import PrescribedDisplacement, Traction
 from ..errors import InputError
 from ..laws import smoothing
 from ..mesh.shapes import DomainShape
@@ -133,8 +131,7 @@ def _on_boundary(boundary: Mapping[str, BoundaryTable]) -> Iterator[_Item]:
 
 
 def _smoothing(scene: Tables) -> Iterator[Mistake]:
-    laws = [(key, getattr(effect, "law", None)) for key, _, effect in _on_boundary(scene.boundary)]
-    names = sorted({law.name for _, law in laws if law is not None})
+    names = sorted({law.name for _, _, effect in _on_boundary(scene.boundary) for law in effect.superpotentials()})
     wanted = scene.solver.smoothing
     fitting = None if wanted is None else smoothing.registered()[wanted].laws
     if fitting is not None and (others := [n for n in names if n not in fitting]):
@@ -154,7 +151,7 @@ def _exclusive(items: Iterable[_Item]) -> Iterator[Mistake]:
 def _on_side(side: str, effects: list[tuple[_Keys, Effect]], scene: Tables) -> Iterator[Mistake]:
     prescribed: dict[int, _Keys] = {}
     for key, effect in effects:
-        for axis in effect.prescribed() if isinstance(effect, PrescribedDisplacement) else ():
+        for axis in effect.prescribed():
             if axis in prescribed:
                 text = f'"{side}" has {_axis(axis)} prescribed already, by {_dotted(prescribed[axis])}'
                 yield Mistake(key, f'{text}; write "free" in one of them')
@@ -169,11 +166,12 @@ def _against(
 ) -> Iterator[Mistake]:
     """Contact and tractions in a direction that is prescribed anyway."""
     blocking = normal if normal in prescribed else 0 if len(prescribed) == dimension else None
-    if isinstance(effect, Contact) and blocking is not None:
+    if effect.bounds_normal and blocking is not None:
         text = f'the displacement normal to "{side}" is prescribed by {_dotted(prescribed[blocking])}'
-        yield Mistake(key, f'{text}; leave contact out or write "free" there')
-    if isinstance(effect, Traction):
-        idle = [i for i, formula in enumerate(effect.values) if i in prescribed and formula.source != 0.0]
+        yield Mistake(key, f'{text}; leave {effect.key} out or write "free" there')
+    load = effect.surface_load()
+    if load is not None:
+        idle = [i for i, formula in enumerate(load.components) if i in prescribed and formula.source != 0.0]
         for axis in idle:
             reason = f'{_axis(axis)} is prescribed on "{side}" by {_dotted(prescribed[axis])}'
             text = f'component {axis + 1} does nothing: {reason}; write 0 here or "free" there'

@@ -144,7 +144,7 @@ def _fits(scene: Scene, axes: Sequence[Axis]) -> None:
 
 def laws(scene: Scene) -> list[Any]:
     """The scene's laws."""
-    return [p.effect.law for p in scene.effects() if hasattr(p.effect, "law")]
+    return [law for placed in scene.effects() for law in placed.effect.superpotentials()]
 
 
 def _product(tables: Tables, axes: Sequence[Axis], left_out: list[str]) -> Iterator[Setting]:
