@@ -18,9 +18,11 @@ from pathlib import Path
 from mpi4py import MPI
 
 from hvi_fenicsx import read_scene, solve
+from hvi_fenicsx.results.gathering import solution_arrays
 from hvi_fenicsx.scene import Scene
-from hvi_fenicsx.studies import solution_arrays
 from hvi_fenicsx.studies.errors import Yardstick
+from hvi_fenicsx.studies.solution_fields import fields
+from hvi_fenicsx.studies.stiffness import stiffness
 
 DEMOS = Path(__file__).parents[1] / "demos"
 COARSEST = 4
@@ -65,10 +67,10 @@ def scene(name: str, cells: int, epsilon: float = 0.0) -> Scene:
 def yardstick(name: str, cells: int) -> Yardstick:
     """The exact law on a fine mesh."""
     solution = solve(scene(name, cells), MPI.COMM_SELF)
-    found, stiffness = solution_arrays.take(solution), solution_arrays.stiffness(solution)
-    if not solution.converged or found is None or stiffness is None:
+    found, matrix = solution_arrays(solution), stiffness(solution)
+    if not solution.converged or found is None or matrix is None:
         raise SystemExit(f"{name}: the reference has no certified solution: {solution.reason}")
-    return Yardstick(found, stiffness)
+    return Yardstick(fields(found), matrix)
 
 
 def lines(name: str, finest: int) -> Iterator[Line]:
@@ -80,8 +82,8 @@ def lines(name: str, finest: int) -> Iterator[Line]:
         for n in meshes:
             epsilon = law(1 / n) / (law(1 / COARSEST) or 1.0)
             solution = solve(scene(name, n, epsilon), MPI.COMM_SELF)
-            found = solution_arrays.take(solution) if solution.converged else None
-            points.append((1 / n, epsilon, reference.errors(reference.move(found)) if found else None))
+            found = solution_arrays(solution) if solution.converged else None
+            points.append((1 / n, epsilon, reference.errors(reference.move(fields(found))) if found else None))
         yield Line(coupling, tuple(points))
 
 

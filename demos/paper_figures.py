@@ -21,9 +21,9 @@ import numpy as np
 import numpy.typing as npt
 from mpi4py import MPI
 
-from hvi_fenicsx import Solution, read_scene, solve
+from hvi_fenicsx import read_scene, solve
 from hvi_fenicsx.laws import QuadraticLinear, create, smoothing
-from hvi_fenicsx.results.contact_table import rows
+from hvi_fenicsx.results.gathering import solution_arrays
 
 Array = npt.NDArray[np.float64]
 COMM = MPI.COMM_WORLD
@@ -58,29 +58,21 @@ def compute(wall: str, cells: int, overrides: list[str]) -> Run | None:
     """One run, gathered on rank 0 (None elsewhere). Collective."""
     scene = read_scene(DEMOS / f"wall_{wall}.toml", [f"domain.cells=[{cells}, {cells}]", *overrides])
     solution = solve(scene, COMM)
-    if not solution.converged or solution.examination is None:
+    if not solution.converged:
         raise SystemExit(f"wall {wall}, h = 1/{cells}: {solution.reason}")
-    floor = rows(solution.problem, solution.examination.states)
-    around = boundary(solution)
-    if COMM.rank != 0:
+    arrays = solution_arrays(solution)
+    if arrays is None or arrays.displacement is None:
         return None
-    ((_, columns),) = floor
+    columns = arrays.parts["floor"].columns
+    around = boundary(arrays.points, arrays.displacement)
     return Run(columns["x"], columns["u_t1"], columns["friction_t1"], columns["sigma_n"], *around)
 
 
-# The displacement of the vertices on the square's sides, sorted by their angle about its middle. Inside, the problem is
-# nondimensional; `scales` leads back to metres.
+# The displacement of the vertices on the square's sides, sorted by their angle about its middle.
 
 
-def boundary(solution: Solution) -> tuple[Array, Array]:
-    """Points and displacements on Γ, on rank 0. Collective."""
-    assert solution.solve_result is not None
-    problem = solution.problem
-    owned = problem.space.dofmap.index_map.size_local
-    points = problem.space.tabulate_dof_coordinates()[:owned, :2]
-    u = solution.solve_result.u.x.array.reshape(-1, 2)[:owned] * problem.scales.displacement
-    pieces = COMM.gather((points, u), root=0) or [(points, u)]
-    points, u = (np.concatenate(arrays) for arrays in zip(*pieces, strict=True))
+def boundary(points: Array, u: Array) -> tuple[Array, Array]:
+    """Points and displacements on Γ, of those of the whole body (n, 2)."""
     on = np.isclose(np.abs(points - 0.5).max(axis=1), 0.5)
     order = np.argsort(np.arctan2(points[on, 1] - 0.5, points[on, 0] - 0.5))
     return points[on][order], u[on][order]

@@ -1,47 +1,57 @@
-"""What a result folder tells: the scene, the summary, Γc as a table. Read from its files alone."""
+"""A finished result folder: the scene, the summary, the body and the parts of Γc. Read from its files alone."""
 
 from __future__ import annotations
 
-import csv
 import json
 import tomllib
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
-from itertools import groupby
+from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
 from ..errors import HviError
-from ..typing import Array, Mask
-from .pictures.draw import PictureError
+from ..typing import Array, Integers, Mask
+from . import solution_arrays
+from .body_mesh import BodyMesh, body_mesh
+from .errors import ResultError
+from .solution_arrays import SolutionArrays
 
 if TYPE_CHECKING:
     from ..laws import Superpotential
 
 T = TypeVar("T")
-NUMBERS = ("s", "x", "y", "z", "u_n", "u_t1", "u_t2", "gap", "sigma_n", "friction_t1", "friction_t2")
-STATES = ("contact", "branch_t", "branch_n")
 
 
 @dataclass(frozen=True)
-class Part:
-    """A part of Γc: its name and the columns of ``contact.csv`` by name, each (m,), NaN where the file has nothing."""
+class ContactPart:
+    """A part of Γc with m vertices.
+
+    Attributes:
+        name: of its boundary table in the scene.
+        columns: the columns of ``contact.csv`` that it has, (m,) each, in the order of that table.
+        vertices: the vertices of the body, (m,).
+        facets: its facets by the vertices of the body, (k, 2) or (k, 3).
+    """
 
     name: str
     columns: Mapping[str, Array]
+    vertices: Integers
+    facets: Integers
 
     def __getitem__(self, column: str) -> Array:
-        return self.columns[column]
+        """A column of the table, (m,); NaN where the table is empty."""
+        return self.columns.get(column, np.full(len(self.vertices), np.nan))
 
     def has(self, column: str) -> bool:
-        """Whether the file has any value in it."""
-        return bool(np.isfinite(self.columns[column]).any())
+        """Whether the table has any value in it."""
+        return bool(np.isfinite(self[column]).any())
 
     @property
     def points(self) -> Array:
-        """The vertices (m, 3), in the file's order."""
+        """The vertices, m, (m, 3)."""
         return np.nan_to_num(np.column_stack([self["x"], self["y"], self["z"]]))
 
     @property
@@ -82,17 +92,35 @@ def _tangential(first: Array, second: Array) -> Array:
 
 @dataclass(frozen=True)
 class Result:
-    """A folder's tables.
+    """A finished result.
 
     Attributes:
-        scene, summary: as the files have them. parts: Γc. sides: vertices (m, 3) of the boundary tables, by name.
+        folder: where it was read from.
+        scene: what ``scene.toml`` says.
+        summary: what ``summary.json`` says.
+        arrays: what ``solution.npz`` holds.
     """
 
     folder: Path
     scene: Mapping[str, Any]
     summary: Mapping[str, Any]
-    parts: tuple[Part, ...]
-    sides: Mapping[str, Array] = field(default_factory=dict)
+    arrays: SolutionArrays
+
+    @cached_property
+    def body(self) -> BodyMesh:
+        """The body with its fields."""
+        return body_mesh(self.arrays)
+
+    @cached_property
+    def parts(self) -> tuple[ContactPart, ...]:
+        """The parts of Γc, in the order of ``contact.csv``."""
+        found = self.arrays.parts.items()
+        return tuple(ContactPart(name, part.columns, part.vertices, part.facets) for name, part in found)
+
+    @property
+    def sides(self) -> Mapping[str, Integers]:
+        """The facets of each boundary table of the scene, (k, 2) or (k, 3)."""
+        return self.arrays.sides
 
     @property
     def solvability(self) -> Mapping[str, Any]:
@@ -127,11 +155,24 @@ class Result:
         return np.pad(-normal / np.linalg.norm(normal), (0, 3 - len(normal))) if normal.any() else None
 
     def acts(self, part: str, key: str) -> bool:
-        """Whether an effect is in force on a part."""
+        """Whether an effect is in force on a part.
+
+        Args:
+            part: the part's name.
+            key: the effect's key in the scene.
+        """
         return key in self._on(part)
 
     def law(self, part: str, key: str = "friction") -> Superpotential | None:
-        """The law of a part, not smoothed; None if it has none, or one that only its author's program knows."""
+        """The law of a part, not smoothed.
+
+        Args:
+            part: the part's name.
+            key: the effect that the law belongs to.
+
+        Returns:
+            The law; None if the part has none, or one that only its author's program knows.
+        """
         from .. import laws  # a tenth of a second, for the picture that asks
 
         table = dict(self._on(part).get(key) or {})
@@ -142,36 +183,20 @@ class Result:
 
 
 def read(folder: Path) -> Result:
-    """Read a folder's tables; ``contact.csv`` and ``boundary.csv`` may be missing.
+    """Read a result folder.
 
     Raises:
-        PictureError: no result is there, or its files are damaged.
+        ResultError: no result is there, or its files are damaged.
     """
     scene = _read(folder / "scene.toml", lambda text: dict(tomllib.loads(text)))
     summary = _read(folder / "summary.json", lambda text: dict(json.loads(text)))
-    table, sides = folder / "contact.csv", folder / "boundary.csv"
-    parts = _read(table, _parts) if table.exists() else ()
-    return Result(folder, scene, summary, parts, _read(sides, _sides) if sides.exists() else {})
+    return Result(folder, scene, summary, solution_arrays.load(folder / solution_arrays.FILE))
 
 
 def _read(path: Path, parse: Callable[[str], T]) -> T:
     try:
         return parse(path.read_text(encoding="utf-8"))
     except OSError as error:
-        raise PictureError(f"{path}: {error.strerror or error}; pictures need a finished result folder") from None
+        raise ResultError(f"{path}: {error.strerror or error}; this is no finished result folder") from None
     except (ValueError, KeyError, TypeError) as error:
-        raise PictureError(f"{path}: damaged ({error})") from None
-
-
-def _parts(text: str) -> tuple[Part, ...]:
-    rows = csv.DictReader(text.splitlines())
-    return tuple(_part(name, list(own)) for name, own in groupby(rows, key=lambda row: row["part"]))
-
-
-def _part(name: str, rows: list[dict[str, str]]) -> Part:
-    return Part(name, {c: np.array([float(row[c]) if row[c] else np.nan for row in rows]) for c in (*NUMBERS, *STATES)})
-
-
-def _sides(text: str) -> dict[str, Array]:
-    rows = [(row["part"], [float(row[c] or 0.0) for c in "xyz"]) for row in csv.DictReader(text.splitlines())]
-    return {name: np.array([point for _, point in own]) for name, own in groupby(rows, key=lambda row: row[0])}
+        raise ResultError(f"{path}: damaged ({error})") from None

@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Sequence
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from mpi4py import MPI
 
 from ..certify.contact_state import State
 from ..effects import Direction
 from ..problem.problem import Problem
-from ..typing import Array, Integers
-from . import arc_length
+from ..report.solution_arrays import PartArrays
+from ..typing import Array
 
 COLUMNS = (
     "part",
@@ -35,78 +33,51 @@ COLUMNS = (
 )
 
 
-def rows(problem: Problem, states: Sequence[State]) -> list[tuple[str, dict[str, Array]]]:
-    """The table by part, columns in SI (absent ones left out), gathered on rank 0 (elsewhere empty). Collective."""
-    comm = problem.domain.mesh.comm
-    found = []
-    for state in sorted(states, key=lambda s: s.surface.part):
-        columns = _gathered(comm, _columns(problem, state))
-        if problem.scales.dimension == 2:
-            chained = (
-                {"number": arc_length.vertices(problem, state.surface)},
-                {"pair": arc_length.edges(problem, state.surface)},
-            )
-            numbers, pairs = (_gathered(comm, pieces) for pieces in chained)
-            if columns:
-                found.append((state.surface.part, _along(columns, numbers["number"], pairs["pair"])))
-        elif columns:
-            found.append((state.surface.part, _sorted(columns)))
-    return found
+def columns(problem: Problem, state: State) -> dict[str, Array]:
+    """What this rank knows of a part's columns, SI, (m,) each; NaN where the table is empty.
 
-
-def _columns(problem: Problem, state: State) -> dict[str, Array]:
+    Args:
+        problem: what was solved.
+        state: of the part.
+    """
     scales, d = problem.scales, problem.scales.dimension
     u, p = scales.displacement, scales.stress
-    columns = {"x": state.surface.points[:, 0], "y": state.surface.points[:, 1]}
+    found = {"x": state.surface.points[:, 0], "y": state.surface.points[:, 1]}
     if d == 3:
-        columns["z"] = state.surface.points[:, 2]
-    columns["u_n"] = state.normal * u
+        found["z"] = state.surface.points[:, 2]
+    found["u_n"] = state.normal * u
     for i in range(d - 1):
-        columns[f"u_t{i + 1}"] = state.slip[:, i] * u
-        columns[f"friction_t{i + 1}"] = state.friction[:, i] * p
+        found[f"u_t{i + 1}"] = state.slip[:, i] * u
+        found[f"friction_t{i + 1}"] = state.friction[:, i] * p
     if state.bounds is not None:
-        columns["gap"] = state.gap * u
-        columns["contact"] = state.contact.astype(float)
-    columns["sigma_n"] = state.pressure * p
+        found["gap"] = np.where(np.isfinite(state.gap), state.gap * u, np.nan)
+        found["contact"] = state.contact.astype(float)
+    found["sigma_n"] = state.pressure * p
     for name, directions in (
         ("branch_t", (Direction.SLIP,)),
         ("branch_n", (Direction.OPENING, Direction.PENETRATION)),
     ):
         branch = state.branch(*directions)
         if branch is not None:
-            columns[name] = branch.astype(float)
-    return columns
+            found[name] = branch.astype(float)
+    return found
 
 
-def _gathered(comm: MPI.Comm, columns: dict[str, Any]) -> dict[str, Any]:
-    pieces = comm.gather(columns, root=0)
-    if pieces is None:
-        return {}
-    return {name: np.concatenate([piece[name] for piece in pieces]) for name in columns}
+def write_csv(path: Path, parts: Mapping[str, PartArrays]) -> None:
+    """Write the table. Rank 0 only.
 
-
-def _along(columns: dict[str, Array], numbers: Integers, pairs: Integers) -> dict[str, Array]:
-    """In 2D along the part, with the arc length s."""
-    order, s = arc_length.along(np.column_stack([columns["x"], columns["y"]]), numbers, pairs)
-    return {name: values[order] for name, values in columns.items()} | {"s": s}
-
-
-def _sorted(columns: dict[str, Array]) -> dict[str, Array]:
-    """In 3D lexicographically."""
-    order = arc_length.lexicographic(np.column_stack([columns[a] for a in "xyz"]))
-    return {name: values[order] for name, values in columns.items()}
-
-
-def write_csv(path: Path, table: Sequence[tuple[str, dict[str, Array]]]) -> None:
-    """The table as a file. Rank 0 only."""
+    Args:
+        path: the file.
+        parts: the parts of Γc by name, in the order of the table.
+    """
     with path.open("w", newline="", encoding="utf-8") as stream:
         writer = csv.writer(stream, lineterminator="\n")
         writer.writerow(COLUMNS)
-        for part, columns in table:
-            size = len(columns["x"])
+        for name, part in parts.items():
+            size = len(part.vertices)
             cells = [
-                [part] * size,
-                *([_text(c, v) for v in columns[c]] if c in columns else [""] * size for c in COLUMNS[1:]),
+                [name] * size,
+                *([_text(c, v) for v in part.columns[c]] if c in part.columns else [""] * size for c in COLUMNS[1:]),
             ]
             writer.writerows(zip(*cells, strict=True))
 

@@ -15,37 +15,57 @@ from ..certify.contact_state import State
 from ..certify.estimate.estimator import Estimate
 from ..errors import InputError
 from ..mesh.vertex_dofs import dof_of_node
-from ..problem import stress
 from ..problem.problem import Problem
+from ..report.solution_arrays import Singles
 from ..rigid import Mode
 from ..runtime.mpi import agree
 from ..typing import Array
 
 
-def write_body(path: Path, problem: Problem, u: fem.Function, estimate: Estimate | None) -> None:
-    """The displacement, m; by cell the von Mises stress, N/m², and the estimated error, over the energy norm of u."""
+def write_body(path: Path, problem: Problem, u: fem.Function, von_mises: Singles, estimate: Estimate | None) -> None:
+    """Write the displacement, m; by cell the von Mises stress and the estimated error. Collective.
+
+    Args:
+        path: the file.
+        problem: what was solved.
+        u: the displacement, nondimensional.
+        von_mises: the von Mises stress of the cells that this rank owns, N/m², (c,).
+        estimate: of the error, whose shares are written over the energy norm of u; None leaves them out.
+
+    Raises:
+        InputError: it cannot be written, on all ranks alike.
+    """
     field = fem.Function(problem.space, name="displacement")
     field.x.array[:] = u.x.array * problem.scales.displacement
-    by_cell: dict[str, Array] = {"von_mises": stress.von_mises(problem.bulk.stress(u))}
+    by_cell = {"von_mises": von_mises}
     if estimate is not None:
-        by_cell["error"] = np.asarray(estimate.cells / (estimate.energy_norm or 1.0), dtype=np.float64)
+        by_cell["error"] = (estimate.cells / (estimate.energy_norm or 1.0)).astype(np.float32)
     space = fem.functionspace(problem.domain.mesh, ("Discontinuous Lagrange", 0))
     _write(path, problem.domain.mesh, [field, *(_constant(space, name, values) for name, values in by_cell.items())])
 
 
-def _constant(space: fem.FunctionSpace, name: str, values: Array) -> fem.Function:
+def _constant(space: fem.FunctionSpace, name: str, values: Singles) -> fem.Function:
     """A field that is constant in each cell, of values at the owned cells. Collective.
 
-    Of its digits the first seven are kept: more say nothing, and their text takes twice as long to write.
+    More than the seven digits of single precision say nothing, and their text takes twice as long to write.
     """
     field = fem.Function(space, name=name)
-    field.x.array[: len(values)] = values.astype(np.float32)
+    field.x.array[: len(values)] = values
     field.x.scatter_forward()
     return field
 
 
 def write_escape(path: Path, problem: Problem, mode: Mode) -> None:
-    """The rigid motion along which the body escapes, dimensionless."""
+    """Write the rigid motion along which the body escapes, dimensionless. Collective.
+
+    Args:
+        path: the file.
+        problem: what was to be solved.
+        mode: the motion.
+
+    Raises:
+        InputError: it cannot be written, on all ranks alike.
+    """
     field = fem.Function(problem.space, name="escape_mode")
     points = np.asarray(problem.points / problem.scales.length)
     field.x.array[:] = problem.bodies.motion(points, mode).ravel()
@@ -53,7 +73,16 @@ def write_escape(path: Path, problem: Problem, mode: Mode) -> None:
 
 
 def write_contact(path: Path, problem: Problem, states: Sequence[State]) -> None:
-    """Γc as a mesh of its own with nodal values; a vertex of two parts has those of the later one."""
+    """Write Γc as a mesh of its own with nodal values; a vertex of two parts has those of the later one. Collective.
+
+    Args:
+        path: the file.
+        problem: what was solved.
+        states: of the parts of Γc, at least one.
+
+    Raises:
+        InputError: it cannot be written, on all ranks alike.
+    """
     mesh, d = problem.domain.mesh, problem.scales.dimension
     facets = np.unique(np.concatenate([s.facets for s in (state.surface for state in states)])).astype(np.int32)
     surface, nodes = compat.submesh_nodes(mesh, d - 1, facets)

@@ -6,37 +6,65 @@ import json
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from ..problem.stress import von_mises
+from ..report.solution_arrays import FILE, SolutionArrays, save
 from ..runtime.log import Journal
 from ..runtime.mpi import on_root
 from ..scene import dump_scene
 from ..workflow import Solution
-from . import boundary_table, contact_table, vtk_fields
+from . import boundary_table, contact_table, gathering, vtk_fields
 from .summary import summary
 
 
 def write(folder: Path, solution: Solution) -> dict[str, Any]:
-    """Write the fields (all ranks) and the tables (rank 0); returns the summary, on all ranks. Collective.
+    """Write the fields (all ranks), the tables and the arrays (rank 0). Collective.
 
     ``summary.json`` and ``run.log`` are written by :func:`write_record`, once the pictures are there too.
+
+    Args:
+        folder: where to.
+        solution: what was found.
+
+    Returns:
+        The summary, on all ranks.
     """
     problem, examination, solved = solution.problem, solution.examination, solution.solve_result
     comm = problem.domain.mesh.comm
-    if solved is not None and examination is not None:
-        vtk_fields.write_body(folder / "displacement.pvd", problem, solved.u, solution.estimate)
-        if examination.states:
-            vtk_fields.write_contact(folder / "contact.pvd", problem, examination.states)
-        rows = contact_table.rows(problem, examination.states)
-        on_root(comm, lambda: contact_table.write_csv(folder / "contact.csv", rows) if examination.states else None)
+    states = () if examination is None else examination.states
+    stress = None
+    if solved is not None:
+        stress = von_mises(problem.bulk.stress(solved.u)).astype(np.float32)
+        vtk_fields.write_body(folder / "displacement.pvd", problem, solved.u, stress, solution.estimate)
     elif solution.solvability.direction is not None:
         vtk_fields.write_escape(folder / "displacement.pvd", problem, solution.solvability.direction)
-    lying = boundary_table.rows(problem, solution.scene.parts)
-    on_root(comm, lambda: boundary_table.write_csv(folder / "boundary.csv", lying, problem.scales.dimension))
+    if states:
+        vtk_fields.write_contact(folder / "contact.pvd", problem, states)
+    points = boundary_table.rows(problem, solution.scene.parts)
+    on_root(comm, lambda: boundary_table.write_csv(folder / "boundary.csv", points, problem.scales.dimension))
+    arrays = gathering.solution_arrays(solution, stress)
+    on_root(comm, lambda: _write_arrays(folder, arrays))
     on_root(comm, lambda: _text(folder / "scene.toml", dump_scene(solution.scene)))
     return summary(solution)
 
 
+def _write_arrays(folder: Path, arrays: SolutionArrays | None) -> None:
+    """``solution.npz``, and ``contact.csv`` where there is contact or a law. Rank 0 only."""
+    assert arrays is not None
+    if arrays.parts:
+        contact_table.write_csv(folder / "contact.csv", arrays.parts)
+    save(folder / FILE, arrays)
+
+
 def write_record(folder: Path, record: dict[str, Any], journal: Journal) -> None:
-    """``summary.json`` and ``run.log``. Rank 0 only."""
+    """Write ``summary.json`` and ``run.log``. Rank 0 only.
+
+    Args:
+        folder: where to.
+        record: the summary.
+        journal: what the run said.
+    """
     _text(folder / "run.log", "\n".join(journal.lines) + "\n")
     _text(folder / "summary.json", json.dumps(record, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
 

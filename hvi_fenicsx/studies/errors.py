@@ -16,7 +16,7 @@ from scipy import sparse
 
 from ..typing import Array, Mask
 from . import interpolation
-from .solution_arrays import PartSample, Sample
+from .solution_fields import PartFields, SolutionFields
 
 JUMP_WIDTHS = 2.0
 """So many facets of the coarser mesh about a jump of the law count as near it."""
@@ -53,12 +53,12 @@ class Yardstick:
         sample: the reference. stiffness: of its mesh, in its numbering.
     """
 
-    def __init__(self, sample: Sample, stiffness: sparse.csr_array) -> None:
+    def __init__(self, sample: SolutionFields, stiffness: sparse.csr_array) -> None:
         self.sample, self.stiffness = sample, stiffness
         self._bodies: dict[tuple[bytes, bytes], Any] = {}
         self.here = self.move(sample)
 
-    def move(self, sample: Sample) -> Moved:
+    def move(self, sample: SolutionFields) -> Moved:
         """A sample on this mesh. The way from a mesh is found once."""
         key = (sample.points.tobytes(), sample.cells.tobytes())
         if key not in self._bodies:
@@ -137,12 +137,12 @@ class Yardstick:
         return _ratio(float(np.linalg.norm(difference)), size)
 
 
-def _width(part: PartSample) -> float:
+def _width(part: PartFields) -> float:
     corners = part.points[part.facets]
     return float(np.max(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2), initial=0.0))
 
 
-def _jumps(part: PartSample) -> Array:
+def _jumps(part: PartFields) -> Array:
     """The middles of the facets on which the slip passes a drop of the law; (k, d)."""
     slip = part.slip[:, 0] if part.slip.shape[1] == 1 else np.linalg.norm(part.slip, axis=1)
     low, high = (f(slip[part.facets], axis=1)[:, None] for f in (np.min, np.max))

@@ -13,13 +13,13 @@ from scipy import sparse
 from .. import compat
 from ..mesh import point_location
 from ..typing import Array, Integers
-from .solution_arrays import PartSample, Sample
+from .solution_fields import PartFields, SolutionFields
 
 _PAIRS = 4_000_000
 """Of vertices and facets that are looked at together."""
 
 
-def body(source: Sample, points: Array) -> sparse.csr_array:
+def body(source: SolutionFields, points: Array) -> sparse.csr_array:
     """From values at the source's vertices to those at the points (m, d): a matrix (m, n). On this process alone."""
     d = source.points.shape[1]
     mesh = compat.simplex_mesh(MPI.COMM_SELF, source.cells, source.points, {2: "triangle", 3: "tetrahedron"}[d])
@@ -28,7 +28,7 @@ def body(source: Sample, points: Array) -> sparse.csr_array:
     return _rows(corners, point_location.weights(source.points[corners], points), len(source.points))
 
 
-def surface(source: PartSample, points: Array) -> sparse.csr_array:
+def surface(source: PartFields, points: Array) -> sparse.csr_array:
     """From values at the vertices of a part to those at the points (m, d) on it: a matrix (m, n)."""
     corners = source.points[source.facets]
     chunk = max(1, _PAIRS // len(corners))

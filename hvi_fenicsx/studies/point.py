@@ -19,12 +19,16 @@ from scipy import sparse
 from ..accuracy.adaptive import Climber
 from ..accuracy.control import Goal, reach
 from ..errors import HviError
+from ..report.solution_arrays import save
+from ..results.gathering import solution_arrays
 from ..results.summary import summary
 from ..runtime.mpi import ended_together, on_root
 from ..runtime.timing import Timer
 from ..scene import Scene, read_scene
 from ..workflow import Solution, finish, prepare
-from . import cost, solution_arrays
+from . import cost
+from .solution_fields import width
+from .stiffness import stiffness
 from .store import write_json
 
 COMM = MPI.COMM_WORLD
@@ -75,13 +79,13 @@ def _solved(scene: Scene, options: argparse.Namespace, timer: Timer) -> Solution
 
 def _keep(options: argparse.Namespace, solution: Solution, record: dict[str, Any]) -> None:
     """The solution, its mesh width and, of a reference, its stiffness. Collective."""
-    found = solution_arrays.take(solution)
-    stiffness = solution_arrays.stiffness(solution) if options.stiffness else None
+    found = solution_arrays(solution)
+    matrix = stiffness(solution) if options.stiffness else None
     if found is not None:
-        record["h"] = solution_arrays.width(found)
-        solution_arrays.save(options.result.with_suffix(".npz"), found)
-    if stiffness is not None:
-        sparse.save_npz(options.result.with_suffix(".stiffness.npz"), stiffness, compressed=False)
+        record["h"] = width(found.points, found.cells)
+        save(options.result.with_suffix(".npz"), found)
+    if matrix is not None:
+        sparse.save_npz(options.result.with_suffix(".stiffness.npz"), matrix, compressed=False)
 
 
 def _repeated(scene: Scene, options: argparse.Namespace, times: list[dict[str, float]]) -> list[dict[str, float]]:

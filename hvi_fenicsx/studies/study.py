@@ -15,7 +15,7 @@ from ..errors import HviError
 from ..report.html import study_page as page
 from ..runtime.versions import __version__, versions
 from ..scene import Scene, read_scene
-from . import meshes, plots, sentences, solution_arrays, table
+from . import meshes, plots, sentences, solution_fields, table
 from .errors import QUANTITIES, Errors, Moved, Yardstick
 from .meshes import Setting
 from .plan import Plan, axis, make
@@ -123,7 +123,7 @@ def evaluate(plan: Plan, store: Store) -> Study:
     """The errors of all points that are in the store, which must hold the reference."""
     finest = plan.reference[0]
     stiffness = sparse.csr_array(sparse.load_npz(stiffness_path(store, finest)))
-    yardstick = Yardstick(solution_arrays.load(store.path(finest).with_suffix(".npz")), stiffness)
+    yardstick = Yardstick(solution_fields.load(store.path(finest).with_suffix(".npz")), stiffness)
     below = [e for e in (_errors(yardstick, store, s) for s in plan.reference[1:]) if e is not None]
     certain = certainty(below)
     rows = tuple(_rows(plan, store, yardstick, certain))
@@ -136,7 +136,7 @@ def _moved(yardstick: Yardstick, store: Store, setting: Setting) -> Moved | None
     """A certified point on the reference's mesh; None for another."""
     if not (store.record(setting) or {}).get("converged"):
         return None
-    return yardstick.move(solution_arrays.load(store.path(setting).with_suffix(".npz")))
+    return yardstick.move(solution_fields.load(store.path(setting).with_suffix(".npz")))
 
 
 def _errors(yardstick: Yardstick, store: Store, setting: Setting) -> Errors | None:

@@ -5,14 +5,14 @@ Synthetic folders, written as the solver writes them, so that this fails for rea
 
 from __future__ import annotations
 
-import csv
 import json
 import os
 import subprocess
 import sys
 import time
 import uuid
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -20,16 +20,18 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 import tomli_w
-from dolfinx import fem, mesh
-from dolfinx.io import VTKFile
+from dolfinx import mesh
 from mpi4py import MPI
+from runs import hvi, write_scene
+from scenes import model
 
+from hvi_fenicsx import compat
 from hvi_fenicsx.errors import HviError
-from hvi_fenicsx.report import reader, units
+from hvi_fenicsx.report import png_file, reader, units
+from hvi_fenicsx.report.body_mesh import BodyMesh, body_mesh
 from hvi_fenicsx.report.pictures import draw, loads_supports
 from hvi_fenicsx.report.pictures.raster import shade
-from hvi_fenicsx.report.vtu import read_body
-from hvi_fenicsx.results.contact_table import COLUMNS
+from hvi_fenicsx.report.solution_arrays import FILE, PartArrays, SolutionArrays, load, save
 
 Array = npt.NDArray[np.float64]
 E, NU, LOAD = 2.15e11, 0.29, 1.0e6
@@ -61,33 +63,42 @@ def peeled(x: Array) -> Array:
     return u
 
 
-def write_field(folder: Path, body: mesh.Mesh, name: str, value: Callable[[Array], Array]) -> None:
+def plain(body: mesh.Mesh) -> SolutionArrays:
+    """The body alone."""
     d = body.geometry.dim
-    field = fem.Function(fem.functionspace(body, ("Lagrange", 1, (d,))), name=name)
-    field.interpolate(lambda x: value(x[:d]))
-    with VTKFile(body.comm, str(folder / "displacement.pvd"), "w") as file:
-        file.write_function([field], 0.0)
+    return SolutionArrays(points=body.geometry.x[:, :d].copy(), cells=compat.geometry_dofmap(body).astype(np.int64))
 
 
-def floor_rows(body: mesh.Mesh, value: Callable[[Array], Array], part: str = "floor") -> Iterator[dict[str, object]]:
-    d = body.geometry.dim
-    x = body.geometry.x
-    x = x[np.isclose(x[:, d - 1], 0.0)]
-    x = x[np.lexsort(x.T)]
-    u = value(x[:, :d].T).T
-    for point, v in zip(x, u, strict=True):
-        lifted = bool(v[-1] > 1e-12)
-        row: dict[str, object] = {"part": part, "x": point[0], "y": point[1], "u_n": -v[-1], "u_t1": v[0], "gap": v[-1]}
-        row |= {"sigma_n": 0.0 if lifted else -LOAD, "friction_t1": 1e3 * v[0] / 9e-6, "contact": int(not lifted)}
-        row |= {"s": point[0], "branch_t": 0} if d == 2 else {"z": point[2], "u_t2": 0.0, "friction_t2": 0.0}
-        yield row
+def facets_on(arrays: SolutionArrays, on: npt.NDArray[np.bool_]) -> npt.NDArray[np.int64]:
+    """The facets all of whose vertices are chosen."""
+    boundary = np.sort(body_mesh(arrays).boundary, axis=1)
+    return boundary[on[boundary].all(axis=1)]
 
 
-def write_table(folder: Path, rows: list[dict[str, object]]) -> None:
-    with (folder / "contact.csv").open("w", newline="", encoding="utf-8") as stream:
-        writer = csv.DictWriter(stream, COLUMNS, lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(rows)
+def floor(body: mesh.Mesh, value: Callable[[Array], Array]) -> PartArrays:
+    """The floor under the body, as a part of Γc."""
+    d, arrays, x = body.geometry.dim, plain(body), body.geometry.x
+    low = np.isclose(x[:, d - 1], 0.0)
+    vertices = np.flatnonzero(low)
+    vertices = vertices[np.lexsort(x[vertices].T)]
+    points, u = x[vertices], value(x[vertices, :d].T).T
+    lifted = u[:, -1] > 1e-12
+    columns = {"x": points[:, 0], "y": points[:, 1], "u_n": -u[:, -1], "u_t1": u[:, 0], "gap": u[:, -1]}
+    columns |= {"sigma_n": np.where(lifted, 0.0, -LOAD), "friction_t1": 1e3 * u[:, 0] / 9e-6}
+    columns |= {"contact": (~lifted).astype(float)}
+    zero = np.zeros(len(points))
+    columns |= {"s": points[:, 0], "branch_t": zero} if d == 2 else {"z": points[:, 2], "u_t2": zero}
+    columns |= {"friction_t2": zero} if d == 3 else {}
+    normals = np.tile(-np.eye(d)[-1], (len(points), 1))
+    facets = facets_on(arrays, low)
+    return PartArrays(
+        columns=columns, vertices=vertices, facets=facets, weights=zero, normals=normals, drops=np.empty(0)
+    )
+
+
+def change(folder: Path, **values: Any) -> None:
+    """Other arrays in a result."""
+    save(folder / FILE, replace(load(folder / FILE), **values))
 
 
 def write_words(folder: Path, d: int, solvability: Mapping[str, object] = HELD, **summary: Any) -> None:
@@ -109,15 +120,16 @@ def write_words(folder: Path, d: int, solvability: Mapping[str, object] = HELD, 
 
 def result(folder: Path, body: mesh.Mesh, value: Callable[[Array], Array], **summary: Any) -> Path:
     folder.mkdir(exist_ok=True)
-    write_field(folder, body, "displacement", value)
-    write_table(folder, list(floor_rows(body, value)))
+    arrays = plain(body)
+    save(folder / FILE, replace(arrays, displacement=value(arrays.points.T).T, parts={"floor": floor(body, value)}))
     write_words(folder, body.geometry.dim, **summary)
     return folder
 
 
 def escaping(folder: Path, body: mesh.Mesh, value: Callable[[Array], Array]) -> Path:
     folder.mkdir(exist_ok=True)
-    write_field(folder, body, "escape_mode", value)
+    arrays = plain(body)
+    save(folder / FILE, replace(arrays, escape_mode=value(arrays.points.T).T))
     write_words(folder, body.geometry.dim, ESCAPES, certificate=None)
     return folder
 
@@ -184,9 +196,8 @@ def test_an_escape_is_drawn_as_a_motion(
 
 
 def write_sides(folder: Path, body: mesh.Mesh, **on: Callable[[Array], npt.NDArray[np.bool_]]) -> None:
-    d, x = body.geometry.dim, body.geometry.x
-    lines = [f"{name},{p[0]},{p[1]},{p[2] if d == 3 else ''}" for name, where in on.items() for p in x[where(x.T)]]
-    (folder / "boundary.csv").write_text("\n".join(["part,x,y,z", *lines]) + "\n", encoding="utf-8")
+    x = body.geometry.x
+    change(folder, sides={name: facets_on(plain(body), where(x.T)) for name, where in on.items()})
 
 
 ON = {"wall": lambda x: x[0] == 0, "pull": lambda x: x[0] == 1}
@@ -197,8 +208,9 @@ def test_the_scene_is_drawn_where_the_folder_tells_its_sides(tmp_path: Path, bod
     folder = result(tmp_path / "r", body(), pressed)
     write_sides(folder, body(), **ON)
     assert_drawn(draw.draw(folder), "body.png", "scene.png", "contact.png")
-    found, drawn = reader.read(folder), read_body(folder / "displacement.pvd")
-    (support,), (load,) = loads_supports.supports(found, drawn), loads_supports.loads(found, drawn)
+    found = reader.read(folder)
+    drawn = found.body
+    (support,), (load,) = loads_supports.held_sides(found), loads_supports.loaded_sides(found)
     assert support.rolling
     assert support.side.normals == pytest.approx(np.broadcast_to([-1.0, 0.0, 0.0], support.side.normals.shape))
     x, y, _ = drawn.points[load.side.vertices].T
@@ -213,19 +225,19 @@ def test_a_slanted_side_is_held_along_its_own_normal(tmp_path: Path) -> None:
     upright = body.geometry.x.copy()
     body.geometry.x[:, :2] = upright[:, :2] @ turn.T
     folder = result(tmp_path / "r", body, np.zeros_like)
-    (folder / "contact.csv").unlink()
+    change(folder, parts={})
     write_sides(folder, body, wall=lambda _: upright[:, 0] == 0)
-    (support,) = loads_supports.supports(reader.read(folder), read_body(folder / "displacement.pvd"))
+    (support,) = loads_supports.held_sides(reader.read(folder))
     assert support.side.normals[:, :2] == pytest.approx(np.broadcast_to(-turn[:, 0], (5, 2)))
     assert len(support.side.facets) == 4
 
 
 def test_each_part_has_its_picture_and_a_scene_without_contact_has_its_body(tmp_path: Path) -> None:
     folder = result(tmp_path / "r", square(), peeled)
-    write_table(folder, [*floor_rows(square(), peeled, "a.b"), *floor_rows(square(), pressed, "floor")])
+    change(folder, parts={"a.b": floor(square(), peeled), "floor": floor(square(), pressed)})
     assert_drawn(draw.draw(folder), "body.png", "contact_a.b.png", "contact_floor.png")
     bare = result(tmp_path / "bare", square(), pressed)
-    (bare / "contact.csv").unlink()
+    change(bare, parts={})
     assert_drawn(draw.draw(bare), "body.png")
 
 
@@ -234,10 +246,13 @@ def test_each_part_has_its_picture_and_a_scene_without_contact_has_its_body(tmp_
     [
         (lambda f: (f / "summary.json").unlink(), "summary.json: No such file"),
         (lambda f: (f / "summary.json").write_text("{"), "summary.json: damaged"),
-        (lambda f: (f / "displacement_p0_000000.vtu").unlink(), "displacement_p0_000000.vtu: No such file"),
-        (lambda f: (f / "displacement_p0_000000.vtu").write_text("<x/>"), "damaged, or not written by dolfinx"),
-        (lambda f: write_table(f, list(floor_rows(box(), pressed))), "do not belong together"),
-        (lambda f: [file.unlink() for file in (f / "displacement.pvd", f / "contact.csv")], "nothing to draw"),
+        (lambda f: (f / FILE).unlink(), "solution.npz: there is no such file"),
+        (lambda f: (f / FILE).write_text("<x/>"), "solution.npz: damaged"),
+        (lambda f: (f / FILE).write_bytes((f / FILE).read_bytes()[:-40]), "solution.npz: damaged"),
+        (lambda f: np.savez(f / FILE, points=np.zeros((3, 2))), "solution.npz: damaged"),
+        (lambda f: change(f, parts={"floor": floor(box(), pressed)}), "do not belong together"),
+        (lambda f: change(f, displacement=np.zeros((3, 2))), "do not belong together"),
+        (lambda f: change(f, displacement=None, parts={}), "nothing to draw"),
     ],
 )
 def test_what_cannot_be_drawn_is_said_in_one_line(tmp_path: Path, damage: Callable[[Path], object], words: str) -> None:
@@ -251,7 +266,7 @@ def test_what_cannot_be_drawn_is_said_in_one_line(tmp_path: Path, damage: Callab
 
 def test_one_picture_that_fails_takes_no_other_with_it(tmp_path: Path) -> None:
     folder = result(tmp_path / "r", square(4), pressed)
-    write_table(folder, [{**row, "x": float(str(row["x"])) + 7.0} for row in floor_rows(square(4), pressed)])
+    change(folder, points=np.full((25, 2), np.inf))
     with pytest.raises(HviError, match=r"body\.png"):
         draw.draw(folder)
     assert (folder / "contact.png").exists()
@@ -311,30 +326,60 @@ def test_a_package_that_is_not_there_is_named(tmp_path: Path) -> None:
 
 
 def test_the_pieces_of_several_ranks_are_one_body(tmp_path: Path) -> None:
-    code = f"""
-import numpy as np
-from dolfinx import fem, mesh
-from dolfinx.io import VTKFile
-from mpi4py import MPI
-body = mesh.create_unit_square(MPI.COMM_WORLD, 8, 8)
-u = fem.Function(fem.functionspace(body, ("Lagrange", 1, (2,))), name="displacement")
-u.interpolate(lambda x: x[:2])
-with VTKFile(body.comm, {str(tmp_path / "displacement.pvd")!r}, "w") as file:
-    file.write_function([u], 0.0)
-"""
-    subprocess.run(["mpirun", "-n", "3", sys.executable, "-m", "mpi4py", "-c", code], check=True, timeout=120)
-    body = read_body(tmp_path / "displacement.pvd")
+    """The model problem without friction, whose displacement is known."""
+    scene = write_scene(tmp_path / "s.toml", model(8))
+    for ranks in (1, 3):
+        assert hvi("run", scene, "--out", tmp_path / str(ranks), "--no-pictures", ranks=ranks).returncode == 0
+    one, three = (reader.read(tmp_path / str(ranks)) for ranks in (1, 3))
+    body = three.body
     assert body.points.shape == (81, 3)
     assert body.cells.shape == (128, 3)
-    assert np.allclose(body.fields["displacement"], body.points)
+    assert body.displacement is not None
+    np.testing.assert_allclose(body.displacement[:, :2].T, pressed(body.points[:, :2].T), rtol=1e-6, atol=1e-15)
     a, b = (body.points[body.boundary[:, i]] for i in (0, 1))
     assert len(body.boundary) == 32
     assert np.isclose(np.sum(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]) / 2, 1.0)  # the body is on the left of its edges
+    assert set(three.sides) == set(one.sides)
+    for name, facets in three.sides.items():
+        assert corners(body, facets) == corners(one.body, one.sides[name])
+    for part, like in zip(three.parts, one.parts, strict=True):
+        assert corners(body, part.facets) == corners(one.body, like.facets)
+        np.testing.assert_array_equal(part.points, body.points[part.vertices])
+        np.testing.assert_array_equal(part.points, like.points)
 
 
-def test_the_surface_of_a_body_in_space_looks_outwards(tmp_path: Path) -> None:
-    write_field(tmp_path, box(), "displacement", pressed)
-    body = read_body(tmp_path / "displacement.pvd")
+def corners(body: BodyMesh, facets: npt.NDArray[np.int64]) -> set[frozenset[tuple[float, ...]]]:
+    """Facets by where their vertices are."""
+    return {frozenset(tuple(np.round(point, 9)) for point in body.points[facet]) for facet in facets}
+
+
+def test_a_result_that_is_written_is_read_as_it_was(tmp_path: Path) -> None:
+    written = replace(plain(square(2)), displacement=np.ones((9, 2)), von_mises=np.ones(8, dtype=np.float32))
+    odd_name = "a:b/“c” .. facets"
+    written = replace(written, sides={odd_name: np.array([[0, 1]])}, parts={odd_name: floor(square(2), peeled)})
+    save(tmp_path / FILE, written)
+    found = load(tmp_path / FILE)
+    assert found.escape_mode is None
+    for key in ("points", "cells", "displacement", "von_mises"):
+        np.testing.assert_array_equal(getattr(found, key), getattr(written, key))
+    np.testing.assert_array_equal(found.sides[odd_name], written.sides[odd_name])
+    part, like = found.parts[odd_name], written.parts[odd_name]
+    assert part.columns.keys() == like.columns.keys()
+    for key in ("vertices", "facets", "weights", "normals", "drops"):
+        np.testing.assert_array_equal(getattr(part, key), getattr(like, key))
+    assert [path.name for path in tmp_path.iterdir()] == [FILE]
+
+
+def test_a_picture_carries_its_caption(tmp_path: Path) -> None:
+    folder = result(tmp_path / "r", square(4), pressed)
+    change(folder, parts={"a": floor(square(4), peeled), "“b”": floor(square(4), pressed)})
+    captions = {path.name: png_file.caption(path.read_bytes()) for path in draw.draw(folder)}
+    assert captions["body.png"] == "The deformed body, its displacements magnified, with what acts on it."
+    assert captions["contact_“b”.png"] == "Along ““b””: displacement, friction and pressure."
+
+
+def test_the_surface_of_a_body_in_space_looks_outwards() -> None:
+    body = body_mesh(plain(box()))
     a, b, c = (body.points[body.boundary[:, i]] for i in range(3))
     assert np.isclose(np.einsum("ki,ki->", a, np.cross(b, c)) / 6, 0.24)
 
@@ -367,7 +412,7 @@ def test_numbers_are_said_as_people_say_them() -> None:
 SAID = [(1e6, "Pa"), (0.999e6, "Pa"), (9e-6, "m"), (1.26e-7, "m"), (1.5, "m"), (2500.0, "m"), (0.0, "Pa")]
 
 
-def test_an_empty_cell_is_nothing_and_not_zero(tmp_path: Path) -> None:
+def test_a_column_that_is_not_there_is_nothing_and_not_zero(tmp_path: Path) -> None:
     folder = result(tmp_path / "r", square(4), peeled)
     part = reader.read(folder).parts[0]
     assert not part.has("u_t2")

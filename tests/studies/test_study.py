@@ -21,12 +21,16 @@ from mpi4py import MPI
 from runs import command, hvi, write_scene
 from scenes import model, quadratic_linear
 
-from hvi_fenicsx import InputError, Scene, compat, solve
+from hvi_fenicsx import InputError, Scene, Solution, compat, solve
 from hvi_fenicsx.mesh import domain, refinement, transfer
 from hvi_fenicsx.mesh.shapes import Rectangle
-from hvi_fenicsx.studies import cost, interpolation, meshes, plan, reference, sentences, solution_arrays, table
+from hvi_fenicsx.results import gathering
+from hvi_fenicsx.studies import cost, interpolation, meshes, plan, reference, sentences, table
 from hvi_fenicsx.studies.errors import QUANTITIES, Yardstick
 from hvi_fenicsx.studies.reference import Certainty
+from hvi_fenicsx.studies.solution_fields import PartFields, SolutionFields, fields, width
+from hvi_fenicsx.studies.stiffness import stiffness
+from hvi_fenicsx.typing import Array, Integers
 
 LAW = quadratic_linear(1.0e6)
 
@@ -35,19 +39,19 @@ def scene(cells: int = 4, **keys: Any) -> Scene:
     return Scene.model_validate(model(cells, **keys))
 
 
-def taken(found: Scene) -> solution_arrays.Sample:
-    result = solution_arrays.take(solve(found, MPI.COMM_SELF))
-    assert result is not None
-    return result
+def taken(found: Scene | Solution) -> SolutionFields:
+    solution = solve(found, MPI.COMM_SELF) if isinstance(found, Scene) else found
+    arrays = gathering.solution_arrays(solution)
+    assert arrays is not None
+    return fields(arrays)
 
 
 @pytest.fixture(scope="module")
 def yardstick() -> Yardstick:
     solution = solve(scene(8, friction=LAW), MPI.COMM_SELF)
-    stiffness, found = solution_arrays.stiffness(solution), solution_arrays.take(solution)
-    assert stiffness is not None
-    assert found is not None
-    return Yardstick(found, stiffness)
+    matrix, found = stiffness(solution), taken(solution)
+    assert matrix is not None
+    return Yardstick(found, matrix)
 
 
 @pytest.mark.parametrize("shape", ["rectangle", "box"])
@@ -73,7 +77,7 @@ def test_interpolation_between_nested_meshes_is_the_ladders_prolongation(shape: 
     step = transfer.prolongation(*spaces, fine)
     d = fine.dimension
     points = [s.tabulate_dof_coordinates()[:, :d] for s in spaces]
-    source = solution_arrays.Sample(points[1], spaces[1].dofmap.list.astype(np.int64), np.zeros_like(points[1]), {})
+    source = SolutionFields(points[1], spaces[1].dofmap.list.astype(np.int64), np.zeros_like(points[1]), {})
     way = interpolation.body(source, points[0])
     values = np.random.default_rng(1).normal(size=points[1].shape)
     coarse_vector, fine_vector = step.createVecs()
@@ -86,8 +90,17 @@ def test_a_surface_in_space_is_interpolated_linearly_and_its_facets_are_found() 
     corners = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1.0], [0, 1, 1]])
     facets = np.array([[0, 1, 2], [0, 2, 3], [0, 3, 5], [0, 4, 5]])
     nothing = np.zeros(len(corners))
-    part = solution_arrays.PartSample(
-        facets, corners, nothing, corners, corners, corners, nothing, nothing, np.empty(0), np.array(True)
+    part = PartFields(
+        facets=facets,
+        points=corners,
+        weights=nothing,
+        normals=corners,
+        slip=corners,
+        friction=corners,
+        pressure=nothing,
+        contact=nothing,
+        drops=np.empty(0),
+        bounded=True,
     )
     points = np.array([[0.3, 0.1, 0.0], [0.2, 0.7, 0.0], [0.0, 0.6, 0.2], [0.0, 0.1, 0.9]])
     np.testing.assert_allclose(interpolation.surface(part, points) @ corners, points, atol=1e-14)
@@ -96,10 +109,9 @@ def test_a_surface_in_space_is_interpolated_linearly_and_its_facets_are_found() 
 def test_the_closed_form_is_met_on_every_mesh() -> None:
     """Without friction P1 holds the solution: all errors are rounding, whatever the mesh."""
     solution = solve(scene(8), MPI.COMM_SELF)
-    stiffness, found = solution_arrays.stiffness(solution), solution_arrays.take(solution)
-    assert stiffness is not None
-    assert found is not None
-    exact = Yardstick(found, stiffness)
+    matrix, found = stiffness(solution), taken(solution)
+    assert matrix is not None
+    exact = Yardstick(found, matrix)
     errors = exact.errors(exact.move(taken(scene(4))))
     known = {name: value for name, value in errors.items() if value is not None}
     assert set(known) == {"energy_norm", "u_t_l2", "u_t_max", "pressure_l1", "pressure_l2", "contact_set", "resultant"}
@@ -124,12 +136,11 @@ def test_every_norm_measures_a_known_difference(yardstick: Yardstick) -> None:
 def test_the_energy_norm_is_that_of_the_closed_form() -> None:
     """Of the model problem without friction: a(u, u) = <g, u>, and the energy is -6 J/m, so a(u, u) = 12 J/m."""
     solution = solve(scene(4), MPI.COMM_SELF)
-    stiffness, found = solution_arrays.stiffness(solution), solution_arrays.take(solution)
-    assert stiffness is not None
-    assert found is not None
+    matrix, found = stiffness(solution), taken(solution)
+    assert matrix is not None
     scales = solution.problem.scales
     u = found.u.ravel() / scales.displacement
-    assert u @ (stiffness @ u) * scales.energy == pytest.approx(12.0, rel=1e-9)
+    assert u @ (matrix @ u) * scales.energy == pytest.approx(12.0, rel=1e-9)
 
 
 def test_near_a_drop_of_the_law_the_largest_error_leaves_vertices_out(yardstick: Yardstick) -> None:
@@ -274,7 +285,7 @@ def test_the_mesh_width_halves_where_a_mesh_is_refined(shape: str) -> None:
     """Whatever the angles of its cells: an order in h is a slope over it."""
     size = (1.0, 0.3, 0.7)[: 2 if shape == "rectangle" else 3]
     body = scene_of(shape, size).build(MPI.COMM_SELF, len(size))
-    widths = [solution_arrays.width(cells_of(b)) for b in (body, refinement.uniform(body).domain)]
+    widths = [width(*cells_of(b)) for b in (body, refinement.uniform(body).domain)]
     assert widths[1] == pytest.approx(widths[0] / 2, rel=1e-9)
 
 
@@ -288,9 +299,8 @@ def scene_of(shape: str, size: tuple[float, ...]) -> Any:
     return Scene.model_validate({"domain": table, "material": steel, "boundary": {}}).domain
 
 
-def cells_of(body: domain.Domain) -> solution_arrays.Sample:
-    points = body.mesh.geometry.x[:, : body.dimension]
-    return solution_arrays.Sample(points, compat.geometry_dofmap(body.mesh), np.zeros_like(points), {})
+def cells_of(body: domain.Domain) -> tuple[Array, Integers]:
+    return body.mesh.geometry.x[:, : body.dimension], compat.geometry_dofmap(body.mesh).astype(np.int64)
 
 
 def test_adaptive_meshes_are_added_and_the_reference_stays_finer_than_the_scenes_own_mesh() -> None:

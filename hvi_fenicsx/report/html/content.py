@@ -4,22 +4,17 @@ from __future__ import annotations
 
 import base64
 import shlex
-import struct
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+from .. import png_file
 from ..reader import Result
 from . import numbers, scene_text, verdict
 from .certificate_text import certificate, estimate
 
-_CAPTIONS = {
-    "escape": "The rigid motion along which the load carries the body away.",
-    "scene": "The scene: the undeformed body with its supports, loads and contact parts.",
-    "body": "The deformed body, its displacements magnified, with what acts on it.",
-    "stress": "Stress in the body (von Mises), constant in each cell; the scale may end below a peak in a corner.",
-}
-"""By the name of the picture, in the order in which they are shown; what is not named here comes after."""
+_FIRST = ("escape", "scene", "body", "stress")
+"""The pictures that are shown first, in this order; what is not named here comes after, by its name."""
 
 
 def content(result: Result) -> dict[str, Any]:
@@ -30,7 +25,7 @@ def content(result: Result) -> dict[str, Any]:
         "summary": result.summary,
         "verdict": verdict.headline(result),
         "existence": list(verdict.existence(result)),
-        "odd": result.summary.get("warnings") or [],
+        "warnings": result.summary.get("warnings") or [],
         "facts_of_run": list(numbers.facts(result)),
         "drawing": shown.pop("scene", None),
         "pictures": list(shown.values()),
@@ -47,28 +42,21 @@ def content(result: Result) -> dict[str, Any]:
 
 def _pictures(folder: Path) -> list[Path]:
     """The finished pictures, the known ones first."""
-    order = list(_CAPTIONS)
     found = (path for path in folder.glob("*.png") if not path.name.startswith("."))
-    return sorted(found, key=lambda p: (order.index(p.stem) if p.stem in order else len(order), p.stem))
+    return sorted(found, key=lambda p: (_FIRST.index(p.stem) if p.stem in _FIRST else len(_FIRST), p.stem))
 
 
 def picture(path: Path) -> dict[str, Any]:
     """A picture that lies in the page itself, with its size, so that the page does not jump while it is decoded."""
     raw = path.read_bytes()
-    width, height = struct.unpack(">II", raw[16:24])
+    width, height = png_file.size(raw)
     return {
         "name": path.name,
-        "caption": _CAPTIONS.get(path.stem) or _of_part(path.stem),
+        "caption": png_file.caption(raw) or path.stem,
         "data": f"data:image/png;base64,{base64.b64encode(raw).decode()}",
         "width": width,
         "height": height,
     }
-
-
-def _of_part(stem: str) -> str:
-    part = stem.removeprefix("contact").removeprefix("_")
-    where = f"“{part}”" if part else "the contact part"
-    return f"Along {where}: displacement, friction and pressure." if stem.startswith("contact") else stem
 
 
 def reproduce(result: Result) -> dict[str, Any]:

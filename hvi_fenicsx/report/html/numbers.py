@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..reader import Part, Result
+from ..reader import ContactPart, Result
 from ..units import quantity, thousands
 
 _PHASES = {
@@ -56,7 +56,7 @@ def time(seconds: Mapping[str, float]) -> Iterator[dict[str, Any]]:
     yield {"name": "in all", "seconds": f"{total:.2f}", "share": None}
 
 
-def contact(part: Part) -> dict[str, Any]:
+def contact(part: ContactPart) -> dict[str, Any]:
     """What happened on a part of Γc."""
     rows: list[tuple[str, str]] = [("vertices", thousands(len(part["x"])))]
     if part.has("contact"):

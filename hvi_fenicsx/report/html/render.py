@@ -7,7 +7,7 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ...errors import HviError
+from ..errors import PageError
 from ..reader import read
 
 if TYPE_CHECKING:
@@ -16,15 +16,12 @@ if TYPE_CHECKING:
 NAME = "report.html"
 
 
-class ReportError(HviError):
-    """The report could not be written; the rest of the folder is as it was."""
-
-
 def write(folder: Path) -> Path:
     """Write ``report.html`` into a result folder, from its files; for rank 0 alone.
 
     Raises:
-        HviError: no result is there, its files are damaged, or the report cannot be written.
+        ResultError: no result is there, or its files are damaged.
+        PageError: the page cannot be written.
     """
     from .content import content
 
@@ -32,10 +29,18 @@ def write(folder: Path) -> Path:
 
 
 def render(template: str, values: dict[str, Any], path: Path) -> Path:
-    """A template of this package with its values, as a file that is there whole or not at all.
+    """Write a template of this package with its values, whole or not at all.
+
+    Args:
+        template: its name.
+        values: what it shows, by name.
+        path: the file.
+
+    Returns:
+        The file.
 
     Raises:
-        ReportError: it cannot be written.
+        PageError: it cannot be written.
     """
     text = _environment().get_template(template).render(values)
     aside = path.with_name(f".{path.name}.{os.getpid()}.part")
@@ -43,7 +48,7 @@ def render(template: str, values: dict[str, Any], path: Path) -> Path:
         aside.write_text(text, encoding="utf-8")
         os.replace(aside, path)
     except OSError as error:
-        raise ReportError(f"{path}: cannot be written: {error.strerror or error}") from None
+        raise PageError(f"{path}: cannot be written: {error.strerror or error}") from None
     finally:
         with contextlib.suppress(OSError):
             aside.unlink()
@@ -59,4 +64,4 @@ def _environment() -> jinja2.Environment:
     )
 
 
-__all__ = ["NAME", "ReportError", "render", "write"]
+__all__ = ["NAME", "render", "write"]

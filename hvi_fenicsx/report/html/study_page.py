@@ -6,8 +6,9 @@ import json
 from pathlib import Path
 from typing import Any
 
+from ..errors import PageError
 from .content import picture
-from .render import NAME, ReportError, render
+from .render import NAME, render
 
 _CAPTIONS = {
     "work_precision": "Error against time: each point a run, the line what nothing cheaper is as accurate as.",
@@ -21,14 +22,14 @@ def write(folder: Path) -> Path:
     """Write the page into the folder of a finished study; for one process alone.
 
     Raises:
-        ReportError: no study is there, it is damaged, or the page cannot be written.
+        PageError: no study is there, it is damaged, or the page cannot be written.
     """
     file = folder / "study.json"
     try:
         study = json.loads(file.read_text(encoding="utf-8"))
         return render("study.html.j2", _content(study, folder), folder / NAME)
     except (OSError, ValueError, KeyError, TypeError) as error:
-        raise ReportError(f"{file}: no finished study, or damaged ({error})") from None
+        raise PageError(f"{file}: no finished study, or damaged ({error})") from None
 
 
 def _content(study: dict[str, Any], folder: Path) -> dict[str, Any]:

@@ -9,23 +9,27 @@ from functools import cached_property
 import numpy as np
 
 from ...typing import Array, Integers
-from ..reader import Part, Result
+from ..body_mesh import BodyMesh
+from ..reader import ContactPart, Result
 from ..units import round_below
-from ..vtu import Body
 
 VISIBLE = 0.08
 """How large the largest displacement is drawn, of the body's size."""
-PEAK, SPOILS = 0.005, 1.25
-"""Of the body's volume, left beyond the end of a scale; how many times its end the peak must be."""
 NEAR = 0.3
 """Gaps larger than this, magnified, of the body's size, are the body's own shape."""
 
 
 @dataclass(frozen=True)
-class Deformed:
-    """A body with its displacement (n, 3), m, and the factor it is drawn with."""
+class DeformedBody:
+    """A body with the displacement that it is drawn with.
 
-    body: Body
+    Attributes:
+        body: the body at rest.
+        displacement: of its vertices, m, (n, 3).
+        factor: by which the displacement is magnified.
+    """
+
+    body: BodyMesh
     displacement: Array
     factor: float
 
@@ -41,72 +45,64 @@ class Deformed:
 
 
 @dataclass(frozen=True)
-class Footing:
-    """A contact part on the body: its vertices (m,), its facets (k, 2|3), and the row of the table by vertex.
+class PartGeometry:
+    """Where a contact part with m vertices lies on the body.
 
-    ``obstacle`` is the unit vector (3,) towards it where that is flat, None where its gap is along the part's normals.
+    Attributes:
+        part: the part.
+        vertices: its vertices in the body, (m,).
+        facets: its facets in the body, looking outwards, (k, 2) or (k, 3).
+        row: of each vertex of the body its row in the part's table, (n,); 0 off the part.
+        obstacle: the unit vector (3,) towards a flat obstacle; None where the gap is along the part's normals.
     """
 
-    part: Part
+    part: ContactPart
     vertices: Integers
     facets: Integers
     row: Integers
     obstacle: Array | None
 
     def values(self, column: Array, vertices: Integers) -> Array:
-        """A column of the table at some of its vertices."""
+        """A column of the table at some vertices.
+
+        Args:
+            column: by row of the table, (m,).
+            vertices: vertices of the body, (j,).
+        """
         return np.asarray(column[self.row[vertices]])
 
 
-def footings(result: Result, body: Body) -> list[Footing]:
-    """All contact parts, placed on the body."""
-    found = []
+def part_geometries(result: Result) -> list[PartGeometry]:
+    """Where all contact parts lie on the body."""
+    body, found = result.body, []
     for part in result.parts:
-        vertices = body.vertices(part.points)
         row = np.zeros(len(body.points), dtype=np.int64)
-        row[vertices] = np.arange(len(vertices))
-        found.append(Footing(part, vertices, body.facets_of(vertices), row, result.obstacle(part.name)))
+        row[part.vertices] = np.arange(len(part.vertices))
+        facets = body.oriented(part.facets)
+        found.append(PartGeometry(part, part.vertices, facets, row, result.obstacle(part.name)))
     return found
 
 
-def deform(body: Body, parts: Sequence[Footing]) -> Deformed:
+def deform(body: BodyMesh, parts: Sequence[PartGeometry]) -> DeformedBody:
     """The body with a round factor that makes its displacement seen.
 
     Where a part leaves its obstacle by its own shape, as a disk does a floor, the factor is 1: magnified, displacements
     would push the body through the obstacle.
+
+    Args:
+        body: the body with its displacement.
+        parts: its contact parts.
     """
-    u = np.nan_to_num(body.fields["displacement"])
+    assert body.displacement is not None
+    u = np.nan_to_num(body.displacement)
     largest = float(np.linalg.norm(u, axis=1).max(initial=0.0))
     if largest == 0.0:
-        return Deformed(body, u, 1.0)
+        return DeformedBody(body, u, 1.0)
     factor = 1.0 if largest > 0.5 * VISIBLE * body.size else round_below(VISIBLE * body.size / largest * 1.25)
-    gap = max((float(np.nanmax(foot.part["gap"], initial=0.0)) for foot in parts), default=0.0)
-    return Deformed(body, u, factor if factor * gap < NEAR * body.size else 1.0)
+    gap = max((float(np.nanmax(geometry.part["gap"], initial=0.0)) for geometry in parts), default=0.0)
+    return DeformedBody(body, u, factor if factor * gap < NEAR * body.size else 1.0)
 
 
-@dataclass(frozen=True)
-class Scale:
-    """A scale for numbers of the cells, from zero; ``cut`` where it ends below the largest of them."""
-
-    end: float
-    largest: float
-
-    @property
-    def cut(self) -> bool:
-        """Whether some cells have more."""
-        return self.end < self.largest
-
-
-def scale_of(body: Body, values: Array) -> Scale:
-    """A scale that a peak in a corner does not spoil: it ends where a share ``PEAK`` of the body has more."""
-    sides = body.points[body.cells[:, 1:]] - body.points[body.cells[:, :1]]
-    volume = np.sqrt(np.linalg.det(sides @ sides.transpose(0, 2, 1)))
-    order = np.argsort(values)
-    share = np.cumsum(volume[order]) / volume.sum()
-    end, largest = float(values[order][np.searchsorted(share, 1.0 - PEAK)]), float(values.max())
-    return Scale(end if 0.0 < end < largest / SPOILS else largest, largest)
-
-
-def largest_stress(parts: list[Footing]) -> float:
+def largest_stress(parts: list[PartGeometry]) -> float:
     """The largest |σ_n| on any of them, N/m²."""
     return max((float(np.nanmax(np.abs(f.part.pressure), initial=0.0)) for f in parts), default=0.0)

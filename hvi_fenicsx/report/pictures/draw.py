@@ -13,8 +13,8 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-from ...errors import HviError
 from ...runtime import processes
+from ..errors import PictureError
 
 UNFINISHED = ".part.png"
 """How the name of a picture ends that is being written."""
@@ -24,15 +24,12 @@ COMPLAINT = "pictures: "
 """How the child's message to its caller begins."""
 
 
-class PictureError(HviError):
-    """A picture could not be drawn; those that could are in the folder."""
-
-
 def draw(folder: Path, *, timeout: float = 120) -> list[Path]:
     """Draw all pictures of a result folder into it; for rank 0 alone.
 
     Args:
-        folder: a result (design.md, the contract). timeout: seconds after which the child is ended.
+        folder: a finished result.
+        timeout: seconds after which the child is ended.
 
     Returns:
         The pictures, as paths.
@@ -73,6 +70,3 @@ def _message(errors: str, code: int) -> str:
     own = [line.removeprefix(COMPLAINT) for line in errors.splitlines() if line.startswith(COMPLAINT)]
     noise = errors.strip().splitlines()[-1:]
     return "; ".join(own or [f"the drawing process ended with {code}", *noise])
-
-
-__all__ = ["PictureError", "draw"]

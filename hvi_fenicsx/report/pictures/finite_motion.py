@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...typing import Array
-from ..vtu import Body
+from ..body_mesh import BodyMesh
 
 REACH = 0.3
 """How far the ghost goes, of the body's size."""
@@ -35,11 +35,13 @@ class Motion:
         return np.asarray(self.pole + turned + part * self.shift)
 
 
-def fitted(body: Body, mode: Array) -> Motion:
-    """The motion whose velocity is a field (n, 3) at the body's vertices, as far as :data:`REACH`.
+def fitted(body: BodyMesh) -> Motion:
+    """The motion whose velocity is the body's escape mode, as far as :data:`REACH`.
 
     The field is a + w × (x - c); its pole is the point of the screw's axis that is nearest to c.
     """
+    assert body.escape_mode is not None
+    mode = body.escape_mode
     middle = body.points.mean(axis=0)
     shift = mode.mean(axis=0)
     spin = _spin(body.points - middle, mode - shift)
@@ -57,7 +59,7 @@ def _spin(arms: Array, field: Array) -> Array:
     return np.asarray(np.linalg.lstsq(inertia, np.cross(arms, field).sum(axis=0), rcond=1e-12)[0])
 
 
-def followed(body: Body, motion: Motion) -> Array:
+def followed(body: BodyMesh, motion: Motion) -> Array:
     """Points to follow on their way: the middle in a translation, else one far out in each diagonal direction."""
     middle = (body.points.min(axis=0) + body.points.max(axis=0)) / 2
     if not motion.spin.any():

@@ -18,10 +18,10 @@ _BAR, _START = 3.2, 0.42
 
 
 def colour_bar(
-    made: Figure, colours: Colormap, scale: tuple[float, float], words: str, remark: str = "", *, at: float = 0.0
+    fig: Figure, colours: Colormap, scale: tuple[float, float], words: str, remark: str = "", *, at: float = 0.0
 ) -> None:
     """A bar of a scale from its lowest to its largest value, ``at`` inches from its usual place; below it a remark."""
-    axes = area(made, _START + at, 0.82, _BAR, 0.2)
+    axes = area(fig, _START + at, 0.82, _BAR, 0.2)
     low, high = scale if scale[1] > scale[0] else (0.0, 1.0)
     axes.imshow(np.linspace(0, 1, 256)[None], cmap=colours, aspect="auto", extent=(low, high, 0.0, 1.0))
     axes.yaxis.set_visible(False)
@@ -30,15 +30,15 @@ def colour_bar(
     axes.set_title(words, loc="left", size=12.5)
     for spine in axes.spines.values():
         spine.set_visible(False)
-    made.text((_START + at) / WIDTH, 0.2 / made.get_figheight(), remark, size=12.5, weight="bold", color=GREY)
+    fig.text((_START + at) / WIDTH, 0.2 / fig.get_figheight(), remark, size=12.5, weight="bold", color=GREY)
 
 
-def legend(made: Figure, keys: Sequence[Artist]) -> None:
+def legend(fig: Figure, keys: Sequence[Artist]) -> None:
     """What the marks mean, one in a line."""
-    made.legend(
+    fig.legend(
         handles=list(keys),
         loc="center left",
-        bbox_to_anchor=(4.05 / WIDTH, 0.74 / made.get_figheight()),
+        bbox_to_anchor=(4.05 / WIDTH, 0.74 / fig.get_figheight()),
         frameon=False,
         fontsize=12,
         handlelength=1.8,

@@ -1,4 +1,4 @@
-"""What acts on the body's sides, from the scene and ``boundary.csv``: loads and supports, on any shape or mesh."""
+"""What acts on the body's sides, from a result: loads and supports, on any shape or mesh."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ import numpy as np
 from ...errors import HviError
 from ...formula import Formula
 from ...typing import Array, Integers
+from ..body_mesh import BodyMesh
 from ..reader import Result
-from ..vtu import Body
 from .boundary_chains import chains, normals
 from .vtk_view import area_vectors
 
@@ -22,7 +22,10 @@ class Side:
     """A piece of a boundary part: in the plane a line, in space all of it.
 
     Attributes:
-        part: its name. vertices: (m,), in the plane along the line. facets: (k, 2|3). normals: outward unit, (m, 3).
+        part: the part's name.
+        vertices: (m,), in the plane along the line.
+        facets: (k, 2) or (k, 3).
+        normals: outward unit normals at the vertices, (m, 3).
     """
 
     part: str
@@ -38,59 +41,70 @@ class Side:
 
 
 @dataclass(frozen=True)
-class Load:
-    """Tractions (m, 3) at the vertices of a side, N/m²."""
+class LoadedSide:
+    """A side with a load.
+
+    Attributes:
+        side: the side.
+        traction: at its vertices, N/m², (m, 3).
+    """
 
     side: Side
     traction: Array
 
 
 @dataclass(frozen=True)
-class Support:
-    """A side whose normal displacement is prescribed; ``rolling`` if it is free along the side."""
+class HeldSide:
+    """A side whose normal displacement is prescribed.
+
+    Attributes:
+        side: the side.
+        rolling: whether it is free along the side.
+    """
 
     side: Side
     rolling: bool
 
 
-def loads(result: Result, body: Body) -> list[Load]:
+def loaded_sides(result: Result) -> list[LoadedSide]:
     """The tractions that are not zero."""
     found = []
-    for side, table in tables(result, body):
-        traction = _traction(table.get("traction"), body.points[side.vertices])
+    for side, table in tables(result):
+        traction = _traction(table.get("traction"), result.body.points[side.vertices])
         if traction is not None and np.any(traction):
-            found.append(Load(side, traction))
+            found.append(LoadedSide(side, traction))
     return found
 
 
-def supports(result: Result, body: Body) -> list[Support]:
+def held_sides(result: Result) -> list[HeldSide]:
     """The sides that are held along the axis nearest to their normal."""
     found = []
-    for side, table in tables(result, body):
+    for side, table in tables(result):
         given = table.get("displacement")
         axis = int(np.argmax(np.abs(side.normal)))
-        if isinstance(given, list) and len(given) == body.dimension and given[axis] != "free":
-            found.append(Support(side, any(v == "free" for i, v in enumerate(given) if i != axis)))
+        if isinstance(given, list) and len(given) == result.body.dimension and given[axis] != "free":
+            found.append(HeldSide(side, any(v == "free" for i, v in enumerate(given) if i != axis)))
     return found
 
 
-def tables(result: Result, body: Body) -> Iterator[tuple[Side, Mapping[str, Any]]]:
+def tables(result: Result) -> Iterator[tuple[Side, Mapping[str, Any]]]:
     """The pieces of each boundary part, with what the scene says of it."""
-    for name, points in result.sides.items():
+    body = result.body
+    for name, own in result.sides.items():
         table = (result.scene.get("boundary") or {}).get(name) or {}
-        facets = body.facets_of(body.vertices(points))
+        facets = body.oriented(own)
         for side in _lines(name, body, facets) if body.dimension == 2 else _faces(name, body, facets):
             yield side, table
 
 
-def _lines(name: str, body: Body, facets: Integers) -> Iterator[Side]:
+def _lines(name: str, body: BodyMesh, facets: Integers) -> Iterator[Side]:
     for chain in chains(facets):
         edges = np.column_stack([chain[:-1], chain[1:]])
         outward = np.pad(normals(body.points, chain), ((0, 0), (0, 1)))
         yield Side(name, chain, edges, outward)
 
 
-def _faces(name: str, body: Body, facets: Integers) -> Iterator[Side]:
+def _faces(name: str, body: BodyMesh, facets: Integers) -> Iterator[Side]:
     if not len(facets):
         return
     vertices, index = np.unique(facets, return_inverse=True)

@@ -15,8 +15,8 @@ from matplotlib.patches import Patch
 from ...typing import Array, Mask
 from ..units import quantity
 from .boundary_chains import chains, normals
-from .deformed import Deformed, Footing
-from .loads_supports import Load, Support
+from .deformed import DeformedBody, PartGeometry
+from .loads_supports import HeldSide, LoadedSide
 from .style import GREY, INK, ORANGE, PURPLE, VERMILION
 
 LOAD, PRESSURE, ROLLER = 0.13, 0.15, 0.011
@@ -47,7 +47,7 @@ def undeformed() -> Artist:
     return Line2D([], [], color=GREY, ls=(0, (3, 2)), lw=1.3, label="undeformed outline")
 
 
-def loads(shape: Deformed, found: list[Load]) -> Iterator[Mark]:
+def loads(shape: DeformedBody, found: list[LoadedSide]) -> Iterator[Mark]:
     """Arrows onto a side where it is pushed, from it where it is pulled; each load with its own scale and value."""
     size = shape.body.size
     for load in found:
@@ -116,7 +116,7 @@ _ARROW: dict[str, Any] = {
 }
 
 
-def supports(shape: Deformed, found: list[Support]) -> Iterator[Mark]:
+def supports(shape: DeformedBody, found: list[HeldSide]) -> Iterator[Mark]:
     """A wall along the side, with rollers where the side may move along it."""
     for support in found:
         points, outward = shape.points[support.side.vertices, :2], support.side.normals[:, :2]
@@ -149,18 +149,18 @@ def _hatched(axes: Axes, line: Array, outward: Array, size: float) -> None:
     axes.plot(*strokes.T, color=GREY, lw=0.9, clip_on=False, zorder=2)
 
 
-def footing(shape: Deformed, foot: Footing, largest: float) -> Iterator[Mark]:
+def contact(shape: DeformedBody, geometry: PartGeometry, largest: float) -> Iterator[Mark]:
     """The obstacle of a part, where the part is off it, and the pressure on it as arrows that end there."""
-    for chain in chains(foot.facets):
+    for chain in chains(geometry.facets):
         outward = normals(shape.body.points, chain)
-        if foot.obstacle is not None:
-            outward = np.broadcast_to(foot.obstacle[:2], outward.shape)
-        gap = np.nan_to_num(foot.values(foot.part["gap"], chain))
+        if geometry.obstacle is not None:
+            outward = np.broadcast_to(geometry.obstacle[:2], outward.shape)
+        gap = np.nan_to_num(geometry.values(geometry.part["gap"], chain))
         base = shape.points[chain, :2] + (shape.factor * gap)[:, None] * outward
-        pressure = np.nan_to_num(foot.values(foot.part.pressure, chain))
-        if foot.part.has("gap"):
+        pressure = np.nan_to_num(geometry.values(geometry.part.pressure, chain))
+        if geometry.part.has("gap"):
             yield _obstacle(base + OBSTACLE * shape.body.size * outward)
-        off = foot.part.lifted[foot.row[chain]]
+        off = geometry.part.lifted[geometry.row[chain]]
         if off.any():
             yield _lifted(shape.points[chain, :2], off, float(gap[off].max()))
         yield from _profile(base, outward, pressure, largest or 1.0, shape.body.size)

@@ -20,12 +20,13 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 from PIL import Image
+from PIL.PngImagePlugin import PngInfo
 
+from ..png_file import CAPTION
 from ..reader import Result
 from ..units import thousands
 from .draw import UNFINISHED
 
-WIDTH_PX = 1200
 WIDTH, DPI = 8.0, 150
 """In inches, and pixels per inch."""
 INK, GREY, PALE = "#222222", "#6b6b6b", "#c9c9c9"
@@ -75,34 +76,32 @@ def pressure_scale(lowest: float, largest: float) -> tuple[LinearSegmentedColorm
 
 def figure(height: float) -> Figure:
     """An empty picture of the common width, its height in inches."""
-    made = Figure(figsize=(WIDTH, height), dpi=DPI, facecolor="white")
-    FigureCanvasAgg(made)
-    return made
+    fig = Figure(figsize=(WIDTH, height), dpi=DPI, facecolor="white")
+    FigureCanvasAgg(fig)
+    return fig
 
 
-def area(made: Figure, left: float, bottom: float, width: float, height: float, **keys: Any) -> Axes:
+def area(fig: Figure, left: float, bottom: float, width: float, height: float, **keys: Any) -> Axes:
     """Axes at a place given in inches."""
-    tall = made.get_figheight()
-    return made.add_axes((left / WIDTH, bottom / tall, width / WIDTH, height / tall), **keys)
+    tall = fig.get_figheight()
+    return fig.add_axes((left / WIDTH, bottom / tall, width / WIDTH, height / tall), **keys)
 
 
-def heading(made: Figure, result: Result, subject: str) -> None:
+def heading(fig: Figure, result: Result, subject: str) -> None:
     """The scene's title; below it what is shown, how large the problem was, its state, and whether to trust it."""
     title = str(result.scene.get("title") or "") or result.folder.name
-    titled(made, title, f"{subject} · {_facts(result)}", *_verdict(result))
+    titled(fig, title, f"{subject} · {_facts(result)}", *_verdict(result))
 
 
-def titled(made: Figure, title: str, below: str, words: str = "", colour: str = INK) -> None:
+def titled(fig: Figure, title: str, below: str, words: str = "", colour: str = INK) -> None:
     """A title in bold; on the line below it what is shown and, at the right, coloured words."""
-    tall = made.get_figheight()
+    tall = fig.get_figheight()
     title = textwrap.shorten(title, 2 * _LINE, placeholder=" …")
     lines = textwrap.wrap(title, _LINE) if len(title) > _LINE else [title]
     size, top, second = (17, 0.19, 0.76) if len(lines) == 1 else (13.5, 0.12, 0.85)
-    made.text(0.3 / WIDTH, 1 - top / tall, "\n".join(lines), size=size, weight="bold", va="top", linespacing=1.1)
-    made.text(0.3 / WIDTH, 1 - second / tall, below, size=12, color=GREY, va="baseline")
-    made.text(
-        1 - 0.3 / WIDTH, 1 - second / tall, words, size=12, weight="bold", color=colour, ha="right", va="baseline"
-    )
+    fig.text(0.3 / WIDTH, 1 - top / tall, "\n".join(lines), size=size, weight="bold", va="top", linespacing=1.1)
+    fig.text(0.3 / WIDTH, 1 - second / tall, below, size=12, color=GREY, va="baseline")
+    fig.text(1 - 0.3 / WIDTH, 1 - second / tall, words, size=12, weight="bold", color=colour, ha="right", va="baseline")
 
 
 def _facts(result: Result) -> str:
@@ -132,10 +131,19 @@ def unfinished(path: Path) -> Iterator[Path]:
         aside.unlink(missing_ok=True)
 
 
-def save(made: Figure, path: Path) -> None:
-    """Write a picture, whole or not at all; without an alpha channel, which nothing needs, it is a quarter smaller."""
-    canvas = FigureCanvasAgg(made)
+def save(fig: Figure, path: Path, caption: str = "") -> None:
+    """Write a picture, whole or not at all; without an alpha channel, which nothing needs, it is a quarter smaller.
+
+    Args:
+        fig: the picture.
+        path: its file.
+        caption: what a reader should see under it; it is kept in the file.
+    """
+    canvas = FigureCanvasAgg(fig)
     canvas.draw()
     image = Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")
+    words = PngInfo()
+    if caption:
+        words.add_itxt(CAPTION, caption)
     with unfinished(path) as aside:
-        image.save(aside, dpi=(DPI, DPI), compress_level=6)
+        image.save(aside, dpi=(DPI, DPI), compress_level=6, pnginfo=words)

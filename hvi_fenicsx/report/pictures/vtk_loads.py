@@ -9,8 +9,8 @@ from matplotlib.axes import Axes
 
 from ...typing import Array, Integers
 from ..units import quantity
-from .deformed import Deformed
-from .loads_supports import Load
+from .deformed import DeformedBody
+from .loads_supports import LoadedSide
 from .style import INK
 from .vtk_view import View
 
@@ -31,7 +31,7 @@ def fill(plotter: pyvista.Plotter, tails: Array, ways: Array) -> None:
     plotter.add_mesh(cloud.glyph(orient="way", scale="way", geom=shaft), color=INK, lighting=False)
 
 
-def arrows(shape: Deformed, load: Load) -> tuple[Array, Array]:
+def arrows(shape: DeformedBody, load: LoadedSide) -> tuple[Array, Array]:
     """Tails and ways of a load's arrows: onto the side where it is pushed, from it where it is pulled."""
     chosen = _sparse(shape.body.points[load.side.vertices], shape.body.size)
     traction = load.traction[chosen]
@@ -55,7 +55,7 @@ def _sparse(points: Array, size: float) -> Integers:
     return np.asarray(order[np.unique(node[order], axis=0, return_index=True)[1]])
 
 
-def labels(axes: Axes, view: View, shape: Deformed, pulled: list[Load]) -> None:
+def labels(axes: Axes, view: View, shape: DeformedBody, pulled: list[LoadedSide]) -> None:
     """Each load's largest value, over the middle of its side, off the tips of its arrows."""
     halo = {"boxstyle": "round,pad=0.15", "fc": "white", "ec": "none", "alpha": 0.85}
     for load in pulled:

@@ -68,9 +68,9 @@ def surface(points: Array, facets: Integers) -> pyvista.PolyData:
     import pyvista
 
     used, index = np.unique(facets, return_inverse=True)
-    made = pyvista.PolyData.from_regular_faces(points[used], index.reshape(facets.shape))
-    made.point_data["vertex"] = used
-    return made
+    fig = pyvista.PolyData.from_regular_faces(points[used], index.reshape(facets.shape))
+    fig.point_data["vertex"] = used
+    return fig
 
 
 def creases(points: Array, facets: Integers, angle: float = 25.0) -> pyvista.PolyData:

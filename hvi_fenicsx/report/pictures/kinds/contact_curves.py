@@ -3,21 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from functools import partial
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from ...typing import Array, Mask
-from ..reader import Part, Result
-from ..units import Unit, quantity, unit_for
-from .style import BLUE, GREEN, GREY, HEADING, INK, ORANGE, VERMILION, area, figure, heading, save
+from ....typing import Array, Mask
+from ...reader import ContactPart, Result
+from ...units import Unit, quantity, unit_for
+from ..registry import picture
+from ..style import BLUE, GREEN, GREY, HEADING, INK, ORANGE, VERMILION, area, figure, heading
 
 if TYPE_CHECKING:
-    from ...laws import Superpotential
+    from ....laws import Superpotential
 
 PANEL, GAP, FOOT = 1.75, 0.62, 0.72
 """Inches: a panel, the room for its title, the axis below the last."""
@@ -29,37 +31,39 @@ IN_RANGE = 1.6
 """A kink of the law is drawn if it lies within this many times the largest slip."""
 
 
-def draw(path: Path, result: Result, part: Part) -> None:
+@picture("contact", dimension=2, of_part=True, caption="Along {part}: displacement, friction and pressure.")
+def draw(result: Result, part: ContactPart) -> Figure:
     """Draw the curves of a part, with what the laws say of them; a law that it does not have has no curve."""
     part = _worth_seeing(part)
     length = unit_for(float(np.max(part["s"])), "m")
     panels = list(_panels(result, part, length))
-    made = figure(HEADING + len(panels) * (PANEL + GAP) + FOOT)
-    heading(made, result, f"on “{part.name}”")
+    fig = figure(HEADING + len(panels) * (PANEL + GAP) + FOOT)
+    heading(fig, result, f"on “{part.name}”")
     lifted = _lifted_spans(part)
     for above, panel in enumerate(reversed(panels)):
-        axes = area(made, 0.95, FOOT + above * (PANEL + GAP), 6.75, PANEL)
+        axes = area(fig, 0.95, FOOT + above * (PANEL + GAP), 6.75, PANEL)
         panel(axes)
         for start, end in lifted:
             axes.axvspan(start / length.size, end / length.size, color=ORANGE, alpha=0.16, lw=0)
         _finish(axes, part, length)
         axes.tick_params(labelbottom=above == 0)
-    _say_lifted(made.axes[0], lifted, part, length)
-    made.axes[0].set_xlabel(f"s along “{part.name}” in {length.name}")
-    save(made, path)
+    _say_lifted(fig.axes[0], lifted, part, length)
+    fig.axes[0].set_xlabel(f"s along “{part.name}” in {length.name}")
+    return fig
 
 
-def _worth_seeing(part: Part) -> Part:
+def _worth_seeing(part: ContactPart) -> ContactPart:
     """Of a part that is closed on a short stretch only, that stretch and its neighbourhood."""
     s, closed = part["s"], part["s"][part["contact"] == 1.0]
     if len(closed) < 2 or np.ptp(closed) > SHORT * np.ptp(s):
         return part
     room = np.ptp(closed)
     near = (s >= closed.min() - room) & (s <= closed.max() + room)
-    return Part(part.name, {name: values[near] for name, values in part.columns.items()})
+    columns = {name: values[near] for name, values in part.columns.items()}
+    return replace(part, columns=columns, vertices=part.vertices[near])
 
 
-def _panels(result: Result, part: Part, length: Unit) -> Iterator[Callable[[Axes], None]]:
+def _panels(result: Result, part: ContactPart, length: Unit) -> Iterator[Callable[[Axes], None]]:
     """From the top: slip and friction, what a normal law acts on, the pressure."""
 
     def displacement(values: Array, words: str, key: str) -> Callable[[Axes], None]:
@@ -77,7 +81,9 @@ def _panels(result: Result, part: Part, length: Unit) -> Iterator[Callable[[Axes
     yield partial(_pressure, part=part, length=length)
 
 
-def _displacement(axes: Axes, part: Part, values: Array, law: Superpotential | None, words: str, length: Unit) -> None:
+def _displacement(
+    axes: Axes, part: ContactPart, values: Array, law: Superpotential | None, words: str, length: Unit
+) -> None:
     """What a law acts on, and the values at which the law drops."""
     values = _without_noise(values, part)
     unit = unit_for(_largest(values), "m")
@@ -109,7 +115,7 @@ def _listed(kinks: Array) -> str:
     )
 
 
-def _friction(axes: Axes, *, part: Part, result: Result, length: Unit) -> None:
+def _friction(axes: Axes, *, part: ContactPart, result: Result, length: Unit) -> None:
     values = part.friction
     unit = unit_for(_largest(values), "Pa")
     law = result.law(part.name) if result.summary.get("smoothing") else None
@@ -123,7 +129,7 @@ def _friction(axes: Axes, *, part: Part, result: Result, length: Unit) -> None:
     _title(axes, f"friction $-\\sigma_t$ in {unit.name}", note or _pieces(axes, part, length, unit))
 
 
-def _pieces(axes: Axes, part: Part, length: Unit, unit: Unit) -> str:
+def _pieces(axes: Axes, part: ContactPart, length: Unit, unit: Unit) -> str:
     """Mark the vertices that have left the law's first piece; says what the mark means."""
     fallen = part["branch_t"] > 0
     if not fallen.any():
@@ -132,7 +138,7 @@ def _pieces(axes: Axes, part: Part, length: Unit, unit: Unit) -> str:
     return f"hollow: past the drop ({np.count_nonzero(fallen)} of {len(fallen)} vertices)"
 
 
-def _pressure(axes: Axes, *, part: Part, length: Unit) -> None:
+def _pressure(axes: Axes, *, part: ContactPart, length: Unit) -> None:
     values = part.pressure
     unit = unit_for(_largest(values), "Pa")
     _line(axes, part, values, length, unit, VERMILION)
@@ -144,7 +150,7 @@ def _pressure(axes: Axes, *, part: Part, length: Unit) -> None:
     _title(axes, f"contact pressure $-\\sigma_n$ in {unit.name}", note)
 
 
-def _line(axes: Axes, part: Part, values: Array, length: Unit, unit: Unit, colour: str) -> None:
+def _line(axes: Axes, part: ContactPart, values: Array, length: Unit, unit: Unit, colour: str) -> None:
     marker = "o" if len(values) <= MARKED else ""
     size = 4.5 if len(values) <= MARKED // 2 else 3.0
     axes.plot(part["s"] / length.size, values / unit.size, color=colour, marker=marker, ms=size)
@@ -155,7 +161,7 @@ def _title(axes: Axes, words: str, note: str) -> None:
     axes.set_title(note, loc="right", size=11.5, color=GREY)
 
 
-def _finish(axes: Axes, part: Part, length: Unit) -> None:
+def _finish(axes: Axes, part: ContactPart, length: Unit) -> None:
     """Zero is always in sight: a pressure that is uniform to a thousandth should look so."""
     bottom, top = axes.get_ylim()
     low, high = min(0.0, *axes.dataLim.intervaly), max(0.0, *axes.dataLim.intervaly)
@@ -170,7 +176,7 @@ def _finish(axes: Axes, part: Part, length: Unit) -> None:
     axes.set_axisbelow(True)
 
 
-def _lifted_spans(part: Part) -> list[tuple[float, float]]:
+def _lifted_spans(part: ContactPart) -> list[tuple[float, float]]:
     """Stretches of s whose vertices are lifted; each vertex stands for half the way to its neighbours."""
     s = part["s"]
     middles = np.concatenate([s[:1], (s[1:] + s[:-1]) / 2, s[-1:]])
@@ -183,7 +189,7 @@ def _runs(flags: Mask) -> Iterator[tuple[int, int]]:
     yield from zip(map(int, edges[::2]), map(int, edges[1::2]), strict=True)
 
 
-def _say_lifted(axes: Axes, spans: list[tuple[float, float]], part: Part, length: Unit) -> None:
+def _say_lifted(axes: Axes, spans: list[tuple[float, float]], part: ContactPart, length: Unit) -> None:
     if not spans:
         return
     start, end = max(spans, key=lambda span: span[1] - span[0])
@@ -197,7 +203,7 @@ def _largest(values: Array) -> float:
     return float(np.nanmax(np.abs(values), initial=0.0))
 
 
-def _without_noise(values: Array, part: Part) -> Array:
+def _without_noise(values: Array, part: ContactPart) -> Array:
     """Displacements that are rounding beside the part's others are zero, and are drawn so."""
     whole = max(_largest(part[name]) for name in ("u_n", "u_t1", "gap") if part.has(name))
     return values if _largest(values) > 1e-9 * whole else 0.0 * values

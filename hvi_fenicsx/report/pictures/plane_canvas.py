@@ -1,8 +1,6 @@
-"""``body.png`` of a plane body: deformed over its outline, |u| in it, contact pressure drawn under its parts."""
+"""The canvas of a picture of a body, and a plane body painted on it."""
 
 from __future__ import annotations
-
-from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -13,16 +11,12 @@ from matplotlib.image import AxesImage
 from matplotlib.patches import PathPatch
 
 from ...typing import Array, Integers
-from ..reader import Result
-from ..units import times, unit_for
-from ..vtu import Body
-from . import plane_marks as marks
+from ..body_mesh import BodyMesh
 from .boundary_chains import chains, closed_path
-from .deformed import Deformed, deform, footings, largest_stress
-from .legend import FOOT, colour_bar, legend
-from .loads_supports import loads, supports
+from .deformed import DeformedBody
+from .legend import FOOT
 from .raster import shade
-from .style import DPI, GREY, HEADING, INK, SLATE, area, figure, heading, save
+from .style import DPI, GREY, HEADING, INK, area, figure
 
 MARGIN, SIDE = 0.3, 7.4
 """Inches: left and right of the body, and its largest width."""
@@ -31,45 +25,23 @@ FEWEST_PIXELS = 13
 """Mesh lines are drawn if they are so far apart."""
 
 
-def draw(path: Path, result: Result, body: Body) -> None:
-    """Draw the body with its loads, supports and contact parts."""
-    parts = footings(result, body)
-    shape = deform(body, parts)
-    drawn = [
-        *marks.supports(shape, supports(result, body)),
-        *marks.loads(shape, loads(result, body)),
-        *(m for part in parts for m in marks.footing(shape, part, largest_stress(parts))),
-    ]
-    made, axes = canvas(np.concatenate([shape.points[:, :2], body.points[:, :2], *(m.extent for m in drawn)]))
-    heading(made, result, "deformed body")
-    paint(axes, shape, shape.body.cells, shape.points, shape.amount, SLATE, float(shape.amount.max()))
-    for mark in drawn:
-        mark.draw(axes)
-    most = float(shape.amount.max())
-    unit = unit_for(most, "m")
-    words = f"displacement |u|, up to {unit.text(most)}"
-    colour_bar(made, SLATE, (0.0, most / unit.size), words, times(shape.factor))
-    legend(made, [marks.undeformed(), *marks.keys(drawn)])
-    save(made, path)
-
-
 def canvas(points: Array) -> tuple[Figure, Axes]:
     """Axes without a frame for points (n, 2): a picture just high enough for them, or as wide as they need it."""
     low, high = points.min(axis=0), points.max(axis=0)
     extent = np.maximum(high - low, 1e-3 * float(np.max(high - low)) or 1.0)
     scale = min(SIDE / extent[0], TALLEST / extent[1])
     tall = max(FLATTEST, scale * extent[1])
-    made = figure(HEADING + tall + FOOT + 0.1)
-    axes = area(made, MARGIN, FOOT, SIDE, tall)
+    fig = figure(HEADING + tall + FOOT + 0.1)
+    axes = area(fig, MARGIN, FOOT, SIDE, tall)
     axes.set_axis_off()
     middle, half = (low + high) / 2, np.array([SIDE, tall]) / scale / 2
     axes.set_xlim(middle[0] - half[0], middle[0] + half[0])
     axes.set_ylim(middle[1] - half[1], middle[1] + half[1])
-    return made, axes
+    return fig, axes
 
 
 def paint(
-    axes: Axes, shape: Deformed, triangles: Integers, corners: Array, values: Array, colours: Colormap, end: float
+    axes: Axes, shape: DeformedBody, triangles: Integers, corners: Array, values: Array, colours: Colormap, end: float
 ) -> None:
     """The body over its undeformed outline, in the colours of values at the corners of triangles, from zero."""
     body, points = shape.body, shape.points
@@ -88,7 +60,7 @@ def paint(
         axes.add_collection(LineCollection(list(points[sides, :2]), colors="white", lw=0.6, alpha=0.5, zorder=2))
 
 
-def _pixels_between_lines(axes: Axes, body: Body) -> float:
+def _pixels_between_lines(axes: Axes, body: BodyMesh) -> float:
     per_metre = SIDE * DPI / float(np.ptp(axes.get_xlim()))
     return per_metre * float(np.sqrt(np.prod(np.ptp(body.points[:, :2], axis=0)) / len(body.cells)))
 

@@ -4,36 +4,36 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import partial
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from ...typing import Array
-from ..reader import Result
-from ..vtu import Body
-from . import vtk_loads
-from .body_plane import canvas
-from .deformed import Deformed
-from .legend import legend
-from .loads_supports import Side, loads, supports, tables
-from .scene_plane import inside, say, touches
-from .style import BLUE, INK, PALE, heading, save
-from .vtk_view import View, area_vectors, best_view, creases, render, surface
+from ....typing import Array
+from ...body_mesh import BodyMesh
+from ...reader import Result
+from .. import vtk_loads
+from ..deformed import DeformedBody
+from ..footprints import FACING
+from ..legend import legend
+from ..loads_supports import Side, held_sides, loaded_sides, tables
+from ..plane_canvas import canvas
+from ..registry import picture
+from ..scene_legend import inside, say, touches
+from ..style import BLUE, INK, PALE, heading
+from ..vtk_view import View, area_vectors, best_view, creases, render, surface
 
 if TYPE_CHECKING:
     import pyvista
 
-FACING = 0.15
-"""Cosine from which a part is drawn where it is."""
 CONTACT, SUPPORT, LOADED = "#eea06d", "#9fb7c9", "#f3cf7a"
 
 
 @dataclass(frozen=True)
-class Coloured:
+class ColouredSide:
     """A part as drawn: its side, its colour, and how far it is moved, (3,)."""
 
     side: Side
@@ -41,36 +41,44 @@ class Coloured:
     away: Array
 
 
-def draw(path: Path, result: Result, body: Body) -> None:
+@picture(
+    "scene",
+    dimension=3,
+    rendered=True,
+    caption="The scene: the undeformed body with its supports, loads and contact parts.",
+    wanted=lambda result: bool(result.sides),
+)
+def draw(result: Result) -> Figure:
     """Draw the scene of a body in space."""
-    rest, pulled = Deformed(body, np.zeros_like(body.points), 1.0), loads(result, body)
-    sides = list(tables(result, body))
+    body = result.body
+    rest, pulled = DeformedBody(body, np.zeros_like(body.points), 1.0), loaded_sides(result)
+    sides = list(tables(result))
     view = best_view([area_vectors(body.points, side.facets).sum(axis=0) for side, table in sides if touches(table)])
-    held = {support.side.part for support in supports(result, body)}
+    held = {support.side.part for support in held_sides(result)}
     colours = [CONTACT if touches(t) else SUPPORT if s.part in held else LOADED for s, t in sides]
-    shown = [Coloured(s, c, _away(view, body, s)) for (s, _), c in zip(sides, colours, strict=True)]
+    shown = [ColouredSide(s, c, _away(view, body, s)) for (s, _), c in zip(sides, colours, strict=True)]
     arrows = [vtk_loads.arrows(rest, load) for load in pulled]
     reached = [body.points, *(body.points[s.side.vertices] + s.away for s in shown)]
     everything = np.concatenate([*reached, *(end for tails, ways in arrows for end in (tails, tails + ways))])
-    made, axes = canvas(view.project(everything))
-    heading(made, result, "the scene")
+    fig, axes = canvas(view.project(everything))
+    heading(fig, result, "the scene")
     depths = (float(view.depth(everything).min()), float(view.depth(everything).max()))
     render(axes, view, depths, partial(_fill, body=body, shown=shown, arrows=arrows, toward=view.toward))
     for part in shown:
         _name(axes, view, body, part)
     vtk_loads.labels(axes, view, rest, pulled)
-    say(made, body)
-    legend(made, [*keys(shown), *inside(result)])
-    save(made, path)
+    say(fig, body)
+    legend(fig, [*keys(shown), *inside(result)])
+    return fig
 
 
-def keys(shown: list[Coloured]) -> list[Artist]:
+def keys(shown: list[ColouredSide]) -> list[Artist]:
     """What the colours mean that are there."""
     words = {CONTACT: "contact, friction or adhesion", SUPPORT: "support", LOADED: "loaded"}
     return [Patch(fc=c, ec=INK, label=w) for c, w in words.items() if c in {s.colour for s in shown}]
 
 
-def _away(view: View, body: Body, side: Side) -> Array:
+def _away(view: View, body: BodyMesh, side: Side) -> Array:
     """Nothing for a part that is seen; a hidden one is moved out along its normal until the body hides it no more."""
     seen = view.project(side.normal[None])[0]
     if float(side.normal @ view.toward) > FACING or not np.any(np.abs(seen) > 1e-6):
@@ -82,7 +90,12 @@ def _away(view: View, body: Body, side: Side) -> Array:
 
 
 def _fill(
-    plotter: pyvista.Plotter, *, body: Body, shown: list[Coloured], arrows: list[tuple[Array, Array]], toward: Array
+    plotter: pyvista.Plotter,
+    *,
+    body: BodyMesh,
+    shown: list[ColouredSide],
+    arrows: list[tuple[Array, Array]],
+    toward: Array,
 ) -> None:
     plotter.add_mesh(surface(body.points, body.boundary), color=PALE, ambient=0.75, diffuse=0.3)
     plotter.add_mesh(creases(body.points, body.boundary), color=INK, line_width=3)
@@ -94,7 +107,7 @@ def _fill(
         vtk_loads.fill(plotter, tails, ways)
 
 
-def _name(axes: Axes, view: View, body: Body, part: Coloured) -> None:
+def _name(axes: Axes, view: View, body: BodyMesh, part: ColouredSide) -> None:
     x, y = view.project((body.points[part.side.vertices].mean(axis=0) + part.away)[None])[0]
     halo = {"boxstyle": "round,pad=0.15", "fc": "white", "ec": "none", "alpha": 0.85}
     axes.text(x, y, part.side.part, size=12.5, color=BLUE, ha="center", va="center", bbox=halo, zorder=9)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import textwrap
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,14 +12,15 @@ from matplotlib.colors import Colormap
 from matplotlib.figure import Figure
 from matplotlib.tri import Triangulation
 
-from ...typing import Array, Integers
-from ..reader import Part, Result
-from ..units import Unit, quantity, unit_for
-from ..vtu import Body
-from .deformed import Footing, footings
-from .raster import shade
-from .style import BLUE, GREEN, GREY, HEADING, INK, WIDTH, area, figure, heading, pressure_scale, save, shades
-from .vtk_view import area_vectors
+from ....typing import Array, Integers
+from ...body_mesh import BodyMesh
+from ...reader import ContactPart, Result
+from ...units import Unit, quantity, unit_for
+from ..deformed import PartGeometry, part_geometries
+from ..raster import shade
+from ..registry import picture
+from ..style import BLUE, GREEN, GREY, HEADING, INK, WIDTH, area, figure, heading, pressure_scale, shades
+from ..vtk_view import area_vectors
 
 WIDEST, TALLEST = 5.8, 2.75
 """Inches: a map."""
@@ -32,7 +32,7 @@ ARROWS = 13
 
 
 @dataclass(frozen=True)
-class Flat:
+class FlatPart:
     """A part laid flat: its vertices (m, 2), m, triangles between them, the two axes (2, 3) and their names."""
 
     points: Array
@@ -41,10 +41,11 @@ class Flat:
     names: tuple[str, str]
 
 
-def draw(path: Path, result: Result, part: Part, body: Body) -> None:
+@picture("contact", dimension=3, of_part=True, caption="Along {part}: displacement, friction and pressure.")
+def draw(result: Result, part: ContactPart) -> Figure:
     """Draw the three maps of a part."""
-    foot = next(foot for foot in footings(result, body) if foot.part.name == part.name)
-    flat, normal = laid_flat(foot, body)
+    geometry = next(geometry for geometry in part_geometries(result) if geometry.part.name == part.name)
+    flat, normal = laid_flat(geometry, result.body)
     rows: list[tuple[str, str, Array, Array | None, Colormap | None]] = [
         ("slip", "m", part.slip, _vectors(part, flat, normal, "u_t"), shades(BLUE))
     ]
@@ -52,30 +53,32 @@ def draw(path: Path, result: Result, part: Part, body: Body) -> None:
         rows.append(("friction", "Pa", part.friction, _vectors(part, flat, normal, "friction_t"), shades(GREEN)))
     rows.append(("contact pressure", "Pa", part.pressure, None, None))
     width, height = _map_size(flat)
-    made = figure(HEADING + len(rows) * (height + GAP) + FOOT)
-    heading(made, result, f"on “{part.name}”")
+    fig = figure(HEADING + len(rows) * (height + GAP) + FOOT)
+    heading(fig, result, f"on “{part.name}”")
     for above, (words, name, values, arrows, colours) in enumerate(reversed(rows)):
-        axes = area(made, LEFT, FOOT + above * (height + GAP), width, height)
+        axes = area(fig, LEFT, FOOT + above * (height + GAP), width, height)
         unit = unit_for(float(np.nanmax(np.abs(values), initial=0.0)), name)
-        _map(made, axes, flat, np.asarray(values / unit.size), colours, _symbol(words, unit))
+        _map(fig, axes, flat, np.asarray(values / unit.size), colours, _symbol(words, unit))
         _grey_where_lifted(axes, flat, part)
         if arrows is not None:
             _arrows(axes, flat, arrows)
         _frame(axes, flat, last=above == 0)
-    _notes(made, result, part, flat)
-    save(made, path)
+    _notes(fig, result, part, flat)
+    return fig
 
 
-def laid_flat(foot: Footing, body: Body) -> tuple[Flat, Array]:
+def laid_flat(geometry: PartGeometry, body: BodyMesh) -> tuple[FlatPart, Array]:
     """The part in two of the coordinate axes, those most along it; and its mean unit normal."""
-    total = area_vectors(body.points, foot.facets).sum(axis=0)
+    total = area_vectors(body.points, geometry.facets).sum(axis=0)
     normal = total / (float(np.linalg.norm(total)) or 1.0)
     kept = [i for i in range(3) if i != int(np.argmax(np.abs(normal)))]
     axes = np.eye(3)[kept]
-    return Flat(foot.part.points @ axes.T, foot.row[foot.facets], axes, ("xyz"[kept[0]], "xyz"[kept[1]])), normal
+    return FlatPart(
+        geometry.part.points @ axes.T, geometry.row[geometry.facets], axes, ("xyz"[kept[0]], "xyz"[kept[1]])
+    ), normal
 
 
-def _vectors(part: Part, flat: Flat, normal: Array, column: str) -> Array:
+def _vectors(part: ContactPart, flat: FlatPart, normal: Array, column: str) -> Array:
     """A tangential field of the table along the map's axes; its tangents are the contract's, of the mean normal."""
     axis = np.array([0.0, 1.0, 0.0]) if abs(normal[0]) > np.cos(np.pi / 4) else np.array([1.0, 0.0, 0.0])
     first = axis - (axis @ normal) * normal
@@ -85,7 +88,7 @@ def _vectors(part: Part, flat: Flat, normal: Array, column: str) -> Array:
     return np.asarray(values @ tangents @ flat.axes.T)
 
 
-def _map_size(flat: Flat) -> tuple[float, float]:
+def _map_size(flat: FlatPart) -> tuple[float, float]:
     wide, tall = np.maximum(np.ptp(flat.points, axis=0), 1e-12)
     scale = min(WIDEST / wide, TALLEST / tall)
     return float(scale * wide), max(float(scale * tall), 0.6)
@@ -96,7 +99,7 @@ def _symbol(words: str, unit: Unit) -> str:
     return f"{words} {symbols[words]} in {unit.name}"
 
 
-def _map(made: Figure, axes: Axes, flat: Flat, values: Array, colours: Colormap | None, words: str) -> None:
+def _map(fig: Figure, axes: Axes, flat: FlatPart, values: Array, colours: Colormap | None, words: str) -> None:
     """Values as an image of the picture's own pixels, with a bar beside it, from zero; without colours, a pressure."""
     low, high = float(np.nanmin(values)), float(np.nanmax(np.abs(values)))
     scale = pressure_scale(low, high) if colours is None else (colours, 0.0, high or 1.0)
@@ -110,19 +113,19 @@ def _map(made: Figure, axes: Axes, flat: Flat, values: Array, colours: Colormap 
         extent=_extent(flat),
     )
     box = axes.get_position()
-    bar = made.add_axes((box.x1 + 0.02, box.y0, 0.02, box.height))
-    made.colorbar(drawn, cax=bar)
+    bar = fig.add_axes((box.x1 + 0.02, box.y0, 0.02, box.height))
+    fig.colorbar(drawn, cax=bar)
     bar.locator_params(axis="y", nbins=4)
     bar.spines[:].set_visible(False)
     axes.set_title(words, loc="left", size=14, parse_math=True)
 
 
-def _extent(flat: Flat) -> tuple[float, float, float, float]:
+def _extent(flat: FlatPart) -> tuple[float, float, float, float]:
     (left, bottom), (right, top) = flat.points.min(axis=0), flat.points.max(axis=0)
     return float(left), float(right), float(bottom), float(top)
 
 
-def _image(axes: Axes, flat: Flat, values: Array) -> Array:
+def _image(axes: Axes, flat: FlatPart, values: Array) -> Array:
     box = axes.get_window_extent()
     wide, tall = round(box.width), round(box.height)
     left, right, bottom, top = _extent(flat)
@@ -130,7 +133,7 @@ def _image(axes: Axes, flat: Flat, values: Array) -> Array:
     return shade((flat.points - [left, bottom]) * scale, flat.triangles, np.nan_to_num(values), (tall, wide))
 
 
-def _grey_where_lifted(axes: Axes, flat: Flat, part: Part) -> None:
+def _grey_where_lifted(axes: Axes, flat: FlatPart, part: ContactPart) -> None:
     if part.idle.any():
         image = _image(axes, flat, part.idle.astype(float))
         veil = np.zeros((*image.shape, 4))
@@ -139,7 +142,7 @@ def _grey_where_lifted(axes: Axes, flat: Flat, part: Part) -> None:
         axes.imshow(veil, origin="lower", aspect="auto", extent=_extent(flat))
 
 
-def _arrows(axes: Axes, flat: Flat, vectors: Array) -> None:
+def _arrows(axes: Axes, flat: FlatPart, vectors: Array) -> None:
     """A field along the part at the nodes of a coarse grid, whatever the mesh."""
     low, extent = flat.points.min(axis=0), np.ptp(flat.points, axis=0)
     spacing = float(np.max(extent)) / ARROWS
@@ -154,7 +157,7 @@ def _arrows(axes: Axes, flat: Flat, vectors: Array) -> None:
     axes.quiver(*np.meshgrid(x, y), *ways, **style, width=0.0045, color=INK, alpha=0.85)
 
 
-def _frame(axes: Axes, flat: Flat, *, last: bool) -> None:
+def _frame(axes: Axes, flat: FlatPart, *, last: bool) -> None:
     left, right, bottom, top = _extent(flat)
     axes.set_xlim(left, right)
     axes.set_ylim(bottom, top)
@@ -166,10 +169,10 @@ def _frame(axes: Axes, flat: Flat, *, last: bool) -> None:
         axes.set_xlabel(f"{flat.names[0]} in m")
 
 
-def _notes(made: Figure, result: Result, part: Part, flat: Flat) -> None:
+def _notes(fig: Figure, result: Result, part: ContactPart, flat: FlatPart) -> None:
     """Where the law drops, as a line on the map of the slip, and what grey means; both said there."""
     law, said = result.law(part.name), []
-    axes = made.axes[-2]  # the map on top, which was drawn last, before its bar
+    axes = fig.axes[-2]  # the map on top, which was drawn last, before its bar
     kinks = law.concave.kinks if law is not None else np.empty(0)
     for kink in kinks[kinks > 0.0]:
         if np.nanmin(part.slip) < kink < np.nanmax(part.slip):
@@ -180,15 +183,15 @@ def _notes(made: Figure, result: Result, part: Part, flat: Flat) -> None:
             said.append(f"the law drops at {quantity(float(kink), 'm')}, not reached")
     if part.idle.any():
         said.append(f"grey: lifted, up to {quantity(float(np.nanmax(part['gap'])), 'm')}")
-    _say(made, axes, said[-2:])
+    _say(fig, axes, said[-2:])
 
 
-def _say(made: Figure, axes: Axes, said: list[str]) -> None:
+def _say(fig: Figure, axes: Axes, said: list[str]) -> None:
     """Beside the map and its bar if there is room, else above it."""
     box = axes.get_position()
     style: dict[str, Any] = {"size": 12, "color": GREY}
     if box.x1 < ROOMY:
         lines = [line for words in said for line in textwrap.wrap(words, 24)]
-        made.text(box.x1 + 0.13, box.y1, "\n".join(lines), va="top", linespacing=1.4, **style)
+        fig.text(box.x1 + 0.13, box.y1, "\n".join(lines), va="top", linespacing=1.4, **style)
     else:
-        made.text(1 - 0.3 / WIDTH, box.y1 + 0.007, "; ".join(said), ha="right", va="bottom", **style)
+        fig.text(1 - 0.3 / WIDTH, box.y1 + 0.007, "; ".join(said), ha="right", va="bottom", **style)

@@ -3,52 +3,60 @@
 from __future__ import annotations
 
 from functools import partial
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+from matplotlib.figure import Figure
 
-from ...typing import Array
-from ..reader import Result
-from ..vtu import Body
-from . import vtk_loads
-from .body_plane import canvas
-from .deformed import Deformed
-from .escape_plane import WAY, arrow, keys, say
-from .finite_motion import fitted, followed
-from .loads_supports import loads
-from .style import INK, PALE, VERMILION, heading, save
-from .vtk_view import best_view, creases, render, surface
+from ....typing import Array
+from ...body_mesh import BodyMesh
+from ...reader import Result
+from .. import vtk_loads
+from ..deformed import DeformedBody
+from ..escape_marks import WAY, arrow, keys, say
+from ..finite_motion import fitted, followed
+from ..loads_supports import loaded_sides
+from ..plane_canvas import canvas
+from ..registry import picture
+from ..style import INK, PALE, VERMILION, heading
+from ..vtk_view import best_view, creases, render, surface
 
 if TYPE_CHECKING:
     import pyvista
 
 
-def draw(path: Path, result: Result, body: Body) -> None:
+@picture(
+    "escape",
+    dimension=3,
+    rendered=True,
+    caption="The rigid motion along which the load carries the body away.",
+    wanted=lambda result: result.body.escape_mode is not None,
+)
+def draw(result: Result) -> Figure:
     """Draw a body in space and its ghost."""
-    mover, view = body.moving("escape_mode"), best_view([])
-    motion = fitted(mover, mover.fields["escape_mode"])
-    rest, pulled = Deformed(body, np.zeros_like(body.points), 1.0), loads(result, body)
+    body, mover, view = result.body, result.body.moving(), best_view([])
+    motion = fitted(mover)
+    rest, pulled = DeformedBody(body, np.zeros_like(body.points), 1.0), loaded_sides(result)
     arrows = [vtk_loads.arrows(rest, load) for load in pulled]
     ghost, posts = motion.at(mover.points), followed(mover, motion)
     posts = posts[view.depth(posts) >= np.quantile(view.depth(posts), 0.15)]  # not the one behind the body
     ways = np.stack([motion.at(posts, part) for part in WAY], axis=1)
     reached = [end for tails, along in arrows for end in (tails, tails + along)]
     everything = np.concatenate([body.points, ghost, ways.reshape(-1, 3), *reached])
-    made, axes = canvas(view.project(everything))
-    heading(made, result, "rigid motion")
+    fig, axes = canvas(view.project(everything))
+    heading(fig, result, "rigid motion")
     depths = (float(view.depth(everything).min()), float(view.depth(everything).max()))
     nearer = ghost + 1e-3 * body.size * view.toward  # where the two share a face, the ghost's is seen
     render(axes, view, depths, partial(_fill, body=body, mover=mover, ghost=nearer, arrows=arrows))
     vtk_loads.labels(axes, view, rest, pulled)
     for way in ways:
         arrow(axes, view.project(way))
-    say(made, result, keys())
-    save(made, path)
+    say(fig, result, keys())
+    return fig
 
 
 def _fill(
-    plotter: pyvista.Plotter, *, body: Body, mover: Body, ghost: Array, arrows: list[tuple[Array, Array]]
+    plotter: pyvista.Plotter, *, body: BodyMesh, mover: BodyMesh, ghost: Array, arrows: list[tuple[Array, Array]]
 ) -> None:
     facets = body.boundary
     plotter.add_mesh(surface(body.points, facets), color=PALE, ambient=0.75, diffuse=0.3)

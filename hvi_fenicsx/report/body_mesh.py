@@ -1,0 +1,113 @@
+"""The body of a result as a mesh: its boundary, which looks outwards, and its fields."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from ..typing import Array, Integers, Mask
+from .solution_arrays import SolutionArrays
+
+
+@dataclass(frozen=True, kw_only=True)
+class BodyMesh:
+    """A mesh of c triangles or tetrahedra with n vertices, which stand in space in both cases.
+
+    Attributes:
+        points: the vertices, m, (n, 3).
+        cells: the vertices of each cell, (c, 3) or (c, 4).
+        displacement: m, (n, 3); None where nothing was solved.
+        escape_mode: the rigid motion along which the body escapes, (n, 3); None where it does not.
+        von_mises: the von Mises stress of each cell, N/m², (c,); None where it was not computed.
+    """
+
+    points: Array
+    cells: Integers
+    displacement: Array | None = None
+    escape_mode: Array | None = None
+    von_mises: Array | None = None
+
+    @property
+    def dimension(self) -> int:
+        """2 or 3."""
+        return int(self.cells.shape[1]) - 1
+
+    @cached_property
+    def size(self) -> float:
+        """The largest extent, m."""
+        return float(np.max(np.ptp(self.points, axis=0)))
+
+    @property
+    def boundary(self) -> Integers:
+        """Facets of one cell only (k, 2|3); counterclockwise seen from outside, in the plane the body on their left."""
+        return self._skin[0]
+
+    @property
+    def behind(self) -> Integers:
+        """The cell of each facet of the boundary, (k,)."""
+        return self._skin[1]
+
+    @cached_property
+    def _skin(self) -> tuple[Integers, Integers]:
+        d = self.dimension
+        facets = np.concatenate([np.delete(self.cells, i, axis=1) for i in range(d + 1)])
+        _, first, count = np.unique(_keys(facets, len(self.points)), return_index=True, return_counts=True)
+        alone = np.sort(first[count == 1])
+        opposite = self.cells.T.ravel()[alone]
+        return _outward(self.points, facets[alone], opposite), alone % len(self.cells)
+
+    def among(self, facets: Integers) -> Mask:
+        """Which facets of the boundary are among these facets (j, 2|3), whatever the order of their vertices; (k,)."""
+        count = len(self.points)
+        return np.asarray(np.isin(_keys(self.boundary, count), _keys(facets, count)))
+
+    def oriented(self, facets: Integers) -> Integers:
+        """These facets (j, 2|3) as they are in the boundary; those inside of the body are left out."""
+        return np.asarray(self.boundary[self.among(facets)])
+
+    def moving(self) -> BodyMesh:
+        """The body that the escape mode moves, one of several: it leaves a point or an axis at rest, but no cell."""
+        assert self.escape_mode is not None
+        moves = np.any(self.escape_mode != 0.0, axis=1)
+        cells = self.cells[np.any(moves[self.cells], axis=1)]
+        kept, numbered = np.unique(cells, return_inverse=True)
+        return BodyMesh(
+            points=self.points[kept], cells=numbered.reshape(cells.shape), escape_mode=self.escape_mode[kept]
+        )
+
+
+def body_mesh(arrays: SolutionArrays) -> BodyMesh:
+    """The body of a solution."""
+    return BodyMesh(
+        points=_in_space(arrays.points),
+        cells=arrays.cells,
+        displacement=None if arrays.displacement is None else _in_space(arrays.displacement),
+        escape_mode=None if arrays.escape_mode is None else _in_space(arrays.escape_mode),
+        von_mises=None if arrays.von_mises is None else arrays.von_mises.astype(np.float64),
+    )
+
+
+def _in_space(vectors: Array) -> Array:
+    """Vectors (n, d) with zeros for what they lack of three components."""
+    return np.pad(vectors, ((0, 0), (0, 3 - vectors.shape[1])))
+
+
+def _outward(points: Array, facets: Integers, opposite: Integers) -> Integers:
+    """Facets turned so that the opposite corner of their cell is behind them."""
+    corner = points[facets[:, 0]]
+    sides = [points[facets[:, i]] - corner for i in range(1, facets.shape[1])]
+    if len(sides) == 1:  # the way out of the page makes a triangle of an edge
+        sides.append(np.broadcast_to([0.0, 0.0, 1.0], corner.shape))
+    inward = np.einsum("ki,ki->k", np.cross(sides[0], sides[1]), points[opposite] - corner) > 0.0
+    return np.where(inward[:, None], facets[:, ::-1], facets)
+
+
+def _keys(facets: Integers, count: int) -> Integers:
+    """One number for each set of corners."""
+    ordered = np.sort(facets, axis=1)
+    key = ordered[:, 0]
+    for column in ordered.T[1:]:
+        key = key * count + column
+    return key

@@ -1,0 +1,61 @@
+"""Contact parts of a body in space as they are drawn: where they are, or beside the body if it hides them.
+
+A part that looks away from the eye, as the underside does, is moved along its normal: its footprint.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from ...typing import Array
+from .deformed import DeformedBody, PartGeometry
+from .style import GREY
+from .vtk_view import View
+
+FACING = 0.15
+"""Cosine from which a part is drawn where it is."""
+
+
+@dataclass(frozen=True)
+class Footprint:
+    """A contact part as drawn: its facets at the points (n, 3), and -σ_n by vertex, NaN where it is lifted."""
+
+    geometry: PartGeometry
+    points: Array
+    away: Array
+    """How far it is moved, (3,); zero for one that is drawn where it is."""
+
+    @property
+    def pressure(self) -> Array:
+        """-σ_n by vertex of the body, NaN where it is lifted and off the part."""
+        values = np.full(len(self.points), np.nan)
+        part = self.geometry.part
+        values[self.geometry.vertices] = np.where(part.idle, np.nan, part.pressure)
+        return values
+
+
+def footprint(shape: DeformedBody, view: View, geometry: PartGeometry, normal: Array) -> Footprint:
+    """A part where it is if it is seen there, else so far out along its normal that the body does not hide it."""
+    unit = np.asarray(normal / (float(np.linalg.norm(normal)) or 1.0), dtype=np.float64)
+    if float(unit @ view.toward) > FACING:
+        return Footprint(geometry, shape.points + 1e-3 * shape.body.size * view.toward, np.zeros(3))
+    seen = view.project(unit[None])[0]
+    across = seen / float(np.linalg.norm(seen))
+    everything = view.project(np.concatenate([shape.points, shape.body.points])) @ across
+    own = view.project(shape.points[geometry.vertices]) @ across
+    way = (everything.max() - own.min() + 0.05 * shape.body.size) / float(np.linalg.norm(seen)) * unit
+    return Footprint(geometry, shape.points + way, way)
+
+
+def guides(axes: Axes, view: View, shape: DeformedBody, patch: Footprint) -> None:
+    """Thin lines from a part on the body to its footprint, at its outermost points."""
+    if not patch.away.any():
+        return
+    start = view.project(shape.points[patch.geometry.vertices])
+    end = view.project(patch.points[patch.geometry.vertices])
+    across = np.array([-(end - start)[0, 1], (end - start)[0, 0]])
+    for i in (int(np.argmin(start @ across)), int(np.argmax(start @ across))):
+        axes.plot(*np.array([start[i], end[i]]).T, color=GREY, lw=1.1, ls=(0, (2, 3)), zorder=0.5)

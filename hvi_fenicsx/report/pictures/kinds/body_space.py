@@ -1,0 +1,130 @@
+"""``body.png`` of a body in space: deformed over its edges, |u| on it, contact pressure on its parts."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.colors import Colormap
+from matplotlib.figure import Figure
+
+from ....typing import Array
+from ...reader import Result
+from ...units import quantity, times, unit_for
+from .. import vtk_loads
+from ..deformed import DeformedBody, PartGeometry, deform, largest_stress, part_geometries
+from ..footprints import Footprint, footprint, guides
+from ..legend import colour_bar
+from ..loads_supports import loaded_sides
+from ..plane_canvas import canvas
+from ..registry import picture
+from ..style import GREY, INK, PALE, SLATE, heading, pressure_scale
+from ..vtk_view import area_vectors, best_view, creases, render, surface
+
+if TYPE_CHECKING:
+    import pyvista
+
+LEGIBLE = 5000
+"""Facets up to which their edges are drawn."""
+
+
+@picture(
+    "body",
+    dimension=3,
+    rendered=True,
+    caption="The deformed body, its displacements magnified, with what acts on it.",
+    wanted=lambda result: result.body.displacement is not None,
+)
+def draw(result: Result) -> Figure:
+    """Draw the body with its loads and contact parts."""
+    body, parts, pulled = result.body, part_geometries(result), loaded_sides(result)
+    shape = deform(body, parts)
+    normals = [area_vectors(body.points, geometry.facets).sum(axis=0) for geometry in parts]
+    view = best_view(normals)
+    shown = [footprint(shape, view, geometry, normal) for geometry, normal in zip(parts, normals, strict=True)]
+    arrows = [vtk_loads.arrows(shape, load) for load in pulled]
+    reached = [shape.points, body.points, *(s.points[s.geometry.vertices] for s in shown)]
+    reached += [end for tails, ways in arrows for end in (tails, tails + ways)]
+    everything = np.concatenate(reached)
+    fig, axes = canvas(view.project(everything))
+    heading(fig, result, "deformed body")
+    scale = pressure_scale(_lowest(parts), largest_stress(parts))
+    depths = (float(view.depth(everything).min()), float(view.depth(everything).max()))
+    render(axes, view, depths, partial(_fill, shape=shape, shown=shown, arrows=arrows, scale=scale))
+    vtk_loads.labels(axes, view, shape, pulled)
+    for patch in shown:
+        guides(axes, view, shape, patch)
+    _foot(fig, shape, shown, scale)
+    return fig
+
+
+def _fill(
+    plotter: pyvista.Plotter,
+    *,
+    shape: DeformedBody,
+    shown: list[Footprint],
+    arrows: list[tuple[Array, Array]],
+    scale: tuple[Colormap, float, float],
+) -> None:
+    facets = shape.body.boundary
+    skin = surface(shape.points, facets)
+    skin.point_data["amount"] = shape.amount[skin.point_data["vertex"]]
+    plotter.add_mesh(
+        skin,
+        scalars="amount",
+        cmap=SLATE,
+        clim=(0.0, float(shape.amount.max()) or 1.0),
+        show_edges=len(facets) <= LEGIBLE,
+        edge_color="white",
+        edge_opacity=0.4,
+        line_width=1,
+        ambient=0.6,
+        diffuse=0.45,
+        show_scalar_bar=False,
+    )
+    plotter.add_mesh(creases(shape.points, facets), color=INK, line_width=3)
+    plotter.add_mesh(creases(shape.body.points, facets), color=GREY, line_width=2)
+    for part in shown:
+        _fill_part(plotter, part, scale)
+    for tails, ways in arrows:
+        vtk_loads.fill(plotter, tails, ways)
+
+
+def _fill_part(plotter: pyvista.Plotter, part: Footprint, scale: tuple[Colormap, float, float]) -> None:
+    patch = surface(part.points, part.geometry.facets)
+    patch.point_data["pressure"] = part.pressure[patch.point_data["vertex"]]
+    plotter.add_mesh(
+        patch,
+        scalars="pressure",
+        cmap=scale[0],
+        clim=scale[1:],
+        nan_color=PALE,
+        show_scalar_bar=False,
+        lighting=False,
+    )
+    plotter.add_mesh(creases(part.points, part.geometry.facets), color=INK, line_width=3)
+
+
+def _lowest(parts: list[PartGeometry]) -> float:
+    return min((float(np.nanmin(geometry.part.pressure)) for geometry in parts), default=0.0)
+
+
+def _foot(fig: Figure, shape: DeformedBody, shown: list[Footprint], scale: tuple[Colormap, float, float]) -> None:
+    most = float(shape.amount.max())
+    unit = unit_for(most, "m")
+    words = f"displacement |u|, up to {unit.text(most)}"
+    colour_bar(fig, SLATE, (0.0, most / unit.size), words, times(shape.factor))
+    if shown:
+        colours, low, high = scale
+        unit = unit_for(high, "Pa")
+        words = f"contact pressure, up to {unit.text(high)}" if low == 0.0 else f"contact pressure in {unit.name}"
+        colour_bar(fig, colours, (low / unit.size, high / unit.size), words, _remark(shown), at=3.75)
+
+
+def _remark(shown: list[Footprint]) -> str:
+    """Where the footprints are, and what grey means on them."""
+    gaps = [float(np.max(s.geometry.part["gap"][s.geometry.part.idle])) for s in shown if s.geometry.part.idle.any()]
+    lifted = [f"grey: lifted, up to {quantity(max(gaps), 'm')}"] if gaps else []
+    away = [s.geometry.part.name for s in shown if s.away.any()]
+    return lifted[0] if lifted else f"“{'”, “'.join(away)}” drawn apart" if away else ""

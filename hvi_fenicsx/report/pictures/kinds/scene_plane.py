@@ -1,0 +1,76 @@
+"""``scene.png`` of a plane body: undeformed, with the names of its parts, their loads, supports and contact."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import PathPatch
+
+from ...body_mesh import BodyMesh
+from ...reader import Result
+from .. import plane_marks as marks
+from ..boundary_chains import chains, closed_path
+from ..deformed import DeformedBody
+from ..legend import legend
+from ..loads_supports import Side, held_sides, loaded_sides, tables
+from ..plane_canvas import canvas
+from ..registry import picture
+from ..scene_legend import inside, say, touches
+from ..style import BLUE, INK, VERMILION, heading
+
+INSIDE = 0.045
+"""How far inside of its part a name is written, of the body's size."""
+
+
+@picture(
+    "scene",
+    dimension=2,
+    caption="The scene: the undeformed body with its supports, loads and contact parts.",
+    wanted=lambda result: bool(result.sides),
+)
+def draw(result: Result) -> Figure:
+    """Draw the scene of a plane body."""
+    body = result.body
+    rest = DeformedBody(body, np.zeros_like(body.points), 1.0)
+    drawn = [*marks.supports(rest, held_sides(result)), *marks.loads(rest, loaded_sides(result))]
+    fig, axes = canvas(np.concatenate([body.points[:, :2], *(mark.extent for mark in drawn)]))
+    heading(fig, result, "the scene")
+    outline = closed_path(body.points, chains(body.boundary))
+    axes.add_patch(PathPatch(outline, fc="#eef2f5", ec=INK, lw=1.6, joinstyle="round", zorder=1))
+    found = list(tables(result))
+    for side, table in found:
+        _part(axes, body, side, table)
+    for mark in drawn:
+        mark.draw(axes)
+    say(fig, body)
+    legend(fig, [*keys(table for _, table in found), *marks.keys(drawn), *inside(result)])
+    return fig
+
+
+def keys(found: Iterator[Mapping[str, Any]]) -> list[Artist]:
+    """The legend's line for contact parts, if there is one."""
+    return (
+        [Line2D([], [], color=VERMILION, lw=5, label="contact, friction or adhesion")]
+        if any(map(touches, found))
+        else []
+    )
+
+
+def _part(axes: Axes, body: BodyMesh, side: Side, table: Mapping[str, Any]) -> None:
+    """The part's line where something touches it, and its name inside of it."""
+    line = body.points[side.vertices, :2]
+    if touches(table):
+        axes.plot(*line.T, color=VERMILION, lw=5, solid_capstyle="butt", zorder=2)
+    middle, inward = len(line) // 2, -side.normals[len(line) // 2, :2]
+    depth = min(INSIDE * body.size, float(np.ptp(body.points[:, :2], axis=0).min()) / 2)
+    at = (line[(len(line) - 1) // 2] + line[middle]) / 2 + depth * inward
+    upright = abs(inward[0]) > 0.8
+    halo = {"boxstyle": "round,pad=0.1", "fc": "#eef2f5", "ec": "none", "alpha": 0.8}
+    style: dict[str, Any] = {"ha": "center", "va": "center", "size": 12.5, "color": BLUE, "bbox": halo, "zorder": 8}
+    axes.text(at[0], at[1], side.part, rotation=90 if upright else 0, **style)

@@ -1,0 +1,45 @@
+"""``stress.png`` of a plane body: the von Mises stress by cell, with loads, supports and obstacles around it."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from ...reader import Result
+from ...units import times
+from .. import plane_marks as marks
+from ..deformed import deform, largest_stress, part_geometries
+from ..legend import legend
+from ..loads_supports import held_sides, loaded_sides
+from ..plane_canvas import canvas, paint
+from ..registry import picture
+from ..stress_scale import bar, scale_of
+from ..style import EMBER, heading
+
+
+@picture(
+    "stress",
+    dimension=2,
+    caption="Stress in the body (von Mises), constant in each cell; the scale may end below a peak in a corner.",
+    wanted=lambda result: result.body.von_mises is not None,
+)
+def draw(result: Result) -> Figure:
+    """Draw the deformed body, each cell in the colour of its stress."""
+    body, parts = result.body, part_geometries(result)
+    assert body.von_mises is not None
+    shape, values = deform(body, parts), body.von_mises
+    drawn = [
+        *marks.supports(shape, held_sides(result)),
+        *marks.loads(shape, loaded_sides(result)),
+        *(m for part in parts for m in marks.contact(shape, part, largest_stress(parts))),
+    ]
+    fig, axes = canvas(np.concatenate([shape.points[:, :2], body.points[:, :2], *(m.extent for m in drawn)]))
+    heading(fig, result, "stress in the body")
+    scale = scale_of(body, values)
+    apart = np.arange(body.cells.size).reshape(body.cells.shape)  # corners that no two cells share
+    paint(axes, shape, apart, shape.points[body.cells.ravel()], np.repeat(values, 3), EMBER, scale.end)
+    for mark in drawn:
+        mark.draw(axes)
+    bar(fig, scale, times(shape.factor))
+    legend(fig, [marks.undeformed(), *marks.keys(drawn)])
+    return fig

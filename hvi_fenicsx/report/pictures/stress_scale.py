@@ -1,0 +1,47 @@
+"""The scale of the stress in the body, and its colour bar."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from ...typing import Array
+from ..body_mesh import BodyMesh
+from ..units import unit_for
+from .legend import colour_bar
+from .style import EMBER
+
+PEAK, SPOILS = 0.005, 1.25
+"""Of the body's volume, left beyond the end of a scale; how many times its end the peak must be."""
+
+
+@dataclass(frozen=True)
+class Scale:
+    """A scale for numbers of the cells, from zero; ``cut`` where it ends below the largest of them."""
+
+    end: float
+    largest: float
+
+    @property
+    def cut(self) -> bool:
+        """Whether some cells have more."""
+        return self.end < self.largest
+
+
+def scale_of(body: BodyMesh, values: Array) -> Scale:
+    """A scale that a peak in a corner does not spoil: it ends where a share ``PEAK`` of the body has more."""
+    sides = body.points[body.cells[:, 1:]] - body.points[body.cells[:, :1]]
+    volume = np.sqrt(np.linalg.det(sides @ sides.transpose(0, 2, 1)))
+    order = np.argsort(values)
+    share = np.cumsum(volume[order]) / volume.sum()
+    end, largest = float(values[order][np.searchsorted(share, 1.0 - PEAK)]), float(values.max())
+    return Scale(end if 0.0 < end < largest / SPOILS else largest, largest)
+
+
+def bar(fig: Figure, scale: Scale, remark: str) -> None:
+    """The bar of the stress, and how large it is where the scale does not reach."""
+    unit = unit_for(scale.end, "Pa")
+    words = f"von Mises stress, {'peak' if scale.cut else 'up to'} {unit.text(scale.largest)}"
+    colour_bar(fig, EMBER, (0.0, scale.end / unit.size), words, remark)

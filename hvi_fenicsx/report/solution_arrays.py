@@ -1,0 +1,159 @@
+"""``solution.npz``: a solution as plain arrays, in SI, for pictures, pages and studies.
+
+This module alone knows the keys of the file. With n vertices and c cells in d dimensions they are:
+
+- ``points`` (n, d) in m; ``cells`` (c, d+1), the vertices of each cell
+- ``displacement`` (n, d) in m, or ``escape_mode`` (n, d) where no solution exists
+- ``von_mises`` (c,) in N/m²
+- ``side:NAME`` (k, d), the vertices of each facet of a boundary table of the scene
+- ``part:NAME:KEY``, a part of Γc with m vertices: ``vertices`` (m,), ``facets`` (k, d), ``weights`` (m,), ``normals``
+  (m, d), ``drops``, and the columns of ``contact.csv`` by their names, (m,) each
+"""
+
+from __future__ import annotations
+
+import os
+import zipfile
+import zlib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ..typing import Array, Integers
+from .errors import ResultError
+
+Singles = npt.NDArray[np.float32]
+"""Real numbers in single precision, whose seven digits are enough for a stress."""
+FILE = "solution.npz"
+_SIDE, _PART = "side:", "part:"
+
+
+@dataclass(frozen=True, kw_only=True)
+class PartArrays:
+    """A part of Γc with m vertices and k facets, in d dimensions.
+
+    Attributes:
+        columns: the columns of ``contact.csv`` that the part has, (m,) each, in the order of that table; NaN where the
+            table is empty.
+        vertices: the vertices of the body, (m,).
+        facets: segments or triangles by the vertices of the body, (k, d), each row ascending.
+        weights: lumped lengths or areas of the vertices, m or m², (m,).
+        normals: outward unit normals, (m, d).
+        drops: the slips at which the friction law drops, m.
+    """
+
+    columns: Mapping[str, Array]
+    vertices: Integers
+    facets: Integers
+    weights: Array
+    normals: Array
+    drops: Array
+
+
+@dataclass(frozen=True, kw_only=True)
+class SolutionArrays:
+    """A solution with n vertices and c cells in d dimensions.
+
+    Attributes:
+        points: the vertices, m, (n, d).
+        cells: the vertices of each cell, (c, d+1).
+        displacement: m, (n, d); None where nothing was solved.
+        escape_mode: the rigid motion along which the body escapes, (n, d); None where it does not.
+        von_mises: the von Mises stress of each cell, N/m², (c,); None where it was not computed.
+        sides: the facets of each boundary table of the scene, (k, d), each row ascending.
+        parts: the parts of Γc by name.
+    """
+
+    points: Array
+    cells: Integers
+    displacement: Array | None = None
+    escape_mode: Array | None = None
+    von_mises: Singles | None = None
+    sides: Mapping[str, Integers] = field(default_factory=dict)
+    parts: Mapping[str, PartArrays] = field(default_factory=dict)
+
+
+def save(path: Path, arrays: SolutionArrays) -> None:
+    """Write a solution, whole or not at all.
+
+    Args:
+        path: the file.
+        arrays: the solution.
+
+    Raises:
+        OSError: it cannot be written.
+    """
+    aside = path.with_name(f".{path.name}.{os.getpid()}")
+    try:
+        with aside.open("wb") as file:
+            np.savez(file, **dict(_members(arrays)))
+        os.replace(aside, path)
+    finally:
+        aside.unlink(missing_ok=True)
+
+
+def _members(arrays: SolutionArrays) -> Iterator[tuple[str, Any]]:
+    """The arrays by their keys; those that are None are left out."""
+    plain = {key: value for key, value in vars(arrays).items() if key not in ("sides", "parts")}
+    yield from ((key, value) for key, value in plain.items() if value is not None)
+    yield from ((f"{_SIDE}{name}", facets) for name, facets in arrays.sides.items())
+    for name, part in arrays.parts.items():
+        own = {key: value for key, value in vars(part).items() if key != "columns"}
+        yield from ((f"{_PART}{name}:{key}", value) for key, value in {**own, **part.columns}.items())
+
+
+def load(path: Path) -> SolutionArrays:
+    """Read a solution.
+
+    Raises:
+        ResultError: the file is missing or damaged.
+    """
+    try:
+        with np.load(path) as stored:
+            arrays = _arrays({key: stored[key] for key in stored.files})
+        _check(arrays)
+        return arrays
+    except FileNotFoundError:
+        raise ResultError(
+            f"{path}: there is no such file; results of earlier versions do not have it: run the scene again"
+        ) from None
+    except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile, zlib.error) as error:
+        raise ResultError(f"{path}: damaged ({error})") from None
+
+
+def _arrays(members: Mapping[str, Any]) -> SolutionArrays:
+    parts: dict[str, dict[str, Any]] = {}
+    for key in members:
+        if key.startswith(_PART):
+            name, own = key.removeprefix(_PART).rsplit(":", 1)
+            parts.setdefault(name, {})[own] = members[key]
+    return SolutionArrays(
+        **{key: value for key, value in members.items() if not key.startswith((_SIDE, _PART))},
+        sides={key.removeprefix(_SIDE): value for key, value in members.items() if key.startswith(_SIDE)},
+        parts={name: _part(own) for name, own in parts.items()},
+    )
+
+
+def _part(members: dict[str, Any]) -> PartArrays:
+    own = {key: members.pop(key) for key in ("vertices", "facets", "weights", "normals", "drops")}
+    return PartArrays(columns=members, **own)
+
+
+def _check(arrays: SolutionArrays) -> None:
+    """Refuse arrays that do not belong together."""
+    n = len(arrays.points)
+    numbers = [arrays.cells, *arrays.sides.values()]
+    numbers += [values for part in arrays.parts.values() for values in (part.vertices, part.facets)]
+    by_vertex = [values for values in (arrays.displacement, arrays.escape_mode) if values is not None]
+    lengths = [(n, len(values)) for values in by_vertex]
+    lengths += [(len(arrays.cells), len(arrays.von_mises))] if arrays.von_mises is not None else []
+    for part in arrays.parts.values():
+        lengths += [(len(part.vertices), len(v)) for v in (part.weights, part.normals, *part.columns.values())]
+    if any(one != other for one, other in lengths) or any(
+        values.size and not 0 <= values.min() <= values.max() < n for values in numbers
+    ):
+        raise ValueError("its arrays do not belong together")

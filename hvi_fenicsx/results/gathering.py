@@ -1,0 +1,115 @@
+"""A solution as plain arrays on rank 0, in SI, whatever the ranks; its vertices are numbered as the unknowns are."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import dolfinx
+import numpy as np
+import numpy.typing as npt
+from dolfinx import fem
+from mpi4py import MPI
+
+from ..certify.contact_state import State
+from ..effects import Direction
+from ..mesh.vertex_dofs import dof_of_node
+from ..problem.problem import Problem
+from ..report.solution_arrays import PartArrays, Singles, SolutionArrays
+from ..typing import Array, Entities, Integers
+from ..workflow import Solution
+from . import arc_length, contact_table
+
+
+def solution_arrays(solution: Solution, von_mises: Singles | None = None) -> SolutionArrays | None:
+    """A solution on rank 0; None elsewhere. Collective.
+
+    Args:
+        solution: what was found.
+        von_mises: of the cells that this rank owns, N/m², (c,); left out where it is None.
+    """
+    problem = solution.problem
+    comm, d = problem.domain.mesh.comm, problem.scales.dimension
+    owned = problem.space.dofmap.index_map.size_local
+    fields: dict[str, npt.NDArray[Any]] = {"points": problem.points[:owned, :d], "cells": _cells(problem)}
+    if solution.solve_result is not None:
+        fields["displacement"] = _by_vertex(problem, solution.solve_result.u) * problem.scales.displacement
+    elif solution.solvability.direction is not None:
+        points = np.asarray(problem.points / problem.scales.length)
+        fields["escape_mode"] = problem.bodies.motion(points, solution.solvability.direction)[:owned]
+    if von_mises is not None:
+        fields["von_mises"] = von_mises
+    gathered = {name: _joined(comm, values) for name, values in fields.items()}
+    sides = {name: _facets(problem, problem.domain.facets(on)) for name, on in solution.scene.parts.items()}
+    parts = _parts(problem, () if solution.examination is None else solution.examination.states)
+    return None if comm.rank else SolutionArrays(**gathered, sides=sides, parts=parts)
+
+
+def _by_vertex(problem: Problem, u: fem.Function) -> Array:
+    """The vectors at the vertices that this rank owns, (n, d)."""
+    owned = problem.space.dofmap.index_map.size_local
+    return np.asarray(u.x.array.reshape(-1, problem.scales.dimension)[:owned], dtype=np.float64)
+
+
+def _cells(problem: Problem) -> Integers:
+    """The cells that this rank owns by their global vertices, (c, d+1)."""
+    space, topology = problem.space, problem.domain.mesh.topology
+    own = space.dofmap.list[: topology.index_map(topology.dim).size_local]
+    return _globally(problem, own)
+
+
+def _globally(problem: Problem, vertices: Entities) -> Integers:
+    """Local vertices of any shape by their global numbers."""
+    found = problem.space.dofmap.index_map.local_to_global(np.ascontiguousarray(vertices, dtype=np.int32).ravel())
+    return np.asarray(found, dtype=np.int64).reshape(vertices.shape)
+
+
+def _facets(problem: Problem, facets: Entities) -> Integers:
+    """Local facets by their global vertices, each once and ascending, (k, d); right on rank 0 alone. Collective."""
+    mesh, d = problem.domain.mesh, problem.scales.dimension
+    corners = np.empty((0, d), dtype=np.int32)
+    if len(facets):  # dolfinx divides by their number
+        corners = dof_of_node(problem.space)[dolfinx.mesh.entities_to_geometry(mesh, d - 1, facets)]
+    return np.unique(np.sort(_joined(mesh.comm, _globally(problem, corners)), axis=1), axis=0)
+
+
+def _parts(problem: Problem, states: Sequence[State]) -> dict[str, PartArrays]:
+    """The parts of Γc by name, sorted by it, on rank 0; elsewhere empty. Collective."""
+    ordered = sorted(states, key=lambda state: state.surface.part)
+    found = {state.surface.part: _part(problem, state) for state in ordered}
+    return {name: part for name, part in found.items() if part is not None}
+
+
+def _part(problem: Problem, state: State) -> PartArrays | None:
+    """A part in the order of ``contact.csv``. Collective."""
+    comm, scales, surface = problem.domain.mesh.comm, problem.scales, state.surface
+    columns = {name: _joined(comm, values) for name, values in contact_table.columns(problem, state).items()}
+    vertices = _joined(comm, _globally(problem, surface.blocks))
+    weights = _joined(comm, surface.weights * scales.length ** (scales.dimension - 1))
+    normals = _joined(comm, surface.normals)
+    facets = _facets(problem, surface.facets)
+    if scales.dimension == 2:
+        pairs = _joined(comm, arc_length.edges(problem, surface))
+    if comm.rank:
+        return None
+    if scales.dimension == 2:
+        order, s = arc_length.along(np.column_stack([columns["x"], columns["y"]]), vertices, pairs)
+        columns = {name: values[order] for name, values in columns.items()} | {"s": s}
+    else:
+        order = arc_length.lexicographic(np.column_stack([columns[axis] for axis in "xyz"]))
+        columns = {name: values[order] for name, values in columns.items()}
+    drops = [term.exact.concave.kinks for term in state.terms if term.direction is Direction.SLIP]
+    return PartArrays(
+        columns=columns,
+        vertices=vertices[order],
+        facets=facets,
+        weights=weights[order],
+        normals=normals[order],
+        drops=np.concatenate([np.empty(0), *drops]) * scales.displacement,
+    )
+
+
+def _joined(comm: MPI.Comm, values: npt.NDArray[Any]) -> Any:
+    """What all ranks have, one after the other, on rank 0; elsewhere their own. Collective."""
+    pieces = comm.gather(np.ascontiguousarray(values), root=0)
+    return values if pieces is None else np.concatenate(pieces)
