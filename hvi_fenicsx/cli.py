@@ -13,10 +13,9 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import NoReturn
 
-from .errors import HviError, InputError
+from .errors import ExitCode, HviError, InputError
 from .runtime import processes
 
-INTERRUPTED = 130
 QUANTITIES = ("energy", "u_t", "sigma_t", "resultant", "lambda_held", "lambda_peak")
 """What an accuracy may be asked of (docs/accuracy.md)."""
 
@@ -137,7 +136,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return error.exit_code
     except KeyboardInterrupt:
         _complain("hvi: interrupted; nothing was written")
-        return INTERRUPTED
+        return ExitCode.INTERRUPTED
 
 
 def _joined(words: Sequence[str]) -> list[str]:
@@ -157,7 +156,7 @@ def _dispatch(options: argparse.Namespace, words: Sequence[str]) -> int:
     if getattr(options, "np", None) and not _under_mpi():
         from .runtime import mpirun
 
-        return mpirun.run(options.np, words, INTERRUPTED)
+        return mpirun.run(options.np, words)
     if _under_mpi():
         processes.die_with_parent(signal.SIGKILL)
     with _undisturbed():

@@ -14,7 +14,7 @@ from . import console, results
 from .accuracy import control
 from .accuracy.adaptive import Climber
 from .accuracy.control import Goal, Reached
-from .errors import HviError, InputError
+from .errors import ExitCode, HviError, InputError
 from .report.html import render
 from .report.pictures import draw as pictures
 from .results.write import write_record
@@ -24,9 +24,11 @@ from .runtime.signals import Interrupt
 from .runtime.timing import Timer
 from .scene import Scene, dump_scene, read_scene
 from .system import petsc_options
-from .workflow import NO_SOLUTION, NOT_CONVERGED, Prepared, Solution, finish, prepare
+from .workflow import Prepared, Solution, finish, prepare
 
 COMM = MPI.COMM_WORLD
+_CODES = {"escapes": ExitCode.NO_SOLUTION, "undecided": ExitCode.NOT_CONVERGED}
+"""What ``hvi check`` ends with, by the state."""
 
 
 def run(options: argparse.Namespace) -> int:
@@ -131,7 +133,7 @@ def _finished(target: Path, scene: Scene, goal: Goal | None) -> int | None:
         and (bought is not None) == (goal is not None)
         and (goal is None or goal.as_dict().items() <= bought.items())
     )
-    if not same or record["exit_code"] not in (0, NO_SOLUTION):
+    if not same or record["exit_code"] not in (ExitCode.CERTIFIED, ExitCode.NO_SOLUTION):
         return None
     print(f"{target}: finished already ({record['reason']})")
     return int(record["exit_code"])
@@ -148,7 +150,7 @@ def check(options: argparse.Namespace) -> int:
     text = _report(prepared, options.loads, as_json=options.json)
     if COMM.rank == 0:
         print(text)
-    return {"escapes": NO_SOLUTION, "undecided": NOT_CONVERGED}.get(prepared.solvability.state, 0)
+    return _CODES.get(prepared.solvability.state, ExitCode.CERTIFIED)
 
 
 def _report(prepared: Prepared, loads: Sequence[str], *, as_json: bool) -> str:

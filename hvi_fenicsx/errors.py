@@ -1,21 +1,40 @@
-"""The program's exceptions: one tree, each with the exit code it ends in."""
+"""The program's exceptions and exit codes: one tree of exceptions, each with the code that it ends in."""
 
 from __future__ import annotations
+
+from enum import IntEnum
+
+
+class ExitCode(IntEnum):
+    """What a command ends with; scripts rely on these numbers (docs/results.md)."""
+
+    CERTIFIED = 0
+    """A solution is certified, or the command did what it was asked for."""
+    ERROR = 1
+    """Anything else."""
+    BAD_INPUT = 2
+    """The scene or the command line cannot be used."""
+    NO_SOLUTION = 3
+    """No solution exists: the state is *escapes*."""
+    NOT_CONVERGED = 4
+    """Not converged, or metastable and no equilibrium found."""
+    INTERRUPTED = 130
+    """Ctrl-C, SIGTERM or SIGUSR1; what was found is written."""
 
 
 class HviError(Exception):
     """Anything the program itself has to say about why it stopped."""
 
-    exit_code = 1
+    exit_code: int = ExitCode.ERROR
 
 
 class InputError(HviError, ValueError):
     """What the user gave cannot be used: what, where, what is allowed, how to mend it."""
 
-    exit_code = 2
+    exit_code = ExitCode.BAD_INPUT
 
 
 class SolverError(HviError, RuntimeError):
     """A solver broke down; the message carries PETSc's own name for the reason."""
 
-    exit_code = 4
+    exit_code = ExitCode.NOT_CONVERGED

@@ -12,7 +12,7 @@ from mpi4py import MPI
 from .certify import certificate, plausibility
 from .certify.certificate import Examination
 from .certify.estimate.estimator import Estimate, estimate
-from .errors import SolverError
+from .errors import ExitCode, SolverError
 from .mesh.domain import Domain
 from .problem.problem import Problem
 from .rigid import LoadFactors, Solvability
@@ -23,9 +23,6 @@ from .system import assemble, existence, free_motions, system
 
 if TYPE_CHECKING:
     from .scene import Scene
-
-CERTIFIED, NO_SOLUTION, NOT_CONVERGED, INTERRUPTED = 0, 3, 4, 130
-"""Exit codes (design.md, the contract)."""
 
 
 @dataclass(frozen=True)
@@ -62,10 +59,10 @@ class Solution:
     def exit_code(self) -> int:
         """By the contract: certified, no solution exists, or not converged."""
         if self.converged:
-            return CERTIFIED
+            return ExitCode.CERTIFIED
         if self.solve_result is None:
-            return NO_SOLUTION
-        return INTERRUPTED if self.solve_result.interrupted else NOT_CONVERGED
+            return ExitCode.NO_SOLUTION
+        return ExitCode.INTERRUPTED if self.solve_result.interrupted else ExitCode.NOT_CONVERGED
 
     @property
     def reason(self) -> str:

@@ -14,11 +14,12 @@ from typing import Any
 
 from mpi4py import MPI
 
+from ..errors import ExitCode
 from ..mesh.domain import Refinement
 from ..runtime import memory
 from ..runtime.mpi import largest
 from ..scene import Scene
-from ..workflow import NOT_CONVERGED, Solution
+from ..workflow import Solution
 from . import adaptive, cost_forecast, quantities
 from .adaptive import Climber, Rung
 from .cost_forecast import Cost, Step
@@ -86,7 +87,7 @@ class Reached:
     def exit_code(self) -> int:
         """The solution's, or *not converged* where the accuracy was not reached."""
         missed = self.goal.accuracy is not None and self.why is not None
-        return self.solution.exit_code or (NOT_CONVERGED if missed else 0)
+        return self.solution.exit_code or (ExitCode.NOT_CONVERGED if missed else ExitCode.CERTIFIED)
 
     def as_dict(self) -> dict[str, Any]:
         """For ``summary.json``."""

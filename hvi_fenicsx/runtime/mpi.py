@@ -1,4 +1,4 @@
-"""Small collective helpers: all ranks agree, on values and on errors, before any of them goes on."""
+"""Collective helpers: all ranks agree on values and on errors before any of them goes on."""
 
 from __future__ import annotations
 
@@ -16,12 +16,21 @@ T = TypeVar("T")
 
 
 def agree(comm: MPI.Comm, value: T) -> list[T]:
-    """Every rank's value, on every rank. Collective."""
+    """Every rank's value, on every rank, in the order of the ranks. Collective.
+
+    Args:
+        comm: the ranks.
+        value: this rank's.
+    """
     return comm.allgather(value)
 
 
 def on_root(comm: MPI.Comm, action: Callable[[], T]) -> T:
     """Run an action on rank 0 only; all ranks get its result, or raise its error. Collective.
+
+    Args:
+        comm: the ranks.
+        action: what to do; only errors of the program and of the file system may come from it.
 
     Raises:
         HviError: what the action raised; of a file that cannot be read or written, which one and why.
@@ -36,13 +45,14 @@ def on_root(comm: MPI.Comm, action: Callable[[], T]) -> T:
         except OSError as caught:
             error = InputError(f"{caught.filename or 'a file could not be written'}: {caught.strerror or caught}")
     error, result = comm.bcast((error, result), root=0)
-    _raise_first([error])
+    if error is not None:
+        raise error
     return result
 
 
 @contextmanager
 def ended_together(comm: MPI.Comm) -> Iterator[None]:
-    """An error that was not foreseen on one rank ends all of them: the others would wait for it for ever."""
+    """End all ranks when one of them has an error that was not foreseen: the others would wait for it for ever."""
     try:
         yield
     except (HviError, KeyboardInterrupt):
@@ -55,17 +65,21 @@ def ended_together(comm: MPI.Comm) -> Iterator[None]:
         raise
 
 
-def _raise_first(errors: list[HviError | None]) -> None:
-    for error in errors:
-        if error is not None:
-            raise error
-
-
 def total(comm: MPI.Comm, value: float) -> float:
-    """Sum over the ranks. Collective."""
+    """Sum over the ranks. Collective.
+
+    Args:
+        comm: the ranks.
+        value: this rank's.
+    """
     return float(comm.allreduce(value, op=MPI.SUM))
 
 
 def largest(comm: MPI.Comm, value: float) -> float:
-    """Maximum over the ranks. Collective."""
+    """Maximum over the ranks. Collective.
+
+    Args:
+        comm: the ranks.
+        value: this rank's.
+    """
     return float(comm.allreduce(value, op=MPI.MAX))

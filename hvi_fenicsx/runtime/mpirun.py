@@ -12,11 +12,16 @@ import subprocess
 from collections.abc import Sequence
 from types import FrameType
 
+from ..errors import ExitCode
 from . import processes
 
 
-def run(ranks: int, words: Sequence[str], interrupted: int) -> int:
-    """Run ``hvi WORDS`` on so many ranks; its exit code, or ``interrupted`` after a signal.
+def run(ranks: int, words: Sequence[str]) -> int:
+    """Run ``hvi WORDS`` on so many ranks; its exit code, that of an interruption after a signal.
+
+    Args:
+        ranks: how many.
+        words: the command line, which may have its ``--np``.
 
     Raises:
         InputError: there is no mpirun.
@@ -32,7 +37,7 @@ def run(ranks: int, words: Sequence[str], interrupted: int) -> int:
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, note)
     code = process.wait()
-    return interrupted if seen and code else code
+    return ExitCode.INTERRUPTED if seen and code else code
 
 
 def without_ranks(words: Sequence[str]) -> list[str]:

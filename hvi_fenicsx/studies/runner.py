@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from types import FrameType
 
-from ..errors import HviError
+from ..errors import ExitCode, HviError
 from ..runtime import processes
 from ..scene import dump_scene
 from . import meshes
@@ -22,8 +22,6 @@ from .store import Store, is_whole, write_json, write_text
 
 PATIENCE = 5.0
 """Seconds for a child to end by itself."""
-NOT_CONVERGED = 4
-"""The exit code of a point that was given up."""
 _OF_A_REFERENCE = 5.0
 """Its time limit, in that of a point."""
 _START = 3.0
@@ -33,7 +31,7 @@ _START = 3.0
 class Stopped(HviError):
     """Ctrl-C or SIGTERM: the finished points are kept."""
 
-    exit_code = 130
+    exit_code = ExitCode.INTERRUPTED
 
 
 @contextlib.contextmanager
@@ -147,7 +145,13 @@ class Runner:
     def _given_up(self, path: Path, limit: float) -> None:
         """A method that hangs must not hang a study: the point is run again only with a longer limit."""
         reason = f"not finished after {limit:g} s; --limit SECONDS --resume gives it longer"
-        record = {"converged": False, "reason": reason, "exit_code": NOT_CONVERGED, "cost": None, "limit": limit}
+        record = {
+            "converged": False,
+            "reason": reason,
+            "exit_code": ExitCode.NOT_CONVERGED,
+            "cost": None,
+            "limit": limit,
+        }
         write_json(path.with_suffix(".json"), record)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 
+from ..errors import ExitCode
 from .reference import Certainty
 from .table import Row, front, told
 
@@ -28,8 +29,6 @@ ROUNDING = 1e-9
 """Relative errors below this are no errors of h or ε."""
 _CLEAR = 2.0
 """Times the reference's own error, an error tells an order."""
-_REFUSED = 2
-"""The exit code of a point whose method does not take the scene."""
 Certain = Mapping[str, Certainty]
 
 
@@ -166,15 +165,15 @@ def _methods(rows: Sequence[Row], own: Row) -> Iterator[str]:
     same = [r for r in rows if rest(r) == rest(own)]
     if len({r.method for r in same}) > 1:
         ordered = sorted(same, key=lambda r: (not r.converged, r.seconds or math.inf))
-        tried = [r for r in ordered if r.exit_code != _REFUSED]
+        tried = [r for r in ordered if r.exit_code != ExitCode.BAD_INPUT]
         parts = [f"{r.method} {seconds(r.seconds) if r.converged else 'not certified'}" for r in tried]
-        refused = [r.method for r in ordered if r.exit_code == _REFUSED]
+        refused = [r.method for r in ordered if r.exit_code == ExitCode.BAD_INPUT]
         rest_of_them = f"; {', '.join(refused)} not for this scene" if refused else ""
         yield f"Methods, at the scene's own setting: {', '.join(parts)}{rest_of_them}."
 
 
 def _failures(rows: Sequence[Row]) -> Iterator[str]:
-    bad = [r for r in rows if not r.converged and r.exit_code != _REFUSED]
+    bad = [r for r in rows if not r.converged and r.exit_code != ExitCode.BAD_INPUT]
     if bad:
         yield f"{len(bad)} of {len(rows)} points ended without a certified solution; study.csv tells why."
 

@@ -11,7 +11,7 @@ from typing import Any
 
 from scipy import sparse
 
-from ..errors import HviError
+from ..errors import ExitCode, HviError
 from ..report.html import study_page as page
 from ..runtime.versions import __version__, versions
 from ..scene import Scene, read_scene
@@ -21,7 +21,7 @@ from .meshes import Setting
 from .plan import Plan, axis, make
 from .progress import Progress
 from .reference import Certainty, certainty
-from .runner import NOT_CONVERGED, Job, Runner, stiffness_path, watched
+from .runner import Job, Runner, stiffness_path, watched
 from .store import MARK, Existing, Store, write_json, write_text
 from .table import Row, front, row
 
@@ -115,7 +115,7 @@ def _check(reference: Setting, store: Store) -> None:
         raise ReferenceError(
             f"the reference ({meshes.words(reference)}, exact law) has no certified solution: {record.get('reason')}; "
             "see `hvi run`, or choose coarser meshes with --axis mesh=...",
-            record.get("exit_code") or NOT_CONVERGED,
+            record.get("exit_code") or ExitCode.NOT_CONVERGED,
         )
 
 

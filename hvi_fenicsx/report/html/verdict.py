@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+from ...errors import ExitCode
 from ..reader import Result
 
 _STATES = {
@@ -31,7 +32,7 @@ def headline(result: Result) -> dict[str, str]:
         return {"kind": "limited", "words": f"An equilibrium was found and is certified; the state is {state}."}
     if not result.solved:
         return {"kind": "bad", "words": "No solution exists: the load carries the body away."}
-    if code == 130:
+    if code == ExitCode.INTERRUPTED:
         return {"kind": "bad", "words": "The run was interrupted: what is shown is not a solution."}
     return {"kind": "bad", "words": f"No certified solution: {result.summary.get('reason')}."}
 
