@@ -27,6 +27,7 @@ from hvi_fenicsx import Scene, read_scene
 from hvi_fenicsx.accuracy import adaptive, control, quantities
 from hvi_fenicsx.accuracy.adaptive import Climber, Rung
 from hvi_fenicsx.accuracy.control import Goal, Reached
+from hvi_fenicsx.accuracy.quantity_base import Observable, contact_norm, prolong
 from hvi_fenicsx.certify import contact_state
 from hvi_fenicsx.runtime.timing import Timer
 
@@ -124,7 +125,7 @@ def true_error(reached: Reached, scene: Scene, requested: float, largest: int) -
     go = climber()
     while rung.solution.estimate.relative > wanted and rung.dofs < largest:  # type: ignore[union-attr]
         below, rung = rung, go.up(rung, adaptive.refined(rung, 0.75), scene, ahead(rung, quantity))
-        field = quantities.carried(field, rung, below)
+        field = prolong(field, rung, below)
     own = rung.solution.estimate.relative  # type: ignore[union-attr]
     if own > 0.7 * reached.rung.solution.estimate.relative:  # type: ignore[union-attr]
         return None, own  # no reference worth the name within the largest number of unknowns
@@ -134,16 +135,15 @@ def true_error(reached: Reached, scene: Scene, requested: float, largest: int) -
 
 def ahead(rung: Rung, quantity: str) -> fem.Function | None:
     """What `hvi run --accuracy` would start the next mesh from."""
-    if quantity == "energy":
-        return None
-    watched = quantities.watched(quantity, rung)
-    watched.add(rung)
-    watched.error()
-    return watched.ahead()
+    found = quantities.find(quantity)()
+    found.add(rung)
+    found.error()
+    return found.ahead()
 
 
 def reader(quantity: str) -> Callable[[Rung], Any]:
-    return displacement if quantity == "energy" else quantities.READERS[quantity]
+    found = quantities.find(quantity)()
+    return found.value if isinstance(found, Observable) else displacement
 
 
 def displacement(rung: Rung) -> fem.Function:
@@ -155,11 +155,10 @@ def displacement(rung: Rung) -> fem.Function:
 
 def distance(rung: Rung, field: fem.Function, quantity: str) -> float:
     """Of a field from the one on this rung, relative."""
-    own = reader(quantity)(rung)
+    own, found = reader(quantity)(rung), quantities.find(quantity)
     apart = field.x.array - own.x.array
-    if quantity != "energy":
-        power = 1 if quantity == "sigma_t" else 2
-        return quantities.on_contact(rung, apart, power) / quantities.on_contact(rung, own.x.array, power)
+    if issubclass(found, Observable):
+        return contact_norm(rung, apart, found.power) / contact_norm(rung, own.x.array, found.power)
     return energy_norm(rung, apart) / energy_norm(rung, own.x.array)
 
 

@@ -11,7 +11,7 @@ from typing import Any
 from mpi4py import MPI
 
 from . import console, results
-from .accuracy import control
+from .accuracy import control, quantities
 from .accuracy.adaptive import Climber
 from .accuracy.control import Goal, Reached
 from .errors import ExitCode, HviError, InputError
@@ -41,6 +41,8 @@ def run(options: argparse.Namespace) -> int:
     petsc_options.insert(options.petsc)
     goal = _goal(options)
     scene = on_root(COMM, lambda: read_scene(options.scene, options.overrides))
+    if goal is not None:
+        quantities.find(goal.quantity)  # known only now: a plugin of the scene may define it
     target = options.out or Path("results") / options.scene.stem
     if options.resume and (code := on_root(COMM, lambda: _finished(target, scene, goal))) is not None:
         return code

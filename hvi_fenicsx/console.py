@@ -6,8 +6,8 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
+from .accuracy import quantities
 from .accuracy.control import Reached
-from .accuracy.quantities import NAMES
 from .certify.estimate.estimator import Estimate
 from .problem import effect_summary
 from .rigid import Body, LoadFactors, Mode
@@ -136,9 +136,10 @@ def bought(reached: Reached) -> Iterator[str]:
     if not steps:
         return
     last, asked = steps[-1], "" if goal.accuracy is None else f" ({percent(goal.accuracy)} was asked for)"
+    what = quantities.find(goal.quantity).description
     epsilon = "" if last.epsilon is None else f", ε {last.epsilon:.2g}"
     yield (
-        f"accuracy: {percent(last.error)}{asked} of {NAMES[goal.quantity]}, by {len(steps)} meshes up to {last.dofs:,} "
+        f"accuracy: {percent(last.error)}{asked} of {what}, by {len(steps)} meshes up to {last.dofs:,} "
         f"unknowns, tolerance {last.tolerance:.0e}{epsilon}, {sum(s.seconds for s in steps):.1f} s"
     )
     if reached.more is not None:

@@ -31,8 +31,6 @@ _BULK_ON_CONTACT = 0.5
 _SMALLEST_BULK = 0.2
 _AIM = 0.9
 """Of the accuracy asked for: where the last step aims."""
-_SAFETY = 1.25
-"""What the estimate in the energy norm is multiplied with: it may be a tenth or two too small (docs/accuracy.md)."""
 _SMOOTHING = 0.3
 """Of the accuracy asked for, what smoothing may take."""
 _TOLD = 4
@@ -131,12 +129,10 @@ class _Climb:
 
     def run(self) -> Reached:
         self.base, self.room = memory.peak(self.comm), memory.limit() * _USABLE
-        self.climber = replace(self.climber, existence=self.goal.quantity.startswith("lambda"))
-        self.watched: quantities.Watched | None = None
+        self.quantity = quantities.find(self.goal.quantity)()
+        self.climber = replace(self.climber, existence=self.quantity.needs_existence)
         begin, start = adaptive.coarsest(self.scene), time.perf_counter()
         rung = self.climber.begin(_solved_with(begin, min(TOLERANCES[1], begin.solver.tolerance * 1e3)), self.comm)
-        if self.goal.quantity != "energy":
-            self.watched = quantities.watched(self.goal.quantity, rung)
         why = self._note(rung, start)
         while why is None and not self._done():
             start = time.perf_counter()
@@ -163,8 +159,7 @@ class _Climb:
         solution = rung.solution
         if solution.solve_result is None or solution.solve_result.interrupted:
             return solution.reason
-        if self.watched is not None:
-            self.watched.add(rung)
+        self.quantity.add(rung)
         if solution.estimate is None:
             self.failures += 1
             self.tell(f"{rung.dofs:,} unknowns: {solution.reason}")
@@ -177,11 +172,10 @@ class _Climb:
     def _step(self, rung: Rung, seconds: float) -> Step:
         estimate = rung.solution.estimate
         assert estimate is not None
-        norm, watched = estimate.energy_norm or 1.0, self.watched
-        smoothing = estimate.smoothing / norm if watched is None else watched.smoothing()
+        norm, smoothing = estimate.energy_norm or 1.0, self.quantity.smoothing()
         return Step(
             rung.dofs,
-            _SAFETY * estimate.relative if watched is None else watched.error(),
+            self.quantity.error(),
             estimate.discretisation / norm,
             smoothing,
             estimate.algebraic / norm,
@@ -209,43 +203,30 @@ class _Climb:
             return self.climber.again(rung, scene)
         bulk = self._bulk()
         nesting = adaptive.refined(rung, bulk) if bulk == self._most else adaptive.sparing(rung, bulk)
-        ahead = None if self.watched is None else self.watched.ahead()
-        return self._too_long(nesting) or self.climber.up(rung, nesting, scene, ahead)
+        return self._too_long(nesting) or self.climber.up(rung, nesting, scene, self.quantity.ahead())
 
     def _bulk(self) -> float:
         """How much of the squared error to refine: no more than takes the estimate to where it should be."""
-        known = self.watched is None or self._told
+        known = self.quantity.known_from_one_mesh
         if not self.steps or self.failures or self.goal.accuracy is None or not known:
             return self._most
-        mesh, smoothing, _ = self._parts()
+        mesh, smoothing, _ = self.quantity.parts(self.steps[-1])
         left = math.sqrt(max((_AIM * self.goal.accuracy) ** 2 - smoothing**2, 0.0)) / mesh if mesh > 0 else 1.0
         # On Γc errors fall as the square of the energy norm's. Halving the edges of what is marked leaves a quarter.
-        needed = (1 - (left**2 if self.watched is None else left)) / 0.75
+        needed = (1 - (left**2 if self.quantity.in_energy_norm else left)) / 0.75
         return min(self._most, max(_SMALLEST_BULK, needed))
-
-    @property
-    def _told(self) -> bool:
-        """Whether one mesh tells the error of the quantity on Γc."""
-        return isinstance(self.watched, quantities.Estimated)
 
     @property
     def _most(self) -> float:
         """Of the squared error, what one step refines that is not the last."""
-        return _BULK_ON_CONTACT if self._told else _BULK[self.scene.dimension]
-
-    def _parts(self) -> tuple[float, float, float]:
-        """The mesh's, smoothing's and the solver's part of the last error; the last one in energy."""
-        last = self.steps[-1]
-        if self.watched is None:
-            return _SAFETY * last.discretisation, _SAFETY * last.smoothing, _SAFETY * last.algebraic
-        mesh = math.sqrt(max(last.error**2 - last.smoothing**2, 0.0)) if math.isfinite(last.error) else math.inf
-        return mesh, last.smoothing, 0.0
+        on_contact = self.quantity.known_from_one_mesh and not self.quantity.in_energy_norm
+        return _BULK_ON_CONTACT if on_contact else _BULK[self.scene.dimension]
 
     def _mesh_will_do(self) -> bool:
         """Whether ε or the tolerance, not the mesh, is what the next rung must change."""
         if not self.steps or self.failures:
             return False
-        mesh, smoothing, algebraic = self._parts()
+        mesh, smoothing, algebraic = self.quantity.parts(self.steps[-1])
         if smoothing > max(mesh, self._allowed(mesh)):
             return self._smoothing_falls()
         wanted = _AIM * (self.goal.accuracy or 0.0)
@@ -271,11 +252,11 @@ class _Climb:
         last = self.steps[-1]
         estimate = last.discretisation if self.goal.accuracy is None else self.goal.accuracy
         error = min(last.error, max(last.discretisation, estimate))
-        wanted = _ALGEBRAIC * (error if self.watched is None else min(error, estimate))
+        wanted = _ALGEBRAIC * (error if self.quantity.in_energy_norm else min(error, estimate))
         if last.algebraic > 0.1 * max(last.discretisation, estimate):
             wanted = min(wanted, 0.1 * last.tolerance)
         low, high = TOLERANCES
-        mesh, smoothing, _ = self._parts()
+        mesh, smoothing, _ = self.quantity.parts(last)
         allowed = self._allowed(mesh)
         factor = max(0.8 * allowed / smoothing, _NARROWEST_STEP) if smoothing > allowed else 1.0
         return _narrowed(_solved_with(scene, min(max(wanted, low), high)), factor)
@@ -283,7 +264,7 @@ class _Climb:
     def _unaffordable(self) -> str | None:
         """Whether the accuracy needs more memory than there is: said before it is tried."""
         known = [step for step in self.steps if math.isfinite(step.error)]
-        if len(known) < (1 if self.watched is None else _TOLD) or self.goal.accuracy is None:
+        if len(known) < (1 if self.quantity.in_energy_norm else _TOLD) or self.goal.accuracy is None:
             return None
         needed = cost_forecast.cost(self.steps, self.goal.accuracy, self.scene.dimension, self.base)
         if needed.dofs <= _LARGEST and needed.memory <= self.room:

@@ -54,8 +54,8 @@ class Scene(Table):
     title: Annotated[str, Field(max_length=200), AfterValidator(_title)] = ""
     """one line that says what this is"""
     plugins: Names | None = None
-    """Python files with your own laws, effects, methods and domain shapes, relative to the scene file; see
-    docs/extending.md"""
+    """Python files with your own laws, effects, methods, domain shapes and target quantities, relative to the scene
+    file; see docs/extending.md"""
     domain: Annotated[SerializeAsAny[DomainShape], BeforeValidator(_shape)]
     """the body's shape"""
     material: Materials

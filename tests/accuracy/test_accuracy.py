@@ -21,7 +21,8 @@ from hvi_fenicsx.accuracy import adaptive, control, cost_forecast, quantities
 from hvi_fenicsx.accuracy.adaptive import Climber, Rung
 from hvi_fenicsx.accuracy.control import Goal, Reached
 from hvi_fenicsx.accuracy.cost_forecast import Step
-from hvi_fenicsx.accuracy.quantities import carried, extrapolated
+from hvi_fenicsx.accuracy.quantities import Friction
+from hvi_fenicsx.accuracy.quantity_base import Observable, contact_norm, extrapolated, prolong
 from hvi_fenicsx.certify import contact_state
 from hvi_fenicsx.runtime import memory
 from hvi_fenicsx.runtime.timing import Timer
@@ -47,7 +48,7 @@ def far_in_energy(rungs: list[Rung]) -> float:
     """Relative distance of the first solution from the last, energy norm."""
     field = rungs[0].solution.solve_result.u  # type: ignore[union-attr]
     for below, rung in itertools.pairwise(rungs):
-        field = carried(field, rung, below)
+        field = prolong(field, rung, below)
     problem, own = rungs[-1].prepared.problem, rungs[-1].solution.solve_result.u  # type: ignore[union-attr]
     norms = []
     for sign in (1.0, 0.0):
@@ -70,12 +71,14 @@ def test_what_is_asked_for_is_kept_and_not_overdone(table: dict[str, Any], reque
 def test_a_quantity_on_the_floor_is_kept(quantity: str) -> None:
     reached = reach(Scene.model_validate(STRONG), Goal(5e-2, quantity))
     rungs = finer(reached.rung, 3)
-    field = quantities.READERS[quantity](rungs[0])
+    observable = quantities.find(quantity)()
+    assert isinstance(observable, Observable)
+    field = observable.value(rungs[0])
     for below, rung in itertools.pairwise(rungs):
-        field = carried(field, rung, below)  # type: ignore[arg-type]
-    own, power = quantities.READERS[quantity](rungs[-1]), 1 if quantity == "sigma_t" else 2
-    apart = quantities.on_contact(rungs[-1], own.x.array - field.x.array, power)  # type: ignore[union-attr]
-    whole = quantities.on_contact(rungs[-1], own.x.array, power)  # type: ignore[union-attr]
+        field = prolong(field, rung, below)  # type: ignore[arg-type]
+    own, power = observable.value(rungs[-1]), 1 if quantity == "sigma_t" else 2
+    apart = contact_norm(rungs[-1], own.x.array - field.x.array, power)  # type: ignore[union-attr]
+    whole = contact_norm(rungs[-1], own.x.array, power)  # type: ignore[union-attr]
     assert 1e-2 * whole < apart < 5e-2 * whole
 
 
@@ -110,12 +113,12 @@ def test_smoothing_is_narrowed_as_far_as_asked_for_without_a_finer_mesh() -> Non
     widths = [step.epsilon for step in reached.steps]
     assert widths[-1] < widths[0] / 10  # type: ignore[operator]
     assert reached.rung.dofs < 100
-    found = quantities.READERS["sigma_t"](reached.rung)
+    found = Friction().read(reached.rung)
     exact = reached.rung.solution.scene.with_solver(smoothing=None, epsilon_absolute=None)
     law = Climber(Timer()).again(reached.rung, exact)
-    true = quantities.READERS["sigma_t"](law)
-    apart = quantities.on_contact(law, true.x.array - found.x.array, 1)  # type: ignore[union-attr]
-    assert apart < 2e-2 * quantities.on_contact(law, true.x.array, 1)  # type: ignore[union-attr]
+    true = Friction().read(law)
+    apart = contact_norm(law, true.x.array - found.x.array, 1)  # type: ignore[union-attr]
+    assert apart < 2e-2 * contact_norm(law, true.x.array, 1)  # type: ignore[union-attr]
 
 
 def l_shape() -> Scene:

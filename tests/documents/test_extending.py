@@ -24,7 +24,7 @@ PLAIN = {
     'law = "plateau", strength = 1.0e6, slip = 3.0e-6': 'law = "graph", points = [[0, 0], [3e-6, 1e6], [9e-6, 1e6], '
     "[9e-6, 0.5e6]]",
     'pressure = { value = "1e6*(1 + x)" }': 'traction = [0.0, "-1e6*(1 + x)"]',
-    'plugins = ["my_law.py", "my_smoothing.py", "my_effect.py", "my_method.py"]': "",
+    'plugins = ["my_law.py", "my_smoothing.py", "my_effect.py", "my_method.py", "my_quantity.py"]': "",
     'method = "lowest"': 'method = "auto"',
 }
 
@@ -105,6 +105,24 @@ def test_a_misspelt_smoothing_is_told_with_the_users_own(files: Path) -> None:
     assert 'unknown value "cubik"; did you mean "cubic"? allowed: chks, cubic, log_exp' in " ".join(done.stderr.split())
 
 
+def test_an_accuracy_of_the_users_quantity_is_kept(files: Path) -> None:
+    """On two ranks; against a solution that is right to 1 % in the energy norm, so to 0.01 % in energy."""
+    for name, ranks, words in (("asked", 2, ("0.02", "--quantity", "work")), ("exact", 1, ("0.01",))):
+        done = hvi("run", "pressed.toml", "--out", name, "--no-pictures", "--accuracy", *words, cwd=files, ranks=ranks)
+        assert done.returncode == 0, done.stderr
+    asked = summary(files / "asked")
+    assert (asked["accuracy"]["quantity"], asked["accuracy"]["reached"]) == ("work", True)
+    assert "of the work of the loads" in (files / "asked" / "run.log").read_text(encoding="utf-8")
+    assert asked["energy"] == pytest.approx(summary(files / "exact")["energy"], rel=0.02)
+
+
+def test_a_misspelt_quantity_is_told_with_the_users_own(files: Path) -> None:
+    done = hvi("run", "pressed.toml", "--accuracy", "0.1", "--quantity", "werk", "--out", "x", cwd=files)
+    assert done.returncode == 2
+    assert "--quantity: unknown name 'werk' (did you mean 'work'?); allowed: energy, u_t," in done.stderr
+    assert not (files / "x").exists()
+
+
 def test_the_result_runs_again_from_its_own_scene(files: Path) -> None:
     assert hvi("run", "pressed.toml", "--no-pictures", cwd=files).returncode == 0
     again = hvi("run", "results/pressed/scene.toml", "--out", "again", "--no-pictures", cwd=files)
@@ -140,7 +158,7 @@ def test_a_plugin_that_cannot_be_loaded_is_told_with_its_place(name: str, files:
     if text is not None:
         (files / name).write_text(text, encoding="utf-8")
     scene = BLOCKS["pressed.toml"].replace(
-        '["my_law.py", "my_smoothing.py", "my_effect.py", "my_method.py"]', f'"{name}"'
+        '["my_law.py", "my_smoothing.py", "my_effect.py", "my_method.py", "my_quantity.py"]', f'"{name}"'
     )
     (files / "pressed.toml").write_text(scene, encoding="utf-8")
     with pytest.raises(InputError) as caught:

@@ -1,0 +1,230 @@
+"""What a target quantity is: what an accuracy may be asked of, and how its error is estimated.
+
+A new quantity is a subclass of :class:`Observable` with a ``name``: known to ``--quantity`` as soon as its module is
+loaded. Light: neither PETSc nor MPI is loaded with this module.
+"""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+
+from ..errors import InputError
+from ..laws.class_registry import enter
+from ..typing import Array
+
+if TYPE_CHECKING:
+    from dolfinx import fem
+
+    from .adaptive import Rung
+    from .cost_forecast import Step
+
+_APART = 1.4
+"""Ratio of the mesh sizes of two rungs from which their difference tells something."""
+_ORDERS = (0.5, 2.0)
+_OBSERVED, _ASSUMED = 1.25, 3.0
+
+
+class Quantity(ABC):
+    """A target quantity on the levels of one adaptive run: its error on the last one, and what of it is smoothing's.
+
+    Class attributes:
+        name: for ``--quantity`` and ``summary.json``.
+        description: what it is, for messages: "the slip on Γc in L2".
+        in_energy_norm: whether its error is the estimate's own, in the energy norm.
+        needs_existence: whether existence (with it the load factors) is analysed on every mesh, not on the first only.
+        registry: the quantities by their names.
+    """
+
+    name: ClassVar[str]
+    description: ClassVar[str]
+    in_energy_norm: ClassVar[bool] = False
+    needs_existence: ClassVar[bool] = False
+    registry: ClassVar[dict[str, type[Quantity]]] = {}
+
+    def __init_subclass__(cls) -> None:
+        if "name" in cls.__dict__:
+            enter(Quantity.registry, cls, cls.name, "quantity")
+
+    def __init__(self) -> None:
+        self._last: Rung
+
+    def add(self, level: Rung) -> None:
+        """Take the next level. Collective.
+
+        Raises:
+            InputError: on all ranks alike: the scene has no such quantity.
+        """
+        self._last = level
+
+    @abstractmethod
+    def error(self) -> float:
+        """The estimated relative error on the last level; infinite where none is known yet. Collective."""
+
+    @property
+    def known_from_one_mesh(self) -> bool:
+        """Whether one mesh is enough to estimate the error."""
+        return False
+
+    def parts(self, step: Step) -> tuple[float, float, float]:
+        """The mesh's, smoothing's and the solver's part of the last level's error, relative.
+
+        The last is that of the energy norm, and 0 where the quantity's own is not known.
+        """
+        if not math.isfinite(step.error):
+            return math.inf, step.smoothing, 0.0
+        return math.sqrt(max(step.error**2 - step.smoothing**2, 0.0)), step.smoothing, 0.0
+
+    def ahead(self) -> fem.Function | None:
+        """The displacement on the last level's mesh that a finer one is expected to have; None: take u_h itself."""
+        return None
+
+    def smoothing(self) -> float:
+        """What smoothing changes of the quantity on the last level, relative: by default, in energy. Collective."""
+        found = self._last.solution.estimate
+        return 0.0 if found is None else found.smoothing / (found.energy_norm or 1.0)
+
+
+@dataclass(frozen=True)
+class MeshValue:
+    """A quantity on one level, SI.
+
+    Attributes:
+        size: mean mesh size, up to a factor.
+        value: numbers, or a P1 vector field that is zero off Γc, taken to the mesh of the last level.
+    """
+
+    size: float
+    value: fem.Function | Array
+
+
+class Observable(Quantity):
+    """A quantity that is read off each level's solution; its error follows from its change from mesh to mesh.
+
+    Three meshes are extrapolated by Richardson with the observed order, times a safety factor (Roache 1994, the grid
+    convergence index): 1.25 where an order could be observed, 3 where it is assumed to be 1.
+
+    Class attributes:
+        power: of the norm on Γc in which a field is measured: 1 for L1, 2 for L2.
+    """
+
+    power: ClassVar[int] = 2
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._values: list[MeshValue] = []
+
+    @abstractmethod
+    def read(self, level: Rung) -> fem.Function | Array:
+        """Its value on a level in SI: numbers (n,), or a P1 vector field that is zero off Γc. Collective."""
+
+    def missing(self, level: Rung) -> str | None:
+        """What the scene lacks to have this quantity, for a message; None where it lacks nothing. Collective."""
+        return None
+
+    def value(self, level: Rung) -> fem.Function | Array:
+        """As :meth:`read`. Collective.
+
+        Raises:
+            InputError: on all ranks alike: the scene has no such quantity.
+        """
+        if lack := self.missing(level):
+            raise InputError(f"--quantity {self.name}: {lack}")
+        return self.read(level)
+
+    def add(self, level: Rung) -> None:
+        """See :meth:`Quantity.add`; fields of coarser levels are taken to the new mesh. Collective."""
+        if level.solution.examination is None:
+            self._values = []
+            return
+        self._values = [MeshValue(v.size, self._on(level, v.value)) for v in self._values]
+        size = float(level.dofs) ** (-1.0 / level.solution.scene.dimension)
+        self._values.append(MeshValue(size, self.value(level)))
+        super().add(level)
+
+    def _on(self, level: Rung, value: fem.Function | Array) -> fem.Function | Array:
+        return value if isinstance(value, np.ndarray) else prolong(value, level, self._last)
+
+    def error(self) -> float:
+        """See :meth:`Quantity.error`; infinite before a second mesh."""
+        return float(np.hypot(self._change(), self.smoothing()))
+
+    def _change(self) -> float:
+        """The error without smoothing's part. Collective."""
+        own, *others = reversed(self._values)
+        apart = [other for other in others if other.size >= _APART * own.size]
+        if not apart:
+            return np.inf
+        near = apart[0]
+        far = next((v for v in apart if v.size >= _APART * near.size), None)
+        largest = self._norm(own, None) or 1.0
+        change = self._norm(own, near) / largest
+        further = None if far is None else self._norm(own, far) / largest
+        return extrapolated((own.size, near.size, far.size if far else np.nan), change, further)
+
+    def _norm(self, own: MeshValue, other: MeshValue | None) -> float:
+        if isinstance(own.value, np.ndarray):
+            return float(np.linalg.norm(own.value - (0.0 if other is None else other.value)))
+        difference = own.value.x.array - (0.0 if other is None else other.value.x.array)  # type: ignore[union-attr]
+        return contact_norm(self._last, difference, self.power)
+
+
+def extrapolated(sizes: Sequence[float], change: float, further: float | None) -> float:
+    """The error of a quantity on the finest of three meshes.
+
+    Args:
+        sizes: of the meshes, the finest first.
+        change: of the quantity from the second to the first.
+        further: the change from the third to the first; None where there is no third.
+    """
+    if change == 0.0:
+        return 0.0
+    order = 1.0 if further is None else _order(sizes, further / change)
+    safety = _ASSUMED if further is None else _OBSERVED
+    return safety * change / ((sizes[1] / sizes[0]) ** order - 1.0)
+
+
+def _order(sizes: Sequence[float], ratio: float) -> float:
+    """The order p at which (h3^p - h1^p)/(h2^p - h1^p) has this value, within what P1 can have."""
+    from scipy.optimize import brentq
+
+    near, far = sizes[1] / sizes[0], sizes[2] / sizes[0]
+
+    def excess(order: float) -> float:
+        return float((far**order - 1.0) / (near**order - 1.0) - ratio)
+
+    low, high = _ORDERS
+    if excess(low) > 0:
+        return low
+    return high if excess(high) < 0 else float(brentq(excess, low, high))
+
+
+def contact_norm(level: Rung, values: Array, power: int) -> float:
+    """The L1 or L2 norm of a vector field on Γc, by vertex quadrature. Collective.
+
+    Args:
+        level: where the field is.
+        values: its local array.
+        power: 1 or 2.
+    """
+    examination, found = level.solution.examination, 0.0
+    for state in () if examination is None else examination.states:
+        lengths = np.linalg.norm(state.surface.values(values), axis=1)
+        found += float(np.sum(state.surface.weights * lengths**power))
+    return float(float(level.comm.allreduce(found)) ** (1.0 / power))
+
+
+def prolong(field: fem.Function, level: Rung, coarser: Rung) -> fem.Function:
+    """A vector field of the next coarser level on the mesh of a level. Collective.
+
+    Args:
+        field: P1, on ``coarser``.
+        level: where to.
+        coarser: the level before it.
+    """
+    return level.prepared.system.displacement(level.step * coarser.prepared.system.unknowns(field))
