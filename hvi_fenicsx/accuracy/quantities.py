@@ -132,8 +132,11 @@ class Friction(ContactField):
     safety = 1.5
 
     def missing(self, level: Rung) -> str | None:
-        """Friction."""
-        return None if _has(level, "friction") else "the scene has no friction"
+        """A law of the slip."""
+        from ..effects import Direction
+
+        slips = any(term.direction is Direction.SLIP for term in level.prepared.problem.terms)
+        return None if slips else "the scene has no friction"
 
     def read(self, level: Rung) -> fem.Function:
         """-σ_t, N/m²."""
@@ -158,7 +161,7 @@ class Resultant(Observable):
 
     def missing(self, level: Rung) -> str | None:
         """Contact."""
-        return None if _has(level, "contact") else "the scene has no contact"
+        return None if level.prepared.problem.bounds else "the scene has no contact"
 
     def read(self, level: Rung) -> Array:
         """Its components (d,), N/m in 2D, N in 3D."""
@@ -215,10 +218,6 @@ def find(name: str) -> type[Quantity]:
     if name not in Quantity.registry:
         raise InputError(f"--quantity: unknown name {name!r}{closest(name, names())}; allowed: {', '.join(names())}")
     return Quantity.registry[name]
-
-
-def _has(level: Rung, key: str) -> bool:
-    return any(effect.key == key for _, _, effect in level.solution.scene.effects())
 
 
 def _states(level: Rung) -> tuple[State, ...]:

@@ -77,11 +77,8 @@ def _change(system: System, u: fem.Function, examination: Examination, inverse: 
     """The defect with its influence on the vertices and, from the second time on, theirs on it. Collective."""
     problem = system.problem
     space, moved = edge_bubbles.space(problem.domain.mesh), fem.Function(problem.space)
-    change, residual, stiffness = (
-        None,
-        problem.bulk.residual_in(space, u, problem.linear.values()),
-        edge_bubbles.Stiffness(problem, space),
-    )
+    change, stiffness = None, edge_bubbles.Stiffness(problem, space)
+    residual = problem.bulk.residual_in(space, u, problem.linear.values())
     for _ in range(_TIMES):
         edges, _ = pointwise(problem, space, u, examination.states, change)
         load = residual - edges - problem.bulk.force_in(space, moved)
