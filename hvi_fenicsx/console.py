@@ -10,7 +10,7 @@ from .accuracy import quantities
 from .accuracy.control import Reached
 from .certify.estimate.estimator import Estimate
 from .problem import effect_summary
-from .rigid import Body, LoadFactors, Mode
+from .rigid import LoadFactors, Mode, RigidBody
 from .solvers import nested_iteration, registry
 from .workflow import Prepared, Solution
 
@@ -38,7 +38,7 @@ def existence(prepared: Prepared) -> str:
     trouble = f" ({s.trouble})" if s.trouble else ""
     parts = [f"{s.state}{trouble}; rigid motions that the supports leave: {motions(s.kernel, bodies)}"]
     if s.direction is not None:
-        parts.append(f"escape by {s.direction.words}")
+        parts.append(f"escape by {s.direction.name}")
     if s.margin is not None:
         parts.append(f"margin {s.margin:.3g}")
     if s.free:
@@ -50,10 +50,10 @@ def existence(prepared: Prepared) -> str:
     return "; ".join(parts)
 
 
-def motions(found: Sequence[Mode], bodies: Sequence[Body]) -> str:
+def motions(found: Sequence[Mode], bodies: Sequence[RigidBody]) -> str:
     """Rigid motions of some bodies: a few in words, more by their number."""
     if len(found) <= _LISTED:
-        return ", ".join(mode.words for mode in found) or "none"
+        return ", ".join(mode.name for mode in found) or "none"
     if len(found) == sum(body.motions for body in bodies):
         return f"all {len(found)}" + (f" of {len(bodies)} bodies" if len(bodies) > 1 else "")
     return f"{len(found)} (`hvi check --json` lists them)"
@@ -68,9 +68,9 @@ def load_factors(factors: Mapping[str, LoadFactors]) -> Iterator[str]:
             held = f"held at factors {' and '.join(ends)}" if ends else "held at any factor"
         else:
             held = "held at no factor"
-        words = f" ({f.mode.words})" if f.mode else ""
+        words = f" ({f.mode.name})" if f.mode else ""
         peak = f"peak at {f.peak:.6g}" if math.isfinite(f.peak) else "no peak" if f.peak > 0 else "beyond every peak"
-        yield f"load {name} alone: {held}{words}; {peak}" + (f" ({f.peak_mode.words})" if f.peak_mode else "")
+        yield f"load {name} alone: {held}{words}; {peak}" + (f" ({f.peak_mode.name})" if f.peak_mode else "")
 
 
 def effects(prepared: Prepared) -> Iterator[str]:

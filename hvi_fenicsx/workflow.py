@@ -71,7 +71,7 @@ class Solution:
             return "no solution exists: the load moves the body away"
         if self.converged:
             local = " (a local equilibrium: the state is metastable)" if self.solvability.state == "metastable" else ""
-            free = ", ".join(mode.words for mode in self.solvability.free)
+            free = ", ".join(mode.name for mode in self.solvability.free)
             return f"certified{local}" + (f"; determined up to {free}" if free else "")
         if self.solvability.state == "metastable" and not self.solve_result.interrupted:
             return f"metastable, and no equilibrium found ({self.solve_result.reason})"

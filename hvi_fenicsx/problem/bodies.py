@@ -15,7 +15,7 @@ from mpi4py import MPI
 
 from ..errors import InputError
 from ..mesh.domain import Domain
-from ..rigid import Body, Mode, motion_at
+from ..rigid import Mode, RigidBody, motion_at
 from ..runtime.mpi import agree
 from ..typing import Array, Integers
 
@@ -28,7 +28,7 @@ class Bodies:
         bodies: what each is, the same on all ranks. labels: the body of each local vertex (owned and ghost), (n,).
     """
 
-    bodies: tuple[Body, ...]
+    bodies: tuple[RigidBody, ...]
     labels: Integers
 
     def __iter__(self) -> Any:
@@ -40,9 +40,9 @@ class Bodies:
         return np.where((self.labels == mode.body)[:, None], field, 0.0)
 
 
-def whole(domain: Domain) -> Body:
+def whole(domain: Domain) -> RigidBody:
     """All that a domain is made of, as one body."""
-    return Body(domain.dimension, np.asarray(domain.centre / domain.length), domain.length)
+    return RigidBody(domain.dimension, np.asarray(domain.centre / domain.length), domain.length)
 
 
 def find(domain: Domain, space: fem.FunctionSpace, points: Array) -> Bodies:
@@ -132,7 +132,7 @@ def _boxes(domain: Domain, points: Array, labels: Integers, count: int) -> tuple
     return lower, upper
 
 
-def _names(domain: Domain, cells: Integers, bodies: Sequence[Body]) -> list[str]:
+def _names(domain: Domain, cells: Integers, bodies: Sequence[RigidBody]) -> list[str]:
     """A body is called by the regions that lie in it alone, else by its number and centre. Collective."""
     regions: dict[int, list[str]] = {}
     for name in sorted(domain.regions):
@@ -145,5 +145,5 @@ def _names(domain: Domain, cells: Integers, bodies: Sequence[Body]) -> list[str]
     ]
 
 
-def _point(body: Body) -> str:
+def _point(body: RigidBody) -> str:
     return "(" + ", ".join(f"{c:.4g}" for c in body.centre[: body.dimension] * body.length) + ")"

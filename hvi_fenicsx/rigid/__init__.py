@@ -1,24 +1,26 @@
-"""Rigid motions: the kernel of a scene in words, and whether its load can be borne."""
+"""Rigid motions: the kernel of a scene, the name of each motion, and whether the load can be borne."""
 
 from ..laws.convex_parts import Directional
-from .kernel import Fixed, kernel, modes
-from .motions import Body, Mode, describe, motion_at, rigid_fields
+from .kernel import FixedDirections, kernel, modes
+from .motions import Mode, RigidBody, describe, motion_at, rigid_fields
 from .reduction import ContactCone, Resistance, RigidProblem
 from .solvability import analyse, load_factors
-from .verdict import LoadFactors, Paper, Solvability, State, combine, combine_factors
+from .thresholds import Thresholds
+from .verdict import ExistenceState, LoadFactors, PaperConditions, Solvability, combine, combine_factors, undecided
 
 __all__ = [
-    "Body",
     "ContactCone",
     "Directional",
-    "Fixed",
+    "ExistenceState",
+    "FixedDirections",
     "LoadFactors",
     "Mode",
-    "Paper",
+    "PaperConditions",
     "Resistance",
+    "RigidBody",
     "RigidProblem",
     "Solvability",
-    "State",
+    "Thresholds",
     "analyse",
     "combine",
     "combine_factors",
@@ -28,4 +30,5 @@ __all__ = [
     "modes",
     "motion_at",
     "rigid_fields",
+    "undecided",
 ]

@@ -7,19 +7,15 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..laws.convex_parts import Directional
+from ..typing import Array
 from .cutting_planes import Functional, Minimum, Programme, Region, ball, cross
 from .kernel import modes, natural_basis, null_space, triangle
-from .motions import Mode, named
-from .reduction import Reduced, RigidProblem
-from .verdict import LoadFactors, Paper, Solvability, State
-
-Array = NDArray[np.float64]
-
-TIE = 1e-9  # a margin this small beside the work of the loads is an equality
-SNAPS = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8)  # coefficients a direction may do without
+from .motions import Mode, mode_of
+from .reduction import ReducedProblem, RigidProblem
+from .thresholds import Thresholds
+from .verdict import ExistenceState, LoadFactors, PaperConditions, Solvability
 
 
 @dataclass(frozen=True)
@@ -28,10 +24,19 @@ class Analysis:
 
     `growth` and `peak` are tuples of convex functionals whose pointwise minimum counts: one, unless a law is
     not convex at infinity.
+
+    Attributes:
+        problem: the body and what it meets.
+        reduced: the same on the kernel's basis.
     """
 
     problem: RigidProblem
-    reduced: Reduced
+    reduced: ReducedProblem
+
+    @property
+    def thresholds(self) -> Thresholds:
+        """What counts as zero."""
+        return self.reduced.thresholds
 
     @cached_property
     def growth(self) -> tuple[Functional, ...]:
@@ -51,20 +56,21 @@ class Analysis:
     @cached_property
     def tie(self) -> float:
         """Works of less than this are zero: relative to the loads, without any to the laws."""
-        return TIE * (self.reduced.load_scale or self._law_scale or 1.0)
+        return self.thresholds.tie * (self.reduced.load_scale or self._law_scale or 1.0)
 
     @cached_property
     def programme(self) -> Programme:
         """The shared cuts."""
-        return Programme(self.reduced.frame, self.reduced.slips, self.reduced.load_scale + self._law_scale or 1.0)
+        scale = self.reduced.load_scale + self._law_scale or 1.0
+        return Programme(self.reduced.frame, self.reduced.slips, scale, self.thresholds)
 
     @cached_property
     def free(self) -> Array:
         """Orthonormal basis (k, q) of the motions that nothing holds and on which the load does no work."""
         rows = np.vstack([self.reduced.contact, *self._resisted()])
-        loose = null_space(triangle(rows))
+        loose = null_space(triangle(rows), self.thresholds)
         work = self.work @ loose
-        return loose if np.abs(work).max(initial=0.0) <= self.tie else loose @ null_space(work[None])
+        return loose if np.abs(work).max(initial=0.0) <= self.tie else loose @ null_space(work[None], self.thresholds)
 
     @property
     def exact(self) -> bool:
@@ -78,14 +84,14 @@ class Analysis:
         peak, last = self._factor(self.peak, self.work, still)
         margin = self._margin(self.growth)
         state = self._state(margin)
-        free = natural_basis(self.reduced.frame @ self.free, self.problem.body.dimension)
+        free = natural_basis(self.reduced.frame @ self.free, self.problem.body.dimension, self.thresholds)
         return Solvability(
             state=state,
             margin=None if margin is None else self._flat(margin.value),
             lambda_held=held,
             lambda_peak=peak,
             direction=self._direction(
-                state, margin, critical if TIE < held < 1.0 else None, last if TIE < peak < 1.0 else None
+                state, margin, critical if self._limits(held) else None, last if self._limits(peak) else None
             ),
             critical=critical,
             kernel=modes(self.reduced.frame, self.problem.body),
@@ -93,6 +99,10 @@ class Analysis:
             paper=self._paper(),
             exact=self.exact,
         )
+
+    def _limits(self, factor: float) -> bool:
+        """Whether a load factor between none and all of the load."""
+        return self.thresholds.tie < factor < 1.0
 
     def load_factors(self, load: str | None) -> LoadFactors:
         """The factors of one load, the others constant, or of the whole load."""
@@ -111,7 +121,7 @@ class Analysis:
                 best = (factor, self._mode(f.minus(moved, factor) if np.isfinite(factor) else f, y))
         return best
 
-    def _state(self, margin: Minimum | None) -> State:
+    def _state(self, margin: Minimum | None) -> ExistenceState:
         """The state, from the margin of the growth and, if that is negative, of the peak."""
         if margin is None or margin.value > self.tie:
             return "held" if self.exact else "metastable"
@@ -124,8 +134,10 @@ class Analysis:
             peak = self._sphere(self.peak, self.free)  # a motion that is free both ways decides nothing
         return "metastable" if peak is None or peak.value > self.tie else "borderline"
 
-    def _direction(self, state: State, margin: Minimum | None, held: Mode | None, peak: Mode | None) -> Mode | None:
-        """The direction of escape: the motion that limits the load first, where load factors tell one."""
+    def _direction(
+        self, state: ExistenceState, margin: Minimum | None, held: Mode | None, peak: Mode | None
+    ) -> Mode | None:
+        """The direction of escape: the motion that limits the load first, where load factors give one."""
         if state == "held" or margin is None:
             return None
         if state == "escapes":
@@ -168,27 +180,27 @@ class Analysis:
 
     def _mode(self, f: Functional, y: Array) -> Mode:
         """The motion y in words, in its simplest form among those with the same value of f."""
-        return named(self._simplest(f, y), self.problem.body, signed=True)
+        return mode_of(self._simplest(f, y), self.problem.body, signed=True)
 
     def _simplest(self, f: Functional, y: Array) -> Array:
         """Unit rigid coefficients (3|6,) of y, small ones dropped if f stays as low and y in the cone."""
         z = self.reduced.frame @ y
         z, limit = z / np.abs(z).max(), self.programme.evaluate(f, y) / np.abs(z).max() + self.tie
-        for snap in SNAPS:
+        for snap in self.thresholds.dropped:
             short = np.where(np.abs(z) <= snap, 0.0, z)
             trial = np.linalg.lstsq(self.reduced.frame, short, rcond=None)[0]
             off = max(np.abs(self.reduced.frame @ trial - short).max(), (f.cone @ trial).max(initial=0.0))
-            if off <= TIE and self.programme.evaluate(f, trial) <= limit:
+            if off <= self.thresholds.tie and self.programme.evaluate(f, trial) <= limit:
                 return np.asarray(short)
         return np.asarray(z)
 
-    def _paper(self) -> Paper:
+    def _paper(self) -> PaperConditions:
         """The paper's conditions look at the load and the contact alone; the laws enter by c."""
         c4 = np.array([part.c4 for part in self.problem.resistances])
         lawless = Functional(np.zeros_like(self.work), np.zeros(len(c4)), self.reduced.contact)
         margin = self._margin([lawless])
         c = float(np.sqrt(c4**2 @ self.reduced.areas))
-        return Paper(c, None if margin is None else self._flat(margin.value))
+        return PaperConditions(c, None if margin is None else self._flat(margin.value))
 
     def _flat(self, margin: float) -> float:
         return 0.0 if abs(margin) <= self.tie else margin

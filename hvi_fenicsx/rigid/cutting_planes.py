@@ -8,7 +8,7 @@ the rows that were once violated. With scalar slips the result is exact after fi
 slips (3D) the lower bound and the value attained approach each other until HiGHS' own accuracy stops them,
 some 1e-11 of the scale.
 
-Everything here is serial and deterministic: one rank runs it and tells the others.
+Everything here is serial and deterministic: one rank runs it and sends the result to the others.
 """
 
 from __future__ import annotations
@@ -18,29 +18,19 @@ from dataclasses import dataclass, field, replace
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import SolverError
-
-Array = NDArray[np.float64]
-
-FEASIBLE = 1e-10  # violation of a cone row of unit length that still counts as none
-MAX_ROUNDS = 500  # linear programmes for one minimum; 3D friction needs about 40
-TIGHT, LOOSE, PATIENCE = (
-    1e-13,
-    1e-9,
-    4,
-)  # gaps relative to the scale; a loose one will do if it shrinks no more
-HIGHS = tuple(
-    {"presolve": presolve, "primal_feasibility_tolerance": tolerance, "dual_feasibility_tolerance": tolerance}
-    for presolve, tolerance in ((False, 1e-10), (True, 1e-10), (False, 1e-9), (True, 1e-9))
-)
-"""The narrowest first; where rounding leaves HiGHS without a verdict, the next."""
+from ..typing import Array
+from .thresholds import DEFAULT, Thresholds
 
 
 @dataclass(frozen=True)
 class SlipIntegral:
-    """G(y) = Σ_i |B_i y|: `rows` (m, r, k) holds the B_i with the lumped area folded in, r = 1 or 2 slips."""
+    """G(y) = Σ_i |B_i y|.
+
+    Attributes:
+        rows: the B_i, each times its lumped area, (m, r, k); r = 1 or 2 slips.
+    """
 
     rows: Array
 
@@ -60,7 +50,10 @@ class SlipIntegral:
 class Functional:
     """The function linear·y + Σ_p factors_p G_p(y) on the cone {cone @ y <= 0}.
 
-    linear (k,), factors (p,), cone (c, k) with rows of length one.
+    Attributes:
+        linear: (k,).
+        factors: of the slip integrals, (p,).
+        cone: rows of length one, (c, k).
     """
 
     linear: Array
@@ -68,13 +61,24 @@ class Functional:
     cone: Array
 
     def minus(self, load: Array, factor: float = 1.0) -> Functional:
-        """The functional less the work of `factor` times the load (k,)."""
+        """The functional less the work of a load.
+
+        Args:
+            load: its work on the basis motions, (k,).
+            factor: what the load is multiplied by.
+        """
         return replace(self, linear=self.linear - factor * load)
 
 
 @dataclass(frozen=True)
 class Region:
-    """The bounded set {upper @ y <= 1, equal @ y = value} to search; arrays (q, k), (e, k), (e,)."""
+    """The bounded set {upper @ y <= 1, equal @ y = value} to search.
+
+    Attributes:
+        upper: (q, k).
+        equal: (e, k).
+        value: (e,).
+    """
 
     upper: Array
     equal: Array
@@ -83,7 +87,13 @@ class Region:
 
 @dataclass(frozen=True)
 class Minimum:
-    """An attained value, the motion y (k,) that attains it, and the lower bound that proves it."""
+    """A minimum and its proof.
+
+    Attributes:
+        value: an attained value.
+        y: the motion that attains it, (k,).
+        lower: the lower bound that proves it.
+    """
 
     value: float
     y: Array
@@ -91,18 +101,29 @@ class Minimum:
 
 
 @dataclass
-class Progress:
-    """Whether the gap between value and bound is small, or at least small enough and stuck in rounding."""
+class GapHistory:
+    """The gaps between value and bound: is the last one small, or at least small enough and stuck in rounding?
+
+    Attributes:
+        scale: the size of the works that are compared.
+        thresholds: what is small.
+        best: the smallest gap.
+        stalled: linear programmes since it fell.
+    """
 
     scale: float
+    thresholds: Thresholds
     best: float = np.inf
     stalled: int = 0
 
     def done(self, gap: float) -> bool:
-        """To be asked once for each linear programme."""
-        self.stalled = 0 if gap < 0.9 * self.best else self.stalled + 1
+        """Whether the search may end at this gap. To be asked once for each linear programme."""
+        limits = self.thresholds
+        self.stalled = 0 if gap < limits.shrunk * self.best else self.stalled + 1
         self.best = min(self.best, gap)
-        return gap <= TIGHT * self.scale or (self.stalled >= PATIENCE and gap <= LOOSE * self.scale)
+        if gap <= limits.tight_gap * self.scale:
+            return True
+        return self.stalled >= limits.patience and gap <= limits.loose_gap * self.scale
 
 
 def ball(frame: Array) -> Region:
@@ -118,7 +139,12 @@ def cross(frame: Array) -> Region:
 
 
 def faces(frame: Array, across: Array) -> Iterator[Region]:
-    """The faces of the sphere |y| = 1, less the motions `across` (q, k) to which y is to be orthogonal."""
+    """The faces of the sphere |y| = 1 in the space orthogonal to some motions.
+
+    Args:
+        frame: rigid coefficients of the basis motions, (n, k).
+        across: the motions to which y is to be orthogonal, (q, k).
+    """
     whole = ball(frame)
     for row in whole.upper[np.abs(whole.upper).max(axis=1) > 0.0]:
         yield replace(whole, equal=np.vstack([row, across]), value=np.r_[1.0, np.zeros(len(across))])
@@ -128,12 +154,19 @@ def faces(frame: Array, across: Array) -> Iterator[Region]:
 class Programme:
     """The motions with rigid coefficients frame @ y, their slip integrals, and the cuts found so far.
 
-    `scale` is the size of the works that are compared.
+    Attributes:
+        frame: rigid coefficients of the basis motions, (n, k).
+        integrals: the slip integral of each part.
+        scale: the size of the works that are compared.
+        thresholds: what is small, and when to give up.
+        cuts: subgradients (k,) of each slip integral.
+        solved: number of linear programmes.
     """
 
     frame: Array
     integrals: tuple[SlipIntegral, ...]
     scale: float
+    thresholds: Thresholds = DEFAULT
     cuts: list[list[Array]] = field(default_factory=list)
     solved: int = 0
 
@@ -144,28 +177,52 @@ class Programme:
             self._cut(start)
 
     def evaluate(self, f: Functional, y: Array) -> float:
-        """The value of f at y, all vertices summed; the cone is not looked at."""
+        """The value of f at y, all vertices summed; the cone is not looked at.
+
+        Args:
+            f: the functional.
+            y: a motion (k,).
+        """
         slip = sum(b * g.value(y) for b, g in zip(f.factors, self.integrals, strict=True) if b > 0.0)
         return float(f.linear @ y + slip)
 
     def minimise(self, f: Functional, region: Region, give_up: float = np.inf) -> Minimum | None:
-        """Minimum of f over region and cone, None if that is empty or nothing in it is below `give_up`."""
+        """Minimum of f over region and cone; None if that is empty or nothing in it is small enough.
+
+        Args:
+            f: the functional, with its cone.
+            region: where to search.
+            give_up: values above this are of no interest.
+
+        Raises:
+            SolverError: the gap between value and bound does not close.
+        """
         best = Minimum(np.inf, np.zeros(self.frame.shape[1]), -np.inf)
-        active, progress = _seeds(f.cone), Progress(self.scale)
-        for _ in range(MAX_ROUNDS):
+        active, progress = _seeds(f.cone), GapHistory(self.scale, self.thresholds)
+        for _ in range(self.thresholds.max_rounds):
             found = self._solve(f, region, active)
             if found is None or found.lower > give_up:
                 return None
-            if not _violated(f.cone, found.y, active):
+            if not self._violated(f.cone, found.y, active):
                 value = self.evaluate(f, found.y)
                 best = Minimum(value, found.y, found.lower) if value < best.value else best
             if progress.done(best.value - found.lower):
                 return replace(best, lower=found.lower)
             self._cut_towards(found.y, best.y)
-        raise SolverError(f"rigid motions: {MAX_ROUNDS} cutting planes left a gap of {progress.best:.1e}")
+        raise SolverError(
+            f"rigid motions: {self.thresholds.max_rounds} cutting planes left a gap of {progress.best:.1e}"
+        )
 
     def sphere(self, f: Functional, across: Array) -> Minimum | None:
-        """Minimum of f over the cone and |y| = 1, one programme for each face; None if there is no such y."""
+        """Minimum of f over the cone and |y| = 1, one programme for each face; None if there is no such y.
+
+        Args:
+            f: the functional, with its cone.
+            across: motions (q, k) to which y is to be orthogonal.
+
+        Raises:
+            SolverError: the gap between value and bound does not close.
+        """
         best: Minimum | None = None
         for face in faces(self.frame, across):
             found = self.minimise(f, face, np.inf if best is None else best.value)
@@ -175,27 +232,35 @@ class Programme:
     def ratio(self, f: Functional, load: Array, least: float) -> tuple[float, Array | None]:
         """The largest λ with λ load·y <= f(y) on the cone, and the motion that limits it (None if none does).
 
-        Works of at most `least` for a unit motion count as none. (inf, None): no λ is too large; (-inf, y):
-        none is small enough, for y forbids it. Dinkelbach's iteration: λ only falls, each motion below the
-        current plane lowers it; so the linear programmes stay bounded, and they share their cuts.
+        (inf, None): no λ is too large; (-inf, y): none is small enough, for y forbids it. Dinkelbach's iteration:
+        λ only falls, each motion below the current plane lowers it; so the linear programmes stay bounded, and they
+        share their cuts.
+
+        Args:
+            f: the functional, with its cone.
+            load: its work on the basis motions, (k,).
+            least: works of at most this size for a unit motion count as none.
+
+        Raises:
+            SolverError: the gap between value and bound does not close.
         """
         start = self.minimise(replace(f, linear=-load, factors=np.zeros_like(f.factors)), ball(self.frame))
         if start is None or -start.value <= least:
             return self._unlimited(f, load, least)
         factor, limit = self.evaluate(f, start.y) / -start.value, start.y
-        active, progress = _seeds(f.cone), Progress(self.scale)
-        for _ in range(MAX_ROUNDS):
+        active, progress = _seeds(f.cone), GapHistory(self.scale, self.thresholds)
+        for _ in range(self.thresholds.max_rounds):
             found = self._solve(f.minus(load, factor), ball(self.frame), active)
             if found is None or progress.done(-found.lower):
                 return factor, limit
-            if not _violated(f.cone, found.y, active):
+            if not self._violated(f.cone, found.y, active):
                 value, work = self.evaluate(f, found.y), float(load @ found.y)
-                if work <= least and value - factor * work < -LOOSE * self.scale:
+                if work <= least and value - factor * work < -self.thresholds.loose_gap * self.scale:
                     return -np.inf, found.y
                 if work > least and value < factor * work:
                     factor, limit = value / work, found.y
             self._cut_towards(found.y, limit)
-        raise SolverError(f"rigid motions: no load factor after {MAX_ROUNDS} cutting planes")
+        raise SolverError(f"rigid motions: no load factor after {self.thresholds.max_rounds} cutting planes")
 
     def _unlimited(self, f: Functional, load: Array, least: float) -> tuple[float, Array | None]:
         """A load that only ever holds has no largest factor, unless a motion it does no work on escapes."""
@@ -225,7 +290,7 @@ class Programme:
         k, a_eq = len(f.linear), np.zeros((len(region.equal), len(c)))
         a_eq[:, :k] = region.equal
         bounds = [(None, None)] * k + [(0.0, None)] * (len(c) - k)
-        for options in HIGHS:
+        for options in self.thresholds.solver_options():
             result = linprog(c / size, a_ub, b_ub, a_eq, region.value, bounds, "highs-ds", options=options)
             if result.status == 2:
                 return None
@@ -251,26 +316,25 @@ class Programme:
         """One motion only: two rays and the origin, no linear programme."""
         reach = 1.0 / np.abs(self.frame).max()
         points = [np.array([t]) for t in (reach, -reach, 0.0)]
-        inside = [y for y in points if _inside(f, region, y)]
+        inside = [y for y in points if self._inside(f, region, y)]
         values = [self.evaluate(f, y) for y in inside]
         i = int(np.argmin(values)) if values else 0
         return Minimum(values[i], inside[i], values[i]) if values else None
 
+    def _inside(self, f: Functional, region: Region, y: Array) -> bool:
+        feasible = self.thresholds.feasible
+        held = np.abs(region.equal @ y - region.value).max(initial=0.0) <= feasible
+        return bool(held and (f.cone @ y).max(initial=0.0) <= feasible)
 
-def _inside(f: Functional, region: Region, y: Array) -> bool:
-    held = np.abs(region.equal @ y - region.value).max(initial=0.0) <= FEASIBLE
-    return bool(held and (f.cone @ y).max(initial=0.0) <= FEASIBLE)
+    def _violated(self, cone: Array, y: Array, active: list[int]) -> bool:
+        """Whether y leaves the cone; the row it violates most is then added to the active ones."""
+        excess = cone @ y
+        if not len(cone) or excess.max() <= self.thresholds.feasible or int(excess.argmax()) in active:
+            return False
+        active.append(int(excess.argmax()))
+        return True
 
 
 def _seeds(cone: Array) -> list[int]:
     """Rows extreme in one coefficient: on a straight part these are its ends, and no other is ever needed."""
     return sorted({*cone.argmin(axis=0).tolist(), *cone.argmax(axis=0).tolist()}) if len(cone) else []
-
-
-def _violated(cone: Array, y: Array, active: list[int]) -> bool:
-    """Whether y leaves the cone; the row it violates most is then added to the active ones."""
-    excess = cone @ y
-    if not len(cone) or excess.max() <= FEASIBLE or int(excess.argmax()) in active:
-        return False
-    active.append(int(excess.argmax()))
-    return True

@@ -7,44 +7,62 @@ from dataclasses import dataclass
 
 import numpy as np
 from mpi4py import MPI
-from numpy.typing import NDArray
 
-from ..errors import InputError
-from .motions import Body, Mode, named, rigid_fields
-
-Array = NDArray[np.float64]
-
-RANK = 1e-9  # singular values this small beside the largest count as zero
+from ..typing import Array
+from .motions import Mode, RigidBody, mode_of, rigid_fields
+from .thresholds import DEFAULT, Thresholds
 
 
 @dataclass(frozen=True)
-class Fixed:
-    """Conditions direction·y(x) = 0: points (k, 3), directions (k, d); each rank gives its own rows."""
+class FixedDirections:
+    """Conditions direction·y(x) = 0; each rank gives its own rows.
+
+    Attributes:
+        points: x, (k, 3).
+        directions: (k, d).
+    """
 
     points: Array
     directions: Array
 
     def __post_init__(self) -> None:
         if np.ndim(self.directions) != 2 or np.shape(self.points) != (len(self.directions), 3):
-            raise InputError("Fixed wants points (k, 3) and directions (k, d) with the same k")
+            raise ValueError("FixedDirections wants points (k, 3) and directions (k, d) with the same k")
 
 
-def kernel(comm: MPI.Comm, body: Body, fixed: Sequence[Fixed]) -> Array:
+def kernel(
+    comm: MPI.Comm, body: RigidBody, fixed: Sequence[FixedDirections], thresholds: Thresholds = DEFAULT
+) -> Array:
     """A basis of Y as columns of rigid coefficients, (3|6, k). Collective; the same on all ranks.
 
     First the translations, orthonormal; then rotations about orthonormal axes, one radian each, whose
     displacement of the centre is orthogonal to those translations. Coordinate axes are taken where possible.
     Each rank sends one triangular factor; the singular values of all of them stacked decide the rank.
+
+    Args:
+        comm: the ranks of the mesh.
+        body: the body that moves.
+        fixed: the conditions, on each rank its own.
+        thresholds: what counts as zero.
     """
     rows = np.vstack([np.zeros((0, body.motions)), *(_condition_rows(part, body) for part in fixed)])
     factors = comm.gather(triangle(rows), root=0)
-    basis = natural_basis(null_space(np.vstack(factors)), body.dimension) if factors is not None else None
+    basis = None if factors is None else _natural_null_space(np.vstack(factors), body.dimension, thresholds)
     return np.asarray(comm.bcast(basis, root=0))
 
 
-def modes(basis: Array, body: Body) -> tuple[Mode, ...]:
-    """The columns of a kernel's basis with their names. Local."""
-    return tuple(named(column, body, signed=False) for column in basis.T)
+def _natural_null_space(rows: Array, dimension: int, thresholds: Thresholds) -> Array:
+    return natural_basis(null_space(rows, thresholds), dimension, thresholds)
+
+
+def modes(basis: Array, body: RigidBody) -> tuple[Mode, ...]:
+    """The motions of a kernel's basis. Local.
+
+    Args:
+        basis: rigid coefficients (3|6, k), one column each.
+        body: the body that moves.
+    """
+    return tuple(mode_of(column, body, signed=False) for column in basis.T)
 
 
 def triangle(rows: Array) -> Array:
@@ -52,31 +70,42 @@ def triangle(rows: Array) -> Array:
     return np.asarray(np.linalg.qr(rows, mode="r")) if len(rows) else rows
 
 
-def null_space(rows: Array) -> Array:
-    """Orthonormal basis (n, k) of {z: rows @ z = 0}; rows (m, n), m = 0 allowed."""
+def null_space(rows: Array, thresholds: Thresholds = DEFAULT) -> Array:
+    """Orthonormal basis (n, k) of {z: rows @ z = 0}.
+
+    Args:
+        rows: (m, n), m = 0 allowed.
+        thresholds: what counts as zero.
+    """
     n = rows.shape[1]
     if not rows.any():
         return np.eye(n)
     _, values, right = np.linalg.svd(np.vstack([rows, np.zeros((n, n))]), full_matrices=False)
-    return np.asarray(right[values <= RANK * values[0]].T)
+    return np.asarray(right[values <= thresholds.rank * values[0]].T)
 
 
-def natural_basis(basis: Array, dimension: int) -> Array:
-    """The same space of rigid coefficients (3|6, k) by translations first, then rotations, see `kernel`."""
-    basis = np.where(np.abs(basis) <= RANK, 0.0, basis)
-    shifts = sparse_basis(basis[:dimension] @ null_space(basis[dimension:]))
-    spins = sparse_basis(basis[dimension:])
-    lift = np.linalg.lstsq(basis[dimension:], spins, rcond=RANK)[0]
+def natural_basis(basis: Array, dimension: int, thresholds: Thresholds = DEFAULT) -> Array:
+    """The same space by translations first, then rotations, see `kernel`.
+
+    Args:
+        basis: rigid coefficients (3|6, k), one column for each motion.
+        dimension: of space, 2 or 3.
+        thresholds: what counts as zero.
+    """
+    basis = np.where(np.abs(basis) <= thresholds.rank, 0.0, basis)
+    shifts = _sparse_basis(basis[:dimension] @ null_space(basis[dimension:], thresholds), thresholds)
+    spins = _sparse_basis(basis[dimension:], thresholds)
+    lift = np.linalg.lstsq(basis[dimension:], spins, rcond=thresholds.rank)[0]
     centre = basis[:dimension] @ lift
     centre = centre - shifts @ (shifts.T @ centre)
     zeros = np.zeros((len(basis) - dimension, shifts.shape[1]))
     return _snap(np.hstack([np.vstack([shifts, zeros]), np.vstack([centre, spins])]))
 
 
-def sparse_basis(vectors: Array) -> Array:
+def _sparse_basis(vectors: Array, thresholds: Thresholds) -> Array:
     """Orthonormal basis of the span of the columns (n, k) of `vectors`, along axes where it can be."""
     left, values, _ = np.linalg.svd(vectors, full_matrices=False)
-    span = left[:, values > RANK]
+    span = left[:, values > thresholds.rank]
     factor, upper = np.linalg.qr(_reduce(span))
     return _snap(factor * np.sign(np.diag(upper)))
 
@@ -97,9 +126,10 @@ def _reduce(span: Array) -> Array:
 
 
 def _snap(values: Array) -> Array:
+    """The values, with zero for what is rounding in an orthonormal basis."""
     return np.where(np.abs(values) < 1e-13, 0.0, values)
 
 
-def _condition_rows(part: Fixed, body: Body) -> Array:
+def _condition_rows(part: FixedDirections, body: RigidBody) -> Array:
     """(k, 3|6): the work of each condition on the basis motions."""
     return np.asarray(np.einsum("kd,knd->kn", part.directions, rigid_fields(part.points, body)))

@@ -9,21 +9,24 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..errors import InputError
+from ..typing import Array
 
-Array = NDArray[np.float64]
-
-TINY = 1e-9  # a coefficient this small beside the largest is not worth a word
+NEGLIGIBLE = 1e-9
+"""A coefficient this small beside the largest is not named."""
 AXES = "xyz"
 
 
 @dataclass(frozen=True)
-class Body:
-    """Dimension d (2 or 3) and centre (3,), nondimensional.
+class RigidBody:
+    """A body, as far as its rigid motions need it; nondimensional.
 
-    For words only: metres per unit of `length`, and where there are several bodies its `name` and `index` among them.
+    Attributes:
+        dimension: d, 2 or 3.
+        centre: (3,).
+        length: metres per unit of length, for the names of motions.
+        name: where there are several bodies, what it is called.
+        index: where there are several bodies, its number among them.
     """
 
     dimension: int
@@ -34,9 +37,9 @@ class Body:
 
     def __post_init__(self) -> None:
         if self.dimension not in (2, 3):
-            raise InputError(f"a body has 2 or 3 dimensions, not {self.dimension}")
+            raise ValueError(f"a body has 2 or 3 dimensions, not {self.dimension}")
         if np.shape(self.centre) != (3,):
-            raise InputError(f"the centre of a body is a point (3,), not an array {np.shape(self.centre)}")
+            raise ValueError(f"the centre of a body is a point (3,), not an array {np.shape(self.centre)}")
 
     @property
     def motions(self) -> int:
@@ -46,20 +49,37 @@ class Body:
 
 @dataclass(frozen=True)
 class Mode:
-    """A rigid motion of one body: in words, as coefficients (3 or 6) on the basis of this module, the body's index."""
+    """A rigid motion of one body.
 
-    words: str
+    Attributes:
+        name: the motion in words.
+        coefficients: (3|6,), on the basis of this module.
+        body: the body's index.
+    """
+
+    name: str
     coefficients: tuple[float, ...]
     body: int = 0
 
 
-def named(coefficients: Array, body: Body, *, signed: bool) -> Mode:
-    """The motion with these coefficients (3|6,), described."""
+def mode_of(coefficients: Array, body: RigidBody, *, signed: bool) -> Mode:
+    """The motion with the given coefficients, with its name.
+
+    Args:
+        coefficients: (3|6,), on the basis of this module.
+        body: the body that moves.
+        signed: whether the name tells the sense too.
+    """
     return Mode(describe(coefficients, body, signed=signed), tuple(float(c) for c in coefficients), body.index)
 
 
-def rigid_fields(points: Array, body: Body) -> Array:
-    """The basis motions at points (m, 3), as (m, 3|6, d). Local to the rank."""
+def rigid_fields(points: Array, body: RigidBody) -> Array:
+    """The basis motions, (m, 3|6, d). Local to the rank.
+
+    Args:
+        points: (m, 3), nondimensional.
+        body: the body that moves.
+    """
     lever, d = points - body.centre, body.dimension
     fields = np.zeros((len(points), body.motions, d))
     fields[:, :d, :] = np.eye(d)
@@ -70,17 +90,26 @@ def rigid_fields(points: Array, body: Body) -> Array:
     return fields
 
 
-def motion_at(points: Array, body: Body, coefficients: tuple[float, ...] | Array) -> Array:
-    """The motion with the given coefficients (3|6) at points (m, 3), as (m, d). Local to the rank."""
+def motion_at(points: Array, body: RigidBody, coefficients: tuple[float, ...] | Array) -> Array:
+    """The displacement of a motion, (m, d). Local to the rank.
+
+    Args:
+        points: (m, 3), nondimensional.
+        body: the body that moves.
+        coefficients: (3|6,), on the basis of this module.
+    """
     return np.asarray(np.einsum("n,mnd->md", np.asarray(coefficients), rigid_fields(points, body)))
 
 
-def describe(coefficients: Array, body: Body, *, signed: bool) -> str:
-    """A motion in words, e.g. "translation along y"; `signed` tells the sense too: "translation along +y".
+def describe(coefficients: Array, body: RigidBody, *, signed: bool) -> str:
+    """A motion in words, such as "translation along y"; points in it are in metres.
 
-    Points are in metres (nondimensional coordinates times `body.length`).
+    Args:
+        coefficients: (3|6,), on the basis of this module.
+        body: the body that moves.
+        signed: whether the sense is told too: "translation along +y".
     """
-    z = np.where(np.abs(coefficients) <= TINY * np.abs(coefficients).max(), 0.0, coefficients)
+    z = np.where(np.abs(coefficients) <= NEGLIGIBLE * np.abs(coefficients).max(), 0.0, coefficients)
     shift, spin = z[: body.dimension], z[body.dimension :]
     whose = f" of {body.name}" if body.name else ""
     if not spin.any():
@@ -89,18 +118,18 @@ def describe(coefficients: Array, body: Body, *, signed: bool) -> str:
     return rotation(shift, spin, body, signed) + whose
 
 
-def _rotation_2d(shift: Array, spin: Array, body: Body, signed: bool) -> str:
+def _rotation_2d(shift: Array, spin: Array, body: RigidBody, signed: bool) -> str:
     pole = body.centre[:2] + np.array([-shift[1], shift[0]]) / spin[0]
     sense = (", counterclockwise" if spin[0] > 0.0 else ", clockwise") if signed else ""
     return f"rotation about {_point(pole * body.length)}{sense}"
 
 
-def _rotation_3d(shift: Array, spin: Array, body: Body, signed: bool) -> str:
+def _rotation_3d(shift: Array, spin: Array, body: RigidBody, signed: bool) -> str:
     """Every motion in space is a screw; the point named is the one of its axis nearest the centre."""
     square = float(spin @ spin)
     pole, pitch = body.centre + np.cross(spin, shift) / square, float(shift @ spin) / square
     axis = f"about the axis through {_point(pole * body.length)} along {_direction(spin, signed)}"
-    if abs(pitch) <= TINY:
+    if abs(pitch) <= NEGLIGIBLE:
         return f"rotation {axis}"
     return f"screw motion {axis}, advancing {_number(pitch * body.length)} per radian"
 
@@ -110,7 +139,7 @@ def _direction(vector: Array, signed: bool) -> str:
     unit = vector / np.linalg.norm(vector)
     if not signed and unit[np.abs(unit).round(6).argmax()] < 0.0:
         unit = -unit
-    if np.abs(unit).max() < 1.0 - TINY:
+    if np.abs(unit).max() < 1.0 - NEGLIGIBLE:
         return "(" + ", ".join(f"{_clean(c):.2f}" for c in unit) + ")"
     i = int(np.abs(unit).argmax())
     return (("+" if unit[i] > 0.0 else "-") if signed else "") + AXES[i]
@@ -125,4 +154,4 @@ def _number(value: float) -> str:
 
 
 def _clean(value: float) -> float:
-    return 0.0 if abs(value) < TINY else float(value)
+    return 0.0 if abs(value) < NEGLIGIBLE else float(value)

@@ -11,44 +11,46 @@ from dataclasses import dataclass
 
 import numpy as np
 from mpi4py import MPI
-from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..laws.convex_parts import Directional
+from ..typing import Array
 from .cutting_planes import Functional, SlipIntegral
-from .kernel import Fixed, kernel
-from .motions import Body, rigid_fields
-
-Array = NDArray[np.float64]
-
-TINY_ROW = 1e-10  # a row this short constrains no rigid motion: what is left of it is rounding
+from .kernel import FixedDirections, kernel
+from .motions import RigidBody, rigid_fields
+from .thresholds import DEFAULT, Thresholds
 
 
 @dataclass(frozen=True)
 class ContactCone:
-    """Unilateral contact: y·n <= 0 at points (m, 3) with outward unit normals (m, d)."""
+    """Unilateral contact: y·n <= 0.
+
+    Attributes:
+        points: vertices (m, 3).
+        normals: n, outward, of unit length, (m, d).
+    """
 
     points: Array
     normals: Array
 
     def __post_init__(self) -> None:
         if np.ndim(self.normals) != 2 or np.shape(self.points) != (len(self.normals), 3):
-            raise InputError("ContactCone wants points (m, 3) and normals (m, d) with the same m")
+            raise ValueError("ContactCone wants points (m, 3) and normals (m, d) with the same m")
 
 
-def linear_part(law: Directional) -> float:
+def _linear_part(law: Directional) -> float:
     """The a of law(s) = a·s + b|s|; one side infinite: the sign of s is known, and the law linear."""
     if np.isinf(law.plus) or np.isinf(law.minus):
         return 0.0 if law.plus == law.minus else (-law.minus if np.isinf(law.plus) else law.plus)
     return 0.5 * (law.plus - law.minus)
 
 
-def even_part(law: Directional) -> float:
+def _even_part(law: Directional) -> float:
     """The b of law(s) = a·s + b|s|; negative if the function is not convex."""
     return 0.0 if np.isinf(law.plus) or np.isinf(law.minus) else 0.5 * (law.plus + law.minus)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Resistance:
     """One part that carries a law.
 
@@ -73,7 +75,7 @@ class Resistance:
     def __post_init__(self) -> None:
         m = len(self.weights)
         if np.shape(self.points) != (m, 3) or np.ndim(self.directions) != 3 or len(self.directions) != m:
-            raise InputError("Resistance wants points (m, 3), weights (m,), directions (m, r, d), one m")
+            raise ValueError("Resistance wants points (m, 3), weights (m,), directions (m, r, d), one m")
         values = (self.growth.minus, self.growth.plus, self.peak.minus, self.peak.plus)
         if not all(value > -np.inf for value in values):  # also refuses nan
             raise InputError(f"growth and peak of a law are numbers or +inf, not {values}")
@@ -81,38 +83,53 @@ class Resistance:
             raise InputError("a law of the length of the slip needs the same growth and peak on both sides")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class RigidProblem:
-    """One body, its conditions, contact, laws, and the work <g, y> (3|6,) of each named load on the basis.
+    """What the rigid motions of one body meet.
 
-    `force` is the sum of the absolute nodal forces: beside it a work is rounding or not, however well loads balance.
+    Attributes:
+        body: the body.
+        loads: by name, the work <g, y> (3|6,) on the basis motions.
+        fixed: directions in which it cannot move.
+        contact: unilateral contact.
+        resistances: the parts that carry laws.
+        force: sum of the absolute nodal forces: beside it a work is rounding or not, however well loads balance.
     """
 
-    body: Body
+    body: RigidBody
     loads: Mapping[str, Array]
-    fixed: tuple[Fixed, ...] = ()
+    fixed: tuple[FixedDirections, ...] = ()
     contact: tuple[ContactCone, ...] = ()
     resistances: tuple[Resistance, ...] = ()
     force: float = 0.0
 
     def __post_init__(self) -> None:
         for name, work in self.loads.items():
-            if np.shape(work) != (self.body.motions,) or not np.isfinite(work).all():
-                raise InputError(f"load {name!r} wants {self.body.motions} finite numbers, one for each rigid motion")
+            if np.shape(work) != (self.body.motions,):
+                raise ValueError(f"load {name!r} wants {self.body.motions} numbers, one for each rigid motion")
+            if not np.isfinite(work).all():
+                raise InputError(f"load {name!r}: its work on a rigid motion is not finite")
 
-    def conditions(self) -> tuple[Fixed, ...]:
+    def conditions(self) -> tuple[FixedDirections, ...]:
         """The fixed conditions, and those of laws whose growth is infinite both ways (linear springs)."""
         springs = [p for p in self.resistances if np.isinf(p.growth.minus) and np.isinf(p.growth.plus)]
-        rows = [Fixed(p.points, p.directions[:, r]) for p in springs for r in range(p.directions.shape[1])]
+        rows = [FixedDirections(p.points, p.directions[:, r]) for p in springs for r in range(p.directions.shape[1])]
         return (*self.fixed, *rows)
 
 
-@dataclass(frozen=True)
-class Reduced:
+@dataclass(frozen=True, kw_only=True)
+class ReducedProblem:
     """The problem in the k coefficients of the kernel's basis; on the root rank only.
 
-    frame (3|6, k), contact (c, k) unit rows, slips one per resistance, moments (p, k) = ∫ direction·y,
-    areas (p,), load name -> (k,), load_scale the largest work of the loads on any basis motion, or their absolute sum.
+    Attributes:
+        frame: the basis as rigid coefficients (3|6, k).
+        contact: rows of unit length (c, k); contact admits the motions with contact @ y <= 0.
+        slips: the slip integral of each resistance.
+        moments: ∫ direction·y of each resistance, (p, k).
+        areas: of each resistance, (p,).
+        loads: by name, the work on the basis motions, (k,).
+        load_scale: the largest work of the loads on any basis motion, or the sum of the absolute nodal forces.
+        thresholds: what counts as zero.
     """
 
     frame: Array
@@ -122,6 +139,7 @@ class Reduced:
     areas: Array
     loads: Mapping[str, Array]
     load_scale: float
+    thresholds: Thresholds
 
     def functional(self, laws: tuple[Directional, ...]) -> Functional:
         """Σ_p ∫ law_p(slip) ds on the cone of contact and of infinite one-sided laws; factors of any sign."""
@@ -131,22 +149,31 @@ class Reduced:
             for sign, side in ((1.0, law.plus), (-1.0, law.minus))
             if np.isinf(side)
         ]
-        linear = np.array([linear_part(law) for law in laws]) @ self.moments
-        return Functional(linear, np.array([even_part(law) for law in laws]), np.vstack([self.contact, *blocked]))
+        linear = np.array([_linear_part(law) for law in laws]) @ self.moments
+        return Functional(linear, np.array([_even_part(law) for law in laws]), np.vstack([self.contact, *blocked]))
 
     def slip_rows(self, p: int) -> Array:
         """The slips of part p as rows (q, k) of length one; vanishing ones are left out."""
         rows = self.slips[p].rows
-        return unit_rows(rows.reshape(-1, rows.shape[2]), TINY_ROW * float(self.areas[p]) / max(len(rows), 1))
+        tiny = self.thresholds.short_row * float(self.areas[p]) / max(len(rows), 1)
+        return unit_rows(rows.reshape(-1, rows.shape[2]), tiny)
 
 
-def reduce(comm: MPI.Comm, problem: RigidProblem) -> tuple[Array, Reduced | None]:
-    """The kernel's basis (3|6, k) everywhere, and on the root the reduced problem if k > 0. Collective."""
-    basis = kernel(comm, problem.body, problem.conditions())
+def reduce(
+    comm: MPI.Comm, problem: RigidProblem, thresholds: Thresholds = DEFAULT
+) -> tuple[Array, ReducedProblem | None]:
+    """The kernel's basis (3|6, k) everywhere, and on the root the reduced problem if k > 0. Collective.
+
+    Args:
+        comm: the ranks of the mesh.
+        problem: the body and what it meets.
+        thresholds: what counts as zero.
+    """
+    basis = kernel(comm, problem.body, problem.conditions(), thresholds)
     if basis.shape[1] == 0:
         return basis, None
     normals = [_work(p.points, p.normals[:, None, :], problem.body, basis)[:, 0] for p in problem.contact]
-    local = np.unique(unit_rows(np.vstack([np.zeros((0, basis.shape[1])), *normals]), TINY_ROW), axis=0)
+    local = np.unique(unit_rows(np.vstack([np.zeros((0, basis.shape[1])), *normals]), thresholds.short_row), axis=0)
     slips = [_work(p.points, p.directions, problem.body, basis) * p.weights[:, None, None] for p in problem.resistances]
     pieces = comm.gather((local, slips, [float(p.weights.sum()) for p in problem.resistances]), root=0)
     if pieces is None:
@@ -154,7 +181,7 @@ def reduce(comm: MPI.Comm, problem: RigidProblem) -> tuple[Array, Reduced | None
     integrals = tuple(SlipIntegral(np.concatenate([piece[1][p] for piece in pieces])) for p in range(len(slips)))
     moments = [g.rows[:, 0].sum(axis=0) if g.rows.shape[1] == 1 else np.zeros(basis.shape[1]) for g in integrals]
     works = {name: np.asarray(work) @ basis for name, work in problem.loads.items()}
-    return basis, Reduced(
+    return basis, ReducedProblem(
         frame=basis,
         contact=np.unique(np.vstack([piece[0] for piece in pieces]), axis=0),
         slips=integrals,
@@ -162,15 +189,21 @@ def reduce(comm: MPI.Comm, problem: RigidProblem) -> tuple[Array, Reduced | None
         areas=np.sum([piece[2] for piece in pieces], axis=0) if integrals else np.zeros(0),
         loads=works,
         load_scale=max(problem.force, sum(float(np.abs(work).max()) for work in problem.loads.values())),
+        thresholds=thresholds,
     )
 
 
 def unit_rows(rows: Array, tiny: float) -> Array:
-    """Rows (m, k) scaled to length one, without those of length <= tiny."""
+    """Rows scaled to length one, without those that are too short.
+
+    Args:
+        rows: (m, k).
+        tiny: the length up to which a row is left out.
+    """
     length = np.linalg.norm(rows, axis=1)
     return np.asarray(rows[length > tiny] / length[length > tiny, None])
 
 
-def _work(points: Array, directions: Array, body: Body, basis: Array) -> Array:
+def _work(points: Array, directions: Array, body: RigidBody, basis: Array) -> Array:
     """direction·y of each basis motion of the kernel: directions (m, r, d) give (m, r, k)."""
     return np.asarray(np.einsum("mrd,mnd->mrn", directions, rigid_fields(points, body)) @ basis)

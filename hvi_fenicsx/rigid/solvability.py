@@ -17,36 +17,53 @@ from mpi4py import MPI
 from ..errors import HviError, InputError, SolverError
 from .analysis import Analysis
 from .kernel import modes
-from .reduction import Reduced, RigidProblem, reduce
+from .reduction import ReducedProblem, RigidProblem, reduce
+from .thresholds import DEFAULT, Thresholds
 from .verdict import LoadFactors, Solvability, undecided, unmovable
 
 Result = TypeVar("Result")
 
 
-def analyse(comm: MPI.Comm, problem: RigidProblem) -> Solvability:
-    """The state of a scene and its margins, before anything is solved. Collective; the same on all ranks."""
-    basis, reduced = reduce(comm, problem)
+def analyse(comm: MPI.Comm, problem: RigidProblem, thresholds: Thresholds = DEFAULT) -> Solvability:
+    """The state of a scene and its margins, before anything is solved. Collective; the same on all ranks.
+
+    Args:
+        comm: the ranks of the mesh.
+        problem: the body and what it meets.
+        thresholds: what counts as zero, and when to give up.
+    """
+    basis, reduced = reduce(comm, problem, thresholds)
     c = _paper_c(comm, problem)
     if basis.shape[1] == 0:
         return unmovable(c)
     return _on_root(comm, reduced, lambda found: _verdict(problem, found, c))
 
 
-def _verdict(problem: RigidProblem, reduced: Reduced, c: float) -> Solvability:
+def _verdict(problem: RigidProblem, reduced: ReducedProblem, c: float) -> Solvability:
     try:
         return Analysis(problem, reduced).solvability()
     except SolverError as error:
         return undecided(modes(reduced.frame, problem.body), c, str(error))
 
 
-def load_factors(comm: MPI.Comm, problem: RigidProblem, load: str | None = None) -> LoadFactors:
-    """Factors of one named load, the others constant, or of the whole load (None).
+def load_factors(
+    comm: MPI.Comm, problem: RigidProblem, load: str | None = None, thresholds: Thresholds = DEFAULT
+) -> LoadFactors:
+    """Factors of one load, the others constant, or of the whole load. Collective; the same on all ranks.
 
-    Collective; the same on all ranks.
+    Args:
+        comm: the ranks of the mesh.
+        problem: the body and what it meets.
+        load: its name; None: the whole load.
+        thresholds: what counts as zero, and when to give up.
+
+    Raises:
+        InputError: there is no such load.
+        SolverError: the linear programmes broke down.
     """
     if load is not None and load not in problem.loads:
         raise InputError(f"there is no load {load!r}; there are: {', '.join(problem.loads) or 'none'}")
-    basis, reduced = reduce(comm, problem)
+    basis, reduced = reduce(comm, problem, thresholds)
     if basis.shape[1] == 0:
         return LoadFactors(-np.inf, np.inf, np.inf, None, None)
     return _on_root(comm, reduced, lambda found: Analysis(problem, found).load_factors(load))
@@ -57,8 +74,8 @@ def _paper_c(comm: MPI.Comm, problem: RigidProblem) -> float:
     return float(np.sqrt(comm.allreduce(square)))
 
 
-def _on_root(comm: MPI.Comm, reduced: Reduced | None, work: Callable[[Reduced], Result]) -> Result:
-    """Work on the rank that holds the data and tell all ranks what came out, be it an error."""
+def _on_root(comm: MPI.Comm, reduced: ReducedProblem | None, work: Callable[[ReducedProblem], Result]) -> Result:
+    """Do the work on the rank that holds the data and send the result, or its error, to all ranks."""
     outcome: Result | HviError | None = None
     if reduced is not None:
         try:

@@ -1,4 +1,4 @@
-"""What is said about a scene before it is solved: its state, margins, load factors and modes, as data."""
+"""The verdict on a scene before it is solved: its state, margins, load factors and modes, as data."""
 
 from __future__ import annotations
 
@@ -10,16 +10,17 @@ import numpy as np
 
 from .motions import Mode
 
-State = Literal["held", "metastable", "escapes", "borderline", "undecided"]
-WORST_FIRST: tuple[State, ...] = ("escapes", "undecided", "metastable", "borderline", "held")
+ExistenceState = Literal["held", "metastable", "escapes", "borderline", "undecided"]
+WORST_FIRST: tuple[ExistenceState, ...] = ("escapes", "undecided", "metastable", "borderline", "held")
 
 
 @dataclass(frozen=True)
-class Paper:
+class PaperConditions:
     """The paper's conditions (A2s), nondimensional.
 
-    c = (Σ c4² area)^½ γ0 with γ0 = 1; margin = min of -<g,y> over y in Y∩K∞ with |y| = 1, None if there is no
-    such y.
+    Attributes:
+        c: (Σ c4² area)^½ γ0 with γ0 = 1.
+        margin: min of -<g,y> over y in Y∩K∞ with |y| = 1, None if there is no such y.
     """
 
     c: float
@@ -40,9 +41,14 @@ class Paper:
 class LoadFactors:
     """The factors of a load, the others constant, between which a body is held, and where the peak ends.
 
-    For λ in (held_from, held) the state is `held`; for λ > peak it is `escapes`. held = inf: no factor is too
-    large; held_from >= held: none is held. `mode` and `peak_mode` are the motions that limit the load, None where
-    nothing does.
+    For λ in (held_from, held) the state is `held`; for λ > peak it is `escapes`.
+
+    Attributes:
+        held_from: see above.
+        held: see above; inf: no factor is too large; at most held_from: no factor is held.
+        peak: see above.
+        mode: the motion that limits the load at `held`, None where nothing does.
+        peak_mode: the motion that limits the load at `peak`, likewise.
     """
 
     held_from: float
@@ -60,12 +66,12 @@ class LoadFactors:
             "held_from": _finite(self.held_from) if some else None,
             "held": _finite(self.held) if some else None,
             "peak": _finite(self.peak),
-            "direction": self.mode.words if self.mode else None,
-            "peak_direction": self.peak_mode.words if self.peak_mode else None,
+            "direction": self.mode.name if self.mode else None,
+            "peak_direction": self.peak_mode.name if self.peak_mode else None,
         }
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Solvability:
     """What the rigid motions say about a scene; nondimensional, |y| is the largest rigid coefficient.
 
@@ -80,11 +86,11 @@ class Solvability:
         free: a basis of the motions that nothing holds and on which the load does no work, both ways.
         paper: the paper's own conditions.
         exact: False if a growth is not convex; margin and lambda_held are then upper bounds, and `held` is
-            not claimed (`metastable` without a direction: only solving tells).
-        trouble: what broke down in the state undecided, in which margin and factors are unknown (None, nan).
+            not claimed (`metastable` without a direction: only solving decides).
+        trouble: in the state undecided, what broke down; margin and factors are then unknown (None, nan).
     """
 
-    state: State
+    state: ExistenceState
     margin: float | None
     lambda_held: float
     lambda_peak: float
@@ -92,7 +98,7 @@ class Solvability:
     critical: Mode | None
     kernel: tuple[Mode, ...]
     free: tuple[Mode, ...]
-    paper: Paper
+    paper: PaperConditions
     exact: bool = True
     trouble: str = ""
 
@@ -103,22 +109,48 @@ class Solvability:
             "margin": self.margin,
             "lambda_held": _finite(self.lambda_held),
             "lambda_peak": _finite(self.lambda_peak),
-            "direction": self.direction.words if self.direction else None,
-            "kernel": [mode.words for mode in self.kernel],
-            "free": [mode.words for mode in self.free],
+            "direction": self.direction.name if self.direction else None,
+            "kernel": [mode.name for mode in self.kernel],
+            "free": [mode.name for mode in self.free],
             "paper": {"c": self.paper.c, "satisfied": self.paper.satisfied if self.state != "undecided" else None},
         }
 
 
 def unmovable(c: float) -> Solvability:
     """The verdict on a body whose conditions leave no rigid motion: coercive, held under any load."""
-    return Solvability("held", None, np.inf, np.inf, None, None, (), (), Paper(c, None))
+    return Solvability(
+        state="held",
+        margin=None,
+        lambda_held=np.inf,
+        lambda_peak=np.inf,
+        direction=None,
+        critical=None,
+        kernel=(),
+        free=(),
+        paper=PaperConditions(c, None),
+    )
 
 
 def undecided(kernel: tuple[Mode, ...], c: float, trouble: str) -> Solvability:
-    """No verdict: what could be known is the kernel. Solving may tell more, since a certificate needs no verdict."""
+    """No verdict. Solving may show more, since a certificate needs no verdict.
+
+    Args:
+        kernel: the motions that the conditions leave.
+        c: the paper's constant.
+        trouble: what broke down.
+    """
     return Solvability(
-        "undecided", None, np.nan, np.nan, None, None, kernel, (), Paper(c, np.nan), exact=False, trouble=trouble
+        state="undecided",
+        margin=None,
+        lambda_held=np.nan,
+        lambda_peak=np.nan,
+        direction=None,
+        critical=None,
+        kernel=kernel,
+        free=(),
+        paper=PaperConditions(c, np.nan),
+        exact=False,
+        trouble=trouble,
     )
 
 
@@ -142,7 +174,7 @@ def combine(bodies: Sequence[Solvability]) -> Solvability:
         critical=first.critical,
         kernel=kernel,
         free=tuple(mode for body in known for mode in body.free),
-        paper=Paper(c, _combined_margin([body.paper.margin for body in known])),
+        paper=PaperConditions(c, _combined_margin([body.paper.margin for body in known])),
         exact=all(body.exact for body in bodies),
     )
 

@@ -12,7 +12,7 @@ from ..laws import Superpotential
 from ..laws.convex_parts import Directional
 from ..problem.law_term import LawTerm
 from ..problem.problem import Problem
-from ..rigid import Body, Resistance, RigidProblem, analyse, rigid_fields
+from ..rigid import Resistance, RigidBody, RigidProblem, analyse, rigid_fields
 from ..typing import Array
 from . import existence
 
@@ -39,7 +39,7 @@ def slides(
 def _majorant(
     problem: Problem,
     forces: Mapping[str, PETSc.Vec],
-    body: Body,
+    body: RigidBody,
     terms: Sequence[tuple[LawTerm, Superpotential, Array]],
 ) -> RigidProblem:
     """The existence question of one body with H - ξ in the place of its laws. Collective."""
@@ -70,7 +70,7 @@ def _majorised(part: Resistance, term: LawTerm, growth: Directional, xi: Array) 
     return replace(part, weights=part.weights * (1.0 - xi / growth.plus), growth=growth, peak=growth)
 
 
-def _borne(body: Body, part: Resistance, term: LawTerm, xi: Array) -> Array:
+def _borne(body: RigidBody, part: Resistance, term: LawTerm, xi: Array) -> Array:
     """∫ ξ·y of this rank's vertices on the rigid basis (3|6,), for a law of a signed slip."""
     if term.radial:
         return np.zeros(body.motions)

@@ -14,11 +14,11 @@ from ..problem.contact_surface import Surface
 from ..problem.law_term import LawTerm
 from ..problem.problem import Bounds, Problem
 from ..rigid import (
-    Body,
     ContactCone,
-    Fixed,
+    FixedDirections,
     LoadFactors,
     Resistance,
+    RigidBody,
     RigidProblem,
     Solvability,
     analyse,
@@ -71,7 +71,7 @@ def rigid_problems(problem: Problem, forces: Mapping[str, PETSc.Vec]) -> tuple[R
 def moves_with_contact_closed(problem: Problem) -> bool:
     """Whether a rigid motion is left when every contact part is held in its normal direction. Collective."""
 
-    def moves(body: Body) -> bool:
+    def moves(body: RigidBody) -> bool:
         held = (_along(problem, body, b.surface, b.surface.normals) for b in problem.bounds)
         return kernel(problem.domain.mesh.comm, body, (_prescribed(problem, body), *held)).shape[1] > 0
 
@@ -83,18 +83,18 @@ def felt(problem: Problem, forces: Mapping[str, PETSc.Vec]) -> dict[str, PETSc.V
     return {name: force for name, force in forces.items() if name not in problem.bulk.strains}
 
 
-def of_body(problem: Problem, forces: Mapping[str, PETSc.Vec], body: Body) -> RigidProblem:
+def of_body(problem: Problem, forces: Mapping[str, PETSc.Vec], body: RigidBody) -> RigidProblem:
     """The data of one body; a law acts on it if it `touches` it. Collective."""
     held = [_along(problem, body, b.surface, b.surface.normals) for b in problem.bounds if _bilateral(b)]
     cones = [_along(problem, body, b.surface, b.surface.normals) for b in problem.bounds if not _bilateral(b)]
     works, force = _works(problem, forces, body)
     return RigidProblem(
-        body,
-        works,
-        (_prescribed(problem, body), *held),
-        tuple(ContactCone(cone.points, cone.directions) for cone in cones),
-        tuple(_resistance(problem, body, term) for term in problem.terms if touches(problem, body, term)),
-        force,
+        body=body,
+        loads=works,
+        fixed=(_prescribed(problem, body), *held),
+        contact=tuple(ContactCone(cone.points, cone.directions) for cone in cones),
+        resistances=tuple(_resistance(problem, body, term) for term in problem.terms if touches(problem, body, term)),
+        force=force,
     )
 
 
@@ -102,24 +102,24 @@ def _bilateral(bounds: Bounds) -> bool:
     return bool(np.all(np.isfinite(bounds.lower) & np.isfinite(bounds.upper)))
 
 
-def inside(problem: Problem, body: Body, blocks: Entities) -> Mask:
+def inside(problem: Problem, body: RigidBody, blocks: Entities) -> Mask:
     """Which of these local vertices are the body's."""
     return np.asarray(problem.bodies.labels[blocks] == body.index)
 
 
-def _along(problem: Problem, body: Body, surface: Surface, directions: Array) -> Fixed:
+def _along(problem: Problem, body: RigidBody, surface: Surface, directions: Array) -> FixedDirections:
     mine = inside(problem, body, surface.blocks)
-    return Fixed(np.asarray(surface.points[mine] / problem.scales.length), directions[mine])
+    return FixedDirections(np.asarray(surface.points[mine] / problem.scales.length), directions[mine])
 
 
-def _prescribed(problem: Problem, body: Body) -> Fixed:
+def _prescribed(problem: Problem, body: RigidBody) -> FixedDirections:
     d, dofs = problem.scales.dimension, problem.fixed_here
     dofs = dofs[inside(problem, body, dofs // d)]
     points = problem.points[dofs // d]
-    return Fixed(np.asarray(points / problem.scales.length), np.asarray(np.eye(d)[dofs % d]))
+    return FixedDirections(np.asarray(points / problem.scales.length), np.asarray(np.eye(d)[dofs % d]))
 
 
-def _works(problem: Problem, forces: Mapping[str, PETSc.Vec], body: Body) -> tuple[dict[str, Array], float]:
+def _works(problem: Problem, forces: Mapping[str, PETSc.Vec], body: RigidBody) -> tuple[dict[str, Array], float]:
     """<g, y> of each load on the rigid basis, and the sum of the absolute nodal forces. Collective."""
     comm, d = problem.domain.mesh.comm, problem.scales.dimension
     points = problem.points
@@ -133,14 +133,21 @@ def _works(problem: Problem, forces: Mapping[str, PETSc.Vec], body: Body) -> tup
     return works, size
 
 
-def touches(problem: Problem, body: Body, term: LawTerm) -> bool:
+def touches(problem: Problem, body: RigidBody, term: LawTerm) -> bool:
     """Whether a law acts on the body. Collective."""
     mine = bool(inside(problem, body, term.surface.blocks).any())
     return bool(problem.domain.mesh.comm.allreduce(mine, op=MPI.LOR))
 
 
-def _resistance(problem: Problem, body: Body, term: LawTerm) -> Resistance:
+def _resistance(problem: Problem, body: RigidBody, term: LawTerm) -> Resistance:
     surface, law = term.surface, term.exact
     mine = inside(problem, body, surface.blocks)
     points = np.asarray(surface.points[mine] / problem.scales.length)
-    return Resistance(points, surface.weights[mine], term.directions[mine], law.growth, law.peak, law.c4)
+    return Resistance(
+        points=points,
+        weights=surface.weights[mine],
+        directions=term.directions[mine],
+        growth=law.growth,
+        peak=law.peak,
+        c4=law.c4,
+    )

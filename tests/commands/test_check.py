@@ -12,7 +12,7 @@ from runs import ROOT, hvi, write_scene
 from scenes import model
 
 from hvi_fenicsx import Scene, console, prepare
-from hvi_fenicsx.rigid import Body, Mode
+from hvi_fenicsx.rigid import Mode, RigidBody
 from hvi_fenicsx.workflow import finish
 
 TOWER = ROOT / "demos" / "tipping_tower.toml"
@@ -50,7 +50,7 @@ def test_a_load_that_is_not_there_is_told_with_those_that_are() -> None:
 
 def test_few_rigid_motions_are_named_and_many_are_counted(tmp_path: Path) -> None:
     """Twelve motions in words are no line that a person reads."""
-    bodies = [Body(3, np.zeros(3), name=f"body {i}", index=i) for i in (1, 2)]
+    bodies = [RigidBody(3, np.zeros(3), name=f"body {i}", index=i) for i in (1, 2)]
     names = [Mode(f"motion {i}", (0.0,) * 6) for i in range(12)]
     assert console.motions([], bodies) == "none"
     assert console.motions(names[:3], bodies) == "motion 0, motion 1, motion 2"

@@ -130,8 +130,8 @@ def test_both_escapes_count_in_the_margin(answers: dict[str, Any]) -> None:
 def test_bodies_without_regions_of_their_own_are_numbered_from_the_left(folder: Path) -> None:
     verdict = prepare(Scene.model_validate(blocks(folder / "nameless.msh", 2, 0.3e6, -2.0e6))).solvability
     assert verdict.direction is not None
-    assert verdict.direction.words == "translation along -x of body 2 at (2.5, 0.5)"
-    assert verdict.kernel[2].words == "rotation about (0.5, 0.5) of body 1 at (0.5, 0.5)"
+    assert verdict.direction.name == "translation along -x of body 2 at (2.5, 0.5)"
+    assert verdict.kernel[2].name == "rotation about (0.5, 0.5) of body 1 at (0.5, 0.5)"
 
 
 @pytest.mark.parametrize(

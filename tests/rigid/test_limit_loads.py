@@ -116,7 +116,7 @@ def test_a_run_is_certified_just_below_and_ends_without_solution_just_above(name
     above = solve(Scene.model_validate(make(dimension, peak * (1 + 1e-6))))
     assert (above.exit_code, above.solvability.state) == (3, "escapes")
     assert above.solvability.direction is not None
-    assert above.solvability.direction.words.startswith(words)
+    assert above.solvability.direction.name.startswith(words)
 
 
 @pytest.mark.parametrize("name", ["sliding", "lifting"])

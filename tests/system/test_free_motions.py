@@ -166,7 +166,7 @@ def test_contact_that_opens_leaves_a_motion_free(method: str) -> None:
     table["solver"] = {"method": method}
     solution = solve(Scene.model_validate(table))
     assert (solution.exit_code, solution.solvability.state) == (0, "borderline")
-    assert [mode.words for mode in solution.solvability.free] == ["translation along y"]
+    assert [mode.name for mode in solution.solvability.free] == ["translation along y"]
     assert solution.examination is not None
     (state,) = solution.examination.states
     assert 0 < np.count_nonzero(state.contact) < len(state.contact)

@@ -69,7 +69,7 @@ def test_the_tower_tips_about_its_front_edge() -> None:
     tipped = demo("tipping_tower", "boundary.wind.traction=[6.3e3, 0]")
     assert tipped.exit_code == ESCAPES
     assert tipped.solvability.direction is not None
-    assert "rotation about (1, 0), clockwise" in tipped.solvability.direction.words
+    assert "rotation about (1, 0), clockwise" in tipped.solvability.direction.name
 
 
 def test_the_lifted_floor_bears_the_press_and_drags_where_it_has_lifted() -> None:

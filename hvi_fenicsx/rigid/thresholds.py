@@ -1,0 +1,49 @@
+"""What counts as zero, as equal and as enough in the analysis of rigid motions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+
+@dataclass(frozen=True, kw_only=True)
+class Thresholds:
+    """Limits of the analysis; everything it compares is nondimensional and of order 1.
+
+    Attributes:
+        rank: singular values this small beside the largest count as zero.
+        short_row: a row this short constrains no rigid motion: what is left of it is rounding.
+        tie: a margin this small beside the work of the loads is an equality.
+        dropped: coefficients of at most this size, the largest tried first, that the motion which is named may do
+            without.
+        feasible: violation of a cone's row of unit length that still counts as none.
+        max_rounds: linear programmes for one minimum; friction in 3D needs about 40.
+        tight_gap: gap between value and lower bound, over the scale, that ends the search.
+        loose_gap: gap that will do where it shrinks no more.
+        patience: linear programmes without a smaller gap after which it counts as shrinking no more.
+        shrunk: what a gap must fall to, of the last smallest, to count as smaller.
+        solver_tolerances: of HiGHS, with and without presolve, the narrowest first; where rounding leaves it without a
+            verdict, the next.
+    """
+
+    rank: float = 1e-9
+    short_row: float = 1e-10
+    tie: float = 1e-9
+    dropped: tuple[float, ...] = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8)
+    feasible: float = 1e-10
+    max_rounds: int = 500
+    tight_gap: float = 1e-13
+    loose_gap: float = 1e-9
+    patience: int = 4
+    shrunk: float = 0.9
+    solver_tolerances: tuple[tuple[bool, float], ...] = ((False, 1e-10), (True, 1e-10), (False, 1e-9), (True, 1e-9))
+
+    def solver_options(self) -> list[dict[str, Any]]:
+        """The options of HiGHS to be tried one after the other."""
+        names = "primal_feasibility_tolerance", "dual_feasibility_tolerance"
+        return [
+            {"presolve": presolve, **dict.fromkeys(names, tolerance)} for presolve, tolerance in self.solver_tolerances
+        ]
+
+
+DEFAULT = Thresholds()
