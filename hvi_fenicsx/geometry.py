@@ -1,4 +1,4 @@
-"""Plane geometry: outlines of bodies, and the curves that their sides lie on."""
+"""Plane geometry: outlines of bodies, the curves that their sides lie on, and chains of edges."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .typing import Array
+from .typing import Array, Integers
 
 Point = tuple[float, float]
 """Coordinates, m."""
@@ -66,3 +66,37 @@ class Outline:
         """The curved sides by name."""
         starts = zip(self.points, self.sides, strict=True)
         return {name: Arc(c, float(np.hypot(p[0] - c[0], p[1] - c[1]))) for p, (name, c) in starts if c is not None}
+
+
+def chains(edges: Integers, rank: Integers | None = None) -> list[Integers]:
+    """Follow oriented edges from end to end.
+
+    Open chains come first, since a walk that begins inside of one would cut it in two.
+
+    Args:
+        edges: the two vertices of each edge, each edge once, (k, 2).
+        rank: of each vertex, (n,): a closed chain begins at its vertex of lowest rank; without it, at the vertex that
+            comes first in the edges.
+
+    Returns:
+        The vertices of each chain in order; a closed one ends with the vertex that it begins with.
+    """
+    onwards: dict[int, list[int]] = {}
+    for a, b in edges:
+        onwards.setdefault(int(a), []).append(int(b))
+    inner = set(map(int, edges[:, 1]))
+    found = [_walk(start, onwards) for start in [a for a in onwards if a not in inner]]
+    while onwards:
+        start = next(iter(onwards)) if rank is None else min(onwards, key=lambda a: int(rank[a]))
+        found.append(_walk(start, onwards))
+    return found
+
+
+def _walk(start: int, onwards: dict[int, list[int]]) -> Integers:
+    """Along the edges as far as they lead; those that were walked are taken out."""
+    chain = [start]
+    while (following := onwards.get(chain[-1])) is not None:
+        if len(following) == 1:
+            del onwards[chain[-1]]
+        chain.append(following.pop())
+    return np.array(chain, dtype=np.int64)

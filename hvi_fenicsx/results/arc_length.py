@@ -7,6 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from .. import compat
+from ..geometry import chains
 from ..mesh.vertex_dofs import dof_of_node
 from ..problem.contact_surface import Surface
 from ..problem.problem import Problem
@@ -17,12 +18,22 @@ _DIGITS = 9
 
 
 def vertices(problem: Problem, surface: Surface) -> Integers:
-    """Global numbers of the part's vertices that this rank owns, (m,)."""
+    """Global numbers of a part's vertices that this rank owns, (m,).
+
+    Args:
+        problem: what was solved.
+        surface: the part.
+    """
     return np.asarray(problem.space.dofmap.index_map.local_to_global(surface.blocks), dtype=np.int64)
 
 
 def edges(problem: Problem, surface: Surface) -> Integers:
-    """The part's facets that this rank knows as pairs of global vertices, the body to their left; (k, 2)."""
+    """A part's facets that this rank knows as pairs of global vertices, the body to their left; (k, 2).
+
+    Args:
+        problem: what was solved.
+        surface: the part.
+    """
     mesh, space = problem.domain.mesh, problem.space
     facets = np.asarray(surface.facets, dtype=np.int32)
     if not len(facets):
@@ -55,54 +66,34 @@ def along(points: Array, numbers: Integers, pairs: Integers) -> tuple[Integers, 
     which the last one ended. The arc length is 0 at the smallest vertex of all, and negative before it.
 
     Args:
-        points: (m, 2). numbers: the vertices' numbers (m,). pairs: facets by these numbers, (k, 2), each perhaps twice.
+        points: the vertices, m, (m, 2).
+        numbers: of the vertices, (m,).
+        pairs: the facets by these numbers, the body to their left, (k, 2); a facet may be there twice.
     """
     rank = np.empty(len(points), dtype=np.int64)
     rank[lexicographic(points)] = np.arange(len(points))
-    place = {int(number): i for i, number in enumerate(numbers)}
-    local = [(place[int(a)], place[int(b)]) for a, b in np.unique(pairs, axis=0)]
-    chains = sorted(_chains(local, rank), key=lambda chain: int(np.min(rank[chain])))
-    return _measured(points, chains, rank)
+    by_number = np.argsort(numbers)
+    edges = by_number[np.searchsorted(numbers[by_number], np.unique(pairs, axis=0))]
+    inner = np.unique(edges[:, 1])
+    found = [chain if chain[0] in inner else _oriented(chain, rank) for chain in chains(edges, rank)]
+    return _measured(points, sorted(found, key=lambda chain: int(np.min(rank[chain]))), rank)
 
 
-def _chains(pairs: list[tuple[int, int]], rank: Integers) -> list[list[int]]:
-    """Vertices chain by chain; open ones first, since a walk from within one would cut it in two.
-
-    A closed chain ends with the vertex that it began with.
-    """
-    onwards: dict[int, list[int]] = {}
-    for a, b in pairs:
-        onwards.setdefault(a, []).append(b)
-    ends = {b for _, b in pairs}
-    begins = [a for a in onwards if a not in ends]
-    found = [_oriented(_walked(a, onwards), rank) for a in begins]
-    while left := [a for a, to in onwards.items() if to]:
-        found.append(_walked(min(left, key=lambda a: int(rank[a])), onwards))
-    return found
-
-
-def _walked(start: int, onwards: dict[int, list[int]]) -> list[int]:
-    """Along the facets as far as they lead, each once."""
-    chain = [start]
-    while onwards.get(chain[-1]):
-        chain.append(onwards[chain[-1]].pop())
-    return chain
-
-
-def _oriented(chain: list[int], rank: Integers) -> list[int]:
+def _oriented(chain: Integers, rank: Integers) -> Integers:
+    """An open chain from the lower of its ends."""
     return chain if rank[chain[0]] <= rank[chain[-1]] else chain[::-1]
 
 
-def _measured(points: Array, chains: list[list[int]], rank: Integers) -> tuple[Integers, Array]:
+def _measured(points: Array, ordered: list[Integers], rank: Integers) -> tuple[Integers, Array]:
     """All chains one after the other; a vertex where two of them touch belongs to the first."""
     order: dict[int, float] = {}
     end = 0.0
-    for i, chain in enumerate(chains):
+    for i, chain in enumerate(ordered):
         steps = np.linalg.norm(np.diff(points[chain], axis=0), axis=1)
         s = end + np.concatenate([[0.0], np.cumsum(steps)])
         if i == 0:
             s -= s[int(np.argmin(rank[chain]))]
         for vertex, length in zip(chain, s, strict=True):
-            order.setdefault(vertex, float(length))
+            order.setdefault(int(vertex), float(length))
         end = float(s[-1])
     return np.array(list(order), dtype=np.int64), np.array(list(order.values()))

@@ -10,10 +10,11 @@ import numpy as np
 
 from ...errors import HviError
 from ...formula import Formula
+from ...geometry import chains
 from ...typing import Array, Integers
 from ..body_mesh import BodyMesh
 from ..reader import Result
-from .boundary_chains import chains, normals
+from .outline import normals
 from .vtk_view import area_vectors
 
 

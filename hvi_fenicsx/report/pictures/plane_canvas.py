@@ -10,11 +10,12 @@ from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
 from matplotlib.patches import PathPatch
 
+from ...geometry import chains
 from ...typing import Array, Integers
 from ..body_mesh import BodyMesh
-from .boundary_chains import chains, closed_path
 from .deformed import DeformedBody
 from .legend import FOOT
+from .outline import closed_path
 from .raster import shade
 from .style import DPI, GREY, HEADING, INK, area, figure
 

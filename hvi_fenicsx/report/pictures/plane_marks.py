@@ -12,11 +12,12 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
+from ...geometry import chains
 from ...typing import Array, Mask
 from ..units import quantity
-from .boundary_chains import chains, normals
 from .deformed import DeformedBody, PartGeometry
 from .loads_supports import HeldSide, LoadedSide
+from .outline import normals
 from .style import GREY, INK, ORANGE, PURPLE, VERMILION
 
 LOAD, PRESSURE, ROLLER = 0.13, 0.15, 0.011

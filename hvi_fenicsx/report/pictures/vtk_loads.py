@@ -44,14 +44,15 @@ def arrows(shape: DeformedBody, load: LoadedSide) -> tuple[Array, Array]:
 
 
 def _sparse(points: Array, size: float) -> Integers:
-    """Of points on a face, one near each node of a coarse grid."""
+    """One point of a face near each node of a coarse grid; of equally near ones that with the smallest coordinates."""
     low = points.min(axis=0)
     extent = np.ptp(points, axis=0)
     flat = extent < 1e-9 * size
     cells = np.where(flat, 0.0, np.maximum(np.round(extent / (0.25 * size)), 1.0))
     place = (points - low) / np.where(flat, 1.0, extent) * cells
     node = np.round(place)
-    order = np.argsort(np.linalg.norm(place - node, axis=1), kind="stable")
+    distance = np.round(np.linalg.norm(place - node, axis=1), 6)
+    order = np.lexsort((*np.round(place, 6).T[::-1], distance))
     return np.asarray(order[np.unique(node[order], axis=0, return_index=True)[1]])
 
 

@@ -7,15 +7,16 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import PathPatch
 
+from ....geometry import chains
 from ....typing import Array
 from ...body_mesh import BodyMesh
 from ...reader import Result
 from .. import plane_marks as marks
-from ..boundary_chains import chains, closed_path
 from ..deformed import DeformedBody
 from ..escape_marks import WAY, arrow, keys, say
 from ..finite_motion import fitted, followed
 from ..loads_supports import held_sides, loaded_sides
+from ..outline import closed_path
 from ..plane_canvas import canvas
 from ..registry import picture
 from ..style import INK, PALE, VERMILION, heading

@@ -12,13 +12,14 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import PathPatch
 
+from ....geometry import chains
 from ...body_mesh import BodyMesh
 from ...reader import Result
 from .. import plane_marks as marks
-from ..boundary_chains import chains, closed_path
 from ..deformed import DeformedBody
 from ..legend import legend
 from ..loads_supports import Side, held_sides, loaded_sides, tables
+from ..outline import closed_path
 from ..plane_canvas import canvas
 from ..registry import picture
 from ..scene_legend import inside, say, touches
