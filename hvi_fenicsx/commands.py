@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Callable, Sequence
+import logging
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from mpi4py import MPI
 
@@ -18,7 +20,7 @@ from .errors import ExitCode, HviError, InputError
 from .report.html import render
 from .report.pictures import draw as pictures
 from .results.write import write_record
-from .runtime.log import Journal
+from .runtime import log
 from .runtime.mpi import on_root
 from .runtime.signals import Interrupt
 from .runtime.timing import Timer
@@ -27,12 +29,35 @@ from .system import petsc_options
 from .workflow import Prepared, Solution, finish, prepare
 
 COMM = MPI.COMM_WORLD
+H = TypeVar("H", bound=logging.Handler)
+_LOG = log.logger("commands")
 _CODES = {"escapes": ExitCode.NO_SOLUTION, "undecided": ExitCode.NOT_CONVERGED}
 """What ``hvi check`` ends with, by the state."""
 
 
+@dataclass(frozen=True, kw_only=True)
+class RunRequest:
+    """What ``hvi run`` is asked for.
+
+    Attributes:
+        scene: what to solve.
+        goal: the accuracy or time asked for, if any.
+        folder: where the result goes.
+        timer: where time goes.
+        given: the command line and PETSc's options, for ``summary.json``.
+        draw: whether to make pictures.
+    """
+
+    scene: Scene
+    goal: Goal | None
+    folder: results.ResultFolder
+    timer: Timer
+    given: dict[str, str]
+    draw: bool
+
+
 def run(options: argparse.Namespace) -> int:
-    """Solve a scene into a folder; the exit code by the contract.
+    """Solve a scene into a folder; the exit code by the contract. Collective.
 
     Raises:
         InputError: on all ranks alike.
@@ -47,10 +72,10 @@ def run(options: argparse.Namespace) -> int:
     if options.resume and (code := on_root(COMM, lambda: _finished(target, scene, goal))) is not None:
         return code
     folder = results.ResultFolder(COMM, target, "replace" if options.force or options.resume else "refuse")
+    given = {"command": options.given, "petsc": options.petsc}
+    draw = not options.no_pictures
     try:
-        with Journal(COMM.rank == 0) as journal:
-            given = {"command": options.given, "petsc": options.petsc}
-            return _run(scene, goal, folder, journal, timer, given, draw=not options.no_pictures)
+        return _run(RunRequest(scene=scene, goal=goal, folder=folder, timer=timer, given=given, draw=draw))
     except BaseException:
         folder.discard()
         raise
@@ -65,61 +90,80 @@ def _goal(options: argparse.Namespace) -> Goal | None:
     return Goal(options.accuracy, options.quantity or "energy", options.time_budget)
 
 
-def _run(
-    scene: Scene,
-    goal: Goal | None,
-    folder: results.ResultFolder,
-    journal: Journal,
-    timer: Timer,
-    given: dict[str, str],
-    *,
-    draw: bool,
-) -> int:
+def _run(request: RunRequest) -> int:
+    """Solve, write and tell; the exit code. Collective."""
     interrupt = Interrupt(COMM)
     interrupt.watch()
-    reached: Reached | None = None
-    said: tuple[str, ...] = ()
-    if goal is not None:
-        climber = Climber(timer, journal.progress, interrupt.requested)
-        reached = control.reach(scene, COMM, goal, climber, journal.say)
-        solution = reached.solution
-    else:
-        prepared = prepare(scene, COMM, timer)
-        said = prepared.warnings
-        for line in console.heading(prepared, COMM.size):
-            journal.say(line)
-        solution = finish(prepared, journal.progress, interrupt.requested)
-    odd = console.odd(warning for warning in solution.warnings if warning not in said)
-    for line in [*console.outcome(solution), *odd, *(console.bought(reached) if reached else [])]:
-        journal.say(line)
-    with timer("output"):
-        record = {**results.write(folder.work, solution), **given, **(_bought(reached) if reached else {})}
-        if draw:
-            on_root(COMM, lambda: _from_files("pictures", pictures.draw, folder.work, record, journal))
-    with timer("output"):
-        record["time"] = timer.report()
-        on_root(COMM, lambda: _from_files("report", render.write, folder.work, record, journal))
-    record["time"] = timer.report()
-    on_root(COMM, lambda: write_record(folder.work, record, journal))
-    folder.commit()
-    journal.say(f"{folder.target}: {timer.total:.1f} s in all; open report.html there")
+    folder, run_logs = request.folder, _on_first_rank(lambda: log.RunLog(request.folder.work / "run.log"))
+    with log.Handlers(*_on_first_rank(log.TerminalDisplay)):
+        with log.Handlers(*run_logs):
+            solution, reached = _solve(request, interrupt)
+            record = _write(request, solution, reached)
+        on_root(COMM, lambda: _finish(run_logs))
+        folder.commit()
+        _LOG.info(f"{folder.target}: {request.timer.total:.1f} s in all; open report.html there")
     return int(record["exit_code"])
 
 
-def _bought(reached: Reached) -> dict[str, Any]:
-    """What of ``summary.json`` differs where an accuracy was asked for."""
+def _on_first_rank(make: Callable[[], H]) -> list[H]:
+    """The handler that rank 0 makes, none on the others. Collective."""
+    made: list[H] = []
+    on_root(COMM, lambda: made.append(make()))
+    return made
+
+
+def _finish(run_logs: Iterable[log.RunLog]) -> None:
+    for run_log in run_logs:
+        run_log.finish()
+
+
+def _solve(request: RunRequest, interrupt: Interrupt) -> tuple[Solution, Reached | None]:
+    """The solution; with it, where an accuracy was asked for, how it was reached. Collective."""
+    if request.goal is not None:
+        climber = Climber(request.timer, log.newton_step, interrupt.requested)
+        reached = control.reach(request.scene, COMM, request.goal, climber, _LOG.info)
+        _say([*console.outcome(reached.solution), *console.odd(reached.solution.warnings), *console.bought(reached)])
+        return reached.solution, reached
+    prepared = prepare(request.scene, COMM, request.timer)
+    _say(console.heading(prepared, COMM.size))
+    solution = finish(prepared, log.newton_step, interrupt.requested)
+    new = (warning for warning in solution.warnings if warning not in prepared.warnings)
+    _say([*console.outcome(solution), *console.odd(new)])
+    return solution, None
+
+
+def _say(lines: Iterable[str]) -> None:
+    for line in lines:
+        _LOG.info(line)
+
+
+def _write(request: RunRequest, solution: Solution, reached: Reached | None) -> dict[str, Any]:
+    """All files of the result but ``run.log``; the summary. Collective."""
+    work, timer = request.folder.work, request.timer
+    with timer("output"):
+        record = {**results.write(work, solution), **request.given, **(_accuracy(reached) if reached else {})}
+        if request.draw:
+            on_root(COMM, lambda: _from_files("pictures", pictures.draw, work, record))
+    with timer("output"):
+        record["time"] = timer.report()
+        on_root(COMM, lambda: _from_files("report", render.write, work, record))
+    record["time"] = timer.report()
+    on_root(COMM, lambda: write_record(work, record))
+    return record
+
+
+def _accuracy(reached: Reached) -> dict[str, Any]:
+    """What differs in ``summary.json`` where an accuracy was asked for."""
     return {"accuracy": results.plain(reached.as_dict()), "exit_code": reached.exit_code}
 
 
-def _from_files(
-    what: str, make: Callable[[Path], object], folder: Path, record: dict[str, Any], journal: Journal
-) -> None:
-    """Pictures and report are made from the other files; one that fails costs a line in the log, not the run."""
-    write_record(folder, record, journal)
+def _from_files(what: str, make: Callable[[Path], object], folder: Path, record: dict[str, Any]) -> None:
+    """Make pictures or report from the other files; one that fails costs a line in the log, not the run."""
+    write_record(folder, record)
     try:
         make(folder)
     except HviError as error:
-        journal.say(f"{what}: {error}")
+        _LOG.info(f"{what}: {error}")
 
 
 def _finished(target: Path, scene: Scene, goal: Goal | None) -> int | None:
@@ -129,20 +173,21 @@ def _finished(target: Path, scene: Scene, goal: Goal | None) -> int | None:
         record = json.loads((target / results.folder.MARK).read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return None
-    bought = record["accuracy"]
-    same = (
-        same
-        and (bought is not None) == (goal is not None)
-        and (goal is None or goal.as_dict().items() <= bought.items())
-    )
-    if not same or record["exit_code"] not in (ExitCode.CERTIFIED, ExitCode.NO_SOLUTION):
+    final = record["exit_code"] in (ExitCode.CERTIFIED, ExitCode.NO_SOLUTION)
+    if not (same and final and _same_goal(goal, record["accuracy"])):
         return None
     print(f"{target}: finished already ({record['reason']})")
     return int(record["exit_code"])
 
 
+def _same_goal(goal: Goal | None, recorded: dict[str, Any] | None) -> bool:
+    if goal is None or recorded is None:
+        return goal is None and recorded is None
+    return goal.as_dict().items() <= recorded.items()
+
+
 def check(options: argparse.Namespace) -> int:
-    """Validate a scene, tell its effects, kernel and existence; 3 when no solution exists, 4 when none can tell.
+    """Validate a scene and print its effects, rigid motions and existence; the exit code by the contract. Collective.
 
     Raises:
         InputError: on all ranks alike.
@@ -162,6 +207,3 @@ def _report(prepared: Prepared, loads: Sequence[str], *, as_json: bool) -> str:
         return json.dumps(console.as_data(prepared, factors), indent=2, ensure_ascii=False)
     lines = [*console.heading(prepared, COMM.size), *console.load_factors(factors), *console.effects(prepared)]
     return "\n".join(lines)
-
-
-__all__ = ["Solution", "check", "run"]

@@ -10,7 +10,6 @@ import numpy as np
 
 from ..problem.stress import von_mises
 from ..report.solution_arrays import FILE, SolutionArrays, save
-from ..runtime.log import Journal
 from ..runtime.mpi import on_root
 from ..scene import dump_scene
 from ..workflow import Solution
@@ -21,7 +20,7 @@ from .summary import summary
 def write(folder: Path, solution: Solution) -> dict[str, Any]:
     """Write the fields (all ranks), the tables and the arrays (rank 0). Collective.
 
-    ``summary.json`` and ``run.log`` are written by :func:`write_record`, once the pictures are there too.
+    ``summary.json`` is written by :func:`write_record`, once the pictures are there too.
 
     Args:
         folder: where to.
@@ -57,15 +56,13 @@ def _write_arrays(folder: Path, arrays: SolutionArrays | None) -> None:
     save(folder / FILE, arrays)
 
 
-def write_record(folder: Path, record: dict[str, Any], journal: Journal) -> None:
-    """Write ``summary.json`` and ``run.log``. Rank 0 only.
+def write_record(folder: Path, record: dict[str, Any]) -> None:
+    """Write ``summary.json``. Rank 0 only.
 
     Args:
         folder: where to.
         record: the summary.
-        journal: what the run said.
     """
-    _text(folder / "run.log", "\n".join(journal.lines) + "\n")
     _text(folder / "summary.json", json.dumps(record, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
 
 

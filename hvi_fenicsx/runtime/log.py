@@ -1,55 +1,153 @@
-"""What a run says: lines on the terminal and in ``run.log``, and one moving line of progress. Rank 0 only."""
+"""Logging: one logger for each room of the package, on rank 0 only, and what shows a run of the command line.
+
+Python users see nothing unless they configure logging, like ``logging.basicConfig(level=logging.INFO)``; at DEBUG every
+Newton step is told. ``hvi run`` shows the lines of the command on the terminal, the last Newton step on a moving line,
+and keeps all records in ``run.log``.
+"""
 
 from __future__ import annotations
 
+import logging
 import sys
 import time
+from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
+PACKAGE = __name__.partition(".")[0]
+COMMANDS, WORKFLOW = f"{PACKAGE}.commands", f"{PACKAGE}.workflow"
+logging.getLogger(PACKAGE).addHandler(logging.NullHandler())
 
-class Journal:
-    """Collects what a run says; used as a context so that the terminal is always left clean.
+
+def logger(room: str) -> logging.Logger:
+    """The logger of a room, such as ``hvi_fenicsx.solvers``; its records are made on rank 0 only."""
+    found = logging.getLogger(f"{PACKAGE}.{room}")
+    found.addFilter(_on_first_rank)
+    return found
+
+
+def _on_first_rank(record: logging.LogRecord) -> bool:
+    """Whether this process is rank 0; one that has not started MPI is alone."""
+    mpi = sys.modules.get("mpi4py.MPI")
+    return mpi is None or mpi.COMM_WORLD.rank == 0
+
+
+_SOLVERS = logger("solvers")
+
+
+def newton_step(method: str, epsilon: float | None, iteration: int, residual: float, contact: int) -> None:
+    """Record a Newton step.
 
     Args:
-        speaks: whether this rank prints (rank 0). The progress line is shown on terminals only.
+        method: its name.
+        epsilon: relative width of the smoothing; None for exact laws.
+        iteration: counted from the start of the solve.
+        residual: of the inequality, relative.
+        contact: vertices in contact, of all ranks.
+    """
+    width = "" if epsilon is None else f", ε {epsilon:.3g}"
+    text = "%s%s, iteration %d, residual %.2e, %d vertices in contact"
+    _SOLVERS.debug(text, method, width, iteration, residual, contact, extra={"moving": True})
+
+
+class RunLog(logging.FileHandler):
+    """``run.log``: each record with the seconds since the start of the run.
+
+    A disk that is full must not end one rank alone: the first error is kept and raised when the log is finished.
+
+    Args:
+        path: the file.
     """
 
-    def __init__(self, speaks: bool) -> None:
-        self.lines: list[str] = []
-        self._speaks = speaks
+    def __init__(self, path: Path) -> None:
+        super().__init__(path, mode="w", encoding="utf-8")
+        self._error: OSError | None = None
+        self.addFilter(lambda record: record.name != WORKFLOW)  # the command says the same in full
+        self.setFormatter(_ElapsedFormatter())
+
+    def handleError(self, record: logging.LogRecord) -> None:
+        """Keep the error that is being handled."""
+        error = sys.exc_info()[1]
+        if not isinstance(error, OSError):
+            raise
+        self._error = self._error or error
+
+    def finish(self) -> None:
+        """Close the file.
+
+        Raises:
+            OSError: a record could not be written.
+        """
+        self.close()
+        if self._error is not None:
+            raise self._error
+
+
+class _ElapsedFormatter(logging.Formatter):
+    """Records with the seconds since it was made."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._start = time.time()
+
+    def format(self, record: logging.LogRecord) -> str:
+        return f"{record.created - self._start:9.3f} s  {record.getMessage()}"
+
+
+class TerminalDisplay(logging.Handler):
+    """The lines of the command on standard output; on a terminal, also the last Newton step on a moving line."""
+
+    def __init__(self) -> None:
+        super().__init__()
         self._start = time.perf_counter()
         self._status: Any = None
+        self.addFilter(lambda record: record.name == COMMANDS or hasattr(record, "moving"))
 
-    def __enter__(self) -> Self:
-        if self._speaks and sys.stderr.isatty():
+    def start(self) -> None:
+        """Begin the moving line, where there is a terminal."""
+        if sys.stderr.isatty():
             from rich.console import Console
 
             self._status = Console(stderr=True).status("", spinner="line")
             self._status.start()
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Show one record."""
+        if not hasattr(record, "moving"):
+            print(record.getMessage(), flush=True)
+        elif self._status is not None:
+            self._status.update(f"{record.getMessage()}, {time.perf_counter() - self._start:.1f} s")
+
+    def close(self) -> None:
+        """Leave the terminal clean."""
+        if self._status is not None:
+            self._status.stop()
+            self._status = None
+        super().close()
+
+
+class Handlers:
+    """Sends the package's records to handlers while its block runs; closes them at its end.
+
+    Args:
+        *handlers: where to; none on the ranks that show nothing.
+    """
+
+    def __init__(self, *handlers: logging.Handler) -> None:
+        self._handlers = handlers
+        self._package = logging.getLogger(PACKAGE)
+
+    def __enter__(self) -> Self:
+        self._level = self._package.level
+        self._package.setLevel(logging.DEBUG)
+        for handler in self._handlers:
+            self._package.addHandler(handler)
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        if self._status is not None:
-            self._status.stop()
-            self._status = None
-
-    def say(self, line: str) -> None:
-        """A line for the terminal and the log."""
-        self.note(line)
-        if self._speaks:
-            print(line, flush=True)
-
-    def note(self, line: str) -> None:
-        """A line for the log only."""
-        self.lines.append(f"{time.perf_counter() - self._start:9.3f} s  {line}")
-
-    def progress(self, stage: str, epsilon: float | None, iteration: int, residual: float, contact: int) -> None:
-        """One step of a solver: in the log, and on the moving line."""
-        width = "" if epsilon is None else f", ε {epsilon:.3g}"
-        line = f"{stage}{width}, iteration {iteration}, residual {residual:.2e}, {contact} vertices in contact"
-        self.note(line)
-        if self._status is not None:
-            self._status.update(f"{line}, {time.perf_counter() - self._start:.1f} s")
+        for handler in self._handlers:
+            self._package.removeHandler(handler)
+            handler.close()
+        self._package.setLevel(self._level)
