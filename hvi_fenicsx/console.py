@@ -75,7 +75,7 @@ def load_factors(factors: Mapping[str, LoadFactors]) -> Iterator[str]:
 
 def effects(prepared: Prepared) -> Iterator[str]:
     """The effects in force with what each adds, and the solver that follows. Collective."""
-    found = effect_summary.shares(prepared.problem)
+    found = effect_summary.summaries(prepared.problem)
     yield from (f"effect: {share.effect} on {share.where or 'the body'}: {share.adds}" for share in found)
     yield from effect_summary.table(found)
     yield f"solver: {solver(prepared)}"
@@ -157,7 +157,7 @@ def as_data(prepared: Prepared, factors: Mapping[str, LoadFactors]) -> dict[str,
         "dofs": prepared.system.dofs,
         "solvability": prepared.solvability.summary(),
         "load_factors": {name: found.summary() for name, found in factors.items()},
-        "effects": [share.as_dict() for share in effect_summary.shares(prepared.problem)],
+        "effects": [summary.as_dict() for summary in effect_summary.summaries(prepared.problem)],
         "solver": solver(prepared),
         "warnings": list(prepared.warnings),
     }

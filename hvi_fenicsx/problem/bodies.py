@@ -5,7 +5,7 @@ Each rank joins the cells that share a facet; the facets that ranks share join w
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -21,21 +21,27 @@ from ..typing import Array, Integers
 
 
 @dataclass(frozen=True)
-class Bodies:
+class MeshBodies:
     """The bodies, from left to right (then from bottom to top), lengths in units of L.
 
     Attributes:
-        bodies: what each is, the same on all ranks. labels: the body of each local vertex (owned and ghost), (n,).
+        bodies: what each is, the same on all ranks.
+        labels: the body of each local vertex (owned and ghost), (n,).
     """
 
     bodies: tuple[RigidBody, ...]
     labels: Integers
 
-    def __iter__(self) -> Any:
+    def __iter__(self) -> Iterator[Body]:
         return iter(self.bodies)
 
     def motion(self, points: Array, mode: Mode) -> Array:
-        """A rigid motion of one body at all local vertices (n, 3), the others at rest, (n, d)."""
+        """A rigid motion of one body, the others at rest, (n, d).
+
+        Args:
+            points: all local vertices in units of L, (n, 3).
+            mode: which body moves, and how.
+        """
         field = motion_at(points, self.bodies[mode.body], mode.coefficients)
         return np.where((self.labels == mode.body)[:, None], field, 0.0)
 
@@ -45,18 +51,23 @@ def whole(domain: Domain) -> RigidBody:
     return RigidBody(domain.dimension, np.asarray(domain.centre / domain.length), domain.length)
 
 
-def find(domain: Domain, space: fem.FunctionSpace, points: Array) -> Bodies:
-    """The bodies of a domain; ``space`` is P1 on its mesh, ``points`` its local vertices. Collective.
+def find(domain: Domain, space: fem.FunctionSpace, points: Array) -> MeshBodies:
+    """The bodies of a domain. Collective.
+
+    Args:
+        domain: what is looked through.
+        space: P1 vectors on its mesh.
+        points: its local vertices in m, (n, 3).
 
     Raises:
         InputError: on all ranks alike: two bodies meet at a vertex (in 3D perhaps along an edge) only, a hinge.
     """
     one = whole(domain)
     if domain.one_piece:
-        return Bodies((one,), np.zeros(len(points), np.int64))
+        return MeshBodies((one,), np.zeros(len(points), np.int64))
     cells, count = _cells(domain)
     if count == 1:
-        return Bodies((one,), np.zeros(len(points), np.int64))
+        return MeshBodies((one,), np.zeros(len(points), np.int64))
     labels = _vertices(domain, space, cells, points)
     lower, upper = _boxes(domain, points[:, : domain.dimension], labels, count)
     centres = (lower + upper) / 2
@@ -65,7 +76,7 @@ def find(domain: Domain, space: fem.FunctionSpace, points: Array) -> Bodies:
     found = [replace(one, centre=np.pad(centres[i] / domain.length, (0, 3 - domain.dimension))) for i in order]
     names = _names(domain, place[cells], found)
     bodies = (replace(body, name=name, index=i) for i, (body, name) in enumerate(zip(found, names, strict=True)))
-    return Bodies(tuple(bodies), place[labels])
+    return MeshBodies(tuple(bodies), place[labels])
 
 
 def _cells(domain: Domain) -> tuple[Integers, int]:

@@ -16,17 +16,22 @@ from mpi4py import MPI
 
 from ..errors import InputError
 from ..typing import Array, Entities, Integers
+from .thresholds import DEFAULT, Thresholds
 from .vectors import nodal
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Surface:
     """The vertices of one boundary part that this rank owns (m of them).
 
     Attributes:
-        part: name. facets: its local facets. blocks: local vertex (block) indices (m,). points: SI (m, 3).
-        normals: outward unit, shape (m, d). tangents: shape (m, d-1, d), by design.md's rule.
-        weights: lumped area of each vertex over L^(d-1), shape (m,).
+        part: its name.
+        facets: its local facets.
+        blocks: local indices of its vertices (blocks of the space), (m,).
+        points: the vertices, m, (m, 3).
+        normals: outward unit normals, (m, d).
+        tangents: unit tangents (:func:`tangents`), (m, d-1, d).
+        weights: lumped area of each vertex over L^(d-1), (m,).
     """
 
     part: str
@@ -56,16 +61,19 @@ def build(
     measure: Any,
     area: float,
     direction: Sequence[float] | None = None,
+    thresholds: Thresholds = DEFAULT,
 ) -> Surface:
-    """The nodes of a part. Collective.
+    """The vertices of a part. Collective.
 
     Args:
         part: its name.
-        space: the P1 vector space. vertices: its local ones, m, (n, 3).
-        facets: its local facets.
+        space: P1 vectors.
+        vertices: the local vertices of the mesh, m, (n, 3).
+        facets: the part's local facets.
         measure: ds with vertex quadrature over the part, SI.
         area: L^(d-1), what the weights are divided by.
         direction: a constant unit vector that stands for the normal (that towards a flat obstacle).
+        thresholds: which normals are parallel to an axis.
 
     Raises:
         InputError: on all ranks alike: a vertex is on none but facets inside the body, which have no outward normal.
@@ -83,8 +91,17 @@ def build(
         normal = np.broadcast_to(np.asarray(direction, dtype=np.float64), normal.shape)
     normals = normal / np.linalg.norm(normal, axis=1, keepdims=True)
     # Rounding must not make an axis-parallel part a slanted one.
-    normals = np.where(np.max(np.abs(normals), axis=1, keepdims=True) > 1 - 1e-10, np.round(normals), normals)
-    return Surface(part, facets, blocks, vertices[blocks], normals, tangents(normals), weights)
+    parallel = np.max(np.abs(normals), axis=1, keepdims=True) > 1 - thresholds.axis_parallel
+    normals = np.where(parallel, np.round(normals), normals)
+    return Surface(
+        part=part,
+        facets=facets,
+        blocks=blocks,
+        points=vertices[blocks],
+        normals=normals,
+        tangents=tangents(normals),
+        weights=weights,
+    )
 
 
 def tangents(normals: Array) -> Array:
@@ -105,6 +122,11 @@ def tangents(normals: Array) -> Array:
 
 
 def component_dofs(blocks: Entities, directions: Array) -> tuple[Integers, Array]:
-    """The scalar dof (m,) of a direction (m, d) along an axis of its vertex's frame, and its sign (m,)."""
+    """The scalar dofs (m,) of directions along an axis of their vertex's frame, and the directions' signs (m,).
+
+    Args:
+        blocks: local indices of the vertices, (m,).
+        directions: unit vectors, each along an axis, (m, d).
+    """
     axis = np.argmax(np.abs(directions), axis=1)
     return blocks.astype(np.int64) * directions.shape[1] + axis, np.sign(directions[np.arange(len(axis)), axis])

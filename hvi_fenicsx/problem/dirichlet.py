@@ -15,19 +15,29 @@ from ..runtime.mpi import agree
 from ..typing import Array, Entities
 from .form_context import FormContext
 from .scaling import Scales
-
-_SAME = 1e-9
-"""Difference of two prescribed displacements, relative to the largest, that is rounding."""
+from .thresholds import DEFAULT, Thresholds
 
 
-def build(context: FormContext, scales: Scales, wanted: Sequence[tuple[str, Condition]]) -> tuple[fem.DirichletBC, ...]:
-    """The conditions, each with the part it stands on, nondimensional. Collective.
+def build(
+    context: FormContext,
+    scales: Scales,
+    wanted: Sequence[tuple[str, Condition]],
+    thresholds: Thresholds = DEFAULT,
+) -> tuple[fem.DirichletBC, ...]:
+    """The conditions, nondimensional. Collective.
+
+    Args:
+        context: spaces, parts and vertices.
+        scales: what one unit is in SI.
+        wanted: the conditions in SI, each with the part it stands on.
+        thresholds: which values are the same.
 
     Raises:
         InputError: on all ranks alike: two parts prescribe different values where they meet.
     """
     found = tuple(_condition(context, scales, part, condition) for part, condition in wanted)
-    _check_agreement(context, scales, [(part, bc) for (part, _), bc in zip(wanted, found, strict=True)])
+    named = [(part, bc) for (part, _), bc in zip(wanted, found, strict=True)]
+    _check_agreement(context, scales, named, thresholds.same_displacement)
     return found
 
 
@@ -43,7 +53,9 @@ def _condition(context: FormContext, scales: Scales, part: str, condition: Condi
     return fem.dirichletbc(function, fem.locate_dofs_topological((component, collapsed), dim, facets), component)
 
 
-def _check_agreement(context: FormContext, scales: Scales, named: Sequence[tuple[str, fem.DirichletBC]]) -> None:
+def _check_agreement(
+    context: FormContext, scales: Scales, named: Sequence[tuple[str, fem.DirichletBC]], rounding: float
+) -> None:
     """Where two parts meet they must prescribe the same: else the order of the tables would decide."""
     values = np.empty(len(context.points) * context.dimension)
     prescribed = [(part, *_values(condition, values)) for part, condition in named]
@@ -51,7 +63,7 @@ def _check_agreement(context: FormContext, scales: Scales, named: Sequence[tuple
     bad: list[str] = []
     for (one, dofs, these), (other, more, those) in combinations(prescribed, 2):
         shared, i, j = np.intersect1d(dofs, more, assume_unique=True, return_indices=True)
-        apart = np.abs(these[i] - those[j]) > _SAME * size
+        apart = np.abs(these[i] - those[j]) > rounding * size
         differing = zip(shared[apart], these[i][apart], those[j][apart], strict=True)
         bad += [_disagreement(context, int(dof), (one, other), pair, scales) for dof, *pair in differing]
     found = [text for rank in agree(context.domain.mesh.comm, bad[:1]) for text in rank]

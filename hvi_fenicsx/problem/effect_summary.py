@@ -1,6 +1,6 @@
 """What each effect in force adds to a problem, read off its contribution: terms, bounds, unknowns, output, solver.
 
-Nothing here is stated by an effect twice: a user's own effect is told about like the program's.
+No effect states any of this itself, so a user's own effect has a summary like the program's.
 """
 
 from __future__ import annotations
@@ -22,14 +22,19 @@ _LAWS = {
 }
 
 
-@dataclass(frozen=True, slots=True)
-class Share:
-    """One effect's share.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EffectSummary:
+    """What one effect adds.
 
     Attributes:
-        effect, where: its key and its place. adds: its term, in words and symbols.
-        terms: what is assembled for it. bounds: bounded displacements. unknowns: displacements that it brings, or with
-            a minus sign takes away. output: what the results hold because of it. solver: what it asks of the solver.
+        effect: its key.
+        where: its place: a part or region, None for the whole body.
+        adds: its term, in words and symbols.
+        terms: what is assembled for it.
+        bounds: number of bounded displacements.
+        unknowns: number of displacements that it brings or, negative, takes away.
+        output: what the results hold because of it.
+        solver: what it asks of the solver.
     """
 
     effect: str
@@ -46,24 +51,24 @@ class Share:
         return {**asdict(self), "output": list(self.output)}
 
 
-def shares(problem: Problem) -> list[Share]:
-    """Of all effects, in the scene's order. Collective."""
+def summaries(problem: Problem) -> list[EffectSummary]:
+    """The summaries of all effects, in the scene's order. Collective."""
     first = next((i for i, (_, e, _) in enumerate(problem.made) if e.place is Place.MATERIAL), None)
-    return [_share(problem, made, brings=i == first) for i, made in enumerate(problem.made)]
+    return [_summary(problem, made, brings=i == first) for i, made in enumerate(problem.made)]
 
 
-def _share(problem: Problem, made: PlacedContribution, *, brings: bool) -> Share:
+def _summary(problem: Problem, made: PlacedContribution, *, brings: bool) -> EffectSummary:
     where, effect, contribution = made
     total = problem.space.dofmap.index_map.size_global * problem.space.dofmap.index_map_bs
-    return Share(
-        effect.key,
-        where,
-        effect.term,
-        ", ".join(_terms(contribution)) or "none",
-        _bounded(problem, where) if contribution.bounds else 0,
-        total if brings else -_prescribed(problem, where, contribution),
-        tuple(_output(effect, contribution)),
-        _solver(contribution),
+    return EffectSummary(
+        effect=effect.key,
+        where=where,
+        adds=effect.term,
+        terms=", ".join(_terms(contribution)) or "none",
+        bounds=_bounded(problem, where) if contribution.bounds else 0,
+        unknowns=total if brings else -_prescribed(problem, where, contribution),
+        output=tuple(_output(effect, contribution)),
+        solver=_solver(contribution),
     )
 
 
@@ -109,20 +114,20 @@ def _solver(contribution: Contribution) -> str:
     return "bounds" if contribution.bounds else "linear"
 
 
-def table(found: Sequence[Share]) -> Iterator[str]:
-    """The shares as lines of aligned columns."""
+def table(found: Sequence[EffectSummary]) -> Iterator[str]:
+    """The summaries as lines of aligned columns."""
     rows = [("effect", "terms", "bounds", "unknowns", "output", "solver"), *map(_row, found)]
     widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
     for row in rows:
         yield "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
 
 
-def _row(share: Share) -> tuple[str, ...]:
+def _row(summary: EffectSummary) -> tuple[str, ...]:
     return (
-        f"{share.effect} on {share.where or 'the body'}",
-        share.terms,
-        f"{share.bounds:,}" if share.bounds else "none",
-        f"{share.unknowns:+,}" if share.unknowns else "none",
-        ", ".join(share.output) or "none",
-        share.solver,
+        f"{summary.effect} on {summary.where or 'the body'}",
+        summary.terms,
+        f"{summary.bounds:,}" if summary.bounds else "none",
+        f"{summary.unknowns:+,}" if summary.unknowns else "none",
+        ", ".join(summary.output) or "none",
+        summary.solver,
     )

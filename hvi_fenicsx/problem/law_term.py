@@ -16,6 +16,7 @@ from ..effects import Direction
 from ..laws import Superpotential
 from ..typing import Array
 from .contact_surface import Surface
+from .thresholds import DEFAULT, Thresholds
 
 
 @dataclass(frozen=True)
@@ -23,11 +24,15 @@ class LawTerm:
     """One law on one part, nondimensional.
 
     Attributes:
-        surface: its vertices (m). direction: what it acts on.
-        law: the j that is solved. exact: the unsmoothed one (the same where nothing is smoothed).
-        directions: what the displacement is multiplied with, shape (m, k, d); k = 2 for |u_t| in 3D.
-        free: 1 where a component is not prescribed, shape (m, d).
-        density: the P1 field τ. residual: the compiled form ∫ τ·v ds.
+        surface: its vertices (m).
+        direction: which displacement it acts on.
+        law: the superpotential j that is solved.
+        exact: the unsmoothed one (the same where nothing is smoothed).
+        directions: what the displacement is multiplied with, (m, k, d); k = 2 for |u_t| in 3D.
+        free: 1 where a component is not prescribed, (m, d).
+        density: the P1 field τ.
+        residual: the compiled form ∫ τ·v ds.
+        thresholds: what its traction is judged by at least.
     """
 
     surface: Surface
@@ -38,6 +43,7 @@ class LawTerm:
     free: Array
     density: fem.Function
     residual: Any
+    thresholds: Thresholds = DEFAULT
 
     @property
     def radial(self) -> bool:
@@ -46,11 +52,11 @@ class LawTerm:
 
     @property
     def traction_scale(self) -> float:
-        """What the law's traction is judged by: its own scale, but nothing finer than a thousandth of the load's."""
-        return max(self.exact.traction_scale, 1e-3)
+        """What the law's traction is judged by: its own scale, but nothing finer than a share of the load's stress."""
+        return max(self.exact.traction_scale, self.thresholds.law_scale)
 
     def slip(self, u: Array) -> Array:
-        """The displacement along the directions, of a local array; shape (m, k)."""
+        """The displacement along the directions, of a local array u; shape (m, k)."""
         return np.einsum("mkd,md->mk", self.directions, self.surface.values(u))
 
     def argument(self, u: Array) -> Array:
@@ -59,7 +65,12 @@ class LawTerm:
         return slip[:, 0] if slip.shape[1] == 1 else np.linalg.norm(slip, axis=1)
 
     def set_traction(self, u: Array, derivative: Array) -> None:
-        """τ from the law's derivative (m,) at u; ghosts are updated. Collective."""
+        """Write τ into ``density``; ghosts are updated. Collective.
+
+        Args:
+            u: the displacement, a local array.
+            derivative: of the law at u, (m,).
+        """
         tau = self._vector(u, derivative) * self.free
         self.density.x.array.reshape(-1, tau.shape[1])[self.surface.blocks] = tau
         self.density.x.scatter_forward()
@@ -75,7 +86,13 @@ class LawTerm:
         return np.divide(slip, r, out=np.zeros_like(slip), where=r > 0)
 
     def rate(self, u: Array, derivative: Array, second: Array) -> Array:
-        """The tangent K of the law's first and second derivatives (m,) at u; shape (m, d, d)."""
+        """The tangent K of the law, (m, d, d).
+
+        Args:
+            u: the displacement, a local array.
+            derivative: of the law at u, (m,).
+            second: the law's second derivative at u, (m,).
+        """
         unit = self._unit(u)
         k = unit.shape[1]
         along = np.einsum("mi,mj->mij", unit, unit) if k > 1 else np.ones((len(unit), 1, 1))

@@ -26,7 +26,7 @@ from ..typing import Array, Entities, Integers
 from . import bodies, bulk, scaling
 from . import contact_surface as surface
 from . import dirichlet as conditions
-from .bodies import Bodies
+from .bodies import MeshBodies
 from .bulk import Bulk
 from .contact_surface import Surface
 from .form_context import FormContext, Scaled
@@ -100,7 +100,7 @@ class Problem:
         return self.fixed[self.fixed < self.space.dofmap.index_map.size_local * self.space.dofmap.index_map_bs]
 
     @functools.cached_property
-    def bodies(self) -> Bodies:
+    def bodies(self) -> MeshBodies:
         """The connected parts of the mesh. Collective when first used."""
         return bodies.find(self.domain, self.space, self.points)
 

@@ -13,7 +13,10 @@ class Scales:
     """What one nondimensional unit is in SI.
 
     Attributes:
-        length: L in m. stress: p0 in N/m². modulus: E0 in N/m². dimension: 2 or 3.
+        length: L in m.
+        stress: p0 in N/m².
+        modulus: E0 in N/m².
+        dimension: 2 or 3.
     """
 
     length: float
@@ -42,10 +45,16 @@ Placed = tuple[str | None, Effect]
 
 
 def choose(length: float, dimension: int, effects: Sequence[Placed], evaluate: Callable[[Placed], Evaluate]) -> Scales:
-    """The scales of a scene. Collective where ``evaluate`` is.
+    """The scales of a problem. Collective where ``evaluate`` is.
 
     The stress scale is the largest load; without one, that of the largest other driving effect (prescribed
     displacement, thermal strain); without that either, the largest law's: the solution is then zero and any will do.
+
+    Args:
+        length: L of the body, m.
+        dimension: 2 or 3.
+        effects: those in force, with their places.
+        evaluate: gives, for an effect with its place, the function that finds a formula's largest absolute value there.
     """
     modulus = max((e.modulus_scale() for _, e in effects), default=0.0) or 1.0
     sizes = Sizes(length, modulus, max((e.expansion_scale() for _, e in effects), default=0.0))

@@ -58,7 +58,12 @@ def _alike(form: Any) -> list[list[Any]]:
 
 
 def turn(vector: PETSc.Vec, rotation: PETSc.Mat | None) -> None:
-    """Take Cartesian components over to local ones, Qᵀ v, in place; None: they are the same. Collective."""
+    """Take Cartesian components over to local ones, Qᵀ v, in place. Collective.
+
+    Args:
+        vector: v.
+        rotation: Q; None where both are the same.
+    """
     if rotation is not None:
         cartesian = vector.copy()
         rotation.multTranspose(cartesian, vector)

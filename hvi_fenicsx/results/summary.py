@@ -38,7 +38,7 @@ def summary(solution: Solution) -> dict[str, Any]:
             "estimate": _estimate(solution),
             "accuracy": None,
             "warnings": list(solution.warnings),
-            "effects": [share.as_dict() for share in effect_summary.shares(problem)],
+            "effects": [summary.as_dict() for summary in effect_summary.summaries(problem)],
             "scales": _scales(problem),
             "time": {name: largest(comm, value) for name, value in solution.timer.report().items()},
             "peak_memory_mb": memory.peak(comm),
