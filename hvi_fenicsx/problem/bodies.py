@@ -32,7 +32,7 @@ class MeshBodies:
     bodies: tuple[RigidBody, ...]
     labels: Integers
 
-    def __iter__(self) -> Iterator[Body]:
+    def __iter__(self) -> Iterator[RigidBody]:
         return iter(self.bodies)
 
     def motion(self, points: Array, mode: Mode) -> Array:
