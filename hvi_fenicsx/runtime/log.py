@@ -72,6 +72,13 @@ class RunLog(logging.FileHandler):
             raise
         self._error = self._error or error
 
+    def close(self) -> None:
+        """Close the file; an error is kept."""
+        try:
+            super().close()
+        except OSError as error:
+            self._error = self._error or error
+
     def finish(self) -> None:
         """Close the file.
 
