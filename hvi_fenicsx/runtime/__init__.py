@@ -1,1 +1,1 @@
-"""What surrounds a run: ranks, processes, signals, log, timing, memory."""
+"""What surrounds a run: ranks, processes, signals, logging, timing, memory."""

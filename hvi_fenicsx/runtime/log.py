@@ -102,35 +102,44 @@ class _ElapsedFormatter(logging.Formatter):
 
 
 class TerminalDisplay(logging.Handler):
-    """The lines of the command on standard output; on a terminal, also the last Newton step on a moving line."""
+    """The lines of the command on standard output; on a terminal also the last Newton step, on a moving line.
+
+    The moving line goes to standard error. It begins at once, and ends when the handler is closed.
+    """
 
     def __init__(self) -> None:
         super().__init__()
         self._start = time.perf_counter()
-        self._status: Any = None
+        self._line: Any = None
         self.addFilter(lambda record: record.name == COMMANDS or hasattr(record, "moving"))
-
-    def start(self) -> None:
-        """Begin the moving line, where there is a terminal."""
         if sys.stderr.isatty():
-            from rich.console import Console
-
-            self._status = Console(stderr=True).status("", spinner="line")
-            self._status.start()
+            self._line = _moving_line()
+            self._line.start()
 
     def emit(self, record: logging.LogRecord) -> None:
         """Show one record."""
         if not hasattr(record, "moving"):
             print(record.getMessage(), flush=True)
-        elif self._status is not None:
-            self._status.update(f"{record.getMessage()}, {time.perf_counter() - self._start:.1f} s")
+        elif self._line is not None:
+            self._line.renderable.update(text=f"{record.getMessage()}, {time.perf_counter() - self._start:.1f} s")
 
     def close(self) -> None:
         """Leave the terminal clean."""
-        if self._status is not None:
-            self._status.stop()
-            self._status = None
+        if self._line is not None:
+            self._line.stop()
+            self._line = None
         super().close()
+
+
+def _moving_line() -> Any:
+    """A line on standard error with a spinner; lines on standard output go above it, where that is a terminal too."""
+    from rich.console import Console
+    from rich.live import Live
+    from rich.spinner import Spinner
+
+    shared = sys.stdout.isatty()
+    spinner = Spinner("line", style="status.spinner")
+    return Live(spinner, console=Console(stderr=True), refresh_per_second=12.5, transient=True, redirect_stdout=shared)
 
 
 class Handlers:

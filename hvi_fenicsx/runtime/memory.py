@@ -1,4 +1,4 @@
-"""How much memory the program has taken, and how much it may take."""
+"""How much memory the program has used, and how much there is."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ _LIMITS = ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limit_in_b
 
 
 def peak(comm: MPI.Comm) -> float:
-    """The most that all ranks together have had at any time, MB. Collective."""
+    """The sum over the ranks of the most memory that each has used at any time, MB. Collective."""
     found = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     return total(comm, found / 2**20 if sys.platform == "darwin" else found / 2**10)
 
 
 def limit() -> float:
-    """The machine's memory, or what the container may have of it, MB."""
+    """The memory of this machine, or what its container may use of it, MB."""
     machine = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") / 2**20
     texts = [Path(file).read_text(encoding="ascii").strip() for file in _LIMITS if Path(file).is_file()]
     return min([machine, *(int(text) / 2**20 for text in texts if text.isdigit())])

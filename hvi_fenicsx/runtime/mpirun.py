@@ -1,8 +1,8 @@
-"""``--np N``: the same command on N ranks under mpirun, an interruption passed on as a request.
+"""``--np N``: the same command on N ranks under mpirun, an interruption passed on as a request to stop.
 
-Open MPI kills the ranks 0.2 s after a SIGINT or SIGTERM of its own, too soon to write what was found; SIGUSR1 it hands
-on (mpirun(1), "Signal Propagation"; MPICH's does too). So mpirun runs apart from the terminal, and this process turns
-the first signal into SIGUSR1, which :mod:`.signals` heeds, and a second one into SIGTERM.
+Open MPI kills the ranks 0.2 s after it gets a SIGINT or SIGTERM, too soon to write what was found; it passes SIGUSR1 on
+to them (mpirun(1), "Signal Propagation"; MPICH does too). So mpirun runs apart from the terminal, and for the first
+signal this process sends it SIGUSR1, which :mod:`.signals` catches, for a second one SIGTERM.
 """
 
 from __future__ import annotations
@@ -27,17 +27,17 @@ def run(ranks: int, words: Sequence[str]) -> int:
         InputError: there is no mpirun.
     """
     command = [*processes.launcher(ranks), "-m", "hvi_fenicsx", *without_ranks(words)]
-    seen: list[int] = []
+    signalled: list[int] = []
 
-    def note(number: int, frame: FrameType | None) -> None:
-        seen.append(number)
-        process.send_signal(signal.SIGUSR1 if len(seen) == 1 else signal.SIGTERM)
+    def pass_on(number: int, frame: FrameType | None) -> None:
+        signalled.append(number)
+        process.send_signal(signal.SIGUSR1 if len(signalled) == 1 else signal.SIGTERM)
 
     process = subprocess.Popen(command, start_new_session=True, preexec_fn=processes.die_with_parent)
     for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, note)
+        signal.signal(number, pass_on)
     code = process.wait()
-    return ExitCode.INTERRUPTED if seen and code else code
+    return ExitCode.INTERRUPTED if signalled and code else code
 
 
 def without_ranks(words: Sequence[str]) -> list[str]:

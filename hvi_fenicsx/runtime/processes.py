@@ -1,4 +1,4 @@
-"""Processes that the program starts: an environment in which they are no ranks of ours, and an end in any event.
+"""Processes that the program starts: an environment in which they are not our MPI ranks, and an end in every case.
 
 Nothing here starts MPI.
 """
@@ -19,7 +19,7 @@ from ..errors import InputError
 _PR_SET_PDEATHSIG = 1
 """prctl(2)."""
 _MPI = ("OMPI_", "PMIX_", "PRTE_", "PMI_", "HYDRA_", "MPI_LOCAL")
-_WISHES = (
+_USER_SETTINGS = (
     "OMPI_ALLOW_RUN_AS_ROOT",
     "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM",
     "OMPI_MCA_btl",
@@ -28,18 +28,18 @@ _WISHES = (
     "PRTE_MCA_mapby",
     "PRTE_MCA_rmaps_default_mapping_policy",
 )
-"""Variables of users (and of `./hvi`) for any mpirun, not of one run."""
+"""Variables by which users (and `./hvi`) set up every mpirun; the others with these beginnings belong to one run."""
 
 
 def environment() -> dict[str, str]:
-    """Ours, without what would make a child believe that it is a rank, and with this package on its path."""
-    kept = {name: value for name, value in os.environ.items() if name in _WISHES or not name.startswith(_MPI)}
+    """Our environment for a child, with this package on its path and without what would make it an MPI rank."""
+    kept = {name: value for name, value in os.environ.items() if name in _USER_SETTINGS or not name.startswith(_MPI)}
     paths = [str(Path(__file__).parents[2]), kept.get("PYTHONPATH", "")]
     return {**kept, "PYTHONPATH": os.pathsep.join(filter(None, paths))}
 
 
 def launcher(ranks: int) -> list[str]:
-    """What starts Python on so many ranks; `-m mpi4py` ends all ranks when one fails.
+    """The command that starts Python on so many ranks; `-m mpi4py` ends all ranks when one fails.
 
     Raises:
         InputError: there is no mpirun.
@@ -50,19 +50,24 @@ def launcher(ranks: int) -> list[str]:
     return [mpirun, "-n", str(ranks), sys.executable, "-m", "mpi4py"]
 
 
-def die_with_parent(order: signal.Signals = signal.SIGTERM) -> None:
-    """Send this process a signal when the one that started it is killed. Linux only.
+def die_with_parent(number: signal.Signals = signal.SIGTERM) -> None:
+    """Have this process get a signal when the one that started it is killed. Linux only.
 
-    Nothing else would end mpirun in a session of its own, nor a rank, which waits for ever for the mpirun that is gone.
+    Nothing else would end an mpirun in a session of its own, nor a rank, which would wait for its mpirun for ever.
     """
     if sys.platform == "linux":
-        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, order)
+        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, number)
 
 
 def end(child: subprocess.Popen[str], patience: float) -> None:
-    """End a child that leads a group: politely first, so that it and its own children can tidy up."""
-    for order in (signal.SIGTERM, signal.SIGKILL):
+    """End a child that leads a process group: by SIGTERM first, so that it and its own children can clean up.
+
+    Args:
+        child: the process.
+        patience: how long to wait for its end before SIGKILL, s.
+    """
+    for number in (signal.SIGTERM, signal.SIGKILL):
         with contextlib.suppress(OSError):
-            os.killpg(child.pid, order)
+            os.killpg(child.pid, number)
         with contextlib.suppress(subprocess.TimeoutExpired):
             child.communicate(timeout=patience)

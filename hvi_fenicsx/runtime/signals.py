@@ -1,6 +1,6 @@
-"""Ctrl-C, SIGTERM and SIGUSR1 as a request that the solvers heed at the next iteration: what was found is written.
+"""Ctrl-C, SIGTERM and SIGUSR1 as a request to stop: the solvers end at the next iteration, the result is written.
 
-SIGUSR1 is what mpirun hands on to its ranks, and what a batch system may send ahead of a job's end.
+SIGUSR1 is what mpirun passes on to its ranks, and what a batch system may send before a job's end.
 """
 
 from __future__ import annotations
@@ -14,21 +14,25 @@ SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGUSR1)
 
 
 class Interrupt:
-    """Catches the first signal; a second one ends the program at once."""
+    """The request to stop, made by the first signal; a second one ends the program at once.
+
+    Args:
+        comm: the ranks that stop together.
+    """
 
     def __init__(self, comm: MPI.Comm) -> None:
-        self._comm, self._seen = comm, False
+        self._comm, self._signalled = comm, False
 
     def watch(self) -> None:
-        """Take over the signals."""
+        """Catch the signals from now on."""
         for number in SIGNALS:
-            signal.signal(number, self._note)
+            signal.signal(number, self._on_signal)
 
-    def _note(self, number: int, frame: FrameType | None) -> None:
-        if self._seen:
+    def _on_signal(self, number: int, frame: FrameType | None) -> None:
+        if self._signalled:
             raise KeyboardInterrupt
-        self._seen = True
+        self._signalled = True
 
     def requested(self) -> bool:
         """Whether any rank was signalled. Collective."""
-        return bool(self._comm.allreduce(self._seen, op=MPI.LOR))
+        return bool(self._comm.allreduce(self._signalled, op=MPI.LOR))

@@ -10,7 +10,11 @@ PHASES = ("jit", "mesh", "assembly", "existence", "setup", "solve", "certificate
 
 
 class Timer:
-    """Accumulates wall time (s) by phase; an inner phase is taken out of the one around it."""
+    """Adds up wall time (s) by phase; the time of an inner phase does not count for the one around it.
+
+    Attributes:
+        seconds: by phase, s.
+    """
 
     def __init__(self) -> None:
         self.seconds = dict.fromkeys(PHASES, 0.0)
@@ -32,7 +36,7 @@ class Timer:
 
     @property
     def total(self) -> float:
-        """Since the timer was made, s."""
+        """Seconds since the timer was made."""
         return time.perf_counter() - self._start
 
     def report(self) -> dict[str, float]:

@@ -12,7 +12,7 @@ _MODULES = ("numpy", "scipy", "pydantic", "mpi4py", "pyvista", "matplotlib", "gm
 
 
 def versions() -> dict[str, str]:
-    """By name; "absent" for what is not installed."""
+    """Versions by name; "absent" for what is not installed."""
     from ..compat import VERSION, petsc_version
 
     found = {

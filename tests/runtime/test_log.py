@@ -1,0 +1,76 @@
+"""What a run tells: records of Python's logging on rank 0, and what the command line makes of them."""
+
+from __future__ import annotations
+
+import logging
+import os
+import subprocess
+from pathlib import Path
+
+import pytest
+from runs import command, write_scene
+from scenes import model, quadratic_linear
+
+from hvi_fenicsx.runtime import log
+
+LAW = quadratic_linear(1.0e6)
+
+
+@pytest.fixture
+def scene(tmp_path: Path) -> Path:
+    return write_scene(tmp_path / "square.toml", model(8, 3e6, friction=LAW))
+
+
+def read_all(descriptor: int) -> str:
+    found = b""
+    while True:
+        try:
+            piece = os.read(descriptor, 4096)
+        except OSError:  # the other end of the terminal is closed
+            piece = b""
+        if not piece:
+            return found.decode()
+        found += piece
+
+
+def test_on_a_terminal_the_last_newton_step_moves_and_is_gone_in_the_end(scene: Path, tmp_path: Path) -> None:
+    ours, theirs = os.openpty()
+    words = command("run", scene, "--out", tmp_path / "r", "--no-pictures")
+    environment = {**os.environ, "TERM": "xterm", "COLUMNS": "200"}
+    process = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=theirs, text=True, env=environment)
+    os.close(theirs)
+    shown, lines = read_all(ours), process.communicate()[0].splitlines()
+    os.close(ours)
+    assert process.returncode == 0
+    assert "\x1b[2K" in shown  # the line is wiped
+    assert "residual" in shown
+    assert not any("residual" in line for line in lines)
+    assert [line.split()[0].rstrip(":") for line in lines[1:5]] == ["existence", "result", "certificate", "estimated"]
+
+
+def test_the_log_has_the_lines_of_the_terminal_and_every_newton_step(scene: Path, tmp_path: Path) -> None:
+    words = command("run", scene, "--out", tmp_path / "r", "--no-pictures")
+    lines = subprocess.run(words, check=True, capture_output=True, text=True).stdout.splitlines()
+    kept = (tmp_path / "r" / "run.log").read_text(encoding="utf-8").splitlines()
+    told = [line.partition(" s  ")[2] for line in kept]
+    assert [line for line in told if line in lines] == lines[:-1]  # the last one tells where the folder is
+    assert any("iteration 0, residual" in line for line in told)
+    seconds = [float(line.partition(" s  ")[0]) for line in kept]
+    assert seconds == sorted(seconds)
+
+
+def test_a_record_that_cannot_be_written_is_told_when_the_log_is_finished() -> None:
+    full = log.RunLog(Path("/dev/full"))
+    with log.Handlers(full):
+        log.logger("commands").info("a line")
+        log.logger("commands").info("another")
+    with pytest.raises(OSError, match="No space left"):
+        full.finish()
+
+
+def test_handlers_leave_the_package_as_they_found_it(tmp_path: Path) -> None:
+    package = logging.getLogger("hvi_fenicsx")
+    before = package.level, list(package.handlers)
+    with log.Handlers(log.RunLog(tmp_path / "run.log")):
+        assert package.level == logging.DEBUG
+    assert (package.level, package.handlers) == before
