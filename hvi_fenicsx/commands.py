@@ -122,13 +122,19 @@ def _solve(request: RunRequest, interrupt: Interrupt) -> tuple[Solution, Reached
     if request.goal is not None:
         climber = Climber(request.timer, log.newton_step, interrupt.requested)
         reached = control.reach(request.scene, COMM, request.goal, climber, _LOG.info)
-        _say([*console.outcome(reached.solution), *console.odd(reached.solution.warnings), *console.bought(reached)])
+        _say(
+            [
+                *console.outcome(reached.solution),
+                *console.warnings(reached.solution.warnings),
+                *console.accuracy(reached),
+            ]
+        )
         return reached.solution, reached
     prepared = prepare(request.scene, COMM, request.timer)
     _say(console.heading(prepared, COMM.size))
     solution = finish(prepared, log.newton_step, interrupt.requested)
     new = (warning for warning in solution.warnings if warning not in prepared.warnings)
-    _say([*console.outcome(solution), *console.odd(new)])
+    _say([*console.outcome(solution), *console.warnings(new)])
     return solution, None
 
 

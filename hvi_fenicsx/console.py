@@ -1,4 +1,4 @@
-"""What the program tells in words: the scene, whether a solution exists, what was found and how sure it is."""
+"""The lines of the terminal: the scene, whether a solution exists, what was found and how sure it is."""
 
 from __future__ import annotations
 
@@ -15,20 +15,25 @@ from .solvers import nested_iteration, registry
 from .workflow import Prepared, Solution
 
 _LISTED = 3
-"""Rigid motions that are told one by one."""
+"""So many rigid motions are named one by one; of more, only the number is given."""
 
 
 def heading(prepared: Prepared, ranks: int) -> Iterator[str]:
-    """The scene, its size and its existence."""
+    """The scene, its size, whether a solution exists, and the warnings before the solve.
+
+    Args:
+        prepared: the scene, assembled.
+        ranks: on which it is solved.
+    """
     title = prepared.scene.title or "untitled"
-    yield f"{title}: {prepared.system.dofs:,} unknowns on {ranks} rank{'s'[: ranks - 1]}"
+    yield f"{title}: {prepared.system.dofs:,} unknowns on {ranks} {'rank' if ranks == 1 else 'ranks'}"
     yield f"existence: {existence(prepared)}"
-    yield from odd(prepared.warnings)
+    yield from warnings(prepared.warnings)
 
 
-def odd(warnings: Iterable[str]) -> Iterator[str]:
-    """What looks odd, a line each."""
-    return (f"odd: {warning}" for warning in warnings)
+def warnings(found: Iterable[str]) -> Iterator[str]:
+    """Warnings, a line each."""
+    return (f"warning: {warning}" for warning in found)
 
 
 def existence(prepared: Prepared) -> str:
@@ -43,7 +48,7 @@ def existence(prepared: Prepared) -> str:
         parts.append(f"margin {s.margin:.3g}")
     if s.free:
         free = motions(s.free, bodies)
-        parts.append(f"free, held by nothing and in balance: {free} (what is returned moves least that way)")
+        parts.append(f"undetermined, neither held nor driven: {free} (the solution that moves least is returned)")
     for name, factor in (("held up to load factor", s.lambda_held), ("peak at load factor", s.lambda_peak)):
         if math.isfinite(factor):
             parts.append(f"{name} {factor:.6g}")
@@ -51,7 +56,12 @@ def existence(prepared: Prepared) -> str:
 
 
 def motions(found: Sequence[Mode], bodies: Sequence[RigidBody]) -> str:
-    """Rigid motions of some bodies: a few in words, more by their number."""
+    """Rigid motions: a few by their names, more by their number.
+
+    Args:
+        found: the motions.
+        bodies: all bodies, whose motions they are.
+    """
     if len(found) <= _LISTED:
         return ", ".join(mode.name for mode in found) or "none"
     if len(found) == sum(body.motions for body in bodies):
@@ -68,24 +78,30 @@ def load_factors(factors: Mapping[str, LoadFactors]) -> Iterator[str]:
             held = f"held at factors {' and '.join(ends)}" if ends else "held at any factor"
         else:
             held = "held at no factor"
-        words = f" ({f.mode.name})" if f.mode else ""
-        peak = f"peak at {f.peak:.6g}" if math.isfinite(f.peak) else "no peak" if f.peak > 0 else "beyond every peak"
-        yield f"load {name} alone: {held}{words}; {peak}" + (f" ({f.peak_mode.name})" if f.peak_mode else "")
+        mode = f" ({f.mode.name})" if f.mode else ""
+        peak = (
+            f"peak at {f.peak:.6g}"
+            if math.isfinite(f.peak)
+            else "no peak"
+            if f.peak > 0
+            else "beyond the peak at every factor"
+        )
+        yield f"load {name} alone: {held}{mode}; {peak}" + (f" ({f.peak_mode.name})" if f.peak_mode else "")
 
 
 def effects(prepared: Prepared) -> Iterator[str]:
     """The effects in force with what each adds, and the solver that follows. Collective."""
     found = effect_summary.summaries(prepared.problem)
-    yield from (f"effect: {share.effect} on {share.where or 'the body'}: {share.adds}" for share in found)
+    yield from (f"effect: {one.effect} on {one.where or 'the body'}: {one.adds}" for one in found)
     yield from effect_summary.table(found)
     yield f"solver: {solver(prepared)}"
 
 
 def solver(prepared: Prepared) -> str:
-    """Which solver the effects call for."""
+    """The solver that the effects call for."""
     wanted = prepared.scene.solver
     kind = nested_iteration.linear(prepared.scene, prepared.system).kind
-    linear = {"lu": "MUMPS", "gamg": "CG with GAMG", "mg": "CG with geometric multigrid on the ladder"}[kind]
+    linear = {"lu": "MUMPS", "gamg": "CG with GAMG", "mg": "CG with geometric multigrid on the mesh hierarchy"}[kind]
     bounds = "" if prepared.problem.bounds else ", no bounds"
     return f"{registry.choose(wanted, prepared.system).words}{bounds}, {linear}"
 
@@ -122,13 +138,13 @@ def error(estimate: Estimate) -> str:
 
 
 def percent(value: float) -> str:
-    """A share as a person reads it."""
+    """A ratio as a percentage."""
     if not math.isfinite(value):
         return "unknown"
     return f"{100 * value:.2g} %" if value >= 1e-5 or value == 0 else f"{value:.0e}"
 
 
-def bought(reached: Reached) -> Iterator[str]:
+def accuracy(reached: Reached) -> Iterator[str]:
     """What was chosen for an accuracy, what it cost, and what a tenth of the error would cost."""
     goal, steps = reached.goal, reached.steps
     if reached.why is not None:
@@ -151,7 +167,12 @@ def bought(reached: Reached) -> Iterator[str]:
 
 
 def as_data(prepared: Prepared, factors: Mapping[str, LoadFactors]) -> dict[str, Any]:
-    """The report of ``check --json``. Collective."""
+    """What ``check --json`` prints. Collective.
+
+    Args:
+        prepared: the scene, assembled.
+        factors: of each load that was asked for.
+    """
     return {
         "scene": prepared.scene.title,
         "dofs": prepared.system.dofs,

@@ -107,7 +107,7 @@ def test_a_weak_law_that_alone_holds_the_body_does_matter() -> None:
 def test_it_is_said_everywhere(tmp_path: Path) -> None:
     path = write_scene(tmp_path / "s.toml", material(model(), youngs_modulus=2.15e5))
     done = hvi("run", path, "--out", tmp_path / "r", "--no-pictures", ranks=2)
-    said = [line.removeprefix("odd: ") for line in done.stdout.splitlines() if line.startswith("odd: ")]
+    said = [line.removeprefix("warning: ") for line in done.stdout.splitlines() if line.startswith("warning: ")]
     assert done.returncode == 0
     assert len(said) == 2
     assert summary(tmp_path / "r")["warnings"] == said
@@ -115,5 +115,5 @@ def test_it_is_said_everywhere(tmp_path: Path) -> None:
     assert all(sentence in log for sentence in said)
     assert all(sentence.replace("'", "&#39;") in page for sentence in said)
     checked = hvi("check", path)
-    assert [line for line in checked.stdout.splitlines() if line.startswith("odd: ")] == [f"odd: {said[0]}"]
+    assert [line for line in checked.stdout.splitlines() if line.startswith("warning: ")] == [f"warning: {said[0]}"]
     assert json.loads(hvi("check", path, "--json").stdout)["warnings"] == said[:1]

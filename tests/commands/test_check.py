@@ -61,7 +61,7 @@ def test_few_rigid_motions_are_named_and_many_are_counted(tmp_path: Path) -> Non
     assert "that the supports leave: translation along y; " in hvi("check", file).stdout
 
 
-@pytest.mark.parametrize(("cells", "linear"), [(8, "MUMPS"), (64, "CG with geometric multigrid on the ladder")])
+@pytest.mark.parametrize(("cells", "linear"), [(8, "MUMPS"), (64, "CG with geometric multigrid on the mesh hierarchy")])
 def test_the_linear_solver_is_the_one_that_a_run_takes(cells: int, linear: str) -> None:
     """On 64 x 64 cells a ladder pays: after the run the system stands on one."""
     prepared = prepare(Scene.model_validate(model(cells)))

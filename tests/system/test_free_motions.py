@@ -199,7 +199,7 @@ def test_what_stays_free_is_told(tmp_path: Path) -> None:
     scene = write_scene(tmp_path / "s.toml", slot(4))
     done = hvi("run", scene, "--out", tmp_path / "r", "--no-pictures")
     assert done.returncode == 0
-    assert "free, held by nothing and in balance: translation along y" in done.stdout
+    assert "undetermined, neither held nor driven: translation along y" in done.stdout
     found = summary(tmp_path / "r")
     assert found["solvability"]["free"] == ["translation along y"]
     assert found["solvability"]["state"] == "borderline"
