@@ -25,7 +25,7 @@ from mpi4py import MPI
 
 from hvi_fenicsx import Scene, read_scene
 from hvi_fenicsx.accuracy import adaptive, control, quantities
-from hvi_fenicsx.accuracy.adaptive import Climber, Rung
+from hvi_fenicsx.accuracy.adaptive import AdaptiveLevel, AdaptiveSolver
 from hvi_fenicsx.accuracy.control import Goal, Reached
 from hvi_fenicsx.accuracy.quantity_base import Observable, contact_norm, prolong
 from hvi_fenicsx.certify import contact_state
@@ -93,15 +93,15 @@ HEAD = (
 )
 
 
-def climber() -> Climber:
-    return Climber(Timer())
+def solver() -> AdaptiveSolver:
+    return AdaptiveSolver(timer=Timer())
 
 
 def measured(name: str, quantity: str, requested: float, largest: int) -> Row:
     """One request, carried out and checked."""
     scene = read_scene(ROOT / "demos" / f"{name}.toml")
     start = time.process_time()
-    reached = control.reach(scene, MPI.COMM_WORLD, Goal(requested, quantity), climber(), lambda line: None)
+    reached = control.reach(scene, MPI.COMM_WORLD, Goal(requested, quantity), solver(), lambda line: None)
     seconds, last = time.process_time() - start, reached.steps[-1]
     true = reference = None
     if reached.why is None:
@@ -122,9 +122,9 @@ def true_error(reached: Reached, scene: Scene, requested: float, largest: int) -
     rung, quantity = reached.rung, reached.goal.quantity
     field = reader(quantity)(rung)
     wanted = min(requested, rung.solution.estimate.relative) / 3  # type: ignore[union-attr]
-    go = climber()
+    go = solver()
     while rung.solution.estimate.relative > wanted and rung.dofs < largest:  # type: ignore[union-attr]
-        below, rung = rung, go.up(rung, adaptive.refined(rung, 0.75), scene, ahead(rung, quantity))
+        below, rung = rung, go.refine(rung, adaptive.refined(rung, 0.75), scene, ahead(rung, quantity))
         field = prolong(field, rung, below)
     own = rung.solution.estimate.relative  # type: ignore[union-attr]
     if own > 0.7 * reached.rung.solution.estimate.relative:  # type: ignore[union-attr]
@@ -133,7 +133,7 @@ def true_error(reached: Reached, scene: Scene, requested: float, largest: int) -
     return (float(np.hypot(apart, own)) if quantity == "energy" else apart), own
 
 
-def ahead(rung: Rung, quantity: str) -> fem.Function | None:
+def ahead(rung: AdaptiveLevel, quantity: str) -> fem.Function | None:
     """What `hvi run --accuracy` would start the next mesh from."""
     found = quantities.find(quantity)()
     found.add(rung)
@@ -141,19 +141,19 @@ def ahead(rung: Rung, quantity: str) -> fem.Function | None:
     return found.ahead()
 
 
-def reader(quantity: str) -> Callable[[Rung], Any]:
+def reader(quantity: str) -> Callable[[AdaptiveLevel], Any]:
     found = quantities.find(quantity)()
     return found.value if isinstance(found, Observable) else displacement
 
 
-def displacement(rung: Rung) -> fem.Function:
+def displacement(rung: AdaptiveLevel) -> fem.Function:
     """The displacement, m."""
     field = fem.Function(rung.prepared.problem.space)
     field.x.array[:] = rung.solution.solve_result.u.x.array * rung.prepared.problem.scales.displacement  # type: ignore[union-attr]
     return field
 
 
-def distance(rung: Rung, field: fem.Function, quantity: str) -> float:
+def distance(rung: AdaptiveLevel, field: fem.Function, quantity: str) -> float:
     """Of a field from the one on this rung, relative."""
     own, found = reader(quantity)(rung), quantities.find(quantity)
     apart = field.x.array - own.x.array
@@ -162,7 +162,7 @@ def distance(rung: Rung, field: fem.Function, quantity: str) -> float:
     return energy_norm(rung, apart) / energy_norm(rung, own.x.array)
 
 
-def energy_norm(rung: Rung, values: Any) -> float:
+def energy_norm(rung: AdaptiveLevel, values: Any) -> float:
     field = fem.Function(rung.prepared.problem.space)
     field.x.array[:] = values
     forces = contact_state.forces(rung.prepared.problem, field)

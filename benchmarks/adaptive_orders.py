@@ -15,7 +15,7 @@ from typing import Any
 
 import common
 import numpy as np
-from accuracy import PAGE, climber
+from accuracy import PAGE, solver
 from mpi4py import MPI
 
 from hvi_fenicsx import Scene, read_scene
@@ -50,7 +50,7 @@ def corner(name: str) -> Scene:
 
 def climbed(scene: Scene, bulk: float, most: int) -> tuple[list[int], list[float]]:
     """Unknowns and estimated errors of a ladder up to so many unknowns."""
-    go = climber()
+    go = solver()
     rung = go.begin(scene, MPI.COMM_WORLD)
     sizes, errors = [], []
     while True:
@@ -58,7 +58,7 @@ def climbed(scene: Scene, bulk: float, most: int) -> tuple[list[int], list[float
         errors.append(rung.solution.estimate.relative)  # type: ignore[union-attr]
         if rung.dofs > most:
             return sizes, errors
-        rung = go.up(rung, adaptive.refined(rung, bulk), scene)
+        rung = go.refine(rung, adaptive.refined(rung, bulk), scene)
 
 
 def order(sizes: Sequence[float], errors: Sequence[float]) -> float:
@@ -106,7 +106,7 @@ def tolerance_savings() -> Iterator[str]:
         for limits in (control.TOLERANCES, (1e-10, 1e-10)):
             control.TOLERANCES, kept = limits, control.TOLERANCES
             start = time.process_time()
-            reached = control.reach(scene, MPI.COMM_WORLD, Goal(requested), climber(), lambda line: None)
+            reached = control.reach(scene, MPI.COMM_WORLD, Goal(requested), solver(), lambda line: None)
             spent.append((time.process_time() - start, reached.solution.solve_result.counts.linear))  # type: ignore[union-attr]
             control.TOLERANCES = kept
         (tied, few), (tight, many) = spent

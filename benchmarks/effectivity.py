@@ -24,14 +24,15 @@ from petsc4py import PETSc
 from hvi_fenicsx import Scene, read_scene
 from hvi_fenicsx.certify.certificate import examine
 from hvi_fenicsx.certify.estimate.estimator import Estimate, estimate
-from hvi_fenicsx.mesh import refinement, transfer
+from hvi_fenicsx.mesh import refinement
 from hvi_fenicsx.problem.problem import Problem
 from hvi_fenicsx.runtime.timing import Timer
-from hvi_fenicsx.solvers.method import SolveResult, silent
-from hvi_fenicsx.solvers.nested_iteration import ascend, solve
+from hvi_fenicsx.solvers.context import RunControl
+from hvi_fenicsx.solvers.nested_iteration import CoarseStart, LevelSolution, ascend, solve
 from hvi_fenicsx.system.assemble import assemble
-from hvi_fenicsx.system.coarser_level import Below
+from hvi_fenicsx.system.levels import Level, prolongation
 from hvi_fenicsx.system.system import System
+from hvi_fenicsx.workflow import prepare
 
 DEMOS = Path(__file__).resolve().parents[1] / "demos"
 STEEL = {"model": "plane_stress", "youngs_modulus": 2.15e11, "poisson_ratio": 0.29}
@@ -39,45 +40,51 @@ EXACT = "solver={}"
 
 
 @dataclass(frozen=True)
-class Rung:
-    """One mesh of a ladder with its solution; ``step`` is the refinement that made it (None for the first)."""
+class Step:
+    """One mesh of a hierarchy with its solution; ``refined`` is the refinement that made it (None for the first)."""
 
-    system: System
-    solve_result: SolveResult
-    step: refinement.Refinement | None
+    solved: LevelSolution
+    refined: refinement.Refinement | None
+
+    @property
+    def system(self) -> System:
+        return self.solved.system
+
+    @property
+    def u(self) -> fem.Function:
+        return self.solved.result.u
 
 
-def rungs(scene: Scene, count: int) -> list[Rung]:
+def steps(scene: Scene, count: int) -> list[Step]:
     """A scene on its own mesh and on uniform refinements of it. Collective."""
-    found: list[Rung] = []
-    for _ in range(count):
-        step = refinement.uniform(found[-1].system.problem.domain) if found else None
-        system = assemble(scene, MPI.COMM_WORLD, Timer(), step.domain if step else None)
-        if step is None:
-            solved = solve(scene, system, Timer(), silent, lambda: False)
-        else:
-            below = found[-1]
-            lift = transfer.between(system, below.system, step)
-            system.below = Below(below.system, lift)
-            solved = ascend(scene, system, (below.system, below.solve_result, lift), Timer(), silent, lambda: False)
-        found.append(Rung(system, solved, step))
+    prepared, control = prepare(scene), RunControl(timer=Timer())
+    model, options, verdict = prepared.model, prepared.options, prepared.solvability
+    found = [Step(solve(model, prepared.system, verdict, options, control), None)]
+    for _ in range(count - 1):
+        below = found[-1].solved
+        refined = refinement.uniform(below.system.problem.domain)
+        system = assemble(refined.domain, model, Timer())
+        lift = prolongation(system, below.system, refined.transfer)
+        levels = (Level(system, below.system, lift), *below.levels)
+        start = CoarseStart(system=below.system, result=below.result, prolongation=lift, levels=levels)
+        found.append(Step(ascend(system, start, verdict, options, control), refined))
     return found
 
 
-def distance(rung: Rung, finer: Sequence[Rung]) -> float:
+def distance(step: Step, finer: Sequence[Step]) -> float:
     """|||u_h - u||| for u on the last of the finer rungs. Collective."""
     fine = finer[-1].system.problem
-    away = _raised(rung.solve_result.u, rung, finer)
-    away.x.array[:] = finer[-1].solve_result.u.x.array - away.x.array
+    away = _raised(step.u, step, finer)
+    away.x.array[:] = finer[-1].u.x.array - away.x.array
     force = fem.assemble_scalar(fem.form(fine.bulk.between(away, away)))
     pressures = zip(
         fine.bulk.averaged,
-        rung.system.problem.bulk.pressures(rung.solve_result.u),
-        fine.bulk.pressures(finer[-1].solve_result.u),
+        step.system.problem.bulk.pressures(step.u),
+        fine.bulk.pressures(finer[-1].u),
         strict=True,
     )
     for part, coarse, exact in pressures:
-        exact.x.array[:] -= _raised(_padded(rung.system.problem, coarse), rung, finer).x.array[:: fine.scales.dimension]
+        exact.x.array[:] -= _raised(_padded(step.system.problem, coarse), step, finer).x.array[:: fine.scales.dimension]
         (scalar,) = part.volume.arguments()
         force += fem.assemble_scalar(fem.form(ufl.replace(part.volume, {scalar: exact * exact}))) / part.modulus
     return float(np.sqrt(MPI.COMM_WORLD.allreduce(force)))
@@ -90,13 +97,13 @@ def _padded(problem: Problem, scalar: fem.Function) -> fem.Function:
     return field
 
 
-def _raised(u: fem.Function, rung: Rung, finer: Sequence[Rung]) -> fem.Function:
+def _raised(u: fem.Function, step: Step, finer: Sequence[Step]) -> fem.Function:
     """A P1 field on the last of the finer meshes."""
     x: PETSc.Vec = u.x.petsc_vec
-    below = rung
+    below = step
     for above in finer:
-        assert above.step is not None
-        x = transfer.prolongation(above.system.problem.space, below.system.problem.space, above.step) * x
+        assert above.refined is not None
+        x = above.refined.transfer.prolongation(above.system.problem.space, below.system.problem.space) * x
         below = above
     result = fem.Function(finer[-1].system.problem.space)
     result.x.array[: x.local_size] = x.array_r
@@ -121,16 +128,16 @@ class Row:
 
 def rows(scene: Scene, levels: int, extra: int = 2) -> list[Row]:
     """Estimates on a ladder against the solution without smoothing ``extra`` refinements further up. Collective."""
-    exact = rungs(_exact(scene), levels + extra)
-    found = exact if scene.solver.smoothing is None else rungs(scene, levels)
-    return [_row(rung, exact[k + 1 :], scene) for k, rung in enumerate(found[:levels])]
+    exact = steps(_exact(scene), levels + extra)
+    found = exact if scene.solver.smoothing is None else steps(scene, levels)
+    return [_row(step, exact[k + 1 :], scene) for k, step in enumerate(found[:levels])]
 
 
-def _row(rung: Rung, finer: Sequence[Rung], scene: Scene) -> Row:
-    problem, u = rung.system.problem, rung.solve_result.u
+def _row(step: Step, finer: Sequence[Step], scene: Scene) -> Row:
+    problem, u = step.system.problem, step.u
     examination = examine(problem, u, scene.solver.tolerance)
-    found = estimate(rung.system, u, examination)
-    return Row(rung.system.dofs, distance(rung, finer), found, examination.certificate.passed)
+    found = estimate(step.system, step.solved.levels, u, examination)
+    return Row(step.system.dofs, distance(step, finer), found, examination.certificate.passed)
 
 
 def _exact(scene: Scene) -> Scene:

@@ -176,12 +176,12 @@ def _hull(states: Sequence[State]) -> list[tuple[float, float, float]]:
 
 def _condensed(system: System) -> tuple[Array, Array, npt.NDArray[np.int64]]:
     """Schur complement and load of the floor's unknowns, and these."""
-    system.set_rates([np.zeros_like(k) for k in system.rates])
+    system.jacobian.set_rates([np.zeros_like(k) for k in system.jacobian.rates])
     blocks = np.unique(np.concatenate([t.surface.blocks for t in system.terms])).astype(np.int64)
     c = np.setdiff1d((2 * blocks[:, None] + np.arange(2)).ravel(), system.problem.fixed)
     i = np.setdiff1d(np.arange(system.dofs), c)
     f = system.load.array_r
-    k = csr_matrix(system.matrix.getValuesCSR()[::-1], shape=system.matrix.getSize()).toarray()
+    k = csr_matrix(system.jacobian.matrix.getValuesCSR()[::-1], shape=system.jacobian.matrix.getSize()).toarray()
     inner = np.linalg.solve(k[np.ix_(i, i)], np.column_stack([k[np.ix_(i, c)], f[i]]))
     return k[np.ix_(c, c)] - k[np.ix_(c, i)] @ inner[:, :-1], f[c] - k[np.ix_(c, i)] @ inner[:, -1], c
 

@@ -17,8 +17,8 @@ from petsc4py import PETSc
 from hvi_fenicsx import workflow
 from hvi_fenicsx.certify import certificate
 from hvi_fenicsx.errors import HviError
-from hvi_fenicsx.solvers import registry
-from hvi_fenicsx.solvers.method import SolveResult, silent
+from hvi_fenicsx.solvers import SolveContext, SolveResult, registry
+from hvi_fenicsx.solvers.context import RunControl
 
 COMM = MPI.COMM_WORLD
 UNDECIDED = ("metastable", "borderline")
@@ -27,7 +27,7 @@ Record = dict[str, Any]
 
 def methods() -> list[str]:
     """All methods there are."""
-    return list(registry.METHODS)
+    return list(registry.available())
 
 
 def attempt(case: Case, data: Mapping[str, Any], method: str, limit: float) -> Record:
@@ -79,12 +79,17 @@ def _unsolved(state: str, found: SolveResult) -> str:
     return "no_equilibrium" if state in UNDECIDED and not broken else "failed"
 
 
-def _solved(case: Case, data: Mapping[str, Any], prepared: workflow.Prepared, late: Callable[[], bool]) -> SolveResult:
+def _solved(
+    case: Case, data: Mapping[str, Any], prepared: workflow.Preparation, late: Callable[[], bool]
+) -> SolveResult:
     """The method's result; the case's start is for the methods that begin on pieces of the laws."""
-    method = registry.create(prepared.scene.solver, prepared.system, prepared.timer, silent, late)
+    control = RunControl(timer=prepared.timer, interrupted=late)
+    context = SolveContext.create(prepared.system, (), prepared.solvability, prepared.options, control)
+    method = registry.choose(prepared.options, prepared.system)(context)
     begin = hard_scenes.branches(case, prepared, data)
     takes = "branches" in inspect.signature(method.solve).parameters
     try:
         return method.solve(branches=begin) if takes else method.solve()  # type: ignore[call-arg]
     except HviError as error:
-        return SolveResult(workflow.fem.Function(prepared.problem.space), method.name, False, str(error))
+        u = workflow.fem.Function(prepared.problem.space)
+        return SolveResult(u=u, method=method.label, converged=False, reason=str(error))

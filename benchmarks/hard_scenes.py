@@ -14,9 +14,6 @@ from petsc4py import PETSc
 
 from hvi_fenicsx import Scene, workflow
 from hvi_fenicsx.mesh import domain
-from hvi_fenicsx.problem import problem
-from hvi_fenicsx.runtime.timing import Timer
-from hvi_fenicsx.system import assemble, existence, system
 
 Array = npt.NDArray[np.float64]
 Plain = dict[str, Any]
@@ -146,16 +143,12 @@ def _adhesion(f: Frame) -> Plain:
     return {"adhesion": {"law": "graph", "points": points}}
 
 
-def prepare(case: Case, data: Mapping[str, Any], method: str, comm: MPI.Comm) -> workflow.Prepared:
+def prepare(case: Case, data: Mapping[str, Any], method: str, comm: MPI.Comm) -> workflow.Preparation:
     """As :func:`hvi_fenicsx.workflow.prepare`, on a mesh whose vertices are moved first. Collective."""
-    made, timer = scene(case, data, method), Timer()
+    made = scene(case, data, method)
     body = made.domain.build(comm, made.dimension)
     distort(body, case)
-    placed = [(p.where, p.effect) for p in made.effects()]
-    composed = problem.compose(body, made.parts, placed, assemble.modification(made))
-    assembled = system.System(composed, system.compile_forms(composed), timer)
-    verdict = existence.solvability(composed, assembled.forces)
-    return workflow.Prepared(made, composed, assembled, verdict, timer)
+    return workflow.prepare(made, comm, domain=body)
 
 
 def distort(body: domain.Domain, case: Case) -> None:
@@ -194,7 +187,7 @@ def _noise(points: Array, seed: float) -> Array:
     return 2.0 * (mixed - np.floor(mixed)) - 1.0
 
 
-def branches(case: Case, prepared: workflow.Prepared, data: Mapping[str, Any]) -> PETSc.Vec | None:
+def branches(case: Case, prepared: workflow.Preparation, data: Mapping[str, Any]) -> PETSc.Vec | None:
     """The displacement, in units of u0, whose pieces of the laws a method is to begin on; None for its own start."""
     if case["start"] == "default":
         return None

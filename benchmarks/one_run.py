@@ -20,16 +20,19 @@ from mpi4py import MPI
 
 from hvi_fenicsx import read_scene
 from hvi_fenicsx.certify.estimate.contact_errors import ratio
+from hvi_fenicsx.mesh.thresholds import Thresholds
 from hvi_fenicsx.runtime import timing
 from hvi_fenicsx.runtime.timing import Timer
 from hvi_fenicsx.scene import Scene
 from hvi_fenicsx.solvers import nested_iteration
 from hvi_fenicsx.solvers.active_set import ActiveSetSolver
-from hvi_fenicsx.solvers.method import resting_start
-from hvi_fenicsx.system import assemble, petsc_options
+from hvi_fenicsx.solvers.closed_start import resting_start
+from hvi_fenicsx.solvers.context import RunControl
+from hvi_fenicsx.system import petsc_options
+from hvi_fenicsx.system.assemble import assemble
 from hvi_fenicsx.system.held_solver import LinearSettings
 from hvi_fenicsx.system.system import System
-from hvi_fenicsx.workflow import finish, prepare
+from hvi_fenicsx.workflow import finish, model_of, options_of, prepare
 
 COMM = MPI.COMM_WORLD
 HYPRE = (
@@ -64,12 +67,19 @@ def linear(scene: Scene, kind: str) -> Figures:
     if kind == "hypre":
         petsc_options.insert(HYPRE)
     timer = Timer()
-    system = assemble.assemble(scene, COMM, timer)
+    system, options, levels = assembled(scene, timer), options_of(scene.solver), ()
     if kind == "mg":
-        system.below = nested_iteration.hierarchy(scene, system, timer)
-    solver = ActiveSetSolver(system, LinearSettings(KINDS[kind]), timer)
+        levels = nested_iteration.hierarchy(model_of(scene), system, options, RunControl(timer=timer))
+    solver = ActiveSetSolver(system, levels, LinearSettings(KINDS[kind]), timer)
     _, iterations = resting_start(solver, [t.law for t in system.terms], scene.solver.tolerance)
     return {**timer.report(), "linear": iterations, "dofs": system.dofs, "certified": True}
+
+
+def assembled(scene: Scene, timer: Timer) -> System:
+    """The scene's system, with the mesh hierarchy below its mesh."""
+    with timer("mesh"):
+        domain = scene.domain.build_hierarchy(COMM, scene.dimension, Thresholds())
+    return assemble(domain, model_of(scene), timer)
 
 
 def plain(scene: Scene) -> Figures:
@@ -77,7 +87,7 @@ def plain(scene: Scene) -> Figures:
     from plain_snes import solve
 
     timer = Timer()
-    system = assemble.assemble(scene, COMM, timer)
+    system = assembled(scene, timer)
     with timer("solve"):
         figures = solve(system, scene.solver.tolerance)
     return {**timer.report(), **figures, "dofs": system.dofs}
@@ -85,12 +95,12 @@ def plain(scene: Scene) -> Figures:
 
 def spmv(system: System) -> float:
     """Seconds of one product with the system's matrix, the least of 20."""
-    x, y = system.matrix.createVecs()
+    x, y = system.jacobian.matrix.createVecs()
     x.set(1.0)
     seconds = []
     for _ in range(20):
         start = time.perf_counter()
-        system.matrix.mult(x, y)
+        system.jacobian.matrix.mult(x, y)
         seconds.append(time.perf_counter() - start)
     return min(seconds)
 
@@ -118,7 +128,7 @@ def main() -> None:
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
     figures |= {"peak_mb": COMM.allreduce(peak), "net_mb": COMM.allreduce(peak - before)}
     if task.get("spmv"):
-        figures["spmv"] = spmv(assemble.assemble(scene, COMM, Timer()))
+        figures["spmv"] = spmv(assembled(scene, Timer()))
     if COMM.rank == 0:
         print(json.dumps(figures), flush=True)
 

@@ -8,8 +8,8 @@ from petsc4py import PETSc
 
 from hvi_fenicsx.runtime.timing import Timer
 from hvi_fenicsx.solvers.active_set import ActiveSetSolver
+from hvi_fenicsx.solvers.closed_start import resting_start
 from hvi_fenicsx.solvers.law_models import Cells, Full
-from hvi_fenicsx.solvers.method import resting_start
 from hvi_fenicsx.system.held_solver import LinearSettings
 from hvi_fenicsx.system.system import System
 
@@ -18,15 +18,15 @@ _MOST = 100
 
 def solve(system: System, tolerance: float) -> dict[str, Any]:
     """Seconds are taken by the caller; iterations, and whether the inequality holds within the tolerance."""
-    solver = ActiveSetSolver(system, LinearSettings.choose(system, "gamg"), Timer())
+    solver = ActiveSetSolver(system, (), LinearSettings.choose(system, "gamg"), Timer())
     x, _ = resting_start(solver, [t.law for t in system.terms], tolerance)
     models = [Full(t.law, Cells.around(t.law.convex, t.argument(x.array_r), radial=t.radial)) for t in system.terms]
     snes = PETSc.SNES().create(system.comm)
     snes.setType("vinewtonrsls")
     residual = system.load.duplicate()
     snes.setFunction(lambda _, u, f: system.residual(u, f, models), residual)
-    system.matrix.setNearNullSpace(system.near_null)
-    snes.setJacobian(lambda _, u, j, p: system.set_rates(system.tangents(u, models)), system.matrix)
+    system.jacobian.matrix.setNearNullSpace(system.near_null)
+    snes.setJacobian(lambda _, u, j, p: system.jacobian.set_rates(system.tangents(u, models)), system.jacobian.matrix)
     snes.setVariableBounds(system.lower, system.upper)
     snes.setTolerances(atol=0.0, rtol=tolerance, max_it=_MOST)
     snes.getKSP().setType("cg")

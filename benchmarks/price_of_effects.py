@@ -77,8 +77,10 @@ def by_program(name: str, cells: int, clock: Callable[[], float]) -> dict[str, f
     from hvi_fenicsx import Scene
     from hvi_fenicsx.runtime.timing import Timer
     from hvi_fenicsx.solvers import nested_iteration
-    from hvi_fenicsx.solvers.method import silent
-    from hvi_fenicsx.system import assemble
+    from hvi_fenicsx.solvers.context import RunControl
+    from hvi_fenicsx.system import existence
+    from hvi_fenicsx.system.assemble import assemble
+    from hvi_fenicsx.workflow import model_of, options_of
 
     forms, make = [], dolfinx.fem.form
 
@@ -90,10 +92,12 @@ def by_program(name: str, cells: int, clock: Callable[[], float]) -> dict[str, f
     body = wanted.domain.build(MPI.COMM_WORLD, wanted.dimension)
     dolfinx.fem.form = counted
     start = clock()
-    system = assemble.assemble(wanted, MPI.COMM_WORLD, Timer(), body)
+    model = model_of(wanted)
+    system = assemble(body, model, Timer())
     assembled = clock()
     dolfinx.fem.form = make
-    found = nested_iteration.solve(wanted, system, Timer(), silent, lambda: False)
+    verdict, control = existence.solvability(system.problem, system.forces), RunControl(timer=Timer())
+    found = nested_iteration.solve(model, system, verdict, options_of(wanted.solver), control).result
     if not found.converged:
         raise SystemExit(f"{name}: {found.reason}")
     return {"integrals": integrals(forms), "assembly": assembled - start, "solve": clock() - assembled}

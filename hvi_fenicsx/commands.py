@@ -14,7 +14,7 @@ from mpi4py import MPI
 
 from . import console, results
 from .accuracy import control, quantities
-from .accuracy.adaptive import Climber
+from .accuracy.adaptive import AdaptiveSolver
 from .accuracy.control import Goal, Reached
 from .errors import ExitCode, HviError, InputError
 from .report.html import render
@@ -26,7 +26,7 @@ from .runtime.signals import Interrupt
 from .runtime.timing import Timer
 from .scene import Scene, dump_scene, read_scene
 from .system import petsc_options
-from .workflow import Prepared, Solution, finish, prepare
+from .workflow import Preparation, Solution, finish, prepare
 
 COMM = MPI.COMM_WORLD
 H = TypeVar("H", bound=logging.Handler)
@@ -120,8 +120,8 @@ def _finish(run_logs: Iterable[log.RunLog]) -> None:
 def _solve(request: RunRequest, interrupt: Interrupt) -> tuple[Solution, Reached | None]:
     """The solution; with it, where an accuracy was asked for, how it was reached. Collective."""
     if request.goal is not None:
-        climber = Climber(request.timer, log.newton_step, interrupt.requested)
-        reached = control.reach(request.scene, COMM, request.goal, climber, _LOG.info)
+        solver = AdaptiveSolver(timer=request.timer, progress=log.newton_step, interrupted=interrupt.requested)
+        reached = control.reach(request.scene, COMM, request.goal, solver, _LOG.info)
         _say(
             [
                 *console.outcome(reached.solution),
@@ -206,7 +206,7 @@ def check(options: argparse.Namespace) -> int:
     return _CODES.get(prepared.solvability.state, ExitCode.CERTIFIED)
 
 
-def _report(prepared: Prepared, loads: Sequence[str], *, as_json: bool) -> str:
+def _report(prepared: Preparation, loads: Sequence[str], *, as_json: bool) -> str:
     """What ``check`` prints. Collective."""
     factors = {name: prepared.load_factors(name) for name in loads}
     if as_json:

@@ -12,13 +12,13 @@ from .certify.estimate.estimator import Estimate
 from .problem import effect_summary
 from .rigid import LoadFactors, Mode, RigidBody
 from .solvers import nested_iteration, registry
-from .workflow import Prepared, Solution
+from .workflow import Preparation, Solution
 
 _LISTED = 3
 """So many rigid motions are named one by one; of more, only the number is given."""
 
 
-def heading(prepared: Prepared, ranks: int) -> Iterator[str]:
+def heading(prepared: Preparation, ranks: int) -> Iterator[str]:
     """The scene, its size, whether a solution exists, and the warnings before the solve.
 
     Args:
@@ -36,7 +36,7 @@ def warnings(found: Iterable[str]) -> Iterator[str]:
     return (f"warning: {warning}" for warning in found)
 
 
-def existence(prepared: Prepared) -> str:
+def existence(prepared: Preparation) -> str:
     """One line on kernel, state, margin and load factors."""
     s = prepared.solvability
     bodies = prepared.problem.bodies.bodies
@@ -89,7 +89,7 @@ def load_factors(factors: Mapping[str, LoadFactors]) -> Iterator[str]:
         yield f"load {name} alone: {held}{mode}; {peak}" + (f" ({f.peak_mode.name})" if f.peak_mode else "")
 
 
-def effects(prepared: Prepared) -> Iterator[str]:
+def effects(prepared: Preparation) -> Iterator[str]:
     """The effects in force with what each adds, and the solver that follows. Collective."""
     found = effect_summary.summaries(prepared.problem)
     yield from (f"effect: {one.effect} on {one.where or 'the body'}: {one.adds}" for one in found)
@@ -97,13 +97,12 @@ def effects(prepared: Prepared) -> Iterator[str]:
     yield f"solver: {solver(prepared)}"
 
 
-def solver(prepared: Prepared) -> str:
+def solver(prepared: Preparation) -> str:
     """The solver that the effects call for."""
-    wanted = prepared.scene.solver
-    kind = nested_iteration.linear(prepared.scene, prepared.system).kind
+    kind = nested_iteration.linear_settings(prepared.system, prepared.options).kind
     linear = {"lu": "MUMPS", "gamg": "CG with GAMG", "mg": "CG with geometric multigrid on the mesh hierarchy"}[kind]
     bounds = "" if prepared.problem.bounds else ", no bounds"
-    return f"{registry.choose(wanted, prepared.system).words}{bounds}, {linear}"
+    return f"{registry.choose(prepared.options, prepared.system).words}{bounds}, {linear}"
 
 
 def outcome(solution: Solution) -> Iterator[str]:
@@ -166,7 +165,7 @@ def accuracy(reached: Reached) -> Iterator[str]:
         )
 
 
-def as_data(prepared: Prepared, factors: Mapping[str, LoadFactors]) -> dict[str, Any]:
+def as_data(prepared: Preparation, factors: Mapping[str, LoadFactors]) -> dict[str, Any]:
     """What ``check --json`` prints. Collective.
 
     Args:

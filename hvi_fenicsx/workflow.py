@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, field
 
 from dolfinx import fem
 from mpi4py import MPI
@@ -12,31 +12,58 @@ from mpi4py import MPI
 from .certify import certificate, plausibility
 from .certify.certificate import Examination
 from .certify.estimate.estimator import Estimate, estimate
-from .errors import ExitCode, SolverError
+from .errors import ExitCode, InputError, SolverError
+from .laws import smoothing
 from .mesh.domain import Domain
+from .mesh.thresholds import Thresholds as MeshThresholds
+from .problem.compose import Model, Modification, unchanged
 from .problem.problem import Problem
 from .rigid import LoadFactors, Solvability
 from .runtime.timing import Timer
+from .scene import Scene, SolverTable
 from .solvers import nested_iteration, registry
-from .solvers.method import Progress, SolveResult, silent
-from .system import assemble, existence, free_motions, system
+from .solvers.context import Progress, RunControl, never, silent
+from .solvers.nested_iteration import CoarseStart, LevelSolution
+from .solvers.options import SolverOptions
+from .solvers.result import SolveResult
+from .solvers.thresholds import Thresholds as SolverThresholds
+from .system import existence, free_motions
+from .system.assemble import assemble
+from .system.levels import Levels
+from .system.system import System
 
-if TYPE_CHECKING:
-    from .scene import Scene
+
+@dataclass(frozen=True, kw_only=True)
+class Thresholds:
+    """The numbers that tune a run.
+
+    Attributes:
+        mesh: how mesh hierarchies are made.
+        solvers: how systems are solved.
+    """
+
+    mesh: MeshThresholds = field(default_factory=MeshThresholds)
+    solvers: SolverThresholds = field(default_factory=SolverThresholds)
 
 
-@dataclass(frozen=True)
+DEFAULT = Thresholds()
+
+
+@dataclass(frozen=True, kw_only=True)
 class Solution:
     """What a run found.
 
     Attributes:
-        scene, problem: what was solved; the problem's laws are the smoothed ones where the scene smooths.
+        scene: what the user asked for.
+        problem: what was solved; its laws are the smoothed ones where the scene smooths.
         solvability: whether a solution can exist.
-        solved: what the method found, None when the state is *escapes* (nothing was solved).
+        solve_result: what the method found, None when the state is *escapes* (nothing was solved).
         examination: the certificate and the state of Γc, None likewise.
         estimate: of the error; None where nothing was certified.
-        dofs: unknowns. epsilon: relative width of the smoothing, None for exact laws. timer: wall time by phase.
-        warnings: what looks odd, see :mod:`.plausibility`.
+        dofs: unknowns.
+        epsilon: relative width of the smoothing, None for exact laws.
+        timer: wall time by phase.
+        warnings: what is implausible, see :mod:`.plausibility`.
     """
 
     scene: Scene
@@ -79,16 +106,32 @@ class Solution:
         return f"not certified ({self.solve_result.reason}){unknown}"
 
 
-@dataclass(frozen=True)
-class Prepared:
-    """A scene made into a problem, assembled, its existence known; ``warnings``: what looks odd so far."""
+@dataclass(frozen=True, kw_only=True)
+class Preparation:
+    """A scene made into an assembled problem whose existence is known.
+
+    Attributes:
+        scene: what the user asked for.
+        model: the effects and their places.
+        options: how to solve.
+        system: the assembled problem.
+        solvability: whether a solution can exist.
+        timer: wall time by phase.
+        warnings: what is implausible so far.
+    """
 
     scene: Scene
-    problem: Problem
-    system: system.System
+    model: Model
+    options: SolverOptions
+    system: System
     solvability: Solvability
     timer: Timer
     warnings: tuple[str, ...] = ()
+
+    @property
+    def problem(self) -> Problem:
+        """The problem that is assembled."""
+        return self.system.problem
 
     def load_factors(self, load: str | None = None) -> LoadFactors:
         """Between which factors of a load the body is held, the other loads constant. Collective.
@@ -103,92 +146,185 @@ class Prepared:
         return existence.load_factors(self.problem, self.system.forces, load)
 
 
+def model_of(scene: Scene) -> Model:
+    """The effects of a scene and their places, its laws smoothed where it says so."""
+    return Model(
+        scene.parts, [(placed.where, placed.effect) for placed in scene.effects()], _modification(scene.solver)
+    )
+
+
+def _modification(wanted: SolverTable) -> Modification:
+    """What the solver table does to a law: smooth it, or nothing."""
+    if wanted.smoothing is None:
+        return unchanged
+    return functools.partial(
+        smoothing.create, wanted.smoothing, epsilon=wanted.epsilon, epsilon_absolute=wanted.epsilon_absolute
+    )
+
+
+def options_of(wanted: SolverTable, thresholds: SolverThresholds = DEFAULT.solvers) -> SolverOptions:
+    """The options of a scene's solver table.
+
+    Args:
+        wanted: the table.
+        thresholds: the numbers that tune the methods.
+
+    Raises:
+        InputError: there is no such method, or it does not take what the table asks for.
+    """
+    method = registry.find(wanted.method)
+    if wanted.smoothing is not None and not method.takes_smoothing:
+        raise InputError(
+            f'solver.method: "{wanted.method}" solves the law without smoothing; leave out smoothing and epsilon, '
+            'or use "auto"'
+        )
+    if wanted.start != "unbroken" and not method.takes_pieces:
+        raise InputError(
+            f'solver.start: is for the branch iteration; leave it out, or use method = "auto", not "{wanted.method}"'
+        )
+    return SolverOptions(
+        method=wanted.method,
+        epsilon=wanted.epsilon,
+        epsilon_absolute=wanted.epsilon_absolute,
+        start=wanted.start,
+        tolerance=wanted.tolerance,
+        linear_solver=wanted.linear_solver,
+        second_order=wanted.second_order,
+        max_iterations=wanted.max_iterations,
+        thresholds=thresholds,
+    )
+
+
 def prepare(
     scene: Scene,
     comm: MPI.Comm = MPI.COMM_WORLD,
     timer: Timer | None = None,
-    body: Domain | None = None,
-    verdict: Solvability | None = None,
-) -> Prepared:
+    domain: Domain | None = None,
+    solvability: Solvability | None = None,
+    thresholds: Thresholds = DEFAULT,
+) -> Preparation:
     """Everything before the solve: mesh, forms, assembly, existence. Collective.
 
     Args:
-        scene: what to solve. comm: the ranks. timer: to go on with.
-        body: the domain where it is there already, refined. verdict: on existence, where it is known.
+        scene: what to solve.
+        comm: the ranks.
+        timer: to go on with.
+        domain: the body where its mesh is there already, refined.
+        solvability: the verdict on existence, where it is known.
+        thresholds: the numbers that tune the run.
 
     Raises:
         InputError: on all ranks alike.
     """
     timer = timer or Timer()
-    assembled = assemble.assemble(scene, comm, timer, body)
+    options, model = options_of(scene.solver, thresholds.solvers), model_of(scene)
+    with timer("mesh"):
+        domain = domain or scene.domain.build_hierarchy(comm, scene.dimension, thresholds.mesh)
+    system = assemble(domain, model, timer)
     with timer("existence"):
-        verdict = verdict or existence.solvability(assembled.problem, assembled.forces)
+        solvability = solvability or existence.solvability(system.problem, system.forces)
     with timer("assembly"):
-        assembled.release(verdict.free)
-        odd = plausibility.foreseen(assembled.problem, assembled.forces)
-    return Prepared(scene, assembled.problem, assembled, verdict, timer, odd)
+        system.release(solvability.free)
+        warnings = plausibility.foreseen(system.problem, system.forces)
+    return Preparation(
+        scene=scene,
+        model=model,
+        options=options,
+        system=system,
+        solvability=solvability,
+        timer=timer,
+        warnings=warnings,
+    )
 
 
 def solve(
-    scene: Scene, comm: MPI.Comm = MPI.COMM_WORLD, *, progress: Progress = silent, timer: Timer | None = None
+    scene: Scene,
+    comm: MPI.Comm = MPI.COMM_WORLD,
+    *,
+    progress: Progress = silent,
+    timer: Timer | None = None,
+    thresholds: Thresholds = DEFAULT,
 ) -> Solution:
     """Solve a scene and certify what was found. Collective.
+
+    Args:
+        scene: what to solve.
+        comm: the ranks.
+        progress: called at each Newton step.
+        timer: to go on with.
+        thresholds: the numbers that tune the run.
 
     Raises:
         InputError: the scene does not fit its mesh, on all ranks alike.
     """
-    return finish(prepare(scene, comm, timer), progress)
+    return finish(prepare(scene, comm, timer, thresholds=thresholds), progress)
 
 
-def finish(
-    prepared: Prepared,
-    progress: Progress = silent,
-    interrupted: Callable[[], bool] = lambda: False,
-    below: nested_iteration.Rung | None = None,
-) -> Solution:
+def finish(prepared: Preparation, progress: Progress = silent, interrupted: Callable[[], bool] = never) -> Solution:
     """Solve, certificate and estimate of a prepared scene; nothing is solved when no solution exists. Collective.
 
     Args:
-        prepared: the scene. progress: see :mod:`.method`. interrupted: whether to stop (collective, asked often).
-        below: a coarser rung to start from, where the mesh was refined.
+        prepared: the scene.
+        progress: called at each Newton step.
+        interrupted: whether to stop (collective, asked at each Newton step).
+    """
+    return finish_with_levels(prepared, progress, interrupted)[0]
+
+
+def finish_with_levels(
+    prepared: Preparation,
+    progress: Progress = silent,
+    interrupted: Callable[[], bool] = never,
+    start: CoarseStart | None = None,
+) -> tuple[Solution, Levels]:
+    """As :func:`finish`, with the coarser levels that were used, for a mesh that will be refined. Collective.
+
+    Args:
+        prepared: the scene.
+        progress: called at each Newton step.
+        interrupted: whether to stop (collective, asked at each Newton step).
+        start: a solution on a coarser mesh, where the mesh was refined from it.
     """
     found = examination = errors = None
-    odd = prepared.warnings
+    levels: Levels = ()
+    warnings, options = prepared.warnings, prepared.options
     if prepared.solvability.state != "escapes":
-        found = _solved(prepared, progress, interrupted, below)
+        solved = _solved(prepared, RunControl(timer=prepared.timer, progress=progress, interrupted=interrupted), start)
+        found, levels = solved.result, solved.levels
         with prepared.timer("certificate"):
-            wanted = prepared.scene.solver
-            examination = certificate.examine(prepared.problem, found.u, wanted.tolerance, inertia=wanted.second_order)
-            odd += plausibility.found(prepared.problem, examination, found.u)
+            examination = certificate.examine(
+                prepared.problem, found.u, options.tolerance, inertia=options.second_order
+            )
+            warnings += plausibility.found(prepared.problem, examination, found.u)
         if examination.certificate.passed:
             with prepared.timer("estimate"):
-                errors = estimate(prepared.system, found.u, examination)
-    return Solution(
-        prepared.scene,
-        prepared.problem,
-        prepared.solvability,
-        found,
-        examination,
-        errors,
-        prepared.system.dofs,
-        registry.relative_width(prepared.scene.solver, prepared.system),
-        prepared.timer,
-        odd,
+                errors = estimate(prepared.system, levels, found.u, examination)
+    solution = Solution(
+        scene=prepared.scene,
+        problem=prepared.problem,
+        solvability=prepared.solvability,
+        solve_result=found,
+        examination=examination,
+        estimate=errors,
+        dofs=prepared.system.dofs,
+        epsilon=options.relative_width(prepared.system),
+        timer=prepared.timer,
+        warnings=warnings,
     )
+    return solution, levels
 
 
-def _solved(
-    prepared: Prepared, progress: Progress, interrupted: Callable[[], bool], below: nested_iteration.Rung | None
-) -> SolveResult:
-    scene, assembled, timer = prepared.scene, prepared.system, prepared.timer
+def _solved(prepared: Preparation, control: RunControl, start: CoarseStart | None) -> LevelSolution:
+    system, options, solvability = prepared.system, prepared.options, prepared.solvability
     try:
-        if below is not None:
-            found = nested_iteration.ascend(scene, assembled, below, timer, progress, interrupted)
+        if start is not None:
+            found = nested_iteration.ascend(system, start, solvability, options, control)
         else:
-            found = nested_iteration.solve(scene, assembled, timer, progress, interrupted)
-        if assembled.freedom is not None:
-            free_motions.settle(prepared.problem, prepared.solvability.free, found.u)
+            found = nested_iteration.solve(prepared.model, system, solvability, options, control)
+        if system.freedom is not None:
+            free_motions.settle(prepared.problem, solvability.free, found.result.u)
         return found
     except SolverError as error:
         u = fem.Function(prepared.problem.space, name="displacement")
-        return SolveResult(u, prepared.scene.solver.method, False, str(error))
+        result = SolveResult(u=u, method=options.method, converged=False, reason=str(error))
+        return LevelSolution(system=system, levels=start.levels if start else (), result=result)

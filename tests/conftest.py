@@ -9,7 +9,6 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-import pytest
 from hypothesis import settings
 
 for name, value in {
@@ -32,10 +31,3 @@ os.environ["PYTHONPATH"] = os.pathsep.join([str(Path(__file__).parent / "support
 settings.register_profile("repeatable", derandomize=True, deadline=None)
 settings.register_profile("search", derandomize=False, deadline=None)
 settings.load_profile("repeatable")
-
-
-@pytest.fixture
-def everything_nested(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Small meshes go up the ladder too, and take its multigrid."""
-    monkeypatch.setattr("hvi_fenicsx.solvers.nested_iteration._WORTHWHILE", 1_000)
-    monkeypatch.setattr("hvi_fenicsx.system.held_solver._LARGEST_DIRECT", {2: 1_000, 3: 1_000})

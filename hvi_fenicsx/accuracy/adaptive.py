@@ -1,4 +1,4 @@
-"""Adaptivity: solve, estimate, mark, refine, transfer, and again: a scene climbs a ladder of meshes made to measure.
+"""Adaptivity: solve, estimate, mark, refine, transfer, and again: a scene is solved on a hierarchy of adapted meshes.
 
 Cells are marked by Dörfler's bulk criterion (Dörfler 1996) on the estimated error by cell.
 """
@@ -14,30 +14,36 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from ..certify.estimate.estimator import Estimate
-from ..mesh import refinement, transfer
-from ..mesh.domain import Domain, Refinement
+from ..mesh import refinement
+from ..mesh.domain import Domain
+from ..mesh.refinement import Refinement
 from ..runtime.mpi import agree, total
 from ..runtime.timing import Timer
 from ..scene import Scene
-from ..solvers.method import Progress, silent
+from ..solvers.context import Progress, never, silent
+from ..solvers.nested_iteration import CoarseStart
+from ..system.levels import Level, Levels, prolongation, stacked
 from ..typing import Entities
-from ..workflow import Prepared, Solution, finish, prepare
+from ..workflow import DEFAULT, Preparation, Solution, Thresholds, finish_with_levels, prepare
 
 _CLOSE, _CORRECTIONS = 1.05, 2
 """How near to the share wanted is near enough, and how often the marking is corrected for it."""
 
 
-@dataclass(frozen=True)
-class Rung:
-    """One mesh of the ladder, solved.
+@dataclass(frozen=True, kw_only=True)
+class AdaptiveLevel:
+    """One mesh of an adaptive hierarchy, solved.
 
     Attributes:
-        prepared, solution: what was solved on it, and what was found. step: the prolongation from the rung below to
-            its unknowns, None on the first.
+        prepared: what was solved on it.
+        solution: what was found.
+        levels: the coarser levels that it was solved with.
+        step: the prolongation from the coarser mesh's unknowns, None on the first mesh.
     """
 
-    prepared: Prepared
+    prepared: Preparation
     solution: Solution
+    levels: Levels
     step: PETSc.Mat | None
 
     @property
@@ -51,58 +57,85 @@ class Rung:
         return self.prepared.system.dofs
 
 
-@dataclass(frozen=True)
-class Climber:
-    """What all rungs share.
+@dataclass(frozen=True, kw_only=True)
+class AdaptiveSolver:
+    """Solves a scene on ever finer meshes, each from the solution on the one before.
 
     Attributes:
-        timer: where time goes. progress, interrupted: see :mod:`.method`.
+        timer: where time goes.
+        progress: called at each Newton step.
+        interrupted: whether to stop (collective, asked at each Newton step).
         existence: whether it is asked for on each mesh anew, not on the first only.
+        thresholds: the numbers that tune the runs.
     """
 
     timer: Timer
     progress: Progress = silent
-    interrupted: Callable[[], bool] = lambda: False
+    interrupted: Callable[[], bool] = never
     existence: bool = False
+    thresholds: Thresholds = DEFAULT
 
-    def begin(self, scene: Scene, comm: MPI.Comm) -> Rung:
+    def begin(self, scene: Scene, comm: MPI.Comm) -> AdaptiveLevel:
         """A scene solved on its own mesh, without a coarser one. Collective.
+
+        Args:
+            scene: what to solve.
+            comm: the ranks.
 
         Raises:
             InputError: the scene does not fit its mesh, on all ranks alike.
         """
-        prepared = prepare(scene, comm, self.timer)
-        return Rung(prepared, finish(prepared, self.progress, self.interrupted), None)
+        prepared = prepare(scene, comm, self.timer, thresholds=self.thresholds)
+        solution, levels = finish_with_levels(prepared, self.progress, self.interrupted)
+        return AdaptiveLevel(prepared=prepared, solution=solution, levels=levels, step=None)
 
-    def up(self, rung: Rung, nesting: Refinement, scene: Scene, ahead: fem.Function | None = None) -> Rung:
-        """The next rung: its scene solved on the refined mesh, from the solution on the rung below. Collective.
+    def refine(
+        self, level: AdaptiveLevel, refined: Refinement, scene: Scene, ahead: fem.Function | None = None
+    ) -> AdaptiveLevel:
+        """A scene solved on the refined mesh, from the solution on the one before. Collective.
 
         Args:
-            rung: the one below. nesting: the refined mesh. scene: to solve on it.
-            ahead: a displacement on the rung below that is nearer to the next one's than its own solution. At a drop
+            level: the one before.
+            refined: its mesh refined.
+            scene: to solve on it.
+            ahead: a displacement on the mesh before that is nearer to the next solution than its own one. At a drop
                 neighbouring vertices may each be the last before it, all in equilibrium; a start decides which.
         """
-        prepared, below = self._prepared(rung, scene, nesting.domain), rung.prepared.system
+        prepared, coarse = self._prepared(level, scene, refined.domain), level.prepared.system
         with self.timer("setup"):
-            step = transfer.between(prepared.system, below, nesting)
-            prepared.system.below = transfer.stacked(step, below)
-        return self._solved(rung, prepared, step, ahead)
+            step = prolongation(prepared.system, coarse, refined.transfer)
+            levels = stacked(prepared.system, coarse, level.levels, step)
+        return self._solved(level, prepared, levels, step, ahead)
 
-    def again(self, rung: Rung, scene: Scene) -> Rung:
-        """The same mesh with another solver table. Collective."""
-        prepared, below = self._prepared(rung, scene, rung.prepared.problem.domain), rung.prepared.system
-        prepared.system.below = below.below
-        return self._solved(rung, prepared, _identity(below.load))
+    def again(self, level: AdaptiveLevel, scene: Scene) -> AdaptiveLevel:
+        """The same mesh with another solver table. Collective.
 
-    def _prepared(self, rung: Rung, scene: Scene, body: Domain) -> Prepared:
-        return prepare(scene, rung.comm, self.timer, body, None if self.existence else rung.solution.solvability)
+        Args:
+            level: solved before.
+            scene: to solve on its mesh.
+        """
+        prepared, before = self._prepared(level, scene, level.prepared.problem.domain), level.prepared.system
+        first = [Level(prepared.system, one.system, one.prolongation) for one in level.levels[:1]]
+        return self._solved(level, prepared, (*first, *level.levels[1:]), _identity(before.load))
 
-    def _solved(self, rung: Rung, prepared: Prepared, step: PETSc.Mat, ahead: fem.Function | None = None) -> Rung:
-        found = rung.solution.solve_result
-        if found is not None and ahead is not None:
-            found = replace(found, u=ahead)
-        start = (rung.prepared.system, found, step) if found is not None else None
-        return Rung(prepared, finish(prepared, self.progress, self.interrupted, start), step)
+    def _prepared(self, level: AdaptiveLevel, scene: Scene, domain: Domain) -> Preparation:
+        known = None if self.existence else level.solution.solvability
+        return prepare(scene, level.comm, self.timer, domain, known, self.thresholds)
+
+    def _solved(
+        self,
+        level: AdaptiveLevel,
+        prepared: Preparation,
+        levels: Levels,
+        step: PETSc.Mat,
+        ahead: fem.Function | None = None,
+    ) -> AdaptiveLevel:
+        found, start = level.solution.solve_result, None
+        if found is not None:
+            found = found if ahead is None else replace(found, u=ahead)
+            start = CoarseStart(system=level.prepared.system, result=found, prolongation=step, levels=levels)
+        solution, used = finish_with_levels(prepared, self.progress, self.interrupted, start)
+        return AdaptiveLevel(prepared=prepared, solution=solution, levels=used, step=step)
 
 
 def _identity(like: PETSc.Vec) -> PETSc.Mat:
@@ -110,37 +143,37 @@ def _identity(like: PETSc.Vec) -> PETSc.Mat:
     return PETSc.Mat().createConstantDiagonal((sizes, sizes), 1.0, comm=like.comm)
 
 
-def refined(rung: Rung, bulk: float) -> Refinement:
+def refined(level: AdaptiveLevel, bulk: float) -> Refinement:
     """The mesh with so much of the squared error refined; the whole mesh where nothing was estimated. Collective."""
-    domain, estimate = rung.prepared.problem.domain, rung.solution.estimate
-    with rung.prepared.timer("mesh"):
+    domain, estimate = level.prepared.problem.domain, level.solution.estimate
+    with level.prepared.timer("mesh"):
         if estimate is None or bulk >= 1.0 or estimate.discretisation == 0.0:
             return refinement.uniform(domain)
-        return refinement.marked(domain, marked(rung.comm, estimate, bulk))
+        return refinement.marked(domain, marked(level.comm, estimate, bulk))
 
 
-def sparing(rung: Rung, share: float) -> Refinement:
+def sparing(level: AdaptiveLevel, share: float) -> Refinement:
     """The mesh with so much of the squared error refined, neighbours that are cut with the marked cells included.
 
     On coarse meshes they are many: to mark such a share would refine far more than it. Collective.
     """
-    bulk, step = share, refined(rung, share)
+    bulk, step = share, refined(level, share)
     for _ in range(_CORRECTIONS):
-        if (reached := _refined_share(rung, step, bulk)) <= _CLOSE * share:
+        if (reached := _refined_share(level, step, bulk)) <= _CLOSE * share:
             break
         bulk *= share / reached
-        step = refined(rung, bulk)
+        step = refined(level, bulk)
     return step
 
 
-def _refined_share(rung: Rung, step: Refinement, bulk: float) -> float:
+def _refined_share(level: AdaptiveLevel, step: Refinement, bulk: float) -> float:
     """Of the squared error: a marked cell counts in full, others by the cuts they have beside a marked one's."""
-    found = rung.solution.estimate
+    found = level.solution.estimate
     if found is None or found.discretisation == 0.0:
         return 0.0
-    squares, chosen = found.cells**2, marked(rung.comm, found, bulk)
-    cuts = squares * (np.bincount(step.parents, minlength=len(squares))[: len(squares)] - 1.0)
-    own, cut, all_cut = (total(rung.comm, float(a.sum())) for a in (squares[chosen], cuts[chosen], cuts))
+    squares, chosen = found.cells**2, marked(level.comm, found, bulk)
+    cuts = squares * (np.bincount(step.transfer.parents, minlength=len(squares))[: len(squares)] - 1.0)
+    own, cut, all_cut = (total(level.comm, float(a.sum())) for a in (squares[chosen], cuts[chosen], cuts))
     return own / found.discretisation**2 * all_cut / cut
 
 

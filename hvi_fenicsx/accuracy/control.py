@@ -15,13 +15,13 @@ from typing import Any
 from mpi4py import MPI
 
 from ..errors import ExitCode
-from ..mesh.domain import Refinement
+from ..mesh.refinement import Refinement
 from ..runtime import memory
 from ..runtime.mpi import largest
 from ..scene import Scene
 from ..workflow import Solution
 from . import adaptive, cost_forecast, quantities
-from .adaptive import Climber, Rung
+from .adaptive import AdaptiveLevel, AdaptiveSolver
 from .cost_forecast import Cost, Step
 
 _BULK = {2: 0.75, 3: 0.5}
@@ -75,7 +75,7 @@ class Reached:
     """
 
     goal: Goal
-    rung: Rung
+    rung: AdaptiveLevel
     solution: Solution
     steps: tuple[Step, ...]
     why: str | None
@@ -102,17 +102,17 @@ class Reached:
         }
 
 
-def reach(scene: Scene, comm: MPI.Comm, goal: Goal, climber: Climber, tell: Callable[[str], None]) -> Reached:
+def reach(scene: Scene, comm: MPI.Comm, goal: Goal, solver: AdaptiveSolver, tell: Callable[[str], None]) -> Reached:
     """Climb until the goal is reached, or cannot be. Collective.
 
     Args:
         scene: what to solve; its mesh sets where to begin (:func:`.adaptive.coarsest`), its ε the largest.
-        comm: the ranks. goal: what is wanted. climber: timer, progress, interruption. tell: of each rung, in a line.
+        comm: the ranks. goal: what is wanted. solver: timer, progress, interruption. tell: of each rung, in a line.
 
     Raises:
         InputError: on all ranks alike: the scene has no such quantity, or does not fit its mesh.
     """
-    return _Climb(scene, comm, goal, climber, tell).run()
+    return _Climb(scene, comm, goal, solver, tell).run()
 
 
 @dataclass
@@ -122,7 +122,7 @@ class _Climb:
     scene: Scene
     comm: MPI.Comm
     goal: Goal
-    climber: Climber
+    solver: AdaptiveSolver
     tell: Callable[[str], None]
     steps: list[Step] = field(default_factory=list)
     failures: int = 0
@@ -130,9 +130,9 @@ class _Climb:
     def run(self) -> Reached:
         self.base, self.room = memory.peak(self.comm), memory.limit() * _USABLE
         self.quantity = quantities.find(self.goal.quantity)()
-        self.climber = replace(self.climber, existence=self.quantity.needs_existence)
+        self.solver = replace(self.solver, existence=self.quantity.needs_existence)
         begin, start = adaptive.coarsest(self.scene), time.perf_counter()
-        rung = self.climber.begin(_solved_with(begin, min(TOLERANCES[1], begin.solver.tolerance * 1e3)), self.comm)
+        rung = self.solver.begin(_solved_with(begin, min(TOLERANCES[1], begin.solver.tolerance * 1e3)), self.comm)
         why = self._note(rung, start)
         while why is None and not self._done():
             start = time.perf_counter()
@@ -144,7 +144,7 @@ class _Climb:
                 why = self._note(rung, start)
         return self._reached(rung, why)
 
-    def _reached(self, rung: Rung, why: str | None) -> Reached:
+    def _reached(self, rung: AdaptiveLevel, why: str | None) -> Reached:
         solution = replace(rung.solution, scene=self.scene)
         more = None
         if self.steps and math.isfinite(self.steps[-1].error) and self.steps[-1].error > 0:
@@ -154,7 +154,7 @@ class _Climb:
             why = None
         return Reached(self.goal, rung, solution, tuple(self.steps), why, more)
 
-    def _note(self, rung: Rung, start: float) -> str | None:
+    def _note(self, rung: AdaptiveLevel, start: float) -> str | None:
         """Record a rung; why to stop at it, or None. Collective."""
         solution = rung.solution
         if solution.solve_result is None or solution.solve_result.interrupted:
@@ -166,10 +166,10 @@ class _Climb:
             return solution.reason if self.failures >= _FAILURES else None
         self.failures = 0
         self.steps.append(self._step(rung, largest(self.comm, time.perf_counter() - start)))
-        self.tell(_line(len(self.steps), self.steps[-1], self.climber.timer.total))
+        self.tell(_line(len(self.steps), self.steps[-1], self.solver.timer.total))
         return None
 
-    def _step(self, rung: Rung, seconds: float) -> Step:
+    def _step(self, rung: AdaptiveLevel, seconds: float) -> Step:
         estimate = rung.solution.estimate
         assert estimate is not None
         norm, smoothing = estimate.energy_norm or 1.0, self.quantity.smoothing()
@@ -190,7 +190,7 @@ class _Climb:
             return False
         return self.steps[-1].error <= (self.goal.accuracy or 0.0)
 
-    def _next(self, rung: Rung) -> Rung | str:
+    def _next(self, rung: AdaptiveLevel) -> AdaptiveLevel | str:
         """The next rung, or why there is none. Collective."""
         if len(self.steps) >= _MOST_RUNGS:
             return f"{_MOST_RUNGS} meshes were not enough"
@@ -198,12 +198,12 @@ class _Climb:
             return too_much
         scene = self._sharper(rung.solution.scene)
         if self.failures == 1 and (tight := _TIGHTER * scene.solver.tolerance) >= TOLERANCES[0]:
-            return self.climber.again(rung, _solved_with(scene, tight))
+            return self.solver.again(rung, _solved_with(scene, tight))
         if self._mesh_will_do():
-            return self.climber.again(rung, scene)
+            return self.solver.again(rung, scene)
         bulk = self._bulk()
         nesting = adaptive.refined(rung, bulk) if bulk == self._most else adaptive.sparing(rung, bulk)
-        return self._too_long(nesting) or self.climber.up(rung, nesting, scene, self.quantity.ahead())
+        return self._too_long(nesting) or self.solver.refine(rung, nesting, scene, self.quantity.ahead())
 
     def _bulk(self) -> float:
         """How much of the squared error to refine: no more than takes the estimate to where it should be."""
@@ -282,7 +282,7 @@ class _Climb:
             return None
         if (needed := cost_forecast.memory(self.steps, dofs, d, self.base)) > self.room:
             return f"the next mesh of {dofs:,} unknowns would need {needed / 1024:.3g} GB"
-        expected = largest(self.comm, self.climber.timer.total) + cost_forecast.seconds(self.steps, dofs)
+        expected = largest(self.comm, self.solver.timer.total) + cost_forecast.seconds(self.steps, dofs)
         if self.goal.seconds is not None and expected > self.goal.seconds:
             return f"the next mesh of {dofs:,} unknowns would end after {expected:.0f} s"
         return None

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from ..certify.contact_state import State
     from ..certify.estimate.contact_errors import OnContact
-    from .adaptive import Rung
+    from .adaptive import AdaptiveLevel
     from .cost_forecast import Step
 
 
@@ -69,7 +69,7 @@ class ContactField(Observable):
         """See :attr:`.Quantity.known_from_one_mesh`."""
         return not self._last.prepared.problem.bulk.averages_dilatation
 
-    def add(self, level: Rung) -> None:
+    def add(self, level: AdaptiveLevel) -> None:
         """See :meth:`.Quantity.add`."""
         if level.prepared.problem.bulk.averages_dilatation:
             super().add(level)
@@ -86,7 +86,8 @@ class ContactField(Observable):
         found, self._ahead = self._last.solution, None
         if found.solve_result is None or found.examination is None:
             return np.inf
-        errors = estimator.on_contact(self._last.prepared.system, found.solve_result.u, found.examination)
+        last = self._last
+        errors = estimator.on_contact(last.prepared.system, last.levels, found.solve_result.u, found.examination)
         self._ahead = errors.moved
         return self.safety * self.pick(errors)
 
@@ -110,11 +111,11 @@ class Slip(ContactField):
     description = "the slip on Γc in L2"
     safety = 1.7
 
-    def missing(self, level: Rung) -> str | None:
+    def missing(self, level: AdaptiveLevel) -> str | None:
         """A part with contact or a law."""
         return None if level.prepared.problem.surfaces else "the scene has no part with contact or a law"
 
-    def read(self, level: Rung) -> fem.Function:
+    def read(self, level: AdaptiveLevel) -> fem.Function:
         """u_t, m."""
         return _tangential(level, lambda state: state.slip, level.prepared.problem.scales.displacement)
 
@@ -131,14 +132,14 @@ class Friction(ContactField):
     power = 1
     safety = 1.5
 
-    def missing(self, level: Rung) -> str | None:
+    def missing(self, level: AdaptiveLevel) -> str | None:
         """A law of the slip."""
         from ..effects import Direction
 
         slips = any(term.direction is Direction.SLIP for term in level.prepared.problem.terms)
         return None if slips else "the scene has no friction"
 
-    def read(self, level: Rung) -> fem.Function:
+    def read(self, level: AdaptiveLevel) -> fem.Function:
         """-σ_t, N/m²."""
         return _tangential(level, lambda state: state.friction, level.prepared.problem.scales.stress)
 
@@ -159,11 +160,11 @@ class Resultant(Observable):
     name = "resultant"
     description = "the contact force"
 
-    def missing(self, level: Rung) -> str | None:
+    def missing(self, level: AdaptiveLevel) -> str | None:
         """Contact."""
         return None if level.prepared.problem.bounds else "the scene has no contact"
 
-    def read(self, level: Rung) -> Array:
+    def read(self, level: AdaptiveLevel) -> Array:
         """Its components (d,), N/m in 2D, N in 3D."""
         states = [s for s in _states(level) if s.bounds is not None]
         pushes = [s.surface.weights[:, None] * s.pressure[:, None] * s.surface.normals for s in states]
@@ -176,17 +177,17 @@ class LoadFactor(Observable):
 
     needs_existence = True
 
-    def missing(self, level: Rung) -> str | None:
+    def missing(self, level: AdaptiveLevel) -> str | None:
         """A load that can be raised until the body escapes."""
         if np.isfinite(self._factor(level)):
             return None
         return "no load factor ends what holds the body; hvi check tells the state"
 
-    def read(self, level: Rung) -> Array:
+    def read(self, level: AdaptiveLevel) -> Array:
         """The factor, (1,)."""
         return np.array([self._factor(level)])
 
-    def _factor(self, level: Rung) -> float:
+    def _factor(self, level: AdaptiveLevel) -> float:
         return float(getattr(level.solution.solvability, self.name))
 
 
@@ -220,12 +221,12 @@ def find(name: str) -> type[Quantity]:
     return Quantity.registry[name]
 
 
-def _states(level: Rung) -> tuple[State, ...]:
+def _states(level: AdaptiveLevel) -> tuple[State, ...]:
     examination = level.solution.examination
     return () if examination is None else examination.states
 
 
-def _tangential(level: Rung, read: Callable[[State], Array], unit: float) -> fem.Function:
+def _tangential(level: AdaptiveLevel, read: Callable[[State], Array], unit: float) -> fem.Function:
     """Tangential vectors (m, d-1) of each part as a field."""
     from dolfinx import fem
 
@@ -237,7 +238,7 @@ def _tangential(level: Rung, read: Callable[[State], Array], unit: float) -> fem
     return field
 
 
-def _from_true_law(level: Rung) -> float:
+def _from_true_law(level: AdaptiveLevel) -> float:
     """∫ of the distance of -σ_t from the unsmoothed law's graph over Γc, nondimensional. Collective."""
     from ..certify.force_attribution import NEAR
     from ..effects import Direction

@@ -21,7 +21,7 @@ from ..typing import Array
 if TYPE_CHECKING:
     from dolfinx import fem
 
-    from .adaptive import Rung
+    from .adaptive import AdaptiveLevel
     from .cost_forecast import Step
 
 _APART = 1.4
@@ -52,9 +52,9 @@ class Quantity(ABC):
             enter(Quantity.registry, cls, cls.name, "quantity")
 
     def __init__(self) -> None:
-        self._last: Rung
+        self._last: AdaptiveLevel
 
-    def add(self, level: Rung) -> None:
+    def add(self, level: AdaptiveLevel) -> None:
         """Take the next level. Collective.
 
         Raises:
@@ -120,14 +120,14 @@ class Observable(Quantity):
         self._values: list[MeshValue] = []
 
     @abstractmethod
-    def read(self, level: Rung) -> fem.Function | Array:
+    def read(self, level: AdaptiveLevel) -> fem.Function | Array:
         """Its value on a level in SI: numbers (n,), or a P1 vector field that is zero off Γc. Collective."""
 
-    def missing(self, level: Rung) -> str | None:
+    def missing(self, level: AdaptiveLevel) -> str | None:
         """What the scene lacks to have this quantity, for a message; None where it lacks nothing. Collective."""
         return None
 
-    def value(self, level: Rung) -> fem.Function | Array:
+    def value(self, level: AdaptiveLevel) -> fem.Function | Array:
         """As :meth:`read`. Collective.
 
         Raises:
@@ -137,7 +137,7 @@ class Observable(Quantity):
             raise InputError(f"--quantity {self.name}: {lack}")
         return self.read(level)
 
-    def add(self, level: Rung) -> None:
+    def add(self, level: AdaptiveLevel) -> None:
         """See :meth:`Quantity.add`; fields of coarser levels are taken to the new mesh. Collective."""
         if level.solution.examination is None:
             self._values = []
@@ -147,7 +147,7 @@ class Observable(Quantity):
         self._values.append(MeshValue(size, self.value(level)))
         super().add(level)
 
-    def _on(self, level: Rung, value: fem.Function | Array) -> fem.Function | Array:
+    def _on(self, level: AdaptiveLevel, value: fem.Function | Array) -> fem.Function | Array:
         return value if isinstance(value, np.ndarray) else prolong(value, level, self._last)
 
     def error(self) -> float:
@@ -204,7 +204,7 @@ def _order(sizes: Sequence[float], ratio: float) -> float:
     return high if excess(high) < 0 else float(brentq(excess, low, high))
 
 
-def contact_norm(level: Rung, values: Array, power: int) -> float:
+def contact_norm(level: AdaptiveLevel, values: Array, power: int) -> float:
     """The L1 or L2 norm of a vector field on Γc, by vertex quadrature. Collective.
 
     Args:
@@ -219,7 +219,7 @@ def contact_norm(level: Rung, values: Array, power: int) -> float:
     return float(float(level.comm.allreduce(found)) ** (1.0 / power))
 
 
-def prolong(field: fem.Function, level: Rung, coarser: Rung) -> fem.Function:
+def prolong(field: fem.Function, level: AdaptiveLevel, coarser: AdaptiveLevel) -> fem.Function:
     """A vector field of the next coarser level on the mesh of a level. Collective.
 
     Args:

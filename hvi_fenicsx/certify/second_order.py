@@ -41,7 +41,7 @@ def by_inertia(problem: Problem, u: fem.Function, states: Sequence[State], toler
     for term in system.terms:
         argument = term.argument(x.array_r)
         models.append(Full(term.law, Cells.around(term.law.convex, argument, radial=term.radial)))
-    system.set_rates(system.tangents(x, models))
+    system.jacobian.set_rates(system.tangents(x, models))
     strong, weak = _active(system, states, tolerance)
     if _negative(system, strong) == 0:
         return LOCAL_MINIMISER
@@ -82,7 +82,7 @@ def _kinks(term: LawTerm, argument: Array, traction: Array, tolerance: float) ->
 
 def _negative(system: System, held: Integers) -> int:
     """Negative eigenvalues of the Hessian with some dofs held. Collective."""
-    matrix = system.matrix.copy()
+    matrix = system.jacobian.matrix.copy()
     start = system.load.owner_range[0]
     matrix.zeroRowsColumns((held + start).astype(PETSc.IntType), diag=1.0)
     matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)

@@ -3,8 +3,8 @@
 Each cell of the grid is cut along the paths of edges from its lowest to its highest corner (Kuhn 1960): in the plane
 ``create_rectangle``'s right-diagonal pattern, in space ``create_box``'s six tetrahedra, both nested in themselves. The
 ranks share a block by recursive bisection (Berger and Bokhari 1987). It cuts at fractions of the block, rounded to
-cells, so that a rank has the same part on every rung of a ladder, to half a cell, and hardly a value travels between
-rungs; a graph partitioner would also have to be run on each of them, and cut each of them elsewhere.
+cells, so that a rank has the same part on every level of the mesh hierarchy, to half a cell, and hardly a value is sent
+between levels; a graph partitioner would have to run on each level, and would cut each of them elsewhere.
 """
 
 from __future__ import annotations
@@ -17,7 +17,40 @@ from dolfinx import mesh as dmesh
 from mpi4py import MPI
 
 from .. import compat
-from ..typing import Array, Integers
+from ..typing import Array, Entities, Integers
+from .domain import Domain
+from .transfer import GridTransfer, Transfer
+
+_COARSEST = 8
+"""Cells each way below which a coarser level does not help."""
+_AXIS_OF_SIDE = {"left": (0, 0), "right": (0, 1), "bottom": (-1, 0), "top": (-1, 1), "front": (1, 0), "back": (1, 1)}
+"""Axis (-1: the last, the vertical one) and end of each named side."""
+
+
+def block(comm: MPI.Comm, size: Sequence[float], cells: Sequence[int]) -> Domain:
+    """[0, size], a rectangle or a box, in cells cut into triangles or tetrahedra. Collective.
+
+    Its mesh hierarchy goes down by half the cells each way, as long as they can be halved.
+
+    Args:
+        comm: the ranks that share it.
+        size: lengths of the edges, m, (d,).
+        cells: cells each way, (d,).
+    """
+    grid, upper = mesh(comm, size, cells), np.asarray(size, dtype=float)
+
+    def coarsening() -> tuple[Domain, Transfer]:
+        return block(comm, size, [n // 2 for n in cells]), GridTransfer(size, cells)
+
+    return Domain(
+        mesh=grid,
+        sides=_sides(grid, upper),
+        regions={},
+        lower=np.zeros(len(upper)),
+        upper=upper,
+        one_piece=True,
+        coarsening=coarsening if all(n % 2 == 0 and n // 2 >= _COARSEST for n in cells) else None,
+    )
 
 
 def mesh(comm: MPI.Comm, size: Sequence[float], cells: Sequence[int]) -> dmesh.Mesh:
@@ -61,3 +94,14 @@ def _points(comm: MPI.Comm, size: Sequence[float], cells: Sequence[int]) -> Arra
     numbers = np.arange(total * comm.rank // comm.size, total * (comm.rank + 1) // comm.size)
     places = np.unravel_index(numbers, counts, order="F")
     return np.column_stack([np.linspace(0.0, s, n)[at] for s, n, at in zip(size, counts, places, strict=True)])
+
+
+def _sides(mesh: dmesh.Mesh, size: Array) -> dict[str, Entities]:
+    """Facets of the surface by the side that their middle lies on."""
+    d = len(size)
+    mesh.topology.create_connectivity(d - 1, d)
+    facets, middles = dmesh.exterior_facet_indices(mesh.topology), np.empty((0, 3))
+    if len(facets):  # dolfinx divides by their number
+        middles = dmesh.compute_midpoints(mesh, d - 1, facets)
+    ends = {n: (axis % d, end) for n, (axis, end) in _AXIS_OF_SIDE.items() if d == 3 or n not in ("front", "back")}
+    return {name: facets[np.abs(middles[:, i] - end * size[i]) < 1e-9 * size[i]] for name, (i, end) in ends.items()}

@@ -1,9 +1,4 @@
-"""A ladder for a mesh that has none: coarser meshes of the same body.
-
-In the plane gmsh makes one within a thinned outline; in space :mod:`.coarsening_3d` does. Only that is made anew; the
-meshes between are its refinements, so the one step that is not nested is the last, onto the mesh itself. What these
-meshes give is a start and a preconditioner: solutions are those of the mesh itself.
-"""
+"""A coarser mesh of a plane body, by gmsh within its thinned outline."""
 
 from __future__ import annotations
 
@@ -17,37 +12,26 @@ import numpy as np
 from .. import compat
 from ..runtime.mpi import on_root
 from ..typing import Entities, Integers
-from . import coarsening_3d, gmsh_model, refinement, thinned_outline
+from . import gmsh_model, refinement, thinned_outline
 from .domain import Domain
 from .thinned_outline import NONE, HalfEdges, Outline
+from .thresholds import DEFAULT, Thresholds
 
-_WORTHWHILE = 20_000
-"""Unknowns from which it pays: below, one factorisation takes less than gmsh."""
-_COARSEST = 2_500
-"""Unknowns of the coarsest mesh, about."""
 _UNNAMED = ""
 
 
-def founded(domain: Domain) -> Domain:
-    """The domain with coarser ones below it, where it is large enough and gmsh can make them. Collective."""
-    d = domain.dimension
-    unknowns = d * domain.mesh.topology.index_map(0).size_global
-    if domain.origin is not None or unknowns < _WORTHWHILE:
-        return domain
-    factor = 2.0 ** round(np.log2(unknowns / _COARSEST) / d)
-    coarse = _coarse(domain, factor) if d == 2 else coarsening_3d.coarse(domain, factor)
-    if coarse is None:
-        return domain
-    growth = unknowns / (d * coarse.mesh.topology.index_map(0).size_global)  # what is round may ask for more vertices
-    return replace(domain, origin=(refinement.repeated(coarse, max(0, round(np.log2(growth) / d) - 1)), None))
+def coarse(domain: Domain, factor: float, thresholds: Thresholds = DEFAULT) -> Domain | None:
+    """The plane body with longer edges; None where gmsh cannot mesh it, or it would be another body. Collective.
 
-
-def _coarse(domain: Domain, factor: float) -> Domain | None:
-    """The plane body with edges longer by a factor, about. Collective."""
+    Args:
+        domain: the body.
+        factor: by which edges get longer, about.
+        thresholds: how far the areas may differ.
+    """
     comm, sides, regions = domain.mesh.comm, sorted(domain.sides), sorted(domain.regions)
     parts = comm.gather(_half_edges(domain, sides, regions))
     with gmsh_model.session(comm) as gmsh:
-        names = on_root(comm, lambda: _meshed(gmsh, HalfEdges.joined(parts or []), factor, sides, regions))
+        names = on_root(comm, lambda: _meshed(gmsh, _thinned(parts, factor, thresholds), sides, regions))
         if names is None:
             return None
         mesh, found, within = gmsh_model.distribute(comm, gmsh, 2, names)
@@ -84,11 +68,14 @@ def _numbered(named: Mapping[str, Entities], names: Sequence[str], size: int) ->
     return numbers
 
 
+def _thinned(parts: Sequence[HalfEdges] | None, factor: float, thresholds: Thresholds) -> Outline | None:
+    return thinned_outline.traced(HalfEdges.joined(parts or []), factor, thresholds.outline_area)
+
+
 def _meshed(
-    gmsh: Any, edges: HalfEdges, factor: float, sides: Sequence[str], regions: Sequence[str]
+    gmsh: Any, thinned: Outline | None, sides: Sequence[str], regions: Sequence[str]
 ) -> dict[int, dict[str, int]] | None:
     """Mesh the thinned outline in gmsh; its physical groups, or None where it cannot. On gmsh's rank."""
-    thinned = thinned_outline.traced(edges, factor)
     if thinned is None:
         return None
     groups = _drawn(gmsh, thinned, [*sides], [*regions, _UNNAMED])

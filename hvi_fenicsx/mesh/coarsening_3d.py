@@ -21,13 +21,10 @@ from ..runtime import processes
 from ..runtime.mpi import agree, on_root, total
 from ..typing import Array, Entities, Integers, Mask
 from .domain import Domain
+from .thresholds import DEFAULT, Thresholds
 
 _SAMPLE = 20_000
 """Cells, about, by which sizes, regions and ranks are known."""
-_DIFFERENT = 0.25
-"""Part by which the volume, or the area of a side, may differ."""
-_PATIENCE, _PER_TRIANGLE = 5.0, 1e-3
-"""Seconds for gmsh: in any case, and for each triangle of the surface (it takes some 1e-4)."""
 
 
 @dataclass(frozen=True)
@@ -49,11 +46,17 @@ class _Surface:
     on: Mask
 
 
-def coarse(domain: Domain, factor: float) -> Domain | None:
-    """The body with cells larger by a factor, about; None where that fails, or is another body. Collective."""
+def coarse(domain: Domain, factor: float, thresholds: Thresholds = DEFAULT) -> Domain | None:
+    """The body with larger cells; None where gmsh fails, or makes another body. Collective.
+
+    Args:
+        domain: the body.
+        factor: by which edges get longer, about.
+        thresholds: how long gmsh may take, and how far the sizes may differ.
+    """
     comm = domain.mesh.comm
     cells, surface = _sampled(domain), _surface(domain)
-    made = on_root(comm, lambda: _remeshed(surface, cells, factor)) if surface else None
+    made = on_root(comm, lambda: _remeshed(surface, cells, factor, thresholds)) if surface else None
     if surface is None or made is None:
         return None
     points, corners = made
@@ -62,7 +65,7 @@ def coarse(domain: Domain, factor: float) -> Domain | None:
         return None
     mesh = compat.simplex_mesh(comm, mine, points if comm.rank == 0 else points[:0], "tetrahedron")
     found = replace(domain, mesh=mesh, sides=_sides(domain, mesh, surface), regions=_regions(domain, mesh, cells))
-    return found if _alike(domain, found) else None
+    return found if _alike(domain, found, thresholds.remeshed_size) else None
 
 
 def _sampled(domain: Domain) -> _Cells:
@@ -118,20 +121,28 @@ def _outward(mesh: dmesh.Mesh, facets: Entities) -> Entities:
     return np.take_along_axis(nodes, (first[:, None] + np.arange(3)) % 3, axis=1)
 
 
-def _remeshed(surface: _Surface, cells: _Cells, factor: float) -> tuple[Array, Integers] | None:
+def _remeshed(surface: _Surface, cells: _Cells, factor: float, thresholds: Thresholds) -> tuple[Array, Integers] | None:
     """Vertices (n, 3) and cells (c, 4), or None where gmsh fails, or takes too long. On rank 0."""
     _, first, inverse = np.unique(surface.nodes, return_index=True, return_inverse=True)
     triangles = inverse.reshape(-1, 3)
     if not _one_shell(triangles):
         return None
     try:
-        return _by_child(surface.corners.reshape(-1, 3)[first], triangles, cells.midpoints, factor * cells.sizes)
+        points, patience = surface.corners.reshape(-1, 3)[first], _patience(thresholds, len(triangles))
+        return _by_child(points, triangles, cells.midpoints, factor * cells.sizes, patience)
     except (subprocess.SubprocessError, OSError):
         return None
 
 
-def _by_child(points: Array, triangles: Integers, places: Array, sizes: Array) -> tuple[Array, Integers]:
-    """What :mod:`.gmsh_worker` makes of these arrays.
+def _patience(thresholds: Thresholds, triangles: int) -> float:
+    """Seconds for gmsh."""
+    return thresholds.gmsh_seconds + thresholds.gmsh_seconds_per_triangle * triangles
+
+
+def _by_child(
+    points: Array, triangles: Integers, places: Array, sizes: Array, patience: float
+) -> tuple[Array, Integers]:
+    """What :mod:`.gmsh_worker` makes of these arrays within so many seconds.
 
     Raises:
         SubprocessError: it failed, or took too long.
@@ -141,7 +152,6 @@ def _by_child(points: Array, triangles: Integers, places: Array, sizes: Array) -
         source, target = Path(folder, "given.npz"), Path(folder, "made.npz")
         np.savez(source, points=points, triangles=triangles, places=places, sizes=sizes)
         command = [sys.executable, "-m", "hvi_fenicsx.mesh.gmsh_worker", os.fspath(source), os.fspath(target)]
-        patience = _PATIENCE + _PER_TRIANGLE * len(triangles)
         subprocess.run(command, env=processes.environment(), capture_output=True, check=True, timeout=patience)
         with np.load(target) as made:
             return made["points"], made["cells"]
@@ -170,10 +180,10 @@ def _regions(domain: Domain, mesh: dmesh.Mesh, cells: _Cells) -> dict[str, Entit
     return {name: np.flatnonzero(within[:, i]).astype(np.int32) for i, name in enumerate(sorted(domain.regions))}
 
 
-def _alike(fine: Domain, found: Domain) -> bool:
+def _alike(fine: Domain, found: Domain, different: float) -> bool:
     """Whether volume and sides are about the same, and no region is lost. Collective."""
     (before, after) = (_measures(domain) for domain in (fine, found))
-    return all(abs(after[name] - size) <= _DIFFERENT * size for name, size in before.items())
+    return all(abs(after[name] - size) <= different * size for name, size in before.items())
 
 
 def _measures(domain: Domain) -> dict[tuple[str, str], float]:

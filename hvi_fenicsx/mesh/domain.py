@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
+from typing import TypeAlias
 
 import numpy as np
-import numpy.typing as npt
 from dolfinx import mesh as dmesh
 from mpi4py import MPI
 
@@ -16,29 +15,26 @@ from ..geometry import Arc
 from ..runtime import memory
 from ..runtime.mpi import agree
 from ..typing import Array, Entities
-from . import blocks, gmsh_model
+from .transfer import Transfer
 
 _LEAST_MEMORY = 300.0
 """Bytes for one unknown: its row of the matrix and its share of the mesh, without any solver."""
-Halves = npt.NDArray[np.int8]
-_AXIS_OF_SIDE = {"left": (0, 0), "right": (0, 1), "bottom": (-1, 0), "top": (-1, 1), "front": (1, 0), "back": (1, 1)}
-"""Axis (-1: the last, the vertical one) and end of each named side."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Domain:
     """A mesh with named sides and regions.
 
     Attributes:
-        mesh: the dolfinx mesh, SI coordinates.
-        sides: local facet indices by name (built-in sides, or physical groups of a file).
-        regions: local cell indices by name (physical groups of a file).
-        lower, upper: corners of the bounding box, shape (d,), the same on all ranks.
-        curves: the true curve of a side by its name, where that is known and not straight; the facets of all other
+        mesh: the dolfinx mesh, coordinates in m.
+        sides: local facets by name (built-in sides, or physical groups of a file).
+        regions: local cells by name (physical groups of a file).
+        lower: lower corner of the bounding box, m, shape (d,), the same on all ranks.
+        upper: upper corner, likewise.
+        curves: the true curve of a side by its name, where it is known and not straight; the facets of all other
             sides, those of mesh files among them, are taken for the geometry itself.
         one_piece: whether the mesh is known to be connected; else one has to look (:mod:`.bodies`).
-        origin: the coarser domain that serves as the rung below, and how it was refined (None: it was not, but is
-            another mesh of the same body); None where there is none.
+        coarsening: makes the next coarser domain of the mesh hierarchy; None where there is none.
     """
 
     mesh: dmesh.Mesh
@@ -48,7 +44,7 @@ class Domain:
     upper: Array
     curves: Mapping[str, Arc] = field(default_factory=dict)
     one_piece: bool = False
-    origin: tuple[Domain, Refinement | None] | None = None
+    coarsening: Coarsening | None = None
 
     @classmethod
     def from_mesh(
@@ -69,7 +65,16 @@ class Domain:
             curves: the true curve of a side by its name, where that is known and not straight.
             one_piece: whether the mesh is known to be connected.
         """
-        return cls(mesh, sides, regions or {}, *_bounding_box(mesh), curves or {}, one_piece)
+        lower, upper = _bounding_box(mesh)
+        return cls(
+            mesh=mesh,
+            sides=sides,
+            regions=regions or {},
+            lower=lower,
+            upper=upper,
+            curves=curves or {},
+            one_piece=one_piece,
+        )
 
     @property
     def dimension(self) -> int:
@@ -85,6 +90,10 @@ class Domain:
     def centre(self) -> Array:
         """Centre of the bounding box, shape (3,), m."""
         return np.pad((self.lower + self.upper) / 2, (0, 3 - self.dimension))
+
+    def coarser(self) -> tuple[Domain, Transfer] | None:
+        """The next coarser domain and the transfer from it to this one; None where there is none. Collective."""
+        return None if self.coarsening is None else self.coarsening()
 
     def facets(self, names: Sequence[str]) -> Entities:
         """Local facets of the named sides together, sorted.
@@ -110,33 +119,17 @@ class Domain:
         return np.unique(np.concatenate([self.regions[name] for name in names])).astype(np.int32)
 
 
-@dataclass(frozen=True)
-class Refinement:
-    """A refined domain and how it came from the one before.
-
-    Attributes:
-        domain: the refined one.
-        parents: local parent cell of each local cell, shape (cells,).
-        halves: twice the barycentric coordinates of each cell's vertices in the parent cell, shape (cells, d+1, d+1):
-            a 2 for a vertex of the parent, two 1s for the middle of one of its edges.
-    """
-
-    domain: Domain
-    parents: Entities
-    halves: Halves
-
-
-def block(comm: MPI.Comm, size: Sequence[float], cells: Sequence[int]) -> Domain:
-    """[0, size], a rectangle or a box, in cells cut into triangles or tetrahedra (:mod:`.blocks`). Collective."""
-    mesh, upper = blocks.mesh(comm, size, cells), np.asarray(size, dtype=float)
-    return Domain(mesh, _block_sides(mesh, upper), {}, np.zeros(len(upper)), upper, one_piece=True)
+Coarsening: TypeAlias = Callable[[], tuple[Domain, Transfer]]
+"""Makes the next coarser domain, and the transfer from it. Collective."""
 
 
 def check_affordable(comm: MPI.Comm, unknowns: int, key: str) -> None:
-    """Refuse what would be killed for want of memory, half an hour later. Collective.
+    """Refuse a mesh that needs more memory than there is, before it is made. Collective.
 
     Args:
-        comm: all ranks. unknowns: of the mesh to be made. key: of ``[domain]``, which makes them so many.
+        comm: all ranks.
+        unknowns: of the mesh to be made.
+        key: of ``[domain]``, which makes them so many.
 
     Raises:
         InputError: on all ranks alike.
@@ -149,29 +142,8 @@ def check_affordable(comm: MPI.Comm, unknowns: int, key: str) -> None:
         )
 
 
-def from_file(comm: MPI.Comm, path: Path, dimension: int, scale: float = 1.0) -> Domain:
-    """A gmsh file, its physical groups being sides and regions; ``scale`` is m per unit of the file. Collective.
-
-    Raises:
-        InputError: on all ranks alike, when the file cannot be read or is no usable mesh.
-    """
-    mesh, sides, regions = gmsh_model.read(comm, path, dimension)
-    mesh.geometry.x[:] *= scale
-    return Domain.from_mesh(mesh, sides, regions)
-
-
-def _block_sides(mesh: dmesh.Mesh, size: Array) -> dict[str, Entities]:
-    """Facets of the surface by the side that their middle lies on."""
-    d = len(size)
-    mesh.topology.create_connectivity(d - 1, d)
-    facets, middles = dmesh.exterior_facet_indices(mesh.topology), np.empty((0, 3))
-    if len(facets):  # dolfinx divides by their number
-        middles = dmesh.compute_midpoints(mesh, d - 1, facets)
-    ends = {n: (axis % d, end) for n, (axis, end) in _AXIS_OF_SIDE.items() if d == 3 or n not in ("front", "back")}
-    return {name: facets[np.abs(middles[:, i] - end * size[i]) < 1e-9 * size[i]] for name, (i, end) in ends.items()}
-
-
 def _bounding_box(mesh: dmesh.Mesh) -> tuple[Array, Array]:
+    """Lower and upper corner of the mesh, m, shape (d,), the same on all ranks. Collective."""
     x = mesh.geometry.x[:, : mesh.geometry.dim]
     inside = x if len(x) else np.full((1, x.shape[1]), np.nan)
     lower, upper = np.fmin.reduce(inside, axis=0), np.fmax.reduce(inside, axis=0)

@@ -7,7 +7,7 @@ bounded from below. Children stay on their parent's rank. New vertices of a side
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import basix
 import numpy as np
@@ -17,13 +17,27 @@ from dolfinx import mesh as dmesh
 from .. import compat
 from ..geometry import Arc
 from ..typing import Array, Entities
-from .domain import Domain, Halves, Refinement, check_affordable
+from .domain import Domain, check_affordable
+from .transfer import Halves, ParentCellTransfer, Transfer
 
 _LONG = {2: 0.0, 3: 0.76}
 """Of a cell's longest edge, what is bisected with it, by dimension: in space all six would make a step of 4 to 5 times
 the unknowns; the longest and, of a sixth of a cube, the diagonals of its faces make it about 2."""
 _SKEWED = np.eye(3) + 1e-6 * np.sqrt([[2.0, 3.0, 5.0], [3.0, 7.0, 11.0], [5.0, 11.0, 13.0]])
 """Where the edges are measured: lengths that tie in the body differ here by their direction, on all ranks alike."""
+
+
+@dataclass(frozen=True)
+class Refinement:
+    """A refined domain and how it came from the one before.
+
+    Attributes:
+        domain: the refined one.
+        transfer: from the one before: the parent cell of each cell, and its place in it.
+    """
+
+    domain: Domain
+    transfer: ParentCellTransfer
 
 
 def uniform(domain: Domain) -> Refinement:
@@ -41,9 +55,17 @@ def repeated(domain: Domain, times: int) -> Domain:
     if times:
         check_affordable(domain.mesh.comm, d * vertices * 2 ** (d * times), "refinements")
     for _ in range(times):
-        step = uniform(domain)
-        domain = replace(step.domain, origin=(domain, step))
+        domain = _above(domain, uniform(domain))
     return domain
+
+
+def _above(coarse: Domain, step: Refinement) -> Domain:
+    """The refined domain, which knows the one that it came from."""
+
+    def coarsening() -> tuple[Domain, Transfer]:
+        return coarse, step.transfer
+
+    return replace(step.domain, coarsening=coarsening)
 
 
 def marked(domain: Domain, cells: Entities) -> Refinement:
@@ -72,14 +94,15 @@ def _refined(domain: Domain, edges: Entities | None) -> Refinement:
     sides = _sides(domain, mesh, parents, halves)
     regions = {name: np.flatnonzero(np.isin(parents, cells)).astype(np.int32) for name, cells in domain.regions.items()}
     _bend(mesh, sides, domain.curves)
-    return Refinement(replace(domain, mesh=mesh, sides=sides, regions=regions, origin=None), parents, halves)
+    fine = replace(domain, mesh=mesh, sides=sides, regions=regions, coarsening=None)
+    return Refinement(fine, ParentCellTransfer(parents, halves))
 
 
 def _bisected(mesh: dmesh.Mesh, edges: Entities | None) -> tuple[dmesh.Mesh, Entities, Halves]:
     """Plaza's rule, by which the first of equally long edges in dolfinx's own numbering, that of the ranks, would go.
 
     Returns:
-        The refined mesh, and ``parents`` and ``halves`` of a :class:`Refinement`.
+        The refined mesh, and ``parents`` and ``halves`` of a :class:`.ParentCellTransfer`.
     """
     d, straight = mesh.geometry.dim, mesh.geometry.x.copy()
     mesh.geometry.x[:, :d] = straight[:, :d] @ _SKEWED[:d, :d]

@@ -19,8 +19,6 @@ _CORNER = np.radians(20.0)
 """By which the outline turns at a vertex that is kept in any case."""
 _TURN = np.radians(30.0)
 """Of a chain, at most, between two vertices that are kept: a coarse chord must not leave its curve far behind."""
-_DIFFERENT = 0.1
-"""Part of the body's area by which that within the thinned outline may differ."""
 _ALONG = 1e-9
 """Angle between two edges that run along each other."""
 NONE = -1
@@ -93,11 +91,16 @@ class Outline:
     places: Mapping[int, Array]
 
 
-def traced(edges: HalfEdges, factor: float) -> Outline | None:
+def traced(edges: HalfEdges, factor: float, different: float) -> Outline | None:
     """The outline with one vertex of so many kept; None where that cannot be meshed or is another body.
 
     So it is where it touches itself (gmsh takes crossing edges for an endless task) or has another area, and where
     a side ends inside of a body.
+
+    Args:
+        edges: of all ranks.
+        factor: so many edges become one, about.
+        different: part of the area by which the thinned one may differ.
     """
     places = dict(zip(edges.ends.ravel().tolist(), edges.points.reshape(-1, 2), strict=True))
     chains = _chains(edges, places)
@@ -109,7 +112,7 @@ def traced(edges: HalfEdges, factor: float) -> Outline | None:
     if faces is None or _touching(pairs, np.array([[places[a], places[b]] for a, b in pairs])):
         return None
     before, after = (sum(_area(p) for p in _polygons(c, loops, places)) for c in (chains, thinned))
-    if abs(after / before - 1.0) >= _DIFFERENT:
+    if abs(after / before - 1.0) >= different:
         return None
     return Outline(thinned, faces, places)
 

@@ -6,10 +6,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import AfterValidator, BeforeValidator, Field, GetCoreSchemaHandler, PlainSerializer, model_validator
+from pydantic import BeforeValidator, Field, GetCoreSchemaHandler, PlainSerializer, model_validator
 from pydantic_core import CoreSchema, core_schema
 
-from .. import method_names
 from ..errors import InputError
 from ..formula import Formula
 from ..laws.smoothing import registered as smoothings
@@ -34,13 +33,6 @@ class OneOf:
         if value is not None and value not in names:
             raise refusal(unknown("value", value, names))
         return value
-
-
-def _method(name: str) -> str:
-    if name not in method_names.available():
-        text = unknown("method", name, method_names.available())
-        raise refusal(text)
-    return name
 
 
 _STARTS = ("unbroken", "resting", "broken")
@@ -74,7 +66,7 @@ Start = Annotated[
 class SolverTable(Table):
     """Method and accuracy. Without smoothing and epsilon the law itself is solved, not a smoothed one."""
 
-    method: Annotated[str, AfterValidator(_method)] = "auto"
+    method: str = "auto"
     """auto chooses by the effects: linear, convex or branch; branch is exact; condensed is the paper's own;
     snes_vi, tao, ssls are there to compare with; or the name of your own method"""
     smoothing: Annotated[str | None, OneOf(smoothings)] = None
@@ -113,12 +105,6 @@ class SolverTable(Table):
             found.append(Mistake(("epsilon_absolute",), "epsilon is given too; leave one of them out"))
         if self.smoothing and self.epsilon is None and self.epsilon_absolute is None:
             found.append(Mistake(("smoothing",), _HOW_WIDE))
-        if self.smoothing and self.method == "branch":
-            text = '"branch" solves the law without smoothing; leave out smoothing and epsilon, or use "auto"'
-            found.append(Mistake(("method",), text))
-        if self.start != "unbroken" and self.method in ("snes_vi", "tao", "ssls", "condensed"):
-            text = f'is for the branch iteration; leave it out, or use method = "auto", not {shown(self.method)}'
-            found.append(Mistake(("start",), text))
         return found
 
 

@@ -1,1 +1,7 @@
 """The solution methods, one file each, and nested iteration."""
+
+from .context import SolveContext
+from .method import Method
+from .result import SolveResult
+
+__all__ = ["Method", "SolveContext", "SolveResult"]

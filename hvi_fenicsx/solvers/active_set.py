@@ -6,6 +6,7 @@ as merit function, and a preconditioner that works at full size.
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -17,27 +18,20 @@ from petsc4py import PETSc
 
 from ..runtime.timing import Timer
 from ..system.held_solver import HeldPreconditioner, LinearSettings
+from ..system.levels import Levels
 from ..system.petsc_options import configure
-from ..system.system import Model, System
+from ..system.system import LawModel, System
 from ..typing import Array, Entities
+from .snes_views import ReducedPreconditioner, unextracted
+from .thresholds import DEFAULT, Thresholds
 
-Progress = Callable[[int, float, int], None]
+StepReport = Callable[[int, float, int], None]
 """Called with iteration, residual, and vertices in contact (of all ranks)."""
 Sizes = tuple[float, float]
 """Of a residual: its norm relative to the load's; its largest nodal traction relative to what is allowed on Γc."""
 _ON_BOUND = 1e-12
-_STILL, _PATIENCE = 1e-3, 2
-"""So many steps that change the residual by less than this fraction: the line search no longer sees the energy fall."""
-_ROUNDING = 1e-7
-"""Below this, twice as many steps without halving the residual mean that rounding allows no more."""
-_LARGEST_ROUNDING, _SAFETY = 1e-4, 4.0
-"""A residual above the first is no rounding; the sample of the rounding error is trusted within the second."""
-_INEXACT, _FORCING, _FINEST = 1e-2, 0.5, 1e-4
-"""Relative tolerance of a step's linear solve: while the active set moves; as a part of what is left; the least."""
-_STRAIGHT = 0.125
-"""The second where one step shall do: nodal tractions fall by a quarter as much as the norm, where ranks meet on Γc."""
-_RUNAWAY = 1e8
-"""A displacement of so many times p0 L / E0 is a body that slides away."""
+_PATIENCE = 2
+"""Steps in a row that show a stall."""
 _REASON = {v: k for k, v in vars(PETSc.SNES.ConvergedReason).items() if isinstance(v, int) and not k.startswith("_")}
 
 
@@ -46,8 +40,12 @@ class Outcome:
     """How one solve ended.
 
     Attributes:
-        converged: by our own test. newton, linear: iterations. measure: residual of the inequality, relative.
-        reason: PETSc's name of the reason, or ours. interrupted: whether it was told to stop.
+        converged: by our own test.
+        newton: Newton steps.
+        linear: iterations of linear solvers.
+        measure: residual of the inequality, relative.
+        reason: PETSc's name of the reason, or ours.
+        interrupted: whether it was asked to stop.
         rounding: where the residual stood still, what rounding makes of it there; a residual no larger is converged.
     """
 
@@ -61,24 +59,41 @@ class Outcome:
 
 
 class ActiveSetSolver:
-    """Bound-constrained minimisation over a system; keeps its preconditioner from solve to solve."""
+    """Bound-constrained minimisation over a system; keeps its preconditioner from solve to solve.
+
+    Args:
+        system: the assembled problem.
+        levels: its coarser levels.
+        settings: how linear systems are solved.
+        timer: where time goes.
+        interrupted: whether to stop (collective, asked at each Newton step).
+        thresholds: how exact steps are, and when to give up.
+    """
 
     def __init__(
         self,
         system: System,
+        levels: Levels,
         settings: LinearSettings,
         timer: Timer,
         interrupted: Callable[[], bool] = lambda: False,
+        thresholds: Thresholds = DEFAULT,
     ) -> None:
         self.system, self.settings, self.timer = system, settings, timer
-        self.held = HeldPreconditioner(system, settings, timer)
-        self.interrupted = interrupted
-        self.progress: Progress | None = None
+        self.held = HeldPreconditioner(system, levels, settings, timer)
+        self.interrupted, self.thresholds = interrupted, thresholds
+        self.progress: StepReport | None = None
         self._residual = system.load.duplicate()
-        self._allowed = system.allowed(1.0)[system.rows.dofs]
+        self._allowed = system.allowed(1.0)[system.jacobian.rows.dofs]
+
+    def stopped_by(self, interrupted: Callable[[], bool]) -> ActiveSetSolver:
+        """The same solver with another way to stop; both share the preconditioner."""
+        other = copy.copy(self)
+        other.interrupted = interrupted
+        return other
 
     @contextmanager
-    def reporting(self, progress: Progress) -> Iterator[None]:
+    def reporting(self, progress: StepReport) -> Iterator[None]:
         """Report to this as long as it lasts; then no more: a reporter holds the solver, and both would stay."""
         before, self.progress = self.progress, progress
         try:
@@ -93,7 +108,7 @@ class ActiveSetSolver:
 
     def in_contact(self, x: PETSc.Vec) -> int:
         """Vertices on a bound of the scene. Collective."""
-        at = self.system.rows.dofs
+        at = self.system.jacobian.rows.dofs
         u, lower, upper = x.array_r[at], self.system.lower.array_r[at], self.system.upper.array_r[at]
         return int(self.system.comm.allreduce(int(np.count_nonzero((u <= lower) | (u >= upper)))))
 
@@ -102,24 +117,44 @@ class ActiveSetSolver:
 
         The larger of its norm relative to the load's, and of the largest nodal traction error on Γc relative to what is
         allowed there.
+
+        Args:
+            x: the displacement.
+            residual: of the equations at x.
+            lower: bounds from below.
+            upper: bounds from above.
         """
         return max(self.sizes(x, residual, lower, upper))
 
     def sizes(self, x: PETSc.Vec, residual: PETSc.Vec, lower: PETSc.Vec, upper: PETSc.Vec) -> Sizes:
-        """The two of which :meth:`measure` is the larger. Collective."""
-        at, r = self.system.rows.dofs, residual.array_r.copy()
+        """The two of which :meth:`measure` is the larger. Collective.
+
+        Args:
+            x: the displacement.
+            residual: of the equations at x.
+            lower: bounds from below.
+            upper: bounds from above.
+        """
+        at, r = self.system.jacobian.rows.dofs, residual.array_r.copy()
         r[at] = projected(x.array_r[at], r[at], lower.array_r[at], upper.array_r[at])
         return self._sizes(r)
 
     def _sizes(self, r: Array) -> Sizes:
-        nodal = float(np.max(np.abs(r[self.system.rows.dofs]) / self._allowed, initial=0.0))
+        nodal = float(np.max(np.abs(r[self.system.jacobian.rows.dofs]) / self._allowed, initial=0.0))
         comm = self.system.comm
         norm = float(np.sqrt(comm.allreduce(float(r @ r)))) / self.system.scale
         return norm, float(comm.allreduce(nodal, op=MPI.MAX))
 
-    def newton_step(self, x: PETSc.Vec, held: Entities, models: Sequence[Model], rtol: float) -> Outcome:
-        """One Newton step with some dofs (local, owned) kept at their values in x. Collective."""
-        self.system.set_rates(self.system.tangents(x, models))
+    def newton_step(self, x: PETSc.Vec, held: Entities, models: Sequence[LawModel], rtol: float) -> Outcome:
+        """One Newton step with some unknowns kept at their values in x. Collective.
+
+        Args:
+            x: where it begins, and where it leads.
+            held: the unknowns that are kept (local, owned).
+            models: what stands for the laws, by term.
+            rtol: relative tolerance of the linear solve.
+        """
+        self.system.jacobian.set_rates(self.system.tangents(x, models))
         self.system.residual(x, self._residual, models)
         self._residual.array[held] = 0.0
         self.held.prepare(held)
@@ -136,7 +171,7 @@ class ActiveSetSolver:
     def solve(
         self,
         x: PETSc.Vec,
-        models: Sequence[Model],
+        models: Sequence[LawModel],
         tolerance: float,
         *,
         lower: PETSc.Vec,
@@ -148,9 +183,13 @@ class ActiveSetSolver:
         """Minimise the energy of the models between the bounds, from and into x. Collective.
 
         Args:
-            x: start and result. models: what stands for the laws, by term.
-            tolerance: of :meth:`measure`. lower, upper: bounds.
-            line_search: PETSc's name; ``bt`` uses the energy. max_iterations: Newton steps.
+            x: start and result.
+            models: what stands for the laws, by term.
+            tolerance: of :meth:`measure`.
+            lower: bounds from below.
+            upper: bounds from above.
+            line_search: PETSc's name; ``bt`` uses the energy.
+            max_iterations: Newton steps at most.
             steady: whether x's active set is expected to stand; the first linear solve then goes to the tolerance.
         """
         with self.timer("solve"):
@@ -169,23 +208,31 @@ class ActiveSetSolver:
             found = Outcome(run.last <= tolerance, run.iterations, run.linear, run.last, reason, run.stopped)
             return found if found.converged or run.stopped else self._to_rounding(found, run.sizes, x)
 
-    def judged(self, step: Outcome, x: PETSc.Vec, models: Sequence[Model], tolerance: float) -> Outcome:
-        """The outcome of a step without bounds: converged if the residual at x is small enough. Collective."""
+    def judged(self, step: Outcome, x: PETSc.Vec, models: Sequence[LawModel], tolerance: float) -> Outcome:
+        """The outcome of a step without bounds: converged if the residual at x is small enough. Collective.
+
+        Args:
+            step: the outcome of the linear solve.
+            x: where it led.
+            models: what stands for the laws, by term.
+            tolerance: of :meth:`measure`.
+        """
         self.system.residual(x, self._residual, models)
         sizes = self._sizes(self._residual.array_r)
         found = replace(step, converged=max(sizes) <= tolerance, measure=max(sizes))
         return found if found.converged else self._to_rounding(found, sizes, x)
 
     def _to_rounding(self, found: Outcome, sizes: Sizes, x: PETSc.Vec) -> Outcome:
-        """A residual that is but rounding can fall no further: the solve has converged as far as numbers go.
+        """Accept a residual at the rounding floor as converged.
 
         Rounding of the body's forces is no excuse for a wrong traction on Γc: each of the two has its own floor.
         """
-        if not np.isfinite(found.measure) or not np.isfinite(x.norm()) or found.measure > _LARGEST_ROUNDING:
+        thresholds = self.thresholds
+        if not np.isfinite(found.measure) or not np.isfinite(x.norm()) or found.measure > thresholds.largest_rounding:
             return found
         noise = self.system.load.duplicate()
         self.system.rounding(x, noise)
-        floors = [_SAFETY * size for size in self._sizes(noise.array_r)]
+        floors = [thresholds.rounding_safety * size for size in self._sizes(noise.array_r)]
         noise.destroy()
         if any(size > floor for size, floor in zip(sizes, floors, strict=True)):
             return found
@@ -196,7 +243,7 @@ class _Run:
     """The callbacks of one SNES solve."""
 
     def __init__(
-        self, owner: ActiveSetSolver, models: Sequence[Model], tolerance: float, lower: PETSc.Vec, upper: PETSc.Vec
+        self, owner: ActiveSetSolver, models: Sequence[LawModel], tolerance: float, lower: PETSc.Vec, upper: PETSc.Vec
     ) -> None:
         self.owner, self.models, self.tolerance = owner, models, tolerance
         self.lower, self.upper = lower, upper
@@ -211,7 +258,7 @@ class _Run:
         snes = PETSc.SNES().create(system.comm)
         snes.setType("vinewtonrsls")
         snes.setFunction(self._function, system.load.duplicate())
-        snes.setJacobian(self._jacobian, _unextracted(self.owner.held))
+        snes.setJacobian(self._jacobian, unextracted(self.owner.held))
         snes.setVariableBounds(self.lower, self.upper)
         snes.setObjective(lambda _, x: system.energy(x, self.models))
         snes.setConvergenceTest(self._converged)
@@ -225,14 +272,16 @@ class _Run:
     def _preconditioner(self, snes: PETSc.SNES) -> PETSc.PC:
         pc = snes.getKSP().getPC()
         pc.setType(PETSc.PC.Type.PYTHON)
-        pc.setPythonContext(_ReducedPC(snes, self.owner.held, self._accuracy))
+        pc.setPythonContext(ReducedPreconditioner(snes, self.owner.held, self._accuracy))
         return pc
 
     def _accuracy(self, *, moved: bool) -> float:
         """How far a linear solve goes: to the tolerance, but not for an active set that is still on the move."""
+        thresholds = self.owner.thresholds
         if self.steady and not moved:
-            return _STRAIGHT * self.tolerance / self.last
-        return max(_INEXACT if moved else _FORCING * self.tolerance / self.last, _FINEST)
+            return thresholds.straight * self.tolerance / self.last
+        wanted = thresholds.moving_accuracy if moved else thresholds.forcing * self.tolerance / self.last
+        return max(wanted, thresholds.finest_accuracy)
 
     def forget(self, snes: PETSc.SNES) -> None:
         """Read off what is needed and free the SNES."""
@@ -247,7 +296,7 @@ class _Run:
 
     def _jacobian(self, snes: PETSc.SNES, x: PETSc.Vec, j: PETSc.Mat, p: PETSc.Mat) -> None:
         system = self.owner.system
-        system.set_rates(system.tangents(x, self.models))
+        system.jacobian.set_rates(system.tangents(x, self.models))
 
     def _converged(self, snes: PETSc.SNES, iteration: int, norms: Any) -> int:
         x, (f, _) = snes.getSolution(), snes.getFunction()[:2]
@@ -260,83 +309,31 @@ class _Run:
         self.stopped = self.owner.interrupted()
         if self.stopped:
             return PETSc.SNES.ConvergedReason.DIVERGED_FUNCTION_COUNT
-        if not np.isfinite(self.last) or x.norm(PETSc.NormType.INFINITY) > _RUNAWAY:
+        if not np.isfinite(self.last) or x.norm(PETSc.NormType.INFINITY) > self.owner.thresholds.runaway:
             return PETSc.SNES.ConvergedReason.DIVERGED_FNORM_NAN
         if self.last <= self.tolerance:
             return PETSc.SNES.ConvergedReason.CONVERGED_FNORM_RELATIVE
-        self._stalled = self._stalled + 1 if abs(self.last - previous) < _STILL * previous else 0
+        stalls = self._stalls(previous)
+        return PETSc.SNES.ConvergedReason.DIVERGED_DTOL if stalls else PETSc.SNES.ConvergedReason.CONVERGED_ITERATING
+
+    def _stalls(self, previous: float) -> bool:
+        """Whether further steps will not lower the residual."""
+        thresholds = self.owner.thresholds
+        self._stalled = self._stalled + 1 if abs(self.last - previous) < thresholds.still * previous else 0
         self._slow = self._slow + 1 if self.last > 0.5 * previous else 0
-        if self._stalled >= _PATIENCE or (self.last < _ROUNDING and self._slow >= 2 * _PATIENCE):
-            return PETSc.SNES.ConvergedReason.DIVERGED_DTOL
-        return PETSc.SNES.ConvergedReason.CONVERGED_ITERATING
-
-
-def _unextracted(held: HeldPreconditioner) -> PETSc.Mat:
-    """J as SNES VI sees it: its inactive part is multiplied at full size instead of being copied out."""
-    sizes = held.system.matrix.getSizes()
-    matrix = PETSc.Mat().createPython(sizes, _Whole(held), comm=held.system.comm)
-    matrix.setUp()
-    return matrix
-
-
-class _Whole:
-    """PETSc's view of J, which is symmetric."""
-
-    def __init__(self, held: HeldPreconditioner) -> None:
-        self._held = held
-
-    def mult(self, _: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        """Y = J x, where a line search that fails looks for a stationary point of the residual's norm. Collective."""
-        self._held.system.matrix.mult(x, y)
-
-    multTranspose = mult
-
-    def createSubMatrix(self, _: PETSc.Mat, rows: PETSc.IS, columns: PETSc.IS, into: PETSc.Mat | None) -> PETSc.Mat:
-        """The rows and columns of the inactive dofs. Collective."""
-        self._held.select(rows)
-        sizes = (rows.getLocalSize(), rows.getSize())
-        matrix = PETSc.Mat().createPython((sizes, sizes), _Reduced(self._held), comm=rows.comm)
-        matrix.setUp()
-        return matrix
-
-
-class _Reduced:
-    """PETSc's view of J on the inactive dofs of a step."""
-
-    def __init__(self, held: HeldPreconditioner) -> None:
-        self._held = held
-
-    def mult(self, _: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        """Y = J x. Collective."""
-        self._held.multiply_reduced(x, y)
-
-
-class _ReducedPC:
-    """PETSc's view of :class:`HeldPreconditioner` on the inactive dofs of a SNES VI step."""
-
-    def __init__(self, snes: PETSc.SNES, held: HeldPreconditioner, accuracy: Callable[..., float]) -> None:
-        self._snes, self._held, self._accuracy = snes, held, accuracy
-        self._active: Entities | None = None
-
-    def setUp(self, pc: PETSc.PC) -> None:
-        """Take the active dofs of this step and prepare for them."""
-        start, end = self._held.system.load.owner_range
-        active = np.ones(end - start, dtype=bool)
-        active[self._snes.getVIInactiveSet().getIndices() - start] = False
-        found = np.flatnonzero(active).astype(np.int32)
-        moved = self._active is not None and not np.array_equal(found, self._active)
-        moved = bool(self._held.system.comm.allreduce(moved))
-        self._snes.getKSP().setTolerances(rtol=self._accuracy(moved=moved))
-        self._active = found
-        self._held.prepare(found)
-
-    def apply(self, pc: PETSc.PC, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        """Y = P^-1 x on the inactive dofs."""
-        self._held.apply_reduced(x, y)
+        at_rounding = self.last < thresholds.rounding_below
+        return self._stalled >= _PATIENCE or (at_rounding and self._slow >= 2 * _PATIENCE)
 
 
 def projected(x: Array, residual: Array, lower: Array, upper: Array) -> Array:
-    """The residual less what the bounds may carry: zero exactly where the inequality holds; shape (n,)."""
+    """The residual less what the bounds may carry: zero exactly where the inequality holds; shape (n,).
+
+    Args:
+        x: displacements, (n,).
+        residual: of the equations, (n,).
+        lower: bounds, (n,).
+        upper: bounds, (n,).
+    """
     at_lower, at_upper = x <= lower + _ON_BOUND, x >= upper - _ON_BOUND
     r = np.where(at_lower, np.minimum(residual, 0.0), residual)
     return np.where(at_upper, np.maximum(r, 0.0), r)

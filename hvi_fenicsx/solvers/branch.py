@@ -21,16 +21,14 @@ from ..laws import Superpotential
 from ..system import boundedness
 from ..typing import Array
 from . import initial_branches, kink_bounds
-from .active_set import ActiveSetSolver, Outcome
+from .active_set import Outcome
+from .closed_start import resting_start
+from .context import SolveContext
 from .fallbacks import Attempt, first_success
-from .law_models import Cells, Full, Majorant, Softened
-from .method import Counts, Settings, SolveResult, resting_start
+from .law_models import Cells, Full, Majorant, SecantMajorant
+from .method import Method
+from .result import Counts, SolveResult
 
-_LOOSE = 1e-4
-"""Tolerance of convex steps while ξ still changes."""
-_NEAR = 1e-11
-"""Distance (of u0) from a kink that counts as being on it."""
-_CELL_CHANGES = 200
 _SLIDES = "the body slides away on what is left of its bonds"
 _ATTEMPTS = (
     (False, "basic", 30),
@@ -44,45 +42,46 @@ _ATTEMPTS = (
 """Of a convex step, until one converges: whether softened, PETSc's line search, most iterations."""
 
 
-class BranchIteration:
+class BranchIteration(Method):
     """The iteration on one system; call :meth:`solve` once.
 
     Args:
-        solver: of the convex steps. settings: tolerance and limits.
-        laws: what stands for the system's laws (nondimensional), by default they themselves. epsilon: their width,
-            for the progress display. wary: whether to ask of each convex step first if it has a solution; else that is
-            asked where a step fails.
+        context: the system and how to solve it.
+        laws: what stands for the system's laws (nondimensional), by default they themselves.
+        epsilon: their relative width, for the progress display.
+        check_bounded: whether to ask of each convex step first if it has a solution; else that is asked where a step
+            fails.
     """
 
     name = "branch"
     words = "a branch iteration (DC) over SNES VI (reduced space)"
     takes_start = True
+    takes_smoothing = False
 
     def __init__(
         self,
-        solver: ActiveSetSolver,
-        settings: Settings,
+        context: SolveContext,
         laws: Sequence[Superpotential] | None = None,
         epsilon: float | None = None,
         *,
-        wary: bool = False,
+        check_bounded: bool = False,
     ) -> None:
-        self._wary = wary
-        self.solver, self.settings, self.system = solver, settings, solver.system
+        super().__init__(context)
+        self._check_bounded, self.thresholds = check_bounded, context.options.thresholds
         self.counts = Counts()
         self.energies: list[float] = []
         self._laws = [t.law for t in self.system.terms] if laws is None else list(laws)
-        self._epsilon = settings.epsilon if epsilon is None else epsilon
+        self._epsilon = context.epsilon if epsilon is None else epsilon
         self._residual = self.system.load.duplicate()
 
     def solve(self, start: PETSc.Vec | None = None, branches: PETSc.Vec | None = None) -> SolveResult:
         """A stationary point. Collective.
 
         Args:
-            start: where to begin; by default the resting start, which holds every rigid motion. A start of one's own
-                must hold them too.
-            branches: a displacement whose pieces of the laws to begin on; by default those of the settings, which
-                unless the scene says otherwise are those of no slip, an unbroken bond, so that a vertex passes a drop
+            start: where to begin; by default the resting start, which holds every rigid motion. Any other start must
+                hold them too.
+            branches: a displacement whose pieces of the laws to begin on; by default those of the options, which
+                unless the user says otherwise are those of no slip, an unbroken bond, so that a vertex passes a drop
                 only when the load drives it there.
 
         Raises:
@@ -92,7 +91,7 @@ class BranchIteration:
         if branches is not None or start is not None:
             xi = self._subgradients(start if branches is None else branches, 0.0)
         else:
-            first = initial_branches.arguments(self.system, x, self.settings.start)
+            first = initial_branches.arguments(self.system, x, self.options.start)
             xi = [law.concave.left(a) for law, a in zip(self._laws, first, strict=True)]
         with self.solver.reporting(self._progress):
             outcome = self._descend(x, self._cells(x), xi)
@@ -106,31 +105,32 @@ class BranchIteration:
         return x
 
     def _progress(self, iteration: int, residual: float, contact: int) -> None:
-        self.settings.progress(self.name, self._epsilon, iteration, residual, contact)
+        self.context.progress(self.label, self._epsilon, iteration, residual, contact)
 
     def _descend(self, x: PETSc.Vec, cells: list[Cells], xi: list[Array]) -> Outcome:
         """Convex steps from and into x until ξ stands. The first ξ may be that of another point."""
         outcome = Outcome(False, 0, 0, float("inf"), "no convex step")
         before = math.inf
-        for _ in range(self.settings.max_branches):
+        for _ in range(self.thresholds.convex_steps):
             cells, outcome, done = self._step(x, cells, xi)
             self._check_fall(before, outcome, x)
             before = self.energies[-1]
             if done:
                 return outcome
             xi = self._subgradients(x, 0.0)
-        return replace(outcome, converged=False, reason=f"ξ still changes after {self.settings.max_branches} steps")
+        return replace(outcome, converged=False, reason=f"ξ still changes after {self.thresholds.convex_steps} steps")
 
     def _off_kinks(self, x: PETSc.Vec) -> PETSc.Vec | None:
         """A point of lower energy, where x sits on a kink of G: both sides are tried (it hides a descent)."""
+        near = self.thresholds.kink_distance
         on = [
-            law.concave.left(a - _NEAR) < law.concave.right(a + _NEAR) - self._slack(law)
+            law.concave.left(a - near) < law.concave.right(a + near) - self._slack(law)
             for law, a in zip(self._laws, self._arguments(x), strict=True)
         ]
         if not self._any(on):
             return None
         energy = self._energy(x)
-        for side in (-_NEAR, _NEAR):
+        for side in (-near, near):
             trial = x.copy()
             outcome = self._descend(trial, self._cells(trial), self._subgradients(trial, side))
             if outcome.converged and self._energy(trial) < energy - self._rounding(energy, x):
@@ -139,12 +139,12 @@ class BranchIteration:
 
     @staticmethod
     def _slack(law: Superpotential) -> float:
-        """What G' may change within _NEAR without a kink."""
+        """What G' may change within the distance of a kink without one."""
         return 1e-6 * law.traction_scale
 
     def _step(self, x: PETSc.Vec, cells: list[Cells], xi: list[Array]) -> tuple[list[Cells], Outcome, bool]:
         """One convex step, first to a loose tolerance, then, if ξ stands, to the wanted one."""
-        if self._wary and self._slides(xi):
+        if self._check_bounded and self._slides(xi):
             return cells, Outcome(False, 0, 0, math.inf, _SLIDES), True
         for tolerance in self._tolerances():
             cells, outcome = self._convex(x, cells, xi, tolerance)
@@ -153,7 +153,7 @@ class BranchIteration:
                 break
         self.counts.branch += 1
         # where rounding ends a step, a ξ that lags behind may leave no more than rounding did
-        allowed = max(self.settings.tolerance, min(outcome.rounding, 2.0 * outcome.measure))
+        allowed = max(self.options.tolerance, min(outcome.rounding, 2.0 * outcome.measure))
         stationary = outcome.converged and left <= allowed
         if stationary or not outcome.converged:
             return cells, outcome, True
@@ -161,22 +161,22 @@ class BranchIteration:
 
     def _tolerances(self) -> list[float]:
         """Of a convex step, one after the other: loose first, unless ξ is expected to stand."""
-        wanted = self.settings.tolerance
-        return [wanted] if wanted >= _LOOSE or self._straight else [_LOOSE, wanted]
+        wanted, loose = self.options.tolerance, self.thresholds.loose_tolerance
+        return [wanted] if wanted >= loose or self._straight else [loose, wanted]
 
     @property
     def _straight(self) -> bool:
-        return self.settings.steady and self.counts.branch == 0
+        return self.context.steady and self.counts.branch == 0
 
     def _convex(
         self, x: PETSc.Vec, cells: list[Cells], xi: list[Array], tolerance: float
     ) -> tuple[list[Cells], Outcome]:
         """Minimise the majorant over K, from and into x; cells change until no kink is overloaded."""
-        for _ in range(_CELL_CHANGES):
+        for _ in range(self.thresholds.cell_changes):
             models = [Majorant(law, c, s) for law, c, s in zip(self._laws, cells, xi, strict=True)]
             outcome = self._bounded(x, models, cells, tolerance)
             self.system.residual(x, self._residual, models)
-            moves = kink_bounds.overloaded(self.system, x, self._residual, models, self.settings.tolerance)
+            moves = kink_bounds.overloaded(self.system, x, self._residual, models, self.options.tolerance)
             if not outcome.converged or not self._any(moves):
                 return cells, outcome
             cells = [c.moved(m) for c, m in zip(cells, moves, strict=True)]
@@ -192,12 +192,18 @@ class BranchIteration:
 
     def _attempts(self, models: Sequence[Majorant]) -> Iterator[Attempt | str]:
         """Of a convex step; none after a failure, where it has no solution."""
-        soft = [Softened(m, m.law.length_scale) for m in models]
+        soft = [SecantMajorant(m, m.law.length_scale) for m in models]
         for softened, search, most in _ATTEMPTS:
-            limit = min(most, self.settings.max_newton)
-            yield Attempt(soft if softened else models, search, limit, kept=softened, steady=self._straight)
-            if not self._wary:
-                self._wary = True
+            limit = min(most, self.options.max_iterations)
+            yield Attempt(
+                models=soft if softened else models,
+                line_search=search,
+                max_iterations=limit,
+                kept=softened,
+                steady=self._straight,
+            )
+            if not self._check_bounded:
+                self._check_bounded = True
                 if self._slides([m.xi for m in models]):
                     yield _SLIDES
 
@@ -212,7 +218,7 @@ class BranchIteration:
         lower, upper = kink_bounds.boxes(self.system, cells)
         full = [Full(law, c) for law, c in zip(self._laws, cells, strict=True)]
         found = self.solver.solve(
-            trial, full, self.settings.tolerance, lower=lower, upper=upper, line_search="bt", max_iterations=15
+            trial, full, self.options.tolerance, lower=lower, upper=upper, line_search="bt", max_iterations=15
         )
         self.counts.spend(found)
         if not found.converged or self._energy(trial) > self._energy(x) + self._rounding(self._energy(x), x):
@@ -220,7 +226,7 @@ class BranchIteration:
         trial.copy(x)
         self.system.residual(x, self._residual, full)
         return found, not self._any(
-            kink_bounds.overloaded(self.system, x, self._residual, full, self.settings.tolerance)
+            kink_bounds.overloaded(self.system, x, self._residual, full, self.options.tolerance)
         )
 
     def _measure(self, x: PETSc.Vec, cells: list[Cells], xi: list[Array]) -> float:
@@ -264,12 +270,12 @@ class BranchIteration:
         reason = "stationary" if outcome.converged else outcome.reason
         steady = self.counts.branch <= 1 and self.counts.newton <= len(self._tolerances())
         return SolveResult(
-            self.system.displacement(x),
-            self.name,
-            outcome.converged,
-            reason,
-            self.counts,
-            tuple(self.energies),
-            outcome.interrupted,
+            u=self.system.displacement(x),
+            method=self.label,
+            converged=outcome.converged,
+            reason=reason,
+            counts=self.counts,
+            energies=tuple(self.energies),
+            interrupted=outcome.interrupted,
             steady=steady,
         )

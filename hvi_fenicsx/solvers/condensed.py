@@ -19,10 +19,11 @@ from scipy.sparse import csr_matrix
 
 from ..errors import InputError, SolverError
 from ..laws import Superpotential
-from ..system.system import Model, System
+from ..system.system import LawModel, System
 from ..typing import Array, Integers
-from .active_set import ActiveSetSolver
-from .method import Counts, Settings, SolveResult
+from .context import SolveContext
+from .method import Method
+from .result import Counts, SolveResult
 from .ssls import onto_bounds
 
 _EVALUATIONS = 100
@@ -59,7 +60,7 @@ class MeanDerivative:
         return self.law.convex.second(x) - self.law.concave.second(x)
 
 
-class Condensation:
+class Condensation(Method):
     """The procedure on one system; call :meth:`solve` once.
 
     Raises:
@@ -68,38 +69,48 @@ class Condensation:
 
     name = "condensed"
     words = "the paper's procedure: condensation and least squares"
-    takes_start = False
+    takes_pieces = False
 
-    def __init__(self, solver: ActiveSetSolver, settings: Settings) -> None:
-        if solver.system.comm.size > 1:
+    def __init__(self, context: SolveContext) -> None:
+        super().__init__(context)
+        if self.system.comm.size > 1:
             raise InputError(
-                f'solver.method = "{self.name}" is dense and runs in one process, not in {solver.system.comm.size}: '
+                f'solver.method = "{self.name}" is dense and runs in one process, not in {self.system.comm.size}: '
                 'leave out --np (mpirun), or use method = "auto"'
             )
-        self.solver, self.settings, self.system = solver, settings, solver.system
         self.models = [MeanDerivative(t.law) for t in self.system.terms]
         self.stopped = False
 
-    def solve(self) -> SolveResult:
+    def solve(self, start: PETSc.Vec | None = None) -> SolveResult:
         """A stationary point of the smoothed energy, or what was reached.
+
+        Args:
+            start: not used; the paper begins at zero.
 
         Raises:
             SolverError: the stiffness without its contact displacements is singular.
         """
-        with self.solver.timer("setup"):
+        with self.context.timer("setup"):
             schur = _Schur(self.system)
-        with self.solver.timer("solve"):
+        with self.context.timer("solve"):
             mixed = _Complementarity(schur, self.models)
             values, reason, counts = self._minimise(mixed)
             found, measure = self._judge(schur.expand(values))
-        converged = measure <= self.settings.tolerance
+        converged = measure <= self.options.tolerance
         words = "stationary" if converged else f"least squares stopped: {reason}, residual {measure:.1e}"
-        energies = (self.system.energy(found, self.models),)
-        return SolveResult(self.system.displacement(found), self.name, converged, words, counts, energies, self.stopped)
+        return SolveResult(
+            u=self.system.displacement(found),
+            method=self.name,
+            converged=converged,
+            reason=words,
+            counts=counts,
+            energies=(self.system.energy(found, self.models),),
+            interrupted=self.stopped,
+        )
 
     def _minimise(self, mixed: _Complementarity) -> tuple[Array, str, Counts]:
         """Contact displacements, why it ended there, and evaluations."""
-        counts, limit = Counts(), min(_EVALUATIONS, self.settings.max_newton)
+        counts, limit = Counts(), min(_EVALUATIONS, self.options.max_iterations)
         if not mixed.schur.kept.size:
             return np.empty(0), "there is nothing to minimise over", counts
         points: list[Array] = []
@@ -122,7 +133,7 @@ class Condensation:
         """Called at each accepted point."""
         points.append(x.copy())
         size = float(np.linalg.norm(mixed.function(x))) / self.system.scale
-        self.settings.progress(self.name, self.settings.epsilon, len(points) - 1, size, mixed.in_contact(x))
+        self.context.progress(self.name, self.context.epsilon, len(points) - 1, size, mixed.in_contact(x))
         self.stopped = self.solver.interrupted()
         if self.stopped:
             raise _Stop
@@ -151,10 +162,10 @@ class _Schur:
 
     def __init__(self, system: System) -> None:
         self.system = system
-        system.set_rates([np.zeros_like(k) for k in system.rates])
+        system.jacobian.set_rates([np.zeros_like(k) for k in system.jacobian.rates])
         self.kept, self.rest = _partition(system)
         self._factor = self._factorised()
-        self._coupling = _sparse(system.matrix)[self.rest][:, self.kept].tocsc()
+        self._coupling = _sparse(system.jacobian.matrix)[self.rest][:, self.kept].tocsc()
         self.G = np.empty((self.kept.size, self.kept.size))
         for start in range(0, self.kept.size, _COLUMNS):
             block = slice(start, start + _COLUMNS)
@@ -165,7 +176,7 @@ class _Schur:
     def _factorised(self) -> PETSc.PC:
         rows = PETSc.IS().createGeneral(self.rest.astype(PETSc.IntType), comm=self.system.comm)
         pc = PETSc.PC().create(self.system.comm)
-        pc.setOperators(self.system.matrix.createSubMatrix(rows, rows))
+        pc.setOperators(self.system.jacobian.matrix.createSubMatrix(rows, rows))
         pc.setType(PETSc.PC.Type.LU)
         pc.setFactorSolverType(PETSc.Mat.SolverType.MUMPS)
         pc.setUp()
@@ -211,7 +222,7 @@ def _partition(system: System) -> tuple[Integers, Integers]:
 class _Complementarity:
     """lower ≤ x ≤ upper ⟂ F(x) = S x - q + law, as Φ(x) = 0."""
 
-    def __init__(self, schur: _Schur, models: Sequence[Model]) -> None:
+    def __init__(self, schur: _Schur, models: Sequence[LawModel]) -> None:
         self.schur, self.models, self.system = schur, models, schur.system
         self._residual = self.system.load.duplicate()
 
@@ -222,9 +233,9 @@ class _Complementarity:
 
     def tangent(self, x: Array) -> Array:
         """F', shape (n, n)."""
-        self.system.set_rates(self.system.tangents(self.schur.spread(x), self.models))
+        self.system.jacobian.set_rates(self.system.tangents(self.schur.spread(x), self.models))
         kept = self.schur.kept
-        return np.asarray(_sparse(self.system.matrix)[kept][:, kept].toarray() - self.schur.G)
+        return np.asarray(_sparse(self.system.jacobian.matrix)[kept][:, kept].toarray() - self.schur.G)
 
     def function(self, x: Array) -> Array:
         """Φ, shape (n,)."""

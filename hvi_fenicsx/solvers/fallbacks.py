@@ -8,24 +8,26 @@ from dataclasses import dataclass, replace
 import numpy as np
 from petsc4py import PETSc
 
-from ..system.system import Model
+from ..system.system import LawModel
 from .active_set import ActiveSetSolver, Outcome
-from .method import Counts
+from .result import Counts
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Attempt:
     """One way to solve a step.
 
     Attributes:
-        models: what stands for the laws. line_search: PETSc's name. max_iterations: Newton steps.
+        models: what stands for the laws.
+        line_search: PETSc's name.
+        max_iterations: Newton steps at most.
         kept: whether the next one goes on from where this one fails, since this one lowers the energy, whatever it
             leaves undone; else the next one begins where this one did.
         start: where to begin instead, this one and the next.
         steady: as in :meth:`.ActiveSetSolver.solve`.
     """
 
-    models: Sequence[Model]
+    models: Sequence[LawModel]
     line_search: str
     max_iterations: int
     kept: bool
@@ -44,8 +46,11 @@ def first_success(
     """The outcome of the first attempt that converges, else of the one that came nearest. Collective.
 
     Args:
-        solver: of each. x: start and result. tolerance, bounds: as in :meth:`.ActiveSetSolver.solve`.
+        solver: of each.
+        x: start and result.
         attempts: the next is asked for only when the last has failed; words in place of one say why there is none.
+        tolerance: as in :meth:`.ActiveSetSolver.solve`.
+        bounds: from below and from above.
         counts: gets the iterations of all.
     """
     begin, best = x.copy(), x.copy()

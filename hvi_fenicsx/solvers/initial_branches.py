@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Literal
 
 import numpy as np
 from petsc4py import PETSc
@@ -13,15 +12,20 @@ from ..formula import Formula
 from ..problem.law_term import LawTerm
 from ..system.system import System
 from ..typing import Array
+from .options import Start
 
-Start = Literal["unbroken", "resting", "broken"] | tuple[Formula, ...]
-"""No slip; the slips at rest (contact closed, every bond a spring); beyond every drop; those of a displacement (m)."""
 _FAR = 1e6
 """Times the law's length and the slip at rest: beyond every drop."""
 
 
 def arguments(system: System, resting: PETSc.Vec, start: Start) -> list[Array]:
-    """What the laws act on there, by term; (m,) each."""
+    """What the laws act on there, by term; (m,) each.
+
+    Args:
+        system: the assembled problem.
+        resting: the displacement with contact closed and laws at rest.
+        start: the name of a start, or a displacement by component.
+    """
     if start == "unbroken":
         return [np.zeros(len(t.surface.blocks)) for t in system.terms]
     if not isinstance(start, str):
@@ -31,7 +35,7 @@ def arguments(system: System, resting: PETSc.Vec, start: Start) -> list[Array]:
 
 
 def _displaced(system: System, start: Sequence[Formula]) -> list[Array]:
-    """Of a displacement in Cartesian components, so by the problem's terms, whose directions are Cartesian too."""
+    """Arguments of a Cartesian displacement, so by the problem's terms, whose directions are Cartesian too."""
     found = []
     for term in system.problem.terms:
         u = np.column_stack([f.at(term.surface.points) for f in start]) / system.problem.scales.displacement

@@ -16,7 +16,12 @@ from .law_models import Cells, Full, Majorant
 
 
 def boxes(system: System, cells: Sequence[Cells]) -> tuple[PETSc.Vec, PETSc.Vec]:
-    """The bounds of the scene cut with the cells of the laws; the system's own where no law has a convex kink."""
+    """The system's bounds cut with the cells of the laws; the very same where no law has a convex kink.
+
+    Args:
+        system: the assembled problem.
+        cells: by term.
+    """
     if not any(len(c.kinks) for c in cells):
         return system.lower, system.upper
     lower, upper = system.lower.copy(), system.upper.copy()
@@ -36,8 +41,13 @@ def overloaded(
 ) -> list[Integers]:
     """Per vertex -1, 0 or 1: where it goes if the kink it sits on cannot carry its force.
 
-    ``residual`` is that of the convex step, H' being taken from within the cell: at the lower end the right derivative,
-    from which the kink's jump leads to the left one.
+    Args:
+        system: the assembled problem.
+        x: the displacement.
+        residual: that of the convex step, H' being taken from within the cell: at the lower end the right derivative,
+            from which the kink's jump leads to the left one.
+        models: of the step, by term.
+        tolerance: relative, of a traction.
     """
     moves = []
     for term, model in zip(system.terms, models, strict=True):

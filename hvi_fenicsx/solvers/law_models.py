@@ -94,7 +94,7 @@ class Majorant:
 
 
 @dataclass(frozen=True)
-class Softened:
+class SecantMajorant:
     """A majorant with the secant stiffness H'/x where it exceeds H'': a step that cannot run away on a flat law.
 
     Where H'/x falls with |x| (friction, adhesion) the secant parabola lies above H, so that full steps lower the energy

@@ -1,123 +1,175 @@
-"""Nested iteration: each rung of the ladder starts from the solution of the coarser one.
+"""Nested iteration: each level of the mesh hierarchy starts from the solution on the coarser one.
 
-Displacement, active set and branches come with it, so that one or two steps remain on the finest mesh; the
-prolongations also build its geometric multigrid. Meshes without a ladder, and small ones, are solved as they are.
+Displacement, active set and pieces of the laws come with it, so that one or two steps remain on the finest mesh; the
+prolongations also build its geometric multigrid. Meshes without a hierarchy, and small ones, are solved as they are.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from petsc4py import PETSc
 
-from ..mesh import transfer
-from ..mesh.domain import Refinement
-from ..runtime.timing import Timer
-from ..scene import Scene
-from ..system import assemble
-from ..system.coarser_level import Below
+from ..mesh.transfer import Transfer
+from ..problem.compose import Model
+from ..rigid import Solvability
+from ..system.assemble import assemble
 from ..system.held_solver import LinearSettings
+from ..system.levels import Level, Levels, prolongation
 from ..system.system import System
 from . import registry
-from .method import Counts, Progress, SolveResult
+from .context import RunControl, SolveContext
+from .options import SolverOptions
 from .quadratic import LinearSolve
-
-_WORTHWHILE = 5_000
-"""Unknowns from which a coarser rung pays."""
-_COARSE_TOLERANCE = 1e-4
+from .result import Counts, SolveResult
 
 
-def coarser(scene: Scene, system: System) -> Scene | None:
-    """The scene one rung below; None where there is none, or where it would not pay."""
-    if system.dofs < _WORTHWHILE:
-        return None
-    return scene if system.problem.domain.origin else transfer.coarser(scene)
+@dataclass(frozen=True, kw_only=True)
+class LevelSolution:
+    """A system solved, and the coarser levels that it was solved with.
+
+    Attributes:
+        system: the assembled problem.
+        levels: its coarser levels, none where there is no mesh hierarchy.
+        result: what the method found.
+    """
+
+    system: System
+    levels: Levels
+    result: SolveResult
 
 
-def linear(scene: Scene, system: System) -> LinearSettings:
-    """How the scene's linear systems will be solved: by multigrid where a ladder is climbed."""
-    kind = registry.choose(scene.solver, system)
-    climbed = coarser(scene, system) is not None and (kind.takes_start or kind is LinearSolve)
-    return LinearSettings.choose(system, scene.solver.linear_solver, ladder=climbed)
+@dataclass(frozen=True, kw_only=True)
+class CoarseStart:
+    """A solution on a coarser mesh to start from.
+
+    Attributes:
+        system: on the coarser mesh.
+        result: what was found there.
+        prolongation: from its unknowns to the finer system's.
+        levels: the coarser levels of the finer system.
+    """
+
+    system: System
+    result: SolveResult
+    prolongation: PETSc.Mat
+    levels: Levels
+
+
+def linear_settings(system: System, options: SolverOptions) -> LinearSettings:
+    """How a system's linear equations will be solved: by multigrid where it has a mesh hierarchy.
+
+    Args:
+        system: the assembled problem.
+        options: method, linear solver and thresholds.
+    """
+    kind = registry.choose(options, system)
+    nested = _has_coarser(system, options) and (kind.takes_start or kind is LinearSolve)
+    return LinearSettings.choose(system, options.linear_solver, options.thresholds.linear, levels=nested)
+
+
+def _has_coarser(system: System, options: SolverOptions) -> bool:
+    """Whether there is a coarser mesh, and it pays."""
+    return system.dofs >= options.thresholds.nested_from and system.problem.domain.coarsening is not None
 
 
 def solve(
-    scene: Scene, system: System, timer: Timer, progress: Progress, interrupted: Callable[[], bool]
-) -> SolveResult:
-    """Solve a scene's system, from the coarsest rung up where there is one and the method takes a start. Collective.
+    model: Model, system: System, solvability: Solvability, options: SolverOptions, control: RunControl
+) -> LevelSolution:
+    """Solve a system, from the coarsest level up where there is one and the method takes a start. Collective.
+
+    Args:
+        model: what is solved, for the coarser meshes.
+        system: assembled on the finest mesh.
+        solvability: the verdict on existence.
+        options: method, tolerance, limits.
+        control: timer, progress and interruption.
 
     Raises:
         SolverError: a convex step raised the energy.
     """
-    coarse = coarser(scene, system)
-    kind = registry.choose(scene.solver, system)
-    if coarse is not None and kind is LinearSolve:
-        system.below = hierarchy(scene, system, timer)
-    if coarse is None or not kind.takes_start:
-        return registry.create(scene.solver, system, timer, progress, interrupted).solve()
-    below, nesting = _assembled(_loosened(coarse), scene, system, timer)
-    below.release(system.freedom.modes if system.freedom else ())
-    found = solve(_loosened(coarse), below, timer, progress, interrupted)
-    with timer("setup"):
-        system.below = Below(below, transfer.between(system, below, nesting))
-    return ascend(scene, system, (below, found, system.below.prolongation), timer, progress, interrupted)
-
-
-Rung = tuple[System, SolveResult, PETSc.Mat]
-"""The next coarser rung, its solution, and the prolongation from its unknowns (:func:`.transfer.between`)."""
+    kind = registry.choose(options, system)
+    nested = _has_coarser(system, options)
+    if not nested or not kind.takes_start:
+        levels = hierarchy(model, system, options, control) if nested and kind is LinearSolve else ()
+        context = SolveContext.create(system, levels, solvability, options, control)
+        return LevelSolution(system=system, levels=levels, result=kind(context).solve())
+    coarse, transfer = _assembled(model, system, control)
+    coarse.release(system.freedom.modes if system.freedom else ())
+    found = solve(model, coarse, solvability, _loosened(options), control)
+    with control.timer("setup"):
+        step = prolongation(system, coarse, transfer)
+    levels = (Level(system, coarse, step), *found.levels)
+    start = CoarseStart(system=coarse, result=found.result, prolongation=step, levels=levels)
+    return ascend(system, start, solvability, options, control)
 
 
 def ascend(
-    scene: Scene, system: System, rung: Rung, timer: Timer, progress: Progress, interrupted: Callable[[], bool]
-) -> SolveResult:
-    """Solve a scene's system from the solution on the rung below. Collective.
+    system: System, start: CoarseStart, solvability: Solvability, options: SolverOptions, control: RunControl
+) -> LevelSolution:
+    """Solve a system from a solution on a coarser mesh. Collective.
+
+    Args:
+        system: assembled on the finer mesh.
+        start: the solution on the coarser mesh.
+        solvability: the verdict on existence.
+        options: method, tolerance, limits.
+        control: timer, progress and interruption.
 
     Raises:
         SolverError: a convex step raised the energy.
     """
-    below, found, step = rung
-    wanted = found.converged and registry.choose(scene.solver, system).takes_start
-    start = _prolonged(step, below, found, system) if wanted else None
-    method = registry.create(scene.solver, system, timer, progress, interrupted, steady=found.steady)
-    result = method.solve() if start is None else method.solve(start)
-    if start is not None and not result.converged and not result.interrupted:
-        result = registry.create(scene.solver, system, timer, progress, interrupted).solve()
+    kind, found = registry.choose(options, system), start.result
+    first = _prolonged(start, system) if found.converged and kind.takes_start else None
+    context = SolveContext.create(system, start.levels, solvability, options, control, steady=found.steady)
+    result = kind(context).solve() if first is None else kind(context).solve(first)
+    if first is not None and not result.converged and not result.interrupted:
+        result = kind(SolveContext.create(system, start.levels, solvability, options, control)).solve()
     counts = Counts()
     counts.add(found.counts)
     counts.add(result.counts)
-    steady = result.steady and (found.steady or found.levels == 1)  # one rung that was is no sign yet
-    return replace(result, counts=counts, levels=found.levels + 1, steady=steady)
+    steady = result.steady and (found.steady or found.levels == 1)  # one level that stood is no sign yet
+    result = replace(result, counts=counts, levels=found.levels + 1, steady=steady)
+    return LevelSolution(system=system, levels=start.levels, result=result)
 
 
-def hierarchy(scene: Scene, system: System, timer: Timer) -> Below | None:
-    """The rungs below for the multigrid of an equation, which needs no start. Collective."""
-    coarse = coarser(scene, system)
-    if coarse is None:
-        return None
-    below, nesting = _assembled(coarse, scene, system, timer)
-    below.below = hierarchy(coarse, below, timer)
-    with timer("setup"):
-        return Below(below, transfer.between(system, below, nesting))
+def hierarchy(model: Model, system: System, options: SolverOptions, control: RunControl) -> Levels:
+    """The coarser levels for the multigrid of an equation, which needs no start. Collective.
+
+    Args:
+        model: what is solved.
+        system: assembled on the finest mesh.
+        options: from which size on a coarser level pays.
+        control: where time goes.
+    """
+    if not _has_coarser(system, options):
+        return ()
+    coarse, transfer = _assembled(model, system, control)
+    below = hierarchy(model, coarse, options, control)
+    with control.timer("setup"):
+        return (Level(system, coarse, prolongation(system, coarse, transfer)), *below)
 
 
-def _assembled(coarse: Scene, scene: Scene, system: System, timer: Timer) -> tuple[System, Scene | Refinement | None]:
-    """The system one rung below that of a scene, and how their meshes are nested. Collective."""
-    body, nesting = system.problem.domain.origin or (None, scene)
-    return assemble.assemble(coarse, system.comm, timer, body), nesting
+def _assembled(model: Model, system: System, control: RunControl) -> tuple[System, Transfer]:
+    """The system on the next coarser mesh, and the transfer from that mesh. Collective."""
+    with control.timer("mesh"):
+        coarser = system.problem.domain.coarser()
+    assert coarser is not None
+    domain, transfer = coarser
+    return assemble(domain, model, control.timer), transfer
 
 
-def _loosened(scene: Scene) -> Scene:
-    """The scene at a tolerance that suits a start."""
-    tolerance = max(_COARSE_TOLERANCE, scene.solver.tolerance)
-    return scene.with_solver(tolerance=tolerance)
+def _loosened(options: SolverOptions) -> SolverOptions:
+    """The options with a tolerance that suits a start."""
+    return replace(options, tolerance=max(options.thresholds.coarse_tolerance, options.tolerance))
 
 
-def _prolonged(step: PETSc.Mat, below: System, found: SolveResult, system: System) -> PETSc.Vec:
+def _prolonged(start: CoarseStart, system: System) -> PETSc.Vec:
     """The coarse solution on the finer mesh, within its bounds and with its prescribed values. Collective."""
+    coarse = start.system
     x = system.load.duplicate()
-    step.mult(below.unknowns(found.u), x)
-    x.scale(below.problem.scales.displacement / system.problem.scales.displacement)
+    start.prolongation.mult(coarse.unknowns(start.result.u), x)
+    x.scale(coarse.problem.scales.displacement / system.problem.scales.displacement)
     x.pointwiseMax(x, system.lower)
     x.pointwiseMin(x, system.upper)
     system.prescribe(x)

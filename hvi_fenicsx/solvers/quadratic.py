@@ -12,11 +12,13 @@ import numpy as np
 from petsc4py import PETSc
 
 from ..system.system import System
-from .active_set import ActiveSetSolver, Outcome
+from .active_set import Outcome
+from .closed_start import resting_start
 from .fallbacks import Attempt, first_success
 from .law_models import Full
-from .method import Counts, Settings, SolveResult, resting_start
-from .rigid_start import settled
+from .method import Method
+from .result import Counts, SolveResult
+from .rigid_start import at_rest
 from .smooth_method import smooth_models
 
 _MARGIN = 0.5
@@ -37,18 +39,19 @@ def is_quadratic(system: System) -> bool:
     return all(term.law.is_linear for term in system.terms)
 
 
-class LinearSolve:
+class LinearSolve(Method):
     """The equation on one system; call :meth:`solve` once."""
 
     name = "linear"
     words = "one linear solve"
-    takes_start = False
+    in_scenes = False
 
-    def __init__(self, solver: ActiveSetSolver, settings: Settings) -> None:
-        self.solver, self.settings, self.system = solver, settings, solver.system
+    def solve(self, start: PETSc.Vec | None = None) -> SolveResult:
+        """The solution of the equation, or what was reached. Collective.
 
-    def solve(self) -> SolveResult:
-        """The solution of the equation, or what was reached. Collective."""
+        Args:
+            start: not used; one linear solve needs none.
+        """
         x, models, counts = self.system.undisplaced(), smooth_models(self.system), Counts()
         outcome = Outcome(False, 0, 0, float("inf"), "not started")
         for _ in range(_REFINEMENTS):
@@ -56,28 +59,32 @@ class LinearSolve:
             counts.linear += outcome.linear
             if outcome.converged:
                 break
-        self.settings.progress(self.name, None, 1, outcome.measure, 0)
+        self.context.progress(self.name, None, 1, outcome.measure, 0)
         reason = "stationary" if outcome.converged else outcome.reason
-        return SolveResult(self.system.displacement(x), self.name, outcome.converged, reason, counts)
+        return SolveResult(
+            u=self.system.displacement(x), method=self.name, converged=outcome.converged, reason=reason, counts=counts
+        )
 
     def _step(self, x: PETSc.Vec, models: Sequence[Full]) -> Outcome:
         """One solve of the residual equation, and how far x is then from the solution. Collective."""
-        step = self.solver.newton_step(x, np.empty(0, np.int32), models, _MARGIN * self.settings.tolerance)
-        return self.solver.judged(step, x, models, self.settings.tolerance)
+        step = self.solver.newton_step(x, np.empty(0, np.int32), models, _MARGIN * self.options.tolerance)
+        return self.solver.judged(step, x, models, self.options.tolerance)
 
 
-class ConvexProgramme:
+class ConvexProgramme(Method):
     """The quadratic programme on one system; call :meth:`solve` once."""
 
     name = "convex"
     words = "one convex quadratic programme by SNES VI (reduced space)"
     takes_start = True
-
-    def __init__(self, solver: ActiveSetSolver, settings: Settings) -> None:
-        self.solver, self.settings, self.system = solver, settings, solver.system
+    in_scenes = False
 
     def solve(self, start: PETSc.Vec | None = None) -> SolveResult:
-        """The minimiser, or what was reached; from the start with contact closed by default. Collective."""
+        """The minimiser, or what was reached. Collective.
+
+        Args:
+            start: where to begin; by default with contact closed.
+        """
         counts, system = Counts(), self.system
         laws = [term.law for term in system.terms]
         if start is None:
@@ -88,34 +95,41 @@ class ConvexProgramme:
             outcome = self._minimise(x, counts)
         reason = "stationary" if outcome.converged else outcome.reason
         return SolveResult(
-            system.displacement(x),
-            self.name,
-            outcome.converged,
-            reason,
-            counts,
+            u=system.displacement(x),
+            method=self.name,
+            converged=outcome.converged,
+            reason=reason,
+            counts=counts,
             interrupted=outcome.interrupted,
             steady=counts.newton <= 1,
         )
 
     def _progress(self, iteration: int, residual: float, contact: int) -> None:
-        self.settings.progress(self.name, None, iteration, residual, contact)
+        self.context.progress(self.name, None, iteration, residual, contact)
 
     def _minimise(self, x: PETSc.Vec, counts: Counts) -> Outcome:
         """Attempts until one converges, into x; the best one's outcome. Collective."""
         bounds = self.system.lower, self.system.upper
-        return first_success(self.solver, x, self._attempts(counts), self.settings.tolerance, bounds, counts)
+        return first_success(self.solver, x, self._attempts(counts), self.options.tolerance, bounds, counts)
 
     def _attempts(self, counts: Counts) -> Iterator[Attempt]:
         """From the start, then from bodies at rest on their supports."""
         models = smooth_models(self.system)
         for number, (search, most) in enumerate(_ATTEMPTS):
-            start = self._settled(models, counts) if number == 1 else None
-            limit = min(most, self.settings.max_newton)
-            steady = self.settings.steady and number == 0
-            yield Attempt(models, search, limit, kept=search == "bt", start=start, steady=steady)
+            start = self._from_rest(models, counts) if number == 1 else None
+            limit = min(most, self.options.max_iterations)
+            steady = self.context.steady and number == 0
+            yield Attempt(
+                models=models,
+                line_search=search,
+                max_iterations=limit,
+                kept=search == "bt",
+                start=start,
+                steady=steady,
+            )
 
-    def _settled(self, models: list[Full], counts: Counts) -> PETSc.Vec | None:
-        rested = settled(self.solver, lambda _: models, min(1e-4, self.settings.tolerance))
+    def _from_rest(self, models: list[Full], counts: Counts) -> PETSc.Vec | None:
+        rested = at_rest(self.context, lambda _: models, min(1e-4, self.options.tolerance))
         if rested is None:
             return None
         counts.linear += rested[1]

@@ -17,11 +17,11 @@ import numpy.typing as npt
 from petsc4py import PETSc
 
 from ..runtime.mpi import agree, on_root
-from ..system import existence, free_motions
-from ..system.system import Model, System
+from ..system import free_motions
+from ..system.system import LawModel, System
 from ..typing import Array, Entities
-from .active_set import ActiveSetSolver
-from .method import contact_dofs
+from .closed_start import contact_dofs
+from .context import SolveContext
 
 _TOUCHES = 1e-7
 """Of the largest distance: a vertex that is so near to its bound rests on it."""
@@ -34,7 +34,13 @@ class _Programme:
     """min work·a + Σ cost |slips a| subject to lower <= rows a <= upper, over the amplitudes a (k,) of rigid motions.
 
     Attributes:
-        work: (k,). rows, lower, upper: (m, k), (m,), (m,). slips, forward, backward: (n, k), costs of either sign (n,).
+        work: of the load, with its sign changed, (k,).
+        rows: contact displacements by amplitude, (m, k).
+        lower: their bounds, (m,).
+        upper: their bounds, (m,).
+        slips: arguments of the laws by amplitude, (n, k).
+        forward: cost of a positive slip, (n,).
+        backward: cost of a negative slip, (n,).
     """
 
     work: Array
@@ -90,26 +96,27 @@ def _independent(rows: Array, order: npt.NDArray[np.intp]) -> npt.NDArray[np.int
     return np.array(chosen, dtype=np.intp)
 
 
-def settled(
-    solver: ActiveSetSolver, models: Callable[[PETSc.Vec], Sequence[Model]], rtol: float
+def at_rest(
+    context: SolveContext, models: Callable[[PETSc.Vec], Sequence[LawModel]], rtol: float
 ) -> tuple[PETSc.Vec, int] | None:
     """The bodies at rest on their supports, and linear iterations. Collective.
 
     Args:
-        solver: of the one linear solve. models: what stands for the laws at a displacement. rtol: of the solve.
+        context: the system, its solver, and the rigid motions that the supports leave.
+        models: what stands for the laws at a displacement.
+        rtol: of the one linear solve.
 
     Returns:
         None where contact does not hold them, or where springs do: their tangent is never singular.
     """
-    system = solver.system
-    modes = existence.solvability(system.problem, system.forces).kernel
+    system, modes = context.system, context.solvability.kernel
     bounded = all(np.isfinite([*astuple(term.law.growth)]).all() for term in system.terms)
     if not modes or not bounded or system.freedom is not None or not system.bounds:
         return None
     motions = [system.unknowns(field) for field in free_motions.fields(system.problem, modes)]
     x = system.undisplaced()
     held = _rest(system, x, motions)
-    return None if held is None else (x, solver.newton_step(x, held, models(x), rtol).linear)
+    return None if held is None else (x, context.solver.newton_step(x, held, models(x), rtol).linear)
 
 
 def _rest(system: System, x: PETSc.Vec, motions: Sequence[PETSc.Vec]) -> Entities | None:

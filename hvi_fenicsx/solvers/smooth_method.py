@@ -3,35 +3,40 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from petsc4py import PETSc
 
 from ..errors import InputError
 from ..system.system import System
-from .active_set import ActiveSetSolver
+from .closed_start import resting_start
+from .context import SolveContext
 from .law_models import Cells, Full
-from .method import Counts, Settings, SolveResult, resting_start
+from .method import Method
+from .result import Counts, SolveResult
 
 
 class Run(ABC):
     """One solve by a method: a PETSc object (SNES, TAO) and what it calls back.
 
     Attributes:
-        models: what stands for the laws. counts: iterations. stopped: whether it was told to end.
+        models: what stands for the laws.
+        counts: iterations.
+        stopped: whether it was asked to end.
         matrix: for the Hessian; a copy of the system's, which PETSc scales or shifts, and which may be indefinite.
         reasons: PETSc's enumeration of why it ended.
     """
 
     reasons: type
 
-    def __init__(self, solver: ActiveSetSolver, settings: Settings, x: PETSc.Vec) -> None:
-        self.solver, self.settings, self.system = solver, settings, solver.system
+    def __init__(self, context: SolveContext, x: PETSc.Vec) -> None:
+        self.context, self.solver, self.system = context, context.solver, context.system
+        self.options = context.options
         self.models = smooth_models(self.system)
         self.counts, self.stopped = Counts(), False
         self.residual = x.duplicate()
-        self.matrix = self.system.matrix.copy()
+        self.matrix = self.system.jacobian.matrix.copy()
         self.matrix.setOption(PETSc.Mat.Option.SPD, False)
 
     @abstractmethod
@@ -39,19 +44,24 @@ class Run(ABC):
         """The configured PETSc object."""
 
     @abstractmethod
-    def iterate(self, made: Any, x: PETSc.Vec) -> None:
-        """Let it solve, from and into x. Collective."""
+    def iterate(self, solver: Any, x: PETSc.Vec) -> None:
+        """Let it solve, from and into x. Collective.
+
+        Args:
+            solver: what :meth:`create` made.
+            x: start and result.
+        """
 
     def execute(self, x: PETSc.Vec) -> str:
         """Iterate from and into x; PETSc's name of its reason to end. Collective."""
-        made = self.create()
+        solver = self.create()
         try:
-            self.iterate(made, x)
-            reason = self._words(made.getConvergedReason())
+            self.iterate(solver, x)
+            reason = self._words(solver.getConvergedReason())
         except PETSc.Error as error:
             reason = f"PETSc error {error.ierr}"
-        self.count(made)
-        for thing in (made, self.matrix):
+        self.count(solver)
+        for thing in (solver, self.matrix):
             thing.destroy()
         return "interrupted" if self.stopped else reason
 
@@ -59,9 +69,9 @@ class Run(ABC):
         names = {v: k for k, v in vars(self.reasons).items() if isinstance(v, int) and "_" in k}
         return names.get(int(reason), str(reason))
 
-    def count(self, made: Any) -> None:
+    def count(self, solver: Any) -> None:
         """Read off its iterations."""
-        self.counts.newton = made.getIterationNumber()
+        self.counts.newton = solver.getIterationNumber()
 
     def judge(self, x: PETSc.Vec) -> tuple[PETSc.Vec, float]:
         """The candidate that x stands for, and its residual of the inequality. Collective."""
@@ -69,43 +79,57 @@ class Run(ABC):
         return x, self.solver.measure(x, self.residual, self.system.lower, self.system.upper)
 
 
-class SmoothMethod:
+class SmoothMethod(Method):
     """A method on one system with smooth laws, from the resting start; call :meth:`solve` once.
 
-    Attributes:
-        run: the class of its solve. solver_words: what it calls itself where it failed.
+    Class attributes:
+        run: the class of its solve.
+        solver_words: what it calls itself where it failed.
 
     Raises:
         InputError: a law has kinks.
     """
 
-    name: str
-    words: str
-    takes_start = False
-    run: type[Run]
-    solver_words: str
+    run: ClassVar[type[Run]]
+    solver_words: ClassVar[str]
+    takes_pieces = False
 
-    def __init__(self, solver: ActiveSetSolver, settings: Settings) -> None:
-        refuse_kinks(solver.system, self.name)
-        self.solver, self.settings = solver, settings
+    def __init__(self, context: SolveContext) -> None:
+        super().__init__(context)
+        refuse_kinks(context.system, self.name)
 
-    def solve(self) -> SolveResult:
-        """A stationary point of the smoothed energy, or what was reached. Collective."""
-        system = self.solver.system
+    def solve(self, start: PETSc.Vec | None = None) -> SolveResult:
+        """A stationary point of the smoothed energy, or what was reached. Collective.
+
+        Args:
+            start: not used; it begins at rest.
+        """
+        system = self.system
         x, linear = resting_start(self.solver, [t.law for t in system.terms])
-        run = self.run(self.solver, self.settings, x)
-        with self.solver.timer("solve"):
+        run = self.run(self.context, x)
+        with self.context.timer("solve"):
             reason = run.execute(x)
             found, measure = run.judge(x)
         run.counts.linear += linear
-        converged = measure <= self.settings.tolerance
+        converged = measure <= self.options.tolerance
         words = "stationary" if converged else f"{self.solver_words} stopped: {reason}, residual {measure:.1e}"
-        energies = (system.energy(found, run.models),)
-        return SolveResult(system.displacement(found), self.name, converged, words, run.counts, energies, run.stopped)
+        return SolveResult(
+            u=system.displacement(found),
+            method=self.name,
+            converged=converged,
+            reason=words,
+            counts=run.counts,
+            energies=(system.energy(found, run.models),),
+            interrupted=run.stopped,
+        )
 
 
 def refuse_kinks(system: System, method: str) -> None:
     """Methods that differentiate a law cannot solve one with kinks.
+
+    Args:
+        system: the assembled problem.
+        method: the method's name.
 
     Raises:
         InputError: on all ranks alike.

@@ -48,14 +48,14 @@ class _Run(Run):
 
     reasons = _Reason
 
-    def iterate(self, made: PETSc.SNES, x: PETSc.Vec) -> None:
+    def iterate(self, solver: PETSc.SNES, x: PETSc.Vec) -> None:
         """Run SNES. Collective."""
-        made.solve(None, x)
+        solver.solve(None, x)
 
-    def count(self, made: PETSc.SNES) -> None:
+    def count(self, solver: PETSc.SNES) -> None:
         """Newton and linear iterations."""
-        super().count(made)
-        self.counts.linear = made.getLinearSolveIterations()
+        super().count(solver)
+        self.counts.linear = solver.getLinearSolveIterations()
 
     def create(self) -> PETSc.SNES:
         """``vinewtonssls``, whose Jacobian is not symmetric."""
@@ -66,14 +66,14 @@ class _Run(Run):
         snes.setJacobian(self._tangent, self.matrix)
         snes.setVariableBounds(self.system.lower, self.system.upper)
         snes.setConvergenceTest(self._converged)
-        snes.setTolerances(max_it=self.settings.max_newton)
+        snes.setTolerances(max_it=self.options.max_iterations)
         linear = _DIRECT if self.solver.settings.kind == "lu" else _KRYLOV
         configure(snes, {"snes_linesearch_type": "bt", **linear})
         return snes
 
     def _tangent(self, snes: PETSc.SNES, x: PETSc.Vec, j: PETSc.Mat, p: PETSc.Mat) -> None:
-        self.system.set_rates(self.system.tangents(x, self.models))
-        self.system.matrix.copy(j, structure=PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
+        self.system.jacobian.set_rates(self.system.tangents(x, self.models))
+        self.system.jacobian.matrix.copy(j, structure=PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
 
     def judge(self, x: PETSc.Vec) -> tuple[PETSc.Vec, float]:
         """The candidate on its bounds, and its residual of the inequality. Collective."""
@@ -82,14 +82,14 @@ class _Run(Run):
 
     def _converged(self, snes: PETSc.SNES, iteration: int, norms: Any) -> int:
         found, measure = self.judge(snes.getSolution())
-        self.settings.progress("ssls", self.settings.epsilon, iteration, measure, self.solver.in_contact(found))
+        self.context.progress("ssls", self.context.epsilon, iteration, measure, self.solver.in_contact(found))
         found.destroy()
         self.stopped = self.solver.interrupted()
         if self.stopped:
             return _Reason.DIVERGED_FUNCTION_COUNT
         if not np.isfinite(measure):
             return _Reason.DIVERGED_FNORM_NAN
-        return _Reason.CONVERGED_FNORM_RELATIVE if measure <= self.settings.tolerance else _Reason.CONVERGED_ITERATING
+        return _Reason.CONVERGED_FNORM_RELATIVE if measure <= self.options.tolerance else _Reason.CONVERGED_ITERATING
 
 
 class SemismoothNewton(SmoothMethod):

@@ -14,7 +14,7 @@ from ..system.held_solver import HeldPreconditioner
 from ..system.petsc_options import configure
 from ..system.system import System
 from ..typing import Array
-from .method import Counts
+from .result import Counts
 from .smooth_method import Run, SmoothMethod
 
 _FOUNDATION = 1e-3
@@ -27,9 +27,9 @@ class _Run(Run):
 
     reasons = _Reason
 
-    def iterate(self, made: PETSc.TAO, x: PETSc.Vec) -> None:
+    def iterate(self, solver: PETSc.TAO, x: PETSc.Vec) -> None:
         """Run TAO. Collective."""
-        made.solve(x)
+        solver.solve(x)
 
     def create(self) -> PETSc.TAO:
         """``bnls`` on the true Hessian."""
@@ -41,7 +41,7 @@ class _Run(Run):
         tao.setHessian(self._tangent, self.matrix, rows)
         tao.setVariableBounds((self.system.lower, self.system.upper))
         tao.setConvergenceTest(self._converged)
-        tao.setMaximumIterations(self.settings.max_newton)
+        tao.setMaximumIterations(self.options.max_iterations)
         configure(tao, {})
         pc = tao.getKSP().getPC()
         if pc.getType() == PETSc.PC.Type.LMVM:  # the default of bnls: the user set none
@@ -51,9 +51,9 @@ class _Run(Run):
 
     def _tangent(self, tao: PETSc.TAO, x: PETSc.Vec, h: PETSc.Mat, rows: PETSc.Mat) -> None:
         """The true Hessian for TAO; the system is left with the tangent of the preconditioner."""
-        self.system.set_rates(self.system.tangents(x, self.models))
-        self.system.matrix.copy(h, structure=PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
-        self.system.set_rates(self._convex(x))
+        self.system.jacobian.set_rates(self.system.tangents(x, self.models))
+        self.system.jacobian.matrix.copy(h, structure=PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
+        self.system.jacobian.set_rates(self._convex(x))
 
     def _convex(self, x: PETSc.Vec) -> list[Array]:
         rates = []
@@ -67,13 +67,13 @@ class _Run(Run):
     def _converged(self, tao: PETSc.TAO) -> int | None:
         x, iteration = tao.getSolution(), tao.getIterationNumber()
         _, measure = self.judge(x)
-        self.settings.progress("tao", self.settings.epsilon, iteration, measure, self.solver.in_contact(x))
+        self.context.progress("tao", self.context.epsilon, iteration, measure, self.solver.in_contact(x))
         self.stopped = self.solver.interrupted()
         if self.stopped:
             return _Reason.DIVERGED_USER
         if not np.isfinite(measure):
             return _Reason.DIVERGED_NAN
-        if measure <= self.settings.tolerance:
+        if measure <= self.options.tolerance:
             return _Reason.CONVERGED_USER
         return _Reason.DIVERGED_MAXITS if iteration >= tao.getMaximumIterations() else _Reason.CONTINUE_ITERATING
 
@@ -85,7 +85,7 @@ def _numbered_rows(system: System) -> PETSc.Mat:
     """
     numbers = system.load.duplicate()
     numbers.array[:] = np.arange(*numbers.owner_range)
-    sizes = system.matrix.getSizes()
+    sizes = system.jacobian.matrix.getSizes()
     rows = PETSc.Mat().createAIJ(sizes, nnz=1, comm=system.comm)
     rows.setDiagonal(numbers)
     rows.assemble()

@@ -15,7 +15,7 @@ from ..errors import InputError
 from ..laws import smoothing
 from ..scene import Scene, dump_scene
 from ..schema import input_error, unknown
-from ..solvers.registry import METHODS
+from ..solvers import registry
 from . import meshes
 from .meshes import Setting
 
@@ -23,7 +23,7 @@ Tables = dict[str, Any]
 EXACT = "exact"
 _CHOICES: Mapping[str, Callable[[], Sequence[str]]] = {
     "smoothing": smoothing.available,
-    "method": lambda: tuple(METHODS),
+    "method": registry.available,
     "linear_solver": lambda: ("auto", "lu", "gamg"),
 }
 _NUMBERS = ("epsilon", "epsilon_absolute", "tolerance", "accuracy")

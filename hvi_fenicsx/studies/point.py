@@ -16,7 +16,7 @@ from typing import Any
 from mpi4py import MPI
 from scipy import sparse
 
-from ..accuracy.adaptive import Climber
+from ..accuracy.adaptive import AdaptiveSolver
 from ..accuracy.control import Goal, reach
 from ..errors import HviError
 from ..report.solution_arrays import save
@@ -71,7 +71,7 @@ def _point(options: argparse.Namespace) -> None:
 def _solved(scene: Scene, options: argparse.Namespace, timer: Timer) -> Solution:
     """The scene on its mesh, or on one made for an accuracy. Collective."""
     if options.accuracy is not None:
-        found = reach(scene, COMM, Goal(options.accuracy), Climber(timer), lambda line: None).solution
+        found = reach(scene, COMM, Goal(options.accuracy), AdaptiveSolver(timer=timer), lambda line: None).solution
         timer.seconds["solve"] += timer.seconds["estimate"]  # which steers the climb: part of what it costs
         return found
     return finish(prepare(scene, COMM, timer))

@@ -12,7 +12,7 @@ from .petsc_options import PREFIX, below_the_users
 from .system import System
 
 
-class Copied:
+class CopiedMatrix:
     """A PC of the system's matrix with some unknowns held, and its copy. Creation is collective.
 
     Args:
@@ -22,12 +22,13 @@ class Copied:
             levels follow the values, is made anew.
 
     Attributes:
-        pc, matrix: the PC, and the copy that it is of.
+        pc: the PC.
+        matrix: the copy that it preconditions.
     """
 
     def __init__(self, system: System, options: Mapping[str, object], *, direct: bool) -> None:
         self._system, self._options, self._direct = system, options, direct
-        self.pc, self.matrix = self._new(), system.matrix.copy()
+        self.pc, self.matrix = self._new(), system.jacobian.matrix.copy()
         self.matrix.setBlockSize(system.problem.scales.dimension)
         self.matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
         self.matrix.setOption(PETSc.Mat.Option.SPD, not direct)
@@ -36,7 +37,7 @@ class Copied:
 
     def prepare(self, held: Entities) -> None:
         """Make it that of the matrix as it stands with these unknowns (local, owned, sorted) held. Collective."""
-        self._system.matrix.copy(self.matrix, structure=PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
+        self._system.jacobian.matrix.copy(self.matrix, structure=PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
         rows = np.union1d(held, self._system.pins) + self._system.load.owner_range[0]
         self.matrix.zeroRowsColumns(rows.astype(PETSc.IntType), diag=1.0)
         if not self._direct:

@@ -4,7 +4,7 @@ SNES VI extracts the inactive rows and columns into a matrix without block size 
 multigrid then fails. Here the full size is kept, whatever is held (solver-notes.md): one preconditioner serves the
 start and every Newton step with the same active set. Algebraic multigrid and the direct solver get a copy of the
 matrix with those rows and columns replaced by the identity; geometric multigrid gets the matrix itself, in which they
-are held by their diagonals (:meth:`.System.hold`).
+are held by their diagonals (:meth:`.Jacobian.hold`).
 """
 
 from __future__ import annotations
@@ -20,17 +20,13 @@ from petsc4py import PETSc
 from ..runtime.timing import Timer
 from ..typing import Array, Entities
 from . import multigrid, schur
-from .copied_matrix import Copied
+from .copied_matrix import CopiedMatrix
+from .levels import Levels
 from .petsc_options import PREFIX, configure
 from .system import System
+from .thresholds import DEFAULT, Thresholds
 
 Kind = Literal["lu", "gamg", "mg"]
-_LARGEST_DIRECT = {2: 60_000, 3: 15_000}
-"""Unknowns up to which a direct solve is the faster one, by dimension (docs/benchmarks.md)."""
-_DRIFT = 0.3
-"""Change of a law's nodal stiffness, relative to an elastic one (about 1), that a Krylov method takes lightly."""
-_SLOW = 50
-"""Iterations from which a direct solver takes over where it can: at 65 a Newton step costs twice as much as with it."""
 _GAMG: dict[str, object] = {
     "pc_type": "gamg",
     "pc_gamg_threshold": 0.01,
@@ -53,25 +49,40 @@ _LU: dict[str, object] = {"pc_type": "cholesky", "pc_factor_mat_solver_type": "m
 
 @dataclass(frozen=True, slots=True)
 class LinearSettings:
-    """How linear systems are solved."""
+    """How linear systems are solved.
+
+    Attributes:
+        kind: a factorisation, algebraic or geometric multigrid.
+        thresholds: when that is left for another one, and when it is set up anew.
+    """
 
     kind: Kind
+    thresholds: Thresholds = DEFAULT
 
     @classmethod
     def choose(
-        cls, system: System, wanted: Literal["auto", "lu", "gamg"] = "auto", *, ladder: bool = False
+        cls,
+        system: System,
+        wanted: Literal["auto", "lu", "gamg"] = "auto",
+        thresholds: Thresholds = DEFAULT,
+        *,
+        levels: bool = False,
     ) -> LinearSettings:
         """By the number of unknowns, unless the user wants one; a nearly incompressible body goes to the direct one.
 
-        ``ladder`` tells that the system will stand on one when it is solved (``System.below``).
+        Args:
+            system: to be solved.
+            wanted: by the user.
+            thresholds: up to which size which one is used.
+            levels: whether the system has coarser levels when it is solved.
         """
         if wanted != "auto":
-            return cls(wanted)
+            return cls(wanted, thresholds)
         if system.problem.bulk.averages_dilatation:
-            return cls("lu")
-        if (ladder or system.below is not None) and system.freedom is None:
-            return cls("mg")
-        return cls("lu" if system.dofs <= _LARGEST_DIRECT[system.problem.scales.dimension] else "gamg")
+            return cls("lu", thresholds)
+        if levels and system.freedom is None:
+            return cls("mg", thresholds)
+        return cls("lu" if _small(system, thresholds) else "gamg", thresholds)
 
     @property
     def ksp(self) -> dict[str, str]:
@@ -84,11 +95,16 @@ class LinearSettings:
         return {"lu": _LU, "gamg": _GAMG, "mg": _MG}[self.kind]
 
 
-class Prepared(Protocol):
-    """A preconditioner that can be made fit for other held unknowns.
+def _small(system: System, thresholds: Thresholds) -> bool:
+    return system.dofs <= thresholds.largest_direct[system.problem.scales.dimension]
+
+
+class Preconditioner(Protocol):
+    """A preconditioner that can be prepared for other held unknowns.
 
     Attributes:
-        pc: it. matrix: what it is of, and equations are to be solved with.
+        pc: PETSc's object.
+        matrix: what it preconditions, and equations are to be solved with.
     """
 
     pc: PETSc.PC
@@ -106,14 +122,20 @@ class HeldPreconditioner:
 
     A direct solve wants the very matrix. A Krylov method is content with that of a similar active set and tangent, as
     long as its iterations do not grow.
+
+    Args:
+        system: whose matrix it is.
+        levels: its coarser levels; used by geometric multigrid alone.
+        settings: how linear systems are solved.
+        timer: where time goes.
     """
 
-    def __init__(self, system: System, settings: LinearSettings, timer: Timer) -> None:
-        self.system, self.settings, self._timer = system, settings, timer
+    def __init__(self, system: System, levels: Levels, settings: LinearSettings, timer: Timer) -> None:
+        self.system, self.levels, self.settings, self._timer = system, levels, settings, timer
         self._held: Entities | None = None
         self._rates: list[Array] = []
-        self._fresh, self._worn = 0, False
-        self._made: Prepared | None = None
+        self._first_iterations, self._outdated = 0, False
+        self._preconditioner: Preconditioner | None = None
         self._kind: Kind | None = None
         self._factorised = 0
         self._in, self._out = system.load.duplicate(), system.load.duplicate()
@@ -121,55 +143,60 @@ class HeldPreconditioner:
 
     def prepare(self, held: Entities) -> None:
         """Make it fit for these held dofs (local, owned, sorted). Collective."""
-        self.system.hold(held if self.settings.kind == "mg" else held[:0])
+        self.system.jacobian.hold(held if self.settings.kind == "mg" else held[:0])
         if self.system.comm.allreduce(self._fits(held), op=MPI.LAND):
             return
         with self._timer("setup"):
             self._build(held)
-        self._held, self._rates = held.copy(), self.system.rates
-        self._fresh, self._worn = 0, False
+        self._held, self._rates = held.copy(), self.system.jacobian.rates
+        self._first_iterations, self._outdated = 0, False
 
     def _fits(self, held: Entities) -> bool:
-        if self._held is None or self._worn:
+        if self._held is None or self._outdated:
             return False
-        changed, drift = len(np.setxor1d(held, self._held, assume_unique=True)), self.system.drift(self._rates)
+        changed, drift = len(np.setxor1d(held, self._held, assume_unique=True)), self.system.jacobian.drift(self._rates)
         if self.settings.kind == "lu":
             return changed == 0 and drift == 0.0
-        return changed <= (0 if self.settings.kind == "mg" else max(2, 0.1 * len(held))) and drift <= _DRIFT
+        most = 0 if self.settings.kind == "mg" else max(2, 0.1 * len(held))
+        return changed <= most and drift <= self.settings.thresholds.drift
 
     def report(self, iterations: int) -> None:
         """Tell what a solve took (the same on all ranks): a preconditioner that serves badly is not used again."""
-        self._fresh = self._fresh or iterations
-        self._worn = iterations > 1.5 * self._fresh + 5
-        small = self.system.dofs <= _LARGEST_DIRECT[self.system.problem.scales.dimension]
-        if iterations > _SLOW and small:
-            self.settings, self._worn = LinearSettings("lu"), True
+        self._first_iterations = self._first_iterations or iterations
+        self._outdated = iterations > 1.5 * self._first_iterations + 5
+        thresholds = self.settings.thresholds
+        if iterations > thresholds.slow and _small(self.system, thresholds):
+            self.settings, self._outdated = LinearSettings("lu", thresholds), True
 
     def _build(self, held: Entities) -> None:
-        kind = self.settings.kind
-        condensing = kind == "lu" and schur.pays(self.system, self._factorised)
-        if self._made is None or kind != self._kind or (condensing and not isinstance(self._made, schur.SchurDirect)):
+        kind, worth = self.settings.kind, self._factorised * self.settings.thresholds.condensing
+        condensing = kind == "lu" and schur.pays(self.system, worth)
+        if kind != self._kind or self._preconditioner is None or (condensing and not self._condensed):
             self._forget()
-            self._made, self._kind = self._new(condensing=condensing), kind
-        self._made.prepare(held)
+            self._preconditioner, self._kind = self._new(condensing=condensing), kind
+        self._preconditioner.prepare(held)
         self._factorised += 1
 
-    def _new(self, *, condensing: bool) -> Prepared:
+    @property
+    def _condensed(self) -> bool:
+        return isinstance(self._preconditioner, schur.SchurDirect)
+
+    def _new(self, *, condensing: bool) -> Preconditioner:
         """Condensing: the body's own factorisation, made once, serves a matrix that changes on Γc alone."""
         if condensing:
             return schur.SchurDirect(self.system, self.settings.pc)
         if self.settings.kind == "mg":
-            return multigrid.Multigrid(self.system, self.settings.pc)
-        return Copied(self.system, self.settings.pc, direct=self.settings.kind == "lu")
+            return multigrid.Multigrid(self.system, self.levels, self.settings.pc)
+        return CopiedMatrix(self.system, self.settings.pc, direct=self.settings.kind == "lu")
 
     def destroy(self) -> None:
         """Free the PETSc objects."""
         self._forget()
 
     def _forget(self) -> None:
-        if self._made is not None:
-            self._made.free()
-        self._made = self._held = None
+        if self._preconditioner is not None:
+            self._preconditioner.free()
+        self._preconditioner = self._held = None
 
     def select(self, inactive: PETSc.IS) -> None:
         """Reduced vectors hold these dofs from now on."""
@@ -178,7 +205,7 @@ class HeldPreconditioner:
 
     def multiply_reduced(self, x: PETSc.Vec, y: PETSc.Vec) -> None:
         """Y = J x on the selected dofs, all others being zero. Collective."""
-        self._reduced(self.system.matrix.mult, x, y)
+        self._reduced(self.system.jacobian.matrix.mult, x, y)
 
     def apply_reduced(self, x: PETSc.Vec, y: PETSc.Vec) -> None:
         """Y = P^-1 x on the selected dofs. Collective."""
@@ -186,7 +213,7 @@ class HeldPreconditioner:
 
     def _unpinned(self, x: PETSc.Vec, y: PETSc.Vec) -> None:
         x.array[self.system.pins] = 0.0
-        self._made.pc.apply(x, y)  # type: ignore[union-attr]
+        self._preconditioner.pc.apply(x, y)  # type: ignore[union-attr]
 
     def _reduced(self, operation: Callable[[PETSc.Vec, PETSc.Vec], None], x: PETSc.Vec, y: PETSc.Vec) -> None:
         whole, part = self._in.array, x.array_r
@@ -204,9 +231,9 @@ class HeldPreconditioner:
         """
         load.array[self.system.pins] = 0.0
         ksp = PETSc.KSP().create(self.system.comm)
-        assert self._made is not None
-        ksp.setOperators(self._made.matrix)
-        ksp.setPC(self._made.pc)
+        assert self._preconditioner is not None
+        ksp.setOperators(self._preconditioner.matrix)
+        ksp.setPC(self._preconditioner.pc)
         ksp.setTolerances(rtol=rtol, max_it=2000)
         ksp.setInitialGuessNonzero(self.settings.kind != "lu")
         configure(ksp, self.settings.ksp, PREFIX)

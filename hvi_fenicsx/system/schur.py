@@ -20,33 +20,37 @@ from .system import System
 
 _COLUMNS = 64
 """Right-hand sides that are solved at once."""
-_WORTH = 30
-"""Unknowns of Γc for which condensing costs as much as one factorisation of the whole matrix (measured: 13 to 45)."""
 
 
-def pays(system: System, factorisations: int) -> bool:
-    """Whether so many factorisations have cost what condensing would: then it loses little at worst, and may save much.
+def pays(system: System, worth: int) -> bool:
+    """Whether factorisations have cost what condensing would: then it loses little at worst, and may save much.
 
     Not where free motions are pinned inside the body, on several processes, or with a preconditioner of the user's.
+
+    Args:
+        system: to be condensed.
+        worth: unknowns of Γc whose condensation costs what the factorisations so far have cost.
     """
     if system.comm.size > 1 or system.freedom is not None or PETSc.Options().hasName(f"{PREFIX}pc_type"):
         return False
-    return 0 < len(system.rows.dofs) <= factorisations * _WORTH
+    return 0 < len(system.jacobian.rows.dofs) <= worth
 
 
 class SchurDirect:
     """The condensed body; the context of its PC of type python. Creation is collective.
 
     Args:
-        system: whose stiffness is condensed to the n unknowns of Γc. options: of the factorisation, below the user's.
+        system: whose stiffness is condensed to the n unknowns of Γc.
+        options: of the factorisation, below the user's.
 
     Attributes:
-        pc, matrix: the PC, and the system's matrix, of which it is.
+        pc: the PC.
+        matrix: the system's, which it preconditions.
     """
 
     def __init__(self, system: System, options: Mapping[str, object]) -> None:
-        self._system, self._dofs = system, system.rows.dofs
-        bulk = system.rows.bulk
+        self._system, self._dofs = system, system.jacobian.rows.dofs
+        bulk = system.jacobian.rows.bulk
         rows = csr_matrix(bulk.getValuesCSR()[::-1], shape=bulk.getSize())
         self._coupling = rows.copy()
         self._coupling.data[np.isin(rows.indices, self._dofs)] = 0.0
@@ -56,13 +60,13 @@ class SchurDirect:
         self._lu: tuple[Array, Entities] | None = None
         self._free: Mask = np.ones(len(self._dofs), dtype=bool)
         self._work = system.load.duplicate()
-        self.pc, self.matrix = PETSc.PC().create(system.comm), system.matrix
+        self.pc, self.matrix = PETSc.PC().create(system.comm), system.jacobian.matrix
         self.pc.setType(PETSc.PC.Type.PYTHON)
         self.pc.setPythonContext(self)
         self.pc.setOperators(self.matrix)
 
     def _interior(self, options: Mapping[str, object]) -> PETSc.PC:
-        matrix = self._system.matrix.copy()
+        matrix = self._system.jacobian.matrix.copy()
         matrix.zeroRowsColumns(self._dofs.astype(PETSc.IntType), diag=1.0)
         matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
         pc = PETSc.PC().create(self._system.comm)
@@ -92,7 +96,7 @@ class SchurDirect:
     def prepare(self, held: Entities) -> None:
         """Take the tangent in force, and hold these dofs, of which all but prescribed ones must be Γc's."""
         self._free = ~np.isin(self._dofs, held)
-        matrix = self._stiffness + block_diag(*self._system.rows.tangent)
+        matrix = self._stiffness + block_diag(*self._system.jacobian.rows.tangent)
         matrix[~self._free] = matrix[:, ~self._free] = 0.0
         matrix[~self._free, ~self._free] = 1.0
         with warnings.catch_warnings():

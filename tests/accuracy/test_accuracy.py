@@ -18,7 +18,7 @@ from scenes import STEEL, model, quadratic_linear
 
 from hvi_fenicsx import Scene, read_scene
 from hvi_fenicsx.accuracy import adaptive, control, cost_forecast, quantities
-from hvi_fenicsx.accuracy.adaptive import Climber, Rung
+from hvi_fenicsx.accuracy.adaptive import AdaptiveLevel, AdaptiveSolver
 from hvi_fenicsx.accuracy.control import Goal, Reached
 from hvi_fenicsx.accuracy.cost_forecast import Step
 from hvi_fenicsx.accuracy.quantities import Friction
@@ -33,18 +33,19 @@ STRONG = model(64, 3e6, friction=quadratic_linear(1e6))
 
 
 def reach(scene: Scene, goal: Goal) -> Reached:
-    return control.reach(scene, COMM, goal, Climber(Timer()), lambda line: None)
+    return control.reach(scene, COMM, goal, AdaptiveSolver(timer=Timer()), lambda line: None)
 
 
-def finer(rung: Rung, times: int) -> list[Rung]:
+def finer(rung: AdaptiveLevel, times: int) -> list[AdaptiveLevel]:
     """Uniform refinements, solved: a reference."""
     found = [rung]
     for _ in range(times):
-        found.append(Climber(Timer()).up(found[-1], adaptive.refined(found[-1], 1.0), rung.solution.scene))
+        last, solver = found[-1], AdaptiveSolver(timer=Timer())
+        found.append(solver.refine(last, adaptive.refined(last, 1.0), rung.solution.scene))
     return found
 
 
-def far_in_energy(rungs: list[Rung]) -> float:
+def far_in_energy(rungs: list[AdaptiveLevel]) -> float:
     """Relative distance of the first solution from the last, energy norm."""
     field = rungs[0].solution.solve_result.u  # type: ignore[union-attr]
     for below, rung in itertools.pairwise(rungs):
@@ -93,7 +94,7 @@ def test_a_mesh_without_a_solution_at_a_loose_tolerance_is_not_refined_for_that(
     """Peeling is undecided on its fourth mesh at 1e-4; at 1e-7 it is certified there, and good enough."""
     told: list[str] = []
     scene = read_scene(DEMOS / "peeling.toml")
-    reached = control.reach(scene, COMM, Goal(0.17), Climber(Timer()), told.append)
+    reached = control.reach(scene, COMM, Goal(0.17), AdaptiveSolver(timer=Timer()), told.append)
     assert any("not certified" in line for line in told)
     assert reached.why is None
     assert reached.rung.dofs < 8_000
@@ -115,7 +116,7 @@ def test_smoothing_is_narrowed_as_far_as_asked_for_without_a_finer_mesh() -> Non
     assert reached.rung.dofs < 100
     found = Friction().read(reached.rung)
     exact = reached.rung.solution.scene.with_solver(smoothing=None, epsilon_absolute=None)
-    law = Climber(Timer()).again(reached.rung, exact)
+    law = AdaptiveSolver(timer=Timer()).again(reached.rung, exact)
     true = Friction().read(law)
     apart = contact_norm(law, true.x.array - found.x.array, 1)  # type: ignore[union-attr]
     assert apart < 2e-2 * contact_norm(law, true.x.array, 1)  # type: ignore[union-attr]
@@ -136,9 +137,9 @@ def l_shape() -> Scene:
 
 def slope(bulk: float, most: int) -> float:
     """Observed order in unknowns of the estimated error, over the last factor of about ten."""
-    rung, points = Climber(Timer()).begin(l_shape(), COMM), []
+    rung, points = AdaptiveSolver(timer=Timer()).begin(l_shape(), COMM), []
     while rung.dofs < most:
-        rung = Climber(Timer()).up(rung, adaptive.refined(rung, bulk), rung.solution.scene)
+        rung = AdaptiveSolver(timer=Timer()).refine(rung, adaptive.refined(rung, bulk), rung.solution.scene)
         points.append((rung.dofs, rung.solution.estimate.relative))  # type: ignore[union-attr]
     kept = np.log([p for p in points if p[0] >= points[-1][0] / 20])
     return float(np.polyfit(kept[:, 0], kept[:, 1], 1)[0])
@@ -165,10 +166,10 @@ def test_the_bulk_criterion_marks_as_few_cells_as_it_can(bulk: float) -> None:
 def test_a_last_step_refines_as_much_of_the_error_as_it_is_to(share: float) -> None:
     """What halves its edges leaves a quarter of its square, so the step after it tells what share was refined."""
     scene = Scene.model_validate(model(4, pull=6e6, friction=quadratic_linear(3e6)))
-    rung = Climber(Timer()).begin(scene, COMM)
+    rung = AdaptiveSolver(timer=Timer()).begin(scene, COMM)
     for _ in range(3):
-        rung = Climber(Timer()).up(rung, adaptive.refined(rung, 0.75), scene)
-    finest = Climber(Timer()).up(rung, adaptive.sparing(rung, share), scene)
+        rung = AdaptiveSolver(timer=Timer()).refine(rung, adaptive.refined(rung, 0.75), scene)
+    finest = AdaptiveSolver(timer=Timer()).refine(rung, adaptive.sparing(rung, share), scene)
     left = [r.solution.estimate.discretisation for r in (finest, rung)]  # type: ignore[union-attr]
     assert 1.0 - (left[0] / left[1]) ** 2 == pytest.approx(0.75 * share, abs=0.02)
 
@@ -220,10 +221,10 @@ class Late(Timer):
 def test_a_time_budget_ends_before_the_step_that_would_exceed_it(seconds: float, meshes: int) -> None:
     """With the accuracy at which three meshes are enough."""
     scene = Scene.model_validate(STRONG)
-    reached = control.reach(scene, COMM, Goal(3e-2, seconds=seconds), Climber(Late()), lambda line: None)
+    reached = control.reach(scene, COMM, Goal(3e-2, seconds=seconds), AdaptiveSolver(timer=Late()), lambda line: None)
     assert len(reached.steps) == meshes
     assert (reached.why is None) == (meshes > 1)
-    best = control.reach(scene, COMM, Goal(None, seconds=10.0), Climber(Late()), lambda line: None)
+    best = control.reach(scene, COMM, Goal(None, seconds=10.0), AdaptiveSolver(timer=Late()), lambda line: None)
     assert (len(best.steps), best.exit_code) == (1, 0)
 
 

@@ -15,7 +15,7 @@ import pytest
 import ufl
 from dolfinx import fem
 from runs import hvi, summary, write_scene
-from scenes import Table, block, model, quadratic_linear, solved
+from scenes import Table, block, model, quadratic_linear, solved, solved_system
 
 from hvi_fenicsx import Scene, Solution, prepare
 from hvi_fenicsx.certify.certificate import examine
@@ -23,9 +23,6 @@ from hvi_fenicsx.certify.estimate.contact_errors import on_contact
 from hvi_fenicsx.certify.estimate.edge_bubbles import Stiffness, diagonal, space
 from hvi_fenicsx.certify.estimate.estimator import Estimate, estimate
 from hvi_fenicsx.problem.problem import Problem
-from hvi_fenicsx.runtime.timing import Timer
-from hvi_fenicsx.solvers.method import silent
-from hvi_fenicsx.solvers.nested_iteration import solve as solve_system
 from hvi_fenicsx.workflow import finish
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "benchmarks"))
@@ -173,12 +170,12 @@ def test_smoothing_is_what_it_changes_of_the_solution(strong: bool) -> None:
 def test_algebraic_is_the_distance_from_the_discrete_solution() -> None:
     prepared = prepare(Scene.model_validate(model(8, pull=3e6, friction=STRONG)))
     problem, system = prepared.problem, prepared.system
-    u = solve_system(prepared.scene, system, Timer(), silent, lambda: False).u
+    u = solved_system(prepared).result.u
     moved = fem.Function(problem.space)
     moved.interpolate(lambda x: np.stack([1e-6 * np.sin(3 * x[0]) * x[1], 1e-6 * x[0] * x[1] ** 2]))
     true = energy_norm(problem, moved)
     moved.x.array[:] += u.x.array
-    assert estimate(system, moved, examine(problem, moved, 1e-8)).algebraic == pytest.approx(true, rel=1e-6)
+    assert estimate(system, (), moved, examine(problem, moved, 1e-8)).algebraic == pytest.approx(true, rel=1e-6)
 
 
 @pytest.mark.parametrize("cells", [4, 8, 16])
@@ -188,7 +185,7 @@ def test_slip_and_friction_against_a_mesh_far_finer(name: str, cells: int) -> No
     law = quadratic_linear(1e6 if name == "strong" else 1e3)
     prepared = prepare(Scene.model_validate(model(cells, 3e6, friction=law)))
     coarse, fine = finish(prepared), solved(model(128, 3e6, friction=law))
-    found = on_contact(prepared.system, coarse.solve_result.u, coarse.examination)
+    found = on_contact(prepared.system, (), coarse.solve_result.u, coarse.examination)
     true = [apart(read(coarse), read(fine), power) for read, power in ((slips, 2), (frictions, 1))]
     assert found.slip == pytest.approx(true[0], rel=0.45)
     assert found.friction == pytest.approx(true[1], rel=0.45)

@@ -8,18 +8,16 @@ import sys
 import numpy as np
 from dolfinx import fem
 from mpi4py import MPI
-from scenes import model
 
-from hvi_fenicsx import Scene
-from hvi_fenicsx.mesh import blocks, transfer
+from hvi_fenicsx.mesh import blocks
+from hvi_fenicsx.mesh.transfer import GridTransfer
 
 
 def main() -> None:
     """By rank: its cells, and of its vertices with values from another rank how many cells they lie from a cut."""
-    scene = Scene.model_validate(model(2) | {"domain": {"shape": "rectangle", "size": [1.0, 2.0], "cells": CELLS}})
     below = [n // 2 for n in CELLS]
     fine, coarse = (fem.functionspace(blocks.mesh(COMM, SIZE, n), ("Lagrange", 1, (2,))) for n in (CELLS, below))
-    columns = transfer.prolongation(fine, coarse, scene)
+    columns = GridTransfer(SIZE, CELLS).prolongation(fine, coarse)
     indptr, found, _ = columns.getValuesCSR()
     first, last = columns.getOwnershipRangesColumn()[COMM.rank : COMM.rank + 2]
     foreign = np.add.reduceat((found < first) | (found >= last), indptr[:-1]) > 0

@@ -10,19 +10,21 @@ from dolfinx import fem
 from petsc4py import PETSc
 from test_refinement import COMM, measure
 
-from hvi_fenicsx.mesh import coarsening_2d, domain, transfer
+from hvi_fenicsx.mesh import gmsh_file
+from hvi_fenicsx.mesh.hierarchy import with_hierarchy
+from hvi_fenicsx.mesh.thresholds import Thresholds
 
 
 def main() -> None:
     """For the file of the first argument."""
-    coarsening_2d._WORTHWHILE, coarsening_2d._COARSEST = 500, 100
-    body = coarsening_2d.founded(domain.from_file(COMM, Path(sys.argv[1]), 2))
-    assert body.origin is not None
-    coarse, nesting = body.origin
+    body = with_hierarchy(gmsh_file.read(COMM, Path(sys.argv[1]), 2), Thresholds(hierarchy_from=500, coarsest=100))
+    coarser = body.coarser()
+    assert coarser is not None
+    coarse, transfer = coarser
     spaces = [fem.functionspace(b.mesh, ("Lagrange", 1, (2,))) for b in (body, coarse)]
     field = fem.Function(spaces[1])
     field.interpolate(lambda x: np.array([x[0] ** 2, np.sin(x[1])]))
-    up = transfer.prolongation(*spaces, nesting) * field.x.petsc_vec
+    up = transfer.prolongation(*spaces) * field.x.petsc_vec
     told = [coarse.mesh.topology.index_map(2).size_global, up.norm(), up.norm(PETSc.NormType.NORM_1)]
     told += [measure(coarse, name) for name in sorted(coarse.sides)]
     if COMM.rank == 0:

@@ -7,8 +7,6 @@ from dolfinx import fem
 from petsc4py import PETSc
 from test_refinement import BODIES, COMM, measure, towards, volume
 
-from hvi_fenicsx.mesh import transfer
-
 
 def main() -> None:
     """For each body three steps towards the origin."""
@@ -21,7 +19,7 @@ def main() -> None:
         vector = field.x.petsc_vec.copy()
         for step in towards(body, np.zeros(d), 3):
             finer = fem.functionspace(step.domain.mesh, ("Lagrange", 1, (d,)))
-            vector = transfer.prolongation(finer, space, step) * vector
+            vector = step.transfer.prolongation(finer, space) * vector
             body, space = step.domain, finer
         sizes = [vector.size, vector.norm(), vector.norm(PETSc.NormType.NORM_1), volume(body)]
         lengths = [measure(body, name) for name in sorted(body.sides)]

@@ -8,17 +8,19 @@ from pathlib import Path
 import numpy as np
 from mpi4py import MPI
 
-from hvi_fenicsx.mesh import coarsening_2d, coarsening_3d, domain
+from hvi_fenicsx.mesh import coarsening_3d, gmsh_file
+from hvi_fenicsx.mesh.hierarchy import with_hierarchy
+from hvi_fenicsx.mesh.thresholds import Thresholds
 
 COMM = MPI.COMM_WORLD
 
 
 def main() -> None:
     """For the file of the first argument."""
-    coarsening_2d._WORTHWHILE, coarsening_2d._COARSEST = 500, 400
-    body = coarsening_2d.founded(domain.from_file(COMM, Path(sys.argv[1]), 3))
-    assert body.origin is not None
-    coarse = body.origin[0]
+    body = with_hierarchy(gmsh_file.read(COMM, Path(sys.argv[1]), 3), Thresholds(hierarchy_from=500, coarsest=400))
+    coarser = body.coarser()
+    assert coarser is not None
+    coarse = coarser[0]
     centres = [coarsening_3d._corners(b.mesh).reshape(-1, 3).mean(axis=0) for b in (body, coarse)]
     cells = coarse.mesh.topology.index_map(3)
     before, after = coarsening_3d._measures(body), coarsening_3d._measures(coarse)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import meshes
@@ -15,14 +16,17 @@ import pytest
 from dolfinx import fem
 from dolfinx.mesh import entities_to_geometry
 from mpi4py import MPI
+from scenes import NESTED
 from test_refinement import measure, volume
 
 from hvi_fenicsx import Scene, read_scene, workflow
-from hvi_fenicsx.mesh import coarsening_2d, domain, gmsh_model, thinned_outline, transfer
+from hvi_fenicsx.mesh import coarsening_2d, gmsh_file, thinned_outline
 from hvi_fenicsx.mesh.domain import Domain
+from hvi_fenicsx.mesh.hierarchy import with_hierarchy
 from hvi_fenicsx.mesh.shapes import HalfDisk, NotchedStrip
 from hvi_fenicsx.mesh.thinned_outline import HalfEdges
-from hvi_fenicsx.system import assemble
+from hvi_fenicsx.mesh.thresholds import Thresholds
+from hvi_fenicsx.mesh.transfer import InterpolationTransfer
 
 HERE = Path(__file__).parent
 DEMOS = Path(__file__).parents[2] / "demos"
@@ -36,21 +40,18 @@ POLYGONS = {
 }
 
 
-@pytest.fixture(autouse=True)
-def everything_founded(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Coarser meshes for small ones too."""
-    monkeypatch.setattr(coarsening_2d, "_WORTHWHILE", 500)
-    monkeypatch.setattr(coarsening_2d, "_COARSEST", 100)
+COARSER = Thresholds(hierarchy_from=500, coarsest=100)
+"""Coarser meshes for small ones too."""
 
 
 def from_file(path: Path, body: str) -> Domain:
-    return domain.from_file(COMM, meshes.make(path / "m.msh", body), 2)
+    return gmsh_file.read(COMM, meshes.make(path / "m.msh", body), 2)
 
 
 def below(body: Domain) -> Domain:
-    made = coarsening_2d.founded(body).origin
-    assert made is not None
-    return made[0]
+    coarser = with_hierarchy(body, COARSER).coarser()
+    assert coarser is not None
+    return coarser[0]
 
 
 def area(body: Domain, name: str) -> float:
@@ -99,7 +100,7 @@ def test_a_notch_is_not_lost() -> None:
 
 @pytest.mark.parametrize("body", [meshes.HINGE.replace("0.5)", "0.03)")], ids=["touches itself"])
 def test_what_cannot_be_outlined_stands_alone(body: str, tmp_path: Path) -> None:
-    assert coarsening_2d.founded(from_file(tmp_path, body)).origin is None
+    assert with_hierarchy(from_file(tmp_path, body), COARSER).coarser() is None
 
 
 def test_outlines_that_cross_themselves_are_given_up() -> None:
@@ -107,13 +108,13 @@ def test_outlines_that_cross_themselves_are_given_up() -> None:
     corners = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.4, -0.2], [0.0, 1.0]])
     ends = np.column_stack([np.arange(5), (np.arange(5) + 1) % 5])
     edges = HalfEdges(ends, corners[ends], np.zeros(5, dtype=np.int64), np.zeros(5, dtype=np.int64))
-    with gmsh_model.session(COMM) as gmsh:
-        assert coarsening_2d._meshed(gmsh, edges, 1.0, ["rim"], ["body"]) is None
+    assert thinned_outline.traced(edges, 1.0, COARSER.outline_area) is None
 
 
-def test_a_coarse_mesh_of_another_area_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(thinned_outline, "_DIFFERENT", 1e-6)
-    assert coarsening_2d.founded(HalfDisk(radius=0.5, mesh_size=0.02).build(COMM, 2)).origin is None
+def test_a_coarse_mesh_of_another_area_is_given_up() -> None:
+    body = HalfDisk(radius=0.5, mesh_size=0.02).build(COMM, 2)
+    assert coarsening_2d.coarse(body, 4.0, COARSER) is not None
+    assert coarsening_2d.coarse(body, 4.0, replace(COARSER, outline_area=1e-6)) is None
 
 
 @pytest.mark.parametrize("name", POLYGONS)
@@ -123,7 +124,7 @@ def test_linear_fields_are_prolonged_as_they_are(name: str, tmp_path: Path) -> N
     fields = [fem.Function(space) for space in (fine, coarse)]
     for field in fields:
         field.interpolate(lambda x: np.array([1 + 2 * x[0] - x[1], x[0] + 3 * x[1]]))
-    found = transfer.prolongation(fine, coarse, None) * fields[1].x.petsc_vec
+    found = InterpolationTransfer().prolongation(fine, coarse) * fields[1].x.petsc_vec
     assert found.array == pytest.approx(fields[0].x.array, abs=1e-12)
 
 
@@ -132,13 +133,13 @@ def scene(path: Path, *overrides: str) -> Scene:
     return read_scene(DEMOS / "strong_law.toml", [f'domain={{shape="file", file="{file}"}}', *overrides])
 
 
-@pytest.mark.usefixtures("everything_nested")
 def test_a_start_from_another_mesh_ends_where_mumps_does(tmp_path: Path) -> None:
     """Without friction the minimiser is unique."""
     convex = ["boundary.wall.displacement=[0.0, 0.0]", 'boundary.floor={on="bottom", contact={gap=0.0}}']
-    climbed = workflow.solve(scene(tmp_path, *convex))
+    thresholds = replace(NESTED, mesh=COARSER)
+    climbed = workflow.solve(scene(tmp_path, *convex), thresholds=thresholds)
     alone = scene(tmp_path, *convex, 'solver={linear_solver="lu"}')
-    direct = workflow.finish(workflow.prepare(alone, body=domain.from_file(COMM, alone.domain.file, 2)))  # type: ignore[union-attr]
+    direct = workflow.finish(workflow.prepare(alone, domain=alone.domain.build(COMM, 2), thresholds=thresholds))
     assert climbed.solve_result is not None
     assert climbed.solve_result.levels > 1
     assert climbed.converged
@@ -148,7 +149,8 @@ def test_a_start_from_another_mesh_ends_where_mumps_does(tmp_path: Path) -> None
 
 
 def test_built_in_blocks_keep_their_own_ladder() -> None:
-    assert assemble.mesh(read_scene(DEMOS / "strong_law.toml", ["domain.cells=[64, 64]"]), COMM).origin is None
+    shape = read_scene(DEMOS / "strong_law.toml", ["domain.cells=[9, 63]"]).domain
+    assert shape.build_hierarchy(COMM, 2, COARSER).coarser() is None
 
 
 def test_ranks_make_the_same_meshes_and_prolong_alike(tmp_path: Path) -> None:
@@ -163,14 +165,14 @@ def test_ranks_make_the_same_meshes_and_prolong_alike(tmp_path: Path) -> None:
     assert told[2] == pytest.approx(told[0], rel=1e-10)
 
 
-@pytest.mark.usefixtures("everything_nested")
 def test_coarse_bodies_slide_along_a_curved_part_as_the_fine_one_does() -> None:
     """A half-disk in a cavity: its normals turn, and what holds them must not hold the tangents of the coarse ones."""
     shape = '{shape="half_disk", radius=0.1, mesh_size=3e-3, mesh_size_below=2e-3}'
     law = '{law="quadratic_linear", gamma1=1e4, gamma2=5e3, delta=1e-4}'
     overrides = [f"domain={shape}", 'boundary.top={on="top", traction=[0.0, -2e4]}']
     floor = f'boundary.floor={{on="arc", contact={{gap=0.0}}, friction={law}}}'
-    found = workflow.solve(read_scene(DEMOS / "hertz.toml", [*overrides, floor]))
+    thresholds = replace(NESTED, mesh=COARSER)
+    found = workflow.solve(read_scene(DEMOS / "hertz.toml", [*overrides, floor]), thresholds=thresholds)
     assert found.converged
     assert found.solve_result is not None
     assert found.solve_result.levels > 1

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,8 +18,12 @@ from mpi4py import MPI
 from test_transfer import lost, space_on
 
 from hvi_fenicsx import Scene, workflow
-from hvi_fenicsx.mesh import coarsening_2d, coarsening_3d, domain, transfer
+from hvi_fenicsx.mesh import coarsening_3d, gmsh_file
 from hvi_fenicsx.mesh.domain import Domain
+from hvi_fenicsx.mesh.hierarchy import with_hierarchy
+from hvi_fenicsx.mesh.thresholds import Thresholds
+from hvi_fenicsx.mesh.transfer import InterpolationTransfer
+from hvi_fenicsx.solvers.thresholds import Thresholds as SolverThresholds
 
 HERE = Path(__file__).parent
 COMM = MPI.COMM_WORLD
@@ -36,11 +41,8 @@ LIFTED: dict[str, Any] = {
 """A block with a bore, pressed down at three of its corners and pulled up at the fourth."""
 
 
-@pytest.fixture(autouse=True)
-def everything_founded(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Coarser meshes for small ones too."""
-    monkeypatch.setattr(coarsening_2d, "_WORTHWHILE", 500)
-    monkeypatch.setattr(coarsening_2d, "_COARSEST", 400)
+COARSER = Thresholds(hierarchy_from=500, coarsest=400)
+"""Coarser meshes for small ones too."""
 
 
 @pytest.fixture(scope="module")
@@ -49,10 +51,10 @@ def bored(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def below(file: Path) -> tuple[Domain, Domain]:
-    body = domain.from_file(COMM, file, 3)
-    made = coarsening_2d.founded(body).origin
-    assert made is not None
-    return body, made[0]
+    body = gmsh_file.read(COMM, file, 3)
+    coarser = with_hierarchy(body, COARSER).coarser()
+    assert coarser is not None
+    return body, coarser[0]
 
 
 def test_a_bored_block_keeps_its_sides_and_regions(bored: Path) -> None:
@@ -67,15 +69,14 @@ def test_a_bored_block_keeps_its_sides_and_regions(bored: Path) -> None:
 def test_a_linear_field_is_prolonged_exactly(tmp_path: Path) -> None:
     body, coarse = below(meshes.make(tmp_path / "m.msh", meshes.BORED.format(radius=0, size=0.12)))
     fine, under = space_on(body.mesh), space_on(coarse.mesh)
-    assert lost(transfer.prolongation(fine, under, None), fine, under, linear=True) < 1e-10
+    assert lost(InterpolationTransfer().prolongation(fine, under), fine, under, linear=True) < 1e-10
 
 
-def test_what_is_solved_does_not_change(bored: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("hvi_fenicsx.solvers.nested_iteration._WORTHWHILE", 500)
+def test_what_is_solved_does_not_change(bored: Path) -> None:
+    nested = workflow.Thresholds(mesh=COARSER, solvers=SolverThresholds(nested_from=500))
     scene = Scene.model_validate(LIFTED | {"domain": {"shape": "file", "file": str(bored)}})
-    climbed = workflow.solve(scene)
-    monkeypatch.setattr(coarsening_2d, "_WORTHWHILE", 10**9)
-    alone = workflow.solve(scene)
+    climbed = workflow.solve(scene, thresholds=nested)
+    alone = workflow.solve(scene, thresholds=replace(nested, mesh=replace(COARSER, hierarchy_from=10**9)))
     assert [s.solve_result.levels for s in (climbed, alone)] == [2, 1]  # type: ignore[union-attr]
     assert climbed.converged
     assert alone.converged
@@ -84,18 +85,16 @@ def test_what_is_solved_does_not_change(bored: Path, monkeypatch: pytest.MonkeyP
 
 @pytest.mark.parametrize("body", [meshes.BLOCKS.format(size=0.1, dimension=3, named=True)])
 def test_bodies_that_gmsh_cannot_take_as_one_have_none(body: str, tmp_path: Path) -> None:
-    assert coarsening_2d.founded(domain.from_file(COMM, meshes.make(tmp_path / "m.msh", body), 3)).origin is None
+    assert with_hierarchy(gmsh_file.read(COMM, meshes.make(tmp_path / "m.msh", body), 3), COARSER).coarser() is None
 
 
-def test_a_mesher_that_takes_too_long_is_not_waited_for(bored: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(coarsening_3d, "_PATIENCE", 0.01)
-    monkeypatch.setattr(coarsening_3d, "_PER_TRIANGLE", 0.0)
-    assert coarsening_2d.founded(domain.from_file(COMM, bored, 3)).origin is None
+def test_a_mesher_that_takes_too_long_is_not_waited_for(bored: Path) -> None:
+    impatient = replace(COARSER, gmsh_seconds=0.01, gmsh_seconds_per_triangle=0.0)
+    assert with_hierarchy(gmsh_file.read(COMM, bored, 3), impatient).coarser() is None
 
 
-def test_a_coarse_mesh_of_another_size_is_given_up(bored: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(coarsening_3d, "_DIFFERENT", 1e-6)
-    assert coarsening_2d.founded(domain.from_file(COMM, bored, 3)).origin is None
+def test_a_coarse_mesh_of_another_size_is_given_up(bored: Path) -> None:
+    assert with_hierarchy(gmsh_file.read(COMM, bored, 3), replace(COARSER, remeshed_size=1e-6)).coarser() is None
 
 
 @pytest.mark.parametrize("ranks", [2, 3])

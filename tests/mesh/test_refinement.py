@@ -9,6 +9,7 @@ import functools
 import subprocess
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import meshes
@@ -19,27 +20,33 @@ import ufl
 from dolfinx import fem
 from dolfinx import mesh as dmesh
 from mpi4py import MPI
-from scenes import model, quadratic_linear
+from scenes import model, quadratic_linear, solved_system
 from test_transfer import lost, rough
 
 from hvi_fenicsx import Scene, workflow
-from hvi_fenicsx.mesh import domain, refinement, transfer
-from hvi_fenicsx.mesh.domain import Domain, Refinement
+from hvi_fenicsx.mesh import gmsh_file, refinement
+from hvi_fenicsx.mesh.blocks import block
+from hvi_fenicsx.mesh.domain import Domain
+from hvi_fenicsx.mesh.refinement import Refinement
 from hvi_fenicsx.mesh.shapes import HalfDisk
 from hvi_fenicsx.runtime.timing import Timer
-from hvi_fenicsx.solvers import nested_iteration
-from hvi_fenicsx.solvers.method import silent
-from hvi_fenicsx.system import assemble
+from hvi_fenicsx.solvers.context import RunControl
+from hvi_fenicsx.solvers.nested_iteration import CoarseStart, ascend
+from hvi_fenicsx.solvers.thresholds import Thresholds as SolverThresholds
+from hvi_fenicsx.system import levels
+from hvi_fenicsx.system.assemble import assemble
+from hvi_fenicsx.system.system import System
+from hvi_fenicsx.system.thresholds import Thresholds as LinearThresholds
 
 COMM = MPI.COMM_WORLD
 
 
 def rectangle() -> Domain:
-    return domain.block(COMM, [1.0, 2.0], [3, 5])
+    return block(COMM, [1.0, 2.0], [3, 5])
 
 
 def box() -> Domain:
-    return domain.block(COMM, [1.0, 2.0, 0.5], [2, 3, 2])
+    return block(COMM, [1.0, 2.0, 0.5], [2, 3, 2])
 
 
 def half_disk() -> Domain:
@@ -99,7 +106,7 @@ def test_curved_sides_approach_their_curve() -> None:
 
 
 def test_regions_keep_their_cells(tmp_path: Path) -> None:
-    body = domain.from_file(COMM, meshes.make(tmp_path / "halves.msh", meshes.HALVES), 2)
+    body = gmsh_file.read(COMM, meshes.make(tmp_path / "halves.msh", meshes.HALVES), 2)
     fine = towards(body, np.array([0.5, 0.5]), 3)[-1].domain
     for name, side in (("soft", -1.0), ("hard", 1.0)):
         middles = dmesh.compute_midpoints(fine.mesh, 2, fine.cells([name]))
@@ -114,7 +121,7 @@ def test_prolongation_from_parent_cells(make: Callable[[], Domain]) -> None:
     d = body.dimension
     for step in (refinement.uniform(body), towards(body, np.zeros(d), 1)[0]):
         fine, coarse = (fem.functionspace(b.mesh, ("Lagrange", 1, (d,))) for b in (step.domain, body))
-        assert lost(transfer.prolongation(fine, coarse, step), fine, coarse) < 1e-13
+        assert lost(step.transfer.prolongation(fine, coarse), fine, coarse) < 1e-13
 
 
 def smallest_angle(body: Domain) -> float:
@@ -164,12 +171,12 @@ def slanted(cells: float) -> Scene:
 
 def test_prolongation_turns_with_the_frames() -> None:
     scene = slanted(0.15)
-    below = assemble.assemble(scene, COMM, Timer())
+    below = assembled(scene, scene.domain.build(COMM, 2))
     step = refinement.uniform(below.problem.domain)
-    above = assemble.assemble(scene, COMM, Timer(), step.domain)
+    above = assembled(scene, step.domain)
     assert below.rotation is not None
-    plain = transfer.prolongation(above.problem.space, below.problem.space, step)
-    turned = transfer.between(above, below, step)
+    plain = step.transfer.prolongation(above.problem.space, below.problem.space)
+    turned = levels.prolongation(above, below, step.transfer)
     known = fem.Function(below.problem.space)
     known.interpolate(lambda x: rough(x)[:2])
     cartesian = plain.createVecRight()
@@ -179,25 +186,33 @@ def test_prolongation_turns_with_the_frames() -> None:
 
 
 @pytest.mark.parametrize("scene", [Scene.model_validate(model(8, 3e6, friction=quadratic_linear(1e6))), slanted(0.1)])
-def test_multigrid_and_starts_on_a_refined_hierarchy(scene: Scene, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The solution of the finest mesh is that of a direct solve from rest; from below one step or two remain."""
-    below = assemble.assemble(scene, COMM, Timer())
-    found = nested_iteration.solve(scene, below, Timer(), silent, lambda: False)
-    monkeypatch.setattr("hvi_fenicsx.system.held_solver._LARGEST_DIRECT", {2: 500, 3: 500})
+def test_multigrid_and_starts_on_a_refined_hierarchy(scene: Scene) -> None:
+    """The solution of the finest mesh is that of a direct solve from rest; few steps remain from the coarser one."""
+    coarse, options = workflow.prepare(scene, COMM), workflow.options_of(scene.solver)
+    options = replace(options, thresholds=SolverThresholds(linear=LinearThresholds(largest_direct={2: 500, 3: 500})))
+    control, found = RunControl(timer=Timer()), solved_system(coarse)
     for k in range(3):
-        step = refinement.uniform(below.problem.domain) if k else towards(below.problem.domain, np.zeros(2), 1)[0]
-        system = assemble.assemble(scene, COMM, Timer(), step.domain)
-        up = transfer.between(system, below, step)
-        system.below = transfer.stacked(up, below)
-        found = nested_iteration.ascend(scene, system, (below, found, up), Timer(), silent, lambda: False)
-        below = system
-    assert found.converged
-    assert found.levels == 4
-    monkeypatch.undo()
-    direct = workflow.finish(workflow.prepare(scene, COMM, body=step.domain)).solve_result
+        before = found.system.problem.domain
+        step = refinement.uniform(before) if k else towards(before, np.zeros(2), 1)[0]
+        system = assembled(scene, step.domain)
+        up = levels.prolongation(system, found.system, step.transfer)
+        start = CoarseStart(
+            system=found.system,
+            result=found.result,
+            prolongation=up,
+            levels=levels.stacked(system, found.system, found.levels, up),
+        )
+        found = ascend(system, start, coarse.solvability, options, control)
+    assert found.result.converged
+    assert found.result.levels == 4
+    direct = workflow.finish(workflow.prepare(scene, COMM, domain=step.domain)).solve_result
     assert direct is not None
-    assert np.max(np.abs(found.u.x.array - direct.u.x.array)) < 1e-6 * np.max(np.abs(direct.u.x.array))
-    assert found.counts.newton <= 4 * direct.counts.newton
+    assert np.max(np.abs(found.result.u.x.array - direct.u.x.array)) < 1e-6 * np.max(np.abs(direct.u.x.array))
+    assert found.result.counts.newton <= 4 * direct.counts.newton
+
+
+def assembled(scene: Scene, body: Domain) -> System:
+    return assemble(body, workflow.model_of(scene), Timer())
 
 
 @pytest.mark.parametrize("ranks", [2, 3])

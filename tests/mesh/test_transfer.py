@@ -16,16 +16,18 @@ from dolfinx import fem
 from dolfinx.mesh import Mesh
 from mpi4py import MPI
 from petsc4py import PETSc
+from scenes import NESTED, solved_system
 
-from hvi_fenicsx import InputError, Scene, read_scene, workflow
-from hvi_fenicsx.mesh import transfer
+from hvi_fenicsx import InputError, read_scene, workflow
+from hvi_fenicsx.mesh.blocks import block
 from hvi_fenicsx.runtime.timing import Timer
-from hvi_fenicsx.solvers import nested_iteration
 from hvi_fenicsx.solvers.active_set import ActiveSetSolver
-from hvi_fenicsx.solvers.method import held_dofs, silent
-from hvi_fenicsx.system import assemble
+from hvi_fenicsx.solvers.closed_start import held_dofs
+from hvi_fenicsx.solvers.context import RunControl
+from hvi_fenicsx.solvers.nested_iteration import hierarchy
 from hvi_fenicsx.system import held_solver as linear
 from hvi_fenicsx.system.held_solver import LinearSettings
+from hvi_fenicsx.system.levels import Levels
 from hvi_fenicsx.system.system import System
 
 DEMOS = Path(__file__).parents[2] / "demos"
@@ -51,11 +53,11 @@ def rough(x: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize(("overrides", "dimension"), SHAPES)
 def test_prolongation_keeps_a_coarse_field(overrides: list[str], dimension: int) -> None:
     """Against dolfinx's own interpolation between meshes that do not match."""
-    scene = read_scene(DEMOS / "strong_law.toml", overrides)
-    below = transfer.coarser(scene)
-    assert below is not None
-    fine, coarse = (space(s, dimension) for s in (scene, below))
-    assert lost(transfer.prolongation(fine, coarse, scene), fine, coarse) < 1e-13
+    block = read_scene(DEMOS / "strong_law.toml", overrides).domain.build(MPI.COMM_WORLD, dimension)
+    coarser = block.coarser()
+    assert coarser is not None
+    fine, coarse = space_on(block.mesh), space_on(coarser[0].mesh)
+    assert lost(coarser[1].prolongation(fine, coarse), fine, coarse) < 1e-13
 
 
 def lost(step: PETSc.Mat, fine: fem.FunctionSpace, coarse: fem.FunctionSpace, *, linear: bool = False) -> float:
@@ -65,10 +67,6 @@ def lost(step: PETSc.Mat, fine: fem.FunctionSpace, coarse: fem.FunctionSpace, *,
     column = step.createVecRight()
     column.array[:] = known.x.array[: column.local_size]
     return float(np.max(np.abs((step * column).array - interpolated(fine, known))))
-
-
-def space(scene: Scene, dimension: int) -> fem.FunctionSpace:
-    return space_on(scene.domain.build(MPI.COMM_WORLD, dimension).mesh)
 
 
 def space_on(mesh: Mesh) -> fem.FunctionSpace:
@@ -84,31 +82,28 @@ def interpolated(fine: fem.FunctionSpace, known: fem.Function) -> Any:
     return result.x.array[: fine.dofmap.index_map.size_local * fine.dofmap.index_map_bs]
 
 
-def test_odd_and_small_meshes_have_no_ladder() -> None:
+def test_odd_and_small_meshes_have_no_coarser_ones() -> None:
     for cells in ([9, 16], [8, 8], [15, 15]):
-        assert transfer.coarser(read_scene(DEMOS / "strong_law.toml", [f"domain.cells={cells}"])) is None
+        assert block(MPI.COMM_WORLD, [1.0, 1.0], cells).coarser() is None
 
 
 @pytest.mark.parametrize("demo", ["wall_left", "strong_law"])
-@pytest.mark.usefixtures("everything_nested")
 def test_nested_solutions_are_certified(demo: str) -> None:
-    found = workflow.solve(read_scene(DEMOS / f"{demo}.toml", ["domain.cells=[64, 64]"]))
+    found = workflow.solve(read_scene(DEMOS / f"{demo}.toml", ["domain.cells=[64, 64]"]), thresholds=NESTED)
     assert found.converged
     assert found.solve_result is not None
     assert found.solve_result.levels == 3
 
 
-@pytest.mark.usefixtures("everything_nested")
 def test_a_convex_scene_ends_where_the_direct_solve_ends() -> None:
     """Without friction the minimiser is unique, whatever the start and the linear solver."""
     overrides = ["domain.cells=[64, 64]", 'boundary.press.traction=[0.0, "-1e6*(1 - 1.5*x)"]']
     scene = read_scene(DEMOS / "strong_law.toml", [*overrides, 'boundary.floor={on="bottom", contact={gap=0.0}}'])
     direct = scene.with_solver(linear_solver="lu")
-    energies = [workflow.solve(s).examination.energy for s in (scene, direct)]  # type: ignore[union-attr]
+    energies = [workflow.solve(s, thresholds=NESTED).examination.energy for s in (scene, direct)]  # type: ignore[union-attr]
     assert energies[0] == pytest.approx(energies[1], rel=1e-9)
 
 
-@pytest.mark.usefixtures("everything_nested")
 def test_multigrid_iterations_do_not_grow_with_the_mesh() -> None:
     assert [iterations(n) for n in (32, 64, 128)] == pytest.approx([iterations(32)] * 3, abs=2)
 
@@ -116,9 +111,9 @@ def test_multigrid_iterations_do_not_grow_with_the_mesh() -> None:
 def iterations(cells: int) -> int:
     """Of a solve with contact closed, to 1e-8."""
     scene = read_scene(DEMOS / "wall_left.toml", [f"domain.cells=[{cells}, {cells}]", "solver={}"])
-    prepared = workflow.prepare(scene)
-    nested_iteration.solve(scene, prepared.system, Timer(), silent, lambda: False)
-    solver = ActiveSetSolver(prepared.system, LinearSettings("mg"), Timer())
+    prepared = workflow.prepare(scene, thresholds=NESTED)
+    levels = solved_system(prepared).levels
+    solver = ActiveSetSolver(prepared.system, levels, LinearSettings("mg"), Timer())
     laws = [t.law for t in prepared.system.terms]
     solver.held.prepare(held_dofs(prepared.system, laws))
     load, x = prepared.system.load.copy(), prepared.system.load.duplicate()
@@ -128,34 +123,32 @@ def iterations(cells: int) -> int:
 
 
 @pytest.mark.parametrize("kind", ["lu", "gamg", "mg"])
-@pytest.mark.usefixtures("everything_nested")
 def test_a_preconditioner_used_before_is_that_made_anew(kind: linear.Kind) -> None:
     """Factors, levels and prolongations are kept; what was held before must leave no trace in them."""
     used, new = (
-        linear.HeldPreconditioner(on_its_ladder("wall_left", 32), LinearSettings(kind), Timer()) for _ in range(2)
+        linear.HeldPreconditioner(*with_levels("wall_left", 32), LinearSettings(kind), Timer()) for _ in range(2)
     )
-    dofs = used.system.rows.dofs.astype(np.int32)
+    dofs = used.system.jacobian.rows.dofs.astype(np.int32)
     for stiffness, held in ((0.7, dofs[::3]), (0.2, dofs[:20]), (0.9, dofs[:0]), (0.4, dofs[5::2])):
-        used.system.set_rates(tangent(used.system, stiffness))
+        used.system.jacobian.set_rates(tangent(used.system, stiffness))
         used.prepare(held)
-    new.system.set_rates(tangent(new.system, stiffness))
+    new.system.jacobian.set_rates(tangent(new.system, stiffness))
     new.prepare(held)
     right = np.random.default_rng(3).standard_normal(used.system.dofs - len(held))
     found, wanted = (applied(preconditioner, held, right) for preconditioner in (used, new))
     np.testing.assert_allclose(found, wanted, rtol=0, atol=1e-11 * np.max(np.abs(wanted)))
 
 
-def on_its_ladder(demo: str, cells: int) -> System:
-    """A demo on a square of so many cells a side, with the rungs below."""
+def with_levels(demo: str, cells: int) -> tuple[System, Levels]:
+    """A demo on a square of so many cells a side, with its coarser levels."""
     scene = read_scene(DEMOS / f"{demo}.toml", [f"domain.cells=[{cells}, {cells}]"])
-    system = workflow.prepare(scene).system
-    system.below = nested_iteration.hierarchy(scene, system, Timer())
-    return system
+    prepared, control = workflow.prepare(scene, thresholds=NESTED), RunControl(timer=Timer())
+    return prepared.system, hierarchy(prepared.model, prepared.system, prepared.options, control)
 
 
 def tangent(system: System, stiffness: float) -> list[np.ndarray]:
     """K of laws that grow along the part."""
-    return [np.linspace(0, stiffness, len(k))[:, None, None] * np.eye(k.shape[1]) for k in system.rates]
+    return [np.linspace(0, stiffness, len(k))[:, None, None] * np.eye(k.shape[1]) for k in system.jacobian.rates]
 
 
 def applied(preconditioner: linear.HeldPreconditioner, held: np.ndarray, right: np.ndarray) -> np.ndarray:
@@ -168,17 +161,15 @@ def applied(preconditioner: linear.HeldPreconditioner, held: np.ndarray, right: 
 
 
 @pytest.mark.parametrize(("demo", "steady"), [("strong_law", True), ("lift_off", False)])
-@pytest.mark.usefixtures("everything_nested")
 def test_only_what_stood_on_every_rung_is_solved_in_one_step(demo: str, steady: bool) -> None:
     """The floor stays closed and its pieces stand, or the end of contact and the drop move from rung to rung."""
-    found = workflow.solve(read_scene(DEMOS / f"{demo}.toml", ["domain.cells=[128, 128]"]))
+    found = workflow.solve(read_scene(DEMOS / f"{demo}.toml", ["domain.cells=[128, 128]"]), thresholds=NESTED)
     assert found.converged
     assert found.solve_result is not None
     assert found.solve_result.steady is steady
 
 
 @pytest.mark.parametrize("body", [meshes.GOOD, meshes.SLANTED], ids=["straight", "slanted"])
-@pytest.mark.usefixtures("everything_nested")
 def test_a_refined_file_goes_up_the_ladder_of_its_meshes(body: str, tmp_path: Path) -> None:
     """Without friction the minimiser is unique: that of the finest mesh alone, which knows of no ladder, by MUMPS."""
     file = meshes.make(tmp_path / "m.msh", body)
@@ -187,8 +178,9 @@ def test_a_refined_file_goes_up_the_ladder_of_its_meshes(body: str, tmp_path: Pa
         read_scene(DEMOS / "strong_law.toml", [*convex, f'domain={{shape="file", file="{file}", {more}}}', *solver])
         for more, solver in (("refinements=3", []), ("scale=1.0", ['solver={linear_solver="lu"}']))
     )
-    mesh = replace(assemble.mesh(scene, MPI.COMM_WORLD), origin=None)
-    direct, found = workflow.finish(workflow.prepare(alone, body=mesh)), workflow.solve(scene)
+    mesh = replace(scene.domain.build_hierarchy(MPI.COMM_WORLD, 2, NESTED.mesh), coarsening=None)
+    direct = workflow.finish(workflow.prepare(alone, domain=mesh, thresholds=NESTED))
+    found = workflow.solve(scene, thresholds=NESTED)
     assert found.solve_result is not None
     assert found.solve_result.levels > 1
     assert found.dofs == direct.dofs

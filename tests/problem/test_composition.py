@@ -16,13 +16,14 @@ import numpy as np
 import pytest
 from petsc4py import PETSc
 from runs import hvi, summary, write_scene
-from scenes import STEEL, Table, displacement, energy, model, quadratic_linear, solved
+from scenes import STEEL, Table, displacement, energy, model, quadratic_linear, solved, solved_system
 
 from hvi_fenicsx import Scene, prepare
-from hvi_fenicsx.solvers import nested_iteration
-from hvi_fenicsx.solvers.method import SolveResult, silent
+from hvi_fenicsx.solvers import SolveResult
 from hvi_fenicsx.solvers.registry import choose
-from hvi_fenicsx.workflow import Prepared, finish
+from hvi_fenicsx.solvers.thresholds import Thresholds as SolverThresholds
+from hvi_fenicsx.system.thresholds import Thresholds as LinearThresholds
+from hvi_fenicsx.workflow import Preparation, Thresholds, finish
 
 SPRING = {"law": "linear_spring", "stiffness": 1e12}
 LAW = quadratic_linear(1e3)
@@ -100,9 +101,9 @@ def calls(name: str) -> int:
     return int(PETSc.Log.Event(name).getPerfInfo()["count"])
 
 
-def found_by_solver(ready: Prepared) -> SolveResult:
+def found_by_solver(ready: Preparation) -> SolveResult:
     """The solve alone: certificate and error estimate have systems of their own."""
-    return nested_iteration.solve(ready.scene, ready.system, ready.timer, silent, lambda: False)
+    return solved_system(ready).result
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -154,12 +155,12 @@ def test_the_simple_solvers_find_what_the_branch_iteration_finds(name: str) -> N
     assert displacement(one) == pytest.approx(displacement(other), abs=1e-9 * np.abs(displacement(other)).max())
 
 
-def test_a_linear_scene_takes_the_ladder_for_its_multigrid_only(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(nested_iteration, "_WORTHWHILE", 0)
-    monkeypatch.setattr("hvi_fenicsx.system.held_solver._LARGEST_DIRECT", {2: 0, 3: 0})
+def test_a_linear_scene_takes_coarser_levels_for_its_multigrid_only() -> None:
+    never_direct = LinearThresholds(largest_direct={2: 0, 3: 0})
+    nested = Thresholds(solvers=SolverThresholds(nested_from=0, linear=never_direct))
     table = rolling()
     table["domain"]["cells"] = [64, 64]
-    found, direct = solved(table), solved(table | {"solver": {"linear_solver": "lu"}})
+    found, direct = solved(table, nested), solved(table | {"solver": {"linear_solver": "lu"}}, nested)
     assert found.converged
     assert found.solve_result is not None
     assert (found.solve_result.levels, found.solve_result.counts.newton) == (1, 0)
@@ -169,7 +170,7 @@ def test_a_linear_scene_takes_the_ladder_for_its_multigrid_only(monkeypatch: pyt
 
 def test_a_method_that_is_named_is_the_one() -> None:
     ready = prepare(Scene.model_validate(rolling() | {"solver": {"method": "tao"}}))
-    assert choose(ready.scene.solver, ready.system).name == "tao"
+    assert choose(ready.options, ready.system).name == "tao"
 
 
 def test_check_tells_effect_by_effect_what_is_added(tmp_path: Path) -> None:

@@ -16,13 +16,12 @@ import numpy.typing as npt
 import pytest
 from dolfinx import fem
 from enumeration import Floor, Point, polyline
-from scenes import DELTA, Table, block, displacement, energy, far, model, points, quadratic_linear, solved
+from scenes import DELTA, Table, block, context_of, displacement, energy, far, model, points, quadratic_linear, solved
 
 from hvi_fenicsx import Scene, prepare
 from hvi_fenicsx.certify.certificate import Certificate, examine
 from hvi_fenicsx.solvers import registry
-from hvi_fenicsx.solvers.method import silent
-from hvi_fenicsx.workflow import Prepared
+from hvi_fenicsx.workflow import Preparation
 
 Array = npt.NDArray[np.float64]
 Graph = list[tuple[float, float]]
@@ -93,7 +92,7 @@ everywhere = pytest.mark.parametrize("case", CASES, ids=str)
 
 
 @functools.cache
-def prepared(case: Case) -> Prepared:
+def prepared(case: Case) -> Preparation:
     return prepare(Scene.model_validate(case.scene(tolerance=TOLERANCE)))
 
 
@@ -169,10 +168,10 @@ def test_from_the_wrong_branch_the_solver_ends_in_the_list(case: Case) -> None:
 def reached(case: Case, u: Array) -> list[Point]:
     """The points of the list that the solver reaches from a start."""
     ready = prepared(case)
-    method = registry.create(ready.scene.solver, ready.system, ready.timer, silent, lambda: False)
+    method = registry.choose(ready.options, ready.system)(context_of(ready))
     start = ready.system.load.duplicate()
     start.array[:] = as_function(case, u).x.array
-    found = method.solve(start)  # type: ignore[call-arg]
+    found = method.solve(start)
     assert found.converged
     end = found.u.x.array.reshape(-1, 2) * ready.problem.scales.displacement
     return listed(case, ready.problem.space.tabulate_dof_coordinates()[:, :2], end)

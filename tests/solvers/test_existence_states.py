@@ -13,8 +13,9 @@ from scenes import DELTA, P, Q, Table, block, displacement, model, points, quadr
 
 from hvi_fenicsx import Scene, rigid, solve, workflow
 from hvi_fenicsx.cli import main
-from hvi_fenicsx.solvers import auto
+from hvi_fenicsx.solvers.thresholds import Thresholds as SolverThresholds
 from hvi_fenicsx.system import boundedness, existence
+from hvi_fenicsx.workflow import Thresholds
 
 GAMMA = 1.0e6
 LAW = quadratic_linear(GAMMA)
@@ -167,13 +168,13 @@ def test_a_convex_step_has_a_solution_as_long_as_its_branch_bears_the_push(
     assert boundedness.slides(prepared.problem, prepared.system.forces, [term.law], xi) == expected
 
 
-def test_the_search_for_an_equilibrium_that_need_not_exist_ends(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(auto, "_BUDGET", 3)
-    found = solved(block(3, 0.97 * GAMMA, Q, LAW))
+def test_the_search_for_an_equilibrium_that_need_not_exist_ends() -> None:
+    brief = Thresholds(solvers=SolverThresholds(search_steps=3))
+    found = solved(block(3, 0.97 * GAMMA, Q, LAW), brief)
     assert found.solvability.state == "metastable"
     assert found.exit_code == 4
     assert "no equilibrium found in 3 Newton steps" in found.reason
-    assert solved(block(3, 0.45 * GAMMA, Q, LAW)).converged  # held: no such limit
+    assert solved(block(3, 0.45 * GAMMA, Q, LAW), brief).converged  # held: no such limit
 
 
 @pytest.mark.parametrize("gap", [-1e-3, "-1e-3*x", "-1e-3*(1 + x)"])

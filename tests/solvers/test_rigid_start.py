@@ -10,12 +10,10 @@ import pytest
 from dolfinx import fem
 from mpi4py import MPI
 from runs import on_ranks
+from scenes import context_of
 
 from hvi_fenicsx import Scene, prepare, solve
-from hvi_fenicsx.runtime.timing import Timer
-from hvi_fenicsx.solvers.active_set import ActiveSetSolver
-from hvi_fenicsx.solvers.rigid_start import settled
-from hvi_fenicsx.system.held_solver import LinearSettings
+from hvi_fenicsx.solvers.rigid_start import at_rest
 
 WEIGHT = 8.0e4
 FLOOR = {"point": [0.0, 0.0], "normal": [0.0, 1.0]}
@@ -63,21 +61,21 @@ def test_a_body_that_rolls_comes_to_rest(case: tuple[str, float, float, float]) 
     assert found.exit_code == 0, found.reason
 
 
-def test_a_settled_body_is_borne_by_as_many_vertices_as_it_has_motions() -> None:
+def test_a_body_at_rest_is_borne_by_as_many_vertices_as_it_has_motions() -> None:
     """Their reactions push, and carry all of its weight."""
-    system = prepare(rolling("none", 0.1, 0.02, 2e4), MPI.COMM_SELF).system
-    rested = settled(ActiveSetSolver(system, LinearSettings("lu"), Timer()), lambda _: [], 1e-10)
+    prepared = prepare(rolling("none", 0.1, 0.02, 2e4), MPI.COMM_SELF)
+    system, rested = prepared.system, at_rest(context_of(prepared), lambda _: [], 1e-10)
     assert rested is not None
     residual = system.load.duplicate()
     system.residual(rested[0], residual, [])
-    forces = residual.array_r[system.rows.dofs]
+    forces = residual.array_r[system.jacobian.rows.dofs]
     bearing = np.flatnonzero(np.abs(forces) > 1e-6 * np.max(np.abs(forces)))
     assert len(bearing) == 2
     assert np.all(forces[bearing] > 0)
     field = fem.Function(system.problem.space)
     field.x.array[1::2] = 1.0
     lift = system.unknowns(field)
-    carried = forces[bearing] @ lift.array_r[system.rows.dofs[bearing]]
+    carried = forces[bearing] @ lift.array_r[system.jacobian.rows.dofs[bearing]]
     assert carried == pytest.approx(-float(system.load.dot(lift)), rel=1e-8)
 
 

@@ -22,8 +22,10 @@ from runs import command, hvi, write_scene
 from scenes import model, quadratic_linear
 
 from hvi_fenicsx import InputError, Scene, Solution, compat, solve
-from hvi_fenicsx.mesh import domain, refinement, transfer
+from hvi_fenicsx.mesh import refinement
+from hvi_fenicsx.mesh.domain import Domain
 from hvi_fenicsx.mesh.shapes import Rectangle
+from hvi_fenicsx.mesh.transfer import GridTransfer
 from hvi_fenicsx.results import gathering
 from hvi_fenicsx.studies import cost, interpolation, meshes, plan, reference, sentences, table
 from hvi_fenicsx.studies.errors import QUANTITIES, Yardstick
@@ -74,7 +76,7 @@ def test_interpolation_between_nested_meshes_is_the_ladders_prolongation(shape: 
         fem.functionspace(s.domain.build(MPI.COMM_SELF, s.dimension).mesh, ("Lagrange", 1, (s.dimension,)))
         for s in (fine, coarse)
     ]
-    step = transfer.prolongation(*spaces, fine)
+    step = GridTransfer(size, cells).prolongation(*spaces)
     d = fine.dimension
     points = [s.tabulate_dof_coordinates()[:, :d] for s in spaces]
     source = SolutionFields(points[1], spaces[1].dofmap.list.astype(np.int64), np.zeros_like(points[1]), {})
@@ -299,7 +301,7 @@ def scene_of(shape: str, size: tuple[float, ...]) -> Any:
     return Scene.model_validate({"domain": table, "material": steel, "boundary": {}}).domain
 
 
-def cells_of(body: domain.Domain) -> tuple[Array, Integers]:
+def cells_of(body: Domain) -> tuple[Array, Integers]:
     return body.mesh.geometry.x[:, : body.dimension], compat.geometry_dofmap(body.mesh).astype(np.int64)
 
 

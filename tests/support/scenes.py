@@ -8,6 +8,13 @@ import numpy as np
 import numpy.typing as npt
 
 from hvi_fenicsx import Scene, Solution, solve
+from hvi_fenicsx.runtime.timing import Timer
+from hvi_fenicsx.solvers import nested_iteration
+from hvi_fenicsx.solvers.context import RunControl, SolveContext
+from hvi_fenicsx.solvers.nested_iteration import LevelSolution
+from hvi_fenicsx.solvers.thresholds import Thresholds as SolverThresholds
+from hvi_fenicsx.system.thresholds import Thresholds as LinearThresholds
+from hvi_fenicsx.workflow import DEFAULT, Preparation, Thresholds
 
 Array = npt.NDArray[np.float64]
 Table = dict[str, Any]
@@ -45,9 +52,27 @@ def block(cells: int = 3, push: float = P, press: float = Q, friction: Table | N
     return table
 
 
-def solved(table: Table) -> Solution:
+NESTED = Thresholds(
+    solvers=SolverThresholds(nested_from=1_000, linear=LinearThresholds(largest_direct={2: 1_000, 3: 1_000}))
+)
+"""Small meshes have coarser levels too, and take their multigrid."""
+
+
+def solved(table: Table, thresholds: Thresholds = DEFAULT) -> Solution:
     """The solution of a scene given as tables."""
-    return solve(Scene.model_validate(table))
+    return solve(Scene.model_validate(table), thresholds=thresholds)
+
+
+def solved_system(prepared: Preparation) -> LevelSolution:
+    """The solve alone, without certificate and estimate."""
+    control = RunControl(timer=Timer())
+    return nested_iteration.solve(prepared.model, prepared.system, prepared.solvability, prepared.options, control)
+
+
+def context_of(prepared: Preparation) -> SolveContext:
+    """What a method is given, without coarser levels."""
+    control = RunControl(timer=Timer())
+    return SolveContext.create(prepared.system, (), prepared.solvability, prepared.options, control)
 
 
 def points(solution: Solution) -> Array:

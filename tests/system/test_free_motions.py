@@ -147,12 +147,12 @@ def test_the_null_space_is_attached_to_the_matrix() -> None:
     """PETSc's own test: the attached vectors are orthonormal and J takes them to zero."""
     prepared = prepare(Scene.model_validate(stressed(2, 4, PLANE)))
     system = prepared.system
-    assert isinstance(system.matrix.getNullSpace(), PETSc.NullSpace)
-    assert system.matrix.getNullSpace().test(system.matrix)
-    assert len(system.matrix.getNullSpace().getVecs()) == 3
+    assert isinstance(system.jacobian.matrix.getNullSpace(), PETSc.NullSpace)
+    assert system.jacobian.matrix.getNullSpace().test(system.jacobian.matrix)
+    assert len(system.jacobian.matrix.getNullSpace().getVecs()) == 3
     held = prepare(Scene.model_validate(block(3, 0.2e6, Q, quadratic_linear(1e6))))
     assert held.system.freedom is None
-    assert held.system.matrix.getNullSpace().handle == 0
+    assert held.system.jacobian.matrix.getNullSpace().handle == 0
 
 
 @pytest.mark.parametrize("method", ["auto", "branch", "snes_vi", "condensed"])

@@ -11,9 +11,12 @@ from scenes import DELTA, displacement, model, quadratic_linear, solved
 from hvi_fenicsx import Scene, prepare
 from hvi_fenicsx.runtime.timing import Timer
 from hvi_fenicsx.solvers.active_set import ActiveSetSolver, Outcome
+from hvi_fenicsx.solvers.thresholds import Thresholds as SolverThresholds
 from hvi_fenicsx.system import schur
 from hvi_fenicsx.system.held_solver import HeldPreconditioner, LinearSettings
 from hvi_fenicsx.system.system import System
+from hvi_fenicsx.system.thresholds import Thresholds as LinearThresholds
+from hvi_fenicsx.workflow import Thresholds
 
 DIRECT = LinearSettings("lu")
 STRONG = quadratic_linear(3e6, DELTA)
@@ -27,12 +30,15 @@ def assembled(cells: int = 8) -> System:
 def test_condensed_it_solves_what_a_factorisation_of_the_whole_solves(every: int) -> None:
     """With a tangent, and with all, some or hardly any unknowns of Γc held."""
     system, generator = assembled(), np.random.default_rng(1)
-    system.set_rates([np.eye(k.shape[1]) * generator.random((len(k), 1, 1)) for k in system.rates])
-    held = system.rows.dofs[1::every].astype(np.int32)
+    system.jacobian.set_rates([np.eye(k.shape[1]) * generator.random((len(k), 1, 1)) for k in system.jacobian.rates])
+    held = system.jacobian.rows.dofs[1::every].astype(np.int32)
     load, expected, found = (system.load.duplicate() for _ in range(3))
     load.array[:] = generator.standard_normal(load.local_size)
     expected.set(0.0)
-    whole, condensed = HeldPreconditioner(system, DIRECT, Timer()), schur.SchurDirect(system, {"pc_type": "cholesky"})
+    whole, condensed = (
+        HeldPreconditioner(system, (), DIRECT, Timer()),
+        schur.SchurDirect(system, {"pc_type": "cholesky"}),
+    )
     whole.prepare(held)
     whole.solve(load, expected, 1e-12)
     condensed.prepare(held)
@@ -47,8 +53,8 @@ def test_a_run_that_condenses_ends_where_one_that_does_not_ends(monkeypatch: pyt
     monkeypatch.setattr(schur.SchurDirect, "__init__", lambda self, *args: (made.append(self), begin(self, *args))[1])
     found: list[npt.NDArray[np.float64]] = []
     for worth in (0, 1_000):  # never; from the second factorisation on
-        monkeypatch.setattr(schur, "_WORTH", worth)
-        found.append(displacement(solved(model(16, 6e6, friction=STRONG, linear_solver="lu"))))
+        thresholds = Thresholds(solvers=SolverThresholds(linear=LinearThresholds(condensing=worth)))
+        found.append(displacement(solved(model(16, 6e6, friction=STRONG, linear_solver="lu"), thresholds)))
     assert len(made) == 1
     assert np.max(np.abs(found[1] - found[0])) < 1e-9 * np.max(np.abs(found[0]))
 
@@ -56,7 +62,7 @@ def test_a_run_that_condenses_ends_where_one_that_does_not_ends(monkeypatch: pyt
 def test_rounding_of_the_bodys_forces_is_no_excuse_for_a_wrong_traction() -> None:
     """A residual under the larger floor, but over the floor of its own, has not converged."""
     system = assembled()
-    solver = ActiveSetSolver(system, DIRECT, Timer())
+    solver = ActiveSetSolver(system, (), DIRECT, Timer())
     x, noise = system.load.duplicate(), system.load.duplicate()
     x.array[:] = np.random.default_rng(2).standard_normal(x.local_size)
     system.rounding(x, noise)

@@ -18,8 +18,8 @@ from petsc4py import PETSc
 from scenes import DELTA, NU, E, P, Q, Table, block, energy, model, quadratic_linear, solved
 
 from hvi_fenicsx import Scene, Superpotential, prepare
-from hvi_fenicsx.mesh import domain, vertex_dofs
-from hvi_fenicsx.workflow import Prepared
+from hvi_fenicsx.mesh import blocks, vertex_dofs
+from hvi_fenicsx.workflow import Preparation
 
 Array = npt.NDArray[np.float64]
 STRONG = quadratic_linear(3e6)
@@ -47,11 +47,11 @@ class Smooth:
         return self.law.convex.second(x) - self.law.concave.second(x)
 
 
-def ready(table: Table) -> Prepared:
+def ready(table: Table) -> Preparation:
     return prepare(Scene.model_validate(table))
 
 
-def random_state(prepared: Prepared, seed: int = 1) -> PETSc.Vec:
+def random_state(prepared: Preparation, seed: int = 1) -> PETSc.Vec:
     """Slips on all pieces of the law, and between them."""
     x = prepared.system.load.duplicate()
     x.array[:] = (
@@ -60,7 +60,7 @@ def random_state(prepared: Prepared, seed: int = 1) -> PETSc.Vec:
     return x
 
 
-def residual(prepared: Prepared, x: PETSc.Vec, models: list[Any]) -> Array:
+def residual(prepared: Preparation, x: PETSc.Vec, models: list[Any]) -> Array:
     out = prepared.system.load.duplicate()
     prepared.system.residual(x, out, models)
     found: Array = out.array_r.copy()
@@ -73,7 +73,7 @@ def moved(x: PETSc.Vec, step: Array) -> PETSc.Vec:
     return y
 
 
-def free(prepared: Prepared) -> npt.NDArray[np.bool_]:
+def free(prepared: Preparation) -> npt.NDArray[np.bool_]:
     return ~np.isin(np.arange(prepared.system.load.local_size), prepared.problem.fixed)
 
 
@@ -95,12 +95,12 @@ def test_the_matrix_is_the_derivative_of_the_residual(name: str) -> None:
     prepared = ready(model(4, 3e6, 1e6, STRONG, **SMOOTHED[name]))
     system = prepared.system
     models = [Smooth(t.law) for t in system.terms]
-    system.set_rates(system.tangents(random_state(prepared, 5), models))
+    system.jacobian.set_rates(system.tangents(random_state(prepared, 5), models))
     x, h = random_state(prepared), 1e-7
-    system.set_rates(system.tangents(x, models))
+    system.jacobian.set_rates(system.tangents(x, models))
     for seed in range(5):
         direction = np.random.default_rng(seed).normal(size=x.local_size) * free(prepared)
-        product = system.matrix * moved(0.0 * x, direction)
+        product = system.jacobian.matrix * moved(0.0 * x, direction)
         difference = residual(prepared, moved(x, h * direction), models) - residual(
             prepared, moved(x, -h * direction), models
         )
@@ -159,12 +159,12 @@ def test_weights_in_space_add_up_to_the_area() -> None:
 
 def test_vertices_are_where_dolfinx_tabulates_them() -> None:
     for size in ([3.0, 0.7], [1.0, 2.0, 3.0]):
-        space = fem.functionspace(domain.block(MPI.COMM_SELF, size, [5, 4, 3][: len(size)]).mesh, ("Lagrange", 1))
+        space = fem.functionspace(blocks.block(MPI.COMM_SELF, size, [5, 4, 3][: len(size)]).mesh, ("Lagrange", 1))
         np.testing.assert_allclose(vertex_dofs.points(space), space.tabulate_dof_coordinates(), rtol=0, atol=1e-15)
 
 
 def test_the_sides_of_a_box_are_where_they_are_said_to_be() -> None:
-    body = domain.block(MPI.COMM_SELF, [1.0, 2.0, 3.0], [1, 1, 1])
+    body = blocks.block(MPI.COMM_SELF, [1.0, 2.0, 3.0], [1, 1, 1])
     x = body.mesh.geometry.x
     body.mesh.topology.create_connectivity(2, 0)
     wanted = {"left": (0, 0), "right": (0, 1), "front": (1, 0), "back": (1, 2), "bottom": (2, 0), "top": (2, 3)}
@@ -232,5 +232,5 @@ def test_a_free_block_has_all_rigid_motions_in_its_near_null_space() -> None:
     vectors = system.near_null.getVecs()
     assert len(vectors) == 3
     for vector in vectors:
-        assert (system.matrix * vector).norm() < 1e-12
+        assert (system.jacobian.matrix * vector).norm() < 1e-12
         assert vector.norm() == pytest.approx(1.0)

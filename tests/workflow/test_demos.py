@@ -164,7 +164,7 @@ def giving(broken: int) -> float:
     del scene["boundary"]["ground"]
     ready = prepare(Scene.model_validate(scene))
     system, scales = ready.system, ready.problem.scales
-    rows, columns, values = system.matrix.getValuesCSR()
+    rows, columns, values = system.jacobian.matrix.getValuesCSR()
     place = ready.problem.space.tabulate_dof_coordinates()
     ground = np.flatnonzero(place[:, 1] == 0.0)
     ground = ground[np.argsort(place[ground, 0])]

@@ -14,6 +14,7 @@ from dolfinx import fem, la
 from ...effects import Direction
 from ...problem.problem import Problem
 from ...runtime.mpi import total
+from ...system.levels import Levels
 from ...system.system import System
 from ...typing import Array
 from ..certificate import Examination
@@ -41,15 +42,18 @@ class OnContact:
     moved: fem.Function
 
 
-def on_contact(system: System, u: fem.Function, examination: Examination) -> OnContact:
+def on_contact(system: System, levels: Levels, u: fem.Function, examination: Examination) -> OnContact:
     """Estimate the errors of slip and -σ_t, what smoothing changes included. Collective.
 
     Args:
-        system, u, examination: as in :func:`.estimate`.
+        system: what was solved.
+        levels: its coarser levels; none where there is no mesh hierarchy.
+        u: its solution, nondimensional, ghosts updated.
+        examination: of the same u.
 
     Nearly incompressible regions are not for this: their averaged pressure is not in the bubbles' force.
     """
-    inverse = Dual(system, u)
+    inverse = Dual(system, levels, u)
     change = _change(system, u, examination, inverse)
     unsure = _unsure(system.problem, u, examination, inverse, change)
     inverse.destroy()

@@ -17,6 +17,7 @@ from ...problem.vectors import new_vector, turn
 from ...runtime.mpi import total
 from ...runtime.timing import Timer
 from ...system.held_solver import HeldPreconditioner, LinearSettings
+from ...system.levels import Levels
 from ...system.system import System
 from ...typing import Array, Entities, Integers
 from .. import contact_state
@@ -35,12 +36,12 @@ class Dual:
     Laws add the rising part of their tangent, so that the body they hold has no free motion. Creation is collective.
     """
 
-    def __init__(self, system: System, u: fem.Function) -> None:
-        self.system, self._before = system, system.rates
+    def __init__(self, system: System, levels: Levels, u: fem.Function) -> None:
+        self.system, self._before = system, system.jacobian.rates
         x = system.unknowns(u)
         self.held = _held(system, x)
-        system.set_rates([_rising(term, x.array_r) for term in system.terms])
-        self._inverse = HeldPreconditioner(system, LinearSettings.choose(system), Timer())
+        system.jacobian.set_rates([_rising(term, x.array_r) for term in system.terms])
+        self._inverse = HeldPreconditioner(system, levels, LinearSettings.choose(system, levels=bool(levels)), Timer())
         self._inverse.prepare(self.held)
 
     def solve(self, functional: Array) -> tuple[fem.Function, float]:
@@ -65,7 +66,7 @@ class Dual:
     def destroy(self) -> None:
         """Free the preconditioner and put the tangent back that was there. Collective."""
         self._inverse.destroy()
-        self.system.set_rates(self._before)
+        self.system.jacobian.set_rates(self._before)
 
 
 def _held(system: System, x: PETSc.Vec) -> Entities:

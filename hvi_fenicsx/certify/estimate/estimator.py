@@ -14,6 +14,7 @@ from dolfinx import fem
 
 from ...problem.problem import Problem
 from ...runtime.mpi import total
+from ...system.levels import Levels
 from ...system.system import System
 from ...typing import Array
 from ..certificate import Examination
@@ -56,15 +57,18 @@ class Estimate:
         return {name: float(getattr(self, name)) for name in names}
 
 
-def estimate(system: System, u: fem.Function, examination: Examination) -> Estimate:
+def estimate(system: System, levels: Levels, u: fem.Function, examination: Examination) -> Estimate:
     """Estimate the error of a displacement. Collective.
 
     Args:
-        system: what was solved. u: its solution, nondimensional, ghosts updated. examination: of the same u.
+        system: what was solved.
+        levels: its coarser levels; none where there is no mesh hierarchy.
+        u: its solution, nondimensional, ghosts updated.
+        examination: of the same u.
     """
     problem = system.problem
     cells, unmet = _between_vertices(problem, u, examination)
-    inverse = dual_norm.Dual(system, u)
+    inverse = dual_norm.Dual(system, levels, u)
     if problem.terms:
         cells += problem.bulk.energy_by_cell(inverse.solve(unmet)[0])
     smoothing = inverse.solve(dual_norm.smoothing(problem, examination.states))[1] if _smoothed(problem) else 0.0

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from mpi4py import MPI
 
     from ..domain import Domain
+    from ..thresholds import Thresholds as MeshThresholds
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,6 +86,21 @@ class DomainShape(Table):
         Raises:
             InputError: on all ranks alike, when the mesh cannot be made, or memory cannot suffice.
         """
+
+    def build_hierarchy(self, comm: MPI.Comm, dimension: int, thresholds: MeshThresholds) -> Domain:
+        """The meshed body with coarser meshes below it, where it is large enough for that to pay. Collective.
+
+        Args:
+            comm: the ranks that share the mesh.
+            dimension: of the scene, 2 or 3.
+            thresholds: when coarser meshes are made, and which are used.
+
+        Raises:
+            InputError: on all ranks alike, when the mesh cannot be made, or memory cannot suffice.
+        """
+        from ..hierarchy import with_hierarchy
+
+        return with_hierarchy(self.build(comm, dimension), thresholds)
 
     @abstractmethod
     def coarsest(self, thresholds: Thresholds = DEFAULT) -> Self:

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from mpi4py import MPI
 
     from ..domain import Domain
+    from ..thresholds import Thresholds as MeshThresholds
 
 _MOST_UNKNOWNS = 2**31 - 1
 """What PETSc's default integers can number."""
@@ -44,10 +45,14 @@ class Block(DomainShape):
 
     def build(self, comm: MPI.Comm, dimension: int) -> Domain:
         """The block in triangles or tetrahedra. Collective."""
-        from .. import domain
+        from .. import blocks, domain
 
         domain.check_affordable(comm, self._unknowns(), "cells")
-        return domain.block(comm, self.size, self.cells)
+        return blocks.block(comm, self.size, self.cells)
+
+    def build_hierarchy(self, comm: MPI.Comm, dimension: int, thresholds: MeshThresholds) -> Domain:
+        """The block, which has coarser ones of its own. Collective."""
+        return self.build(comm, dimension)
 
     def coarsest(self, thresholds: Thresholds = DEFAULT) -> Self:
         """The block with its cells halved as long as enough are left each way."""

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from mpi4py import MPI
 
     from ..domain import Domain
+    from ..thresholds import Thresholds as MeshThresholds
 
 MOST_REFINEMENTS = 10
 """A million cells or more from each of the mesh's own."""
@@ -30,6 +31,12 @@ class FixedMesh(DomainShape):
 
     if TYPE_CHECKING:  # each shape says where it stands among its keys
         refinements: int
+
+    def build_hierarchy(self, comm: MPI.Comm, dimension: int, thresholds: MeshThresholds) -> Domain:
+        """The mesh refined so often, with coarser meshes below it. Collective."""
+        from .. import refinement
+
+        return refinement.repeated(super().build_hierarchy(comm, dimension, thresholds), self.refinements)
 
     def coarsest(self, thresholds: Thresholds = DEFAULT) -> Self:
         """The mesh as it is given."""
@@ -86,9 +93,9 @@ class MeshFile(FixedMesh):
 
     def build(self, comm: MPI.Comm, dimension: int) -> Domain:
         """The mesh of the file, unrefined. Collective."""
-        from .. import domain
+        from .. import gmsh_file
 
-        return domain.from_file(comm, self.file, dimension, self.scale)
+        return gmsh_file.read(comm, self.file, dimension, self.scale)
 
     def files(self) -> tuple[Path, ...]:
         """The mesh file."""

@@ -1,0 +1,62 @@
+"""What a method found, and the iterations that it took."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from dolfinx import fem
+
+from .active_set import Outcome
+
+
+@dataclass
+class Counts:
+    """Iterations spent.
+
+    Attributes:
+        newton: Newton steps.
+        linear: iterations of linear solvers.
+        branch: convex steps.
+    """
+
+    newton: int = 0
+    linear: int = 0
+    branch: int = 0
+
+    def spend(self, step: Outcome) -> None:
+        """Count one solve of the active set solver in."""
+        self.newton += step.newton
+        self.linear += step.linear
+
+    def add(self, other: Counts) -> None:
+        """Count another method's in."""
+        self.newton += other.newton
+        self.linear += other.linear
+        self.branch += other.branch
+
+
+@dataclass(frozen=True, kw_only=True)
+class SolveResult:
+    """What a method found.
+
+    Attributes:
+        u: the displacement in units of u0, ghosts updated.
+        method: its name.
+        converged: by the method's own test.
+        reason: in words.
+        counts: iterations.
+        energies: after each convex step, nondimensional.
+        interrupted: whether it ended because it was asked to.
+        levels: levels of the mesh hierarchy that it went up.
+        steady: whether the pieces and the active set that it began with stood, on every level.
+    """
+
+    u: fem.Function
+    method: str
+    converged: bool
+    reason: str
+    counts: Counts = field(default_factory=Counts)
+    energies: tuple[float, ...] = ()
+    interrupted: bool = False
+    levels: int = 1
+    steady: bool = False

@@ -1,0 +1,75 @@
+"""What PETSc's SNES VI sees of the matrix and of the preconditioner, which both stay at full size."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from petsc4py import PETSc
+
+from ..system.held_solver import HeldPreconditioner
+from ..typing import Entities
+
+
+def unextracted(held: HeldPreconditioner) -> PETSc.Mat:
+    """J as SNES VI sees it: its inactive part is multiplied at full size instead of being copied out."""
+    sizes = held.system.jacobian.matrix.getSizes()
+    matrix = PETSc.Mat().createPython(sizes, _Whole(held), comm=held.system.comm)
+    matrix.setUp()
+    return matrix
+
+
+class _Whole:
+    """PETSc's view of J, which is symmetric."""
+
+    def __init__(self, held: HeldPreconditioner) -> None:
+        self._held = held
+
+    def mult(self, _: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        """Y = J x, where a line search that fails looks for a stationary point of the residual's norm. Collective."""
+        self._held.system.jacobian.matrix.mult(x, y)
+
+    multTranspose = mult
+
+    def createSubMatrix(self, _: PETSc.Mat, rows: PETSc.IS, columns: PETSc.IS, into: PETSc.Mat | None) -> PETSc.Mat:
+        """The rows and columns of the inactive dofs. Collective."""
+        self._held.select(rows)
+        sizes = (rows.getLocalSize(), rows.getSize())
+        matrix = PETSc.Mat().createPython((sizes, sizes), _Reduced(self._held), comm=rows.comm)
+        matrix.setUp()
+        return matrix
+
+
+class _Reduced:
+    """PETSc's view of J on the inactive dofs of a step."""
+
+    def __init__(self, held: HeldPreconditioner) -> None:
+        self._held = held
+
+    def mult(self, _: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        """Y = J x. Collective."""
+        self._held.multiply_reduced(x, y)
+
+
+class ReducedPreconditioner:
+    """PETSc's view of :class:`HeldPreconditioner` on the inactive dofs of a SNES VI step."""
+
+    def __init__(self, snes: PETSc.SNES, held: HeldPreconditioner, accuracy: Callable[..., float]) -> None:
+        self._snes, self._held, self._accuracy = snes, held, accuracy
+        self._active: Entities | None = None
+
+    def setUp(self, pc: PETSc.PC) -> None:
+        """Take the active dofs of this step and prepare for them."""
+        start, end = self._held.system.load.owner_range
+        active = np.ones(end - start, dtype=bool)
+        active[self._snes.getVIInactiveSet().getIndices() - start] = False
+        found = np.flatnonzero(active).astype(np.int32)
+        moved = self._active is not None and not np.array_equal(found, self._active)
+        moved = bool(self._held.system.comm.allreduce(moved))
+        self._snes.getKSP().setTolerances(rtol=self._accuracy(moved=moved))
+        self._active = found
+        self._held.prepare(found)
+
+    def apply(self, pc: PETSc.PC, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        """Y = P^-1 x on the inactive dofs."""
+        self._held.apply_reduced(x, y)

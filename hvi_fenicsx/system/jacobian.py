@@ -1,0 +1,84 @@
+"""The matrix of a nonlinear solve: the bulk stiffness with the laws' tangent, and what a step holds.
+
+J = A + W K + H, symmetric. Laws and active sets touch only the diagonal blocks of Γc's vertices (:mod:`.contact_rows`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from ..problem.law_term import LawTerm
+from ..problem.problem import Bounds
+from ..typing import Array, Entities
+from .contact_rows import ContactRows
+
+
+class Jacobian:
+    """J = A + W K + H of one system. Creation is collective; it owns the matrix.
+
+    Attributes:
+        matrix: J; Dirichlet rows and columns are those of the identity; block size d.
+        rows: the rows of Γc.
+        held: the unknowns of Γc (local, owned, sorted) that J holds.
+    """
+
+    def __init__(self, stiffness: PETSc.Mat, terms: Sequence[LawTerm], bounds: Sequence[Bounds]) -> None:
+        self.matrix, self._terms = stiffness, tuple(terms)
+        self.rows = ContactRows(stiffness, [*(t.surface for t in terms), *(b.surface for b in bounds)])
+        self._rates = [np.zeros((*t.free.shape, t.free.shape[1])) for t in terms]
+        self.held: Entities = np.empty(0, np.int32)
+        self._comm = stiffness.comm.tompi4py()
+
+    @property
+    def rates(self) -> list[Array]:
+        """A copy of the K in force, (m, d, d) by term."""
+        return [k.copy() for k in self._rates]
+
+    def set_rates(self, rates: Sequence[Array]) -> None:
+        """Make K, (m, d, d) by term, the tangent in force, with nothing held. Collective."""
+        changed = any(bool(np.any(new != old)) for new, old in zip(rates, self._rates, strict=True))
+        if self._comm.allreduce(changed, op=MPI.LOR):
+            self._rates = [k.copy() for k in rates]
+            self.rows.set_tangent(self._terms, rates)
+            self._write(np.empty(0, np.int32))
+        else:
+            self.hold(np.empty(0, np.int32))
+
+    def hold(self, held: Entities) -> None:
+        """Hold these unknowns of Γc (local, owned, sorted) where a solve finds them, and no others. Collective."""
+        if self._comm.allreduce(not np.array_equal(held, self.held), op=MPI.LOR):
+            self._write(held)
+
+    def take(self, tangent: Array, held: Entities) -> None:
+        """Take the tangent of a finer level, restricted. Collective.
+
+        Args:
+            tangent: W K at the vertices of Γc, (m, d, d).
+            held: unknowns to hold (local, owned, sorted).
+        """
+        changed = not (np.array_equal(tangent, self.rows.tangent) and np.array_equal(held, self.held))
+        if self._comm.allreduce(changed, op=MPI.LOR):
+            self.rows.tangent[:] = tangent
+            self._rates = [np.full_like(k, np.nan) for k in self._rates]  # its own are no longer in force
+            self._write(held)
+
+    def _write(self, held: Entities) -> None:
+        self.rows.write(self.matrix, held)
+        self.held = held.copy()
+
+    def drift(self, rates: Sequence[Array]) -> float:
+        """Largest nodal stiffness (an elastic one is about 1) by which this rank's K differs from ``rates``."""
+        changes = (
+            float(np.max(np.abs(new - old) * term.surface.weights[:, None, None], initial=0.0))
+            for term, new, old in zip(self._terms, self._rates, rates, strict=True)
+        )
+        return max(changes, default=0.0)
+
+    def elastic_product(self, x: PETSc.Vec, out: PETSc.Vec) -> None:
+        """A x into ``out``: by J, but by A's own rows where they differ. Collective."""
+        self.matrix.mult(x, out)
+        self.rows.overwrite(x, out)
