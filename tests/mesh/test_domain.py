@@ -13,7 +13,7 @@ from runs import contact, hvi, summary, write_scene
 from scenes import NU, STEEL, E, P, Q, Table, displacement, energy, far, model, points, quadratic_linear, solved
 
 from hvi_fenicsx import InputError
-from hvi_fenicsx.mesh import domain
+from hvi_fenicsx.mesh import gmsh_file
 
 
 def on_file(file: Path, table: Table, **domain: Any) -> Table:
@@ -131,5 +131,5 @@ def test_a_broken_file_does_not_spoil_the_next(tmp_path: Path) -> None:
     broken.write_text("Point(1) = {0, 0, 0 this is broken; letters\nfoo bar {")
     good = Path(__file__).parents[2] / "demos" / "thermal_bar.geo"
     with pytest.raises(InputError, match="gmsh cannot read it"):
-        domain.from_file(MPI.COMM_WORLD, broken, 2)
-    assert domain.from_file(MPI.COMM_WORLD, good, 2).regions
+        gmsh_file.read(MPI.COMM_WORLD, broken, 2)
+    assert gmsh_file.read(MPI.COMM_WORLD, good, 2).regions
