@@ -223,14 +223,8 @@ def test_cells_add_up_and_find_the_corner() -> None:
 
 def test_a_run_says_it(tmp_path: Path) -> None:
     scene = write_scene(tmp_path / "scene.toml", LIFTED)
-    records = []
-    for ranks in (1, 2, 3):
-        out = tmp_path / str(ranks)
-        done = hvi("run", scene, "--out", out, "--no-pictures", ranks=ranks)
-        assert done.returncode == 0, done.stderr
-        assert "estimated error" in done.stdout
-        records.append(summary(out)["estimate"])
-    for record in records[1:]:
-        for name in ("relative", "discretisation", "energy_norm"):
-            assert record[name] == pytest.approx(records[0][name], rel=1e-10)
-    assert records[0]["total"] / records[0]["energy_norm"] == pytest.approx(records[0]["relative"])
+    done = hvi("run", scene, "--out", tmp_path / "r", "--no-pictures")
+    assert done.returncode == 0, done.stderr
+    assert "estimated error" in done.stdout
+    record = summary(tmp_path / "r")["estimate"]
+    assert record["total"] / record["energy_norm"] == pytest.approx(record["relative"])

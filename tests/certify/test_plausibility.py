@@ -106,7 +106,7 @@ def test_a_weak_law_that_alone_holds_the_body_does_matter() -> None:
 
 def test_it_is_said_everywhere(tmp_path: Path) -> None:
     path = write_scene(tmp_path / "s.toml", material(model(), youngs_modulus=2.15e5))
-    done = hvi("run", path, "--out", tmp_path / "r", "--no-pictures", ranks=2)
+    done = hvi("run", path, "--out", tmp_path / "r", "--no-pictures")
     said = [line.removeprefix("warning: ") for line in done.stdout.splitlines() if line.startswith("warning: ")]
     assert done.returncode == 0
     assert len(said) == 2

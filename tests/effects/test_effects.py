@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 import sympy
-from runs import ROOT, hvi, summary
+from runs import ROOT
 from scenes import STEEL, E, P, Q, Table, block, displacement, energy, far, model, points, quadratic_linear, solved
 
 from hvi_fenicsx import InputError, Scene, prepare, read_scene, solve
@@ -247,13 +247,6 @@ def test_heat_in_one_region_strains_that_region_only() -> None:
     x, u = points(found), displacement(found)
     assert u[x[:, 0] > 1 - 1e-9, 0].mean() == pytest.approx(12e-6 * 30 * 0.6, rel=1e-2)
     assert np.abs(u[x[:, 0] < 0.25, 0]).max() < 1e-7
-
-
-def test_a_heated_bar_on_two_ranks_is_that_of_one(tmp_path: Path) -> None:
-    scene = ROOT / "demos" / "thermal_bar.toml"
-    done = [hvi("run", scene, "--out", tmp_path / str(n), "--no-pictures", ranks=n) for n in (1, 2)]
-    assert [d.returncode for d in done] == [0, 0]
-    assert summary(tmp_path / "2")["energy"] == pytest.approx(summary(tmp_path / "1")["energy"], rel=1e-9)
 
 
 # --- loads, supports, shapes

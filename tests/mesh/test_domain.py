@@ -9,7 +9,7 @@ import meshes
 import numpy as np
 import pytest
 from mpi4py import MPI
-from runs import contact, hvi, summary, write_scene
+from runs import contact, hvi, write_scene
 from scenes import NU, STEEL, E, P, Q, Table, displacement, energy, far, model, points, quadratic_linear, solved
 
 from hvi_fenicsx import InputError
@@ -88,17 +88,6 @@ def test_a_force_need_be_finite_in_its_own_region_only(tmp_path: Path) -> None:
     table["body"]["weight"]["region"] = "soft"
     with pytest.raises(InputError, match=r"body\.soft\.force: .* is not finite"):
         solved(table)
-
-
-def test_a_gmsh_body_on_two_ranks_is_that_of_one(square: Path, tmp_path: Path) -> None:
-    table = on_file(square, model(4, 6e6, Q, quadratic_linear(3e6), tolerance=1e-12))
-    scene = write_scene(tmp_path / "s.toml", table)
-    for ranks in (1, 2):
-        assert hvi("run", scene, "--out", tmp_path / str(ranks), "--no-pictures", ranks=ranks).returncode == 0
-    one, two = (contact(tmp_path / r) for r in "12")
-    assert summary(tmp_path / "1")["energy"] == pytest.approx(summary(tmp_path / "2")["energy"], rel=1e-10)
-    for column in ("s", "u_t1", "u_n", "sigma_n", "friction_t1"):
-        np.testing.assert_allclose(one[column], two[column], atol=1e-8 * np.max(np.abs(one[column])))
 
 
 def test_a_floor_of_two_groups_is_one_part(tmp_path: Path) -> None:

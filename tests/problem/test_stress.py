@@ -5,14 +5,12 @@ Each case against a closed form; the whole field of a run on two ranks against t
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 import pytest
-import pyvista
-from runs import ROOT, hvi
+from runs import ROOT
 from scenes import Table, solved
 
 from hvi_fenicsx import Solution, read_scene, solve
@@ -117,20 +115,3 @@ def test_two_materials_end_to_end_bear_one_stress() -> None:
     changes = [f"material.{m}.{k}={v}" for m in ("aluminium", "steel") for k, v in same.items()]
     found = stresses(solve(read_scene(ROOT / "demos" / "thermal_bar.toml", changes)))
     assert_uniform(found, -(ALPHA * 60.0 - 0.5e-3) / (0.4 / 7e10 + 0.6 / 2.1e11), 0.0, 0.0)
-
-
-def field(folder: Path) -> Array:
-    """Von Mises stresses by cell, in an order that no numbering changes."""
-    body = pyvista.get_reader(folder / "displacement.pvd").read()[0]
-    own = body.cell_data["vtkGhostType"] == 0 if "vtkGhostType" in body.cell_data else slice(None)
-    middle = np.round(body.cell_centers().points[own], 9)
-    return np.asarray(body.cell_data["von_mises"][own][np.lexsort(middle.T)])
-
-
-def test_two_ranks_write_the_stress_of_one(tmp_path: Path) -> None:
-    scene, cells = ROOT / "demos" / "strong_law.toml", "domain.cells=[12, 12]"
-    for n in (1, 2):
-        hvi("run", scene, "--set", cells, "--out", tmp_path / str(n), "--no-pictures", ranks=n)
-    one, two = field(tmp_path / "1"), field(tmp_path / "2")
-    assert np.ptp(one) > 0.1 * one.max()
-    np.testing.assert_allclose(two, one, rtol=1e-6)

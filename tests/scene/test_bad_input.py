@@ -14,11 +14,10 @@ from typing import Any
 import damage
 import meshes
 import pytest
-from runs import hvi, write_scene
+from runs import hvi, process, write_scene
 from scenes import STEEL, model, quadratic_linear
 
 from hvi_fenicsx import InputError, Scene, prepare
-from hvi_fenicsx.cli import main
 
 LAW = quadratic_linear(1e3)
 TABLE: dict[str, tuple[str, str]] = {
@@ -70,24 +69,14 @@ def assert_refused(done: subprocess.CompletedProcess[str], words: str, folder: P
     assert {f.name for f in folder.iterdir()} == before
 
 
-def called(capsys: pytest.CaptureFixture[str], *words: object) -> subprocess.CompletedProcess[str]:
-    """The command line within this process: a traceback would be an error of the test itself."""
-    code = main(list(map(str, words)))
-    out, err = capsys.readouterr()
-    return subprocess.CompletedProcess([], code, out, err)
-
-
 @pytest.mark.parametrize("case", TABLE)
-def test_a_wrong_scene_is_refused_in_words(
-    case: str, scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_wrong_scene_is_refused_in_words(case: str, scene: Path, tmp_path: Path) -> None:
     override, words = TABLE[case]
-    monkeypatch.chdir(tmp_path)
-    assert_refused(called(capsys, "run", scene, "--set", override), words, tmp_path, {"scene.toml"})
+    assert_refused(hvi("run", scene, "--set", override, cwd=tmp_path), words, tmp_path, {"scene.toml"})
 
 
 def test_a_wrong_scene_is_refused_by_the_process_too(scene: Path, tmp_path: Path) -> None:
-    done = hvi("run", scene, "--set", "boundary.press.traction=[0.0, '-1e6/x']", cwd=tmp_path)
+    done = process("run", scene, "--set", "boundary.press.traction=[0.0, '-1e6/x']", cwd=tmp_path)
     assert_refused(done, "is not finite everywhere there", tmp_path, {"scene.toml"})
 
 
@@ -105,37 +94,38 @@ ALL_RANKS = """
 import json, sys
 from mpi4py import MPI
 from hvi_fenicsx.cli import main
-codes = [main(["run", sys.argv[1], *words]) for words in json.loads(sys.argv[3])]
+codes = [main(["run", *words]) for words in json.loads(sys.argv[2])]
 every = MPI.COMM_WORLD.gather(codes)
 if every:
-    with open(sys.argv[2], "w") as file:
+    with open(sys.argv[1], "w") as file:
         file.write(repr(every))
 """
 
 
 def test_all_of_it_on_two_ranks(scene: Path, tmp_path: Path) -> None:
-    """One start of MPI for the whole table and all places; each message is printed once."""
+    """One start of MPI for the whole table, all places and mesh files; each message is printed once."""
     codes, outs = tmp_path / "codes", [out.format(folder=tmp_path) for out in PLACES]
+    meshed = {"linear triangles only": _on_a_damaged_mesh(tmp_path), "bottom, left, right, top": _misnamed(tmp_path)}
     calls = [*(["--set", override] for override, _ in TABLE.values()), *(["--out", out] for out in outs)]
-    words = [sys.executable, "-m", "mpi4py", "-c", ALL_RANKS, str(scene), str(codes), json.dumps(calls)]
+    calls = [*([str(scene), *words] for words in calls), *([str(file)] for file in meshed.values())]
+    before = {f.name for f in tmp_path.iterdir()}
+    words = [sys.executable, "-m", "mpi4py", "-c", ALL_RANKS, str(codes), json.dumps(calls)]
     done = subprocess.run(
         ["mpirun", "-n", "2", *words], cwd=tmp_path, capture_output=True, text=True, check=False, timeout=200
     )
     assert done.returncode == 0, done.stderr
     assert codes.read_text() == repr([[2] * len(calls)] * 2)
     assert done.stderr.count("hvi: ") == len(calls)
-    assert all(words in done.stderr for _, words in TABLE.values())
+    assert all(words in done.stderr for words in [*(words for _, words in TABLE.values()), *meshed])
     assert all(f"hvi: --out {out}: " in done.stderr for out in outs)
-    assert {f.name for f in tmp_path.iterdir()} == {"scene.toml", "codes"}
+    assert {f.name for f in tmp_path.iterdir()} == before | {"codes"}
 
 
 @pytest.mark.parametrize(
     "words", [[], ["fly"], ["run"], ["run", "a.toml", "--speed", "9"], ["run", "a.toml", "--np", "x"]]
 )
-def test_a_wrong_command_line_is_refused_like_a_wrong_scene(
-    words: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert_refused(called(capsys, *words), "--help", tmp_path, set())
+def test_a_wrong_command_line_is_refused_like_a_wrong_scene(words: list[str], tmp_path: Path) -> None:
+    assert_refused(hvi(*words, cwd=tmp_path), "--help", tmp_path, set())
 
 
 def test_a_missing_scene_names_those_that_are_there(scene: Path, tmp_path: Path) -> None:
@@ -200,18 +190,19 @@ def test_a_mesh_that_has_lost_cells_but_not_their_nodes_is_read(tmp_path: Path) 
     assert prepare(Scene.model_validate(file_scene(file))).system.dofs == 2 * 16
 
 
-def test_a_damaged_mesh_file_stops_two_ranks_with_one_message(tmp_path: Path) -> None:
-    file = meshes.make(tmp_path / "m.msh", meshes.BAD["second order"])
-    scene = write_scene(tmp_path / "scene.toml", file_scene(file))
-    done = hvi("run", scene, ranks=2, cwd=tmp_path)
-    assert_refused(done, "linear triangles only", tmp_path, {"scene.toml", "m.msh"})
+def _on_a_damaged_mesh(folder: Path) -> Path:
+    file = meshes.make(folder / "damaged.msh", meshes.BAD["second order"])
+    return write_scene(folder / "damaged.toml", file_scene(file))
+
+
+def _misnamed(folder: Path) -> Path:
+    file = meshes.make(folder / "good.msh", meshes.GOOD)
+    return write_scene(folder / "misnamed.toml", file_scene(file, wall={"on": "lleft", "displacement": [0.0, "free"]}))
 
 
 def test_a_group_that_the_mesh_does_not_have_is_told_with_those_it_has(tmp_path: Path) -> None:
-    file = meshes.make(tmp_path / "m.msh", meshes.GOOD)
-    scene = write_scene(tmp_path / "scene.toml", file_scene(file, wall={"on": "lleft", "displacement": [0.0, "free"]}))
-    done = hvi("run", scene, ranks=2, cwd=tmp_path)
-    assert_refused(done, "bottom, left, right, top", tmp_path, {"scene.toml", "m.msh"})
+    done = hvi("run", _misnamed(tmp_path), cwd=tmp_path)
+    assert_refused(done, "bottom, left, right, top", tmp_path, {"misnamed.toml", "good.msh"})
 
 
 def test_a_region_that_the_mesh_does_not_have_is_told(tmp_path: Path) -> None:

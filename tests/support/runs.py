@@ -1,8 +1,11 @@
-"""Runs of the command line as users start them: a process, serial or under mpirun, and what it left behind."""
+"""Runs of the command line, within this process or as users start them, serial or under mpirun; what they leave."""
 
 from __future__ import annotations
 
+import contextlib
+import io
 import json
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -12,6 +15,8 @@ import numpy as np
 import numpy.typing as npt
 
 from hvi_fenicsx import Scene, dump_scene
+from hvi_fenicsx.cli import main
+from hvi_fenicsx.runtime.signals import SIGNALS
 
 ROOT = Path(__file__).parents[2]
 
@@ -24,7 +29,22 @@ def command(*words: object, ranks: int = 1) -> list[str]:
 
 
 def hvi(*words: object, ranks: int = 1, cwd: Path = ROOT) -> subprocess.CompletedProcess[str]:
-    """Run a command to its end."""
+    """A command to its end, within this process (what ``main`` returns is what a process ends with) or on ranks."""
+    if ranks > 1:
+        return process(*words, ranks=ranks, cwd=cwd)
+    out, err = io.StringIO(), io.StringIO()
+    handlers = {number: signal.getsignal(number) for number in SIGNALS}
+    try:
+        with contextlib.chdir(cwd), contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+            code = main(list(map(str, words)))
+    finally:
+        for number, handler in handlers.items():
+            signal.signal(number, handler)
+    return subprocess.CompletedProcess(words, code, out.getvalue(), err.getvalue())
+
+
+def process(*words: object, ranks: int = 1, cwd: Path = ROOT) -> subprocess.CompletedProcess[str]:
+    """A command to its end, in a process of its own or in several: slower by a second of imports."""
     return subprocess.run(
         command(*words, ranks=ranks), cwd=cwd, capture_output=True, text=True, check=False, timeout=300
     )
@@ -53,9 +73,12 @@ def run_all(folder: Path, scenes: dict[str, dict[str, Any]], ranks: int) -> None
     """Results FOLDER/NAME-RANKS of all scenes; one start of MPI serves them, since starting it is what takes time."""
     for name, table in scenes.items():
         write_scene(folder / f"{name}.toml", table)
-    start = ["mpirun", "-n", str(ranks)] if ranks > 1 else []
+    if ranks == 1:
+        for name in scenes:
+            hvi("run", folder / f"{name}.toml", "--out", folder / f"{name}-1", "--no-pictures")
+        return
     python = [sys.executable, "-m", "mpi4py", "-c", _RUN_ALL, str(folder), str(ranks), *scenes]
-    subprocess.run([*start, *python], check=True, capture_output=True, timeout=300)
+    subprocess.run(["mpirun", "-n", str(ranks), *python], check=True, capture_output=True, timeout=300)
 
 
 def write_scene(path: Path, table: dict[str, Any]) -> Path:

@@ -6,12 +6,11 @@ A demo that nobody checks drifts from its own text, and readers copy demos first
 from __future__ import annotations
 
 import functools
-from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 import pytest
-from runs import ROOT, hvi, summary
+from runs import ROOT
 from scenes import displacement, energy, points
 from scipy.sparse import csc_matrix, csr_matrix, diags
 from scipy.sparse.linalg import spsolve
@@ -190,12 +189,3 @@ def test_the_giving_support_has_the_solutions_of_its_header(start: str, broken: 
     assert found.examination.certificate.second_order == "local minimiser"
     sunk = state(found, "ground").normal * found.problem.scales.displacement > 0.1
     assert np.count_nonzero(sunk) == broken
-
-
-def test_a_demo_runs_on_two_ranks_as_on_one(tmp_path: Path) -> None:
-    """A gmsh shape, meshed on rank 0, and nodal values gathered from both."""
-    done = [hvi("run", DEMOS / "hertz.toml", "--out", tmp_path / str(n), "--no-pictures", ranks=n) for n in (1, 2)]
-    assert [d.returncode for d in done] == [0, 0]
-    one, two = (summary(tmp_path / str(n)) for n in (1, 2))
-    assert two["energy"] == pytest.approx(one["energy"], rel=1e-9)
-    assert two["contact"]["active"] == one["contact"]["active"]
