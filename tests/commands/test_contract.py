@@ -71,9 +71,9 @@ def result(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFact
 def test_the_folder_holds_what_is_promised_and_nothing_else(result: Path) -> None:
     names = {file.name for file in result.iterdir()}
     assert {"summary.json", "contact.csv", "displacement.pvd", "contact.pvd", "scene.toml", "run.log"} <= names
-    assert {"boundary.csv", "report.html"} <= names
+    assert {"boundary.csv", "report.html", "solution.npz"} <= names
     rest = {Path(n).suffix for n in names} - {".json", ".csv", ".pvd", ".toml", ".log", ".png", ".vtu", ".pvtu"}
-    assert rest == {".html"}
+    assert rest == {".html", ".npz"}
     assert [file.name for file in result.parent.iterdir()] == ["square"]
 
 

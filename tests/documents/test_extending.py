@@ -12,9 +12,10 @@ import re
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
-from runs import ROOT, hvi, summary
+from runs import ROOT, hvi, process, summary
 
 from hvi_fenicsx import InputError, read_scene
 
@@ -29,12 +30,24 @@ PLAIN = {
 }
 
 
-@pytest.fixture
-def files(tmp_path: Path) -> Path:
-    """A folder with the document's files."""
-    for name, text in BLOCKS.items():
-        (tmp_path / name).write_text(text, encoding="utf-8")
-    return tmp_path
+@pytest.fixture(scope="module")
+def files(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the document's files; and, as ``plain.toml``, their scene in the program's own words."""
+    folder, plain = tmp_path_factory.mktemp("extending"), BLOCKS["pressed.toml"]
+    for own, word in PLAIN.items():
+        assert own in plain
+        plain = plain.replace(own, word)
+    for name, text in (BLOCKS | {"plain.toml": plain}).items():
+        (folder / name).write_text(text, encoding="utf-8")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def pressed(files: Path) -> Path:
+    """The result of the document's scene. The user's classes are known to processes of their own only."""
+    done = process("run", "pressed.toml", "--no-pictures", cwd=files)
+    assert done.returncode == 0, done.stderr
+    return files / "results" / "pressed"
 
 
 def package() -> dict[str, str]:
@@ -50,19 +63,13 @@ def test_the_document_has_the_files_and_counts_their_lines() -> None:
 
 
 @pytest.mark.parametrize("ranks", [1, 2])
-def test_the_users_scene_is_that_of_the_programs_own_words(ranks: int, files: Path) -> None:
-    before = package()
-    plain = BLOCKS["pressed.toml"]
-    for own, word in PLAIN.items():
-        assert own in plain
-        plain = plain.replace(own, word)
-    (files / "plain.toml").write_text(plain, encoding="utf-8")
-    done = [
-        hvi("run", f"{name}.toml", "--no-pictures", cwd=files, ranks=n)
-        for name, n in (("pressed", ranks), ("plain", 1))
-    ]
-    assert [d.returncode for d in done] == [0, 0], done[0].stderr
-    own, program = (summary(files / "results" / name) for name in ("pressed", "plain"))
+def test_the_users_scene_is_that_of_the_programs_own_words(ranks: int, files: Path, request: Any) -> None:
+    before, out = package(), request.getfixturevalue("pressed") if ranks == 1 else files / "parallel"
+    if ranks > 1:
+        done = process("run", "pressed.toml", "--out", out, "--no-pictures", cwd=files, ranks=ranks)
+        assert done.returncode == 0, done.stderr
+    assert hvi("run", "plain.toml", "--out", f"plain{ranks}", "--no-pictures", cwd=files).returncode == 0
+    own, program = summary(out), summary(files / f"plain{ranks}")
     assert own["energy"] == pytest.approx(program["energy"], rel=1e-9)
     assert (own["method"], program["method"]) == ("lowest", "branch")
     assert own["solvability"]["margin"] == pytest.approx(program["solvability"]["margin"])
@@ -72,18 +79,18 @@ def test_the_users_scene_is_that_of_the_programs_own_words(ranks: int, files: Pa
 
 def test_a_body_of_the_users_shape_stands_on_its_floor_with_its_weight(files: Path) -> None:
     before = package()
-    done = hvi("run", "standing.toml", "--no-pictures", cwd=files)
+    done = process("run", "standing.toml", "--no-pictures", cwd=files)
     assert done.returncode == 0, done.stderr
     assert summary(files / "results" / "standing")["contact"]["resultant"] == pytest.approx(
         [0.0, 1.5 * 2.0e4], abs=1e-4
     )
-    refused = hvi("check", "standing.toml", "--set", 'boundary.floor.on="botom"', cwd=files)
+    refused = process("check", "standing.toml", "--set", 'boundary.floor.on="botom"', cwd=files)
     assert (refused.returncode, package()) == (2, before)
     assert 'unknown side "botom"; did you mean "bottom"? allowed: bottom, right, top, left' in refused.stderr
 
 
 def test_check_tells_what_they_add(files: Path) -> None:
-    data = json.loads(hvi("check", "pressed.toml", "--json", cwd=files).stdout)
+    data = json.loads(process("check", "pressed.toml", "--json", cwd=files).stdout)
     pressure = next(e for e in data["effects"] if e["effect"] == "pressure")
     assert (pressure["adds"], pressure["terms"]) == ("<g, v> += -∫ p v·n ds", "1 linear")
     assert "the lower energy" in data["solver"]
@@ -92,7 +99,7 @@ def test_check_tells_what_they_add(files: Path) -> None:
 def test_the_users_smoothing_gives_what_a_narrow_one_of_the_programs_gives(files: Path) -> None:
     for name in ("cubic", "quadratic"):
         wanted = f'solver={{smoothing="{name}", epsilon=1e-3}}'
-        done = hvi("run", "pressed.toml", "--set", wanted, "--out", name, "--no-pictures", cwd=files)
+        done = process("run", "pressed.toml", "--set", wanted, "--out", name, "--no-pictures", cwd=files)
         assert done.returncode == 0, done.stderr
     own, program = (summary(files / name) for name in ("cubic", "quadratic"))
     assert (own["smoothing"], own["certificate"]["passed"]) == ("cubic", True)
@@ -100,7 +107,7 @@ def test_the_users_smoothing_gives_what_a_narrow_one_of_the_programs_gives(files
 
 
 def test_a_misspelt_smoothing_is_told_with_the_users_own(files: Path) -> None:
-    done = hvi("check", "pressed.toml", "--set", 'solver={smoothing="cubik", epsilon=0.01}', cwd=files)
+    done = process("check", "pressed.toml", "--set", 'solver={smoothing="cubik", epsilon=0.01}', cwd=files)
     assert done.returncode == 2
     assert 'unknown value "cubik"; did you mean "cubic"? allowed: chks, cubic, log_exp' in " ".join(done.stderr.split())
 
@@ -108,7 +115,9 @@ def test_a_misspelt_smoothing_is_told_with_the_users_own(files: Path) -> None:
 def test_an_accuracy_of_the_users_quantity_is_kept(files: Path) -> None:
     """On two ranks; against a solution that is right to 1 % in the energy norm, so to 0.01 % in energy."""
     for name, ranks, words in (("asked", 2, ("0.02", "--quantity", "work")), ("exact", 1, ("0.01",))):
-        done = hvi("run", "pressed.toml", "--out", name, "--no-pictures", "--accuracy", *words, cwd=files, ranks=ranks)
+        done = process(
+            "run", "pressed.toml", "--out", name, "--no-pictures", "--accuracy", *words, cwd=files, ranks=ranks
+        )
         assert done.returncode == 0, done.stderr
     asked = summary(files / "asked")
     assert (asked["accuracy"]["quantity"], asked["accuracy"]["reached"]) == ("work", True)
@@ -117,27 +126,25 @@ def test_an_accuracy_of_the_users_quantity_is_kept(files: Path) -> None:
 
 
 def test_a_misspelt_quantity_is_told_with_the_users_own(files: Path) -> None:
-    done = hvi("run", "pressed.toml", "--accuracy", "0.1", "--quantity", "werk", "--out", "x", cwd=files)
+    done = process("run", "pressed.toml", "--accuracy", "0.1", "--quantity", "werk", "--out", "x", cwd=files)
     assert done.returncode == 2
     assert "--quantity: unknown name 'werk' (did you mean 'work'?); allowed: energy, u_t," in done.stderr
     assert not (files / "x").exists()
 
 
-def test_the_result_runs_again_from_its_own_scene(files: Path) -> None:
-    assert hvi("run", "pressed.toml", "--no-pictures", cwd=files).returncode == 0
-    again = hvi("run", "results/pressed/scene.toml", "--out", "again", "--no-pictures", cwd=files)
+def test_the_result_runs_again_from_its_own_scene(files: Path, pressed: Path) -> None:
+    again = process("run", pressed / "scene.toml", "--out", "again", "--no-pictures", cwd=files)
     assert again.returncode == 0, again.stderr
-    assert summary(files / "again")["energy"] == summary(files / "results" / "pressed")["energy"]
+    assert summary(files / "again")["energy"] == summary(pressed)["energy"]
 
 
-def test_from_python(files: Path) -> None:
+def test_from_python(files: Path, pressed: Path) -> None:
     done = subprocess.run(
         [sys.executable, "pressed.py"], cwd=files, capture_output=True, text=True, check=True, timeout=300
     )
     words = done.stdout.split()
     assert words[0] == "certified"
-    assert hvi("run", "pressed.toml", "--no-pictures", cwd=files).returncode == 0
-    assert float(words[-2]) == pytest.approx(summary(files / "results" / "pressed")["energy"], rel=1e-7)
+    assert float(words[-2]) == pytest.approx(summary(pressed)["energy"], rel=1e-7)
 
 
 WRONG = {
