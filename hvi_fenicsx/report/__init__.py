@@ -1,1 +1,1 @@
-"""The report of a finished result folder: pictures and one page of html. No MPI, no dolfinx."""
+"""What is made from a finished result folder alone: pictures and pages. No MPI, no dolfinx, no scene objects."""

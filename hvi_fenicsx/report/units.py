@@ -11,7 +11,12 @@ _NARROW = "\N{NARROW NO-BREAK SPACE}"
 
 @dataclass(frozen=True)
 class Unit:
-    """A unit with its prefix: ``value / size`` is the number to write before ``name``."""
+    """A unit with its prefix.
+
+    Attributes:
+        size: of the unit, in the unit without its prefix.
+        name: with the prefix.
+    """
 
     size: float
     name: str
@@ -22,7 +27,12 @@ class Unit:
 
 
 def unit_for(largest: float, name: str) -> Unit:
-    """The prefix that brings the largest value between 1 and 1000, if it may; none for zero."""
+    """The unit whose prefix brings the largest value between 1 and 1000, if there is one; no prefix for zero.
+
+    Args:
+        largest: in the unit without a prefix.
+        name: of the unit without a prefix.
+    """
     if not (math.isfinite(largest) and largest != 0.0):
         return Unit(1.0, name)
     exponent = 3 * math.floor(math.log10(abs(largest) * (1.0 + 1e-9)) / 3)
@@ -33,7 +43,12 @@ def unit_for(largest: float, name: str) -> Unit:
 
 
 def quantity(value: float, name: str) -> str:
-    """A value with the prefix that suits it."""
+    """A value with the prefix that suits it.
+
+    Args:
+        value: in the unit without a prefix.
+        name: of the unit without a prefix.
+    """
     return unit_for(value, name).text(value)
 
 

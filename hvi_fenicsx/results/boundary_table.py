@@ -1,4 +1,4 @@
-"""``boundary.csv``: the vertices of every boundary table of the scene, so that a folder tells where its parts lie."""
+"""``boundary.csv``: the vertices of every boundary table of the scene."""
 
 from __future__ import annotations
 
@@ -16,7 +16,12 @@ COLUMNS = ("part", "x", "y", "z")
 
 
 def rows(problem: Problem, parts: Mapping[str, Sequence[str]]) -> list[tuple[str, Array]]:
-    """The vertices of each part, SI, shape (m, 3), gathered on rank 0 (elsewhere empty). Collective."""
+    """The vertices of each part, m, (m, 3), on rank 0; elsewhere empty. Collective.
+
+    Args:
+        problem: what was solved.
+        parts: the sides, or physical groups, that each part stands on.
+    """
     return [(name, _vertices(problem, on)) for name, on in parts.items()]
 
 
@@ -31,7 +36,13 @@ def _vertices(problem: Problem, on: Sequence[str]) -> Array:
 
 
 def write_csv(path: Path, table: Sequence[tuple[str, Array]], dimension: int) -> None:
-    """The table as a file; z is empty in the plane. Rank 0 only."""
+    """Write the table; z is empty in the plane. Rank 0 only.
+
+    Args:
+        path: the file.
+        table: the vertices of each part, m, (m, 3).
+        dimension: of the body, 2 or 3.
+    """
     with path.open("w", newline="", encoding="utf-8") as stream:
         writer = csv.writer(stream, lineterminator="\n")
         writer.writerow(COLUMNS)

@@ -16,7 +16,7 @@ from ..runtime.mpi import on_root
 from ..runtime.signals import SIGNALS
 
 MARK = "summary.json"
-"""The file that says that a folder holds a finished result; always moved last."""
+"""A folder with this file holds a finished result; it is always moved last."""
 _XML, _PNG = b"</VTKFile>", b"IEND\xaeB`\x82"
 _ENDS = {".pvd": _XML, ".vtu": _XML, ".pvtu": _XML, ".png": _PNG, ".html": b"</html>"}
 _LONGEST_END = 64
@@ -27,7 +27,8 @@ class ResultFolder:
     """A folder for one result.
 
     Args:
-        comm: the ranks that write. target: where the result goes.
+        comm: the ranks that write.
+        target: where the result goes.
         existing: what to do with a result that is there already.
 
     Raises:
@@ -94,7 +95,7 @@ class ResultFolder:
             signal.pthread_sigmask(signal.SIG_SETMASK, held)
 
     def _refuse_torn(self) -> None:
-        """VTK's writers do not tell that a disk was full."""
+        """VTK's writers do not say that a disk was full."""
         for file in sorted(self.work.iterdir()):
             if not _is_whole(file):
                 raise InputError(f"--out {self.target}: {file.name} could not be written whole; is the disk full?")

@@ -35,16 +35,9 @@ def facts(result: Result) -> Iterator[tuple[str, str]]:
         names = ("branch", "newton", "linear", "levels")
         yield "steps", ", ".join(f"{counts[n]} {n}" for n in names if counts.get(n) is not None)
     if energy is not None:
-        yield "energy", f"{energy:.8g} {'J' if _dimension(result) == 3 else 'J/m'}"
+        yield "energy", f"{energy:.8g} {'J' if result.body.dimension == 3 else 'J/m'}"
     if summary.get("peak_memory_mb"):
         yield "memory at its peak", f"{thousands(round(summary['peak_memory_mb']))} MB over all ranks"
-
-
-def _dimension(result: Result) -> int:
-    """2 or 3, told by the material models."""
-    material = result.scene.get("material") or {}
-    tables = [material, *(m for m in material.values() if isinstance(m, Mapping))]
-    return 3 if any(table.get("model") == "three_dimensional" for table in tables) else 2
 
 
 def time(seconds: Mapping[str, float]) -> Iterator[dict[str, Any]]:

@@ -32,7 +32,7 @@ def parts(result: Result) -> Iterator[dict[str, Any]]:
     """Each boundary part: its name, where it lies, and what acts on it."""
     for name, table in (result.scene.get("boundary") or {}).items():
         on = table.get("on", ())
-        acts = [(key, words(value)) for key, value in table.items() if key not in _PLACE]
+        acts = [(key, value_text(value)) for key, value in table.items() if key not in _PLACE]
         yield {"name": name, "on": on if isinstance(on, str) else ", ".join(on), "acts": acts}
 
 
@@ -65,24 +65,24 @@ def _first_paragraph(kind: type) -> str:
 
 def _entries(table: Mapping[str, Any]) -> str:
     """``key value, key value``, without what is zero and so does nothing."""
-    return ", ".join(f"{key.replace('_', ' ')} {words(value)}" for key, value in table.items() if value != 0.0)
+    return ", ".join(f"{key.replace('_', ' ')} {value_text(value)}" for key, value in table.items() if value != 0.0)
 
 
-def words(value: Any) -> str:
+def value_text(value: Any) -> str:
     """A value of a scene file as people write it."""
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, int | float):
         return number(value)
     if isinstance(value, list):
-        return f"({', '.join(map(words, value))})"
+        return f"({', '.join(map(value_text, value))})"
     if isinstance(value, Mapping):
         return ", ".join(_pair(key, item) for key, item in value.items())
     return str(value).replace("_", " ") if str(value).isidentifier() else str(value)
 
 
 def _pair(key: str, value: Any) -> str:
-    text = f"({words(value)})" if isinstance(value, Mapping) else words(value)
+    text = f"({value_text(value)})" if isinstance(value, Mapping) else value_text(value)
     return text if key == "law" else f"{key} {text}"
 
 

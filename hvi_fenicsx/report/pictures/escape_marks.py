@@ -21,7 +21,12 @@ WAY = np.linspace(0.0, 1.0, 25)
 
 
 def arrow(axes: Axes, way: Array) -> None:
-    """An arrow along points (n, 2)."""
+    """Draw an arrow.
+
+    Args:
+        axes: to draw on.
+        way: the points along it, (n, 2).
+    """
     drawn = FancyArrowPatch(
         path=DrawnPath(way), arrowstyle="-|>,head_length=9,head_width=5", color=VERMILION, lw=3.2, zorder=7, shrinkB=0
     )
@@ -36,7 +41,13 @@ def keys() -> list[Artist]:
 
 
 def say(fig: Figure, result: Result, keys: list[Artist]) -> None:
-    """The motion in words, and what the marks mean."""
+    """Write the motion in words, and what the marks mean.
+
+    Args:
+        fig: the picture.
+        result: whose body escapes.
+        keys: the lines of the legend.
+    """
     words = str(result.solvability.get("direction") or "a rigid motion")
     tall = fig.get_figheight()
     fig.text(0.3 / WIDTH, (FOOT - 0.28) / tall, "The load moves the body by", size=12.5, color=GREY, va="top")

@@ -18,7 +18,9 @@ class Motion:
     """x → pole + rotation(x - pole) + shift: a screw, a rotation, or a translation (spin zero).
 
     Attributes:
-        pole, shift, spin: (3,); ``spin`` is axis times angle.
+        pole: a point of the axis, m, (3,).
+        shift: along the axis, or the translation, m, (3,).
+        spin: the axis times the angle, (3,).
     """
 
     pole: Array
@@ -26,7 +28,12 @@ class Motion:
     spin: Array
 
     def at(self, points: Array, part: float = 1.0) -> Array:
-        """Points (n, 3) after a part of the motion."""
+        """Where points are after a part of the motion, m, (n, 3).
+
+        Args:
+            points: at rest, m, (n, 3).
+            part: of the motion, 0 to 1.
+        """
         arm, spin = points - self.pole, part * self.spin
         angle = float(np.linalg.norm(spin))
         axis = spin / angle if angle > 0.0 else spin
@@ -60,7 +67,12 @@ def _spin(arms: Array, field: Array) -> Array:
 
 
 def followed(body: BodyMesh, motion: Motion) -> Array:
-    """Points to follow on their way: the middle in a translation, else one far out in each diagonal direction."""
+    """Points to follow on their way: the middle in a translation, else one far out in each diagonal direction; (j, 3).
+
+    Args:
+        body: the body at rest.
+        motion: that it makes.
+    """
     middle = (body.points.min(axis=0) + body.points.max(axis=0)) / 2
     if not motion.spin.any():
         return middle[None]

@@ -21,12 +21,17 @@ FACING = 0.15
 
 @dataclass(frozen=True)
 class Footprint:
-    """A contact part as drawn: its facets at the points (n, 3), and -σ_n by vertex, NaN where it is lifted."""
+    """A contact part as it is drawn.
+
+    Attributes:
+        geometry: where it lies on the body.
+        points: where the body's vertices would be drawn with it, m, (n, 3).
+        away: how far it is moved, m, (3,); zero for one that is drawn where it is.
+    """
 
     geometry: PartGeometry
     points: Array
     away: Array
-    """How far it is moved, (3,); zero for one that is drawn where it is."""
 
     @property
     def pressure(self) -> Array:
@@ -38,7 +43,14 @@ class Footprint:
 
 
 def footprint(shape: DeformedBody, view: View, geometry: PartGeometry, normal: Array) -> Footprint:
-    """A part where it is if it is seen there, else so far out along its normal that the body does not hide it."""
+    """A part where it is if it is seen there, else so far out along its normal that the body does not hide it.
+
+    Args:
+        shape: the deformed body.
+        view: from where it is seen.
+        geometry: where the part lies on the body.
+        normal: outward normal of the part, of any length, (3,).
+    """
     unit = np.asarray(normal / (float(np.linalg.norm(normal)) or 1.0), dtype=np.float64)
     if float(unit @ view.toward) > FACING:
         return Footprint(geometry, shape.points + 1e-3 * shape.body.size * view.toward, np.zeros(3))
@@ -51,7 +63,14 @@ def footprint(shape: DeformedBody, view: View, geometry: PartGeometry, normal: A
 
 
 def guides(axes: Axes, view: View, shape: DeformedBody, patch: Footprint) -> None:
-    """Thin lines from a part on the body to its footprint, at its outermost points."""
+    """Draw thin lines from a part on the body to its footprint, at its outermost points.
+
+    Args:
+        axes: to draw on.
+        view: from where the body is seen.
+        shape: the deformed body.
+        patch: the footprint.
+    """
     if not patch.away.any():
         return
     start = view.project(shape.points[patch.geometry.vertices])

@@ -20,7 +20,16 @@ _BAR, _START = 3.2, 0.42
 def colour_bar(
     fig: Figure, colours: Colormap, scale: tuple[float, float], words: str, remark: str = "", *, at: float = 0.0
 ) -> None:
-    """A bar of a scale from its lowest to its largest value, ``at`` inches from its usual place; below it a remark."""
+    """Draw the bar of a scale.
+
+    Args:
+        fig: the picture.
+        colours: of the scale.
+        scale: its lowest and its largest value.
+        words: above the bar.
+        remark: below it.
+        at: how far to the right of its usual place, inches.
+    """
     axes = area(fig, _START + at, 0.82, _BAR, 0.2)
     low, high = scale if scale[1] > scale[0] else (0.0, 1.0)
     axes.imshow(np.linspace(0, 1, 256)[None], cmap=colours, aspect="auto", extent=(low, high, 0.0, 1.0))
@@ -34,7 +43,12 @@ def colour_bar(
 
 
 def legend(fig: Figure, keys: Sequence[Artist]) -> None:
-    """What the marks mean, one in a line."""
+    """Write what the marks mean, one in a line.
+
+    Args:
+        fig: the picture.
+        keys: the lines.
+    """
     fig.legend(
         handles=list(keys),
         loc="center left",

@@ -44,7 +44,17 @@ def canvas(points: Array) -> tuple[Figure, Axes]:
 def paint(
     axes: Axes, shape: DeformedBody, triangles: Integers, corners: Array, values: Array, colours: Colormap, end: float
 ) -> None:
-    """The body over its undeformed outline, in the colours of values at the corners of triangles, from zero."""
+    """Draw a plane body over its undeformed outline, in the colours of values at the corners of triangles.
+
+    Args:
+        axes: to draw on.
+        shape: the deformed body.
+        triangles: to be coloured, by their corners, (k, 3).
+        corners: m, (j, 2) or (j, 3).
+        values: at the corners, (j,).
+        colours: of the values, from zero.
+        end: the value at the end of the colours.
+    """
     body, points = shape.body, shape.points
     loops = chains(body.boundary)
     outline = closed_path(points, loops)

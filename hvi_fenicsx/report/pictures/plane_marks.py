@@ -30,7 +30,14 @@ ARROWS = 9
 
 @dataclass(frozen=True)
 class Mark:
-    """Something to draw: the points (n, 2) that it reaches, how, and its line in the legend."""
+    """Something to draw around the body.
+
+    Attributes:
+        extent: the points that it reaches, m, (n, 2).
+        draw: draws it.
+        key: its line in the legend.
+        words: of that line; empty for none.
+    """
 
     extent: Array
     draw: Callable[[Axes], None]
@@ -49,7 +56,12 @@ def undeformed() -> Artist:
 
 
 def loads(shape: DeformedBody, found: list[LoadedSide]) -> Iterator[Mark]:
-    """Arrows onto a side where it is pushed, from it where it is pulled; each load with its own scale and value."""
+    """Arrows onto a side where it is pushed, from it where it is pulled; each load with its own scale and value.
+
+    Args:
+        shape: the deformed body.
+        found: the sides with loads.
+    """
     size = shape.body.size
     for load in found:
         points = shape.points[load.side.vertices, :2]
@@ -118,7 +130,12 @@ _ARROW: dict[str, Any] = {
 
 
 def supports(shape: DeformedBody, found: list[HeldSide]) -> Iterator[Mark]:
-    """A wall along the side, with rollers where the side may move along it."""
+    """A wall along each side, with rollers where the side may move along it.
+
+    Args:
+        shape: the deformed body.
+        found: the sides that are held.
+    """
     for support in found:
         points, outward = shape.points[support.side.vertices, :2], support.side.normals[:, :2]
         radius = ROLLER * shape.body.size if support.rolling else 0.0
@@ -151,7 +168,13 @@ def _hatched(axes: Axes, line: Array, outward: Array, size: float) -> None:
 
 
 def contact(shape: DeformedBody, geometry: PartGeometry, largest: float) -> Iterator[Mark]:
-    """The obstacle of a part, where the part is off it, and the pressure on it as arrows that end there."""
+    """The obstacle of a part, where the part is off it, and the pressure on it as arrows that end there.
+
+    Args:
+        shape: the deformed body.
+        geometry: where the part lies on the body.
+        largest: the stress that is drawn longest, N/m².
+    """
     for chain in chains(geometry.facets):
         outward = normals(shape.body.points, chain)
         if geometry.obstacle is not None:

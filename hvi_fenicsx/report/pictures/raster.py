@@ -20,10 +20,16 @@ _LARGEST = 1 << 20
 
 
 def shade(points: Array, triangles: Integers, values: Array, shape: tuple[int, int]) -> Array:
-    """Values (n,) at points (n, 2) in pixels, the image's lower left corner being (0, 0), as an image.
+    """An image of values that are linear on triangles.
+
+    Args:
+        points: in pixels from the image's lower left corner, (n, 2).
+        triangles: by their points, (k, 3).
+        values: at the points, (n,).
+        shape: rows and columns of the image.
 
     Returns:
-        An array of the shape, its first row the lowest, NaN where there is no triangle.
+        An array of this shape, its first row the lowest, NaN where there is no triangle.
     """
     image = np.full(shape, np.nan)
     corners = points[triangles] - 0.5  # pixel centres at whole numbers

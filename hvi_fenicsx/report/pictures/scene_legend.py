@@ -31,7 +31,12 @@ def inside(result: Result) -> list[Artist]:
 
 
 def say(fig: Figure, body: BodyMesh) -> None:
-    """The body's extent and how many cells it has."""
+    """Write the body's extent and how many cells it has.
+
+    Args:
+        fig: the picture.
+        body: the body.
+    """
     extent = " × ".join(quantity(float(c), "m") for c in np.ptp(body.points, axis=0)[: body.dimension])
     tall = fig.get_figheight()
     for line, words in enumerate(

@@ -18,8 +18,13 @@ PEAK, SPOILS = 0.005, 1.25
 
 
 @dataclass(frozen=True)
-class Scale:
-    """A scale for numbers of the cells, from zero; ``cut`` where it ends below the largest of them."""
+class StressScale:
+    """A scale for the stress of the cells, from zero.
+
+    Attributes:
+        end: where it ends, N/m².
+        largest: the largest stress, N/m².
+    """
 
     end: float
     largest: float
@@ -30,18 +35,29 @@ class Scale:
         return self.end < self.largest
 
 
-def scale_of(body: BodyMesh, values: Array) -> Scale:
-    """A scale that a peak in a corner does not spoil: it ends where a share ``PEAK`` of the body has more."""
+def scale_of(body: BodyMesh, values: Array) -> StressScale:
+    """A scale that a peak in a corner does not spoil: it ends where a share ``PEAK`` of the body has more.
+
+    Args:
+        body: the body.
+        values: the stress of its cells, N/m², (c,).
+    """
     sides = body.points[body.cells[:, 1:]] - body.points[body.cells[:, :1]]
     volume = np.sqrt(np.linalg.det(sides @ sides.transpose(0, 2, 1)))
     order = np.argsort(values)
     share = np.cumsum(volume[order]) / volume.sum()
     end, largest = float(values[order][np.searchsorted(share, 1.0 - PEAK)]), float(values.max())
-    return Scale(end if 0.0 < end < largest / SPOILS else largest, largest)
+    return StressScale(end if 0.0 < end < largest / SPOILS else largest, largest)
 
 
-def bar(fig: Figure, scale: Scale, remark: str) -> None:
-    """The bar of the stress, and how large it is where the scale does not reach."""
+def bar(fig: Figure, scale: StressScale, remark: str) -> None:
+    """Draw the bar of the stress, and say how large it is where the scale does not reach.
+
+    Args:
+        fig: the picture.
+        scale: of the stress.
+        remark: below the bar.
+    """
     unit = unit_for(scale.end, "Pa")
     words = f"von Mises stress, {'peak' if scale.cut else 'up to'} {unit.text(scale.largest)}"
     colour_bar(fig, EMBER, (0.0, scale.end / unit.size), words, remark)

@@ -55,7 +55,12 @@ matplotlib.rcParams.update(
 
 
 def shades(dark: str, light: str = "#f4f4f1") -> LinearSegmentedColormap:
-    """A muted scale from pale to one colour."""
+    """A muted scale of colours.
+
+    Args:
+        dark: its end.
+        light: its beginning.
+    """
     return LinearSegmentedColormap.from_list(dark, [light, dark])
 
 
@@ -68,7 +73,15 @@ _BOTH = LinearSegmentedColormap.from_list("both", [PURPLE, "#fdfaf7", VERMILION]
 
 
 def pressure_scale(lowest: float, largest: float) -> tuple[LinearSegmentedColormap, float, float]:
-    """Colours for -σ_n and their range; there is tension only where something adheres."""
+    """Colours for -σ_n; there is tension only where something adheres.
+
+    Args:
+        lowest: of -σ_n, N/m².
+        largest: of |σ_n|, N/m².
+
+    Returns:
+        The colours, and the values at their ends, N/m².
+    """
     if lowest < -1e-6 * largest:
         return _BOTH, -largest, largest
     return _PRESSED, 0.0, largest or 1.0
@@ -82,19 +95,42 @@ def figure(height: float) -> Figure:
 
 
 def area(fig: Figure, left: float, bottom: float, width: float, height: float, **keys: Any) -> Axes:
-    """Axes at a place given in inches."""
+    """Axes at a place given in inches.
+
+    Args:
+        fig: the picture.
+        left: of the axes.
+        bottom: of the axes.
+        width: of the axes.
+        height: of the axes.
+        keys: of matplotlib's ``add_axes``.
+    """
     tall = fig.get_figheight()
     return fig.add_axes((left / WIDTH, bottom / tall, width / WIDTH, height / tall), **keys)
 
 
 def heading(fig: Figure, result: Result, subject: str) -> None:
-    """The scene's title; below it what is shown, how large the problem was, its state, and whether to trust it."""
+    """Write the scene's title; below it what is shown, how large the problem was, its state, and its certificate.
+
+    Args:
+        fig: the picture.
+        result: the result.
+        subject: what is shown.
+    """
     title = str(result.scene.get("title") or "") or result.folder.name
     titled(fig, title, f"{subject} · {_facts(result)}", *_verdict(result))
 
 
 def titled(fig: Figure, title: str, below: str, words: str = "", colour: str = INK) -> None:
-    """A title in bold; on the line below it what is shown and, at the right, coloured words."""
+    """Write a title in bold.
+
+    Args:
+        fig: the picture.
+        title: the title.
+        below: on the line below it.
+        words: at the right of that line.
+        colour: of these words.
+    """
     tall = fig.get_figheight()
     title = textwrap.shorten(title, 2 * _LINE, placeholder=" …")
     lines = textwrap.wrap(title, _LINE) if len(title) > _LINE else [title]

@@ -22,7 +22,13 @@ ARROW = 0.16
 
 
 def fill(plotter: pyvista.Plotter, tails: Array, ways: Array) -> None:
-    """Put arrows into the scene."""
+    """Put arrows into VTK's scene.
+
+    Args:
+        plotter: that draws it.
+        tails: where the arrows begin, m, (k, 3).
+        ways: from there to their tips, m, (k, 3).
+    """
     import pyvista
 
     cloud = pyvista.PolyData(tails)
@@ -32,7 +38,15 @@ def fill(plotter: pyvista.Plotter, tails: Array, ways: Array) -> None:
 
 
 def arrows(shape: DeformedBody, load: LoadedSide) -> tuple[Array, Array]:
-    """Tails and ways of a load's arrows: onto the side where it is pushed, from it where it is pulled."""
+    """The arrows of a load: onto the side where it is pushed, from it where it is pulled.
+
+    Args:
+        shape: the deformed body.
+        load: the load.
+
+    Returns:
+        Where they begin, m, (k, 3), and the way from there to their tips, m, (k, 3).
+    """
     chosen = _sparse(shape.body.points[load.side.vertices], shape.body.size)
     traction = load.traction[chosen]
     ways = traction * ARROW * shape.body.size / float(np.linalg.norm(load.traction, axis=1).max())
@@ -57,7 +71,14 @@ def _sparse(points: Array, size: float) -> Integers:
 
 
 def labels(axes: Axes, view: View, shape: DeformedBody, pulled: list[LoadedSide]) -> None:
-    """Each load's largest value, over the middle of its side, off the tips of its arrows."""
+    """Write each load's largest value, over the middle of its side, off the tips of its arrows.
+
+    Args:
+        axes: to write on.
+        view: from where the body is seen.
+        shape: the deformed body.
+        pulled: the loads.
+    """
     halo = {"boxstyle": "round,pad=0.15", "fc": "white", "ec": "none", "alpha": 0.85}
     for load in pulled:
         middle = shape.points[load.side.vertices].mean(axis=0) + 1.3 * ARROW * shape.body.size * load.side.normal

@@ -27,7 +27,13 @@ SHARPER = 1.6
 
 @dataclass(frozen=True)
 class View:
-    """Orthonormal: what is to the right in the picture, what is up, and what comes towards the eye."""
+    """From where a body is seen: three orthonormal vectors (3,).
+
+    Attributes:
+        right: what is to the right in the picture.
+        up: what is up in the picture.
+        toward: what comes towards the eye.
+    """
 
     right: Array
     up: Array
@@ -57,14 +63,24 @@ def best_view(normals: Sequence[Array]) -> View:
 
 
 def area_vectors(points: Array, facets: Integers) -> Array:
-    """Outward normals (k, 3) of facets, as long as their areas."""
+    """Outward normals (k, 3) of facets, as long as their areas.
+
+    Args:
+        points: m, (n, 3).
+        facets: counterclockwise seen from outside, (k, 3).
+    """
     corner = points[facets[:, 0]]
     normals = np.cross(points[facets[:, 1]] - corner, points[facets[:, 2]] - corner)
     return np.asarray(normals / 2.0, dtype=np.float64)
 
 
 def surface(points: Array, facets: Integers) -> pyvista.PolyData:
-    """Facets as VTK's, without the points that none of them has."""
+    """Facets as VTK's, without the points that none of them has; ``vertex`` is the number of each point.
+
+    Args:
+        points: m, (n, 3).
+        facets: (k, 3).
+    """
     import pyvista
 
     used, index = np.unique(facets, return_inverse=True)
@@ -74,12 +90,25 @@ def surface(points: Array, facets: Integers) -> pyvista.PolyData:
 
 
 def creases(points: Array, facets: Integers, angle: float = 25.0) -> pyvista.PolyData:
-    """The edges at which facets meet at an angle (degrees), and those of one facet only."""
+    """The edges at which facets meet at an angle, and those of one facet only.
+
+    Args:
+        points: m, (n, 3).
+        facets: (k, 3).
+        angle: the least one that counts, degrees.
+    """
     return surface(points, facets).extract_feature_edges(angle, manifold_edges=False, non_manifold_edges=False)
 
 
 def render(axes: Axes, view: View, depths: tuple[float, float], fill: Callable[[pyvista.Plotter], None]) -> None:
-    """Draw what ``fill`` adds to a plotter, at the scale of the axes, into them."""
+    """Draw a scene of VTK's into axes, at their scale.
+
+    Args:
+        axes: to draw on.
+        view: from where the scene is seen.
+        depths: of its farthest and its nearest point along the view, m.
+        fill: puts what is drawn into the scene.
+    """
     import pyvista
 
     (left, right), (bottom, top) = axes.get_xlim(), axes.get_ylim()

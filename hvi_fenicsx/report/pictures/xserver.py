@@ -1,8 +1,9 @@
 """An X server for a VTK that draws through one: Xvfb, started while other things load, and always ended.
 
 VTK before 9.4 aborts where it finds no display. Xvfb says by itself when it is ready (``-displayfd``): nothing sleeps.
-The number of its display is drawn by lot. Xvfb itself would take the first free one; but a server that ends removes the
-socket of its number, and that may by then be the socket of another, just started.
+The number of its display is random. Xvfb itself would take the first free one; but a server that ends removes the
+socket of its number, and that may by then be the socket of another, just started. ``xvfb-run`` takes as long, but when
+it is killed its server runs on and its folder in ``/tmp`` stays.
 """
 
 from __future__ import annotations
@@ -32,12 +33,12 @@ class XServer:
     """
 
     def __init__(self, wanted: bool = True) -> None:
-        self._told = -1
+        self._ready = -1
         self._connection: socket.socket | None = None
         self._process = self._start() if wanted and _needed() else None
 
     def _start(self) -> subprocess.Popen[bytes]:
-        self._told, writing = os.pipe()
+        self._ready, writing = os.pipe()
         display = f":{random.SystemRandom().choice(DISPLAYS)}"
         size = ["-screen", "0", "640x480x24"]  # pictures are drawn beside the screen, whatever its size
         process = subprocess.Popen(
@@ -52,10 +53,10 @@ class XServer:
 
     def wait(self) -> None:
         """Wait until it is ready; sets ``DISPLAY``. A server that fails is left out: VTK may do without."""
-        if self._told >= 0:
-            number = _line(self._told)
-            os.close(self._told)
-            self._told = -1
+        if self._ready >= 0:
+            number = _line(self._ready)
+            os.close(self._ready)
+            self._ready = -1
             if number:
                 os.environ["DISPLAY"] = f":{number}"
                 self._connection = _connected(number)
@@ -93,13 +94,13 @@ def _connected(number: str) -> socket.socket | None:
 
 def _line(pipe: int) -> str:
     """What the server says, to the end of its line: it gives up if the pipe is closed before."""
-    told = b""
-    while not told.endswith(b"\n") and select.select([pipe], [], [], READY_WITHIN)[0]:
+    line = b""
+    while not line.endswith(b"\n") and select.select([pipe], [], [], READY_WITHIN)[0]:
         piece = os.read(pipe, 16)
         if not piece:
             return ""
-        told += piece
-    return told.decode().strip()
+        line += piece
+    return line.decode().strip()
 
 
 def _needed() -> bool:

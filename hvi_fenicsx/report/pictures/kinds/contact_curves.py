@@ -33,7 +33,12 @@ IN_RANGE = 1.6
 
 @picture("contact", dimension=2, of_part=True, caption="Along {part}: displacement, friction and pressure.")
 def draw(result: Result, part: ContactPart) -> Figure:
-    """Draw the curves of a part, with what the laws say of them; a law that it does not have has no curve."""
+    """Draw the curves of a part, with what the laws say of them; a law that it does not have has no curve.
+
+    Args:
+        result: the result.
+        part: the part of Γc, in the plane.
+    """
     part = _worth_seeing(part)
     length = unit_for(float(np.max(part["s"])), "m")
     panels = list(_panels(result, part, length))
@@ -53,7 +58,7 @@ def draw(result: Result, part: ContactPart) -> Figure:
 
 
 def _worth_seeing(part: ContactPart) -> ContactPart:
-    """Of a part that is closed on a short stretch only, that stretch and its neighbourhood."""
+    """The part; if it is closed on a short stretch only, that stretch and its neighbourhood."""
     s, closed = part["s"], part["s"][part["contact"] == 1.0]
     if len(closed) < 2 or np.ptp(closed) > SHORT * np.ptp(s):
         return part

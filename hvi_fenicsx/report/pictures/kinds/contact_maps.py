@@ -33,7 +33,14 @@ ARROWS = 13
 
 @dataclass(frozen=True)
 class FlatPart:
-    """A part laid flat: its vertices (m, 2), m, triangles between them, the two axes (2, 3) and their names."""
+    """A part laid flat.
+
+    Attributes:
+        points: its vertices, m, (m, 2).
+        triangles: its facets by its vertices, (k, 3).
+        axes: the two unit vectors that its coordinates run along, (2, 3).
+        names: of these axes.
+    """
 
     points: Array
     triangles: Integers
@@ -43,7 +50,12 @@ class FlatPart:
 
 @picture("contact", dimension=3, of_part=True, caption="Along {part}: displacement, friction and pressure.")
 def draw(result: Result, part: ContactPart) -> Figure:
-    """Draw the three maps of a part."""
+    """Draw the three maps of a part.
+
+    Args:
+        result: the result.
+        part: the part of Γc, in space.
+    """
     geometry = next(geometry for geometry in part_geometries(result) if geometry.part.name == part.name)
     flat, normal = laid_flat(geometry, result.body)
     rows: list[tuple[str, str, Array, Array | None, Colormap | None]] = [
@@ -68,7 +80,15 @@ def draw(result: Result, part: ContactPart) -> Figure:
 
 
 def laid_flat(geometry: PartGeometry, body: BodyMesh) -> tuple[FlatPart, Array]:
-    """The part in two of the coordinate axes, those most along it; and its mean unit normal."""
+    """Lay a part flat along two of the coordinate axes, those most along it.
+
+    Args:
+        geometry: where the part lies on the body.
+        body: the body.
+
+    Returns:
+        The flat part, and its mean unit normal (3,).
+    """
     total = area_vectors(body.points, geometry.facets).sum(axis=0)
     normal = total / (float(np.linalg.norm(total)) or 1.0)
     kept = [i for i in range(3) if i != int(np.argmax(np.abs(normal)))]

@@ -34,7 +34,13 @@ CONTACT, SUPPORT, LOADED = "#eea06d", "#9fb7c9", "#f3cf7a"
 
 @dataclass(frozen=True)
 class ColouredSide:
-    """A part as drawn: its side, its colour, and how far it is moved, (3,)."""
+    """A side as it is drawn.
+
+    Attributes:
+        side: the side.
+        colour: by what acts on it.
+        away: how far it is moved, m, (3,).
+    """
 
     side: Side
     colour: str
