@@ -11,10 +11,14 @@ import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from .errors import ExitCode, HviError, InputError
 from .runtime import processes
+
+_RANK_VARIABLES = ("OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK")
+_SIZE_VARIABLES = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE")
+"""By these, mpirun tells each process its rank, and the number of ranks."""
 
 
 class _Parser(argparse.ArgumentParser):
@@ -43,38 +47,20 @@ def parser() -> argparse.ArgumentParser:
         epilog="Exit codes: 0 certified, 2 bad input, 3 no solution exists, 4 not converged, 130 interrupted.",
     )
     commands = main_parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
-    run = commands.add_parser(
-        "run", help="solve a scene; results go to results/SCENE or --out", formatter_class=_RunHelp
-    )
-    _scene_arguments(run)
-    run.add_argument("--out", type=Path, metavar="DIR", help="where the result goes")
-    run.add_argument("--force", action="store_true", help="replace a result that is there")
-    run.add_argument("--resume", action="store_true", help="keep a finished result of the same scene, else run it")
-    run.add_argument(
-        "--accuracy", type=_share, metavar="REL", help="choose mesh, ε and tolerances for this error: 1e-2"
-    )
-    run.add_argument("--quantity", metavar="NAME", help="what --accuracy is of, by default energy")
-    run.add_argument("--time-budget", type=_duration, metavar="S", help="the most accurate solution within S seconds")
-    run.add_argument("--np", type=_ranks, metavar="N", help="run on N MPI ranks")
-    run.add_argument("--petsc", default="", metavar="OPTIONS", help='PETSc options, like "-hvi_ksp_monitor"')
-    run.add_argument("--no-pictures", action="store_true", help="write no pictures")
-    check = commands.add_parser("check", help="validate a scene and say whether a solution exists; solves nothing")
-    _scene_arguments(check)
-    check.add_argument(
-        "--load",
-        action="append",
-        default=[],
-        dest="loads",
-        metavar="NAME",
-        help="load factors of one load, the others constant: the part (or region) it is on, or part.traction",
-    )
-    check.add_argument("--json", action="store_true", help="print the report as JSON")
-    _study_arguments(commands.add_parser("study", help="what accuracy costs in time: a scene along several axes"))
-    commands.add_parser("version", help="versions of everything")
+    _add_run_options(_add(commands, "run", "solve a scene; results go to results/SCENE or --out", _RunHelp))
+    _add_check_options(_add(commands, "check", "validate a scene and say whether a solution exists; solves nothing"))
+    _add_study_options(_add(commands, "study", "measure what accuracy costs in time, along several axes"))
+    _add(commands, "version", "versions of everything")
     return main_parser
 
 
-def _scene_arguments(command: argparse.ArgumentParser) -> None:
+def _add(
+    commands: Any, name: str, text: str, formatter: type[argparse.HelpFormatter] = argparse.HelpFormatter
+) -> argparse.ArgumentParser:
+    return commands.add_parser(name, help=text, description=text, formatter_class=formatter)
+
+
+def _add_scene_options(command: argparse.ArgumentParser) -> None:
     command.add_argument("scene", type=Path, metavar="SCENE.toml", help="the scene file")
     command.add_argument(
         "--set",
@@ -86,71 +72,109 @@ def _scene_arguments(command: argparse.ArgumentParser) -> None:
     )
 
 
-def _share(text: str) -> float:
-    return _number(text, 1.0, "a relative error between 0 and 1, like 1e-2,")
+def _add_run_options(run: argparse.ArgumentParser) -> None:
+    _add_scene_options(run)
+    run.add_argument("--out", type=Path, metavar="DIR", help="the folder for the result")
+    run.add_argument("--force", action="store_true", help="replace a result that is there")
+    run.add_argument("--resume", action="store_true", help="keep a finished result of the same scene, else run it")
+    run.add_argument(
+        "--accuracy",
+        type=_relative_error,
+        metavar="REL",
+        help="choose mesh, ε and tolerances so that the relative error is below REL, like 1e-2",
+    )
+    run.add_argument("--quantity", metavar="NAME", help="the quantity whose error --accuracy bounds, by default energy")
+    run.add_argument(
+        "--time-budget", type=_seconds, metavar="S", help="find the most accurate solution within S seconds"
+    )
+    run.add_argument("--np", type=_ranks, metavar="N", help="run on N MPI ranks")
+    run.add_argument("--petsc", default="", metavar="OPTIONS", help='PETSc options, like "-hvi_ksp_monitor"')
+    run.add_argument("--no-pictures", action="store_true", help="write no pictures")
 
 
-def _duration(text: str) -> float:
-    return _number(text, math.inf, "a number of seconds above 0")
+def _add_check_options(check: argparse.ArgumentParser) -> None:
+    _add_scene_options(check)
+    check.add_argument(
+        "--load",
+        action="append",
+        default=[],
+        dest="loads",
+        metavar="NAME",
+        help="also print the factors of this load, the others constant: its part or region, or PART.traction",
+    )
+    check.add_argument("--json", action="store_true", help="print the report as JSON")
 
 
-def _number(text: str, below: float, wanted: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not 0 < value < below:
-        raise argparse.ArgumentTypeError(f"{wanted} is wanted, not {text!r}")
-    return value
-
-
-def _study_arguments(study: argparse.ArgumentParser) -> None:
-    _scene_arguments(study)
+def _add_study_options(study: argparse.ArgumentParser) -> None:
+    _add_scene_options(study)
     study.add_argument(
         "--axis",
         action="append",
         default=[],
         metavar="NAME=VALUE,...",
-        help="vary mesh, epsilon, epsilon_absolute, smoothing, method, tolerance, linear_solver or accuracy; several: "
-        "all combinations; none: a plan of the program's own",
+        help="solve the scene for each VALUE of mesh, epsilon, epsilon_absolute, smoothing, method, tolerance, "
+        "linear_solver or accuracy; several axes: all combinations; none: the program plans the study",
     )
-    study.add_argument("--out", type=Path, metavar="DIR", help="where the study goes; else results/SCENE-study")
+    study.add_argument("--out", type=Path, metavar="DIR", help="the folder for the study; else results/SCENE-study")
     study.add_argument("--force", action="store_true", help="replace a study that is there")
     study.add_argument("--resume", action="store_true", help="keep the points that are finished")
-    study.add_argument("--repeat", type=_repetitions, metavar="N", help="repetitions of a point at most")
-    study.add_argument("--limit", type=_duration, metavar="SECONDS", help="of a point, after which it is given up")
+    study.add_argument("--repeat", type=_repetitions, metavar="N", help="solve a point at most N times for its time")
+    study.add_argument("--limit", type=_seconds, metavar="SECONDS", help="give a point up after so many seconds")
     study.add_argument("--np", type=_ranks, metavar="N", help="run each point on N MPI ranks")
 
 
+def _relative_error(text: str) -> float:
+    return _number(text, 1.0, "a relative error between 0 and 1, like 1e-2")
+
+
+def _seconds(text: str) -> float:
+    return _number(text, math.inf, "a number of seconds above 0")
+
+
+def _number(text: str, below: float, allowed: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not 0 < value < below:
+        raise argparse.ArgumentTypeError(f"must be {allowed} (is {text!r})")
+    return value
+
+
 def _repetitions(text: str) -> int:
-    if not text.isdigit() or not 1 <= int(text) <= 1000:
-        raise argparse.ArgumentTypeError(f"a number from 1 to 1000 is wanted, not {text!r}")
-    return int(text)
+    return _whole_number(text, 1000)
 
 
 def _ranks(text: str) -> int:
-    if not text.isdigit() or not 1 <= int(text) <= 4096:
-        raise argparse.ArgumentTypeError(f"a number of ranks from 1 to 4096 is wanted, not {text!r}")
+    return _whole_number(text, 4096)
+
+
+def _whole_number(text: str, most: int) -> int:
+    if not text.isdigit() or not 1 <= int(text) <= most:
+        raise argparse.ArgumentTypeError(f"must be a whole number from 1 to {most} (is {text!r})")
     return int(text)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command; the exit code by the contract. Collective under mpirun."""
-    words = _joined(sys.argv[1:] if arguments is None else arguments)
+    return int(_run_command(_with_petsc_joined(sys.argv[1:] if arguments is None else arguments)))
+
+
+def _run_command(words: Sequence[str]) -> int:
     try:
         options = parser().parse_args(words)
         options.given = shlex.join(["hvi", *words])
         return _dispatch(options, words)
     except HviError as error:
-        _complain(f"hvi: {error}")
+        _print_error(f"hvi: {error}")
         return error.exit_code
     except KeyboardInterrupt:
-        _complain("hvi: interrupted; nothing was written")
+        _print_error("hvi: interrupted; nothing was written")
         return ExitCode.INTERRUPTED
 
 
-def _joined(words: Sequence[str]) -> list[str]:
-    """``--petsc OPTIONS`` as one word: options begin with a dash, which argparse takes for options of its own."""
+def _with_petsc_joined(words: Sequence[str]) -> list[str]:
+    """The command line with ``--petsc OPTIONS`` as one word: argparse would take PETSc's dashes for its own options."""
     found = list(words)
     if "--petsc" in found[:-1]:
         at = found.index("--petsc")
@@ -163,13 +187,17 @@ def _dispatch(options: argparse.Namespace, words: Sequence[str]) -> int:
         return _version()
     if options.command == "study":
         return _study(options, words)
-    if getattr(options, "np", None) and not _under_mpi():
+    if getattr(options, "np", None) and not _is_under_mpirun():
         from .runtime import mpirun
 
         return mpirun.run(options.np, words)
-    if _under_mpi():
+    if _is_under_mpirun():
         processes.die_with_parent(signal.SIGKILL)
-    with _undisturbed():
+    return _run_or_check(options)
+
+
+def _run_or_check(options: argparse.Namespace) -> int:
+    with _interrupts_held():
         from . import commands
         from .runtime.mpi import ended_together
 
@@ -178,8 +206,8 @@ def _dispatch(options: argparse.Namespace, words: Sequence[str]) -> int:
 
 
 @contextmanager
-def _undisturbed() -> Iterator[None]:
-    """Let Ctrl-C wait for the end of an import, which it would end in some library's own words."""
+def _interrupts_held() -> Iterator[None]:
+    """Let Ctrl-C wait for the end of an import, which it would end with a library's own traceback."""
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
@@ -190,43 +218,47 @@ def _undisturbed() -> Iterator[None]:
 def _version() -> int:
     from .runtime.versions import versions
 
-    if _first():
+    if _is_first_rank():
         print("\n".join(f"{name} {version}" for name, version in versions().items()))
-    return 0
+    return ExitCode.CERTIFIED
 
 
 def _study(options: argparse.Namespace, words: Sequence[str]) -> int:
-    """A study is one process that starts its points; under mpirun rank 0 becomes that process, the others have no part.
+    """A study is one process that starts its points; under mpirun rank 0 becomes that process, the others end.
 
-    None of them has started MPI yet, so that they may end as they like.
+    None of them has started MPI yet, so they may end at any time.
     """
-    if _under_mpi():
-        if not _first():
-            return 0
-        from .runtime import mpirun
-
-        ranks = options.np or next((int(os.environ[n]) for n in _SIZE_VARIABLES if n in os.environ), 1)
-        alone = [sys.executable, "-m", "hvi_fenicsx", *mpirun.without_ranks(words), f"--np={ranks}"]
-        os.execve(sys.executable, alone, processes.environment())
-    with _undisturbed():
+    if _is_under_mpirun():
+        if not _is_first_rank():
+            return ExitCode.CERTIFIED
+        _become_single_process(options.np or _ranks_of_mpirun(), words)
+    with _interrupts_held():
         from .studies import study
 
     return study.run(options)
 
 
-_SIZE_VARIABLES = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE")
-_RANK_VARIABLES = ("OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK")
+def _become_single_process(ranks: int, words: Sequence[str]) -> NoReturn:
+    """Replace this process, one of several ranks, by ``hvi WORDS --np RANKS`` in a process of its own."""
+    from .runtime import mpirun
+
+    alone = [sys.executable, "-m", "hvi_fenicsx", *mpirun.without_ranks(words), f"--np={ranks}"]
+    os.execve(sys.executable, alone, processes.environment())
 
 
-def _under_mpi() -> bool:
+def _ranks_of_mpirun() -> int:
+    return next((int(os.environ[name]) for name in _SIZE_VARIABLES if name in os.environ), 1)
+
+
+def _is_under_mpirun() -> bool:
     return any(name in os.environ for name in _RANK_VARIABLES)
 
 
-def _first() -> bool:
-    """Whether this is rank 0, told by the launcher's variables: MPI itself need not be started for a message."""
+def _is_first_rank() -> bool:
+    """Whether this is rank 0, by mpirun's variables: MPI itself need not be started for a message."""
     return next((os.environ[name] for name in _RANK_VARIABLES if name in os.environ), "0") == "0"
 
 
-def _complain(message: str) -> None:
-    if _first():
+def _print_error(message: str) -> None:
+    if _is_first_rank():
         print(message, file=sys.stderr, flush=True)

@@ -234,7 +234,7 @@ def _check_call(name: str, count: int, text: str) -> None:
         raise InputError(f"function {name!r} in {text!r} is not known; {hint}allowed: {', '.join(FUNCTIONS)}")
     wanted = 2 if name in _TWO_ARGUMENTS else 1
     if count != wanted:
-        raise InputError(f"{name} in {text!r} takes {wanted} argument{'s'[: wanted - 1]}, not {count}")
+        raise InputError(f"{name} in {text!r} takes {wanted} {'argument' if wanted == 1 else 'arguments'}, not {count}")
 
 
 def _check_power(op: ast.operator, exponent: ast.expr, text: str) -> None:

@@ -192,7 +192,8 @@ def as_data(study: Study) -> dict[str, Any]:
 def _heading(study: Study) -> Sequence[str]:
     title = study.scene.title or "untitled"
     certified = sum(r.converged for r in study.rows)
-    lines = [f"{title}: {len(study.rows)} points, {certified} certified, on {study.ranks} rank{'s'[: study.ranks - 1]}"]
+    ranks = "1 rank" if study.ranks == 1 else f"{study.ranks} ranks"
+    lines = [f"{title}: {len(study.rows)} points, {certified} certified, on {ranks}"]
     if study.left_out:
         lines.append(f"{len(study.left_out)} combinations are no scenes, like {study.left_out[0]}")
     return lines
