@@ -10,7 +10,7 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
-from ..effects import Contribution, Direction, Effect, Place
+from ..effects import Contribution, Direction, Effect, Place, Role, role_of
 from .contact_surface import Surface
 from .problem import PlacedContribution, Problem
 
@@ -35,6 +35,7 @@ class EffectSummary:
         unknowns: number of displacements that it brings or, negative, takes away.
         output: what the results hold because of it.
         solver: what it asks of the solver.
+        role: what it does, for those who report or draw it.
     """
 
     effect: str
@@ -45,6 +46,7 @@ class EffectSummary:
     unknowns: int
     output: tuple[str, ...]
     solver: str
+    role: Role
 
     def as_dict(self) -> dict[str, object]:
         """For ``check --json``."""
@@ -69,6 +71,7 @@ def _summary(problem: Problem, made: PlacedContribution, *, brings: bool) -> Eff
         unknowns=total if brings else -_prescribed(problem, where, contribution),
         output=tuple(_output(effect, contribution)),
         solver=_solver(contribution),
+        role=role_of(effect, contribution),
     )
 
 

@@ -137,49 +137,59 @@ class Result:
         """Whether the certificate was passed."""
         return bool((self.summary.get("certificate") or {}).get("passed"))
 
-    def _on(self, part: str) -> Mapping[str, Any]:
-        return (self.scene.get("boundary") or {}).get(part) or {}
+    def roles(self, part: str) -> list[Mapping[str, Any]]:
+        """What the effects on a part do (:class:`hvi_fenicsx.effects.Role`)."""
+        return [role for where, role in self._roles("boundary") if where == part]
+
+    def _roles(self, place: str) -> list[tuple[str | None, Mapping[str, Any]]]:
+        found = [(entry["where"], entry.get("role") or {}) for entry in self.summary.get("effects") or []]
+        return [(where, role) for where, role in found if role.get("place") == place]
 
     @property
     def within(self) -> list[str]:
-        """What acts inside of the body, in words."""
-        body = self.scene.get("body") or {}
-        named = {key for name, value in body.items() for key in (value if isinstance(value, dict) else [name])}
-        words = {"force": "a force on the body itself", "temperature": "a change of temperature"}
-        return [said for key, said in words.items() if key in named]
+        """What acts inside of the body, in words; loads first."""
+        roles = sorted((role for _, role in self._roles("body")), key=lambda role: role["drive"] != "load")
+        return list(dict.fromkeys(role["label"] for role in roles))
 
     def obstacle(self, part: str) -> Array | None:
         """The unit vector (3,) from a part towards its flat obstacle, if it has one."""
-        contact = self._on(part).get("contact") or {}
-        normal = np.array((contact.get("obstacle") or {}).get("normal") or [], dtype=np.float64)
-        return np.pad(-normal / np.linalg.norm(normal), (0, 3 - len(normal))) if normal.any() else None
+        known = [role["obstacle"] for role in self.roles(part) if role["obstacle"]]
+        return np.pad(np.array(known[0], dtype=np.float64), (0, 3 - len(known[0]))) if known else None
 
-    def acts(self, part: str, key: str) -> bool:
-        """Whether an effect is in force on a part.
+    def resists(self, part: str, direction: str) -> bool:
+        """Whether a law acts on a displacement of a part.
 
         Args:
             part: the part's name.
-            key: the effect's key in the scene.
+            direction: "slip", "opening" or "penetration".
         """
-        return key in self._on(part)
+        return bool(self._laws(part, direction))
 
-    def law(self, part: str, key: str = "friction") -> Superpotential | None:
+    def law(self, part: str, direction: str = "slip") -> Superpotential | None:
         """The law of a part, not smoothed.
 
         Args:
             part: the part's name.
-            key: the effect that the law belongs to.
+            direction: the displacement that it acts on: "slip", "opening" or "penetration".
 
         Returns:
-            The law; None if the part has none, or one that only its author's program knows.
+            The law; None if the part has none or several, or one that only its author's program knows.
         """
         from .. import laws  # a tenth of a second, for the picture that asks
 
-        table = dict(self._on(part).get(key) or {})
-        try:
-            return laws.create(table.pop("law"), table)
-        except (HviError, KeyError):
+        tables = self._laws(part, direction)
+        if len(tables) != 1:
             return None
+        parameters = {key: value for key, value in tables[0].items() if key != "law"}
+        try:
+            return laws.create(tables[0]["law"], parameters)
+        except HviError:
+            return None
+
+    def _laws(self, part: str, direction: str) -> list[Mapping[str, Any]]:
+        """The laws that act on a displacement of a part, as a scene writes them."""
+        brought = [law for role in self.roles(part) for law in role["laws"]]
+        return [law["law"] for law in brought if law["direction"] == direction]
 
 
 def read(folder: Path) -> Result:

@@ -101,6 +101,13 @@ def change(folder: Path, **values: Any) -> None:
     save(folder / FILE, replace(load(folder / FILE), **values))
 
 
+def role(where: str, effect: str, **role: Any) -> dict[str, Any]:
+    """An effect on a boundary part, as the summary has it."""
+    nothing = {"traction": [], "pressure": None, "prescribed": [], "bounded": False, "obstacle": None, "laws": []}
+    plain = {"place": "boundary", "drive": "resistance", "meaning": "", "label": effect}
+    return {"effect": effect, "where": where, "role": plain | nothing | role}
+
+
 def write_words(folder: Path, d: int, solvability: Mapping[str, object] = HELD, **summary: Any) -> None:
     loaded = {"on": "right", "traction": ["1e6*(1 - y)", *[0.0] * (d - 1)]}
     floor = {"on": "bottom", "contact": {"gap": 0.0}, "friction": LAW}
@@ -113,6 +120,13 @@ def write_words(folder: Path, d: int, solvability: Mapping[str, object] = HELD, 
             "floor": floor,
         },
     }
+    effects = [
+        role("wall", "displacement", drive="kinematic", prescribed=[0]),
+        role("pull", "traction", drive="load", traction=loaded["traction"]),
+        role("floor", "contact", drive="kinematic", bounded=True),
+        role("floor", "friction", laws=[{"direction": "slip", "law": LAW}]),
+    ]
+    summary = {"effects": effects} | summary
     record = {"dofs": 578, "smoothing": None, "solvability": solvability, "certificate": {"passed": True}} | summary
     (folder / "scene.toml").write_text(tomli_w.dumps(scene), encoding="utf-8")
     (folder / "summary.json").write_text(json.dumps(record), encoding="utf-8")

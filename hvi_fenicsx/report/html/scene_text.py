@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import inspect
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from ...effects import Effect
 from ..reader import Result
 
 _PLACE = {"on", "region"}
@@ -38,13 +36,11 @@ def parts(result: Result) -> Iterator[dict[str, Any]]:
 
 def effects(result: Result) -> Iterator[dict[str, str]]:
     """Each effect in force: where, what it is, what it adds to the problem."""
-    known = {key: kind for place in Effect.registry.values() for key, kind in place.items()}
     for entry in result.summary.get("effects") or []:
-        kind = known.get(entry["effect"])
         yield {
             "name": entry["effect"],
             "where": entry["where"] or "the whole body",
-            "meaning": _first_paragraph(kind) if kind else "",
+            "meaning": (entry.get("role") or {}).get("meaning", ""),
             "adds": entry["adds"],
             "share": ", ".join(_share(entry)),
         }
@@ -57,10 +53,6 @@ def _share(entry: Mapping[str, Any]) -> Iterator[str]:
             yield f"{entry[name]:+,} {name}".replace("-", "−")
     if entry.get("solver"):
         yield f"solver: {entry['solver']}"
-
-
-def _first_paragraph(kind: type) -> str:
-    return (inspect.getdoc(kind) or "").split("\n\n")[0].replace("\n", " ").replace("`", "")
 
 
 def _entries(table: Mapping[str, Any]) -> str:

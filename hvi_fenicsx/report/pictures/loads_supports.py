@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -70,9 +70,9 @@ class HeldSide:
 def loaded_sides(result: Result) -> list[LoadedSide]:
     """The tractions that are not zero."""
     found = []
-    for side, table in tables(result):
-        traction = _traction(table.get("traction"), result.body.points[side.vertices])
-        if traction is not None and np.any(traction):
+    for side, roles in roles_by_side(result):
+        traction = np.sum([_traction(role, result.body.points[side.vertices], side.normals) for role in roles], axis=0)
+        if np.any(traction):
             found.append(LoadedSide(side, traction))
     return found
 
@@ -80,22 +80,22 @@ def loaded_sides(result: Result) -> list[LoadedSide]:
 def held_sides(result: Result) -> list[HeldSide]:
     """The sides that are held along the axis nearest to their normal."""
     found = []
-    for side, table in tables(result):
-        given = table.get("displacement")
+    for side, roles in roles_by_side(result):
+        held = {component for role in roles for component in role["prescribed"]}
         axis = int(np.argmax(np.abs(side.normal)))
-        if isinstance(given, list) and len(given) == result.body.dimension and given[axis] != "free":
-            found.append(HeldSide(side, any(v == "free" for i, v in enumerate(given) if i != axis)))
+        if axis in held:
+            found.append(HeldSide(side, rolling=len(held) < result.body.dimension))
     return found
 
 
-def tables(result: Result) -> Iterator[tuple[Side, Mapping[str, Any]]]:
-    """The pieces of each boundary part, with what the scene says of it."""
+def roles_by_side(result: Result) -> Iterator[tuple[Side, Sequence[Mapping[str, Any]]]]:
+    """The pieces of each boundary part, with the roles of its effects."""
     body = result.body
     for name, own in result.sides.items():
-        table = (result.scene.get("boundary") or {}).get(name) or {}
+        roles = result.roles(name)
         facets = body.oriented(own)
         for side in _lines(name, body, facets) if body.dimension == 2 else _faces(name, body, facets):
-            yield side, table
+            yield side, roles
 
 
 def _lines(name: str, body: BodyMesh, facets: Integers) -> Iterator[Side]:
@@ -115,14 +115,18 @@ def _faces(name: str, body: BodyMesh, facets: Integers) -> Iterator[Side]:
     yield Side(name, vertices, facets, outward / np.linalg.norm(outward, axis=1)[:, None])
 
 
-def _traction(given: Any, points: Array) -> Array | None:
-    """By component, a number or a formula; what cannot be read is not drawn."""
-    if not isinstance(given, list):
-        return None
+def _traction(role: Mapping[str, Any], points: Array, normals: Array) -> Array:
+    """The load of one effect at points (m, 3), N/m², (m, 3); what cannot be read is not drawn."""
     traction = np.zeros((len(points), 3))
     try:
-        for i, component in enumerate(given[:3]):
-            traction[:, i] = np.nan_to_num(Formula(component).at(points.astype(np.float64)))
+        for i, component in enumerate(role["traction"][:3]):
+            traction[:, i] = _values(component, points)
+        if role["pressure"] is not None:
+            traction -= _values(role["pressure"], points)[:, None] * normals
     except HviError:
-        return None
+        return np.zeros((len(points), 3))
     return traction
+
+
+def _values(formula: float | str, points: Array) -> Array:
+    return np.nan_to_num(Formula(formula).at(points.astype(np.float64)))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -16,13 +16,10 @@ from ..units import quantity, thousands
 from .legend import FOOT
 from .style import BLUE, GREY, INK, WIDTH
 
-ACTING = {"displacement", "traction"}
-"""What has a drawing of its own; whatever else acts on a part colours it as a contact part."""
 
-
-def touches(table: Mapping[str, Any]) -> bool:
-    """Whether contact or a law acts on a part."""
-    return bool(set(table) - {"on"} - ACTING)
+def touches(roles: Iterable[Mapping[str, Any]]) -> bool:
+    """Whether contact or a law acts on a part, from the roles of its effects."""
+    return any(role["bounded"] or role["laws"] for role in roles)
 
 
 def inside(result: Result) -> list[Artist]:

@@ -71,18 +71,18 @@ def _worth_seeing(part: ContactPart) -> ContactPart:
 def _panels(result: Result, part: ContactPart, length: Unit) -> Iterator[Callable[[Axes], None]]:
     """From the top: slip and friction, what a normal law acts on, the pressure."""
 
-    def displacement(values: Array, words: str, key: str) -> Callable[[Axes], None]:
+    def displacement(values: Array, words: str, direction: str) -> Callable[[Axes], None]:
         return partial(
-            _displacement, part=part, values=values, law=result.law(part.name, key), words=words, length=length
+            _displacement, part=part, values=values, law=result.law(part.name, direction), words=words, length=length
         )
 
-    yield displacement(part.slip, "slip $u_t$", "friction")
-    if result.acts(part.name, "friction"):
+    yield displacement(part.slip, "slip $u_t$", "slip")
+    if result.resists(part.name, "slip"):
         yield partial(_friction, part=part, result=result, length=length)
-    if result.acts(part.name, "adhesion"):
-        yield displacement(-part["u_n"], "opening $-u_n$", "adhesion")
-    if result.acts(part.name, "support"):
-        yield displacement(part["u_n"], "penetration $u_n$", "support")
+    if result.resists(part.name, "opening"):
+        yield displacement(-part["u_n"], "opening $-u_n$", "opening")
+    if result.resists(part.name, "penetration"):
+        yield displacement(part["u_n"], "penetration $u_n$", "penetration")
     yield partial(_pressure, part=part, length=length)
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -18,7 +17,7 @@ from ...reader import Result
 from .. import plane_marks as marks
 from ..deformed import DeformedBody
 from ..legend import legend
-from ..loads_supports import Side, held_sides, loaded_sides, tables
+from ..loads_supports import Side, held_sides, loaded_sides, roles_by_side
 from ..outline import closed_path
 from ..plane_canvas import canvas
 from ..registry import picture
@@ -44,29 +43,25 @@ def draw(result: Result) -> Figure:
     heading(fig, result, "the scene")
     outline = closed_path(body.points, chains(body.boundary))
     axes.add_patch(PathPatch(outline, fc="#eef2f5", ec=INK, lw=1.6, joinstyle="round", zorder=1))
-    found = list(tables(result))
-    for side, table in found:
-        _part(axes, body, side, table)
+    found = list(roles_by_side(result))
+    for side, roles in found:
+        _part(axes, body, side, contact=touches(roles))
     for mark in drawn:
         mark.draw(axes)
     say(fig, body)
-    legend(fig, [*keys(table for _, table in found), *marks.keys(drawn), *inside(result)])
+    legend(fig, [*keys(any(touches(roles) for _, roles in found)), *marks.keys(drawn), *inside(result)])
     return fig
 
 
-def keys(found: Iterator[Mapping[str, Any]]) -> list[Artist]:
+def keys(contact: bool) -> list[Artist]:
     """The legend's line for contact parts, if there is one."""
-    return (
-        [Line2D([], [], color=VERMILION, lw=5, label="contact, friction or adhesion")]
-        if any(map(touches, found))
-        else []
-    )
+    return [Line2D([], [], color=VERMILION, lw=5, label="contact, friction or adhesion")] if contact else []
 
 
-def _part(axes: Axes, body: BodyMesh, side: Side, table: Mapping[str, Any]) -> None:
+def _part(axes: Axes, body: BodyMesh, side: Side, *, contact: bool) -> None:
     """The part's line where something touches it, and its name inside of it."""
     line = body.points[side.vertices, :2]
-    if touches(table):
+    if contact:
         axes.plot(*line.T, color=VERMILION, lw=5, solid_capstyle="butt", zorder=2)
     middle, inward = len(line) // 2, -side.normals[len(line) // 2, :2]
     depth = min(INSIDE * body.size, float(np.ptp(body.points[:, :2], axis=0).min()) / 2)

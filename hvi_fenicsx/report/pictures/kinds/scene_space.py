@@ -19,7 +19,7 @@ from .. import vtk_loads
 from ..deformed import DeformedBody
 from ..footprints import FACING
 from ..legend import legend
-from ..loads_supports import Side, held_sides, loaded_sides, tables
+from ..loads_supports import Side, held_sides, loaded_sides, roles_by_side
 from ..plane_canvas import canvas
 from ..registry import picture
 from ..scene_legend import inside, say, touches
@@ -58,11 +58,11 @@ def draw(result: Result) -> Figure:
     """Draw the scene of a body in space."""
     body = result.body
     rest, pulled = DeformedBody(body, np.zeros_like(body.points), 1.0), loaded_sides(result)
-    sides = list(tables(result))
-    view = best_view([area_vectors(body.points, side.facets).sum(axis=0) for side, table in sides if touches(table)])
+    found = list(roles_by_side(result))
+    view = best_view([area_vectors(body.points, side.facets).sum(axis=0) for side, roles in found if touches(roles)])
     held = {support.side.part for support in held_sides(result)}
-    colours = [CONTACT if touches(t) else SUPPORT if s.part in held else LOADED for s, t in sides]
-    shown = [ColouredSide(s, c, _away(view, body, s)) for (s, _), c in zip(sides, colours, strict=True)]
+    colours = [CONTACT if touches(t) else SUPPORT if s.part in held else LOADED for s, t in found]
+    shown = [ColouredSide(s, c, _away(view, body, s)) for (s, _), c in zip(found, colours, strict=True)]
     arrows = [vtk_loads.arrows(rest, load) for load in pulled]
     reached = [body.points, *(body.points[s.side.vertices] + s.away for s in shown)]
     everything = np.concatenate([*reached, *(end for tails, ways in arrows for end in (tails, tails + ways))])
