@@ -120,7 +120,7 @@ def _finish(run_logs: Iterable[log.RunLog]) -> None:
 def _solve(request: RunRequest, interrupt: Interrupt) -> tuple[Solution, Reached | None]:
     """The solution; with it, where an accuracy was asked for, how it was reached. Collective."""
     if request.goal is not None:
-        solver = AdaptiveSolver(timer=request.timer, progress=log.newton_step, interrupted=interrupt.requested)
+        solver = AdaptiveSolver(timer=request.timer, interrupted=interrupt.requested)
         reached = control.reach(request.scene, COMM, request.goal, solver, _LOG.info)
         _say(
             [
@@ -132,7 +132,7 @@ def _solve(request: RunRequest, interrupt: Interrupt) -> tuple[Solution, Reached
         return reached.solution, reached
     prepared = prepare(request.scene, COMM, request.timer)
     _say(console.heading(prepared, COMM.size))
-    solution = finish(prepared, log.newton_step, interrupt.requested)
+    solution = finish(prepared, interrupted=interrupt.requested)
     new = (warning for warning in solution.warnings if warning not in prepared.warnings)
     _say([*console.outcome(solution), *console.warnings(new)])
     return solution, None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 
 from dolfinx import fem
@@ -19,10 +19,11 @@ from .mesh.thresholds import Thresholds as MeshThresholds
 from .problem.compose import Model, Modification, unchanged
 from .problem.problem import Problem
 from .rigid import LoadFactors, Solvability
+from .runtime.log import logger, newton_step
 from .runtime.timing import Timer
 from .scene import Scene, SolverTable
 from .solvers import nested_iteration, registry
-from .solvers.context import Progress, RunControl, never, silent
+from .solvers.context import Progress, RunControl, never
 from .solvers.nested_iteration import CoarseStart, LevelSolution
 from .solvers.options import SolverOptions
 from .solvers.result import SolveResult
@@ -31,6 +32,8 @@ from .system import existence, free_motions
 from .system.assemble import assemble
 from .system.levels import Levels
 from .system.system import System
+
+_LOG = logger("workflow")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -223,9 +226,12 @@ def prepare(
     system = assemble(domain, model, timer)
     with timer("existence"):
         solvability = solvability or existence.solvability(system.problem, system.forces)
+    margin = "" if solvability.margin is None else f", margin {solvability.margin:.3g}"
+    _LOG.info("%d unknowns; existence: %s%s", system.dofs, solvability.state, margin)
     with timer("assembly"):
         system.release(solvability.free)
         warnings = plausibility.foreseen(system.problem, system.forces)
+    _log_warnings(warnings)
     return Preparation(
         scene=scene,
         model=model,
@@ -241,7 +247,7 @@ def solve(
     scene: Scene,
     comm: MPI.Comm = MPI.COMM_WORLD,
     *,
-    progress: Progress = silent,
+    progress: Progress = newton_step,
     timer: Timer | None = None,
     thresholds: Thresholds = DEFAULT,
 ) -> Solution:
@@ -250,7 +256,7 @@ def solve(
     Args:
         scene: what to solve.
         comm: the ranks.
-        progress: called at each Newton step.
+        progress: called at each Newton step; by default it is logged.
         timer: to go on with.
         thresholds: the numbers that tune the run.
 
@@ -260,12 +266,14 @@ def solve(
     return finish(prepare(scene, comm, timer, thresholds=thresholds), progress)
 
 
-def finish(prepared: Preparation, progress: Progress = silent, interrupted: Callable[[], bool] = never) -> Solution:
+def finish(
+    prepared: Preparation, progress: Progress = newton_step, interrupted: Callable[[], bool] = never
+) -> Solution:
     """Solve, certificate and estimate of a prepared scene; nothing is solved when no solution exists. Collective.
 
     Args:
         prepared: the scene.
-        progress: called at each Newton step.
+        progress: called at each Newton step; by default it is logged.
         interrupted: whether to stop (collective, asked at each Newton step).
     """
     return finish_with_levels(prepared, progress, interrupted)[0]
@@ -273,7 +281,7 @@ def finish(prepared: Preparation, progress: Progress = silent, interrupted: Call
 
 def finish_with_levels(
     prepared: Preparation,
-    progress: Progress = silent,
+    progress: Progress = newton_step,
     interrupted: Callable[[], bool] = never,
     start: CoarseStart | None = None,
 ) -> tuple[Solution, Levels]:
@@ -281,7 +289,7 @@ def finish_with_levels(
 
     Args:
         prepared: the scene.
-        progress: called at each Newton step.
+        progress: called at each Newton step; by default it is logged.
         interrupted: whether to stop (collective, asked at each Newton step).
         start: a solution on a coarser mesh, where the mesh was refined from it.
     """
@@ -295,7 +303,10 @@ def finish_with_levels(
             examination = certificate.examine(
                 prepared.problem, found.u, options.tolerance, inertia=options.second_order
             )
-            warnings += plausibility.found(prepared.problem, examination, found.u)
+            implausible = plausibility.found(prepared.problem, examination, found.u)
+        _log_warnings(implausible)
+        warnings += implausible
+        _log_certificate(examination.certificate)
         if examination.certificate.passed:
             with prepared.timer("estimate"):
                 errors = estimate(prepared.system, levels, found.u, examination)
@@ -312,6 +323,18 @@ def finish_with_levels(
         warnings=warnings,
     )
     return solution, levels
+
+
+def _log_warnings(warnings: Iterable[str]) -> None:
+    for warning in warnings:
+        _LOG.warning("%s", warning)
+
+
+def _log_certificate(found: certificate.Certificate) -> None:
+    names = ("equilibrium", "penetration", "tension", "complementarity", "inclusion")
+    parts = ", ".join(f"{name} {getattr(found, name):.1e}" for name in names)
+    verdict = "passed" if found.passed else "not passed"
+    _LOG.info("certificate %s (%g): %s; %s", verdict, found.tolerance, parts, found.second_order)
 
 
 def _solved(prepared: Preparation, control: RunControl, start: CoarseStart | None) -> LevelSolution:

@@ -17,10 +17,11 @@ from ..certify.estimate.estimator import Estimate
 from ..mesh import refinement
 from ..mesh.domain import Domain
 from ..mesh.refinement import Refinement
+from ..runtime.log import newton_step
 from ..runtime.mpi import agree, total
 from ..runtime.timing import Timer
 from ..scene import Scene
-from ..solvers.context import Progress, never, silent
+from ..solvers.context import Progress, never
 from ..solvers.nested_iteration import CoarseStart
 from ..system.levels import Level, Levels, prolongation, stacked
 from ..typing import Entities
@@ -63,14 +64,14 @@ class AdaptiveSolver:
 
     Attributes:
         timer: where time goes.
-        progress: called at each Newton step.
+        progress: called at each Newton step; by default it is logged.
         interrupted: whether to stop (collective, asked at each Newton step).
         existence: whether it is asked for on each mesh anew, not on the first only.
         thresholds: the numbers that tune the runs.
     """
 
     timer: Timer
-    progress: Progress = silent
+    progress: Progress = newton_step
     interrupted: Callable[[], bool] = never
     existence: bool = False
     thresholds: Thresholds = DEFAULT

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from ..rigid import Solvability
+from ..runtime.log import newton_step
 from ..runtime.timing import Timer
 from ..system.held_solver import LinearSettings
 from ..system.levels import Levels
@@ -15,10 +16,6 @@ from .options import SolverOptions
 
 Progress = Callable[[str, float | None, int, float, int], None]
 """Called with the method's name, ε, iteration, residual, and vertices in contact (of all ranks)."""
-
-
-def silent(method: str, epsilon: float | None, iteration: int, residual: float, contact: int) -> None:
-    """A progress display that shows nothing."""
 
 
 def never() -> bool:
@@ -32,12 +29,12 @@ class RunControl:
 
     Attributes:
         timer: where time goes.
-        progress: called at each Newton step.
+        progress: called at each Newton step; by default it is logged.
         interrupted: whether to stop (collective, asked at each Newton step).
     """
 
     timer: Timer
-    progress: Progress = silent
+    progress: Progress = newton_step
     interrupted: Callable[[], bool] = never
 
 
@@ -51,7 +48,7 @@ class SolveContext:
         solvability: whether a solution can exist, and which rigid motions the supports leave.
         options: method, tolerance, limits.
         timer: where time goes.
-        progress: called at each Newton step.
+        progress: called at each Newton step; by default it is logged.
         steady: whether the pieces and the active set of a start from the coarser level are expected to stand.
     """
 
@@ -60,7 +57,7 @@ class SolveContext:
     solvability: Solvability
     options: SolverOptions
     timer: Timer
-    progress: Progress = silent
+    progress: Progress = newton_step
     steady: bool = False
 
     @classmethod

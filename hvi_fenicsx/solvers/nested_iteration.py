@@ -13,15 +13,19 @@ from petsc4py import PETSc
 from ..mesh.transfer import Transfer
 from ..problem.compose import Model
 from ..rigid import Solvability
+from ..runtime.log import logger
 from ..system.assemble import assemble
 from ..system.held_solver import LinearSettings
 from ..system.levels import Level, Levels, prolongation
 from ..system.system import System
 from . import registry
 from .context import RunControl, SolveContext
+from .method import Method
 from .options import SolverOptions
 from .quadratic import LinearSolve
 from .result import Counts, SolveResult
+
+_LOG = logger("solvers")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -93,6 +97,7 @@ def solve(
     if not nested or not kind.takes_start:
         levels = hierarchy(model, system, options, control) if nested and kind is LinearSolve else ()
         context = SolveContext.create(system, levels, solvability, options, control)
+        _log_level(system, kind)
         return LevelSolution(system=system, levels=levels, result=kind(context).solve())
     coarse, transfer = _assembled(model, system, control)
     coarse.release(system.freedom.modes if system.freedom else ())
@@ -122,6 +127,7 @@ def ascend(
     kind, found = registry.choose(options, system), start.result
     first = _prolonged(start, system) if found.converged and kind.takes_start else None
     context = SolveContext.create(system, start.levels, solvability, options, control, steady=found.steady)
+    _log_level(system, kind)
     result = kind(context).solve() if first is None else kind(context).solve(first)
     if first is not None and not result.converged and not result.interrupted:
         result = kind(SolveContext.create(system, start.levels, solvability, options, control)).solve()
@@ -131,6 +137,10 @@ def ascend(
     steady = result.steady and (found.steady or found.levels == 1)  # one level that stood is no sign yet
     result = replace(result, counts=counts, levels=found.levels + 1, steady=steady)
     return LevelSolution(system=system, levels=start.levels, result=result)
+
+
+def _log_level(system: System, kind: type[Method]) -> None:
+    _LOG.info("level of %d unknowns: method %s", system.dofs, kind.label)
 
 
 def hierarchy(model: Model, system: System, options: SolverOptions, control: RunControl) -> Levels:

@@ -5,14 +5,19 @@ from __future__ import annotations
 import logging
 import os
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 from runs import command, write_scene
 from scenes import model, quadratic_linear
 
+from hvi_fenicsx import Scene, solve
 from hvi_fenicsx.runtime import log
+from hvi_fenicsx.solvers.thresholds import Thresholds as SolverThresholds
+from hvi_fenicsx.workflow import Thresholds
 
+NESTED = Thresholds(solvers=SolverThresholds(nested_from=500))
 LAW = quadratic_linear(1.0e6)
 
 
@@ -74,3 +79,44 @@ def test_handlers_leave_the_package_as_they_found_it(tmp_path: Path) -> None:
     with log.Handlers(log.RunLog(tmp_path / "run.log")):
         assert package.level == logging.DEBUG
     assert (package.level, package.handlers) == before
+
+
+def solve_from_python(caplog: pytest.LogCaptureFixture, level: int, **keys: object) -> list[logging.LogRecord]:
+    with caplog.at_level(level, logger="hvi_fenicsx"):
+        solve(Scene.model_validate(model(32, 3e6, friction=LAW, **keys)), thresholds=NESTED)
+    return caplog.records
+
+
+def test_from_python_existence_levels_and_certificate_are_told_at_info(caplog: pytest.LogCaptureFixture) -> None:
+    records = solve_from_python(caplog, logging.INFO)
+    told = [(r.name, r.getMessage().partition(":")[0]) for r in records]
+    assert told == [
+        ("hvi_fenicsx.workflow", "2178 unknowns; existence"),
+        *(("hvi_fenicsx.solvers", f"level of {n} unknowns") for n in (162, 578, 2178)),
+        ("hvi_fenicsx.workflow", "certificate passed (1e-08)"),
+    ]
+    assert "existence: held, margin 0.333" in records[0].getMessage()
+
+
+def test_from_python_every_newton_step_is_told_at_debug(caplog: pytest.LogCaptureFixture) -> None:
+    steps = [r for r in solve_from_python(caplog, logging.DEBUG) if r.levelno == logging.DEBUG]
+    assert len(steps) > 3
+    assert {r.name for r in steps} == {"hvi_fenicsx.solvers"}
+    assert all(r.getMessage().startswith("branch, iteration ") for r in steps)
+    assert "ε 0.1" in solve_from_python(caplog, logging.DEBUG, epsilon=0.1)[-2].getMessage()
+
+
+_QUIET = "from hvi_fenicsx import read_scene, solve; solve(read_scene('square.toml'))"
+_TOLD = "import logging, sys; logging.basicConfig(level=logging.DEBUG, stream=sys.stdout, format='%(name)s'); " + _QUIET
+
+
+def test_python_users_who_configure_nothing_see_nothing(scene: Path) -> None:
+    done = subprocess.run([sys.executable, "-c", _QUIET], cwd=scene.parent, capture_output=True, text=True, check=True)
+    assert (done.stdout, done.stderr) == ("", "")
+
+
+def test_on_two_ranks_only_the_first_tells(scene: Path) -> None:
+    words = ["mpirun", "-n", "2", sys.executable, "-m", "mpi4py", "-c", _TOLD]
+    done = subprocess.run(words, cwd=scene.parent, capture_output=True, text=True, check=True, timeout=300)
+    assert done.stdout.split().count("hvi_fenicsx.workflow") == 2
+    assert "hvi_fenicsx.solvers" in done.stdout
