@@ -36,8 +36,8 @@ COUPLINGS: Mapping[str, Callable[[float], float]] = {
 COLOURS = dict(zip(COUPLINGS, ("#D55E00", "#E69F00", "#0072B2", "#AA4499", "#009E73"), strict=True))
 QUANTITIES = {"energy_norm": "energy norm", "u_t_l2": "uₜ (L2)", "friction_l1": "-σₜ (L1)"}
 CASES = {
-    "wall_left": ("paper", "wall left, the paper's S: it acts at zero slip for every ε"),
-    "strong_law": ("chks", "strong law, chks: the slip passes the drop"),
+    "wall_left": ("paper", "wall left, the paper's S, which acts at zero slip for every ε"),
+    "strong_law": ("chks", "strong law, chks, the slip passes the drop"),
 }
 
 
@@ -127,20 +127,21 @@ def draw(found: Mapping[str, list[Line]], path: Path) -> None:
     figure.savefig(path, dpi=110)
 
 
-INTRODUCTION = """# The joint limit (h, ε) → 0
+INTRODUCTION = """# The joint limit (h, ε) → 0: how must ε depend on h?
 
     ./hvi exec python3 benchmarks/joint_limit.py
 
-The paper's Theorem 2 lets h and ε tend to 0 together, and couples them in no way. Measured here: relative errors
-against the exact law on a mesh four times finer than the finest, along ε ~ √h, h, h² (each scaled to ε = 1 at h = 1/4,
-relative to the law's energy), with ε = 1 fixed, and for the exact law.
-The order in h is that of the two finest meshes; it is an observation, not a bound.
+In the paper's Theorem 2, h and ε tend to 0 together, without any relation between them. This page compares
+couplings ε(h) by measurement: ε ~ √h, ε ~ h and ε ~ h², each with ε = 1 at h = 1/4 (relative to the law's energy);
+ε = 1 fixed; and the exact law. The tables show relative errors. The reference is the exact law on a mesh four times
+finer than the finest. The order in h is that of the two finest meshes. It is an observation, not a bound.
 
 ![Errors against h along the couplings](images/joint_limit.png)
 
-On wall_left -σₜ takes the order of the coupling: 0 for a fixed ε, ½ for √h, 1 for h; with h² no vertex is left in the
-band from h = 1/16 on, and the solution is that of the exact law to all digits shown. On strong_law every coupling
-slower than h² costs accuracy in uₜ and -σₜ, and the energy norm notices √h. The exact law needs no coupling.
+On wall_left, the error of -σₜ has the order of the coupling: 0 for a fixed ε, ½ for √h, 1 for h. With h², no vertex is
+left in the smoothed band from h = 1/16 on; the solution is then that of the exact law, to all digits shown. On
+strong_law, every coupling slower than h² costs accuracy in uₜ and -σₜ, and √h also costs accuracy in the energy norm.
+The exact law needs no coupling.
 """
 
 
