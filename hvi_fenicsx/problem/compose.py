@@ -15,7 +15,7 @@ import numpy as np
 import ufl
 from dolfinx import fem
 
-from ..effects import BoundaryLaw, Direction, NormalBounds, Place
+from ..effects import BoundaryLaw, Direction, Evaluate, NormalBounds, Place
 from ..errors import InputError
 from ..formula import Formula
 from ..laws import Superpotential
@@ -69,22 +69,31 @@ def compose(domain: Domain, model: Model) -> Problem:
     for name, on in parts.items():
         if not sum(agree(domain.mesh.comm, len(domain.facets(on)))):
             raise InputError(f"boundary.{name}: no facet lies on it; see `on`")
-    scales = scaling.choose(
-        domain.length, domain.dimension, effects, lambda placed: functools.partial(_largest, domain, parts, placed)
-    )
+    sizes, evaluate = scaling.sizes(domain.length, effects), functools.partial(_evaluation, domain, parts)
+    scales = scaling.choose(sizes, domain.dimension, effects, evaluate)
     context = FormContext(domain, parts, scales, effects)
     made = [PlacedContribution(where, effect, effect.contribute(context, where)) for where, effect in effects]
-    return _sum(context, scales, made, model.modify)
+    doubts = [f"{_place(e)}: {text}" for e in effects for text in e[1].implausible(evaluate(e), sizes)]
+    return _sum(context, scales, made, model.modify, tuple(doubts))
+
+
+def _place(placed: Placed) -> str:
+    """Where the scene states an effect."""
+    where, effect = placed
+    return ".".join(filter(None, (effect.place.value, where, effect.key)))
+
+
+def _evaluation(domain: Domain, parts: Mapping[str, Sequence[str]], placed: Placed) -> Evaluate:
+    """The function that finds a formula's largest absolute value where an effect acts."""
+    return functools.partial(_largest, domain, parts, placed)
 
 
 def _largest(domain: Domain, parts: Mapping[str, Sequence[str]], placed: Placed, formula: Formula) -> float:
-    where, effect = placed
     values = formula.at(_points(domain, _entities(domain, parts, placed)))
     finite = bool(np.all(np.isfinite(values)))
     gathered = agree(domain.mesh.comm, (finite, float(np.max(np.abs(values), initial=0.0))))
     if not all(ok for ok, _ in gathered):
-        place = effect.place.value if where is None else f"{effect.place.value}.{where}"
-        raise InputError(f"{place}.{effect.key}: the formula {formula.source!r} is not finite everywhere there")
+        raise InputError(f"{_place(placed)}: the formula {formula.source!r} is not finite everywhere there")
     return max(value for _, value in gathered)
 
 
@@ -112,13 +121,14 @@ def _sum(
     scales: Scales,
     made: Sequence[PlacedContribution],
     modify: Modification,
+    doubts: tuple[str, ...],
 ) -> Problem:
     wanted = [(str(where), c) for where, _, contribution in made for c in contribution.conditions]
     prescribed = dirichlet.build(context, scales, wanted)
     held = tuple((where, bc.dof_indices()[0]) for (where, _), bc in zip(wanted, prescribed, strict=True))
     fixed = np.unique(np.concatenate([np.empty(0, np.int32), *(dofs for _, dofs in held)])).astype(np.int32)
     surfaces = _surfaces(context, made)
-    bounds = [_bounds(context, surfaces[w], b, scales) for w, _, c in made if w is not None for b in c.bounds]
+    bounds = [_bounds(context, surfaces[w], e.key, b, scales) for w, e, c in made if w is not None for b in c.bounds]
     _check_compatible(context, bounds, prescribed, fixed)
     _check_normal_laws(made)
     terms = [
@@ -138,6 +148,7 @@ def _sum(
         bounds=tuple(bounds),
         terms=tuple(terms),
         surfaces=tuple(surfaces.values()),
+        implausible=doubts,
         made=tuple(made),
         held=held,
     )
@@ -171,11 +182,12 @@ def _by_name(made: Sequence[PlacedContribution], kind: str) -> dict[str, Any]:
 
 def _check_normal_laws(made: Sequence[PlacedContribution]) -> None:
     """Two normal laws on one part would be one law of the opening: the user states it."""
-    normal = [w for w, _, c in made for law in c.laws if law.direction is not Direction.SLIP]
-    for where in normal:
-        if normal.count(where) > 1:
+    normal = [(w, e.key) for w, e, c in made for law in c.laws if law.direction is not Direction.SLIP]
+    for where in dict.fromkeys(w for w, _ in normal):
+        keys = sorted(key for w, key in normal if w == where)
+        if len(keys) > 1:
             raise InputError(
-                f"boundary.{where}: adhesion and support act on the same displacement; state them as one law of the "
+                f"boundary.{where}: {' and '.join(keys)} act on the same displacement; state them as one law of the "
                 'opening, adhesion = { law = "graph", ... }'
             )
 
@@ -188,8 +200,8 @@ def _prescribed(context: FormContext, made: Sequence[PlacedContribution]) -> tup
     )
 
 
-def _bounds(context: FormContext, where: Surface, bounds: NormalBounds, scales: Scales) -> Bounds:
-    """Collective.
+def _bounds(context: FormContext, where: Surface, effect: str, bounds: NormalBounds, scales: Scales) -> Bounds:
+    """The bounds that an effect, by its key, puts on a part. Collective.
 
     Raises:
         InputError: on all ranks alike: a bound that is not a finite number at some vertex.
@@ -200,7 +212,8 @@ def _bounds(context: FormContext, where: Surface, bounds: NormalBounds, scales: 
             return np.full(len(where.blocks), np.inf)
         found = formula.at(where.points) / scales.displacement
         if not all(agree(context.domain.mesh.comm, bool(np.all(np.isfinite(found))))):
-            raise InputError(f"boundary.{where.part}.contact: the gap is not finite everywhere there; see its formula")
+            reason = "the gap is not finite everywhere there; see its formula"
+            raise InputError(f"boundary.{where.part}.{effect}: {reason}")
         return np.asarray(found)
 
     # lower ≤ -u·n ≤ upper

@@ -76,6 +76,7 @@ class Problem:
         bounds: by part.
         terms: the laws at their vertices.
         surfaces: of the parts with bounds or laws, in the order of the parts.
+        implausible: what effects doubt of their own numbers, in sentences.
         made: what each effect contributed.
         held: the dofs of each condition, with its part.
     """
@@ -92,6 +93,7 @@ class Problem:
     bounds: tuple[Bounds, ...]
     terms: tuple[LawTerm, ...]
     surfaces: tuple[Surface, ...]
+    implausible: tuple[str, ...]
     made: tuple[PlacedContribution, ...]
     held: tuple[tuple[str, Entities], ...]
 

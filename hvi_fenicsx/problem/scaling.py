@@ -44,24 +44,33 @@ Placed = tuple[str | None, Effect]
 """An effect with where it acts: a boundary part, a region, or None for the whole body."""
 
 
-def choose(length: float, dimension: int, effects: Sequence[Placed], evaluate: Callable[[Placed], Evaluate]) -> Scales:
+def sizes(length: float, effects: Sequence[Placed]) -> Sizes:
+    """What the effects' scales may depend on.
+
+    Args:
+        length: L of the body, m.
+        effects: those in force, with their places.
+    """
+    modulus = max((e.modulus_scale() for _, e in effects), default=0.0) or 1.0
+    return Sizes(length, modulus, max((e.expansion_scale() for _, e in effects), default=0.0))
+
+
+def choose(sizes: Sizes, dimension: int, effects: Sequence[Placed], evaluate: Callable[[Placed], Evaluate]) -> Scales:
     """The scales of a problem. Collective where ``evaluate`` is.
 
     The stress scale is the largest load; without one, that of the largest other driving effect (prescribed
     displacement, thermal strain); without that either, the largest law's: the solution is then zero and any will do.
 
     Args:
-        length: L of the body, m.
+        sizes: of the body and its materials.
         dimension: 2 or 3.
         effects: those in force, with their places.
         evaluate: gives, for an effect with its place, the function that finds a formula's largest absolute value there.
     """
-    modulus = max((e.modulus_scale() for _, e in effects), default=0.0) or 1.0
-    sizes = Sizes(length, modulus, max((e.expansion_scale() for _, e in effects), default=0.0))
     stress = dict.fromkeys(Drive, 0.0)
     for placed in effects:
         effect = placed[1]
         size = effect.stress_scale(evaluate(placed), sizes)
         stress[effect.drive] = max(stress[effect.drive], size)
     chosen = next((stress[kind] for kind in Drive if stress[kind] > 0), 1.0)
-    return Scales(length, chosen, modulus, dimension)
+    return Scales(sizes.length, chosen, sizes.modulus, dimension)
