@@ -201,8 +201,19 @@ def _run_or_check(options: argparse.Namespace) -> int:
         from . import commands
         from .runtime.mpi import ended_together
 
-    with ended_together(commands.COMM):
+    with ended_together(commands.COMM), _placed(options):
         return commands.run(options) if options.command == "run" else commands.check(options)
+
+
+@contextmanager
+def _placed(options: argparse.Namespace) -> Iterator[None]:
+    """Say where in the scene file a key stands that an error names."""
+    from .scene import with_place
+
+    try:
+        yield
+    except InputError as error:
+        raise InputError(with_place(str(error), options.scene, options.overrides)) from error
 
 
 @contextmanager

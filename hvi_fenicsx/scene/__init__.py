@@ -2,7 +2,7 @@
 
 from .effect_tables import BodyTable, BoundaryTable, MaterialTable
 from .model import PlacedEffect, Scene
-from .reader import read_scene
+from .reader import read_scene, with_place
 from .solver_table import SolverTable
 from .writer import dump_scene
 
@@ -15,4 +15,5 @@ __all__ = [
     "SolverTable",
     "dump_scene",
     "read_scene",
+    "with_place",
 ]

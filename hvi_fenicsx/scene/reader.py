@@ -20,6 +20,8 @@ from .overrides import override
 from .toml_lines import line_of, lines_of
 
 _LARGEST = 1_000_000
+_KEY = re.compile(r"((?:title|plugins|domain|material|body|boundary|solver)(?:\.[\w-]+)+): ")
+"""How a message begins that names a key of the scene."""
 _MOST_PROBLEMS = 10
 _Place = tuple[str | int, ...]
 
@@ -40,6 +42,27 @@ def read_scene(path: str | os.PathLike[str], overrides: Sequence[str] = ()) -> S
     data = _toml(file, text)
     changed = [override(data, assignment) for assignment in overrides]
     return _scene(file, text, data, changed)
+
+
+def with_place(message: str, path: str | os.PathLike[str], overrides: Sequence[str] = ()) -> str:
+    """A message that begins with a key of the scene, with that key's place in front: file and line, or ``--set``.
+
+    Args:
+        message: of an error that was found after the scene had been read, like ``solver.method: ...``.
+        path: the scene file.
+        overrides: values that were overridden.
+    """
+    key = _KEY.match(message)
+    if key is None:
+        return message
+    file = Path(path)
+    try:
+        text = _text(file)
+        data = _toml(file, text)
+        changed = [override(data, assignment) for assignment in overrides]
+    except InputError:
+        return message
+    return _where(file, lines_of(text), tuple(key[1].split(".")), changed) + message[key.end(1) :]
 
 
 def _text(file: Path) -> str:

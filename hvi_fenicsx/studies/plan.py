@@ -16,6 +16,7 @@ from ..laws import smoothing
 from ..scene import Scene, dump_scene
 from ..schema import input_error, unknown
 from ..solvers import registry
+from ..workflow import options_of
 from . import meshes
 from .meshes import Setting
 
@@ -197,6 +198,7 @@ def _setting(tables: Tables) -> Setting:
         scene = Scene.model_validate(tables)
     except ValidationError as error:
         raise input_error(error, Scene) from None
+    options_of(scene.solver)  # refuses what the method does not take
     wanted = scene.solver
     for law in laws(scene) if wanted.smoothing else ():
         smoothing.create(str(wanted.smoothing), law, epsilon=wanted.epsilon, epsilon_absolute=wanted.epsilon_absolute)

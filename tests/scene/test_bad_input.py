@@ -46,6 +46,15 @@ TABLE: dict[str, tuple[str, str]] = {
     "unknown law": ("boundary.floor.friction.law='coulomb'", "coulomb"),
     "a law against its formula": ("boundary.floor.friction.gamma2=1e3", "2 gamma2"),
     "negative epsilon": ("solver.epsilon=-0.1", "epsilon"),
+    "unknown method": ("solver.method='newtn'", "--set solver.method: unknown method 'newtn'"),
+    "exact method with smoothing": (
+        "solver={method='branch', epsilon=0.1}",
+        '--set solver.method: "branch" solves the law without smoothing',
+    ),
+    "start of another method": (
+        "solver={method='tao', epsilon=0.1, start='broken'}",
+        "--set solver.start: is for the branch iteration",
+    ),
     "two widths": ("solver={epsilon=0.1, epsilon_absolute=0.1}", "leave one of them out"),
     "no such mesh": ("domain={shape='file', file='absent.msh'}", "does not exist"),
     "more memory than there is": ("domain.cells=[32000, 32000]", "use fewer cells"),
@@ -73,6 +82,21 @@ def assert_refused(done: subprocess.CompletedProcess[str], words: str, folder: P
 def test_a_wrong_scene_is_refused_in_words(case: str, scene: Path, tmp_path: Path) -> None:
     override, words = TABLE[case]
     assert_refused(hvi("run", scene, "--set", override, cwd=tmp_path), words, tmp_path, {"scene.toml"})
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ('method = "auto"', 'method = "newtn"', "solver.method: unknown method 'newtn'"),
+        ("-1000000.0", '"-1e6/x"', "boundary.press.traction: the formula '-1e6/x' is not finite everywhere there"),
+    ],
+)
+def test_what_is_found_late_has_its_line(old: str, new: str, words: str, scene: Path, tmp_path: Path) -> None:
+    """The method is known only after the scene is read, and a load is evaluated on the mesh."""
+    text = scene.read_text(encoding="utf-8")
+    scene.write_text(text.replace(old, new), encoding="utf-8")
+    line = text[: text.index(old)].count("\n") + (1 if "method" in old else -1)
+    assert_refused(hvi("run", scene, cwd=tmp_path), f"scene.toml:{line}: {words}", tmp_path, {"scene.toml"})
 
 
 def test_a_wrong_scene_is_refused_by_the_process_too(scene: Path, tmp_path: Path) -> None:

@@ -252,18 +252,6 @@ REFUSED = {
         "[solver]\nstart = [0.0, 0.0, 0.0]",
         "s.toml:21: solver.start: has 3 components; a 2D scene wants 2",
     ),
-    "start of another method": (
-        "[solver]",
-        '[solver]\nmethod = "tao"\nstart = "broken"',
-        's.toml:22: solver.start: is for the branch iteration; leave it out, or use method = "auto", not "tao"',
-    ),
-    "exact method with smoothing": (
-        "[solver]",
-        '[solver]\nmethod = "branch"',
-        's.toml:21: solver.method: "branch" solves the law without smoothing; leave out smoothing '
-        "and epsilon, or use "
-        '"auto"',
-    ),
     "text without quotes": (
         'on = "left"',
         "on = left",
