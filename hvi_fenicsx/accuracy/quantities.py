@@ -19,7 +19,7 @@ from .quantity_base import Observable, Quantity, contact_norm
 if TYPE_CHECKING:
     from dolfinx import fem
 
-    from ..certify.contact_state import State
+    from ..certify.contact_state import ContactState
     from ..certify.estimate.contact_errors import OnContact
     from .adaptive import AdaptiveLevel
     from .cost_forecast import Step
@@ -221,12 +221,12 @@ def find(name: str) -> type[Quantity]:
     return Quantity.registry[name]
 
 
-def _states(level: AdaptiveLevel) -> tuple[State, ...]:
+def _states(level: AdaptiveLevel) -> tuple[ContactState, ...]:
     examination = level.solution.examination
     return () if examination is None else examination.states
 
 
-def _tangential(level: AdaptiveLevel, read: Callable[[State], Array], unit: float) -> fem.Function:
+def _tangential(level: AdaptiveLevel, read: Callable[[ContactState], Array], unit: float) -> fem.Function:
     """Tangential vectors (m, d-1) of each part as a field."""
     from dolfinx import fem
 
@@ -240,12 +240,11 @@ def _tangential(level: AdaptiveLevel, read: Callable[[State], Array], unit: floa
 
 def _from_true_law(level: AdaptiveLevel) -> float:
     """∫ of the distance of -σ_t from the unsmoothed law's graph over Γc, nondimensional. Collective."""
-    from ..certify.force_attribution import NEAR
     from ..effects import Direction
 
     found = 0.0
     for state in _states(level):
-        for term, argument, traction in zip(state.terms, state.arguments, state.tractions, strict=True):
-            away = term.exact.distance(argument, traction, NEAR)
-            found += float(np.sum(state.surface.weights * np.where(term.direction is Direction.SLIP, away, 0.0)))
+        for law in state.laws:
+            if law.term.direction is Direction.SLIP:
+                found += float(np.sum(state.surface.weights * law.true_distance()))
     return float(level.comm.allreduce(found))

@@ -17,14 +17,11 @@ from ..runtime.mpi import agree, largest, total
 from ..typing import Array
 from . import contact_state
 from . import second_order as stability
-from .contact_state import Forces, State
-from .force_attribution import NEAR, on_bounds, on_kink
-
-_LARGEST_ROUNDING, _SAFETY = 1e-4, 4.0
-"""An entry above the first is no rounding; the sample of the rounding error is trusted within the second."""
+from .contact_state import ContactState, Forces
+from .thresholds import DEFAULT, Thresholds
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Certificate:
     """How far u is from a solution.
 
@@ -39,7 +36,8 @@ class Certificate:
         inclusion_true: the same for the unsmoothed law.
         second_order: ``local minimiser``, ``not a minimiser`` (a vertex on a concave kink: moving it off lowers the
             energy) or ``undecided`` (a law with negative curvature, unless the inertia of its Hessian was asked for).
-        tolerance, passed: what was asked for, and whether all but ``inclusion_true`` are within it.
+        tolerance: what was asked for.
+        passed: whether all entries but ``inclusion_true`` are within the tolerance.
         rounding: None where all are; else by how much rounding alone moves the entries at this u: what is no larger
             passes, since no displacement in double precision can do better.
     """
@@ -65,30 +63,43 @@ class Examination:
     """The certificate and what it was read off, nondimensional.
 
     Attributes:
-        certificate: the verdict. energy: ½a(u, u) - <g, u> + Σ laws. forces, states: reactions and Γc.
+        certificate: the verdict.
+        energy: ½a(u, u) - <g, u> + Σ laws.
+        forces: reactions and loads.
+        states: of the parts of Γc.
         smoothing_error: largest distance of a law's traction from the unsmoothed law's, in units of p0.
     """
 
     certificate: Certificate
     energy: float
     forces: Forces
-    states: tuple[State, ...]
+    states: tuple[ContactState, ...]
     smoothing_error: float
 
 
-def examine(problem: Problem, u: fem.Function, tolerance: float, *, inertia: bool = False) -> Examination:
+def examine(
+    problem: Problem,
+    u: fem.Function,
+    tolerance: float,
+    *,
+    inertia: bool = False,
+    thresholds: Thresholds = DEFAULT,
+) -> Examination:
     """Certify u. Collective.
 
     Args:
-        problem: what was solved. u: nondimensional, ghosts updated. tolerance: relative.
+        problem: what was solved.
+        u: nondimensional, ghosts updated.
+        tolerance: relative.
         inertia: whether to factorise the Hessian where the states leave the second order undecided (it costs a
             direct solve or two).
+        thresholds: when a vertex is on a kink or a bound, and what is rounding.
     """
     comm = problem.domain.mesh.comm
     forces = contact_state.forces(problem, u)
-    states = contact_state.states(problem, u, forces.reaction)
+    states = contact_state.states(problem, u, forces.reaction, thresholds)
     size = largest(comm, float(np.max(np.abs(u.x.array), initial=0.0))) or 1.0
-    scale = _force_scale(problem, u, forces)
+    scale = _force_scale(problem, u, forces, thresholds.rounding_safety)
     entries = {
         "equilibrium": _unbalanced(problem, forces, states) / scale,
         "penetration": largest(comm, _worst(states, _penetration)) / size,
@@ -97,8 +108,8 @@ def examine(problem: Problem, u: fem.Function, tolerance: float, *, inertia: boo
         "inclusion": largest(comm, max((_inclusion(s) for s in states), default=0.0)),
     }
     passed, rounding = _within(entries, tolerance), None
-    if not passed and _within(entries, _LARGEST_ROUNDING):
-        rounding = _rounding(problem, u, states, scale)
+    if not passed and _within(entries, thresholds.largest_rounding):
+        rounding = thresholds.rounding_safety * _rounding(problem, u, states, scale)
         passed = _within(entries, max(tolerance, rounding))
     true, error = (largest(comm, value) for value in _inclusion_true(states))
     second_order = _second_order(comm, states)
@@ -119,13 +130,13 @@ def _within(entries: Mapping[str, float], limit: float) -> bool:
     return all(np.isfinite(v) and v <= limit for v in entries.values())
 
 
-def _force_scale(problem: Problem, u: fem.Function, forces: Forces) -> float:
+def _force_scale(problem: Problem, u: fem.Function, forces: Forces, safety: float) -> float:
     """Norm of the loads, or of the supports' reactions where these are larger; 1 where all forces are rounding.
 
     Collective.
     """
     load, reaction = (_norm(problem, v) for v in (forces.load, forces.reaction))
-    if load > 0.0 or reaction > _SAFETY * _norm(problem, _noise(problem, u)):
+    if load > 0.0 or reaction > safety * _norm(problem, _noise(problem, u)):
         return max(load, reaction)
     return 1.0
 
@@ -141,11 +152,11 @@ def _noise(problem: Problem, u: fem.Function) -> Array:
     signs = np.random.default_rng(comm.rank).choice([-1.0, 1.0], len(u.x.array))
     shuffled.x.array[:] = u.x.array * signs * np.finfo(float).eps
     shuffled.x.scatter_forward()
-    moved = contact_state.forces(problem, shuffled)
-    return moved.reaction + moved.load
+    forces = contact_state.forces(problem, shuffled)
+    return forces.reaction + forces.load
 
 
-def _rounding(problem: Problem, u: fem.Function, states: Sequence[State], scale: float) -> float:
+def _rounding(problem: Problem, u: fem.Function, states: Sequence[ContactState], scale: float) -> float:
     """By how much the entries change when the last digits of u are shuffled. Collective."""
     force = _noise(problem, u)
     tractions = [
@@ -153,79 +164,71 @@ def _rounding(problem: Problem, u: fem.Function, states: Sequence[State], scale:
         for s in states
     ]
     worst = largest(problem.domain.mesh.comm, max(tractions, default=0.0))
-    return _SAFETY * max(_norm(problem, force) / scale, worst)
+    return max(_norm(problem, force) / scale, worst)
 
 
-def _finest(state: State) -> float:
-    return min((t.traction_scale for t in state.terms), default=1.0)
+def _finest(state: ContactState) -> float:
+    return min((law.term.traction_scale for law in state.laws), default=1.0)
 
 
-def _energy(problem: Problem, u: fem.Function, forces: Forces, states: Sequence[State]) -> float:
+def _energy(problem: Problem, u: fem.Function, forces: Forces, states: Sequence[ContactState]) -> float:
     """½u·(Au) - b·u = ½u·(reaction - load), plus the laws. Collective."""
     values = u.x.array[: forces.load.size]
     elastic = 0.5 * float(values @ (forces.reaction - forces.load).ravel())
     laws = sum(
-        float(np.sum(s.surface.weights * t.law.value(a)))
-        for s in states
-        for t, a in zip(s.terms, s.arguments, strict=True)
+        float(np.sum(state.surface.weights * law.term.law.value(law.argument)))
+        for state in states
+        for law in state.laws
     )
     return total(problem.domain.mesh.comm, elastic + laws)
 
 
-def _unbalanced(problem: Problem, forces: Forces, states: Sequence[State]) -> float:
+def _unbalanced(problem: Problem, forces: Forces, states: Sequence[ContactState]) -> float:
     """Norm of the residual force that nothing carries. Collective."""
     return _norm(problem, contact_state.balanced(problem, forces.reaction, states))
 
 
-def _worst(states: Sequence[State], measure: Callable[[Bounds, State], Array]) -> float:
+def _worst(states: Sequence[ContactState], measure: Callable[[Bounds, ContactState], Array]) -> float:
     values = [measure(s.bounds, s) for s in states if s.bounds is not None]
     return max((float(np.max(v, initial=0.0)) for v in values), default=0.0)
 
 
-def _penetration(bounds: Bounds, state: State) -> Array:
+def _penetration(bounds: Bounds, state: ContactState) -> Array:
     return bounds.beyond(state.normal)
 
 
-def _tension(bounds: Bounds, state: State) -> Array:
+def _tension(bounds: Bounds, state: ContactState) -> Array:
     """Pulling at the upper bound of u·n, pushing at the lower one."""
-    pressure = state.contact_pressure
-    lower, upper = on_bounds(bounds, state.normal)
+    pressure, lower, upper = state.contact_pressure, state.on_lower, state.on_upper
     wrong = np.where(upper & lower, 0.0, np.where(upper, pressure, np.where(lower, -pressure, 0.0)))
     return np.maximum(wrong, 0.0)
 
 
-def _complementarity(bounds: Bounds, state: State, size: float) -> Array:
+def _complementarity(bounds: Bounds, state: ContactState, size: float) -> Array:
     gap = np.maximum(-bounds.beyond(state.normal), 0.0)
     return np.minimum(np.abs(state.contact_pressure), gap / size)
 
 
-def _inclusion(state: State) -> float:
-    pairs = [d / t.traction_scale for t, d in zip(state.terms, state.distances, strict=True)]
+def _inclusion(state: ContactState) -> float:
+    pairs = [law.distance / law.term.traction_scale for law in state.laws]
     return max((float(np.max(p, initial=0.0)) for p in pairs), default=0.0)
 
 
-def _inclusion_true(states: Sequence[State]) -> tuple[float, float]:
-    """Relative to the law's scale, and in units of p0."""
+def _inclusion_true(states: Sequence[ContactState]) -> tuple[float, float]:
+    """Largest distance from the unsmoothed laws, relative to the law's scale, and in units of p0."""
     worst = absolute = 0.0
-    for state in states:
-        for term, argument, traction, hidden in zip(
-            state.terms, state.arguments, state.tractions, state.hidden, strict=True
-        ):
-            true = term.exact
-            away = np.where(hidden, 0.0, true.distance(argument, traction, NEAR))
-            size = float(np.max(away, initial=0.0))
-            worst, absolute = max(worst, size / term.traction_scale), max(absolute, size)
+    for law in (law for state in states for law in state.laws):
+        size = float(np.max(np.where(law.hidden, 0.0, law.true_distance()), initial=0.0))
+        worst, absolute = max(worst, size / law.term.traction_scale), max(absolute, size)
     return worst, absolute
 
 
-def _second_order(comm: MPI.Comm, states: Sequence[State]) -> str:
+def _second_order(comm: MPI.Comm, states: Sequence[ContactState]) -> str:
     kink = curved = False
-    for state in states:
-        for term, argument, hidden in zip(state.terms, state.arguments, state.hidden, strict=True):
-            concave = term.law.concave
-            x = argument[~hidden]
-            kink |= bool(np.any(on_kink(concave, x)))
-            curved |= bool(np.any(concave.second(x) > term.law.convex.second(x)))
+    for law in (law for state in states for law in state.laws):
+        x, j = law.argument[~law.hidden], law.term.law
+        kink |= bool(np.any(law.on_concave_kink() & ~law.hidden))
+        curved |= bool(np.any(j.concave.second(x) > j.convex.second(x)))
     found = agree(comm, (kink, curved))
     if any(k for k, _ in found):
         return stability.NO_MINIMISER

@@ -6,7 +6,7 @@ the support's reaction too, so there the law's own traction stands.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,192 +19,251 @@ from ..problem.problem import Bounds, Problem
 from ..problem.vectors import nodal
 from ..typing import Array, Integers, Mask
 from . import force_attribution
-from .force_attribution import NEAR, Ledger
+from .force_attribution import ForceAttribution
+from .thresholds import DEFAULT, Thresholds
 
 
 @dataclass(frozen=True)
 class Forces:
-    """Internal forces minus loads, and the loads, by vertex (owned), nondimensional, shape (blocks, d).
+    """Forces by vertex (owned), nondimensional, (blocks, d).
 
-    The first is the reaction of whatever holds the body: zero off supports, contact and laws.
+    Attributes:
+        reaction: internal forces minus loads, the reaction of whatever holds the body: zero off supports, contact and
+            laws.
+        load: the loads.
     """
 
     reaction: Array
     load: Array
 
 
-@dataclass(frozen=True)
-class State:
+@dataclass(frozen=True, kw_only=True)
+class LawState:
+    """One law at the vertices (m) of its part, nondimensional.
+
+    Attributes:
+        term: the law.
+        argument: what it acts on, (m,).
+        traction: the traction it gives, (m,).
+        distance: how far that is from Clarke's subdifferential, (m,).
+        hidden: where a support hides what the law gives, (m,).
+        near: distance from a kink that counts as being on it.
+    """
+
+    term: LawTerm
+    argument: Array
+    traction: Array
+    distance: Array
+    hidden: Mask
+    near: float
+
+    def true_distance(self) -> Array:
+        """How far the traction is from the unsmoothed law's subdifferential, (m,)."""
+        return self.term.exact.distance(self.argument, self.traction, self.near)
+
+    def on_convex_kink(self) -> Mask:
+        """Where it is on a kink of the law's convex part, (m,)."""
+        return force_attribution.on_kink(self.term.law.convex, self.argument, self.near)
+
+    def on_concave_kink(self) -> Mask:
+        """Where it is on a kink of the law's concave part, (m,)."""
+        return force_attribution.on_kink(self.term.law.concave, self.argument, self.near)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ContactState:
     """The vertices of one part (m), nondimensional.
 
     Attributes:
-        surface: the part. bounds: of its normal displacement, or None. terms: its laws.
-        normal, slip: u·n (m,) and u·t (m, d-1). gap: to the lower bound of -u·n, (m,), inf where there is none.
-        pressure: σ_n (m,). contact_pressure: what of it contact carries. friction: -σ_t (m, d-1).
-        contact: on a bound, (m,).
-        arguments, tractions, distances: of each law, by term: what it acts on, the traction it gives, and how far that
-            is from Clarke's subdifferential; (m,) each.
-        hidden: of each law, where a support hides what it gives; (m,) each.
+        surface: the part.
+        bounds: of its normal displacement, or None.
+        laws: the states of its laws.
+        normal: u·n, (m,).
+        slip: u·t, (m, d-1).
+        gap: distance to the lower bound of -u·n, (m,), infinite where there is none.
+        pressure: σ_n, (m,).
+        contact_pressure: the part of σ_n that contact carries, (m,).
+        friction: -σ_t, (m, d-1).
+        on_lower: whether u·n is on its lower bound, (m,).
+        on_upper: whether u·n is on its upper bound, (m,).
     """
 
     surface: Surface
     bounds: Bounds | None
-    terms: tuple[LawTerm, ...]
+    laws: tuple[LawState, ...]
     normal: Array
     slip: Array
     gap: Array
     pressure: Array
     contact_pressure: Array
     friction: Array
-    contact: Mask
-    arguments: tuple[Array, ...]
-    tractions: tuple[Array, ...]
-    distances: tuple[Array, ...]
-    hidden: tuple[Mask, ...]
+    on_lower: Mask
+    on_upper: Mask
+
+    @property
+    def contact(self) -> Mask:
+        """Whether u·n is on a bound, (m,)."""
+        return self.on_lower | self.on_upper
 
     def branch(self, *directions: Direction) -> Integers | None:
         """The active piece of the law in one of these directions, (m,); None where there is no such law."""
-        for term, argument in zip(self.terms, self.arguments, strict=True):
-            if term.direction in directions:
-                return term.law.branch(argument, NEAR)
+        for law in self.laws:
+            if law.term.direction in directions:
+                return law.term.law.branch(law.argument, law.near)
         return None
 
 
 def forces(problem: Problem, u: fem.Function) -> Forces:
-    """Reassembled from the forms, whatever a solver believes. Collective."""
+    """The forces at a displacement, reassembled from the forms. Collective.
+
+    Args:
+        problem: what is solved.
+        u: nondimensional, ghosts updated.
+    """
     internal = problem.bulk.force(u)
     load = sum((nodal(form) for form in problem.linear.values()), np.zeros_like(internal))
     return Forces(internal - load, load)
 
 
-def states(problem: Problem, u: fem.Function, reaction: Array) -> tuple[State, ...]:
-    """The state of each part with bounds or laws, in the problem's order. Collective."""
-    book, terms, bounds = force_attribution.carried(problem, u.x.array, reaction)
-    read = [_law(book, term, t, u.x.array) for term, t in zip(problem.terms, terms, strict=True)]
-    contact = {id(b.surface): _contact(book, b) for b in bounds}
-    originals = {id(b.surface): contact[id(t.surface)] for b, t in zip(problem.bounds, bounds, strict=True)}
-    return tuple(
-        _state(problem, s, u.x.array, reaction, dict(zip(map(id, problem.terms), read, strict=True)), originals)
-        for s in problem.surfaces
+def states(
+    problem: Problem, u: fem.Function, reaction: Array, thresholds: Thresholds = DEFAULT
+) -> tuple[ContactState, ...]:
+    """The state of each part with bounds or laws, in the problem's order. Collective.
+
+    Args:
+        problem: what is solved.
+        u: nondimensional, ghosts updated.
+        reaction: internal forces minus loads at u, (blocks, d).
+        thresholds: when a vertex is on a kink or a bound.
+    """
+    values = u.x.array
+    attribution = force_attribution.attribute(problem, values, reaction, thresholds.near)
+    laws = [_law(attribution, *pair, values) for pair in zip(problem.terms, attribution.terms, strict=True)]
+    pairs = zip(problem.bounds, attribution.bounds, strict=True)
+    contact = {bounds.surface.part: _contact(attribution, local) for bounds, local in pairs}
+    return tuple(_state(problem, surface, values, reaction, laws, contact, thresholds) for surface in problem.surfaces)
+
+
+def _law(attribution: ForceAttribution, term: LawTerm, local: LawTerm, u: Array) -> LawState:
+    argument = term.argument(u)
+    low, high = term.law.interval(argument, attribution.near)
+    parts, hidden = [], np.zeros(len(argument), dtype=bool)
+    for dofs, sign in force_attribution.components(local):
+        share = np.where(sign > 0, attribution.share[dofs], 1.0 - attribution.share[dofs])
+        parts.append(low + share * (high - low) + sign * attribution.excess[dofs])
+        hidden |= attribution.held[dofs]
+    if len(parts) == 1:
+        traction, distance = parts[0], _away(parts[0], low, high)
+    else:
+        traction, distance = _radial(attribution, term, local, argument, u)
+    return LawState(
+        term=term, argument=argument, traction=traction, distance=distance, hidden=hidden, near=attribution.near
     )
 
 
-@dataclass(frozen=True)
-class _Law:
-    """What the ledger says of one law: argument, traction, distance, hidden; (m,) each."""
-
-    argument: Array
-    traction: Array
-    distance: Array
-    hidden: Mask
-
-
-def _law(book: Ledger, term: LawTerm, local: LawTerm, u: Array) -> _Law:
-    argument = term.argument(u)
-    low, high = term.law.interval(argument, NEAR)
-    parts, hidden = [], np.zeros(len(argument), dtype=bool)
-    for dofs, sign in force_attribution.components(local):
-        share = np.where(sign > 0, book.share[dofs], 1.0 - book.share[dofs])
-        parts.append(low + share * (high - low) + sign * book.excess[dofs])
-        hidden |= book.held[dofs]
-    if len(parts) == 1:
-        return _Law(argument, parts[0], _away(parts[0], low, high), hidden)
-    return _radial(book, term, local, argument, u, hidden)
-
-
-def _radial(book: Ledger, term: LawTerm, local: LawTerm, argument: Array, u: Array, hidden: Mask) -> _Law:
+def _radial(
+    attribution: ForceAttribution, term: LawTerm, local: LawTerm, argument: Array, u: Array
+) -> tuple[Array, Array]:
     """A law of |u_t|: the traction is a vector along the slip, at zero slip any within the kink's disc."""
     dofs = [d for d, _ in force_attribution.components(local)]
     signs = np.stack([s for _, s in force_attribution.components(local)], axis=1)
-    carried_elsewhere = np.stack([book.held[d] | book.contact[d] for d in dofs], axis=1)
-    needed = np.stack([book.needed[d] for d in dofs], axis=1) * signs / term.surface.weights[:, None]
-    slip, moving = term.slip(u), argument > NEAR
+    carried_elsewhere = np.stack([attribution.held[d] | attribution.contact[d] for d in dofs], axis=1)
+    needed = np.stack([attribution.needed[d] for d in dofs], axis=1) * signs / term.surface.weights[:, None]
+    slip, moving = term.slip(u), argument > attribution.near
     unit = np.divide(slip, argument[:, None], out=np.zeros_like(slip), where=moving[:, None])
-    low, high = term.law.interval(argument, NEAR)
+    low, high = term.law.interval(argument, attribution.near)
     needed = np.where(carried_elsewhere, unit * ((low + high) / 2)[:, None], needed)
     along = np.where(moving, np.sum(needed * unit, axis=1), np.linalg.norm(needed, axis=1))
     across = np.where(moving, np.linalg.norm(needed - along[:, None] * unit, axis=1), 0.0)
-    return _Law(argument, along, np.hypot(_away(along, low, high), across), hidden)
+    return along, np.hypot(_away(along, low, high), across)
 
 
 def _away(traction: Array, low: Array, high: Array) -> Array:
     return np.maximum(np.maximum(low - traction, traction - high), 0.0)
 
 
-def _contact(book: Ledger, bounds: Bounds) -> Array:
+def _contact(attribution: ForceAttribution, bounds: Bounds) -> Array:
     """σ_n that contact carries, (m,); off the bounds what is left there, which should be nothing."""
     dofs, sign = bounds.component()
-    weight = np.where(book.contact[dofs], book.contact_weight[dofs], bounds.surface.weights)
-    return sign * book.contact_force[dofs] / weight
+    weight = np.where(attribution.contact[dofs], attribution.contact_weight[dofs], bounds.surface.weights)
+    return sign * attribution.contact_force[dofs] / weight
 
 
 def _state(
-    problem: Problem, surface: Surface, u: Array, reaction: Array, laws: dict[int, _Law], contact: dict[int, Array]
-) -> State:
+    problem: Problem,
+    surface: Surface,
+    u: Array,
+    reaction: Array,
+    laws: Sequence[LawState],
+    contact: Mapping[str, Array],
+    thresholds: Thresholds,
+) -> ContactState:
     bounds = next((b for b in problem.bounds if b.surface is surface), None)
-    terms = tuple(t for t in problem.terms if t.surface is surface)
-    read = tuple(laws[id(t)] for t in terms)
-    traction = reaction[surface.blocks] / surface.weights[:, None]
+    here = tuple(law for law in laws if law.term.surface is surface)
     normal = np.sum(surface.values(u) * surface.normals, axis=1)
-    own = contact.get(id(surface), np.zeros(len(normal)))
+    own = contact.get(surface.part, np.zeros(len(normal)))
     slip = np.einsum("mkd,md->mk", surface.tangents, surface.values(u))
-    pressure, friction = _tractions(terms, read, bounds, surface, traction, own, slip)
-    return State(
-        surface,
-        bounds,
-        terms,
-        normal,
-        slip,
-        np.full(len(normal), np.inf) if bounds is None else bounds.upper - normal,
-        pressure,
-        own,
-        friction,
-        np.zeros(len(normal), dtype=bool) if bounds is None else force_attribution.touches(bounds, normal),
-        tuple(r.argument for r in read),
-        tuple(r.traction for r in read),
-        tuple(r.distance for r in read),
-        tuple(r.hidden for r in read),
+    traction = reaction[surface.blocks] / surface.weights[:, None]
+    nowhere = np.zeros(len(normal), dtype=bool)
+    on = (nowhere, nowhere) if bounds is None else force_attribution.on_bounds(bounds, normal, thresholds.near)
+    return ContactState(
+        surface=surface,
+        bounds=bounds,
+        laws=here,
+        normal=normal,
+        slip=slip,
+        gap=np.full(len(normal), np.inf) if bounds is None else bounds.upper - normal,
+        pressure=_pressure(here, bounds, surface, traction, own),
+        contact_pressure=own,
+        friction=_friction(here, surface, traction, slip),
+        on_lower=on[0],
+        on_upper=on[1],
     )
 
 
-def _tractions(
-    terms: Sequence[LawTerm],
-    read: Sequence[_Law],
-    bounds: Bounds | None,
-    surface: Surface,
-    traction: Array,
-    contact: Array,
-    slip: Array,
-) -> tuple[Array, Array]:
-    """σ_n and -σ_t: of what acts on the part where something does, else the residual."""
+def _pressure(
+    laws: Sequence[LawState], bounds: Bounds | None, surface: Surface, traction: Array, contact: Array
+) -> Array:
+    """σ_n of what acts on the part where something does, else of the residual."""
     pressure = contact.copy() if bounds is not None else np.sum(traction * surface.normals, axis=1)
-    friction = -np.einsum("mkd,md->mk", surface.tangents, traction)
-    normal_laws = [(t, r) for t, r in zip(terms, read, strict=True) if t.direction is not Direction.SLIP]
+    normal_laws = [law for law in laws if law.term.direction is not Direction.SLIP]
     if normal_laws and bounds is None:
         pressure = np.zeros_like(pressure)
-    for term, law in normal_laws:
-        pressure = pressure - np.sum(term.directions[:, 0] * surface.normals, axis=1) * law.traction
-    for term, law in zip(terms, read, strict=True):
-        if term.direction is Direction.SLIP:
-            alone = law.hidden if term.radial else np.ones(len(friction), dtype=bool)
+    for law in normal_laws:
+        pressure = pressure - np.sum(law.term.directions[:, 0] * surface.normals, axis=1) * law.traction
+    return pressure
+
+
+def _friction(laws: Sequence[LawState], surface: Surface, traction: Array, slip: Array) -> Array:
+    """-σ_t of what acts on the part where something does, else of the residual."""
+    friction = -np.einsum("mkd,md->mk", surface.tangents, traction)
+    for law in laws:
+        if law.term.direction is Direction.SLIP:
+            alone = law.hidden if law.term.radial else np.ones(len(friction), dtype=bool)
             friction = np.where(alone[:, None], _along(slip, law), friction)
-    return pressure, friction
+    return friction
 
 
-def _along(slip: Array, law: _Law) -> Array:
+def _along(slip: Array, law: LawState) -> Array:
     """The law's traction as a vector: along a signed slip, or in the direction of a slip vector."""
     if slip.shape[1] == 1:
         return law.traction[:, None]
-    moving = law.argument[:, None] > NEAR
+    moving = law.argument[:, None] > law.near
     return law.traction[:, None] * np.divide(slip, law.argument[:, None], out=np.zeros_like(slip), where=moving)
 
 
-def balanced(problem: Problem, reaction: Array, parts: Sequence[State]) -> Array:
-    """The reaction less what supports, contact and laws may carry: zero in equilibrium; shape (blocks, d)."""
+def balanced(problem: Problem, reaction: Array, parts: Sequence[ContactState]) -> Array:
+    """The reaction without what supports, contact and laws may carry: zero in equilibrium; (blocks, d).
+
+    Args:
+        problem: the supports.
+        reaction: internal forces minus loads, (blocks, d).
+        parts: contact and laws.
+    """
     rest = reaction.copy()
     rest.reshape(-1)[problem.fixed_here] = 0.0
     for state in parts:
-        carried = [t.directions for t in state.terms]
+        carried = [law.term.directions for law in state.laws]
         if state.bounds is not None:
             carried.append(state.surface.normals[:, None, :])
         for directions in carried:

@@ -1,4 +1,4 @@
-"""Who carries the residual force at a vertex of Γc: laws, contact, prescribed displacements; component by component.
+"""Which of laws, contact and prescribed displacements carry the residual force at a vertex of Γc, by component.
 
 At most vertices a component has one carrier. At corners, at the seam of two parts, and where adhesion acts beside
 contact there are several, and only their sum is known. Laws may then carry any value of the (weighted, Minkowski) sum
@@ -7,7 +7,7 @@ of their Clarke intervals; a bound that is reached, or a support, carries the re
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,19 +19,27 @@ from ..problem.problem import Bounds, Problem
 from ..system import local_frames
 from ..typing import Array, Integers, Mask
 
-NEAR = 1e-10
-"""Distance (of u0) from a kink or a bound that counts as being on it."""
 
-
-@dataclass(frozen=True)
-class Ledger:
+@dataclass(frozen=True, kw_only=True)
+class ForceAttribution:
     """The attribution, by owned scalar dof in local components; all arrays (n,).
 
     Attributes:
-        needed: minus the residual, what the carriers give. low, high: range of the laws' sum. weight: of the laws.
-        contact: a bound is reached. held: prescribed. contact_weight: of the parts whose bound is reached.
+        terms: the problem's laws in local components.
+        bounds: its bounds in local components.
+        near: distance (of u0) from a kink or a bound that counts as being on it.
+        needed: minus the residual, what the carriers give.
+        low: lower end of the range of the laws' sum.
+        high: its upper end.
+        weight: area of the laws.
+        contact: whether a bound is reached.
+        held: whether it is prescribed.
+        contact_weight: area of the parts whose bound is reached.
     """
 
+    terms: tuple[LawTerm, ...]
+    bounds: tuple[Bounds, ...]
+    near: float
     needed: Array
     low: Array
     high: Array
@@ -63,62 +71,87 @@ class Ledger:
         alone = (self.weight == 0) | self.contact
         return np.where(self.held | ~alone, 0.0, self.by_laws - self.needed)
 
+    def enter_law(self, term: LawTerm, u: Array) -> None:
+        """Enter what a law may carry at u (local array)."""
+        low, high = term.law.interval(term.argument(u), self.near)
+        for dofs, sign in components(term):
+            ends = np.stack([sign * low, sign * high]) * term.surface.weights
+            np.add.at(self.low, dofs, ends.min(axis=0))
+            np.add.at(self.high, dofs, ends.max(axis=0))
+            np.add.at(self.weight, dofs, term.surface.weights)
 
-def carried(problem: Problem, u: Array, residual: Array) -> tuple[Ledger, Sequence[LawTerm], Sequence[Bounds]]:
-    """The ledger of a displacement (local array) and its residual (owned); terms and bounds in local components."""
+    def enter_bounds(self, bounds: Bounds, u: Array) -> None:
+        """Enter which bounds are reached at u (local array)."""
+        dofs, sign = bounds.component()
+        reached = touches(bounds, sign * u.ravel()[dofs], self.near)
+        self.contact[dofs] |= reached
+        np.add.at(self.contact_weight, dofs, np.where(reached, bounds.surface.weights, 0.0))
+
+
+def attribute(problem: Problem, u: Array, residual: Array, near: float) -> ForceAttribution:
+    """Attribute the residual force of a displacement to its carriers.
+
+    Args:
+        problem: the laws, bounds and supports.
+        u: nondimensional, a local array.
+        residual: internal forces minus loads at the owned blocks, (blocks, d).
+        near: distance (of u0) from a kink or a bound that counts as being on it.
+    """
     local = local_frames.build(problem)
-    terms = problem.terms if local is None else tuple(local.term(t) for t in problem.terms)
-    bounds = problem.bounds if local is None else tuple(local.bounds(b) for b in problem.bounds)
     if local is not None:
         u, residual = local.turned(u), local.turned(residual)
     n = residual.size
-    ledger = Ledger(
-        -residual.ravel(),
-        np.zeros(n),
-        np.zeros(n),
-        np.zeros(n),
-        np.zeros(n, dtype=bool),
-        np.isin(np.arange(n), problem.fixed),
-        np.zeros(n),
+    found = ForceAttribution(
+        terms=problem.terms if local is None else tuple(local.term(t) for t in problem.terms),
+        bounds=problem.bounds if local is None else tuple(local.bounds(b) for b in problem.bounds),
+        near=near,
+        needed=-residual.ravel(),
+        low=np.zeros(n),
+        high=np.zeros(n),
+        weight=np.zeros(n),
+        contact=np.zeros(n, dtype=bool),
+        held=np.isin(np.arange(n), problem.fixed),
+        contact_weight=np.zeros(n),
     )
-    for term in terms:
-        _enter_law(ledger, term, u)
-    for b in bounds:
-        _enter_bound(ledger, b, u)
-    return ledger, terms, bounds
+    for term in found.terms:
+        found.enter_law(term, u)
+    for bounds in found.bounds:
+        found.enter_bounds(bounds, u)
+    return found
 
 
-def _enter_law(ledger: Ledger, term: LawTerm, u: Array) -> None:
-    low, high = term.law.interval(term.argument(u), NEAR)
-    for dofs, sign in components(term):
-        ends = np.stack([sign * low, sign * high]) * term.surface.weights
-        np.add.at(ledger.low, dofs, ends.min(axis=0))
-        np.add.at(ledger.high, dofs, ends.max(axis=0))
-        np.add.at(ledger.weight, dofs, term.surface.weights)
+def on_bounds(bounds: Bounds, normal: Array, near: float) -> tuple[Mask, Mask]:
+    """Whether a normal displacement is on the lower and on the upper bound, (m,) each.
+
+    Args:
+        bounds: of u·n.
+        normal: u·n, (m,).
+        near: distance that counts as being on a bound.
+    """
+    return normal <= bounds.lower + near, normal >= bounds.upper - near
 
 
-def _enter_bound(ledger: Ledger, bounds: Bounds, u: Array) -> None:
-    dofs, sign = bounds.component()
-    normal = sign * u.ravel()[dofs]
-    reached = touches(bounds, normal)
-    ledger.contact[dofs] |= reached
-    np.add.at(ledger.contact_weight, dofs, np.where(reached, bounds.surface.weights, 0.0))
+def touches(bounds: Bounds, normal: Array, near: float) -> Mask:
+    """Whether a normal displacement is on a bound, (m,).
 
-
-def on_bounds(bounds: Bounds, normal: Array) -> tuple[Mask, Mask]:
-    """Whether u·n (m,) is on the lower and on the upper bound."""
-    return normal <= bounds.lower + NEAR, normal >= bounds.upper - NEAR
-
-
-def touches(bounds: Bounds, normal: Array) -> Mask:
-    """Whether u·n (m,) is on a bound."""
-    lower, upper = on_bounds(bounds, normal)
+    Args:
+        bounds: of u·n.
+        normal: u·n, (m,).
+        near: distance that counts as being on a bound.
+    """
+    lower, upper = on_bounds(bounds, normal, near)
     return lower | upper
 
 
-def on_kink(part: ConvexPart, argument: Array) -> Mask:
-    """Whether a law's argument (m,) is on a kink of its H or G."""
-    return np.asarray(np.any(np.abs(argument[:, None] - part.kinks) <= NEAR, axis=1))
+def on_kink(part: ConvexPart, argument: Array, near: float) -> Mask:
+    """Whether a law's argument is on a kink, (m,).
+
+    Args:
+        part: the law's H or G.
+        argument: what it acts on, (m,).
+        near: distance that counts as being on a kink.
+    """
+    return np.asarray(np.any(np.abs(argument[:, None] - part.kinks) <= near, axis=1))
 
 
 def components(term: LawTerm) -> Iterator[tuple[Integers, Array]]:

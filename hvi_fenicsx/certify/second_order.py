@@ -14,25 +14,25 @@ import numpy as np
 from dolfinx import fem
 from petsc4py import PETSc
 
-from ..problem.law_term import LawTerm
 from ..problem.problem import Problem
 from ..runtime.timing import Timer
 from ..solvers.law_models import Cells, Full
 from ..system.system import System, compile_forms
-from ..typing import Array, Integers, Mask
-from .contact_state import State
-from .force_attribution import NEAR, on_kink
+from ..typing import Integers, Mask
+from .contact_state import ContactState, LawState
 
 LOCAL_MINIMISER, NO_MINIMISER, UNDECIDED = "local minimiser", "not a minimiser", "undecided"
 _NEGATIVE_PIVOTS = 12
 """MUMPS's INFOG entry."""
 
 
-def by_inertia(problem: Problem, u: fem.Function, states: Sequence[State], tolerance: float) -> str:
+def by_inertia(problem: Problem, u: fem.Function, states: Sequence[ContactState], tolerance: float) -> str:
     """The status of a certified u, by one or two factorisations. Collective.
 
     Args:
-        problem: with the laws that were solved. u: nondimensional. states: of Γc at u.
+        problem: with the laws that were solved.
+        u: nondimensional, ghosts updated.
+        states: of Γc at u.
         tolerance: relative traction above which a constraint is strongly active.
     """
     system = System(problem, compile_forms(problem), Timer())
@@ -48,7 +48,7 @@ def by_inertia(problem: Problem, u: fem.Function, states: Sequence[State], toler
     return NO_MINIMISER if _negative(system, np.union1d(strong, weak)) > 0 else UNDECIDED
 
 
-def _active(system: System, states: Sequence[State], tolerance: float) -> tuple[Integers, Integers]:
+def _active(system: System, states: Sequence[ContactState], tolerance: float) -> tuple[Integers, Integers]:
     """Local dofs that constraints hold strongly and weakly."""
     strong: list[Integers] = [np.empty(0, np.int64)]
     weak: list[Integers] = [np.empty(0, np.int64)]
@@ -61,8 +61,7 @@ def _active(system: System, states: Sequence[State], tolerance: float) -> tuple[
         weak.append(dofs[state.contact & ~loaded])
     for term in system.terms:
         state = by_part[term.surface.part]
-        position = next(i for i, t in enumerate(state.terms) if t.direction is term.direction)
-        held, loose = _kinks(term, state.arguments[position], state.tractions[position], tolerance)
+        held, loose = _kinks(next(law for law in state.laws if law.term.direction is term.direction), tolerance)
         dofs = term.surface.dofs
         touched = np.any(np.abs(term.directions) > 0.5, axis=1)
         strong.append(dofs[held[:, None] & touched])
@@ -70,13 +69,12 @@ def _active(system: System, states: Sequence[State], tolerance: float) -> tuple[
     return np.unique(np.concatenate(strong)), np.unique(np.concatenate(weak))
 
 
-def _kinks(term: LawTerm, argument: Array, traction: Array, tolerance: float) -> tuple[Mask, Mask]:
+def _kinks(law: LawState, tolerance: float) -> tuple[Mask, Mask]:
     """Whether a vertex sits within a convex kink, or at the edge of what it carries."""
-    law = term.law
-    on = on_kink(law.convex, argument)
-    low, high = law.interval(argument, NEAR)
-    margin = tolerance * term.traction_scale
-    inside = (traction > low + margin) & (traction < high - margin)
+    on = law.on_convex_kink()
+    low, high = law.term.law.interval(law.argument, law.near)
+    margin = tolerance * law.term.traction_scale
+    inside = (law.traction > low + margin) & (law.traction < high - margin)
     return on & inside, on & ~inside
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..certify.contact_state import State
+from ..certify.contact_state import ContactState
 from ..effects import Direction
 from ..problem.problem import Problem
 from ..report.solution_arrays import PartArrays
@@ -33,7 +33,7 @@ COLUMNS = (
 )
 
 
-def columns(problem: Problem, state: State) -> dict[str, Array]:
+def columns(problem: Problem, state: ContactState) -> dict[str, Array]:
     """What this rank knows of a part's columns, SI, (m,) each; NaN where the table is empty.
 
     Args:

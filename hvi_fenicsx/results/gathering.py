@@ -11,7 +11,7 @@ import numpy.typing as npt
 from dolfinx import fem
 from mpi4py import MPI
 
-from ..certify.contact_state import State
+from ..certify.contact_state import ContactState
 from ..effects import Direction
 from ..mesh.vertex_dofs import dof_of_node
 from ..problem.problem import Problem
@@ -73,14 +73,14 @@ def _facets(problem: Problem, facets: Entities) -> Integers:
     return np.unique(np.sort(_joined(mesh.comm, _globally(problem, corners)), axis=1), axis=0)
 
 
-def _parts(problem: Problem, states: Sequence[State]) -> dict[str, PartArrays]:
+def _parts(problem: Problem, states: Sequence[ContactState]) -> dict[str, PartArrays]:
     """The parts of Γc by name, sorted by it, on rank 0; elsewhere empty. Collective."""
     ordered = sorted(states, key=lambda state: state.surface.part)
     found = {state.surface.part: _part(problem, state) for state in ordered}
     return {name: part for name, part in found.items() if part is not None}
 
 
-def _part(problem: Problem, state: State) -> PartArrays | None:
+def _part(problem: Problem, state: ContactState) -> PartArrays | None:
     """A part in the order of ``contact.csv``. Collective."""
     comm, scales, surface = problem.domain.mesh.comm, problem.scales, state.surface
     columns = {name: _joined(comm, values) for name, values in contact_table.columns(problem, state).items()}
@@ -98,7 +98,7 @@ def _part(problem: Problem, state: State) -> PartArrays | None:
     else:
         order = arc_length.lexicographic(np.column_stack([columns[axis] for axis in "xyz"]))
         columns = {name: values[order] for name, values in columns.items()}
-    drops = [term.exact.concave.kinks for term in state.terms if term.direction is Direction.SLIP]
+    drops = [law.term.exact.concave.kinks for law in state.laws if law.term.direction is Direction.SLIP]
     return PartArrays(
         columns=columns,
         vertices=vertices[order],

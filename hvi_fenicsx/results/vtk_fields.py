@@ -11,7 +11,7 @@ from dolfinx import mesh as dmesh
 from dolfinx.io import VTKFile
 
 from .. import compat
-from ..certify.contact_state import State
+from ..certify.contact_state import ContactState
 from ..certify.estimate.estimator import Estimate
 from ..errors import InputError
 from ..mesh.vertex_dofs import dof_of_node
@@ -72,7 +72,7 @@ def write_escape(path: Path, problem: Problem, mode: Mode) -> None:
     _write(path, problem.domain.mesh, [field])
 
 
-def write_contact(path: Path, problem: Problem, states: Sequence[State]) -> None:
+def write_contact(path: Path, problem: Problem, states: Sequence[ContactState]) -> None:
     """Write Γc as a mesh of its own with nodal values; a vertex of two parts has those of the later one. Collective.
 
     Args:
@@ -97,13 +97,13 @@ def write_contact(path: Path, problem: Problem, states: Sequence[State]) -> None
     _write(path, surface, fields)
 
 
-def _nodal(problem: Problem, states: Sequence[State]) -> dict[str, Array]:
+def _nodal(problem: Problem, states: Sequence[ContactState]) -> dict[str, Array]:
     """By name, values at all local vertices of the body (NaN where there is none). Collective."""
     scalar = fem.functionspace(problem.domain.mesh, ("Lagrange", 1))
     u, p = problem.scales.displacement, problem.scales.stress
     found: dict[str, fem.Function] = {}
 
-    def put(name: str, state: State, values: Array) -> None:
+    def put(name: str, state: ContactState, values: Array) -> None:
         if name not in found:
             found[name] = fem.Function(scalar)
             found[name].x.array[:] = np.nan
@@ -117,7 +117,7 @@ def _nodal(problem: Problem, states: Sequence[State]) -> dict[str, Array]:
         for i in range(problem.scales.dimension - 1):
             put(f"u_t{i + 1}", state, state.slip[:, i] * u)
             put(f"friction_t{i + 1}", state, state.friction[:, i] * p)
-        distances = state.distances
+        distances = [law.distance for law in state.laws]
         put("inclusion_distance", state, np.max(distances, axis=0) * p if distances else 0.0 * state.normal)
     for field in found.values():
         field.x.scatter_forward()

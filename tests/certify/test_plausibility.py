@@ -31,7 +31,7 @@ def sized(metres: float) -> dict[str, Any]:
     return table
 
 
-ODD = {
+MISTAKEN = {
     "E in GPa": (lambda: material(model(), youngs_modulus=215.0), "Young's modulus is 215"),
     "E in Pa twice": (lambda: material(model(), youngs_modulus=2.15e17), "Young's modulus is 2.15e+17"),
     "E in MPa": (lambda: material(model(), youngs_modulus=2.15e5), "is 4.65 of Young's modulus"),
@@ -50,9 +50,9 @@ ODD = {
 HUNG = {"on": "top", "displacement": ["free", 0.0]}
 
 
-@pytest.mark.parametrize("case", ODD)
+@pytest.mark.parametrize("case", MISTAKEN)
 def test_a_unit_taken_for_another_is_told(case: str) -> None:
-    make_table, words = ODD[case]
+    make_table, words = MISTAKEN[case]
     found = warned(make_table())
     assert any(words in sentence for sentence in found), found
 
@@ -79,7 +79,7 @@ def test_sane_demos_are_left_in_peace(demo: str) -> None:
 
 
 @pytest.mark.parametrize("demo", sorted((ROOT / "demos").glob("*.toml")), ids=lambda d: d.stem)
-def test_before_solving_only_the_odd_demos_are_warned_of(demo: Path) -> None:
+def test_before_solving_only_the_implausible_demos_are_warned_of(demo: Path) -> None:
     """The paper's law carries a thousandth of the load; the other scene is dimensionless, with a modulus of 10."""
     expected = {
         "wall_left": "it cannot matter",
@@ -93,7 +93,7 @@ def test_before_solving_only_the_odd_demos_are_warned_of(demo: Path) -> None:
         assert found == ()
 
 
-def test_the_papers_own_data_are_odd_twice() -> None:
+def test_the_papers_own_data_are_warned_of_twice() -> None:
     law, smoothing = solve(read_scene(ROOT / "demos" / "wall_left.toml")).warnings
     assert "5.0e-04 of the load" in law
     assert "24 % of the law's peak" in smoothing

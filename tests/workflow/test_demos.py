@@ -16,7 +16,7 @@ from scipy.sparse import csc_matrix, csr_matrix, diags
 from scipy.sparse.linalg import spsolve
 
 from hvi_fenicsx import Scene, Solution, prepare, read_scene, solve
-from hvi_fenicsx.certify.contact_state import State
+from hvi_fenicsx.certify.contact_state import ContactState
 
 Array = npt.NDArray[np.float64]
 DEMOS = ROOT / "demos"
@@ -28,13 +28,13 @@ def demo(name: str, *overrides: str) -> Solution:
     return solve(read_scene(DEMOS / f"{name}.toml", list(overrides)))
 
 
-def state(solution: Solution, part: str) -> State:
+def state(solution: Solution, part: str) -> ContactState:
     assert solution.exit_code == 0
     assert solution.examination is not None
     return next(s for s in solution.examination.states if s.surface.part == part)
 
 
-def mean(where: State, values: Array) -> Array:
+def mean(where: ContactState, values: Array) -> Array:
     """The mean of nodal values over a part."""
     weights = where.surface.weights
     return np.asarray(weights @ values / weights.sum())

@@ -18,7 +18,7 @@ from ...system.levels import Levels
 from ...system.system import System
 from ...typing import Array
 from ..certificate import Examination
-from ..contact_state import State
+from ..contact_state import ContactState
 from . import defect, edge_bubbles
 from .dual_norm import Dual
 from .law_traces import Along, Change, law, pointwise
@@ -61,8 +61,8 @@ def on_contact(system: System, levels: Levels, u: fem.Function, examination: Exa
     tractions = [
         _traction(system.problem, state, number, u, change, unsure)
         for state in examination.states
-        for number, term in enumerate(state.terms)
-        if term.direction is Direction.SLIP
+        for number, law in enumerate(state.laws)
+        if law.term.direction is Direction.SLIP
     ]
     comm = system.comm
     apart, whole = (total(comm, sum(pair[i] for pair in slips)) for i in (0, 1))
@@ -112,7 +112,7 @@ def _unsure(problem: Problem, u: fem.Function, examination: Examination, inverse
     d, comm = problem.scales.dimension, problem.domain.mesh.comm
     force, count = fem.Function(problem.space), 0
     for state in examination.states:
-        for number in range(len(state.terms)):
+        for number in range(len(state.laws)):
             along, tau = _drops(problem, change.edges.function_space, u, state, number)
             force.x.array[:] += along.tested(tau)[1].ravel()
             count += int(np.count_nonzero(np.any(tau, axis=(1, 2))))
@@ -124,12 +124,12 @@ def _unsure(problem: Problem, u: fem.Function, examination: Examination, inverse
 
 
 def _drops(
-    problem: Problem, space: fem.FunctionSpace, u: fem.Function, state: State, number: int
+    problem: Problem, space: fem.FunctionSpace, u: fem.Function, state: ContactState, number: int
 ) -> tuple[Along, Array]:
     """A law's drops on the facets within which they lie, spread over their uncertain share of them, (f, q, k)."""
-    term = state.terms[number]
+    term = state.laws[number].term
     along, concave = Along(problem, space, state.surface, term.directions), term.exact.concave
-    ends = along.at_vertices(state.arguments[number][:, None])[:, :, 0]
+    ends = along.at_vertices(state.laws[number].argument[:, None])[:, :, 0]
     height = np.zeros(len(ends))
     for kink, jump in zip(concave.kinks, concave.jumps, strict=True):
         height += jump * ((ends.min(axis=1, initial=np.inf) < kink) & (kink < ends.max(axis=1, initial=-np.inf)))
@@ -139,7 +139,9 @@ def _drops(
     return along, _PLACE * height[:, None, None] * unit
 
 
-def _slip(problem: Problem, state: State, u: fem.Function, change: Change, unsure: fem.Function) -> tuple[float, float]:
+def _slip(
+    problem: Problem, state: ContactState, u: fem.Function, change: Change, unsure: fem.Function
+) -> tuple[float, float]:
     """∫ of the squares of the slip's change and of the slip over this rank's share of a part. Collective."""
     along = Along(problem, change.edges.function_space, state.surface, state.surface.tangents)
     added, slip = along.linear(change.vertices) + along.quadratic(change.edges), along.linear(u)
@@ -149,7 +151,7 @@ def _slip(problem: Problem, state: State, u: fem.Function, change: Change, unsur
 
 
 def _traction(
-    problem: Problem, state: State, number: int, u: fem.Function, change: Change, unsure: fem.Function
+    problem: Problem, state: ContactState, number: int, u: fem.Function, change: Change, unsure: fem.Function
 ) -> tuple[float, float, float]:
     """∫ of the law's change against the interpolated nodal tractions, of what is unsure of it, of those. Collective."""
     space, further = change.edges.function_space, fem.Function(problem.space)

@@ -12,7 +12,7 @@ from dolfinx import fem
 from petsc4py import PETSc
 
 from ...problem.law_term import LawTerm
-from ...problem.problem import Bounds, Problem
+from ...problem.problem import Problem
 from ...problem.vectors import new_vector, turn
 from ...runtime.mpi import total
 from ...runtime.timing import Timer
@@ -22,8 +22,9 @@ from ...system.system import System
 from ...typing import Array, Entities, Integers
 from .. import contact_state
 from ..certificate import Examination
-from ..contact_state import State
-from ..force_attribution import components, on_bounds, on_kink, touches
+from ..contact_state import ContactState
+from ..force_attribution import components, on_kink, touches
+from ..thresholds import DEFAULT
 from .law_traces import nearest, tractions
 
 RTOL = 0.1
@@ -75,9 +76,9 @@ def _held(system: System, x: PETSc.Vec) -> Entities:
     found: list[Integers] = [np.empty(0, np.int64)]
     for bounds in system.bounds:
         dofs, sign = bounds.component()
-        found.append(dofs[touches(bounds, sign * u[dofs])])
+        found.append(dofs[touches(bounds, sign * u[dofs], DEFAULT.near)])
     for term in system.terms:
-        stuck = on_kink(term.law.convex, term.argument(u))
+        stuck = on_kink(term.law.convex, term.argument(u), DEFAULT.near)
         found.extend(dofs[stuck] for dofs, _ in components(term))
     return np.setdiff1d(np.unique(np.concatenate(found)), system.problem.fixed).astype(np.int32)
 
@@ -90,7 +91,7 @@ def _rising(term: LawTerm, u: Array) -> Array:
     return term.rate(u, secant, second)
 
 
-def smoothing(problem: Problem, states: Sequence[State]) -> Array:
+def smoothing(problem: Problem, states: Sequence[ContactState]) -> Array:
     """The smoothed laws' nodal forces minus the nearest ones of the unsmoothed laws, owned blocks (n, d)."""
     return _law_forces(problem, states, exact=True)
 
@@ -101,20 +102,19 @@ def algebraic(problem: Problem, examination: Examination) -> Array:
     rest = rest - _law_forces(problem, examination.states, exact=False)  # a law's force is minus its residual
     for state in examination.states:
         if state.bounds is not None:
-            force = state.surface.weights * _unfounded(state.bounds, state)
+            force = state.surface.weights * _impossible_pressure(state)
             rest[state.surface.blocks] += force[:, None] * state.surface.normals
     return np.asarray(rest)
 
 
-def _unfounded(bounds: Bounds, state: State) -> Array:
+def _impossible_pressure(state: ContactState) -> Array:
     """σ_n (m,) that contact cannot carry: at a gap, or of the wrong sign."""
-    lower, upper = on_bounds(bounds, state.normal)
     p = state.contact_pressure
-    right = (upper & (p <= 0)) | (lower & (p >= 0))
+    right = (state.on_upper & (p <= 0)) | (state.on_lower & (p >= 0))
     return np.where(right, 0.0, p)
 
 
-def penetration_energy(problem: Problem, states: Sequence[State]) -> float:
+def penetration_energy(problem: Problem, states: Sequence[ContactState]) -> float:
     """Σ force times penetration over the vertices with bounds. Collective."""
     local = 0.0
     for state in states:
@@ -124,19 +124,16 @@ def penetration_energy(problem: Problem, states: Sequence[State]) -> float:
     return total(problem.domain.mesh.comm, local)
 
 
-def _law_forces(problem: Problem, states: Sequence[State], *, exact: bool) -> Array:
+def _law_forces(problem: Problem, states: Sequence[ContactState], *, exact: bool) -> Array:
     """Nodal law forces that the (exact or solved) law cannot give, owned blocks (n, d)."""
     d = problem.scales.dimension
     forces = np.zeros((problem.space.dofmap.index_map.size_local, d))
     for state in states:
-        for number, term in enumerate(state.terms):
-            given, slip = tractions(state, number), _slip(state, number)
+        for number, law in enumerate(state.laws):
+            term, given = law.term, tractions(state, number)
+            slip = state.slip if term.radial else law.argument[:, None]
             away = given - nearest(term.exact if exact else term.law, slip, given)
-            away[state.hidden[number]] = 0.0
+            away[law.hidden] = 0.0
             vectors = np.einsum("mk,mkd->md", away * state.surface.weights[:, None], term.directions)
             np.add.at(forces, state.surface.blocks, vectors)
     return forces
-
-
-def _slip(state: State, number: int) -> Array:
-    return state.slip if state.terms[number].radial else state.arguments[number][:, None]

@@ -17,8 +17,8 @@ from ...laws import Superpotential
 from ...problem.contact_surface import Surface
 from ...problem.problem import Problem
 from ...typing import Array, Entities
-from ..contact_state import State
-from ..force_attribution import NEAR, on_kink
+from ..contact_state import ContactState
+from ..thresholds import DEFAULT
 from .edge_bubbles import quadrature
 
 _DEGREE = 12
@@ -78,11 +78,11 @@ def nearest(law: Superpotential, slip: Array, traction: Array) -> Array:
         law: j. slip, traction: (m, k); a signed slip has k = 1, else the law acts on the length of the vector.
     """
     if slip.shape[1] == 1:
-        low, high = law.interval(slip[:, 0], NEAR)
+        low, high = law.interval(slip[:, 0], DEFAULT.near)
         return np.asarray(np.clip(traction[:, 0], low, high)[:, None])
     length = np.linalg.norm(slip, axis=1)
-    low, high = law.interval(length, NEAR)
-    moving = (length > NEAR)[:, None]
+    low, high = law.interval(length, DEFAULT.near)
+    moving = (length > DEFAULT.near)[:, None]
     along = np.divide(slip, length[:, None], out=np.zeros_like(slip), where=moving)
     sliding = np.clip(np.sum(traction * along, axis=1), low, high)[:, None] * along
     size = np.linalg.norm(traction, axis=1)
@@ -90,9 +90,10 @@ def nearest(law: Superpotential, slip: Array, traction: Array) -> Array:
     return np.where(moving, sliding, inside[:, None] * traction)
 
 
-def tractions(state: State, number: int) -> Array:
+def tractions(state: ContactState, number: int) -> Array:
     """The nodal tractions of one of a part's laws along its directions, (m, k)."""
-    return state.friction if state.terms[number].radial else state.tractions[number][:, None]
+    law = state.laws[number]
+    return state.friction if law.term.radial else law.traction[:, None]
 
 
 def spread(problem: Problem, surface: Surface, values: Array) -> Array:
@@ -172,7 +173,12 @@ class Change:
 
 
 def law(
-    problem: Problem, bubbles: fem.FunctionSpace, u: fem.Function, state: State, number: int, change: Change | None
+    problem: Problem,
+    bubbles: fem.FunctionSpace,
+    u: fem.Function,
+    state: ContactState,
+    number: int,
+    change: Change | None,
 ) -> tuple[Along, Array, Array]:
     """One law between the vertices. Collective.
 
@@ -184,13 +190,14 @@ def law(
     Returns:
         The points, the interpolated nodal tractions and those of the law nearest to them; (f, q, k) each.
     """
-    term = state.terms[number]
+    own = state.laws[number]
+    term = own.term
     along = Along(problem, bubbles, state.surface, term.directions)
     nodal, slip = along.interpolated(tractions(state, number)), along.linear(u)
     if change is not None:
-        sticks = along.interpolated(on_kink(term.law.convex, state.arguments[number])[:, None].astype(float))
+        sticks = along.interpolated(own.on_convex_kink()[:, None].astype(float))
         added = along.linear(change.vertices) + along.quadratic(change.edges)
-        slip = slip + np.where(sticks > 1 - NEAR, 0.0, added)
+        slip = slip + np.where(sticks > 1 - own.near, 0.0, added)
     k, asked = slip.shape[2], term.law if change is None else term.exact
     return along, nodal, nearest(asked, slip.reshape(-1, k), nodal.reshape(-1, k)).reshape(slip.shape)
 
@@ -199,20 +206,20 @@ def pointwise(
     problem: Problem,
     bubbles: fem.FunctionSpace,
     u: fem.Function,
-    states: Sequence[State],
+    states: Sequence[ContactState],
     change: Change | None = None,
 ) -> tuple[Array, Array]:
     """∫ τ·v ds of all laws tested with edge bubbles; the nodal forces minus that with P1; each (n, d). Collective."""
     d = problem.scales.dimension
     edges, vertices = np.zeros((_local(bubbles), d)), np.zeros((_local(problem.space), d))
     for state in states:
-        for number, term in enumerate(state.terms):
+        for number, own in enumerate(state.laws):
             along, _, tau = law(problem, bubbles, u, state, number, change)
             at_edges, at_vertices = along.tested(tau)
             nodal = tractions(state, number) * state.surface.weights[:, None]
             edges += at_edges
             vertices -= at_vertices
-            np.add.at(vertices, state.surface.blocks, np.einsum("mk,mkd->md", nodal, term.directions))
+            np.add.at(vertices, state.surface.blocks, np.einsum("mk,mkd->md", nodal, own.term.directions))
     return _gathered(bubbles, edges), _gathered(problem.space, vertices)
 
 

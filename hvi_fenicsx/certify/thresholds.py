@@ -1,0 +1,53 @@
+"""The numbers that tune how a solution is judged."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, kw_only=True)
+class Thresholds:
+    """When a vertex is on a kink or a bound, and what is rounding.
+
+    Attributes:
+        near: distance (of u0) from a kink or a bound that counts as being on it.
+        largest_rounding: a certificate's entry above this is no rounding.
+        rounding_safety: factor within which the sample of the rounding error is trusted.
+    """
+
+    near: float = 1e-10
+    largest_rounding: float = 1e-4
+    rounding_safety: float = 4.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class PlausibilityThresholds:
+    """What a scene and its solution are warned of.
+
+    Attributes:
+        largest_strain: small strains are assumed everywhere.
+        softest: smallest plausible Young's modulus, N/m²: softer than a gel.
+        stiffest: largest plausible Young's modulus, N/m²: stiffer than diamond.
+        largest_body: m.
+        weak_law: a law's largest force over the load, below which it cannot matter.
+        unrelated: ratio of two lengths that have nothing to do with each other.
+        smoothing_change: change of a traction by smoothing, over the law's peak, that is large.
+        smoothing_share: share of a part on which smoothing may change the traction so much.
+        nearly_all: share of a part that counts as all of it: a vertex on a support does not slip.
+        rounding: displacement or work of a rigid motion, nondimensional, up to which it is none.
+    """
+
+    largest_strain: float = 0.1
+    softest: float = 1e3
+    stiffest: float = 2e12
+    largest_body: float = 200.0
+    weak_law: float = 0.01
+    unrelated: float = 100.0
+    smoothing_change: float = 0.1
+    smoothing_share: float = 0.25
+    nearly_all: float = 0.9
+    rounding: float = 1e-10
+
+
+DEFAULT = Thresholds()
+PLAUSIBILITY = PlausibilityThresholds()
