@@ -1,1 +1,1 @@
-"""The mesh: domain shapes, gmsh, refinement, coarsening, and the transfer between levels."""
+"""The mesh: domain shapes, gmsh files, refinement, coarsening, and the transfer between levels."""

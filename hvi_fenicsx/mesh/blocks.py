@@ -4,7 +4,7 @@ Each cell of the grid is cut along the paths of edges from its lowest to its hig
 ``create_rectangle``'s right-diagonal pattern, in space ``create_box``'s six tetrahedra, both nested in themselves. The
 ranks share a block by recursive bisection (Berger and Bokhari 1987). It cuts at fractions of the block, rounded to
 cells, so that a rank has the same part on every level of the mesh hierarchy, to half a cell, and hardly a value is sent
-between levels; a graph partitioner would have to run on each level, and would cut each of them elsewhere.
+between levels; a graph partitioner would have to run on each level, and would cut each level elsewhere.
 """
 
 from __future__ import annotations
@@ -19,28 +19,28 @@ from mpi4py import MPI
 from .. import compat
 from ..typing import Array, Entities, Integers
 from .domain import Domain
+from .thresholds import DEFAULT, Thresholds
 from .transfer import GridTransfer, Transfer
 
-_COARSEST = 8
-"""Cells each way below which a coarser level does not help."""
 _AXIS_OF_SIDE = {"left": (0, 0), "right": (0, 1), "bottom": (-1, 0), "top": (-1, 1), "front": (1, 0), "back": (1, 1)}
 """Axis (-1: the last, the vertical one) and end of each named side."""
 
 
-def block(comm: MPI.Comm, size: Sequence[float], cells: Sequence[int]) -> Domain:
-    """[0, size], a rectangle or a box, in cells cut into triangles or tetrahedra. Collective.
+def block(comm: MPI.Comm, size: Sequence[float], cells: Sequence[int], thresholds: Thresholds = DEFAULT) -> Domain:
+    """The rectangle or box [0, size], in cells cut into triangles or tetrahedra. Collective.
 
-    Its mesh hierarchy goes down by half the cells each way, as long as they can be halved.
+    Each coarser level of its mesh hierarchy has half the cells each way, as long as they can be halved.
 
     Args:
         comm: the ranks that share it.
         size: lengths of the edges, m, (d,).
         cells: cells each way, (d,).
+        thresholds: how coarse the coarsest level is.
     """
     grid, upper = mesh(comm, size, cells), np.asarray(size, dtype=float)
 
     def coarsening() -> tuple[Domain, Transfer]:
-        return block(comm, size, [n // 2 for n in cells]), GridTransfer(size, cells)
+        return block(comm, size, [n // 2 for n in cells], thresholds), GridTransfer(size, cells)
 
     return Domain(
         mesh=grid,
@@ -49,25 +49,40 @@ def block(comm: MPI.Comm, size: Sequence[float], cells: Sequence[int]) -> Domain
         lower=np.zeros(len(upper)),
         upper=upper,
         one_piece=True,
-        coarsening=coarsening if all(n % 2 == 0 and n // 2 >= _COARSEST for n in cells) else None,
+        coarsening=coarsening if all(n % 2 == 0 and n // 2 >= thresholds.coarsest_block for n in cells) else None,
     )
 
 
 def mesh(comm: MPI.Comm, size: Sequence[float], cells: Sequence[int]) -> dmesh.Mesh:
-    """[0, size] in so many cells each way, cut into triangles or tetrahedra, without ghost cells. Collective."""
-    lower, upper = share(cells, comm.size, comm.rank)
+    """The mesh of the rectangle or box [0, size], without ghost cells. Collective.
+
+    Args:
+        comm: the ranks that share it.
+        size: lengths of the edges, m, (d,).
+        cells: cells each way, (d,), each cut into triangles or tetrahedra.
+    """
+    lower, upper = part_of_rank(cells, comm.size, comm.rank)
     kind = {2: "triangle", 3: "tetrahedron"}[len(cells)]
     return compat.simplex_mesh(comm, _simplices(lower, upper, cells), _points(comm, size, cells), kind)
 
 
-def share(cells: Sequence[int], ranks: int, rank: int) -> tuple[Integers, Integers]:
-    """The cells of the grid that a rank keeps: from ``lower`` to before ``upper`` (d,); none where they are too few."""
+def part_of_rank(cells: Sequence[int], ranks: int, rank: int) -> tuple[Integers, Integers]:
+    """The part of the grid that a rank keeps.
+
+    Args:
+        cells: cells each way, (d,).
+        ranks: number of ranks.
+        rank: the rank.
+
+    Returns:
+        The first cell, and the one after the last, (d,) both; they are equal where there are too few cells.
+    """
     lower, upper = np.zeros(len(cells)), np.ones(len(cells))
     first, last = 0, ranks
     while last - first > 1:
         middle = (first + last + 1) // 2
         extent = (upper - lower) * cells
-        axis = len(extent) - 1 - np.argmax(extent[::-1])  # of equals the last: bodies stand on what then stays whole
+        axis = len(extent) - 1 - np.argmax(extent[::-1])  # of equal ones the last, so that the bottom stays whole
         cut = lower[axis] + (upper[axis] - lower[axis]) * (middle - first) / (last - first)
         if rank < middle:
             upper[axis], last = cut, middle
@@ -78,7 +93,7 @@ def share(cells: Sequence[int], ranks: int, rank: int) -> tuple[Integers, Intege
 
 
 def _simplices(lower: Integers, upper: Integers, cells: Sequence[int]) -> Integers:
-    """Those of a part of the grid, (n, d+1), in numbers of the grid's vertices, x running fastest."""
+    """The simplices of a part of the grid, (n, d+1), as numbers of the grid's vertices, x running fastest."""
     steps = np.cumprod([1, *(n + 1 for n in cells[:-1])], dtype=np.int64)
     corners = np.zeros(1, np.int64)
     for begin, end, step in zip(lower, upper, steps, strict=True):
@@ -88,7 +103,7 @@ def _simplices(lower: Integers, upper: Integers, cells: Sequence[int]) -> Intege
 
 
 def _points(comm: MPI.Comm, size: Sequence[float], cells: Sequence[int]) -> Array:
-    """An equal share of the grid's vertices in the order of their numbers, (n, d); dolfinx sends each where it goes."""
+    """An equal part of the grid's vertices by their numbers, m, (n, d); dolfinx sends each where it is needed."""
     counts = [n + 1 for n in cells]
     total = int(np.prod(counts, dtype=np.int64))
     numbers = np.arange(total * comm.rank // comm.size, total * (comm.rank + 1) // comm.size)
@@ -97,7 +112,7 @@ def _points(comm: MPI.Comm, size: Sequence[float], cells: Sequence[int]) -> Arra
 
 
 def _sides(mesh: dmesh.Mesh, size: Array) -> dict[str, Entities]:
-    """Facets of the surface by the side that their middle lies on."""
+    """Exterior facets by the side that their midpoint lies on."""
     d = len(size)
     mesh.topology.create_connectivity(d - 1, d)
     facets, middles = dmesh.exterior_facet_indices(mesh.topology), np.empty((0, 3))

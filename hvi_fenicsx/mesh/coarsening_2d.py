@@ -1,4 +1,4 @@
-"""A coarser mesh of a plane body, by gmsh within its thinned outline."""
+"""A coarser mesh of a plane body, made by gmsh within its thinned outline."""
 
 from __future__ import annotations
 
@@ -14,24 +14,27 @@ from ..runtime.mpi import on_root
 from ..typing import Entities, Integers
 from . import gmsh_model, refinement, thinned_outline
 from .domain import Domain
-from .thinned_outline import NONE, HalfEdges, Outline
+from .thinned_outline import NONE, HalfEdges, ThinnedOutline
 from .thresholds import DEFAULT, Thresholds
 
 _UNNAMED = ""
 
 
-def coarse(domain: Domain, factor: float, thresholds: Thresholds = DEFAULT) -> Domain | None:
-    """The plane body with longer edges; None where gmsh cannot mesh it, or it would be another body. Collective.
+def coarsen(domain: Domain, factor: float, thresholds: Thresholds = DEFAULT) -> Domain | None:
+    """The plane body on a mesh of longer edges. Collective.
 
     Args:
         domain: the body.
         factor: by which edges get longer, about.
-        thresholds: how far the areas may differ.
+        thresholds: which vertices of the outline are kept, and how far the areas may differ.
+
+    Returns:
+        None where gmsh cannot mesh the thinned outline, or where its area differs too much.
     """
     comm, sides, regions = domain.mesh.comm, sorted(domain.sides), sorted(domain.regions)
     parts = comm.gather(_half_edges(domain, sides, regions))
     with gmsh_model.session(comm) as gmsh:
-        names = on_root(comm, lambda: _meshed(gmsh, _thinned(parts, factor, thresholds), sides, regions))
+        names = on_root(comm, lambda: _mesh(gmsh, _thinned(parts, factor, thresholds), sides, regions))
         if names is None:
             return None
         mesh, found, within = gmsh_model.distribute(comm, gmsh, 2, names)
@@ -40,7 +43,7 @@ def coarse(domain: Domain, factor: float, thresholds: Thresholds = DEFAULT) -> D
 
 
 def _half_edges(domain: Domain, sides: Sequence[str], regions: Sequence[str]) -> HalfEdges:
-    """This rank's edges without a second cell, or on a side, or between regions; lengths in those of the body."""
+    """This rank's edges without a second cell, on a side, or between regions; lengths relative to the body's."""
     mesh = domain.mesh
     facets, nodes = refinement.cell_facets(mesh), compat.geometry_dofmap(mesh)
     region = _numbered(domain.regions, regions, len(facets))
@@ -61,24 +64,24 @@ def _half_edges(domain: Domain, sides: Sequence[str], regions: Sequence[str]) ->
 
 
 def _numbered(named: Mapping[str, Entities], names: Sequence[str], size: int) -> Integers:
-    """For each entity the number of the name that it bears, or NONE."""
+    """For each entity the number of its name, or NONE."""
     numbers = np.full(size, NONE)
     for number, name in enumerate(names):
         numbers[named[name]] = number
     return numbers
 
 
-def _thinned(parts: Sequence[HalfEdges] | None, factor: float, thresholds: Thresholds) -> Outline | None:
-    return thinned_outline.traced(HalfEdges.joined(parts or []), factor, thresholds.outline_area)
+def _thinned(parts: Sequence[HalfEdges] | None, factor: float, thresholds: Thresholds) -> ThinnedOutline | None:
+    return thinned_outline.trace(HalfEdges.joined(parts or []), factor, thresholds)
 
 
-def _meshed(
-    gmsh: Any, thinned: Outline | None, sides: Sequence[str], regions: Sequence[str]
+def _mesh(
+    gmsh: Any, thinned: ThinnedOutline | None, sides: Sequence[str], regions: Sequence[str]
 ) -> dict[int, dict[str, int]] | None:
     """Mesh the thinned outline in gmsh; its physical groups, or None where it cannot. On gmsh's rank."""
     if thinned is None:
         return None
-    groups = _drawn(gmsh, thinned, [*sides], [*regions, _UNNAMED])
+    groups = _draw(gmsh, thinned, [*sides], [*regions, _UNNAMED])
     try:
         gmsh.model.mesh.generate(2)
     except Exception:
@@ -87,10 +90,10 @@ def _meshed(
     return groups
 
 
-def _drawn(gmsh: Any, thinned: Outline, sides: list[str], regions: list[str]) -> dict[int, dict[str, int]]:
-    """The outline in gmsh, each of its edges one edge of a cell; the physical groups by dimension and name.
+def _draw(gmsh: Any, thinned: ThinnedOutline, sides: list[str], regions: list[str]) -> dict[int, dict[str, int]]:
+    """Draw the outline in gmsh, each of its edges one edge of a cell; the physical groups by dimension and name.
 
-    Cells of no region are in one of the last name.
+    Cells of no region are in the region of the last name.
     """
     geo = gmsh.model.geo
     kept = sorted({v for chain in thinned.chains for v in chain.vertices})
@@ -103,15 +106,20 @@ def _drawn(gmsh: Any, thinned: Outline, sides: list[str], regions: list[str]) ->
     geo.synchronize()
     for line in (line for found in lines for line in found):
         gmsh.model.mesh.setTransfiniteCurve(line, 2)
-    bounds: dict[int, list[int]] = {}
-    for chain, found in zip(thinned.chains, lines, strict=True):
-        bounds.setdefault(chain.side, []).extend(found)
-    bounds.pop(NONE, None)
     add = gmsh.model.addPhysicalGroup
     return {
-        1: {sides[number]: add(1, found) for number, found in bounds.items()},
+        1: {sides[number]: add(1, found) for number, found in _lines_by_side(thinned, lines).items()},
         2: {regions[number]: add(2, found) for number, found in surfaces.items()},
     }
+
+
+def _lines_by_side(thinned: ThinnedOutline, lines: Sequence[Sequence[int]]) -> dict[int, list[int]]:
+    """Gmsh lines by the number of their side."""
+    found: dict[int, list[int]] = {}
+    for chain, own in zip(thinned.chains, lines, strict=True):
+        found.setdefault(chain.side, []).extend(own)
+    found.pop(NONE, None)
+    return found
 
 
 def _curves(lines: Sequence[Sequence[int]], loop: Sequence[tuple[int, bool]]) -> list[int]:

@@ -1,7 +1,8 @@
-"""A coarser mesh of a body in space, by gmsh (:mod:`.gmsh_worker`); sides and regions are those of the nearest cells.
+"""A coarser mesh of a body in space, made by gmsh (:mod:`.gmsh_worker`).
 
-It serves as a start and a preconditioner only: where sides part in the middle of a flat face, or regions inside of the
-body, its own part there to the width of a cell.
+Its facets and cells take the side and the region of the nearest facet or cell of the fine mesh. It serves as a start
+value and a preconditioner only: where two sides meet in the middle of a flat face, or two regions inside of the body,
+their border is right to the width of a cell.
 """
 
 from __future__ import annotations
@@ -20,16 +21,21 @@ from .. import compat
 from ..runtime import processes
 from ..runtime.mpi import agree, on_root, total
 from ..typing import Array, Entities, Integers, Mask
+from . import refinement
 from .domain import Domain
 from .thresholds import DEFAULT, Thresholds
 
-_SAMPLE = 20_000
-"""Cells, about, by which sizes, regions and ranks are known."""
-
 
 @dataclass(frozen=True)
-class _Cells:
-    """A sample of all ranks' cells: midpoints (k, 3), sizes (k,), ranks (k,), whether in each region (k, r)."""
+class _CellSample:
+    """Some of all ranks' cells.
+
+    Attributes:
+        midpoints: m, (k, 3).
+        sizes: edge of a regular tetrahedron of the same volume, m, (k,).
+        ranks: where each cell is, (k,).
+        within: whether the cell is in each region, (k, regions).
+    """
 
     midpoints: Array
     sizes: Array
@@ -39,53 +45,62 @@ class _Cells:
 
 @dataclass(frozen=True)
 class _Surface:
-    """All triangles (t) of the surface: the file's nodes (t, 3), corners (t, 3, 3), whether on each side (t, s)."""
+    """All triangles of the body's surface.
+
+    Attributes:
+        nodes: numbers of the nodes in the mesh file, (t, 3).
+        corners: m, (t, 3, 3).
+        on: whether the triangle is on each side, (t, sides).
+    """
 
     nodes: Integers
     corners: Array
     on: Mask
 
 
-def coarse(domain: Domain, factor: float, thresholds: Thresholds = DEFAULT) -> Domain | None:
-    """The body with larger cells; None where gmsh fails, or makes another body. Collective.
+def coarsen(domain: Domain, factor: float, thresholds: Thresholds = DEFAULT) -> Domain | None:
+    """The body on a mesh of larger cells. Collective.
 
     Args:
         domain: the body.
         factor: by which edges get longer, about.
-        thresholds: how long gmsh may take, and how far the sizes may differ.
+        thresholds: how long gmsh may take, and how far volume and areas may differ.
+
+    Returns:
+        None where gmsh fails, or where volume or areas differ too much.
     """
     comm = domain.mesh.comm
-    cells, surface = _sampled(domain), _surface(domain)
-    made = on_root(comm, lambda: _remeshed(surface, cells, factor, thresholds)) if surface else None
-    if surface is None or made is None:
+    cells, surface = _sample(domain, thresholds), _surface(domain)
+    remeshed = on_root(comm, lambda: _remeshed(surface, cells, factor, thresholds)) if surface else None
+    if surface is None or remeshed is None:
         return None
-    points, corners = made
+    points, corners = remeshed
     mine = corners[cells.ranks[_nearest(cells.midpoints, points[corners].mean(axis=1))] == comm.rank]
     if min(agree(comm, len(mine))) == 0:
         return None
     mesh = compat.simplex_mesh(comm, mine, points if comm.rank == 0 else points[:0], "tetrahedron")
     found = replace(domain, mesh=mesh, sides=_sides(domain, mesh, surface), regions=_regions(domain, mesh, cells))
-    return found if _alike(domain, found, thresholds.remeshed_size) else None
+    return found if _similar(domain, found, thresholds.remeshed_size) else None
 
 
-def _sampled(domain: Domain) -> _Cells:
-    """The same cells in the same order, whatever the ranks. Collective."""
+def _sample(domain: Domain, thresholds: Thresholds) -> _CellSample:
+    """The same cells in the same order for any number of ranks. Collective."""
     comm, topology = domain.mesh.comm, domain.mesh.topology
-    every = max(1, topology.index_map(3).size_global // _SAMPLE)
+    every = max(1, topology.index_map(3).size_global // thresholds.sampled_cells)
     numbers = np.asarray(topology.original_cell_index, dtype=np.int64)
     chosen = np.flatnonzero(numbers % every == 0)
-    corners = _corners(domain.mesh)[chosen]
+    corners = owned_corners(domain.mesh)[chosen]
     within = np.zeros((len(numbers), len(domain.regions)), dtype=bool)
     for i, name in enumerate(sorted(domain.regions)):
         within[domain.regions[name], i] = True
     sizes, ranks = np.cbrt(6 * np.sqrt(2) * _volumes(corners)), np.full(len(chosen), comm.rank)
     parts = agree(comm, (numbers[chosen], corners.mean(axis=1), sizes, ranks, within[chosen]))
     order, *found = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
-    return _Cells(*(array[np.argsort(order)] for array in found))
+    return _CellSample(*(array[np.argsort(order)] for array in found))
 
 
 def _surface(domain: Domain) -> _Surface | None:
-    """None where a side lies inside of the body. Collective."""
+    """The body's surface; None where a side lies inside of the body. Collective."""
     mesh, owned = domain.mesh, domain.mesh.topology.index_map(2).size_local
     facets = _exterior(mesh)
     on: Mask = np.zeros((owned + mesh.topology.index_map(2).num_ghosts, len(domain.sides)), dtype=np.bool_)
@@ -121,28 +136,29 @@ def _outward(mesh: dmesh.Mesh, facets: Entities) -> Entities:
     return np.take_along_axis(nodes, (first[:, None] + np.arange(3)) % 3, axis=1)
 
 
-def _remeshed(surface: _Surface, cells: _Cells, factor: float, thresholds: Thresholds) -> tuple[Array, Integers] | None:
+def _remeshed(
+    surface: _Surface, cells: _CellSample, factor: float, thresholds: Thresholds
+) -> tuple[Array, Integers] | None:
     """Vertices (n, 3) and cells (c, 4), or None where gmsh fails, or takes too long. On rank 0."""
     _, first, inverse = np.unique(surface.nodes, return_index=True, return_inverse=True)
     triangles = inverse.reshape(-1, 3)
     if not _one_shell(triangles):
         return None
     try:
-        points, patience = surface.corners.reshape(-1, 3)[first], _patience(thresholds, len(triangles))
-        return _by_child(points, triangles, cells.midpoints, factor * cells.sizes, patience)
+        points, timeout = surface.corners.reshape(-1, 3)[first], _seconds_for_gmsh(thresholds, len(triangles))
+        return _run_gmsh(points, triangles, cells.midpoints, factor * cells.sizes, timeout)
     except (subprocess.SubprocessError, OSError):
         return None
 
 
-def _patience(thresholds: Thresholds, triangles: int) -> float:
-    """Seconds for gmsh."""
+def _seconds_for_gmsh(thresholds: Thresholds, triangles: int) -> float:
     return thresholds.gmsh_seconds + thresholds.gmsh_seconds_per_triangle * triangles
 
 
-def _by_child(
-    points: Array, triangles: Integers, places: Array, sizes: Array, patience: float
+def _run_gmsh(
+    points: Array, triangles: Integers, places: Array, sizes: Array, timeout: float
 ) -> tuple[Array, Integers]:
-    """What :mod:`.gmsh_worker` makes of these arrays within so many seconds.
+    """The mesh that :mod:`.gmsh_worker` makes, in a process of its own, within a time limit (s).
 
     Raises:
         SubprocessError: it failed, or took too long.
@@ -152,13 +168,13 @@ def _by_child(
         source, target = Path(folder, "given.npz"), Path(folder, "made.npz")
         np.savez(source, points=points, triangles=triangles, places=places, sizes=sizes)
         command = [sys.executable, "-m", "hvi_fenicsx.mesh.gmsh_worker", os.fspath(source), os.fspath(target)]
-        subprocess.run(command, env=processes.environment(), capture_output=True, check=True, timeout=patience)
+        subprocess.run(command, env=processes.environment(), capture_output=True, check=True, timeout=timeout)
         with np.load(target) as made:
             return made["points"], made["cells"]
 
 
 def _one_shell(triangles: Integers) -> bool:
-    """Whether each edge has two triangles, and all hang together."""
+    """Whether each edge has two triangles, and all triangles are connected."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
@@ -175,21 +191,21 @@ def _sides(domain: Domain, mesh: dmesh.Mesh, surface: _Surface) -> dict[str, Ent
     return {name: facets[on[:, i]] for i, name in enumerate(sorted(domain.sides))}
 
 
-def _regions(domain: Domain, mesh: dmesh.Mesh, cells: _Cells) -> dict[str, Entities]:
-    within = cells.within[_nearest(cells.midpoints, _corners(mesh).mean(axis=1))]
+def _regions(domain: Domain, mesh: dmesh.Mesh, cells: _CellSample) -> dict[str, Entities]:
+    within = cells.within[_nearest(cells.midpoints, owned_corners(mesh).mean(axis=1))]
     return {name: np.flatnonzero(within[:, i]).astype(np.int32) for i, name in enumerate(sorted(domain.regions))}
 
 
-def _alike(fine: Domain, found: Domain, different: float) -> bool:
-    """Whether volume and sides are about the same, and no region is lost. Collective."""
-    (before, after) = (_measures(domain) for domain in (fine, found))
-    return all(abs(after[name] - size) <= different * size for name, size in before.items())
+def _similar(fine: Domain, coarse: Domain, difference: float) -> bool:
+    """Whether volume and areas differ by no more than this part, and no region is lost. Collective."""
+    (before, after) = (measures(domain) for domain in (fine, coarse))
+    return all(abs(after[name] - size) <= difference * size for name, size in before.items())
 
 
-def _measures(domain: Domain) -> dict[tuple[str, str], float]:
-    """Volume, areas of the sides, volumes of the regions. Collective."""
+def measures(domain: Domain) -> dict[tuple[str, str], float]:
+    """Volume of the body (m³), areas of the sides (m²) and volumes of the regions, by kind and name. Collective."""
     comm, x = domain.mesh.comm, domain.mesh.geometry.x
-    volumes = _volumes(_corners(domain.mesh))
+    volumes = _volumes(owned_corners(domain.mesh))
     sizes = {("body", ""): float(volumes.sum())}
     for name, facets in sorted(domain.sides.items()):
         corners = x[_outward(domain.mesh, facets)]
@@ -201,17 +217,17 @@ def _measures(domain: Domain) -> dict[tuple[str, str], float]:
 
 
 def _nearest(places: Array, points: Array) -> Integers:
-    """The place (number) nearest to each point."""
+    """The number of the place that is nearest to each point."""
     from scipy.spatial import cKDTree
 
     return np.asarray(cKDTree(places).query(points)[1], dtype=np.int64)
 
 
-def _corners(mesh: dmesh.Mesh) -> Array:
-    """Of the cells that this rank owns, (c, 4, 3)."""
-    owned = mesh.topology.index_map(3).size_local
-    return np.asarray(mesh.geometry.x[compat.geometry_dofmap(mesh)[:owned]])
+def owned_corners(mesh: dmesh.Mesh) -> Array:
+    """Vertices of the tetrahedra that this rank owns, m, (c, 4, 3)."""
+    return refinement.cell_corners(mesh)[: mesh.topology.index_map(3).size_local]
 
 
 def _volumes(corners: Array) -> Array:
+    """Volumes of tetrahedra, m³."""
     return np.asarray(np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1])) / 6)

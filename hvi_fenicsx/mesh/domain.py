@@ -15,10 +15,8 @@ from ..geometry import Arc
 from ..runtime import memory
 from ..runtime.mpi import agree
 from ..typing import Array, Entities
+from .thresholds import DEFAULT, Thresholds
 from .transfer import Transfer
-
-_LEAST_MEMORY = 300.0
-"""Bytes for one unknown: its row of the matrix and its share of the mesh, without any solver."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,7 +31,7 @@ class Domain:
         upper: upper corner, likewise.
         curves: the true curve of a side by its name, where it is known and not straight; the facets of all other
             sides, those of mesh files among them, are taken for the geometry itself.
-        one_piece: whether the mesh is known to be connected; else one has to look (:mod:`.bodies`).
+        one_piece: whether the mesh is known to be connected; else :mod:`.bodies` finds out.
         coarsening: makes the next coarser domain of the mesh hierarchy; None where there is none.
     """
 
@@ -59,7 +57,7 @@ class Domain:
         """The domain of a mesh. Collective.
 
         Args:
-            mesh: SI coordinates.
+            mesh: coordinates in m.
             sides: local facet indices by name.
             regions: local cell indices by name.
             curves: the true curve of a side by its name, where that is known and not straight.
@@ -123,18 +121,19 @@ Coarsening: TypeAlias = Callable[[], tuple[Domain, Transfer]]
 """Makes the next coarser domain, and the transfer from it. Collective."""
 
 
-def check_affordable(comm: MPI.Comm, unknowns: int, key: str) -> None:
+def check_affordable(comm: MPI.Comm, unknowns: int, key: str, thresholds: Thresholds = DEFAULT) -> None:
     """Refuse a mesh that needs more memory than there is, before it is made. Collective.
 
     Args:
         comm: all ranks.
-        unknowns: of the mesh to be made.
-        key: of ``[domain]``, which makes them so many.
+        unknowns: number of unknowns of the mesh to be made.
+        key: the key of ``[domain]`` that makes them so many.
+        thresholds: memory of one unknown.
 
     Raises:
         InputError: on all ranks alike.
     """
-    least, room = unknowns * _LEAST_MEMORY / 2**20, memory.room(comm)
+    least, room = unknowns * thresholds.bytes_per_unknown / 2**20, memory.room(comm)
     if least > room:
         raise InputError(
             f"domain.{key}: make {unknowns:.1e} unknowns, which need {least / 1024:.3g} GB at least; there are "

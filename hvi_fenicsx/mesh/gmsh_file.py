@@ -14,8 +14,8 @@ def read(comm: MPI.Comm, path: Path, dimension: int, scale: float = 1.0) -> Doma
     """The mesh of a file, its physical groups being sides and regions. Collective.
 
     Args:
-        comm: the ranks that share it.
-        path: of the file.
+        comm: the ranks that share the mesh.
+        path: the file.
         dimension: of the cells, 2 or 3.
         scale: m per unit of the file's coordinates.
 

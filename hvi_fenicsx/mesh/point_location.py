@@ -1,4 +1,4 @@
-"""Points placed in a mesh that they do not belong to: the cell that holds each, and barycentric weights in it."""
+"""Points located in a mesh: the cell that holds each point, and its barycentric weights in that cell."""
 
 from __future__ import annotations
 
@@ -10,18 +10,24 @@ from mpi4py import MPI
 from .. import compat
 from ..runtime.mpi import agree
 from ..typing import Array, Integers
-
-_NOTHING = 1e-9
-"""A barycentric weight that is rounding: the point lies on the facet opposite to that vertex."""
+from .thresholds import DEFAULT, Thresholds
 
 
-def between(points: Array, space: fem.FunctionSpace, vertices: Array) -> tuple[Integers, Array]:
-    """The vertices (global blocks) between which each point (m, 3) lies, and their weights; (m, d+1) both. Collective.
+def interpolation_weights(
+    points: Array, space: fem.FunctionSpace, vertices: Array, thresholds: Thresholds = DEFAULT
+) -> tuple[Integers, Array]:
+    """The vertices of the cell that holds each point, and the point's weights of them. Collective.
 
     Each rank is sent the cells that may hold its points. A point outside of all cells is moved to the nearest one.
 
     Args:
-        points: this rank's. space: P1, of the mesh in which they are placed. vertices: its local ones, (n, 3).
+        points: this rank's points, m, (m, 3).
+        space: P1 on the mesh in which they are located.
+        vertices: local vertices of that mesh, m, (n, 3).
+        thresholds: which weight is rounding.
+
+    Returns:
+        Global numbers of vertices (blocks), and barycentric weights, (m, d+1) both.
     """
     comm, d = space.mesh.comm, space.mesh.geometry.dim
     corners, numbers = _gathered(comm, points, vertices, space)
@@ -31,13 +37,13 @@ def between(points: Array, space: fem.FunctionSpace, vertices: Array) -> tuple[I
     x[local] = corners
     kind = space.mesh.topology.cell_name()
     mesh = compat.simplex_mesh(MPI.COMM_SELF, local, x, kind)
-    found = mesh.topology.original_cell_index[cells(mesh, points)]
-    share = inside(weights(corners[found], points[:, :d]))
-    return numbers[found], inside(np.where(share < _NOTHING, 0.0, share))
+    found = mesh.topology.original_cell_index[containing_cells(mesh, points, thresholds)]
+    weights = clipped(barycentric_weights(corners[found], points[:, :d]))
+    return numbers[found], clipped(np.where(weights < thresholds.barycentric_rounding, 0.0, weights))
 
 
 def _gathered(comm: MPI.Comm, points: Array, vertices: Array, space: fem.FunctionSpace) -> tuple[Array, Integers]:
-    """Corners (k, d+1, d) and their global numbers (k, d+1) of the cells near a rank's points, from all. Collective."""
+    """Corners (k, d+1, d) and their global numbers (k, d+1) of all cells near this rank's points. Collective."""
     d = space.mesh.geometry.dim
     blocks = space.dofmap.list
     corners = vertices[blocks][:, :, :d]
@@ -50,22 +56,27 @@ def _gathered(comm: MPI.Comm, points: Array, vertices: Array, space: fem.Functio
     return np.concatenate([c for c, _ in found]), np.concatenate([n for _, n in found])
 
 
-def cells(mesh: dolfinx.mesh.Mesh, points: Array) -> Integers:
-    """The cell that holds each point (m, 3), or the one nearest to it, on a mesh of this process alone.
+def containing_cells(mesh: dolfinx.mesh.Mesh, points: Array, thresholds: Thresholds = DEFAULT) -> Integers:
+    """The cell that holds each point, or the one nearest to it.
 
-    Of those whose boxes hold it, it is the one with the largest least weight: dolfinx's own test of collision takes
-    cells that are a millionth off.
+    Among the cells whose boxes hold the point, it is the one whose smallest barycentric weight is largest: dolfinx's
+    own collision test also takes cells that miss the point by a millionth of their size.
+
+    Args:
+        mesh: a mesh of this process alone.
+        points: m, (m, 3).
+        thresholds: which weight is rounding.
     """
     d = mesh.topology.dim
     tree = geometry.bb_tree(mesh, d, padding=1e-12 * float(np.ptp(mesh.geometry.x)))
     boxed = geometry.compute_collisions_points(tree, points)
     point = np.repeat(np.arange(len(points)), np.diff(boxed.offsets))
     corners = mesh.geometry.x[compat.geometry_dofmap(mesh)[boxed.array]][:, :, : mesh.geometry.dim]
-    least = weights(corners, points[point, : mesh.geometry.dim]).min(axis=1)
+    least = barycentric_weights(corners, points[point, : mesh.geometry.dim]).min(axis=1)
     found, best = np.full(len(points), -1, dtype=np.int64), np.full(len(points), -np.inf)
     order = np.argsort(least)  # of several entries for one point, the last one stays
     found[point[order]], best[point[order]] = boxed.array[order], least[order]
-    outside = np.flatnonzero(best < -_NOTHING)
+    outside = np.flatnonzero(best < -thresholds.barycentric_rounding)
     if len(outside):
         everything = np.arange(mesh.topology.index_map(d).size_local, dtype=np.int32)
         middles = geometry.create_midpoint_tree(mesh, d, everything)
@@ -73,14 +84,19 @@ def cells(mesh: dolfinx.mesh.Mesh, points: Array) -> Integers:
     return found
 
 
-def inside(weights: Array) -> Array:
-    """Barycentric weights of a point of the simplex near that of the given ones."""
-    clipped = np.clip(weights, 0.0, 1.0)
-    return np.asarray(clipped / clipped.sum(axis=-1, keepdims=True))
+def clipped(weights: Array) -> Array:
+    """Barycentric weights (..., c) moved into the simplex: none is negative, and their sum is 1."""
+    positive = np.clip(weights, 0.0, 1.0)
+    return np.asarray(positive / positive.sum(axis=-1, keepdims=True))
 
 
-def weights(corners: Array, points: Array) -> Array:
-    """Barycentric weights (..., c) of points (..., d) in simplices (..., c, d); of their projections where c ≤ d."""
+def barycentric_weights(corners: Array, points: Array) -> Array:
+    """Barycentric weights of points in simplices, (..., c).
+
+    Args:
+        corners: of the simplices, (..., c, d).
+        points: (..., d); where c ≤ d, the weights are those of their projections onto the simplex's plane or line.
+    """
     first = corners[..., 0, :]
     edges = corners[..., 1:, :] - first[..., None, :]
     gram = np.einsum("...id,...jd->...ij", edges, edges)

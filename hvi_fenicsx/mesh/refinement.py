@@ -1,7 +1,7 @@
 """A domain refined, uniformly or where it is marked, with its named sides and regions.
 
 Edges are bisected by Plaza's rule (Plaza and Carey 2000): the longest edge of a cell goes first, so that angles stay
-bounded from below. Children stay on their parent's rank. New vertices of a side whose curve is known move onto it.
+bounded away from 0. Children stay on their parent's rank. New vertices of a side whose curve is known move onto it.
 """
 
 from __future__ import annotations
@@ -18,22 +18,20 @@ from .. import compat
 from ..geometry import Arc
 from ..typing import Array, Entities
 from .domain import Domain, check_affordable
+from .thresholds import DEFAULT, Thresholds
 from .transfer import Halves, ParentCellTransfer, Transfer
 
-_LONG = {2: 0.0, 3: 0.76}
-"""Of a cell's longest edge, what is bisected with it, by dimension: in space all six would make a step of 4 to 5 times
-the unknowns; the longest and, of a sixth of a cube, the diagonals of its faces make it about 2."""
 _SKEWED = np.eye(3) + 1e-6 * np.sqrt([[2.0, 3.0, 5.0], [3.0, 7.0, 11.0], [5.0, 11.0, 13.0]])
-"""Where the edges are measured: lengths that tie in the body differ here by their direction, on all ranks alike."""
+"""Edges are measured after this linear map: there edges of equal length differ by direction, on all ranks alike."""
 
 
 @dataclass(frozen=True)
 class Refinement:
-    """A refined domain and how it came from the one before.
+    """A refined domain and the transfer to it.
 
     Attributes:
-        domain: the refined one.
-        transfer: from the one before: the parent cell of each cell, and its place in it.
+        domain: the refined domain.
+        transfer: from the domain that was refined: the parent cell of each cell, and its place in it.
     """
 
     domain: Domain
@@ -41,26 +39,31 @@ class Refinement:
 
 
 def uniform(domain: Domain) -> Refinement:
-    """Each cell cut into 2^d. Collective."""
+    """Refine every cell into 2^d. Collective."""
     return _refined(domain, None)
 
 
-def repeated(domain: Domain, times: int) -> Domain:
-    """Each cell cut into 2^d so often; each of the domains knows the one that it came from. Collective.
+def repeated(domain: Domain, times: int, thresholds: Thresholds = DEFAULT) -> Domain:
+    """Refine every cell several times; each domain knows the one that it came from as its coarser level. Collective.
+
+    Args:
+        domain: the body on the mesh to be refined.
+        times: how often every cell is cut into 2^d.
+        thresholds: memory of one unknown.
 
     Raises:
         InputError: on all ranks alike: memory cannot suffice.
     """
     d, vertices = domain.dimension, domain.mesh.topology.index_map(0).size_global
     if times:
-        check_affordable(domain.mesh.comm, d * vertices * 2 ** (d * times), "refinements")
+        check_affordable(domain.mesh.comm, d * vertices * 2 ** (d * times), "refinements", thresholds)
     for _ in range(times):
-        domain = _above(domain, uniform(domain))
+        domain = _with_coarser(domain, uniform(domain))
     return domain
 
 
-def _above(coarse: Domain, step: Refinement) -> Domain:
-    """The refined domain, which knows the one that it came from."""
+def _with_coarser(coarse: Domain, step: Refinement) -> Domain:
+    """The refined domain, with the one that it came from as its coarser level."""
 
     def coarsening() -> tuple[Domain, Transfer]:
         return coarse, step.transfer
@@ -68,24 +71,27 @@ def _above(coarse: Domain, step: Refinement) -> Domain:
     return replace(step.domain, coarsening=coarsening)
 
 
-def marked(domain: Domain, cells: Entities) -> Refinement:
-    """The long edges of the marked cells (local indices) bisected, and others as far as the mesh asks for it.
+def marked(domain: Domain, cells: Entities, thresholds: Thresholds = DEFAULT) -> Refinement:
+    """Bisect the long edges of the marked cells, and others as far as a conforming mesh needs it. Collective.
 
-    In the plane all three count as long. Collective.
+    Args:
+        domain: the body on the mesh to be refined.
+        cells: the marked cells, local indices.
+        thresholds: which edges count as long; in the plane all three.
     """
     topology = domain.mesh.topology
     topology.create_entities(1)
     topology.create_connectivity(domain.dimension, 1)
     lengths = _edge_lengths(domain.mesh, cells)
-    long = lengths >= _LONG[domain.dimension] * lengths.max(axis=1, keepdims=True)
+    long = lengths >= thresholds.bisected_edges[domain.dimension] * lengths.max(axis=1, keepdims=True)
     edges = topology.connectivity(domain.dimension, 1).array.reshape(-1, lengths.shape[1])[cells]
     return _refined(domain, np.unique(edges[long]).astype(np.int32))
 
 
 def _edge_lengths(mesh: dmesh.Mesh, cells: Entities) -> Array:
-    """Of the edges of cells in the order of their topology, shape (cells, 3 or 6)."""
+    """Lengths of the cells' edges, in the order of the topology, m, (cells, 3 or 6)."""
     ends = np.array(basix.topology(basix.CellType[mesh.topology.cell_name()])[1])
-    corners = _corners(mesh)[cells]
+    corners = cell_corners(mesh)[cells]
     return np.asarray(np.linalg.norm(corners[:, ends[:, 0]] - corners[:, ends[:, 1]], axis=2))
 
 
@@ -99,7 +105,7 @@ def _refined(domain: Domain, edges: Entities | None) -> Refinement:
 
 
 def _bisected(mesh: dmesh.Mesh, edges: Entities | None) -> tuple[dmesh.Mesh, Entities, Halves]:
-    """Plaza's rule, by which the first of equally long edges in dolfinx's own numbering, that of the ranks, would go.
+    """Bisect edges by Plaza's rule; which of equally long edges goes first must not depend on the ranks' numbering.
 
     Returns:
         The refined mesh, and ``parents`` and ``halves`` of a :class:`.ParentCellTransfer`.
@@ -109,20 +115,20 @@ def _bisected(mesh: dmesh.Mesh, edges: Entities | None) -> tuple[dmesh.Mesh, Ent
     fine, parents = compat.refine(mesh, edges)
     halves = _halves(mesh, fine, parents)
     mesh.geometry.x[:] = straight
-    fine.geometry.x[compat.geometry_dofmap(fine), :d] = 0.5 * halves @ _corners(mesh)[parents]
+    fine.geometry.x[compat.geometry_dofmap(fine), :d] = 0.5 * halves @ cell_corners(mesh)[parents]
     return fine, parents, halves
 
 
-def _corners(mesh: dmesh.Mesh) -> Array:
-    """Vertices of each local cell, shape (cells, d+1, d)."""
+def cell_corners(mesh: dmesh.Mesh) -> Array:
+    """Vertices of each local cell, m, (cells, d+1, d)."""
     return np.asarray(mesh.geometry.x[compat.geometry_dofmap(mesh)][:, :, : mesh.geometry.dim])
 
 
 def _halves(coarse: dmesh.Mesh, fine: dmesh.Mesh, parents: Entities) -> Halves:
-    """Twice the barycentric coordinates of the children's vertices. Before anything is bent they are whole numbers."""
-    corners = _corners(coarse)[parents]
+    """Twice the barycentric coordinates of the children's vertices: whole numbers, before curved sides are bent."""
+    corners = cell_corners(coarse)[parents]
     edges = corners[:, 1:] - corners[:, :1]
-    inner = np.linalg.solve(edges.transpose(0, 2, 1), (_corners(fine) - corners[:, :1]).transpose(0, 2, 1))
+    inner = np.linalg.solve(edges.transpose(0, 2, 1), (cell_corners(fine) - corners[:, :1]).transpose(0, 2, 1))
     inner = inner.transpose(0, 2, 1)
     both = np.concatenate([1.0 - inner.sum(axis=2, keepdims=True), inner], axis=2)
     return np.rint(2.0 * both).astype(np.int8)
@@ -142,12 +148,12 @@ def _sides(domain: Domain, fine: dmesh.Mesh, parents: Entities, halves: Halves) 
     coarse, own = cell_facets(domain.mesh), cell_facets(fine)
     # A child's facet i lies in its parent's facet j when none of its vertices (all but i) has a part in vertex j.
     cell, i, j = np.nonzero(halves.sum(axis=1, dtype=np.int8)[:, None, :] == halves)
-    above = coarse[parents[cell], j]
+    parent_facet = coarse[parents[cell], j]
     found = {}
     for name, facets in domain.sides.items():
         mask = np.zeros(coarse.max(initial=-1) + 1, dtype=bool)
         mask[facets] = True
-        found[name] = np.unique(own[cell, i][mask[above]]).astype(np.int32)
+        found[name] = np.unique(own[cell, i][mask[parent_facet]]).astype(np.int32)
     return found
 
 

@@ -1,29 +1,53 @@
-"""The numbers that tune how mesh hierarchies are made."""
+"""The numbers that tune how meshes, and mesh hierarchies, are made."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 
 @dataclass(frozen=True, kw_only=True)
 class Thresholds:
-    """When coarser meshes of a mesh file are made, and which of them are used.
+    """When coarser meshes are made, which of them are used, and what counts as rounding.
 
     Attributes:
-        hierarchy_from: unknowns from which coarser meshes pay; below, one factorisation takes less than gmsh.
-        coarsest: unknowns of the coarsest mesh, about.
+        bytes_per_unknown: memory that one unknown needs at least: its row of the matrix and its part of the mesh,
+            without any solver.
+        coarsest_block: cells each way of a block below which a coarser level does not help.
+        bisected_edges: length of the edges of a marked cell that are bisected, relative to its longest one, by
+            dimension. In space all six edges would make a step of 4 to 5 times the unknowns; the longest and, in a
+            sixth of a cube, the diagonals of its faces make it about 2.
+        hierarchy_from: unknowns of a mesh file from which coarser meshes pay; with fewer, one factorisation takes less
+            time than gmsh.
+        coarsest: unknowns of the coarsest mesh of a mesh file, about.
+        outline_corner: angle (radian) by which an outline turns at a vertex that is kept in any case.
+        outline_turn: angle (radian) by which an outline turns at most between two vertices that are kept: a coarse
+            chord must stay near its curve.
+        outline_parallel: angle (radian) between two edges up to which they run along each other.
         outline_area: part of a plane body's area by which that within the thinned outline may differ.
+        sampled_cells: cells, about, by which sizes, regions and ranks of a body in space are known.
         remeshed_size: part by which a remeshed body's volume, or the area of a side, may differ.
         gmsh_seconds: seconds that gmsh has in any case to remesh a body in space.
         gmsh_seconds_per_triangle: seconds more for each triangle of its surface; it takes some 1e-4.
+        barycentric_rounding: a barycentric weight that is rounding: the point lies on the facet opposite to that
+            vertex.
     """
 
+    bytes_per_unknown: float = 300.0
+    coarsest_block: int = 8
+    bisected_edges: Mapping[int, float] = field(default_factory=lambda: {2: 0.0, 3: 0.76})
     hierarchy_from: int = 20_000
     coarsest: int = 2_500
+    outline_corner: float = math.radians(20.0)
+    outline_turn: float = math.radians(30.0)
+    outline_parallel: float = 1e-9
     outline_area: float = 0.1
+    sampled_cells: int = 20_000
     remeshed_size: float = 0.25
     gmsh_seconds: float = 5.0
     gmsh_seconds_per_triangle: float = 1e-3
+    barycentric_rounding: float = 1e-9
 
 
 DEFAULT = Thresholds()

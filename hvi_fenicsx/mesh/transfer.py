@@ -1,4 +1,4 @@
-"""The transfer between two neighbouring levels of a mesh hierarchy: P1 prolongation.
+"""The transfer from a level of a mesh hierarchy to the next finer one: P1 prolongation.
 
 Where the meshes are nested, each vertex of the finer one is a vertex of the coarser one or the midpoint of an edge:
 between a mesh and its refinement, and between built-in blocks of which one has half the cells each way,
@@ -27,16 +27,16 @@ Rows = tuple[Numbers, Numbers, Array]
 
 
 class Transfer(ABC):
-    """How a mesh came from the next coarser one, and so how P1 fields get from that one to it."""
+    """The way from a coarser mesh to a finer one of the same body, and so of P1 fields on it."""
 
     @abstractmethod
     def rows(self, fine: fem.FunctionSpace, coarse: fem.FunctionSpace, points: tuple[Array, Array]) -> Rows:
-        """The rows of this rank's fine unknowns in the coarse ones' global numbers. Collective.
+        """The rows of this rank's fine unknowns, columns being the coarse unknowns' global numbers. Collective.
 
         Args:
             fine: P1 vectors on the finer mesh.
             coarse: P1 vectors on the coarser mesh.
-            points: vertices of both, m: the owned fine ones (n, 3), and all local coarse ones (m, 3).
+            points: the owned vertices of the finer mesh (n, 3) and all local ones of the coarser mesh (m, 3), m.
         """
 
     def prolongation(
@@ -47,7 +47,7 @@ class Transfer(ABC):
         Args:
             fine: P1 vectors on the finer mesh.
             coarse: P1 vectors on the coarser mesh.
-            points: the local vertices of both, m, (n, 3), where they are at hand.
+            points: the local vertices of the finer and of the coarser mesh, m, (n, 3), where they are at hand.
 
         Returns:
             Rows are the fine unknowns, columns the coarse ones.
@@ -75,7 +75,7 @@ class ParentCellTransfer(Transfer):
     halves: Halves
 
     def rows(self, fine: fem.FunctionSpace, coarse: fem.FunctionSpace, points: tuple[Array, Array]) -> Rows:
-        """The mean of the two parent vertices of each fine vertex. Local."""
+        """Each fine vertex is the mean of two vertices of its parent cell. Local."""
         return _mean_rows(self._parent_vertices(fine, coarse), fine.dofmap.index_map_bs)
 
     def _parent_vertices(self, fine: fem.FunctionSpace, coarse: fem.FunctionSpace) -> Numbers:
@@ -83,9 +83,9 @@ class ParentCellTransfer(Transfer):
         corners = self.halves.shape[1]
         halves = self.halves.reshape(-1, corners)
         ends = np.argmax(halves > 0, axis=1), corners - 1 - np.argmax(halves[:, ::-1] > 0, axis=1)
-        above = coarse.dofmap.list[self.parents].repeat(corners, axis=0)
-        row = np.arange(len(above))
-        found = np.column_stack([above[row, end] for end in ends]).astype(np.int32)
+        parent_dofs = coarse.dofmap.list[self.parents].repeat(corners, axis=0)
+        row = np.arange(len(parent_dofs))
+        found = np.column_stack([parent_dofs[row, end] for end in ends]).astype(np.int32)
         vertices, owned = fine.dofmap.list[: len(self.parents)].ravel(), fine.dofmap.index_map.size_local
         local = np.empty((owned, 2), dtype=np.int32)
         local[vertices[vertices < owned]] = found[vertices < owned]
@@ -106,7 +106,7 @@ class GridTransfer(Transfer):
     cells: Sequence[int]
 
     def rows(self, fine: fem.FunctionSpace, coarse: fem.FunctionSpace, points: tuple[Array, Array]) -> Rows:
-        """The mean of the two ends of the coarse edge that each fine vertex halves. Collective.
+        """Each fine vertex is the mean of the two ends of a coarse edge. Collective.
 
         Odd coordinates run along a coarse edge from its lower to its upper end: an axis, or the diagonal of a face or
         of a cell.
@@ -137,8 +137,8 @@ class InterpolationTransfer(Transfer):
     """Between meshes of the same body that are not nested."""
 
     def rows(self, fine: fem.FunctionSpace, coarse: fem.FunctionSpace, points: tuple[Array, Array]) -> Rows:
-        """The barycentric weights of each fine vertex in the coarse cell that holds it. Collective."""
-        corners, weights = point_location.between(points[0], coarse, points[1])
+        """Each fine vertex has barycentric weights in the coarse cell that holds it. Collective."""
+        corners, weights = point_location.interpolation_weights(points[0], coarse, points[1])
         d = fine.dofmap.index_map_bs
         order = np.argsort(corners, axis=1)
         columns = np.take_along_axis(corners, order, axis=1)[:, None, :] * d + np.arange(d)[None, :, None]
@@ -159,7 +159,7 @@ def _mean_rows(pairs: Numbers, d: int) -> Rows:
 
 
 def _split(start: Numbers, columns: Numbers, values: Array, coarse: fem.FunctionSpace) -> tuple[Rows, Rows]:
-    """Compressed rows as PETSc keeps them on several ranks: this rank's columns, counted from its first, and others."""
+    """Compressed rows as PETSc stores them on several ranks: this rank's columns, from its first on, and all others."""
     first, last = (end * coarse.dofmap.index_map_bs for end in coarse.dofmap.index_map.local_range)
     own = (columns >= first) & (columns < last)
     before = np.concatenate([[0], np.cumsum(own)])[start].astype(PETSc.IntType)
@@ -167,10 +167,12 @@ def _split(start: Numbers, columns: Numbers, values: Array, coarse: fem.Function
 
 
 def _sizes(space: fem.FunctionSpace) -> tuple[int, int]:
+    """Local and global number of unknowns."""
     d = space.dofmap.index_map_bs
     return space.dofmap.index_map.size_local * d, space.dofmap.index_map.size_global * d
 
 
 def _flat(place: Numbers, cells: Numbers) -> Numbers:
+    """Numbers of grid vertices by their integer coordinates (n, d), x running fastest."""
     strides = np.concatenate([[1], np.cumprod(cells[:-1] + 1)]).astype(PETSc.IntType)
     return sum((place[:, i] * step for i, step in enumerate(strides)), start=np.zeros(len(place), PETSc.IntType))

@@ -10,7 +10,7 @@ from ..typing import Array, Entities
 
 
 def dof_of_node(space: fem.FunctionSpace) -> Entities:
-    """The (block) dof at each geometry node of a P1 space on simplices."""
+    """The (block) dof at each geometry node of a P1 space on simplices, (nodes,)."""
     nodes, dofs = _by_cell(space)
     result = np.zeros(space.mesh.geometry.x.shape[0], dtype=np.int32)
     result[nodes] = dofs

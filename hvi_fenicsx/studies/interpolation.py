@@ -23,9 +23,11 @@ def body(source: SolutionFields, points: Array) -> sparse.csr_array:
     """From values at the source's vertices to those at the points (m, d): a matrix (m, n). On this process alone."""
     d = source.points.shape[1]
     mesh = compat.simplex_mesh(MPI.COMM_SELF, source.cells, source.points, {2: "triangle", 3: "tetrahedron"}[d])
-    found = mesh.topology.original_cell_index[point_location.cells(mesh, np.pad(points, ((0, 0), (0, 3 - d))))]
+    found = mesh.topology.original_cell_index[
+        point_location.containing_cells(mesh, np.pad(points, ((0, 0), (0, 3 - d))))
+    ]
     corners = source.cells[found]
-    return _rows(corners, point_location.weights(source.points[corners], points), len(source.points))
+    return _rows(corners, point_location.barycentric_weights(source.points[corners], points), len(source.points))
 
 
 def surface(source: PartFields, points: Array) -> sparse.csr_array:
@@ -36,14 +38,14 @@ def surface(source: PartFields, points: Array) -> sparse.csr_array:
     facets = np.concatenate(nearest) if nearest else np.empty(0, dtype=np.int64)
     return _rows(
         source.facets[facets],
-        point_location.inside(point_location.weights(corners[facets], points)),
+        point_location.clipped(point_location.barycentric_weights(corners[facets], points)),
         len(source.points),
     )
 
 
 def _nearest(corners: Array, points: Array) -> Integers:
     """The facet (of k, each of d corners) nearest to each point."""
-    weights = point_location.inside(point_location.weights(corners[None], points[:, None]))
+    weights = point_location.clipped(point_location.barycentric_weights(corners[None], points[:, None]))
     away = np.einsum("mkc,kcd->mkd", weights, corners) - points[:, None]
     return np.asarray(np.argmin(np.einsum("mkd,mkd->mk", away, away), axis=1))
 

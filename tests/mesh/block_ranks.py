@@ -15,8 +15,8 @@ from hvi_fenicsx.mesh.transfer import GridTransfer
 
 def main() -> None:
     """By rank: its cells, and of its vertices with values from another rank how many cells they lie from a cut."""
-    below = [n // 2 for n in CELLS]
-    fine, coarse = (fem.functionspace(blocks.mesh(COMM, SIZE, n), ("Lagrange", 1, (2,))) for n in (CELLS, below))
+    coarser = [n // 2 for n in CELLS]
+    fine, coarse = (fem.functionspace(blocks.mesh(COMM, SIZE, n), ("Lagrange", 1, (2,))) for n in (CELLS, coarser))
     columns = GridTransfer(SIZE, CELLS).prolongation(fine, coarse)
     indptr, found, _ = columns.getValuesCSR()
     first, last = columns.getOwnershipRangesColumn()[COMM.rank : COMM.rank + 2]
@@ -31,7 +31,7 @@ def main() -> None:
 def distances(points: np.ndarray) -> np.ndarray:
     """Of points from the sides of this rank's part that lie inside of the block, in cells."""
     place = points * CELLS / np.array(SIZE)
-    lower, upper = blocks.share(CELLS, COMM.size, COMM.rank)
+    lower, upper = blocks.part_of_rank(CELLS, COMM.size, COMM.rank)
     sides = [(axis, side) for end in (lower, upper) for axis, side in enumerate(end) if 0 < side < CELLS[axis]]
     return np.min([np.abs(place[:, axis] - side) for axis, side in sides], axis=0)
 

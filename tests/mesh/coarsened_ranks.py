@@ -1,4 +1,4 @@
-"""Prints what must not depend on the number of ranks: of meshes below a file's, and of a field taken up."""
+"""Prints what must not depend on the number of ranks: of meshes coarser than a file's, and of a prolonged field."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ def main() -> None:
     field = fem.Function(spaces[1])
     field.interpolate(lambda x: np.array([x[0] ** 2, np.sin(x[1])]))
     up = transfer.prolongation(*spaces) * field.x.petsc_vec
-    told = [coarse.mesh.topology.index_map(2).size_global, up.norm(), up.norm(PETSc.NormType.NORM_1)]
-    told += [measure(coarse, name) for name in sorted(coarse.sides)]
+    printed = [coarse.mesh.topology.index_map(2).size_global, up.norm(), up.norm(PETSc.NormType.NORM_1)]
+    printed += [measure(coarse, name) for name in sorted(coarse.sides)]
     if COMM.rank == 0:
-        print(*told)
+        print(*printed)
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Prints what must not depend on the number of ranks: of refined bodies and of a field taken up to them."""
+"""Prints what must not depend on the number of ranks: of refined bodies and of a field prolonged to them."""
 
 from __future__ import annotations
 

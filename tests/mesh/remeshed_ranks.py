@@ -1,4 +1,4 @@
-"""Prints by rank, of the mesh below a file's: its part of the cells, its way from the fine one's, errors, sizes."""
+"""Prints by rank, of a mesh coarser than a file's: its part of the cells, distance from the fine one's part, errors, sizes."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ def main() -> None:
     coarser = body.coarser()
     assert coarser is not None
     coarse = coarser[0]
-    centres = [coarsening_3d._corners(b.mesh).reshape(-1, 3).mean(axis=0) for b in (body, coarse)]
+    centres = [coarsening_3d.owned_corners(b.mesh).reshape(-1, 3).mean(axis=0) for b in (body, coarse)]
     cells = coarse.mesh.topology.index_map(3)
-    before, after = coarsening_3d._measures(body), coarsening_3d._measures(coarse)
-    told = (
+    before, after = coarsening_3d.measures(body), coarsening_3d.measures(coarse)
+    printed = (
         cells.size_local / cells.size_global,
         float(np.linalg.norm(centres[0] - centres[1])) / body.length,
         max(abs(after[name] / size - 1) for name, size in before.items()),
         cells.size_global,
         *after.values(),
     )
-    for line in COMM.gather(told) or []:
+    for line in COMM.gather(printed) or []:
         print(*line)
 
 

@@ -1,4 +1,4 @@
-"""Why: a block that is not the documented one, or not whole, would be solved all the same; a bad share of it too."""
+"""Why: a block that is not the documented one, or not whole, would be solved all the same; a bad partition of it too."""
 
 from __future__ import annotations
 
@@ -36,23 +36,23 @@ def simplices(mesh: dmesh.Mesh) -> set[frozenset[tuple[float, ...]]]:
 def test_each_cell_is_on_one_rank(cells: Sequence[int], ranks: int) -> None:
     count = np.zeros(cells, dtype=int)
     for rank in range(ranks):
-        count[tuple(itertools.starmap(slice, zip(*blocks.share(cells, ranks, rank), strict=True)))] += 1
+        count[tuple(itertools.starmap(slice, zip(*blocks.part_of_rank(cells, ranks, rank), strict=True)))] += 1
     assert np.all(count == 1)
 
 
 @pytest.mark.parametrize(("cells", "ranks"), itertools.product([[64, 64], [50, 70], [16, 16, 16]], [2, 3, 5, 8]))
-def test_ranks_have_as_many_cells_and_the_same_part_on_each_rung(cells: list[int], ranks: int) -> None:
-    """A cut is half a cell from where it belongs at most, and half a cell of the coarser rung is one of the finer."""
+def test_ranks_have_as_many_cells_and_the_same_part_on_each_level(cells: list[int], ranks: int) -> None:
+    """A cut is half a cell from where it belongs at most, and half a cell of the coarser level is one of the finer."""
     for rank in range(ranks):
-        part = np.array(blocks.share(cells, ranks, rank))
-        below = np.array(blocks.share([n // 2 for n in cells], ranks, rank))
-        assert np.max(np.abs(part - 2 * below)) <= 1
+        part = np.array(blocks.part_of_rank(cells, ranks, rank))
+        coarser = np.array(blocks.part_of_rank([n // 2 for n in cells], ranks, rank))
+        assert np.max(np.abs(part - 2 * coarser)) <= 1
         assert np.prod(part[1] - part[0]) * ranks == pytest.approx(np.prod(cells), rel=0.15)
 
 
 @pytest.mark.parametrize(("ranks", "cells", "away"), [(2, (16, 24), 1), (3, (24, 36), 1), (3, (16, 20), 2)])
-def test_values_between_rungs_cross_ranks_at_the_cuts_only(ranks: int, cells: tuple[int, int], away: int) -> None:
-    """A vertex next to a cut is the mean of one on it; where the rungs' cuts differ by a cell, so do the vertices."""
+def test_values_between_levels_cross_ranks_at_the_cuts_only(ranks: int, cells: tuple[int, int], away: int) -> None:
+    """A vertex next to a cut is the mean of one on it; where the levels' cuts differ by a cell, so do the vertices."""
     found = on_ranks(ranks, "tests/mesh/block_ranks.py", *cells)
     assert sum(own for own, _, _ in found) == 2 * cells[0] * cells[1]
     assert max(own for own, _, _ in found) <= 1.1 * 2 * cells[0] * cells[1] / ranks

@@ -48,7 +48,7 @@ def from_file(path: Path, body: str) -> Domain:
     return gmsh_file.read(COMM, meshes.make(path / "m.msh", body), 2)
 
 
-def below(body: Domain) -> Domain:
+def coarser_of(body: Domain) -> Domain:
     coarser = with_hierarchy(body, COARSER).coarser()
     assert coarser is not None
     return coarser[0]
@@ -62,7 +62,7 @@ def area(body: Domain, name: str) -> float:
 @pytest.mark.parametrize("name", POLYGONS)
 def test_a_polygon_keeps_its_sides_and_regions(name: str, tmp_path: Path) -> None:
     body = from_file(tmp_path, POLYGONS[name])
-    coarse = below(body)
+    coarse = coarser_of(body)
     assert volume(coarse) == pytest.approx(volume(body), rel=1e-12)
     assert {s: measure(coarse, s) for s in coarse.sides} == pytest.approx({s: measure(body, s) for s in body.sides})
     assert {r: area(coarse, r) for r in coarse.regions} == pytest.approx({r: area(body, r) for r in body.regions})
@@ -73,29 +73,29 @@ def test_a_polygon_keeps_its_sides_and_regions(name: str, tmp_path: Path) -> Non
 def test_what_is_round_stays_nearly_so(tmp_path: Path) -> None:
     """A hole and an inclusion keep their areas to what inscribed polygons lose."""
     body = from_file(tmp_path, meshes.HOLLOW)
-    coarse = below(body)
+    coarse = coarser_of(body)
     assert area(coarse, "inclusion") == pytest.approx(np.pi * 0.01, rel=0.06)
     assert area(coarse, "matrix") == pytest.approx(1 - 2 * np.pi * 0.01, rel=0.005)
     assert measure(coarse, "bottom") == pytest.approx(1.0, rel=1e-12)
 
 
-def test_known_curves_are_met_by_all_rungs() -> None:
-    body = below(HalfDisk(radius=0.5, mesh_size=0.02).build(COMM, 2))
+def test_known_curves_are_met_on_all_levels() -> None:
+    body = coarser_of(HalfDisk(radius=0.5, mesh_size=0.02).build(COMM, 2))
     x = body.mesh.geometry.x[np.unique(entities_to_geometry(body.mesh, 1, body.sides["arc"]))]
     assert np.hypot(x[:, 0], x[:, 1] - 0.5) == pytest.approx(0.5, rel=1e-12)
 
 
 def test_what_is_finer_stays_finer(tmp_path: Path) -> None:
     body = from_file(tmp_path, meshes.GRADED)
-    for rung in (body, below(body)):
-        lengths = rung.mesh.h(1, np.sort(rung.sides["bottom"]))
+    for level in (body, coarser_of(body)):
+        lengths = level.mesh.h(1, np.sort(level.sides["bottom"]))
         assert lengths.max() / lengths.min() > 10
 
 
 def test_a_notch_is_not_lost() -> None:
     strip = NotchedStrip(size=(1.0, 0.5), notch=(0.1, 0.2), mesh_size=0.02)
     body = strip.build(COMM, 2)
-    assert measure(below(body), "notch") == pytest.approx(measure(body, "notch"), rel=1e-12)
+    assert measure(coarser_of(body), "notch") == pytest.approx(measure(body, "notch"), rel=1e-12)
 
 
 @pytest.mark.parametrize("body", [meshes.HINGE.replace("0.5)", "0.03)")], ids=["touches itself"])
@@ -108,19 +108,19 @@ def test_outlines_that_cross_themselves_are_given_up() -> None:
     corners = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.4, -0.2], [0.0, 1.0]])
     ends = np.column_stack([np.arange(5), (np.arange(5) + 1) % 5])
     edges = HalfEdges(ends, corners[ends], np.zeros(5, dtype=np.int64), np.zeros(5, dtype=np.int64))
-    assert thinned_outline.traced(edges, 1.0, COARSER.outline_area) is None
+    assert thinned_outline.trace(edges, 1.0, COARSER) is None
 
 
 def test_a_coarse_mesh_of_another_area_is_given_up() -> None:
     body = HalfDisk(radius=0.5, mesh_size=0.02).build(COMM, 2)
-    assert coarsening_2d.coarse(body, 4.0, COARSER) is not None
-    assert coarsening_2d.coarse(body, 4.0, replace(COARSER, outline_area=1e-6)) is None
+    assert coarsening_2d.coarsen(body, 4.0, COARSER) is not None
+    assert coarsening_2d.coarsen(body, 4.0, replace(COARSER, outline_area=1e-6)) is None
 
 
 @pytest.mark.parametrize("name", POLYGONS)
 def test_linear_fields_are_prolonged_as_they_are(name: str, tmp_path: Path) -> None:
     body = from_file(tmp_path, POLYGONS[name])
-    fine, coarse = (fem.functionspace(b.mesh, ("Lagrange", 1, (2,))) for b in (body, below(body)))
+    fine, coarse = (fem.functionspace(b.mesh, ("Lagrange", 1, (2,))) for b in (body, coarser_of(body)))
     fields = [fem.Function(space) for space in (fine, coarse)]
     for field in fields:
         field.interpolate(lambda x: np.array([1 + 2 * x[0] - x[1], x[0] + 3 * x[1]]))
@@ -137,32 +137,32 @@ def test_a_start_from_another_mesh_ends_where_mumps_does(tmp_path: Path) -> None
     """Without friction the minimiser is unique."""
     convex = ["boundary.wall.displacement=[0.0, 0.0]", 'boundary.floor={on="bottom", contact={gap=0.0}}']
     thresholds = replace(NESTED, mesh=COARSER)
-    climbed = workflow.solve(scene(tmp_path, *convex), thresholds=thresholds)
+    nested = workflow.solve(scene(tmp_path, *convex), thresholds=thresholds)
     alone = scene(tmp_path, *convex, 'solver={linear_solver="lu"}')
     direct = workflow.finish(workflow.prepare(alone, domain=alone.domain.build(COMM, 2), thresholds=thresholds))
-    assert climbed.solve_result is not None
-    assert climbed.solve_result.levels > 1
-    assert climbed.converged
+    assert nested.solve_result is not None
+    assert nested.solve_result.levels > 1
+    assert nested.converged
     assert direct.solve_result is not None
     assert direct.solve_result.levels == 1
-    assert climbed.examination.energy == pytest.approx(direct.examination.energy, rel=1e-9)  # type: ignore[union-attr]
+    assert nested.examination.energy == pytest.approx(direct.examination.energy, rel=1e-9)  # type: ignore[union-attr]
 
 
-def test_built_in_blocks_keep_their_own_ladder() -> None:
+def test_built_in_blocks_keep_their_own_mesh_hierarchy() -> None:
     shape = read_scene(DEMOS / "strong_law.toml", ["domain.cells=[9, 63]"]).domain
     assert shape.build_hierarchy(COMM, 2, COARSER).coarser() is None
 
 
 def test_ranks_make_the_same_meshes_and_prolong_alike(tmp_path: Path) -> None:
     file = meshes.make(tmp_path / "m.msh", POLYGONS["halves"])
-    told = []
+    printed = []
     for ranks in (1, 2, 3):
         command = ["mpirun", "--oversubscribe", "-n", str(ranks), sys.executable, "coarsened_ranks.py", str(file)]
         run = subprocess.run(command, cwd=HERE, capture_output=True, text=True, timeout=120)
         assert run.returncode == 0, run.stderr
-        told.append([float(word) for word in run.stdout.split()])
-    assert told[1] == pytest.approx(told[0], rel=1e-10)
-    assert told[2] == pytest.approx(told[0], rel=1e-10)
+        printed.append([float(word) for word in run.stdout.split()])
+    assert printed[1] == pytest.approx(printed[0], rel=1e-10)
+    assert printed[2] == pytest.approx(printed[0], rel=1e-10)
 
 
 def test_coarse_bodies_slide_along_a_curved_part_as_the_fine_one_does() -> None:

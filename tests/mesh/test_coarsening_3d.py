@@ -50,7 +50,7 @@ def bored(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return meshes.make(tmp_path_factory.mktemp("bored") / "m.msh", meshes.BORED.format(radius=0.2, size=0.09))
 
 
-def below(file: Path) -> tuple[Domain, Domain]:
+def with_coarser(file: Path) -> tuple[Domain, Domain]:
     body = gmsh_file.read(COMM, file, 3)
     coarser = with_hierarchy(body, COARSER).coarser()
     assert coarser is not None
@@ -58,8 +58,8 @@ def below(file: Path) -> tuple[Domain, Domain]:
 
 
 def test_a_bored_block_keeps_its_sides_and_regions(bored: Path) -> None:
-    body, coarse = below(bored)
-    fine, found = coarsening_3d._measures(body), coarsening_3d._measures(coarse)
+    body, coarse = with_coarser(bored)
+    fine, found = coarsening_3d.measures(body), coarsening_3d.measures(coarse)
     assert found == pytest.approx(fine, rel=0.1)
     flat = {name: size for name, size in fine.items() if name[1] in ("left", "right", "bottom", "top")}
     assert {name: found[name] for name in flat} == pytest.approx(flat, rel=1e-9)
@@ -67,20 +67,20 @@ def test_a_bored_block_keeps_its_sides_and_regions(bored: Path) -> None:
 
 
 def test_a_linear_field_is_prolonged_exactly(tmp_path: Path) -> None:
-    body, coarse = below(meshes.make(tmp_path / "m.msh", meshes.BORED.format(radius=0, size=0.12)))
+    body, coarse = with_coarser(meshes.make(tmp_path / "m.msh", meshes.BORED.format(radius=0, size=0.12)))
     fine, under = space_on(body.mesh), space_on(coarse.mesh)
     assert lost(InterpolationTransfer().prolongation(fine, under), fine, under, linear=True) < 1e-10
 
 
 def test_what_is_solved_does_not_change(bored: Path) -> None:
-    nested = workflow.Thresholds(mesh=COARSER, solvers=SolverThresholds(nested_from=500))
+    thresholds = workflow.Thresholds(mesh=COARSER, solvers=SolverThresholds(nested_from=500))
     scene = Scene.model_validate(LIFTED | {"domain": {"shape": "file", "file": str(bored)}})
-    climbed = workflow.solve(scene, thresholds=nested)
-    alone = workflow.solve(scene, thresholds=replace(nested, mesh=replace(COARSER, hierarchy_from=10**9)))
-    assert [s.solve_result.levels for s in (climbed, alone)] == [2, 1]  # type: ignore[union-attr]
-    assert climbed.converged
+    nested = workflow.solve(scene, thresholds=thresholds)
+    alone = workflow.solve(scene, thresholds=replace(thresholds, mesh=replace(COARSER, hierarchy_from=10**9)))
+    assert [s.solve_result.levels for s in (nested, alone)] == [2, 1]  # type: ignore[union-attr]
+    assert nested.converged
     assert alone.converged
-    assert climbed.examination.energy == pytest.approx(alone.examination.energy, rel=1e-9)  # type: ignore[union-attr]
+    assert nested.examination.energy == pytest.approx(alone.examination.energy, rel=1e-9)  # type: ignore[union-attr]
 
 
 @pytest.mark.parametrize("body", [meshes.BLOCKS.format(size=0.1, dimension=3, named=True)])
@@ -102,11 +102,11 @@ def test_the_coarse_mesh_is_the_same_on_several_ranks_shared_like_the_fine_one(r
     command = ["mpirun", "--oversubscribe", "-n", str(ranks), sys.executable, "remeshed_ranks.py", str(bored)]
     run = subprocess.run(command, cwd=HERE, capture_output=True, text=True, timeout=120)
     assert run.returncode == 0, run.stderr
-    told = np.array([[float(word) for word in line.split()] for line in run.stdout.splitlines()])
-    assert len(told) == ranks
-    assert np.all(told[:, 0] > 0.5 / ranks), "of the coarse cells"
-    assert np.all(told[:, 1] < 0.2), "distance of the parts' centres over the body"
-    assert np.all(told[:, 2] < 0.1), "of a side's area"
-    coarse = below(bored)[1]
-    alone = [coarse.mesh.topology.index_map(3).size_global, *coarsening_3d._measures(coarse).values()]
-    np.testing.assert_allclose(told[:, 3:], [alone] * ranks, rtol=1e-12)
+    printed = np.array([[float(word) for word in line.split()] for line in run.stdout.splitlines()])
+    assert len(printed) == ranks
+    assert np.all(printed[:, 0] > 0.5 / ranks), "of the coarse cells"
+    assert np.all(printed[:, 1] < 0.2), "distance of the parts' centres over the body"
+    assert np.all(printed[:, 2] < 0.1), "of a side's area"
+    coarse = with_coarser(bored)[1]
+    alone = [coarse.mesh.topology.index_map(3).size_global, *coarsening_3d.measures(coarse).values()]
+    np.testing.assert_allclose(printed[:, 3:], [alone] * ranks, rtol=1e-12)

@@ -126,7 +126,7 @@ def test_prolongation_from_parent_cells(make: Callable[[], Domain]) -> None:
 
 def smallest_angle(body: Domain) -> float:
     """Of all cells (2D) or of their faces (3D), degrees."""
-    corners = refinement._corners(body.mesh)
+    corners = refinement.cell_corners(body.mesh)
     worst = np.inf
     count = corners.shape[1]
     for i in range(count):
@@ -171,17 +171,17 @@ def slanted(cells: float) -> Scene:
 
 def test_prolongation_turns_with_the_frames() -> None:
     scene = slanted(0.15)
-    below = assembled(scene, scene.domain.build(COMM, 2))
-    step = refinement.uniform(below.problem.domain)
-    above = assembled(scene, step.domain)
-    assert below.rotation is not None
-    plain = step.transfer.prolongation(above.problem.space, below.problem.space)
-    turned = levels.prolongation(above, below, step.transfer)
-    known = fem.Function(below.problem.space)
+    coarse = assembled(scene, scene.domain.build(COMM, 2))
+    step = refinement.uniform(coarse.problem.domain)
+    fine = assembled(scene, step.domain)
+    assert coarse.rotation is not None
+    plain = step.transfer.prolongation(fine.problem.space, coarse.problem.space)
+    turned = levels.prolongation(fine, coarse, step.transfer)
+    known = fem.Function(coarse.problem.space)
     known.interpolate(lambda x: rough(x)[:2])
     cartesian = plain.createVecRight()
     cartesian.array[:] = known.x.array
-    found = above.displacement(turned * below.unknowns(known))
+    found = fine.displacement(turned * coarse.unknowns(known))
     assert np.max(np.abs(found.x.array - (plain * cartesian).array)) < 1e-14
 
 

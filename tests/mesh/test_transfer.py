@@ -161,8 +161,8 @@ def applied(preconditioner: linear.HeldPreconditioner, held: np.ndarray, right: 
 
 
 @pytest.mark.parametrize(("demo", "steady"), [("strong_law", True), ("lift_off", False)])
-def test_only_what_stood_on_every_rung_is_solved_in_one_step(demo: str, steady: bool) -> None:
-    """The floor stays closed and its pieces stand, or the end of contact and the drop move from rung to rung."""
+def test_only_what_stood_on_every_level_is_solved_in_one_step(demo: str, steady: bool) -> None:
+    """The floor stays closed and its pieces stand, or the end of contact and the drop move from level to level."""
     found = workflow.solve(read_scene(DEMOS / f"{demo}.toml", ["domain.cells=[128, 128]"]), thresholds=NESTED)
     assert found.converged
     assert found.solve_result is not None
@@ -170,8 +170,8 @@ def test_only_what_stood_on_every_rung_is_solved_in_one_step(demo: str, steady: 
 
 
 @pytest.mark.parametrize("body", [meshes.GOOD, meshes.SLANTED], ids=["straight", "slanted"])
-def test_a_refined_file_goes_up_the_ladder_of_its_meshes(body: str, tmp_path: Path) -> None:
-    """Without friction the minimiser is unique: that of the finest mesh alone, which knows of no ladder, by MUMPS."""
+def test_a_refined_file_is_solved_from_level_to_level(body: str, tmp_path: Path) -> None:
+    """Without friction the minimiser is unique: that of the finest mesh alone, without a mesh hierarchy, by MUMPS."""
     file = meshes.make(tmp_path / "m.msh", body)
     convex = ["boundary.wall.displacement=[0.0, 0.0]", 'boundary.floor={on="bottom", contact={gap=0.0}}']
     scene, alone = (
