@@ -1,4 +1,4 @@
-"""Prints by rank, of a mesh coarser than a file's: its part of the cells, distance from the fine one's part, errors, sizes."""
+"""Prints by rank, of a mesh coarser than a file's: part of the cells, distance from the fine part, errors, sizes."""
 
 from __future__ import annotations
 

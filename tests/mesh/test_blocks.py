@@ -1,4 +1,4 @@
-"""Why: a block that is not the documented one, or not whole, would be solved all the same; a bad partition of it too."""
+"""Why: a block that is not the documented one, or not whole, would be solved all the same; and a bad partition."""
 
 from __future__ import annotations
 
