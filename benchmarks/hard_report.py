@@ -116,12 +116,13 @@ def _without(results: Results) -> str:
     decided = {key: number for key, number in results.enumerated.items() if number is not None}
     confirmed = sum(not number for number in decided.values())
     rows = [[f"`{k}`", *_size(results.cases[k]), str(n)] for k, n in decided.items()]
-    words = f"""## No equilibrium found
+    words = f"""## Cases without an equilibrium
 
-Of {len(ended - results.found)} metastable or borderline cases no method found an equilibrium. Where the laws' tractions
-are piecewise linear (unsmoothed laws and the quadratic smoothing) and the floor is short, all states of the floor's
-vertices are gone through by branch and bound (`benchmarks/hard_enumeration.py`): {len(results.enumerated)} cases, of
-which {len(decided)} are decided within its number of linear programmes. {confirmed} of these have no equilibrium."""
+In {len(ended - results.found)} metastable or borderline cases no method found an equilibrium. Is there none?
+`benchmarks/hard_enumeration.py` tries all states of the floor's vertices by branch and bound. It can do so where the
+tractions are piecewise linear (unsmoothed laws and the quadratic smoothing) and the floor is short: here in
+{len(results.enumerated)} cases. In {len(decided)} of them it ended within its limit of linear programmes.
+{confirmed} of these have no equilibrium."""
     return f"{words}\n\n{_markdown(['case', 'law', 'cells', 'equilibria there are'], rows)}" if rows else words
 
 
@@ -130,22 +131,29 @@ def _size(case: Case) -> list[str]:
 
 
 def _head(table: Table, listed: Sequence[Case]) -> str:
-    return f"""# Hard cases
+    return f"""# Hard cases: which method solves what?
 
-{len(listed)} combinations of everything that makes such a problem hard, each solved with each method and judged by the
-certificate alone. The axes and their values are in `benchmarks/hard_cases.toml`, committed before anything was run (its
-`later` values before anything was run with them); the list of cases follows from it (`{COMMAND} list`): every
-value of an axis beside an otherwise plain case, every pair of
-values of two axes, every triple of {" and of ".join(", ".join(t) for t in table.data["triples"])}, and a few corners.
+This page reports {len(listed)} difficult problems, solved with several methods. Only the certificate decides whether
+a problem is solved. The problems combine everything that makes such a problem difficult: support, law, strength,
+distance from the limit load, mesh, units, start and more. `benchmarks/hard_cases.toml` has these axes and their values.
+They were committed before anything was run (the `later` values before anything was run with them). The list of cases
+follows from the axes (`{COMMAND} list`): it has
+
+- every value of an axis, in an otherwise plain case;
+- every pair of values of two axes;
+- every triple of values of these axes: {"; ".join(", ".join(t) for t in table.data["triples"])};
+- a few combinations of many extreme values.
+
+The commands are
 
     {COMMAND} run       # hours for all methods; `--method auto` is minutes; resumes where it stopped
     {COMMAND} report    # writes this document and its picture
 
-A case counts as solved when its displacement is certified within {table.data["tolerance"]:g}, when it is proved that no
-solution exists (state *escapes*), or when, the state being metastable or borderline, no equilibrium was found by any
-method. The time of one case and method is processor time.
+A case counts as solved in three situations: its displacement is certified within
+{table.data["tolerance"]:g}; or it is proved that no solution exists (state *escapes*); or its state is metastable or
+borderline, and no method found an equilibrium. The time of one case and method is processor time.
 
-![Share of the cases that a method is asked which it solves, by value of each axis](hard-cases.png)"""
+![Share of the cases solved by each method, for each value of each axis](hard-cases.png)"""
 
 
 def _counts(results: Results) -> str:
@@ -161,14 +169,24 @@ def _counts(results: Results) -> str:
     ]
     words += ["held: certified", "no equilibrium found", "missed", "failed"]
     quick = [f"`{m}` {_quick(results, m)}" for m in results.methods]
-    return f"""## Solved
+    return f"""## How many cases does each method solve?
 
 {_markdown(words, (_count(results, m) for m in results.methods))}
 
-There are {len(results.cases)} cases. That no solution exists is told before any method is asked. Refused: `tao` and
-`ssls` take no law with a kink (the paper's smoothing keeps one at zero slip), `condensed` runs in one process; `branch`
-was run on the unsmoothed laws, for which it is. Held: an equilibrium exists. Missed: no equilibrium found, but another
-method or the enumeration found one. Solved within {QUICK:g} s: {", ".join(quick)}."""
+There are {len(results.cases)} cases. The columns mean:
+
+- *no solution exists*: the existence analysis proves it before any method is asked; not counted under
+  *asked* and *solved*;
+- *refused*: `tao` and `ssls` take no law with a kink (the paper's smoothing keeps one at zero slip); `condensed` runs
+  in one process only;
+- *asked*: the cases run, without these two;
+- *held: certified*: of the cases in which the body is held, so that an equilibrium exists, those that are certified;
+- *no equilibrium found*: the state is metastable or borderline, and no method or enumeration found an equilibrium;
+- *missed*: the method found no equilibrium, but another method or the enumeration did;
+- *failed*: all other cases.
+
+`branch` was run on the unsmoothed laws only, because it is made for them.
+Solved within {QUICK:g} s: {", ".join(quick)}."""
 
 
 def _count(results: Results, method: str) -> list[str]:
@@ -199,7 +217,7 @@ def _iterations(results: Results) -> str:
     for method in results.methods:
         ended = [r for r in results.of[method].values() if r["outcome"] == "certified"]
         rows.append([f"`{method}`", *(_spread([r[e] for r in ended if e in r]) for e in entries)])
-    text = "## Iterations of the certified ones: median, maximum\n\n"
+    text = "## How many iterations do the certified cases take? Median, maximum\n\n"
     return text + _markdown(["method", *entries.values()], rows)
 
 
@@ -209,11 +227,11 @@ def _spread(values: Sequence[float]) -> str:
 
 def _open(results: Results, method: str) -> str:
     """What is left, counted by reason; for ``auto`` case by case too."""
-    found = results.unsolved(method)
+    found, head = results.unsolved(method), f"## Cases that `{method}` does not solve, by reason"
     if not found:
-        return f"## Unsolved by `{method}`\n\nNone."
+        return f"{head}\n\nNone."
     reasons = Counter(_reason(r) for r in found).most_common()
-    summary = f"## Unsolved by `{method}`\n\n" + "\n".join(f"- {number} × {reason}" for reason, number in reasons)
+    summary = f"{head}\n\n" + "\n".join(f"- {number} × {reason}" for reason, number in reasons)
     if method != "auto":
         return summary
     rows = [_row(results.cases[r["key"]], r, results) for r in found]
