@@ -1,7 +1,8 @@
-"""Whether the elements of a gmsh file make a mesh at all: dolfinx takes that for granted, and else crashes or hangs."""
+"""Whether a gmsh file makes a mesh at all: dolfinx takes that for granted, and else crashes or hangs."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from itertools import combinations
 from pathlib import Path
 from typing import Any
@@ -11,13 +12,79 @@ import numpy as np
 from ..errors import InputError
 from ..typing import Integers
 
+_SIMPLEX = {2: 2, 3: 4}
+"""Gmsh's element type of the linear simplex, by dimension."""
 
-def check(gmsh: Any, path: Path, dimension: int) -> None:
-    """Refuse lost nodes, elements listed twice, facets of more than two cells, sides off every cell. On gmsh's rank.
+
+@dataclass(frozen=True, kw_only=True)
+class Thresholds:
+    """What makes the mesh of a file unusable.
+
+    Attributes:
+        flat: ratio of a cell's inscribed to its circumscribed sphere (1 for an equilateral one), below which it has no
+            volume.
+        largest: coordinate, in the file's unit.
+        out_of_plane: height of a plane mesh, over its width.
+    """
+
+    flat: float = 1e-9
+    largest: float = 1e12
+    out_of_plane: float = 1e-12
+
+
+DEFAULT = Thresholds()
+
+
+def check(gmsh: Any, path: Path, dimension: int, thresholds: Thresholds = DEFAULT) -> None:
+    """Refuse a mesh that dolfinx cannot take. Rank 0 only.
+
+    Args:
+        gmsh: the module, the file being open in it.
+        path: of the file, for messages.
+        dimension: of the cells, 2 or 3.
+        thresholds: what makes a mesh unusable.
 
     Raises:
-        InputError: with the node tags of the first fault.
+        InputError: with the node or element tags of the first fault.
     """
+    _check_cells(gmsh, path, dimension)
+    _check_points(gmsh, path, dimension, thresholds)
+    _check_quality(gmsh, path, dimension, thresholds)
+    _check_connections(gmsh, path, dimension)
+
+
+def _check_cells(gmsh: Any, path: Path, dimension: int) -> None:
+    """Refuse cells of another dimension, or that are no linear simplices."""
+    if gmsh.model.getDimension() != dimension:
+        found = gmsh.model.getDimension()
+        raise InputError(f"mesh file {path}: its cells have dimension {found}, the material's model wants {dimension}")
+    if list(gmsh.model.mesh.getElements(dimension)[0]) != [_SIMPLEX[dimension]]:
+        shape = "triangles" if dimension == 2 else "tetrahedra"
+        raise InputError(f"mesh file {path}: linear {shape} only; remesh with order 1 and without recombination")
+
+
+def _check_points(gmsh: Any, path: Path, dimension: int, thresholds: Thresholds) -> None:
+    """Refuse coordinates that are not finite, too large, or not in the plane."""
+    points = np.asarray(gmsh.model.mesh.getNodes()[1]).reshape(-1, 3)
+    if not np.all(np.isfinite(points)):
+        raise InputError(f"mesh file {path}: a node's coordinates are not finite numbers")
+    if np.max(np.abs(points)) > thresholds.largest:
+        largest = thresholds.largest
+        raise InputError(f"mesh file {path}: a node's coordinate is beyond ±{largest:g}; remesh near the origin")
+    if dimension == 2 and np.ptp(points[:, 2]) > thresholds.out_of_plane * np.ptp(points[:, :2]):
+        raise InputError(f"mesh file {path}: a 2D mesh must lie in a plane z = constant")
+
+
+def _check_quality(gmsh: Any, path: Path, dimension: int, thresholds: Thresholds) -> None:
+    """Refuse cells without volume."""
+    tags = gmsh.model.mesh.getElements(dimension)[1][0]
+    quality = np.abs(gmsh.model.mesh.getElementQualities(tags, "gamma"))
+    if not np.all(quality > thresholds.flat):
+        raise InputError(f"mesh file {path}: cell {tags[int(np.argmin(quality))]} has no volume; remesh")
+
+
+def _check_connections(gmsh: Any, path: Path, dimension: int) -> None:
+    """Refuse lost nodes, elements listed twice, facets of more than two cells, sides that lie on no cell."""
     known = gmsh.model.mesh.getNodes()[0]
     cells, sides = (_elements(gmsh, d) for d in (dimension, dimension - 1))
     facets = np.concatenate([cells[:, list(c)] for c in combinations(range(dimension + 1), dimension)])

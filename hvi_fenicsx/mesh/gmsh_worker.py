@@ -2,25 +2,38 @@
 
 IN holds ``points`` (n, 3), ``triangles`` (t, 3), counterclockwise as seen from outside, ``places`` (k, 3) and the
 ``sizes`` (k,) of cells wanted near them; OUT will hold ``points`` and ``cells`` (c, 4). It is a process of its own:
-gmsh may take any time for a surface that it cannot parametrise, or end with it.
+for a surface that it cannot parametrise gmsh may take any time, or end its process.
 """
 
 from __future__ import annotations
 
 import math
 import sys
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from ..typing import Array, Integers
 
-_CORNER = math.radians(40.0)
-"""By which a surface turns at an edge that is kept."""
 _TETRAHEDRON, _TRIANGLE = 4, 2
 """Gmsh's element types."""
-_UNIFORM = 1.5
-"""Ratio of the sizes below which one is enough."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Thresholds:
+    """What of a surface is kept, and when one size of cells is enough.
+
+    Attributes:
+        corner: angle by which a surface turns at an edge that is kept.
+        uniform: ratio of the sizes below which one size is enough.
+    """
+
+    corner: float = math.radians(40.0)
+    uniform: float = 1.5
+
+
+DEFAULT = Thresholds()
 
 
 def main() -> None:
@@ -30,31 +43,31 @@ def main() -> None:
     given = np.load(sys.argv[1])
     gmsh.initialize(["-noenv"], readConfigFiles=False, interruptible=False)
     gmsh.option.setNumber("General.Terminal", 0)
-    _surface(gmsh, given["points"], given["triangles"])
-    _wish(gmsh, given["places"], given["sizes"])
+    _add_volume(gmsh, given["points"], given["triangles"], DEFAULT)
+    _set_sizes(gmsh, given["places"], given["sizes"], DEFAULT)
     gmsh.model.mesh.generate(3)
-    points, cells = _made(gmsh)
+    points, cells = _volume_mesh(gmsh)
     np.savez(sys.argv[2], points=points, cells=cells)
 
 
-def _surface(gmsh: Any, points: Array, triangles: Integers) -> None:
-    """Patches of the surface, parted at its edges, and the volume within."""
+def _add_volume(gmsh: Any, points: Array, triangles: Integers, thresholds: Thresholds) -> None:
+    """Give gmsh the patches of the surface, parted at its edges, and the volume within."""
     mesh = gmsh.model.mesh
     gmsh.model.addDiscreteEntity(2, 1)
     mesh.addNodes(2, 1, np.arange(1, len(points) + 1), points.ravel())
     mesh.addElementsByType(1, _TRIANGLE, [], (triangles + 1).ravel())
-    mesh.classifySurfaces(_CORNER, True, True, math.pi)
+    mesh.classifySurfaces(thresholds.corner, True, True, math.pi)
     mesh.createGeometry()
     loop = gmsh.model.geo.addSurfaceLoop([tag for _, tag in gmsh.model.getEntities(2)])
     gmsh.model.geo.addVolume([loop])
     gmsh.model.geo.synchronize()
 
 
-def _wish(gmsh: Any, places: Array, sizes: Array) -> None:
+def _set_sizes(gmsh: Any, places: Array, sizes: Array, thresholds: Thresholds) -> None:
     """Ask for cells of these sizes, everywhere that of the nearest place."""
     for option in ("ExtendFromBoundary", "FromPoints", "FromCurvature"):
         gmsh.option.setNumber(f"Mesh.MeshSize{option}", 0)
-    if np.ptp(sizes) < (_UNIFORM - 1.0) * np.min(sizes):
+    if np.ptp(sizes) < (thresholds.uniform - 1.0) * np.min(sizes):
         gmsh.option.setNumber("Mesh.MeshSizeMax", float(np.median(sizes)))
         gmsh.option.setNumber("Mesh.MeshSizeMin", float(np.median(sizes)))
         return
@@ -64,7 +77,7 @@ def _wish(gmsh: Any, places: Array, sizes: Array) -> None:
     gmsh.model.mesh.setSizeCallback(lambda dim, tag, x, y, z, size: float(sizes[tree.query((x, y, z))[1]]))
 
 
-def _made(gmsh: Any) -> tuple[Array, Integers]:
+def _volume_mesh(gmsh: Any) -> tuple[Array, Integers]:
     """Vertices (n, 3) and cells (c, 4) of the volume."""
     tags, flat, _ = gmsh.model.mesh.getNodes()
     corners = gmsh.model.mesh.getElementsByType(_TETRAHEDRON)[1].astype(np.int64)
