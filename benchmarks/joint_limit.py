@@ -20,7 +20,8 @@ from mpi4py import MPI
 from hvi_fenicsx import read_scene, solve
 from hvi_fenicsx.results.gathering import solution_arrays
 from hvi_fenicsx.scene import Scene
-from hvi_fenicsx.studies.errors import Yardstick
+from hvi_fenicsx.studies.error_norms import errors
+from hvi_fenicsx.studies.reference_solution import ReferenceSolution
 from hvi_fenicsx.studies.solution_fields import fields
 from hvi_fenicsx.studies.stiffness import stiffness
 
@@ -64,18 +65,18 @@ def scene(name: str, cells: int, epsilon: float = 0.0) -> Scene:
     return read_scene(DEMOS / f"{name}.toml", [f"domain.cells=[{cells}, {cells}]", f"solver={width}"])
 
 
-def yardstick(name: str, cells: int) -> Yardstick:
+def reference_of(name: str, cells: int) -> ReferenceSolution:
     """The exact law on a fine mesh."""
     solution = solve(scene(name, cells), MPI.COMM_SELF)
     found, matrix = solution_arrays(solution), stiffness(solution)
     if not solution.converged or found is None or matrix is None:
         raise SystemExit(f"{name}: the reference has no certified solution: {solution.reason}")
-    return Yardstick(fields(found), matrix)
+    return ReferenceSolution(fields(found), matrix)
 
 
 def lines(name: str, finest: int) -> Iterator[Line]:
     """The couplings, with c such that all begin at ε = 1 on the coarsest mesh."""
-    reference = yardstick(name, 4 * finest)
+    reference = reference_of(name, 4 * finest)
     meshes = [n for n in (2**k for k in range(2, 12)) if COARSEST <= n <= finest]
     for coupling, law in COUPLINGS.items():
         points = []
@@ -83,7 +84,7 @@ def lines(name: str, finest: int) -> Iterator[Line]:
             epsilon = law(1 / n) / (law(1 / COARSEST) or 1.0)
             solution = solve(scene(name, n, epsilon), MPI.COMM_SELF)
             found = solution_arrays(solution) if solution.converged else None
-            points.append((1 / n, epsilon, reference.errors(reference.move(fields(found))) if found else None))
+            points.append((1 / n, epsilon, errors(reference, reference.transfer(fields(found))) if found else None))
         yield Line(coupling, tuple(points))
 
 

@@ -244,7 +244,7 @@ def _study(options: argparse.Namespace, words: Sequence[str]) -> int:
             return ExitCode.CERTIFIED
         _become_single_process(options.np or _ranks_of_mpirun(), words)
     with _interrupts_held():
-        from .studies import study
+        from .studies import run as study
 
     return study.run(options)
 

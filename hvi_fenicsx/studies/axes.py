@@ -1,75 +1,254 @@
-"""The axes of a study's pictures: errors in per cent, times, mesh widths, all logarithmic."""
+"""The axes that a study can vary. To add one, subclass :class:`Axis` here: it is known by its name at once."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+from typing import ClassVar
 
-from matplotlib.axes import Axes
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+from ..errors import InputError
+from ..laws import smoothing
+from ..scene import Scene
+from ..schema import unknown
+from ..solvers import registry
+from . import meshes
+from .scene_tables import WIDTHS, Tables, smooths, unsmoothed, with_solver, without
+from .setting import Setting
 
-from ..report.pictures.style import GREY
-from .sentences import NAMES, ROUNDING, seconds
-
-LEAST = 1e-6
-"""A smaller error is drawn on it."""
-_BOTTOM = 1e-7
-"""No axis of errors goes below it."""
-_LINE = 0.17
-"""Inches that a name takes in height: of points or lines closer than this only one is named."""
-
-
-def error_axis(axes: Axes, quantity: str, own: float | None, shown: Sequence[float], note: str = "") -> None:
-    """The y axis: errors of a quantity, logarithmic, in per cent; the reference's own is a grey band from below."""
-    axes.set_yscale("log")
-    low, high = span([max(e, LEAST) for e in shown])
-    low = min(low, own / 2 if own and own > low / 30 else low) / 1.5
-    low, high = max(_BOTTOM, 10.0 ** math.floor(math.log10(low))), 10.0 ** math.ceil(math.log10(high * 1.5))
-    axes.set_ylim(low, high)
-    if own is not None and own > low:
-        axes.axhspan(low, own, color=GREY, alpha=0.16, lw=0, zorder=0)
-        axes.text(0.995, low * 1.05, "the reference's own error ", transform=axes.get_yaxis_transform(), ha="right",
-                  va="bottom", size=10, color=GREY)  # fmt: skip
-    axes.tick_params(axis="y", which="minor", length=0)
-    axes.yaxis.set_major_locator(LogLocator(numticks=6))
-    axes.yaxis.set_major_formatter(FuncFormatter(lambda y, _: f"{100 * y:.8f}".rstrip("0").rstrip(".") + " %"))
-    axes.yaxis.set_minor_formatter(NullFormatter())
-    axes.grid(which="major", color="#e6e6e6", lw=0.8)
-    axes.set_axisbelow(True)
-    axes.set_title(f"error in {_name(quantity)}", loc="left", size=13)
-    axes.set_title(note, loc="right", size=11.5, color=GREY)
+EXACT = "exact"
+"""The width of a smoothing that is none."""
 
 
-def _name(quantity: str) -> str:
-    return NAMES[quantity].replace("_t", "ₜ").replace("_n", "ₙ")
+class Axis:
+    """One quantity that a study can vary.
+
+    Attributes:
+        name: in ``--axis NAME=VALUE,...``; where it is a key of the solver table, nothing else may be needed.
+        needs_law: whether the scene must have a law that can be smoothed.
+        excludes: the axes that cannot be given beside it.
+        combined: whether its values are combined with those of the other axes; else :meth:`setting` is asked.
+    """
+
+    registry: ClassVar[dict[str, Axis]] = {}
+    """All axes by name, in the order in which they are applied."""
+
+    name: ClassVar[str]
+    needs_law: ClassVar[bool] = False
+    excludes: ClassVar[tuple[str, ...]] = ()
+    combined: ClassVar[bool] = True
+
+    def __init_subclass__(cls) -> None:
+        if "name" in vars(cls):
+            Axis.registry[cls.name] = cls()
+
+    def check(self, value: str) -> None:
+        """Refuse a value that the axis does not have.
+
+        Raises:
+            InputError: with what is allowed.
+        """
+
+    def apply(self, tables: Tables, value: str, beside: Collection[str]) -> Tables:
+        """The tables of a scene with a value of this axis.
+
+        Args:
+            tables: the scene's, the domain as an object.
+            value: as the user wrote it.
+            beside: the names of all axes that are given.
+
+        Raises:
+            InputError: the scene does not take it.
+        """
+        return with_solver(tables, **{self.name: value})
+
+    def setting(self, scene: Scene, value: str) -> Setting:
+        """What is solved for a value that is not combined with those of other axes.
+
+        Args:
+            scene: the scene.
+            value: as the user wrote it.
+        """
+        raise NotImplementedError
 
 
-def time_axis(axes: Axes) -> None:
-    """The x axes of all panels of a page: times, logarithmic."""
-    figure_axes = axes.get_figure().axes  # type: ignore[union-attr]
-    for here in figure_axes:
-        here.set_xscale("log")
-        here.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0), numticks=12))
-        here.xaxis.set_major_formatter(FuncFormatter(lambda x, _: seconds(x)))
-        here.xaxis.set_minor_formatter(NullFormatter())
+class Mesh(Axis):
+    """The mesh, in the words of the scene's domain shape."""
+
+    name = "mesh"
+
+    def apply(self, tables: Tables, value: str, beside: Collection[str]) -> Tables:
+        """See the base class."""
+        return meshes.at(tables, value)
 
 
-def plain_log(axes: Axes) -> None:
-    """The x axis: numbers, logarithmic."""
-    axes.set_xscale("log")
-    axes.xaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:.3g}"))
-    axes.xaxis.set_minor_formatter(NullFormatter())
-    axes.tick_params(axis="x", which="minor", length=0)
+class _Number(Axis):
+    """A positive number."""
+
+    below: ClassVar[float] = math.inf
+    or_exact: ClassVar[bool] = False
+
+    def check(self, value: str) -> None:
+        """See the base class."""
+        if self.or_exact and value == EXACT:
+            return
+        try:
+            good = 0.0 < float(value) < self.below
+        except ValueError:
+            good = False
+        if not good:
+            also = f" and below {self.below:g}" if math.isfinite(self.below) else ""
+            also += f", or {EXACT} for the law itself" if self.or_exact else ""
+            raise InputError(f"--axis {self.name}: {value!r} must be a number above 0{also}")
+
+    def apply(self, tables: Tables, value: str, beside: Collection[str]) -> Tables:
+        """See the base class."""
+        return with_solver(tables, **{self.name: float(value)})
 
 
-def apart(axes: Axes, one: float, other: float) -> bool:
-    """Whether two errors are so far apart on the axis that both can be named."""
-    low, high = axes.get_ylim()
-    inches = axes.bbox.height / axes.figure.dpi
-    return abs(math.log(one / other)) / math.log(high / low) * inches > _LINE
+class Epsilon(_Number):
+    """The width of the smoothing, relative to the law's energy at its kink."""
+
+    name = "epsilon"
+    needs_law = True
+    or_exact = True
+
+    def apply(self, tables: Tables, value: str, beside: Collection[str]) -> Tables:
+        """See the base class."""
+        return unsmoothed(tables) if value == EXACT else super().apply(without(tables, *WIDTHS), value, beside)
 
 
-def span(values: Sequence[float]) -> tuple[float, float]:
-    """The least and the largest value that is not rounding."""
-    known = [v for v in values if v > ROUNDING] or [LEAST]
-    return min(known), max(known)
+class EpsilonAbsolute(Epsilon):
+    """The width of the smoothing in N/m."""
+
+    name = "epsilon_absolute"
+    excludes = ("epsilon",)
+
+
+class _Choice(Axis):
+    """One of several names."""
+
+    def allowed(self) -> Sequence[str]:
+        """The names."""
+        raise NotImplementedError
+
+    def check(self, value: str) -> None:
+        """See the base class."""
+        if value not in self.allowed():
+            raise InputError(f"--axis {self.name}: {unknown(self.name, value, self.allowed())}")
+
+
+class Smoothing(_Choice):
+    """The kind of smoothing. It is applied after the width: where that is exact, nothing is smoothed."""
+
+    name = "smoothing"
+    needs_law = True
+
+    def allowed(self) -> Sequence[str]:
+        """See the base class."""
+        return smoothing.available()
+
+    def apply(self, tables: Tables, value: str, beside: Collection[str]) -> Tables:
+        """See the base class."""
+        exact = not smooths(tables) and any(width in beside for width in WIDTHS)
+        return tables if exact else super().apply(tables, value, beside)
+
+
+class Method(_Choice):
+    """The method that solves."""
+
+    name = "method"
+
+    def allowed(self) -> Sequence[str]:
+        """See the base class."""
+        return registry.available()
+
+
+class Tolerance(_Number):
+    """The relative residual at which the iteration ends."""
+
+    name = "tolerance"
+    below = 1.0
+
+
+class LinearSolver(_Choice):
+    """The linear solver."""
+
+    name = "linear_solver"
+
+    def allowed(self) -> Sequence[str]:
+        """See the base class."""
+        return ("auto", "lu", "gamg")
+
+
+class Accuracy(_Number):
+    """Adaptive meshes: what ``hvi run --accuracy`` is asked for in the energy norm."""
+
+    name = "accuracy"
+    below = 1.0
+    combined = False
+
+    def setting(self, scene: Scene, value: str) -> Setting:
+        """See the base class."""
+        return Setting(scene, accuracy=float(value))
+
+
+@dataclass(frozen=True)
+class AxisValues:
+    """One axis with the values that a study takes of it.
+
+    Attributes:
+        axis: the axis.
+        values: as the user wrote them.
+    """
+
+    axis: Axis
+    values: tuple[str, ...]
+
+    @property
+    def name(self) -> str:
+        """The axis's name."""
+        return self.axis.name
+
+
+def values_of(name: str, values: Sequence[str]) -> AxisValues:
+    """Some values of an axis.
+
+    Args:
+        name: of the axis.
+        values: of it.
+    """
+    return AxisValues(Axis.registry[name], tuple(values))
+
+
+def read(text: str) -> AxisValues:
+    """What ``--axis NAME=VALUE,VALUE`` asks for.
+
+    Raises:
+        InputError: an unknown name, no values, or one that is not allowed.
+    """
+    name, _, rest = text.partition("=")
+    values = tuple(dict.fromkeys(v.strip() for v in rest.split(",") if v.strip()))
+    if name not in Axis.registry:
+        raise InputError(f"--axis {text}: {unknown('axis', name, tuple(Axis.registry))}")
+    if not values:
+        raise InputError(f"--axis {text}: needs values, like --axis epsilon=1,0.1,0.01,exact")
+    for value in values:
+        Axis.registry[name].check(value)
+    return values_of(name, values)
+
+
+def applied(tables: Tables, pairs: Mapping[str, str]) -> Tables:
+    """The tables of a scene with a value of each of several axes.
+
+    Args:
+        tables: the scene's, the domain as an object.
+        pairs: the values by axis.
+
+    Raises:
+        InputError: the scene does not take one of them.
+    """
+    for name, axis in Axis.registry.items():
+        if name in pairs:
+            tables = axis.apply(tables, pairs[name], pairs.keys())
+    return tables

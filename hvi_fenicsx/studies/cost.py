@@ -7,13 +7,10 @@ import statistics
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from .thresholds import DEFAULT, Thresholds
+
 PHASES = ("mesh", "assembly", "setup", "solve", "certificate")
 """What is counted: compilation (``jit``) is paid once for all, and a study writes no results."""
-STEADY = 0.05
-"""The standard error of the median, relative, below which it is steady."""
-FEWEST = 3
-LONG, PATIENCE = 20.0, 15.0
-"""Seconds: a run longer than the first is not repeated; beyond the second no further repetition is begun."""
 
 
 def seconds(times: Mapping[str, float]) -> float:
@@ -30,15 +27,24 @@ def spread(values: Sequence[float]) -> float:
     return 1.2533 * deviation / math.sqrt(len(values)) / middle if middle > 0.0 else 0.0
 
 
-def wanted(found: Sequence[Mapping[str, float]], first: Mapping[str, float], most: int) -> bool:
-    """Whether one more run is wanted: small runs are repeated more often, since they cost less and scatter more."""
+def wanted(
+    found: Sequence[Mapping[str, float]], first: Mapping[str, float], most: int, thresholds: Thresholds = DEFAULT
+) -> bool:
+    """Whether one more run is wanted: small runs are repeated more often, since they cost less and scatter more.
+
+    Args:
+        found: the times of the runs so far by phase, s.
+        first: those of the very first run, which filled the caches.
+        most: runs at most.
+        thresholds: when a median is steady, and when patience ends.
+    """
     values = [seconds(times) for times in found]
-    if len(found) >= most or seconds(first) > LONG or sum(values) > PATIENCE:
+    if len(found) >= most or seconds(first) > thresholds.longest_repeated or sum(values) > thresholds.patience:
         return False
-    return len(found) < FEWEST or spread(values) > STEADY
+    return len(found) < thresholds.fewest_runs or spread(values) > thresholds.steady
 
 
-def summarised(times: Sequence[Mapping[str, float]]) -> dict[str, Any]:
+def cost_record(times: Sequence[Mapping[str, float]]) -> dict[str, Any]:
     """Median cost and median of each phase, s; the spread of the former (null for a single run); the number of runs."""
     values = [seconds(t) for t in times]
     error = spread(values)

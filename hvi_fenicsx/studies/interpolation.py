@@ -20,7 +20,12 @@ _PAIRS = 4_000_000
 
 
 def body(source: SolutionFields, points: Array) -> sparse.csr_array:
-    """From values at the source's vertices to those at the points (m, d): a matrix (m, n). On this process alone."""
+    """The matrix (m, n) from values at the vertices of a body to those at points. On this process alone.
+
+    Args:
+        source: with n vertices.
+        points: m, (m, d).
+    """
     d = source.points.shape[1]
     mesh = compat.simplex_mesh(MPI.COMM_SELF, source.cells, source.points, {2: "triangle", 3: "tetrahedron"}[d])
     found = mesh.topology.original_cell_index[
@@ -31,7 +36,12 @@ def body(source: SolutionFields, points: Array) -> sparse.csr_array:
 
 
 def surface(source: PartFields, points: Array) -> sparse.csr_array:
-    """From values at the vertices of a part to those at the points (m, d) on it: a matrix (m, n)."""
+    """The matrix (m, n) from values at the vertices of a part to those at points on it.
+
+    Args:
+        source: with n vertices.
+        points: m, (m, d).
+    """
     corners = source.points[source.facets]
     chunk = max(1, _PAIRS // len(corners))
     nearest = [_nearest(corners, points[i : i + chunk]) for i in range(0, len(points), chunk)]

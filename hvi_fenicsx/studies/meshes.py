@@ -1,9 +1,8 @@
-"""The mesh axis of a study: which meshes of a shape are solved on."""
+"""The meshes of a study: those that its mesh axis names, those of the default plan, and those of the reference."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping
 from fractions import Fraction
 from typing import Any
 
@@ -11,44 +10,9 @@ from pydantic import ValidationError
 
 from ..errors import InputError
 from ..mesh.shapes import DomainShape
-from ..report.units import quantity
-from ..scene import Scene
 from ..schema import input_error
-
-_MOST_POINT = {2: 150_000, 3: 60_000}
-_MOST_REFERENCE = {2: 400_000, 3: 250_000}
-"""Unknowns of the finest point of a plan's own making, and of the reference, by dimension."""
-_BELOW, _ABOVE = 2, 1
-"""Rungs of a plan's own making below and above the scene's mesh."""
-
-Tables = dict[str, Any]
-ADAPTIVE = "adaptive to "
-"""How the words of an adaptive mesh begin."""
-
-
-@dataclass(frozen=True)
-class Setting:
-    """What one point solves.
-
-    Attributes:
-        scene: the scene, on its own mesh.
-        accuracy: instead of that mesh, one refined adaptively until the estimate is below this (`hvi run --accuracy`).
-    """
-
-    scene: Scene
-    accuracy: float | None = None
-
-
-def words(setting: Setting) -> str:
-    """The mesh, as people name it."""
-    if setting.accuracy is not None:
-        return f"{ADAPTIVE}{100 * setting.accuracy:g} %"
-    return setting.scene.domain.mesh_text(lambda metres: quantity(metres, "m"))
-
-
-def unknowns(setting: Setting) -> float:
-    """About how many there are; of a mesh file, which is not opened for it, a guess."""
-    return setting.scene.domain.unknowns(setting.scene.dimension)
+from .scene_tables import Tables, setting_of
+from .thresholds import DEFAULT, Thresholds
 
 
 def refined(tables: Mapping[str, Any], factor: Fraction) -> Tables | None:
@@ -88,21 +52,32 @@ def at(tables: Mapping[str, Any], text: str) -> Tables:
         raise InputError(f"--axis mesh: {error}") from None
 
 
-def ladder(tables: Mapping[str, Any], setting_of: Callable[[Tables], Setting]) -> list[Tables]:
-    """The meshes of a plan's own making, coarse to fine: the scene's, halved and doubled as far as that goes."""
-    steps = [refined(tables, Fraction(2) ** k) for k in range(-_BELOW, _ABOVE + 1)]
-    found = [t for t in steps if t is not None and _affordable(setting_of(t), _MOST_POINT)]
-    return found or [dict(tables)]
+def default_meshes(tables: Mapping[str, Any], thresholds: Thresholds = DEFAULT) -> list[Tables]:
+    """The meshes of the default plan, coarse to fine: the scene's, halved and doubled as far as that goes.
+
+    Args:
+        tables: the scene's, the domain as an object.
+        thresholds: how many, and how large.
+    """
+    powers = range(-thresholds.coarser_meshes, thresholds.finer_meshes + 1)
+    found = [t for k in powers if (t := refined(tables, Fraction(2) ** k)) is not None]
+    return [t for t in found if _affordable(t, thresholds.largest_point)] or [dict(tables)]
 
 
-def reference(tables: Mapping[str, Any], setting_of: Callable[[Tables], Setting]) -> list[Tables]:
-    """Three rungs from the reference down, for the finest mesh of a plan: it is four times finer, or twice."""
+def reference_meshes(tables: Mapping[str, Any], thresholds: Thresholds = DEFAULT) -> list[Tables]:
+    """The reference's mesh, four times finer or twice, and the next two coarser ones.
+
+    Args:
+        tables: of the scene on the finest mesh of a plan, the domain as an object.
+        thresholds: how large the reference may be.
+    """
     finest = refined(tables, Fraction(4))
-    if finest is None or not _affordable(setting_of(finest), _MOST_REFERENCE):
+    if finest is None or not _affordable(finest, thresholds.largest_reference):
         finest = refined(tables, Fraction(2)) or dict(tables)
-    below = [refined(finest, Fraction(1, n)) for n in (2, 4)]
-    return [finest, *(t for t in below if t is not None)]
+    coarser = [refined(finest, Fraction(1, n)) for n in (2, 4)]
+    return [finest, *(t for t in coarser if t is not None)]
 
 
-def _affordable(setting: Setting, most: Mapping[int, int]) -> bool:
-    return unknowns(setting) <= most[setting.scene.dimension]
+def _affordable(tables: Tables, most: Mapping[int, int]) -> bool:
+    setting = setting_of(tables)
+    return setting.unknowns <= most[setting.scene.dimension]

@@ -1,10 +1,11 @@
-"""The pictures of a study, one page each: error against cost with its front, against h, against ε; where time goes."""
+"""The pictures of a study, one page each. To add one, write a function here under :func:`study_picture`."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -18,80 +19,97 @@ from ..report.pictures.style import (
     INK,
     ORANGE,
     PALE,
-    PURPLE,
-    VERMILION,
     area,
     figure,
     save,
     titled,
 )
-from .axes import LEAST, apart, error_axis, plain_log, span, time_axis
 from .cost import PHASES
-from .sentences import headlines, order, over_h, seconds, told_first
+from .plot_axes import LEAST, apart, error_axis, plain_log, span, time_axis
+from .plot_page import FOOT, Kind, colour, kinds, legend, page, quantities
+from .sentences import order, over_h, seconds
+from .study import Study
 from .table import Row, front
 
-if TYPE_CHECKING:
-    from .study import Study
-
-PANEL, GAP, FOOT = 2.6, 0.6, 0.85
-"""Inches: a panel, the room for its title, the axis below the last."""
-_SMOOTHINGS = {None: GREEN, "quadratic": BLUE, "chks": PURPLE, "log_exp": ORANGE, "paper": VERMILION}
-_OWN_SMOOTHING = "#56B4E9"
 _PHASE_COLOURS = dict(zip(PHASES, (PALE, "#8fb8d6", ORANGE, BLUE, GREEN), strict=True))
 _BARS = 12
 """Bars of the picture of time, at most."""
 
 
+@dataclass(frozen=True)
+class StudyPicture:
+    """A picture of a study.
+
+    Attributes:
+        caption: what a reader sees under it.
+        make: draws it; None where the study has no values for it.
+    """
+
+    caption: str
+    make: Callable[[Study], Figure | None]
+
+
+PICTURES: dict[str, StudyPicture] = {}
+"""All by the names of their files, without the ending."""
+Maker = Callable[[Study], Figure | None]
+
+
+def study_picture(name: str, *, caption: str) -> Callable[[Maker], Maker]:
+    """Register the function below as a picture of a study.
+
+    Args:
+        name: of its file, without the ending.
+        caption: what a reader sees under it.
+    """
+
+    def register(make: Maker) -> Maker:
+        PICTURES[name] = StudyPicture(caption, make)
+        return make
+
+    return register
+
+
 def draw(study: Study, folder: Path) -> None:
-    """Draw all that the study has values for; pictures of an earlier one that it has none for are removed."""
-    for name, made in (
-        ("work_precision.png", _work_precision(study)),
-        ("error_h.png", _against_h(study)),
-        ("error_epsilon.png", _against_epsilon(study)),
-        ("time.png", _time(study)),
-    ):
-        if made is None:
-            (folder / name).unlink(missing_ok=True)
+    """Draw all that the study has values for; pictures of an earlier one that it has none for are removed.
+
+    Args:
+        study: what was found.
+        folder: where to.
+    """
+    for name, picture in PICTURES.items():
+        fig = picture.make(study)
+        if fig is None:
+            (folder / f"{name}.png").unlink(missing_ok=True)
         else:
-            save(made, folder / name)
+            save(fig, folder / f"{name}.png", picture.caption)
 
 
-def _page(study: Study, subject: str, panels: int, tall: float = PANEL, wide: float = 6.5) -> tuple[Figure, list[Axes]]:
-    """Panels below each other, the first at the top."""
-    made = figure(HEADING + panels * (tall + GAP) + FOOT)
-    titled(made, study.scene.title or "untitled", subject)
-    places = reversed(range(panels))
-    return made, [area(made, 1.15, FOOT + above * (tall + GAP), wide, tall) for above in places]
-
-
-def _quantities(study: Study) -> list[str]:
-    """The traction first: it is what accuracy costs most in."""
-    found = headlines(study.rows)
-    return sorted(found, key=lambda q: q != told_first(found))
-
-
+@study_picture(
+    "work_precision",
+    caption="Error against time: each point a run, the line what nothing cheaper is as accurate as.",
+)
 def _work_precision(study: Study) -> Figure | None:
-    quantities = _quantities(study)[:2]
+    drawn = quantities(study)[:2]
     if not any(r.seconds for r in study.rows):
         return None
-    made, axes = _page(study, "what accuracy costs: a point is a setting, down and left is better", len(quantities))
-    for quantity, here in zip(quantities, axes, strict=True):
+    fig, axes = page(study, "what accuracy costs: a point is a setting, down and left is better", len(drawn))
+    for quantity, here in zip(drawn, axes, strict=True):
         _cost_panel(here, study, quantity)
         here.tick_params(labelbottom=here is axes[-1])
-    _legend(axes[0], _kinds(study))
+    legend(axes[0], kinds(study))
     axes[-1].set_xlabel("time to solution, without compilation and output")
     low, high = span([r.seconds for r in study.rows if r.converged and r.seconds])
     for here in axes:
         here.set_xlim(low / 3.0, high * 1.3)
     time_axis(axes[-1])
-    return made
+    return fig
 
 
 def _cost_panel(axes: Axes, study: Study, quantity: str) -> None:
     known = [(r.seconds, e, r) for r in study.rows if (e := r.error(quantity)) is not None and r.seconds]
     for s, e, r in known:
         here = "o" if r.method == "auto" else "D"
-        axes.plot(s, max(e, LEAST), here, color=_colour(r.smoothing), ms=6.5, alpha=0.85, mec="white", mew=0.6)
+        axes.plot(s, max(e, LEAST), here, color=colour(r.smoothing), ms=6.5, alpha=0.85, mec="white", mew=0.6)
     own = study.own
     if (error := own.error(quantity)) is not None and own.seconds:
         axes.plot(own.seconds, max(error, LEAST), "*", ms=19, mfc="none", mec=INK, mew=1.5, zorder=6)
@@ -114,41 +132,17 @@ def _front_line(axes: Axes, best: Sequence[Row], quantity: str) -> None:
             )  # fmt: skip
 
 
-def _colour(smoothing: str | None) -> str:
-    """A smoothing's colour; those of a user's own share one."""
-    return _SMOOTHINGS.get(smoothing, _OWN_SMOOTHING)
-
-
 def _short(found: Row) -> str:
     return f"{found.mesh.removesuffix(' cells')}, {found.law.replace('exact law', 'exact')}"
 
 
-def _kinds(study: Study) -> list[tuple[str, str, str]]:
-    """Marker, colour and words of each kind of point that there is."""
-    there = {r.smoothing for r in study.rows if r.converged}
-    ordered = [*(s for s in _SMOOTHINGS if s in there), *sorted(s for s in there if s and s not in _SMOOTHINGS)]
-    kinds = [("o", _colour(s), "exact law" if s is None else s) for s in ordered]
-    if any(r.method != "auto" for r in study.rows if r.converged):
-        kinds.append(("D", GREY, "another method"))
-    return [*kinds, ("*", INK, "the scene's own")]
-
-
-def _legend(axes: Axes, kinds: Sequence[tuple[str, str, str]]) -> None:
-    for marker, colour, words in kinds:
-        hollow: dict[str, Any] = {"mfc": "none", "mec": INK} if marker == "*" else {"mec": "white"}
-        axes.plot([], [], marker, color=colour, label=words, ms=13 if marker == "*" else 7, **hollow)
-    axes.legend(
-        loc="lower right", bbox_to_anchor=(1.015, 1.085), ncols=len(kinds), frameon=False, fontsize=10,
-        handletextpad=0.0, columnspacing=0.6, borderaxespad=0.0,
-    )  # fmt: skip
-
-
+@study_picture("error_h", caption="Error against the mesh width.")
 def _against_h(study: Study) -> Figure | None:
-    quantities = [q for q in _quantities(study) if len(over_h(study.rows, study.own, q)) > 1][:3]
-    if not quantities:
+    drawn = [q for q in quantities(study) if len(over_h(study.rows, study.own, q)) > 1][:3]
+    if not drawn:
         return None
-    made, axes = _page(study, "error against the mesh width h", len(quantities), 2.3, 5.3)
-    for quantity, here in zip(quantities, axes, strict=True):
+    fig, axes = page(study, "error against the mesh width h", len(drawn), 2.3, 5.3)
+    for quantity, here in zip(drawn, axes, strict=True):
         values, ends = _lines_over_h(here, study, quantity)
         found = order(study.rows, study.own, quantity, study.certain)
         note = "" if found is None else f"exact law: h^{found:.2f} at the fine end"
@@ -159,7 +153,7 @@ def _against_h(study: Study) -> Figure | None:
         here.set_xticks(sorted({h for h, _ in over_h(study.rows, study.own, quantity)}))
         here.invert_xaxis()
     axes[-1].set_xlabel("mesh width h in m, finer to the right")
-    return made
+    return fig
 
 
 End = tuple[float, float, str, str]
@@ -177,12 +171,12 @@ def _lines_over_h(axes: Axes, study: Study, quantity: str) -> tuple[list[float],
         if len(points) < 2:
             continue
         xs, ys = zip(*points, strict=True)
-        colour = _colour(like.smoothing if like else None)
+        shade = colour(like.smoothing if like else None)
         shown = [max(y, LEAST) for y in ys]
         thin: dict[str, Any] = {"lw": 1.5, "alpha": 0.35 + 0.6 * i / (len(ordered) or 1)}
         style = thin if like is not None else {"lw": 2.6, "zorder": 5}
-        axes.plot(xs, shown, "o-", color=colour, ms=5, **style)
-        ends.append((xs[-1], shown[-1], "exact law" if like is None else like.law, colour))
+        axes.plot(xs, shown, "o-", color=shade, ms=5, **style)
+        ends.append((xs[-1], shown[-1], "exact law" if like is None else like.law, shade))
         values += shown
     return values, ends
 
@@ -201,18 +195,19 @@ def _name_lines(axes: Axes, ends: Sequence[End]) -> None:
         axes.annotate(words, exact[:2], (8, 0), textcoords="offset points", size=10, color=exact[3], va="center")
 
 
+@study_picture("error_epsilon", caption="Error against ε, the width of the smoothing.")
 def _against_epsilon(study: Study) -> Figure | None:
-    quantities = [q for q in _quantities(study) if any(len(p) > 1 for _, _, p in _over_epsilon(study, q))][:3]
-    if not quantities:
+    drawn = [q for q in quantities(study) if any(len(p) > 1 for _, _, p in _over_epsilon(study, q))][:3]
+    if not drawn:
         return None
-    made, axes = _page(study, f"error against ε; {study.exact.mesh}; dashed: the exact law", len(quantities), 2.3)
-    kinds = {}
-    for quantity, here in zip(quantities, axes, strict=True):
+    fig, axes = page(study, f"error against ε; {study.exact.mesh}; dashed: the exact law", len(drawn), 2.3)
+    shown: dict[str, Kind] = {}
+    for quantity, here in zip(drawn, axes, strict=True):
         values: list[float] = []
-        for kind, colour, points in _over_epsilon(study, quantity):
+        for kind, shade, points in _over_epsilon(study, quantity):
             xs, ys = zip(*points, strict=True)
-            here.plot(xs, [max(y, LEAST) for y in ys], "o-", color=colour, ms=6)
-            kinds[kind] = ("o", colour, kind)
+            here.plot(xs, [max(y, LEAST) for y in ys], "o-", color=shade, ms=6)
+            shown[kind] = ("o", shade, kind)
             values += ys
         if (bare := study.exact.error(quantity)) is not None:
             here.axhline(max(bare, LEAST), color=GREEN, ls=(0, (4, 3)), lw=2)
@@ -220,13 +215,13 @@ def _against_epsilon(study: Study) -> Figure | None:
         if (own := study.own.error(quantity)) is not None and study.own.epsilon:
             here.plot(study.own.epsilon, max(own, LEAST), "*", ms=19, mfc="none", mec=INK, mew=1.5, zorder=6)
             values.append(own)
-            kinds["~own"] = ("*", INK, "the scene's own")
+            shown["~own"] = ("*", INK, "the scene's own")
         error_axis(here, quantity, study.certain[quantity].error, values)
         plain_log(here)
         here.tick_params(labelbottom=here is axes[-1])
-    _legend(axes[0], [kinds[k] for k in sorted(kinds)])
+    legend(axes[0], [shown[k] for k in sorted(shown)])
     axes[-1].set_xlabel("ε, relative to the law's energy at its kink")
-    return made
+    return fig
 
 
 def _over_epsilon(study: Study, quantity: str) -> list[tuple[str, str, list[tuple[float, float]]]]:
@@ -241,17 +236,18 @@ def _over_epsilon(study: Study, quantity: str) -> list[tuple[str, str, list[tupl
             and (e := r.error(quantity)) is not None
         }
         if points:
-            found.append((kind, _colour(kind), sorted(points.items())))
+            found.append((kind, colour(kind), sorted(points.items())))
     return found
 
 
+@study_picture("time", caption="Where the time goes.")
 def _time(study: Study) -> Figure | None:
     rows = _bars(study)
     if not rows:
         return None
-    made = figure(HEADING + 0.42 * len(rows) + 0.55 + FOOT)
-    titled(made, study.scene.title or "untitled", "where the time goes: the scene's own setting and the front")
-    axes = area(made, 3.1, FOOT, 4.2, 0.42 * len(rows))
+    fig = figure(HEADING + 0.42 * len(rows) + 0.55 + FOOT)
+    titled(fig, study.scene.title or "untitled", "where the time goes: the scene's own setting and the front")
+    axes = area(fig, 3.1, FOOT, 4.2, 0.42 * len(rows))
     for i, r in enumerate(reversed(rows)):
         left = 0.0
         for phase in PHASES:
@@ -267,17 +263,17 @@ def _time(study: Study) -> Figure | None:
         axes.bar(0, 0, color=_PHASE_COLOURS[phase], label=phase)
     axes.legend(loc="lower right", bbox_to_anchor=(1.03, 1.0), ncols=len(PHASES), frameon=False, fontsize=11,
                 handlelength=1.0, handletextpad=0.4, columnspacing=1.0)  # fmt: skip
-    return made
+    return fig
 
 
 def _bars(study: Study) -> list[Row]:
     """The front of the first quantity and the scene's own setting, by cost."""
-    quantities = _quantities(study)
-    best = front(study.rows, quantities[0], study.certain)[-(_BARS - 2) :] if quantities else []
+    drawn = quantities(study)
+    best = front(study.rows, drawn[0], study.certain)[-(_BARS - 2) :] if drawn else []
     chosen = {r.point: r for r in (*best, study.own, study.exact) if r.converged and r.phases}
     return sorted(chosen.values(), key=lambda r: r.seconds or 0.0)
 
 
 def _bar_name(study: Study, found: Row) -> str:
-    words = found.words.replace(" cells", "").replace("exact law", "exact")
+    words = found.text.replace(" cells", "").replace("exact law", "exact")
     return f"★ {words}" if found.point == study.own.point else words

@@ -64,7 +64,7 @@ def _point(options: argparse.Namespace) -> None:
     del first
     if converged:
         times = _repeated(scene, options, times)
-    record["cost"] = cost.summarised(times)
+    record["cost"] = cost.cost_record(times)
     on_root(COMM, lambda: write_json(options.result.with_suffix(".json"), record))
 
 
@@ -72,7 +72,7 @@ def _solved(scene: Scene, options: argparse.Namespace, timer: Timer) -> Solution
     """The scene on its mesh, or on one made for an accuracy. Collective."""
     if options.accuracy is not None:
         found = reach(scene, COMM, Goal(options.accuracy), AdaptiveSolver(timer=timer), lambda line: None).solution
-        timer.seconds["solve"] += timer.seconds["estimate"]  # which steers the climb: part of what it costs
+        timer.seconds["solve"] += timer.seconds["estimate"]  # which steers the refinement: part of what it costs
         return found
     return finish(prepare(scene, COMM, timer))
 

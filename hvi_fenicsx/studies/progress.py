@@ -2,50 +2,63 @@
 
 from __future__ import annotations
 
+import logging
 import sys
 import time
 from types import TracebackType
-from typing import Any, Self
+from typing import Self
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+
+_LOG = logging.getLogger(__name__)
 
 
-class Progress:
-    """Used as a context, so that the terminal is always left clean."""
+class StudyProgress:
+    """The progress of a study; used as a context, so that the terminal is always left clean."""
 
     def __init__(self) -> None:
         self._start = time.perf_counter()
-        self._bar: Any = None
-        self._task: Any = None
+        seen = sys.stderr.isatty()
+        self._bar = Progress(
+            BarColumn(24),
+            MofNCompleteColumn(),
+            TextColumn("{task.description}"),
+            console=Console(stderr=True, quiet=not seen),
+            transient=True,
+            disable=not seen,
+        )
+        self._task = self._bar.add_task("")
 
     def __enter__(self) -> Self:
-        if sys.stderr.isatty():
-            from rich import progress
-            from rich.console import Console
-
-            columns = (progress.BarColumn(24), progress.MofNCompleteColumn(), progress.TextColumn("{task.description}"))
-            self._bar = progress.Progress(*columns, console=Console(stderr=True), transient=True)
-            self._bar.start()
-            self._task = self._bar.add_task("")
+        self._bar.start()
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        if self._bar is not None:
-            self._bar.stop()
+        self._bar.stop()
 
     @property
     def seconds(self) -> float:
         """Since it was made."""
         return time.perf_counter() - self._start
 
-    def step(self, words: str, done: int, of: int, to_go: float) -> None:
-        """What is being done, how many are done, and the seconds that the rest will take."""
-        if self._bar is not None:
-            text = f"about {_time(to_go)} to go · {words}"
-            self._bar.update(self._task, description=text, completed=done, total=of)
+    def show(self, point: str, *, done: int, total: int, to_go: float) -> None:
+        """Show which point is being run.
+
+        Args:
+            point: its setting.
+            done: points that are finished.
+            total: all points.
+            to_go: seconds that the rest will take.
+        """
+        text = f"about {_duration(to_go)} to go · {point}"
+        _LOG.info("%d of %d points are finished, %s", done, total, text)
+        self._bar.update(self._task, description=text, completed=done, total=total)
 
 
-def _time(seconds: float) -> str:
+def _duration(seconds: float) -> str:
     if seconds < 90.0:
         return f"{max(1, round(seconds))} s"
     return f"{round(seconds / 60)} min" if seconds < 5400.0 else f"{seconds / 3600:.1f} h"

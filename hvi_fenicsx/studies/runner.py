@@ -12,26 +12,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from types import FrameType
 
-from ..errors import ExitCode, HviError
+from ..errors import ExitCode
 from ..runtime import processes
 from ..scene import dump_scene
-from . import meshes
-from .meshes import Setting
-from .progress import Progress
+from .errors import StudyInterruptedError
+from .progress import StudyProgress
+from .setting import Setting
 from .store import Store, is_whole, write_json, write_text
-
-PATIENCE = 5.0
-"""Seconds for a child to end by itself."""
-_OF_A_REFERENCE = 5.0
-"""Its time limit, in that of a point."""
-_START = 3.0
-"""Seconds that a point takes at least, until the first has told: interpreter, libraries, caches."""
-
-
-class Stopped(HviError):
-    """Ctrl-C or SIGTERM: the finished points are kept."""
-
-    exit_code = ExitCode.INTERRUPTED
+from .thresholds import DEFAULT, Thresholds
 
 
 @contextlib.contextmanager
@@ -39,11 +27,11 @@ def watched(folder: Path) -> Iterator[None]:
     """SIGINT and SIGTERM end the child that runs, and the study.
 
     Raises:
-        Stopped: a signal came.
+        StudyInterruptedError: a signal came.
     """
 
     def note(number: int, frame: FrameType | None) -> None:
-        raise Stopped(f"interrupted; what is finished is kept in {folder}; --resume goes on from there")
+        raise StudyInterruptedError(f"interrupted; what is finished is kept in {folder}; --resume goes on from there")
 
     numbers = (signal.SIGINT, signal.SIGTERM)
     before = [signal.signal(number, note) for number in numbers]
@@ -55,67 +43,87 @@ def watched(folder: Path) -> Iterator[None]:
 
 
 @dataclass(frozen=True)
-class Job:
-    """A point to run; ``stiffness`` of a reference."""
+class PointRun:
+    """A point to run.
+
+    Attributes:
+        setting: what it solves.
+        stiffness: whether its stiffness is kept, since it will be the reference.
+    """
 
     setting: Setting
     stiffness: bool = False
 
+    @property
+    def text(self) -> str:
+        """The setting in words."""
+        role = "reference: " if self.stiffness else ""
+        return f"{role}{self.setting.mesh}, {self.setting.law}, {self.setting.scene.solver.method}"
+
 
 @dataclass
 class Runner:
-    """Runs jobs into a store.
+    """Runs points into a store.
 
     Attributes:
-        store: where they go. repeat: repetitions at most. limit: seconds after which a point is given up.
+        store: where they go.
+        repeat: repetitions of each at most.
+        limit: seconds after which a point is given up.
         progress: what is shown.
+        thresholds: how long processes may take.
     """
 
     store: Store
     repeat: int
     limit: float
-    progress: Progress
+    progress: StudyProgress
+    thresholds: Thresholds = DEFAULT
     _done: list[tuple[float, float]] = field(default_factory=list)
 
-    def run(self, jobs: Sequence[Job], of: Sequence[Job]) -> None:
-        """Run those that are not finished, of all that will be run.
+    def run(self, runs: Sequence[PointRun], everything: Sequence[PointRun]) -> None:
+        """Run those points that are not finished.
 
         Interrupted, nothing is left behind of the point that was running.
-        """
-        todo = [job for job in of if not self.finished(job)]
-        for job in [job for job in jobs if job in todo]:
-            self.progress.step(_words(job), len(of) - len(todo), len(of), self._to_go(todo))
-            self._one(job)
-            todo.remove(job)
 
-    def finished(self, job: Job) -> bool:
+        Args:
+            runs: the points.
+            everything: all points of the study, for the time to go.
+        """
+        todo = [one for one in everything if not self.finished(one)]
+        for one in [one for one in runs if one in todo]:
+            self.progress.show(
+                one.text, done=len(everything) - len(todo), total=len(everything), to_go=self._to_go(todo)
+            )
+            self._one(one)
+            todo.remove(one)
+
+    def finished(self, one: PointRun) -> bool:
         """Whether a point is in the store, whole and with all that is wanted, or was given up after no less time."""
-        record = self.store.record(job.setting)
-        if record is None or record.get("limit", self._limit(job)) < self._limit(job):
+        record = self.store.record(one.setting)
+        if record is None or record.get("limit", self._limit(one)) < self._limit(one):
             return False
         if "limit" in record:
             return True
-        solution = self.store.path(job.setting).with_suffix(".npz")
-        stiffness = stiffness_path(self.store, job.setting)
-        wanted = [*([solution] if record["converged"] else []), *([stiffness] if job.stiffness else [])]
+        wanted = [self.store.solution(one.setting)] if record["converged"] else []
+        wanted += [self.store.stiffness(one.setting)] if one.stiffness else []
         return all(map(is_whole, wanted))
 
-    def _limit(self, job: Job) -> float:
-        return self.limit * (_OF_A_REFERENCE if job.stiffness else 1.0)
+    def _limit(self, one: PointRun) -> float:
+        return self.limit * (self.thresholds.reference_limit if one.stiffness else 1.0)
 
-    def _to_go(self, jobs: Sequence[Job]) -> float:
+    def _to_go(self, runs: Sequence[PointRun]) -> float:
         """Seconds that these will take, from what the finished ones took a start and an unknown."""
-        start = min((s for s, _ in self._done), default=_START)
+        start = min((s for s, _ in self._done), default=self.thresholds.start)
         rates = [max(0.0, s - start) / n for s, n in self._done if n > 0.0]
-        rate = statistics.median(rates) if rates else 1e-4
-        return sum(start + rate * (meshes.unknowns(job.setting)) for job in jobs)
+        rate = statistics.median(rates) if rates else self.thresholds.seconds_per_unknown
+        return sum(start + rate * one.setting.unknowns for one in runs)
 
-    def _one(self, job: Job) -> None:
-        path, began = self.store.path(job.setting), self.progress.seconds
+    def _one(self, one: PointRun) -> None:
+        path, began = self.store.path(one.setting), self.progress.seconds
         path.with_suffix(".json").unlink(missing_ok=True)
-        write_text(path.with_suffix(".toml"), dump_scene(job.setting.scene))
+        write_text(path.with_suffix(".toml"), dump_scene(one.setting.scene))
         child = subprocess.Popen(
-            [*_python(self.store.ranks), "-m", "hvi_fenicsx.studies.point", *self._arguments(job, path)],
+            [*_python(self.store.ranks), "-m", "hvi_fenicsx.studies.point", *self._arguments(one, path)],
             env=processes.environment(),
             stdout=subprocess.DEVNULL,
             stderr=subprocess.PIPE,
@@ -123,19 +131,19 @@ class Runner:
             start_new_session=True,
         )
         try:
-            with _ended(child, path):
-                _, errors = child.communicate(timeout=self._limit(job))
+            with _ended(child, path, self.thresholds.kill_after):
+                _, errors = child.communicate(timeout=self._limit(one))
             if not path.with_suffix(".json").exists():
                 self._failed(path, child.returncode, errors)
         except subprocess.TimeoutExpired:
-            self._given_up(path, self._limit(job))
-        self._done.append((self.progress.seconds - began, meshes.unknowns(job.setting)))
+            self._given_up(path, self._limit(one))
+        self._done.append((self.progress.seconds - began, one.setting.unknowns))
 
-    def _arguments(self, job: Job, path: Path) -> list[str]:
-        repeat = 1 if job.stiffness else self.repeat
-        words = [str(path.with_suffix(".toml")), str(path), f"--repeat={repeat}"]
-        words += ["--stiffness"] if job.stiffness else []
-        return [*words, *([f"--accuracy={job.setting.accuracy}"] if job.setting.accuracy is not None else [])]
+    def _arguments(self, one: PointRun, path: Path) -> list[str]:
+        repeat = 1 if one.stiffness else self.repeat
+        arguments = [str(path.with_suffix(".toml")), str(path), f"--repeat={repeat}"]
+        arguments += ["--stiffness"] if one.stiffness else []
+        return [*arguments, *([f"--accuracy={one.setting.accuracy}"] if one.setting.accuracy is not None else [])]
 
     def _failed(self, path: Path, code: int, errors: str) -> None:
         """A point that ended without a result is a result: it is listed with its reason, and not run again."""
@@ -155,30 +163,18 @@ class Runner:
         write_json(path.with_suffix(".json"), record)
 
 
-def stiffness_path(store: Store, setting: Setting) -> Path:
-    """Of a reference's stiffness."""
-    return store.path(setting).with_suffix(".stiffness.npz")
-
-
 def _python(ranks: int) -> list[str]:
     return [sys.executable] if ranks == 1 else processes.launcher(ranks)
 
 
 @contextlib.contextmanager
-def _ended(child: subprocess.Popen[str], path: Path) -> Iterator[None]:
+def _ended(child: subprocess.Popen[str], path: Path, patience: float) -> Iterator[None]:
     """Whatever happens, of the child nothing remains: no process (it leads a group), no half-written file."""
     try:
         yield
     except BaseException:
-        processes.end(child, PATIENCE)
+        processes.end(child, patience)
         if not path.with_suffix(".json").exists():
             for file in (*path.parent.glob(f"{path.name}.*"), *path.parent.glob(f".{path.name}.*")):
                 file.unlink(missing_ok=True)
         raise
-
-
-def _words(job: Job) -> str:
-    solver = job.setting.scene.solver
-    width = solver.epsilon if solver.epsilon is not None else solver.epsilon_absolute
-    law = "exact law" if width is None else f"{solver.smoothing}, ε = {width:g}"
-    return f"{'reference: ' if job.stiffness else ''}{meshes.words(job.setting)}, {law}, {solver.method}"

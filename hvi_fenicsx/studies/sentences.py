@@ -1,4 +1,4 @@
-"""What a study says in words a person can act on, all of it derived from its rows."""
+"""What a study says in sentences that a person can act on, all derived from its rows."""
 
 from __future__ import annotations
 
@@ -6,63 +6,70 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 
 from ..errors import ExitCode
-from .reference import Certainty
-from .table import Row, front, told
+from .certainty import Certainty
+from .error_norms import ERROR_NORMS
+from .table import Row, claimed_error, front
+from .thresholds import DEFAULT, Thresholds
 
 TARGETS = (0.1, 0.01, 0.001)
-NAMES: Mapping[str, str] = {
-    "energy_norm": "the energy norm",
-    "u_t_l2": "u_t (L2)",
-    "u_t_max": "u_t (largest)",
-    "friction_l1": "-σ_t (L1)",
-    "friction_l2": "-σ_t (L2)",
-    "friction_max": "-σ_t (largest, away from jumps)",
-    "pressure_l1": "-σ_n (L1)",
-    "pressure_l2": "-σ_n (L2)",
-    "contact_set": "the contact set",
-    "resultant": "the contact resultant",
-    "friction_force": "the friction force",
-}
+"""The relative errors whose cost is named."""
 _HEADLINES = ("energy_norm", "u_t_l2", "friction_l1", "pressure_l1")
+"""The quantities that sentences and pictures may show."""
 _NEARLY, _MOSTLY = 0.9, 0.65
+"""Parts of an error from which on it is called nearly all of it, most of it."""
 ROUNDING = 1e-9
 """Relative errors below this are no errors of h or ε."""
-_CLEAR = 2.0
-"""Times the reference's own error, an error tells an order."""
 Certain = Mapping[str, Certainty]
+"""How well the reference is known, by quantity."""
 
 
 def headlines(rows: Sequence[Row]) -> list[str]:
-    """The quantities that are told and drawn: energy norm, slip, and -σ_t (-σ_n where there is no friction)."""
+    """The quantities that are shown: energy norm, slip, and -σ_t (-σ_n where there is no friction)."""
     known = [q for q in _HEADLINES if any(r.error(q) is not None for r in rows)]
     return [q for q in known if q != "pressure_l1" or "friction_l1" not in known]
 
 
-def told_first(quantities: Sequence[str]) -> str:
+def main_quantity(quantities: Sequence[str]) -> str:
     """The quantity that a study is most about: the traction on Γc, where there is one."""
     return quantities[-1] if quantities else "energy_norm"
 
 
-def all_of_them(rows: Sequence[Row], own: Row, exact: Row, certain: Certain) -> list[str]:
-    """The sentences, the most useful first."""
+def sentences(
+    rows: Sequence[Row], own: Row, exact: Row, certain: Certain, thresholds: Thresholds = DEFAULT
+) -> list[str]:
+    """What a study says, the most useful first.
+
+    Args:
+        rows: all points.
+        own: the scene's own setting.
+        exact: the exact law on the same mesh.
+        certain: how well the reference is known, by quantity.
+        thresholds: which errors and gains count.
+    """
     quantities = headlines(rows)
-    found = [_own(own, exact, told_first(quantities))]
-    found += [_targets(rows, q, certain) for q in reversed(quantities)]
-    found += [
-        *_orders(rows, own, quantities, certain),
-        *_adaptive(rows, certain),
-        *_methods(rows, own),
-        *_failures(rows),
+    return [
+        own_setting(own, exact, main_quantity(quantities)),
+        *(targets(rows, q, certain, thresholds) for q in reversed(quantities)),
+        *_orders(rows, own, quantities, certain, thresholds),
+        *adaptive_meshes(rows, certain),
+        *methods(rows, own),
+        *failures(rows),
     ]
-    return found
 
 
-def _own(own: Row, exact: Row, quantity: str) -> str:
-    setting = f"The scene's own setting ({own.words})"
+def own_setting(own: Row, exact: Row, quantity: str) -> str:
+    """What the scene's own setting costs, how far off it is, and by what.
+
+    Args:
+        own: the scene's own setting.
+        exact: the exact law on the same mesh.
+        quantity: key of the error norm.
+    """
+    setting = f"The scene's own setting ({own.text})"
     error = own.error(quantity)
     if error is None:
         return f"{setting} was not measured: {own.reason}."
-    text = f"{setting} takes {seconds(own.seconds)} and is {percent(error)} off in {NAMES[quantity]}"
+    text = f"{setting} takes {seconds(own.seconds)} and is {percent(error)} off in {ERROR_NORMS[quantity].name}"
     bare = exact.error(quantity)
     if own.smoothing is None or bare is None:
         return f"{text}."
@@ -72,7 +79,16 @@ def _own(own: Row, exact: Row, quantity: str) -> str:
 
 
 def share_of_epsilon(own: Row, exact: Row, quantity: str) -> float | None:
-    """ε's part of the error: the distance from the exact law on the same mesh, beside that law's error in h."""
+    """ε's part of the error: the distance from the exact law on the same mesh, beside that law's error in h.
+
+    Args:
+        own: the scene's own setting.
+        exact: the exact law on the same mesh.
+        quantity: key of the error norm.
+
+    Returns:
+        0 to 1; None where it is not known.
+    """
     part, bare = (own.epsilon_part or {}).get(quantity), exact.error(quantity)
     if part is None or bare is None or part + bare < ROUNDING:
         return None
@@ -86,32 +102,39 @@ def _how_much(share: float) -> str:
     return "most of it h" if share > 1 - _NEARLY else "nearly all of it h"
 
 
-def _targets(rows: Sequence[Row], quantity: str, certain: Certain) -> str:
-    """What each accuracy costs; one sentence a quantity."""
-    best = front(rows, quantity, certain)
+def targets(rows: Sequence[Row], quantity: str, certain: Certain, thresholds: Thresholds = DEFAULT) -> str:
+    """What each accuracy costs.
+
+    Args:
+        rows: all points.
+        quantity: key of the error norm.
+        certain: how well the reference is known, by quantity.
+        thresholds: which gain in accuracy counts.
+    """
+    best = front(rows, quantity, certain, thresholds)
     reached: dict[str, tuple[Row, list[str]]] = {}
     missed = []
     for target in TARGETS:
-        cheapest = next((r for r in best if (told(r, quantity, certain) or 0.0) <= target), None)
+        cheapest = next((r for r in best if (claimed_error(r, quantity, certain) or 0.0) <= target), None)
         if cheapest is None:
             missed = [_missed(rows, quantity, target, certain)]
             break
         reached.setdefault(cheapest.point, (cheapest, []))[1].append(percent(target))
-    parts = [f"{', '.join(t)} for {seconds(r.seconds)} ({r.words})" for r, t in reached.values()]
-    return f"In {NAMES[quantity]}: {'; '.join([*parts, *missed])}."
+    parts = [f"{', '.join(t)} for {seconds(r.seconds)} ({r.text})" for r, t in reached.values()]
+    return f"In {ERROR_NORMS[quantity].name}: {'; '.join([*parts, *missed])}."
 
 
 def _missed(rows: Sequence[Row], quantity: str, target: float, certain: Certain) -> str:
     own = certain[quantity].error
     if own is not None and own > target:
-        return f"{percent(target)} cannot be told: the reference itself is uncertain by {percent(own)}"
+        return f"{percent(target)} cannot be claimed: the reference itself is uncertain by {percent(own)}"
     errors = [(r.error(quantity), r) for r in rows]
     best, at = min(((e, r) for e, r in errors if e is not None), key=lambda pair: pair[0])
-    return f"{percent(target)} is not reached here: the best is {percent(best)} for {seconds(at.seconds)} ({at.words})"
+    return f"{percent(target)} is not reached here: the best is {percent(best)} for {seconds(at.seconds)} ({at.text})"
 
 
 def slope(points: Sequence[tuple[float, float]]) -> float | None:
-    """The order of y = C xᵖ through the two smallest x; None where there are no two positive y."""
+    """The order p of y = C xᵖ through the two points (x, y) of smallest x; None where there are no two positive y."""
     known = sorted((x, y) for x, y in points if x > 0.0 and y > ROUNDING)
     if len(known) < 2 or known[0][0] == known[1][0]:
         return None
@@ -120,7 +143,14 @@ def slope(points: Sequence[tuple[float, float]]) -> float | None:
 
 
 def over_h(rows: Sequence[Row], own: Row, quantity: str, *, like: Row | None = None) -> list[tuple[float, float]]:
-    """(h, error) of the points with the own method and the law of ``like`` (exact without it), coarse to fine."""
+    """(h, error) of the points with the scene's own method, coarse to fine.
+
+    Args:
+        rows: all points.
+        own: the scene's own setting.
+        quantity: key of the error norm.
+        like: whose law the points have; without it, the exact law.
+    """
     law = like.law if like else "exact law"
     found: dict[float, float] = {}
     for r in rows:
@@ -131,22 +161,41 @@ def over_h(rows: Sequence[Row], own: Row, quantity: str, *, like: Row | None = N
     return sorted(found.items(), reverse=True)
 
 
-def order(rows: Sequence[Row], own: Row, quantity: str, certain: Certain) -> float | None:
-    """In h of the exact law's error, from the two finest meshes whose error stands clear of the reference's own."""
-    least = _CLEAR * (certain[quantity].error or 0.0)
+def order(
+    rows: Sequence[Row], own: Row, quantity: str, certain: Certain, thresholds: Thresholds = DEFAULT
+) -> float | None:
+    """The order in h of the exact law's error, from the two finest meshes whose error the reference resolves.
+
+    Args:
+        rows: all points.
+        own: the scene's own setting.
+        quantity: key of the error norm.
+        certain: how well the reference is known, by quantity.
+        thresholds: which errors it resolves.
+    """
+    least = thresholds.resolved * (certain[quantity].error or 0.0)
     return slope([(h, error) for h, error in over_h(rows, own, quantity) if error >= least])
 
 
-def _orders(rows: Sequence[Row], own: Row, quantities: Sequence[str], certain: Certain) -> Iterator[str]:
-    found = [(q, order(rows, own, q, certain)) for q in quantities]
-    parts = [f"h^{value:.2f} in {NAMES[q]}" for q, value in found if value is not None]
+def _orders(
+    rows: Sequence[Row], own: Row, quantities: Sequence[str], certain: Certain, thresholds: Thresholds
+) -> Iterator[str]:
+    found = [(q, order(rows, own, q, certain, thresholds)) for q in quantities]
+    parts = [f"h^{value:.2f} in {ERROR_NORMS[q].name}" for q, value in found if value is not None]
     if parts:
-        yield f"With the exact law the error falls as {', '.join(parts)} (two finest meshes, clear of the reference)."
+        which = "two finest meshes whose errors the reference resolves"
+        yield f"With the exact law the error falls as {', '.join(parts)} ({which})."
 
 
-def _adaptive(rows: Sequence[Row], certain: Certain) -> Iterator[str]:
-    """What the adaptive meshes reached, as far as it can be told, and which uniform one does as well."""
-    known = [(e, r) for r in rows if r.law == "exact law" and (e := told(r, "energy_norm", certain)) is not None]
+def adaptive_meshes(rows: Sequence[Row], certain: Certain) -> Iterator[str]:
+    """What the adaptive meshes reached, as far as it can be claimed, and which uniform one does as well.
+
+    Args:
+        rows: all points.
+        certain: how well the reference is known, by quantity.
+    """
+    exact = [(claimed_error(r, "energy_norm", certain), r) for r in rows if r.law == "exact law"]
+    known = [(e, r) for e, r in exact if e is not None]
     found = sorted(((e, r) for e, r in known if r.adaptive), key=lambda pair: -pair[0])
     if not found:
         return
@@ -158,7 +207,14 @@ def _adaptive(rows: Sequence[Row], certain: Certain) -> Iterator[str]:
     yield f"Adaptive meshes: {', '.join(parts)} in the energy norm; a uniform mesh needs {like} for {percent(best)}."
 
 
-def _methods(rows: Sequence[Row], own: Row) -> Iterator[str]:
+def methods(rows: Sequence[Row], own: Row) -> Iterator[str]:
+    """What each method costs at the scene's own setting.
+
+    Args:
+        rows: all points.
+        own: the scene's own setting.
+    """
+
     def rest(r: Row) -> tuple[object, ...]:
         return (r.mesh, r.law, r.tolerance, r.linear_solver)
 
@@ -172,10 +228,11 @@ def _methods(rows: Sequence[Row], own: Row) -> Iterator[str]:
         yield f"Methods, at the scene's own setting: {', '.join(parts)}{rest_of_them}."
 
 
-def _failures(rows: Sequence[Row]) -> Iterator[str]:
+def failures(rows: Sequence[Row]) -> Iterator[str]:
+    """How many points failed."""
     bad = [r for r in rows if not r.converged and r.exit_code != ExitCode.BAD_INPUT]
     if bad:
-        yield f"{len(bad)} of {len(rows)} points ended without a certified solution; study.csv tells why."
+        yield f"{len(bad)} of {len(rows)} points ended without a certified solution; study.csv says why."
 
 
 def percent(value: float) -> str:
@@ -190,6 +247,6 @@ def seconds(value: float | None) -> str:
     """A time, to two digits."""
     if value is None:
         return "an unknown time"
-    if value < 0.1:
+    if value < 0.0995:  # which would be 1e+02 ms
         return f"{1e3 * value:.2g} ms"
     return f"{value:.2g} s" if value < 9.95 else f"{value:.0f} s"

@@ -20,7 +20,7 @@ from typing import Any, Literal
 from ..errors import InputError
 from ..runtime.versions import __version__
 from ..scene import dump_scene
-from .meshes import Setting
+from .setting import Setting
 
 MARK = "study.json"
 POINTS = "points"
@@ -31,21 +31,34 @@ _RECORDED = {"converged", "reason", "exit_code", "cost"}
 
 @dataclass(frozen=True)
 class Store:
-    """The folder, and the ranks that its points run on."""
+    """The folder of a study.
+
+    Attributes:
+        folder: the folder.
+        ranks: that its points run on.
+    """
 
     folder: Path
     ranks: int = 1
 
     def name(self, setting: Setting) -> str:
-        """Of a setting's point."""
+        """The name of a setting's point."""
         digest = hashlib.sha256(f"{__version__} {self.ranks} {setting.accuracy}\n{dump_scene(setting.scene)}".encode())
         for file in setting.scene.domain.files():
             digest.update(file.read_bytes())
         return digest.hexdigest()[:16]
 
     def path(self, setting: Setting) -> Path:
-        """Of a point's files, without their endings."""
+        """A point's files, without their endings."""
         return self.folder / POINTS / self.name(setting)
+
+    def solution(self, setting: Setting) -> Path:
+        """A point's solution."""
+        return self.path(setting).with_suffix(".npz")
+
+    def stiffness(self, setting: Setting) -> Path:
+        """A reference's stiffness."""
+        return self.path(setting).with_suffix(".stiffness.npz")
 
     def record(self, setting: Setting) -> dict[str, Any] | None:
         """What a finished point cost and found; None where it is not finished, or its record is damaged."""
@@ -101,12 +114,22 @@ def is_whole(archive: Path) -> bool:
 
 
 def write_json(path: Path, data: Mapping[str, Any]) -> None:
-    """Write JSON, whole or not at all."""
+    """Write JSON, whole or not at all.
+
+    Args:
+        path: the file.
+        data: what it says.
+    """
     write_text(path, json.dumps(data, indent=1, ensure_ascii=False, allow_nan=False) + "\n")
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write a text, whole or not at all."""
+    """Write a text, whole or not at all.
+
+    Args:
+        path: the file.
+        text: what it says.
+    """
     aside = path.with_name(f".{path.name}.{os.getpid()}")
     aside.write_text(text, encoding="utf-8")
     os.replace(aside, path)

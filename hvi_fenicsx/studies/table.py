@@ -8,27 +8,41 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from . import meshes
+from .certainty import Certainty
 from .cost import PHASES
-from .errors import QUANTITIES, Errors
-from .meshes import Setting
-from .reference import Certainty
+from .error_norms import ERROR_NORMS, Errors
+from .setting import ADAPTIVE, Setting
+from .thresholds import DEFAULT, Thresholds
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Row:
     """A point: its setting, what it cost, how far off it is.
 
     Attributes:
-        point: its name in the folder ``points``. mesh, h: words, and the mesh width in m.
-        smoothing, epsilon, epsilon_absolute: None for the exact law; ε relative, and in N/m where the scene says so.
-        method, linear_solver, tolerance: of the solver table.
-        dofs, converged, reason, exit_code, energy, iterations, peak_memory_mb: as in ``summary.json``; the memory is
-            that of the first run, summed over the ranks.
-        seconds, spread, runs, phases: cost without compilation and output, see :mod:`.cost`.
-        errors: relative, by quantity, against the reference. epsilon_part: of these, how far the point is from the
-            exact law on its own mesh (None: it is exact, or that point failed).
-        left_out: share of Γc near jumps of the law, which ``friction_max`` leaves out.
+        point: its name in the folder ``points``.
+        mesh: as people name it.
+        h: the mesh width, m; None of an adaptive mesh.
+        smoothing: kind of the smoothing; None for the exact law.
+        epsilon: width of the smoothing, relative; None for the exact law.
+        epsilon_absolute: width of the smoothing, N/m, where the scene says it so.
+        method: of the solver table.
+        linear_solver: of the solver table.
+        tolerance: of the solver table.
+        dofs: unknowns.
+        converged: whether the solution is certified.
+        reason: why the run ended as it did.
+        exit_code: of the run.
+        energy: J/m or J.
+        iterations: by kind.
+        peak_memory_mb: of the first run, summed over the ranks.
+        seconds: median cost without compilation and output, see :mod:`.cost`.
+        spread: standard error of the median, relative.
+        runs: that the median is of.
+        phases: median cost by phase, s.
+        errors: relative, against the reference.
+        epsilon_part: how far the point is from the exact law on its own mesh; None: it is exact, or that point failed.
+        left_out: part of Γc near jumps of the law, which ``friction_max`` leaves out.
         beyond_reference: quantities whose error is below the reference's own.
     """
 
@@ -60,7 +74,7 @@ class Row:
     @property
     def adaptive(self) -> bool:
         """Whether the mesh was refined to an accuracy."""
-        return self.mesh.startswith(meshes.ADAPTIVE)
+        return self.mesh.startswith(ADAPTIVE)
 
     @property
     def law(self) -> str:
@@ -72,8 +86,8 @@ class Row:
         return f"{kind}ε = {width}"
 
     @property
-    def words(self) -> str:
-        """The setting in words; what is as the program chooses goes without saying."""
+    def text(self) -> str:
+        """The setting in words; what is as the program chooses is left out."""
         parts = [self.mesh, self.law]
         parts += [self.method] if self.method != "auto" else []
         parts += [f"tolerance {self.tolerance:g}"] if self.tolerance != 1e-8 else []
@@ -89,16 +103,27 @@ def row(
     point: str,
     setting: Setting,
     record: Mapping[str, Any],
-    errors: Errors | None,
-    part: Errors | None,
-    left_out: float | None,
     certain: Mapping[str, Certainty],
+    *,
+    errors: Errors | None = None,
+    epsilon_part: Errors | None = None,
+    left_out: float | None = None,
 ) -> Row:
-    """The row of a finished point."""
+    """The row of a finished point.
+
+    Args:
+        point: its name.
+        setting: what it solved.
+        record: what it cost and found.
+        certain: how well the reference is known, by quantity.
+        errors: relative, against the reference.
+        epsilon_part: how far it is from the exact law on its own mesh.
+        left_out: part of Γc that ``friction_max`` leaves out.
+    """
     wanted, cost = setting.scene.solver, record.get("cost") or {}
     return Row(
         point=point,
-        mesh=meshes.words(setting),
+        mesh=setting.mesh,
         h=None if setting.accuracy is not None else setting.scene.domain.width() or record.get("h"),
         smoothing=wanted.smoothing,
         epsilon=record.get("epsilon", wanted.epsilon) if wanted.smoothing else None,
@@ -109,7 +134,7 @@ def row(
         **_picked(record, _RECORDED),
         **_picked(cost, ("seconds", "spread", "runs", "phases")),
         errors=errors,
-        epsilon_part=part,
+        epsilon_part=epsilon_part,
         left_out=left_out,
         beyond_reference=_beyond(errors, certain),
     )
@@ -127,24 +152,35 @@ def _beyond(errors: Errors | None, certain: Mapping[str, Certainty]) -> tuple[st
     return tuple(name for name, value, own in pairs if value is not None and own is not None and value < own)
 
 
-GAIN = 0.95
-"""So much smaller an error must be to be worth more time: below this, two solutions are the same."""
+def claimed_error(found: Row, quantity: str, certain: Mapping[str, Certainty]) -> float | None:
+    """The error that can be claimed: not less than the reference's own.
 
-
-def told(found: Row, quantity: str, certain: Mapping[str, Certainty]) -> float | None:
-    """The error that can be claimed: not less than the reference's own."""
+    Args:
+        found: the point.
+        quantity: key of the error norm.
+        certain: how well the reference is known, by quantity.
+    """
     error = found.error(quantity)
     return None if error is None else max(error, certain[quantity].error or 0.0)
 
 
-def front(rows: Sequence[Row], quantity: str, certain: Mapping[str, Certainty]) -> list[Row]:
-    """The points that nothing cheaper is as accurate as, cheapest first (Pareto)."""
-    pairs = [(r.seconds, told(r, quantity, certain), r) for r in rows]
+def front(
+    rows: Sequence[Row], quantity: str, certain: Mapping[str, Certainty], thresholds: Thresholds = DEFAULT
+) -> list[Row]:
+    """The Pareto front: the points that nothing cheaper is as accurate as, cheapest first.
+
+    Args:
+        rows: all points.
+        quantity: key of the error norm.
+        certain: how well the reference is known, by quantity.
+        thresholds: which gain in accuracy counts.
+    """
+    pairs = [(r.seconds, claimed_error(r, quantity, certain), r) for r in rows]
     known = sorted(((s, e, r) for s, e, r in pairs if s is not None and e is not None), key=lambda t: t[:2])
     found: list[Row] = []
     best = float("inf")
     for _, error, candidate in known:
-        if error < GAIN * best:
+        if error < thresholds.gain * best:
             best = error
             found.append(candidate)
     return found
@@ -166,7 +202,7 @@ def _flat(found: Row) -> dict[str, Any]:
     for name, keys in (("phases", PHASES), ("iterations", ("newton", "linear", "levels", "branch"))):
         plain |= {f"{name}_{key}": (data[name] or {}).get(key) for key in keys}
     for name, prefix in (("errors", "error"), ("epsilon_part", "epsilon_part")):
-        plain |= {f"{prefix}_{key}": (data[name] or {}).get(key) for key in QUANTITIES}
+        plain |= {f"{prefix}_{key}": (data[name] or {}).get(key) for key in ERROR_NORMS}
     return {**plain, "beyond_reference": " ".join(found.beyond_reference)}
 
 

@@ -27,9 +27,11 @@ from hvi_fenicsx.mesh.domain import Domain
 from hvi_fenicsx.mesh.shapes import Rectangle
 from hvi_fenicsx.mesh.transfer import GridTransfer
 from hvi_fenicsx.results import gathering
-from hvi_fenicsx.studies import cost, interpolation, meshes, plan, reference, sentences, table
-from hvi_fenicsx.studies.errors import QUANTITIES, Yardstick
-from hvi_fenicsx.studies.reference import Certainty
+from hvi_fenicsx.studies import axes, cost, interpolation, meshes, plan, scene_tables, sentences, table, thresholds
+from hvi_fenicsx.studies.certainty import Certainty, certainty
+from hvi_fenicsx.studies.error_norms import ERROR_NORMS, error_norm, errors
+from hvi_fenicsx.studies.reference_solution import ReferenceSolution, TransferredSolution
+from hvi_fenicsx.studies.setting import Setting
 from hvi_fenicsx.studies.solution_fields import PartFields, SolutionFields, fields, width
 from hvi_fenicsx.studies.stiffness import stiffness
 from hvi_fenicsx.typing import Array, Integers
@@ -49,11 +51,11 @@ def taken(found: Scene | Solution) -> SolutionFields:
 
 
 @pytest.fixture(scope="module")
-def yardstick() -> Yardstick:
+def reference() -> ReferenceSolution:
     solution = solve(scene(8, friction=LAW), MPI.COMM_SELF)
     matrix, found = stiffness(solution), taken(solution)
     assert matrix is not None
-    return Yardstick(found, matrix)
+    return ReferenceSolution(found, matrix)
 
 
 @pytest.mark.parametrize("shape", ["rectangle", "box"])
@@ -113,26 +115,26 @@ def test_the_closed_form_is_met_on_every_mesh() -> None:
     solution = solve(scene(8), MPI.COMM_SELF)
     matrix, found = stiffness(solution), taken(solution)
     assert matrix is not None
-    exact = Yardstick(found, matrix)
-    errors = exact.errors(exact.move(taken(scene(4))))
-    known = {name: value for name, value in errors.items() if value is not None}
+    exact = ReferenceSolution(found, matrix)
+    found_errors = errors(exact, exact.transfer(taken(scene(4))))
+    known = {name: value for name, value in found_errors.items() if value is not None}
     assert set(known) == {"energy_norm", "u_t_l2", "u_t_max", "pressure_l1", "pressure_l2", "contact_set", "resultant"}
     assert max(known.values()) < 1e-9
 
 
-def test_every_norm_measures_a_known_difference(yardstick: Yardstick) -> None:
+def test_every_norm_measures_a_known_difference(reference: ReferenceSolution) -> None:
     """All fields one per cent larger: one per cent in every norm; and a rigid motion has no energy."""
-    here = yardstick.sample
+    here = reference.fields
     parts = {
         name: replace(p, slip=1.01 * p.slip, friction=1.01 * p.friction, pressure=1.01 * p.pressure)
         for name, p in here.parts.items()
     }
-    errors = yardstick.errors(yardstick.move(replace(here, u=1.01 * here.u, parts=parts)))
-    assert errors.pop("contact_set") == 0.0
-    assert errors.pop("friction_max") == pytest.approx(0.01)
-    assert all(value == pytest.approx(0.01, rel=1e-9) for value in errors.values()), errors
+    found = errors(reference, reference.transfer(replace(here, u=1.01 * here.u, parts=parts)))
+    assert found.pop("contact_set") == 0.0
+    assert found.pop("friction_max") == pytest.approx(0.01)
+    assert all(value == pytest.approx(0.01, rel=1e-9) for value in found.values()), found
     turned = here.u + 1e-6 * np.column_stack([1.0 - here.points[:, 1], here.points[:, 0]])
-    assert yardstick.errors(yardstick.move(replace(here, u=turned)))["energy_norm"] < 1e-6  # type: ignore[operator]
+    assert errors(reference, reference.transfer(replace(here, u=turned)))["energy_norm"] < 1e-6  # type: ignore[operator]
 
 
 def test_the_energy_norm_is_that_of_the_closed_form() -> None:
@@ -145,27 +147,27 @@ def test_the_energy_norm_is_that_of_the_closed_form() -> None:
     assert u @ (matrix @ u) * scales.energy == pytest.approx(12.0, rel=1e-9)
 
 
-def test_near_a_drop_of_the_law_the_largest_error_leaves_vertices_out(yardstick: Yardstick) -> None:
-    here, (name, part) = yardstick.sample, next(iter(yardstick.sample.parts.items()))
+def test_near_a_drop_of_the_law_the_largest_error_leaves_vertices_out(reference: ReferenceSolution) -> None:
+    here, (name, part) = reference.fields, next(iter(reference.fields.parts.items()))
     slips = np.where(part.points[:, 0] < 0.5, 1.0, 3.0)[:, None]
-    dropped = Yardstick(
-        replace(here, parts={name: replace(part, slip=slips, drops=np.array([2.0]))}), yardstick.stiffness
+    dropped = ReferenceSolution(
+        replace(here, parts={name: replace(part, slip=slips, drops=np.array([2.0]))}), reference.stiffness
     )
-    near = dropped._near(name, dropped.here)
+    near = dropped.near_jump(name, dropped.own)
     jump = 0.5 - 1 / 16  # the slip passes the drop between the vertices at 3/8 and 1/2
     np.testing.assert_array_equal(near, np.abs(part.points[:, 0] - jump) <= 2 / 8)
-    assert dropped.left_out(dropped.here) == pytest.approx(float(part.weights[near].sum()))
+    assert dropped.left_out(dropped.own) == pytest.approx(float(part.weights[near].sum()))
 
 
 @pytest.mark.parametrize("order", [0.7, 1.0, 1.6])
-def test_the_references_own_error_follows_from_the_rungs_below(order: float) -> None:
+def test_the_references_own_error_follows_from_the_coarser_levels(order: float) -> None:
     """Errors C hᵖ, additive; in the energy norm their squares are."""
     h, c = 0.1, 3.0
     truth = c * h**order
-    below = [dict.fromkeys(QUANTITIES, c * (n * h) ** order - truth) for n in (2, 4)]
-    for errors, n in zip(below, (2, 4), strict=True):
-        errors["energy_norm"] = math.sqrt((c * (n * h) ** order) ** 2 - truth**2)
-    for found in reference.certainty(below).values():
+    below = [dict.fromkeys(ERROR_NORMS, c * (n * h) ** order - truth) for n in (2, 4)]
+    for at_level, n in zip(below, (2, 4), strict=True):
+        at_level["energy_norm"] = math.sqrt((c * (n * h) ** order) ** 2 - truth**2)
+    for found in certainty(below).values():
         assert found.error == pytest.approx(truth)
         assert found.order == pytest.approx(order)
 
@@ -187,16 +189,14 @@ def test_a_point_is_repeated_until_its_median_is_steady() -> None:
 
 def rows_of(pairs: list[tuple[float, float]]) -> list[table.Row]:
     record = {"converged": True, "reason": "certified", "exit_code": 0, "dofs": 1}
-    certain = dict.fromkeys(QUANTITIES, Certainty(1e-4, None))
+    certain = dict.fromkeys(ERROR_NORMS, Certainty(1e-4, None))
     return [
         table.row(
             str(i),
-            meshes.Setting(scene(4)),
+            Setting(scene(4)),
             {**record, "cost": {"seconds": s, "spread": None, "runs": 1, "phases": None}},
-            dict.fromkeys(QUANTITIES, e),
-            None,
-            None,
             certain,
+            errors=dict.fromkeys(ERROR_NORMS, e),
         )
         for i, (s, e) in enumerate(pairs)
     ]
@@ -205,9 +205,10 @@ def rows_of(pairs: list[tuple[float, float]]) -> list[table.Row]:
 def test_the_front_holds_what_nothing_cheaper_is_as_accurate_as() -> None:
     draws = np.random.default_rng(5).uniform(-3, 0, (40, 2))
     pairs = [(10.0**s, 10.0**e) for s, e in draws]
-    rows, certain = rows_of(pairs), dict.fromkeys(QUANTITIES, Certainty(1e-4, None))
+    rows, certain = rows_of(pairs), dict.fromkeys(ERROR_NORMS, Certainty(1e-4, None))
     found = table.front(rows, "energy_norm", certain)
-    better = [not any(s < t and e < r / table.GAIN for s, e in pairs) for t, r in pairs]
+    gain = thresholds.DEFAULT.gain
+    better = [not any(s < t and e < r / gain for s, e in pairs) for t, r in pairs]
     assert {int(r.point) for r in found} <= {i for i, good in enumerate(better) if good}
     assert all(a.errors["energy_norm"] > b.errors["energy_norm"] for a, b in pairwise(found))  # type: ignore[index, operator]
     assert min(e for _, e in pairs) == pytest.approx(found[-1].errors["energy_norm"], rel=0.06)  # type: ignore[index]
@@ -215,13 +216,15 @@ def test_the_front_holds_what_nothing_cheaper_is_as_accurate_as() -> None:
 
 def test_a_sentence_names_the_cheapest_setting_for_each_accuracy() -> None:
     rows = rows_of([(0.1, 0.05), (0.2, 0.004), (0.3, 0.006), (0.4, 0.002)])
-    certain = dict.fromkeys(QUANTITIES, Certainty(1e-4, None))
-    words = sentences._targets(rows, "energy_norm", certain)
+    certain = dict.fromkeys(ERROR_NORMS, Certainty(1e-4, None))
+    words = sentences.targets(rows, "energy_norm", certain)
     assert "10 % for 0.1 s" in words
     assert "1 % for 0.2 s" in words
     assert "0.1 % is not reached here: the best is 0.2 % for 0.4 s" in words
-    unsure = dict.fromkeys(QUANTITIES, Certainty(0.02, None))
-    assert "1 % cannot be told: the reference itself is uncertain by 2 %" in sentences._targets(rows, "u_t_l2", unsure)
+    unsure = dict.fromkeys(ERROR_NORMS, Certainty(0.02, None))
+    assert "1 % cannot be claimed: the reference itself is uncertain by 2 %" in sentences.targets(
+        rows, "u_t_l2", unsure
+    )
 
 
 def test_an_order_is_told_from_errors_that_the_reference_resolves() -> None:
@@ -229,9 +232,9 @@ def test_an_order_is_told_from_errors_that_the_reference_resolves() -> None:
     rows = [
         replace(r, h=h) for h, r in zip((0.4, 0.2, 0.1), rows_of([(0.1, 0.04), (0.2, 0.02), (0.3, 0.005)]), strict=True)
     ]
-    unsure = dict.fromkeys(QUANTITIES, Certainty(0.005, None))
+    unsure = dict.fromkeys(ERROR_NORMS, Certainty(0.005, None))
     assert sentences.order(rows, rows[0], "u_t_l2", unsure) == pytest.approx(1.0)
-    assert sentences.order(rows, rows[0], "u_t_l2", dict.fromkeys(QUANTITIES, Certainty(1e-4, None))) == pytest.approx(
+    assert sentences.order(rows, rows[0], "u_t_l2", dict.fromkeys(ERROR_NORMS, Certainty(1e-4, None))) == pytest.approx(
         2.0
     )
 
@@ -239,36 +242,73 @@ def test_an_order_is_told_from_errors_that_the_reference_resolves() -> None:
 def test_methods_that_refuse_the_scene_did_not_fail() -> None:
     own, other = rows_of([(0.1, 0.04), (0.2, 0.04)])
     refused = replace(other, method="tao", converged=False, exit_code=2, seconds=None)
-    words = [*sentences._methods([own, refused], own), *sentences._failures([own, refused])]
+    words = [*sentences.methods([own, refused], own), *sentences.failures([own, refused])]
     assert words == ["Methods, at the scene's own setting: auto 0.1 s; tao not for this scene."]
 
 
 def test_adaptive_meshes_are_set_beside_the_uniform_one_that_does_as_well() -> None:
     rows = rows_of([(0.1, 0.05), (0.2, 0.009), (0.5, 0.008)])
     rows = [replace(rows[0], dofs=50), replace(rows[1], dofs=900), replace(rows[2], dofs=90, mesh="adaptive to 1 %")]
-    certain = dict.fromkeys(QUANTITIES, Certainty(1e-4, None))
-    (words,) = sentences._adaptive(rows, certain)
+    certain = dict.fromkeys(ERROR_NORMS, Certainty(1e-4, None))
+    (words,) = sentences.adaptive_meshes(rows, certain)
     assert "0.8 % with 90 unknowns (0.5 s)" in words
     assert "more than any" in words
-    (words,) = sentences._adaptive([rows[0], replace(rows[1], errors=rows[2].errors), rows[2]], certain)
+    (words,) = sentences.adaptive_meshes([rows[0], replace(rows[1], errors=rows[2].errors), rows[2]], certain)
     assert "a uniform mesh needs 900 (0.2 s) for 0.8 %" in words
-    (words,) = sentences._adaptive(rows, dict.fromkeys(QUANTITIES, Certainty(0.02, None)))
+    (words,) = sentences.adaptive_meshes(rows, dict.fromkeys(ERROR_NORMS, Certainty(0.02, None)))
     assert "2 % with 90 unknowns" in words
 
 
 def test_the_share_of_epsilon_is_that_of_its_distance_from_the_exact_law() -> None:
     own, exact = rows_of([(0.1, 0.5), (0.1, 0.01)])
-    own = replace(own, smoothing="paper", epsilon=1.0, epsilon_part=dict.fromkeys(QUANTITIES, 0.49))
+    own = replace(own, smoothing="paper", epsilon=1.0, epsilon_part=dict.fromkeys(ERROR_NORMS, 0.49))
     assert sentences.share_of_epsilon(own, exact, "friction_l1") == pytest.approx(0.98)
-    assert "nearly all of it ε" in sentences._own(own, exact, "friction_l1")
+    assert "nearly all of it ε" in sentences.own_setting(own, exact, "friction_l1")
 
 
 def test_a_plan_is_the_product_of_its_axes_with_the_exact_law_on_every_mesh() -> None:
-    made = plan.make(scene(4, friction=LAW), [plan.axis("mesh=2,8"), plan.axis("epsilon=1,exact")])
+    made = plan.make(scene(4, friction=LAW), [axes.read("mesh=2,8"), axes.read("epsilon=1,exact")])
     found = {(s.scene.domain.cells[0], s.scene.solver.epsilon) for s in made.points}  # type: ignore[union-attr]
     assert found == {(2, 1.0), (2, None), (8, 1.0), (8, None), (4, None)}
     assert [s.scene.domain.cells[0] for s in made.reference] == [32, 16, 8]  # type: ignore[union-attr]
     assert all(s.scene.solver.smoothing is None for s in made.reference)
+
+
+def test_combinations_that_are_no_scene_are_left_out() -> None:
+    made = plan.make(
+        scene(4, friction=LAW), [axes.read(a) for a in ("method=auto,branch", "smoothing=chks", "epsilon=1")]
+    )
+    assert {(s.scene.solver.method, s.scene.solver.smoothing) for s in made.points} == {
+        ("auto", None),
+        ("auto", "chks"),
+    }
+    assert "solves the law without smoothing" in made.left_out[0]
+
+
+def test_an_axis_is_one_class(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(axes.Axis, "registry", dict(axes.Axis.registry))
+
+    class MaxIterations(axes.Axis):
+        name = "max_iterations"
+
+        def apply(self, tables: dict[str, Any], value: str, beside: object) -> dict[str, Any]:
+            return scene_tables.with_solver(tables, max_iterations=int(value))
+
+    made = plan.make(scene(4, friction=LAW), [axes.read("max_iterations=7,9")])
+    assert {s.scene.solver.max_iterations for s in made.points} >= {7, 9}
+
+
+def test_an_error_norm_is_one_function(reference: ReferenceSolution, monkeypatch: pytest.MonkeyPatch) -> None:
+    for key in list(ERROR_NORMS):
+        monkeypatch.delitem(ERROR_NORMS, key)
+
+    @error_norm("u_max", description="displacement, largest", name="u (largest)")
+    def largest(reference: ReferenceSolution, found: TransferredSolution, other: TransferredSolution) -> float:
+        return float(np.abs(found.u - other.u).max() / np.abs(reference.own.u).max())
+
+    here = reference.fields
+    assert errors(reference, reference.transfer(replace(here, u=1.5 * here.u))) == {"u_max": pytest.approx(0.5)}
+    monkeypatch.delitem(ERROR_NORMS, "u_max")
 
 
 @pytest.mark.parametrize(("mesh_size", "below"), [(0.02, None), (0.02, 2e-3), (0.01, 2e-3)])
@@ -279,7 +319,7 @@ def test_the_unknowns_of_a_graded_mesh_are_foreseen(shape: str, mesh_size: float
     made = Scene.model_validate({**model(4, 1e6), "domain": table, "boundary": {}})
     body = made.domain.build(MPI.COMM_SELF, 2)
     true = 2 * body.mesh.topology.index_map(0).size_global
-    assert 0.6 < meshes.unknowns(meshes.Setting(made)) / true < 1.4
+    assert 0.6 < Setting(made).unknowns / true < 1.4
 
 
 @pytest.mark.parametrize("shape", ["rectangle", "box"])
@@ -306,7 +346,7 @@ def cells_of(body: Domain) -> tuple[Array, Integers]:
 
 
 def test_adaptive_meshes_are_added_and_the_reference_stays_finer_than_the_scenes_own_mesh() -> None:
-    made = plan.make(scene(8, friction=LAW), [plan.axis("mesh=4"), plan.axis("accuracy=0.1,0.05")])
+    made = plan.make(scene(8, friction=LAW), [axes.read("mesh=4"), axes.read("accuracy=0.1,0.05")])
     assert [s.accuracy for s in made.points if s.accuracy] == [0.1, 0.05]
     assert {s.scene.domain.cells[0] for s in made.points if not s.accuracy} == {4, 8}  # type: ignore[union-attr]
     assert made.reference[0].scene.domain.cells[0] == 32  # type: ignore[union-attr]
@@ -324,7 +364,7 @@ def test_a_plan_of_the_programs_own_varies_what_the_scene_has() -> None:
 
 
 @pytest.mark.parametrize(
-    ("axes", "words"),
+    ("given", "words"),
     [
         (["mash=1"], "did you mean 'mesh'"),
         (["mesh="], "needs values"),
@@ -336,9 +376,9 @@ def test_a_plan_of_the_programs_own_varies_what_the_scene_has() -> None:
         (["smoothing=chks"], "epsilon"),
     ],
 )
-def test_a_bad_plan_says_how_to_mend_it(axes: list[str], words: str) -> None:
+def test_a_bad_plan_says_how_to_mend_it(given: list[str], words: str) -> None:
     with pytest.raises(InputError) as error:
-        plan.make(scene(4, friction=LAW), [plan.axis(a) for a in axes])
+        plan.make(scene(4, friction=LAW), [axes.read(text) for text in given])
     assert words in str(error.value).replace('"', "'")
 
 
@@ -352,7 +392,7 @@ def test_cells_that_do_not_come_out_whole_are_refused_with_those_that_do() -> No
 
 def test_a_scene_without_a_law_has_no_epsilon() -> None:
     with pytest.raises(InputError, match="no law"):
-        plan.make(scene(4), [plan.axis("epsilon=1")])
+        plan.make(scene(4), [axes.read("epsilon=1")])
 
 
 @pytest.fixture(scope="module")
@@ -380,7 +420,7 @@ def test_a_study_leaves_numbers_and_pictures(studied: Path) -> None:
         assert float(line["seconds"]) == pytest.approx(sum(point["phases"].values()))
         assert point["peak_memory_mb"] > 50
     assert found["own"] == found["exact"]
-    assert set(found["quantities"]) == set(QUANTITIES)
+    assert set(found["quantities"]) == set(ERROR_NORMS)
     assert {p.name for p in (studied / "out").glob("*.png")} == {"work_precision.png", "error_epsilon.png", "time.png"}
 
 
@@ -405,7 +445,7 @@ def test_under_mpirun_the_points_run_on_its_ranks_and_the_errors_are_the_same(st
     assert two["ranks"] == 2
     for a, b in zip(one["points"], two["points"], strict=True):
         assert b["converged"]
-        for name in QUANTITIES:
+        for name in ERROR_NORMS:
             assert a["errors"][name] == pytest.approx(b["errors"][name], rel=1e-5, abs=1e-8), name
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import base64
 import shlex
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +19,7 @@ _FIRST = ("escape", "scene", "body", "stress")
 
 def content(result: Result) -> dict[str, Any]:
     """All that the template shows."""
-    shown = {path.stem: picture(path) for path in _pictures(result.folder)}
+    shown = {path.stem: picture(path) for path in pictures(result.folder, _FIRST)}
     return {
         "title": str(result.scene.get("title") or result.summary.get("scene") or result.folder.name),
         "summary": result.summary,
@@ -40,10 +40,15 @@ def content(result: Result) -> dict[str, Any]:
     }
 
 
-def _pictures(folder: Path) -> list[Path]:
-    """The finished pictures, the known ones first."""
+def pictures(folder: Path, first: Sequence[str]) -> list[Path]:
+    """The finished pictures of a folder.
+
+    Args:
+        folder: the folder.
+        first: the names of those that come first, in this order; the others follow by their names.
+    """
     found = (path for path in folder.glob("*.png") if not path.name.startswith("."))
-    return sorted(found, key=lambda p: (_FIRST.index(p.stem) if p.stem in _FIRST else len(_FIRST), p.stem))
+    return sorted(found, key=lambda p: (first.index(p.stem) if p.stem in first else len(first), p.stem))
 
 
 def picture(path: Path) -> dict[str, Any]:

@@ -7,15 +7,11 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import PageError
-from .content import picture
+from .content import picture, pictures
 from .render import NAME, render
 
-_CAPTIONS = {
-    "work_precision": "Error against time: each point a run, the line what nothing cheaper is as accurate as.",
-    "error_h": "Error against the mesh width.",
-    "error_epsilon": "Error against ε, the width of the smoothing.",
-    "time": "Where the time goes.",
-}
+_FIRST = ("work_precision", "error_h", "error_epsilon", "time")
+"""The pictures that are shown first, in this order; what is not named here comes after, by its name."""
 
 
 def write(folder: Path) -> Path:
@@ -33,11 +29,10 @@ def write(folder: Path) -> Path:
 
 
 def _content(study: dict[str, Any], folder: Path) -> dict[str, Any]:
-    shown = [folder / f"{name}.png" for name in _CAPTIONS]
     return {
         "title": f"{study['scene'] or 'untitled'}: what accuracy costs",
         "sentences": list(study["sentences"]),
-        "pictures": [{**picture(path), "caption": _CAPTIONS[path.stem]} for path in shown if path.exists()],
+        "pictures": [picture(path) for path in pictures(folder, _FIRST)],
         "facts_of_study": [
             ("points", str(len(study["points"]))),
             ("MPI ranks of each", str(study["ranks"])),

@@ -1,0 +1,133 @@
+"""The command ``hvi study``: what accuracy costs in time. Run, measured, drawn and written into a folder."""
+
+from __future__ import annotations
+
+import argparse
+import os
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from ..errors import ExitCode
+from ..report.html import study_page
+from ..runtime.versions import __version__, versions
+from ..scene import read_scene
+from . import axes, plots, table
+from .error_norms import ERROR_NORMS
+from .errors import NoReferenceError
+from .plan import Plan, make
+from .progress import StudyProgress
+from .runner import PointRun, Runner, watched
+from .sentences import headlines, percent, sentences, share_of_epsilon
+from .setting import Setting
+from .store import MARK, Existing, Store, write_json, write_text
+from .study import Study, evaluate
+from .thresholds import DEFAULT
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run a study into a folder; the exit code. On one process: the points start their own.
+
+    Raises:
+        InputError: the scene, the plan or the folder cannot be used.
+        NoReferenceError: no solution exists (3), or the reference is not certified (4).
+        StudyInterruptedError: a signal came (130); finished points are kept.
+    """
+    scene = read_scene(options.scene, options.overrides)
+    plan = make(scene, [axes.read(text) for text in options.axis])
+    folder = Path(os.path.abspath(options.out or Path("results") / f"{options.scene.stem}-study"))
+    store = Store(folder, options.np or 1)
+    store.open(_existing(options))
+    with watched(folder):
+        with StudyProgress() as progress:
+            repeat, limit = options.repeat or DEFAULT.repetitions, options.limit or DEFAULT.time_limit
+            _run(plan, Runner(store, repeat, limit, progress))
+        study = evaluate(plan, store)
+        plots.draw(study, folder)
+        write(study, folder)
+        study_page.write(folder)
+    print("\n".join([*_heading(study), *said(study), f"{folder}: {MARK}, study.csv, pictures"]))
+    return 0
+
+
+def _existing(options: argparse.Namespace) -> Existing:
+    return "replace" if options.force else "resume" if options.resume else "refuse"
+
+
+def _run(plan: Plan, runner: Runner) -> None:
+    """The reference first: without it the rest is in vain."""
+    references = [PointRun(setting, stiffness=i == 0) for i, setting in enumerate(plan.reference)]
+    wanted = {runner.store.name(one.setting): one for one in (*references, *map(PointRun, plan.points))}
+    wanted |= {runner.store.name(references[0].setting): references[0]}
+    runs = list(wanted.values())
+    runner.run(runs[:1], runs)
+    _check(plan.reference[0], runner.store)
+    runner.run(runs, runs)
+
+
+def _check(reference: Setting, store: Store) -> None:
+    record = store.record(reference) or {}
+    if not record.get("converged"):
+        raise NoReferenceError(
+            f"the reference ({reference.mesh}, exact law) has no certified solution: {record.get('reason')}; "
+            "see `hvi run`, or choose coarser meshes with --axis mesh=...",
+            record.get("exit_code") or ExitCode.NOT_CONVERGED,
+        )
+
+
+def write(study: Study, folder: Path) -> None:
+    """Write ``study.csv`` and, last, ``study.json``.
+
+    Args:
+        study: what was found.
+        folder: where to.
+    """
+    write_text(folder / "study.csv", table.as_csv(study.rows))
+    write_json(folder / MARK, as_data(study))
+
+
+def said(study: Study) -> list[str]:
+    """What a study says, in sentences."""
+    known = [(q, study.certain[q].error) for q in headlines(study.rows)]
+    parts = [f"{percent(e)} in {ERROR_NORMS[q].name}" for q, e in known if e is not None]
+    sure = f"itself uncertain by {', '.join(parts)}" if parts else "on the only mesh there is"
+    reference = f"{study.reference.text} ({study.reference.dofs or 0:,} unknowns)"
+    return [
+        *sentences(study.rows, study.own, study.exact, study.certain),
+        f"Measured against {reference}, {sure}.",
+    ]
+
+
+def as_data(study: Study) -> dict[str, Any]:
+    """All of ``study.json`` (docs/study.md)."""
+    return {
+        "scene": study.scene.title,
+        "version": __version__,
+        "ranks": study.ranks,
+        "sentences": said(study),
+        "quantities": {key: norm.description for key, norm in ERROR_NORMS.items()},
+        "headlines": headlines(study.rows),
+        "own": study.own.point,
+        "exact": study.exact.point,
+        "share_of_epsilon": {q: share_of_epsilon(study.own, study.exact, q) for q in ERROR_NORMS},
+        "reference": {
+            **asdict(study.reference),
+            "certainty": {q: asdict(c) for q, c in study.certain.items()},
+            "errors_of_coarser_rungs": list(study.coarser),
+        },
+        "fronts": {q: [r.point for r in table.front(study.rows, q, study.certain)] for q in ERROR_NORMS},
+        "points": table.as_data(study.rows),
+        "left_out": list(study.left_out),
+        "versions": versions(),
+    }
+
+
+def _heading(study: Study) -> Sequence[str]:
+    title = study.scene.title or "untitled"
+    certified = sum(r.converged for r in study.rows)
+    ranks = "1 rank" if study.ranks == 1 else f"{study.ranks} ranks"
+    lines = [f"{title}: {len(study.rows)} points, {certified} certified, on {ranks}"]
+    if study.left_out:
+        lines.append(f"{len(study.left_out)} combinations are no scenes, like {study.left_out[0]}")
+    return lines

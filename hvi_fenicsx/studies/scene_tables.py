@@ -1,0 +1,76 @@
+"""A scene as tables that a study changes: as they stand in a file, but the domain as an object."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from typing import Any
+
+from pydantic import ValidationError
+
+from ..laws import smoothing
+from ..scene import Scene, dump_scene
+from ..schema import input_error
+from ..workflow import options_of
+from .setting import Setting
+
+Tables = dict[str, Any]
+WIDTHS = ("epsilon", "epsilon_absolute")
+"""The two keys of the solver table for the width of the smoothing."""
+
+
+def tables_of(scene: Scene) -> Tables:
+    """The tables of a scene."""
+    return {**tomllib.loads(dump_scene(scene)), "domain": scene.domain}
+
+
+def setting_of(tables: Mapping[str, Any]) -> Setting:
+    """The scene of these tables.
+
+    Raises:
+        InputError: the tables contradict each other, or its laws cannot be smoothed as they say.
+    """
+    try:
+        scene = Scene.model_validate(tables)
+    except ValidationError as error:
+        raise input_error(error, Scene) from None
+    wanted = scene.solver
+    options_of(wanted)
+    for law in laws(scene) if wanted.smoothing else ():
+        smoothing.create(str(wanted.smoothing), law, epsilon=wanted.epsilon, epsilon_absolute=wanted.epsilon_absolute)
+    return Setting(scene)
+
+
+def laws(scene: Scene) -> list[Any]:
+    """The scene's laws."""
+    return [law for placed in scene.effects() for law in placed.effect.superpotentials()]
+
+
+def with_solver(tables: Mapping[str, Any], **values: Any) -> Tables:
+    """The tables with other values in the solver table.
+
+    Args:
+        tables: of a scene.
+        values: by key.
+    """
+    return {**tables, "solver": {**tables.get("solver", {}), **values}}
+
+
+def without(tables: Mapping[str, Any], *keys: str) -> Tables:
+    """The tables without some keys of the solver table.
+
+    Args:
+        tables: of a scene.
+        keys: of the solver table.
+    """
+    return {**tables, "solver": {k: v for k, v in tables.get("solver", {}).items() if k not in keys}}
+
+
+def unsmoothed(tables: Mapping[str, Any]) -> Tables:
+    """The tables with the exact law."""
+    return without(tables, "smoothing", *WIDTHS)
+
+
+def smooths(tables: Mapping[str, Any]) -> bool:
+    """Whether the tables name a width of the smoothing."""
+    return any(key in tables.get("solver", {}) for key in WIDTHS)
