@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 from dolfinx import fem
+from domains import COMM, measure
 from petsc4py import PETSc
-from test_refinement import COMM, measure
 
 from hvi_fenicsx.mesh import gmsh_file
 from hvi_fenicsx.mesh.hierarchy import with_hierarchy

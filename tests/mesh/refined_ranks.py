@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 from dolfinx import fem
+from domains import BODIES, COMM, measure, towards, volume
 from petsc4py import PETSc
-from test_refinement import BODIES, COMM, measure, towards, volume
 
 
 def main() -> None:

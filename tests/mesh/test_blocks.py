@@ -50,7 +50,10 @@ def test_ranks_have_as_many_cells_and_the_same_part_on_each_level(cells: list[in
         assert np.prod(part[1] - part[0]) * ranks == pytest.approx(np.prod(cells), rel=0.15)
 
 
-@pytest.mark.parametrize(("ranks", "cells", "away"), [(2, (16, 24), 1), (3, (24, 36), 1), (3, (16, 20), 2)])
+BETWEEN = [pytest.param(2, (16, 24), 1, marks=pytest.mark.long), (3, (24, 36), 1), (3, (16, 20), 2)]
+
+
+@pytest.mark.parametrize(("ranks", "cells", "away"), BETWEEN)
 def test_values_between_levels_cross_ranks_at_the_cuts_only(ranks: int, cells: tuple[int, int], away: int) -> None:
     """A vertex next to a cut is the mean of one on it; where the levels' cuts differ by a cell, so do the vertices."""
     found = on_ranks(ranks, "tests/mesh/block_ranks.py", *cells)

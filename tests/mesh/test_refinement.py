@@ -14,21 +14,16 @@ from pathlib import Path
 
 import meshes
 import numpy as np
-import numpy.typing as npt
 import pytest
-import ufl
 from dolfinx import fem
 from dolfinx import mesh as dmesh
-from mpi4py import MPI
+from domains import BODIES, COMM, half_disk, lost, measure, rough, towards, volume
+from runs import RANKS
 from scenes import model, quadratic_linear, solved_system
-from test_transfer import lost, rough
 
 from hvi_fenicsx import Scene, workflow
 from hvi_fenicsx.mesh import gmsh_file, refinement
-from hvi_fenicsx.mesh.blocks import block
 from hvi_fenicsx.mesh.domain import Domain
-from hvi_fenicsx.mesh.refinement import Refinement
-from hvi_fenicsx.mesh.shapes import HalfDisk
 from hvi_fenicsx.runtime.timing import Timer
 from hvi_fenicsx.solvers.context import RunControl
 from hvi_fenicsx.solvers.nested_iteration import CoarseStart, ascend
@@ -37,52 +32,6 @@ from hvi_fenicsx.system import levels
 from hvi_fenicsx.system.assemble import assemble
 from hvi_fenicsx.system.system import System
 from hvi_fenicsx.system.thresholds import Thresholds as LinearThresholds
-
-COMM = MPI.COMM_WORLD
-
-
-def rectangle() -> Domain:
-    return block(COMM, [1.0, 2.0], [3, 5])
-
-
-def box() -> Domain:
-    return block(COMM, [1.0, 2.0, 0.5], [2, 3, 2])
-
-
-def half_disk() -> Domain:
-    return HalfDisk(radius=0.5, mesh_size=0.2).build(COMM, 2)
-
-
-BODIES: list[Callable[[], Domain]] = [rectangle, box, half_disk]
-
-
-def near(body: Domain, point: npt.NDArray[np.float64], radius: float) -> npt.NDArray[np.int32]:
-    """Local cells whose middle is so near to a point."""
-    count = body.mesh.topology.index_map(body.dimension).size_local
-    middles = dmesh.compute_midpoints(body.mesh, body.dimension, np.arange(count, dtype=np.int32))
-    return np.flatnonzero(np.linalg.norm(middles[:, : len(point)] - point, axis=1) < radius).astype(np.int32)
-
-
-def towards(body: Domain, point: npt.NDArray[np.float64], steps: int) -> list[Refinement]:
-    """Refinements around a point, each on half the radius of the one before."""
-    found: list[Refinement] = []
-    for step in range(steps):
-        found.append(refinement.marked(body, near(body, point, 0.8 * 0.6**step)))
-        body = found[-1].domain
-    return found
-
-
-def measure(body: Domain, name: str) -> float:
-    """Length or area of a side."""
-    facets = np.sort(body.sides[name])
-    tags = dmesh.meshtags(body.mesh, body.dimension - 1, facets, np.ones(len(facets), dtype=np.int32))
-    ds = ufl.Measure("ds", domain=body.mesh, subdomain_data=tags)(1)
-    return float(COMM.allreduce(fem.assemble_scalar(fem.form(fem.Constant(body.mesh, 1.0) * ds))))
-
-
-def volume(body: Domain) -> float:
-    dx = ufl.Measure("dx", domain=body.mesh)
-    return float(COMM.allreduce(fem.assemble_scalar(fem.form(fem.Constant(body.mesh, 1.0) * dx))))
 
 
 @pytest.mark.parametrize("make", BODIES[:2])
@@ -215,7 +164,7 @@ def assembled(scene: Scene, body: Domain) -> System:
     return assemble(body, workflow.model_of(scene), Timer())
 
 
-@pytest.mark.parametrize("ranks", [2, 3])
+@pytest.mark.parametrize("ranks", RANKS[1:])
 def test_ranks_agree(ranks: int) -> None:
     """The same lengths, vertices and transferred field, however the mesh is split."""
     parallel = _run(ranks)

@@ -7,13 +7,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import meshes
 import numpy as np
 import pytest
-from dolfinx import fem
-from dolfinx.mesh import Mesh
+from domains import lost, space_on
 from mpi4py import MPI
 from petsc4py import PETSc
 from scenes import NESTED, solved_system
@@ -44,12 +42,6 @@ SHAPES: list[tuple[list[str], int]] = [
 ]
 
 
-def rough(x: np.ndarray) -> np.ndarray:
-    """A field that is not in the coarse space."""
-    rows = [np.abs(x[0] - 0.3) + x[1] ** 2, np.sin(3 * x[0] * x[1]), x[2] ** 2 + np.abs(x[0] - x[1])]
-    return np.array(rows)
-
-
 @pytest.mark.parametrize(("overrides", "dimension"), SHAPES)
 def test_prolongation_keeps_a_coarse_field(overrides: list[str], dimension: int) -> None:
     """Against dolfinx's own interpolation between meshes that do not match."""
@@ -58,28 +50,6 @@ def test_prolongation_keeps_a_coarse_field(overrides: list[str], dimension: int)
     assert coarser is not None
     fine, coarse = space_on(block.mesh), space_on(coarser[0].mesh)
     assert lost(coarser[1].prolongation(fine, coarse), fine, coarse) < 1e-13
-
-
-def lost(step: PETSc.Mat, fine: fem.FunctionSpace, coarse: fem.FunctionSpace, *, linear: bool = False) -> float:
-    """Largest difference of a prolonged field, rough or linear, from its interpolation."""
-    known = fem.Function(coarse)
-    known.interpolate(lambda x: ((x[[1, 2, 0]] - x) if linear else rough(x))[: coarse.mesh.geometry.dim])
-    column = step.createVecRight()
-    column.array[:] = known.x.array[: column.local_size]
-    return float(np.max(np.abs((step * column).array - interpolated(fine, known))))
-
-
-def space_on(mesh: Mesh) -> fem.FunctionSpace:
-    """P1 vectors."""
-    return fem.functionspace(mesh, ("Lagrange", 1, (mesh.geometry.dim,)))
-
-
-def interpolated(fine: fem.FunctionSpace, known: fem.Function) -> Any:
-    cells = np.arange(fine.mesh.topology.index_map(fine.mesh.topology.dim).size_local, dtype=np.int32)
-    data = fem.create_interpolation_data(fine, known.function_space, cells, padding=1e-10)
-    result = fem.Function(fine)
-    result.interpolate_nonmatching(known, cells, data)
-    return result.x.array[: fine.dofmap.index_map.size_local * fine.dofmap.index_map_bs]
 
 
 def test_odd_and_small_meshes_have_no_coarser_ones() -> None:

@@ -131,6 +131,7 @@ def test_all_of_it_on_two_ranks(scene: Path, tmp_path: Path) -> None:
     codes, outs = tmp_path / "codes", [out.format(folder=tmp_path) for out in PLACES]
     meshed = {"linear triangles only": _on_a_damaged_mesh(tmp_path), "bottom, left, right, top": _misnamed(tmp_path)}
     calls = [*(["--set", override] for override, _ in TABLE.values()), *(["--out", out] for out in outs)]
+    calls += [["--set", 'solver.method="condensed"']]
     calls = [*([str(scene), *words] for words in calls), *([str(file)] for file in meshed.values())]
     before = {f.name for f in tmp_path.iterdir()}
     words = [sys.executable, "-m", "mpi4py", "-c", ALL_RANKS, str(codes), json.dumps(calls)]
@@ -142,6 +143,7 @@ def test_all_of_it_on_two_ranks(scene: Path, tmp_path: Path) -> None:
     assert done.stderr.count("hvi: ") == len(calls)
     assert all(words in done.stderr for words in [*(words for _, words in TABLE.values()), *meshed])
     assert all(f"hvi: --out {out}: " in done.stderr for out in outs)
+    assert "one process, not in 2" in done.stderr
     assert {f.name for f in tmp_path.iterdir()} == before | {"codes"}
 
 

@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-import subprocess
-import sys
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -195,40 +192,3 @@ def test_the_fischer_burmeister_function_is_zero_on_complementary_pairs_only() -
     assert by_a[4] == pytest.approx(3 / 5 - 1)
     assert by_b[4] == pytest.approx(4 / 5 - 1)
     assert np.all(np.isfinite(by_a + by_b))
-
-
-_TWO_RANKS = """
-import sys
-sys.path[:0] = {tests!r}
-from test_methods import strong
-from hvi_fenicsx import Scene, solve
-from hvi_fenicsx.errors import InputError
-from mpi4py import MPI
-try:
-    found = solve(Scene.model_validate(strong(8, 3e6, 1e6, True, epsilon=0.1, method={method!r})))
-    text = f"{{found.exit_code}} {{found.examination.energy * found.problem.scales.energy:.12e}}"
-except InputError as error:
-    text = str(error)
-if MPI.COMM_WORLD.rank == 0:
-    print(text)
-"""
-
-
-def on_two_ranks(method: str) -> str:
-    code = _TWO_RANKS.format(tests=[str(Path(__file__).parent)], method=method)
-    run = subprocess.run(
-        ["mpirun", "-n", "2", sys.executable, "-c", code], capture_output=True, text=True, timeout=300, check=True
-    )
-    return run.stdout.strip()
-
-
-@pytest.mark.parametrize("method", ["tao", "ssls"])
-def test_on_two_ranks_they_find_the_same(method: str) -> None:
-    wanted = solved(strong(8, 3 * P, 1.0e6, True, epsilon=0.1))
-    code, joules = on_two_ranks(method).split()
-    assert code == "0"
-    assert float(joules) == pytest.approx(energy(wanted), rel=1e-8)
-
-
-def test_the_papers_procedure_is_for_one_process() -> None:
-    assert "one process, not in 2" in on_two_ranks("condensed")

@@ -13,12 +13,15 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+import pytest
 
 from hvi_fenicsx import Scene, dump_scene
 from hvi_fenicsx.cli import main
 from hvi_fenicsx.runtime.signals import SIGNALS
 
 ROOT = Path(__file__).parents[2]
+RANKS = (1, pytest.param(2, marks=pytest.mark.long), 3)
+"""Three ranks show what two do, and more: one with a neighbour on either side, parts of unequal size."""
 
 
 def command(*words: object, ranks: int = 1) -> list[str]:
