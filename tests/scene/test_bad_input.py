@@ -118,7 +118,7 @@ ALL_RANKS = """
 import json, sys
 from mpi4py import MPI
 from hvi_fenicsx.cli import main
-codes = [main(["run", *words]) for words in json.loads(sys.argv[2])]
+codes = [int(main(["run", *words])) for words in json.loads(sys.argv[2])]
 every = MPI.COMM_WORLD.gather(codes)
 if every:
     with open(sys.argv[1], "w") as file:
