@@ -12,10 +12,17 @@ Path = tuple[str | int, ...]
 
 
 def override(data: dict[str, Any], assignment: str) -> Path:
-    """Set one value in the tables; tables that are not there are made. Returns its place.
+    """Set one value in the tables; tables that are not there are made.
+
+    Args:
+        data: the tables, which are changed.
+        assignment: ``dotted.key=TOML-VALUE``.
+
+    Returns:
+        The keys down to the value.
 
     Raises:
-        InputError: no ``key=value``, a value that is no TOML, or a way that leads nowhere.
+        InputError: no ``key=value``, a value that is not TOML, or a key that the tables cannot have.
     """
     key, equals, value = assignment.partition("=")
     if not equals or not key.strip():
@@ -29,14 +36,14 @@ def _steps(key: str, assignment: str) -> list[str]:
         parsed: Any = tomllib.loads(f"{key} = 0")
     except (ValueError, RecursionError):
         raise InputError(
-            f"--set {assignment}: {shown(key)} is no dotted key, like boundary.floor.friction.delta"
+            f"--set {assignment}: {shown(key)} is not a dotted key, like boundary.floor.friction.delta"
         ) from None
     steps = []
     while isinstance(parsed, dict) and len(parsed) == 1:
         step, parsed = next(iter(parsed.items()))
         steps.append(step)
     if parsed != 0:
-        raise InputError(f"--set {assignment}: {shown(key)} is no dotted key")
+        raise InputError(f"--set {assignment}: {shown(key)} is not a dotted key")
     return steps
 
 
@@ -49,8 +56,8 @@ def _value(text: str, assignment: str) -> Any:
         return parsed["value"]
     key = assignment.partition("=")[0]
     raise InputError(
-        f"--set {assignment}: {shown(text)} is no TOML value; a text needs quotes, and the shell more around "
-        f"them: --set '{key}=\"{text.strip()}\"'"
+        f"--set {assignment}: {shown(text)} is not a TOML value; a text needs quotes, with quotes of "
+        f"the shell around them: --set '{key}=\"{text.strip()}\"'"
     )
 
 

@@ -1,4 +1,4 @@
-"""``plugins = "my_laws.py"``: a scene's own laws, effects and methods, loaded before its tables are read."""
+"""``plugins = "my_laws.py"``: a scene's own laws, effects, methods and shapes, loaded before its tables are read."""
 
 from __future__ import annotations
 
@@ -14,10 +14,14 @@ from ..schema import refusal, shown
 
 
 def load(names: Any, folder: str | os.PathLike[str]) -> tuple[str, ...]:
-    """Load Python files, each once in a process; their absolute paths.
+    """Load Python files, each once in a process.
 
     Args:
-        names: one or a list, of files relative to the folder (that of the scene file).
+        names: one file or a list of them, relative to the folder.
+        folder: that of the scene file.
+
+    Returns:
+        Their absolute paths.
 
     Raises:
         PydanticCustomError: a file that is not there, no Python file, or raises an error of its own.
@@ -47,10 +51,10 @@ def _execute(module: str, path: Path) -> None:
     spec = importlib.util.spec_from_file_location(module, path)
     if spec is None or spec.loader is None:
         raise refusal(f"{path} cannot be loaded")
-    made = importlib.util.module_from_spec(spec)
-    sys.modules[module] = made  # dataclasses and pydantic look their own module up
+    plugin = importlib.util.module_from_spec(spec)
+    sys.modules[module] = plugin  # dataclasses and pydantic look their own module up
     try:
-        spec.loader.exec_module(made)
+        spec.loader.exec_module(plugin)
     except Exception as error:
         del sys.modules[module]
         raise refusal(f"{path}{_line(error, path)}: {type(error).__name__}: {error}") from None

@@ -1,4 +1,4 @@
-"""Scene files: TOML into a :class:`Scene`, and everything wrong with one into a single readable error."""
+"""Scene files: TOML read as a :class:`Scene`; all that is wrong with a file is told in one readable error."""
 
 from __future__ import annotations
 
@@ -7,6 +7,8 @@ import re
 import stat
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -20,9 +22,11 @@ from .overrides import override
 from .toml_lines import line_of, lines_of
 
 _LARGEST = 1_000_000
+"""Bytes of a scene file at most."""
 _KEY = re.compile(r"((?:title|plugins|domain|material|body|boundary|solver)(?:\.[\w-]+)+): ")
 """How a message begins that names a key of the scene."""
-_MOST_PROBLEMS = 10
+_MOST_MISTAKES = 10
+"""Mistakes that one message lists."""
 _Place = tuple[str | int, ...]
 
 
@@ -34,14 +38,10 @@ def read_scene(path: str | os.PathLike[str], overrides: Sequence[str] = ()) -> S
         overrides: ``dotted.key=TOML-VALUE`` each, in order; a list's entries go by number from 0.
 
     Raises:
-        InputError: the file cannot be read or is no valid scene; up to ten mistakes, one a line, each
+        InputError: the file cannot be read or is not a valid scene; up to ten mistakes, one a line, each
             with its line in the file, the key, what is allowed and how to mend it.
     """
-    file = Path(path)
-    text = _text(file)
-    data = _toml(file, text)
-    changed = [override(data, assignment) for assignment in overrides]
-    return _scene(file, text, data, changed)
+    return _Source.read(path, overrides).scene()
 
 
 def with_place(message: str, path: str | os.PathLike[str], overrides: Sequence[str] = ()) -> str:
@@ -55,22 +55,70 @@ def with_place(message: str, path: str | os.PathLike[str], overrides: Sequence[s
     key = _KEY.match(message)
     if key is None:
         return message
-    file = Path(path)
     try:
-        text = _text(file)
-        data = _toml(file, text)
-        changed = [override(data, assignment) for assignment in overrides]
+        source = _Source.read(path, overrides)
     except InputError:
         return message
-    return _where(file, lines_of(text), tuple(key[1].split(".")), changed) + message[key.end(1) :]
+    return source.place(tuple(key[1].split("."))) + message[key.end(1) :]
+
+
+@dataclass(frozen=True)
+class _Source:
+    """A scene file that is valid TOML.
+
+    Attributes:
+        file: its name.
+        text: what it holds.
+        tables: the same as tables, values overridden.
+        overridden: the places of these values.
+    """
+
+    file: Path
+    text: str
+    tables: dict[str, Any]
+    overridden: Sequence[_Place]
+
+    @classmethod
+    def read(cls, path: str | os.PathLike[str], overrides: Sequence[str]) -> _Source:
+        file = Path(path)
+        text = _text(file)
+        tables = _toml(file, text)
+        return cls(file, text, tables, [override(tables, assignment) for assignment in overrides])
+
+    def scene(self) -> Scene:
+        try:
+            return Scene.model_validate(self.tables, context={"folder": self.file.absolute().parent})
+        except ValidationError as error:
+            mistakes = mistakes_of(error, Scene)
+        raise InputError(self._listed(mistakes))
+
+    @cached_property
+    def _lines(self) -> Mapping[_Place, int]:
+        return lines_of(self.text)
+
+    def _listed(self, mistakes: Iterable[Mistake]) -> str:
+        """The mistakes in the order of the file, a line each."""
+        found = [Mistake(tuple(key for key in m.where if key != WHOLE), m.text) for m in mistakes]
+        found.sort(key=lambda m: line_of(self._lines, m.where) or 0)
+        texts = [f"{self.place(m.where)}: {m.text}" for m in found]
+        rest = len(texts) - _MOST_MISTAKES
+        return "\n".join(texts[:_MOST_MISTAKES] + ([f"... and {rest} more"] if rest > 0 else []))
+
+    def place(self, where: _Place) -> str:
+        """A place as messages name it: file and line, or ``--set``; then the key."""
+        key = ".".join(map(str, where))
+        if any(where[: len(place)] == place for place in self.overridden):
+            return f"--set {key}"
+        line = line_of(self._lines, where)
+        return f"{self.file}:{line}: {key}" if line else f"{self.file}: {key}"
 
 
 def _text(file: Path) -> str:
     raw = _bytes(file)
     if len(raw) > _LARGEST:
-        raise InputError(f"{file}: has more than {_LARGEST // 1_000_000} MB; that is no scene file")
+        raise InputError(f"{file}: has more than {_LARGEST // 1_000_000} MB; a scene file is smaller")
     if b"\0" in raw:
-        raise InputError(f"{file}: is no text file; a scene is TOML in UTF-8")
+        raise InputError(f"{file}: is not a text file; a scene is TOML in UTF-8")
     try:
         text = raw.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -83,19 +131,25 @@ def _text(file: Path) -> str:
 
 def _bytes(file: Path) -> bytes:
     try:
-        if stat.S_ISDIR(os.stat(file).st_mode):
-            raise InputError(f"{file}: is a folder; give the scene file in it")
-        if not stat.S_ISREG(os.stat(file).st_mode):
-            raise InputError(f"{file}: is no ordinary file")
+        kind = os.stat(file).st_mode
+    except (OSError, ValueError) as error:
+        raise _unreadable(file, error) from None
+    if stat.S_ISDIR(kind):
+        raise InputError(f"{file}: is a folder; give the scene file in it")
+    if not stat.S_ISREG(kind):
+        raise InputError(f"{file}: is not an ordinary file")
+    try:
         with open(file, "rb") as stream:
             return stream.read(_LARGEST + 1)
-    except FileNotFoundError:
-        raise InputError(f"{file}: does not exist{_nearby(file)}") from None
-    except (OSError, ValueError) as error:  # ValueError: a null byte in the name
-        reason = getattr(error, "strerror", None) or str(error)
-        if isinstance(error, InputError):
-            raise
-        raise InputError(f"{str(file)!r}: cannot be read: {reason}") from None
+    except OSError as error:
+        raise _unreadable(file, error) from None
+
+
+def _unreadable(file: Path, error: OSError | ValueError) -> InputError:
+    """The message on a file that cannot be read; a ValueError is about a null byte in its name."""
+    if isinstance(error, FileNotFoundError):
+        return InputError(f"{file}: does not exist{_nearby(file)}")
+    return InputError(f"{str(file)!r}: cannot be read: {getattr(error, 'strerror', None) or error}")
 
 
 def _nearby(file: Path) -> str:
@@ -125,27 +179,3 @@ def _broken(file: Path, text: str, message: str) -> str:
     hint = f": {content[0].strip()[:60]}" if content and content[0].strip() else ""
     mend = "; texts need quotes" if "Invalid value" in reason else ""
     return f"{file}:{line}:{column}: not valid TOML: {reason}{mend}{hint}"
-
-
-def _scene(file: Path, text: str, data: dict[str, Any], changed: Sequence[_Place]) -> Scene:
-    try:
-        return Scene.model_validate(data, context={"folder": file.absolute().parent})
-    except ValidationError as error:
-        mistakes = mistakes_of(error, Scene)
-    raise InputError(_listed(file, lines_of(text), mistakes, changed))
-
-
-def _listed(file: Path, lines: Mapping[_Place, int], mistakes: Iterable[Mistake], changed: Sequence[_Place]) -> str:
-    found = [(Mistake(tuple(s for s in p.where if s != WHOLE), p.text)) for p in mistakes]
-    found.sort(key=lambda p: line_of(lines, p.where) or 0)
-    texts = [f"{_where(file, lines, p.where, changed)}: {p.text}" for p in found]
-    rest = len(texts) - _MOST_PROBLEMS
-    return "\n".join(texts[:_MOST_PROBLEMS] + ([f"... and {rest} more"] if rest > 0 else []))
-
-
-def _where(file: Path, lines: Mapping[_Place, int], where: _Place, changed: Sequence[_Place]) -> str:
-    key = ".".join(map(str, where))
-    if any(where[: len(place)] == place for place in changed):
-        return f"--set {key}"
-    line = line_of(lines, where)
-    return f"{file}:{line}: {key}" if line else f"{file}: {key}"

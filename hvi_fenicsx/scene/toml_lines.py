@@ -30,7 +30,12 @@ def lines_of(text: str) -> Mapping[Path, int]:
 
 
 def line_of(lines: Mapping[Path, int], where: Path) -> int | None:
-    """The line of a place, or of the innermost table around it that has one."""
+    """The line of a place, or of the innermost table around it that has one.
+
+    Args:
+        lines: by the keys of each place, see :func:`lines_of`.
+        where: the keys of the place.
+    """
     for length in range(len(where), 0, -1):
         if where[:length] in lines:
             return lines[where[:length]]

@@ -332,8 +332,8 @@ def test_overrides(assignment: str, write: Callable[..., Path]) -> None:
 
 WRONG_OVERRIDES = {
     "solver.tolerance=2": "--set solver.tolerance: must be less than 1 (is 2)",
-    "solver.method=branch": '--set solver.method=branch: "branch" is no TOML value; a text needs quotes, and '
-    "the shell more around them: --set 'solver.method=\"branch\"'",
+    "solver.method=branch": '--set solver.method=branch: "branch" is not a TOML value; a text needs quotes, with '
+    "quotes of the shell around them: --set 'solver.method=\"branch\"'",
     "domain.cells.2=8": '--set domain.cells.2=8: domain.cells is a list: unknown index "2"; allowed: 0, 1',
     "title.x=1": '--set title.x=1: title is "Wall left", not a table; it has no "x"',
     "solver": "--set solver: must be KEY=VALUE, like --set solver.tolerance=1e-10",
@@ -355,11 +355,11 @@ def test_files_that_are_no_scenes(tmp_path: Path, write: Callable[..., Path]) ->
     (tmp_path / "s.toml").write_bytes(b'title = "\xff"')
     assert message(tmp_path / "s.toml") == "s.toml:1: is not UTF-8; save the scene as UTF-8"
     (tmp_path / "s.toml").write_bytes(b"\x7fELF\0\0")
-    assert message(tmp_path / "s.toml") == "s.toml: is no text file; a scene is TOML in UTF-8"
-    assert message(write("#" * 1_000_001)) == "s.toml: has more than 1 MB; that is no scene file"
+    assert message(tmp_path / "s.toml") == "s.toml: is not a text file; a scene is TOML in UTF-8"
+    assert message(write("#" * 1_000_001)) == "s.toml: has more than 1 MB; a scene file is smaller"
     assert message(write("a = " + "[" * 5000)).startswith("s.toml")
     assert message(write("a = " + "1" * 5000)) == "s.toml: has a number of too many digits"
-    assert message(Path("/dev/null")) == "null: is no ordinary file"
+    assert message(Path("/dev/null")) == "null: is not an ordinary file"
     with pytest.raises(InputError, match="cannot be read"):
         read_scene("a\0b")
     with pytest.raises(InputError, match=r"does not exist; .* has s.toml"):
