@@ -65,17 +65,17 @@ def _definite(matrix: Array, mend: str) -> None:
 
 
 class OrthotropicElasticity(_ByMatrix):
-    """Orthotropic elasticity, its axes being x, y, z; for turned axes state the tensor."""
+    """Orthotropic linear elasticity with the axes x, y, z. For rotated axes use `elasticity = "tensor"`."""
 
     key: ClassVar[str] = "orthotropic"
     term: ClassVar[str] = "a(u, v) = ∫ σ(u):ε(v) dx, orthotropic"
 
     youngs_moduli: Numbers
-    """E1, E2, E3 along x, y, z in N/m²; plane stress has no E3"""
+    """Young's moduli E1, E2, E3 along x, y, z, N/m²; plane stress has no E3"""
     poisson_ratios: Ratios
-    """ν12, ν13, ν23: νij is the contraction along j when pulled along i; plane stress has ν12 only"""
+    """ratios ν12, ν13, ν23: νij is the contraction along j under tension along i; plane stress has ν12 only"""
     shear_moduli: Numbers
-    """G12, G13, G23 in N/m²; plane models have G12 only"""
+    """shear moduli G12, G13, G23, N/m²; plane models have G12 only"""
 
     @model_validator(mode="after")
     def _fits(self) -> OrthotropicElasticity:
@@ -132,7 +132,7 @@ def _blocks(normal: Array, shear: Array) -> Array:
 
 
 class TensorElasticity(_ByMatrix):
-    """Elasticity by its whole tensor, as Voigt's matrix: σ = C ε, shear strains doubled.
+    """Linear elasticity with any tensor, as a matrix in Voigt notation: σ = C ε, shear strains doubled.
 
     In 2D it is what the plane model leaves of it: the model's name then changes nothing, and σ_33, which it does not
     tell, is written as zero.
@@ -142,7 +142,7 @@ class TensorElasticity(_ByMatrix):
     term: ClassVar[str] = "a(u, v) = ∫ σ(u):ε(v) dx, C given"
 
     matrix: Rows
-    """C in N/m², rows of 3 (order 11, 22, 12) in 2D or of 6 (order 11, 22, 33, 23, 13, 12) in 3D"""
+    """C in N/m², a list of rows: 3 rows in 2D (order 11, 22, 12), 6 rows in 3D (order 11, 22, 33, 23, 13, 12)"""
 
     @model_validator(mode="after")
     def _fits(self) -> TensorElasticity:

@@ -28,7 +28,7 @@ class Obstacle(BaseModel):
 
 
 class Contact(Effect):
-    """Unilateral, gap - u·n ≥ 0, or bilateral, lower ≤ -u·n ≤ upper, at every vertex of the part; n outward.
+    """Unilateral contact, gap - u·n ≥ 0, or bilateral contact, lower ≤ -u·n ≤ upper, at every vertex; n points outward.
 
     With an obstacle n is the direction towards it, and the gap the distance to it.
     """
@@ -41,14 +41,14 @@ class Contact(Effect):
     term: ClassVar[str] = "K: gap - u·n ≥ 0 on Γc, or lower ≤ -u·n ≤ upper"
 
     gap: FormulaField | None = None
-    """gap in m, a number or a formula in x, y, z: the body may move outwards by so much"""
+    """unilateral contact: how far the body may move outward, m, a number or a formula in x, y, z"""
     lower: FormulaField | None = None
-    """instead of a gap: least opening -u·n in m, a number or a formula"""
+    """bilateral contact, instead of `gap`: the smallest opening -u·n, m, a number or a formula"""
     upper: FormulaField | None = None
-    """with lower: largest opening in m, a number or a formula"""
+    """bilateral contact, with `lower`: the largest opening -u·n, m, a number or a formula"""
 
     obstacle: Obstacle | None = None
-    """instead of a gap: a flat obstacle under a curved part, { point = [0, 0], normal = [0, 1] }"""
+    """instead of `gap`: a flat obstacle near a curved part, { point = [0, 0], normal = [0, 1] }"""
 
     @model_validator(mode="after")
     def _one_way(self) -> Contact:

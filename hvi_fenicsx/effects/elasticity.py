@@ -33,9 +33,9 @@ class Elasticity(Effect):
     place: ClassVar[Place] = Place.MATERIAL
 
     model: Literal["plane_stress", "plane_strain", "three_dimensional"]
-    """plane_stress (the paper's), plane_strain, three_dimensional"""
+    """the kind of elastic problem; the paper uses plane_stress"""
     thermal_expansion: Annotated[float, Field(allow_inf_nan=False)] = 0.0
-    """α in 1/K, for `temperature` in a body table"""
+    """the coefficient α of thermal expansion, 1/K; used by `temperature` in a body table"""
 
     @abstractmethod
     def thermal_stress(self) -> Array:
@@ -68,15 +68,15 @@ class Elasticity(Effect):
 
 
 class IsotropicElasticity(Elasticity):
-    """Isotropic elasticity; plane stress is the paper's own Hooke law (equation (tau))."""
+    """Isotropic linear elasticity. Plane stress is the Hooke law of the paper (equation (tau))."""
 
     key: ClassVar[str] = "isotropic"
     term: ClassVar[str] = "a(u, v) = ∫ σ(u):ε(v) dx, isotropic"
 
     youngs_modulus: Annotated[float, Field(gt=0, allow_inf_nan=False)]
-    """E in N/m²"""
+    """Young's modulus E, N/m²"""
     poisson_ratio: Annotated[float, Field(gt=-1, lt=0.5, allow_inf_nan=False)]
-    """ν, between -1 and 0.5"""
+    """Poisson's ratio ν, between -1 and 0.5"""
 
     def lame(self) -> tuple[float, float]:
         """λ of the trace term and 2μ, N/m²; plane stress uses the paper's Eν/(1-ν²)."""

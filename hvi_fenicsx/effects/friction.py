@@ -10,7 +10,7 @@ from .law_effect import LawEffect
 
 
 class Friction(LawEffect):
-    """A law of the tangential displacement: -σ_t in ∂j(u_t); on lifted vertices too, as in the paper."""
+    """A law of the tangential displacement: -σ_t ∈ ∂j(u_t). It also acts on lifted vertices, as in the paper."""
 
     key: ClassVar[str] = "friction"
     term: ClassVar[str] = "∫ j⁰(u_t; v_t - u_t) ds on Γc, vertex quadrature"

@@ -57,7 +57,7 @@ class LawEffect(Effect):
     direction: ClassVar[Direction]
 
     law: LawField
-    """the law's name; its parameters stand beside it"""
+    """the name of the law; write its parameters as further keys of the same table"""
 
     @model_validator(mode="before")
     @classmethod

@@ -44,7 +44,7 @@ class _Listed(Effect):
 
 
 class Traction(_Listed):
-    """Surface traction t (N/m²), a list of formulas, one for each component."""
+    """A surface traction t (N/m²): a list of formulas, one for each component."""
 
     key: ClassVar[str] = "traction"
     place: ClassVar[Place] = Place.BOUNDARY
@@ -72,7 +72,7 @@ class Traction(_Listed):
 
 
 class BodyForce(_Listed):
-    """Force per volume f (N/m³), a list of formulas, one for each component."""
+    """A force per volume f (N/m³): a list of formulas, one for each component."""
 
     key: ClassVar[str] = "force"
     label: ClassVar[str] = "a force on the body itself"
@@ -111,7 +111,7 @@ Component = Annotated[
 
 
 class PrescribedDisplacement(_Listed):
-    """Displacement by component (m), a list of formulas; ``"free"`` leaves a component alone."""
+    """A prescribed displacement (m): a list of formulas, one for each component. ``"free"`` prescribes nothing."""
 
     key: ClassVar[str] = "displacement"
     place: ClassVar[Place] = Place.BOUNDARY

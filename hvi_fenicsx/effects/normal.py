@@ -9,7 +9,7 @@ from .law_effect import LawEffect
 
 
 class Adhesion(LawEffect):
-    """A law of the opening -u·n: σ_n in ∂j(-u·n), pulling the body back; beside unilateral contact, or without it."""
+    """A law of the opening: σ_n ∈ ∂j(-u·n). It pulls the body back; it may act with or without unilateral contact."""
 
     key: ClassVar[str] = "adhesion"
     term: ClassVar[str] = "∫ j⁰(-u_n; -(v_n - u_n)) ds on Γc, vertex quadrature"
@@ -17,7 +17,7 @@ class Adhesion(LawEffect):
 
 
 class Support(LawEffect):
-    """A law of the penetration u·n (normal compliance): -σ_n in ∂j(u·n), pushing the body back."""
+    """A law of the penetration (normal compliance): -σ_n ∈ ∂j(u·n). It pushes the body back."""
 
     key: ClassVar[str] = "support"
     term: ClassVar[str] = "∫ j⁰(u_n; v_n - u_n) ds on Γc, vertex quadrature"

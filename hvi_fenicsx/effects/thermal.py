@@ -15,7 +15,7 @@ from .fields import FormulaField
 
 
 class Temperature(Effect):
-    """Temperature above that of the stress-free state (K), a number or a formula.
+    """The temperature above that of the stress-free state (K): a number or a formula.
 
     Strains α ΔT by the material's `thermal_expansion`; the stress is C : (ε(u) - α ΔT I).
     """

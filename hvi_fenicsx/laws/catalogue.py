@@ -22,7 +22,7 @@ from .traction_graph import TractionGraph
 
 @dataclass(frozen=True)
 class QuadraticLinear(PolylineLaw):
-    """j(x) = min{γ1/(2δ) x², γ2 |x|}: traction rises to γ1 at δ, drops to γ2 = γ1/2 and stays there.
+    """j(x) = min{γ1/(2δ) x², γ2 |x|}: the traction rises to γ1 at δ, drops to γ2 = γ1/2 and stays there.
 
     Ovcharova and Gwinner, section 5.1, read as an even law. The two pieces cross at 2 δ γ2/γ1; only with
     γ1 = 2 γ2 is that δ, and InputError is raised otherwise.
@@ -84,7 +84,7 @@ class QuadraticLinearLiteral(PolylineLaw):
 
 @dataclass(frozen=True)
 class Tresca(PolylineLaw):
-    """j(x) = yield_traction |x|: stick below the yield traction, slip at it. A convex kink at 0.
+    """j(x) = yield_traction |x|: no slip below the yield traction, slip at it. The kink at 0 is convex.
 
     The law has no length of its own; `reference_slip` (m) serves its energy scale and so the relative
     smoothing only.
@@ -113,7 +113,7 @@ class Tresca(PolylineLaw):
 
 @dataclass(frozen=True)
 class LinearSpring(PolylineLaw):
-    """j(x) = ½ stiffness x², stiffness in N/m³. No kink; `reference_slip` (m) is for the energy scale."""
+    """j(x) = ½ stiffness x², stiffness in N/m³. There is no kink; `reference_slip` (m) gives the energy scale only."""
 
     name = "linear_spring"
     stiffness: float
@@ -139,7 +139,7 @@ class LinearSpring(PolylineLaw):
 
 @dataclass(frozen=True)
 class Sawtooth(PolylineLaw):
-    """Teeth of width delta: the traction rises to the k-th peak at k delta, then drops to the residual.
+    """A sawtooth with teeth of width delta: the traction rises to the k-th peak at k delta, then drops to the residual.
 
     The peaks descend evenly from peak_traction, the k-th of n = `drops` being
     residual + (peak - residual)(n + 1 - k)/n. With one drop it is the quadratic-linear law for any γ1 > γ2.
@@ -184,7 +184,7 @@ class Sawtooth(PolylineLaw):
 
 @dataclass(frozen=True)
 class Graph(PolylineLaw):
-    """The law as its graph: points (displacement, traction), vertical segments up or down being jumps.
+    """The graph of the traction: points (displacement, traction). Two points at one displacement are a jump.
 
     Displacements start at 0 and do not descend; after the last point the traction stays constant.
     The law is odd in the traction (even in the energy), or zero for negative displacements if one_sided. A

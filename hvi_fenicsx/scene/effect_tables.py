@@ -102,7 +102,7 @@ def _parameter(text: str, table: Mapping[str, Any]) -> tuple[str, ...]:
 
 
 class BoundaryTable(EffectTable):
-    """A boundary part and what acts on it."""
+    """A part of the boundary and the effects that act on it. NAME is the name of the part in the results."""
 
     place: ClassVar[Place] = Place.BOUNDARY
 
@@ -116,12 +116,12 @@ class BoundaryTable(EffectTable):
 
 
 class BodyTable(EffectTable):
-    """What acts in the body, or in a region of it."""
+    """The effects that act in the body, or in one region of it."""
 
     place: ClassVar[Place] = Place.BODY
 
     region: Names | None = None
-    """a physical group of cells, or a list of them; the whole body if it is left out"""
+    """a physical group of cells, or a list of them; without it the whole body"""
 
     if TYPE_CHECKING:
 
@@ -130,12 +130,12 @@ class BodyTable(EffectTable):
 
 
 class MaterialTable(Table):
-    """The elasticity of the body, or of a region of it: the further keys are those of the model."""
+    """The elasticity of the body, or of one region of it. The further keys depend on `elasticity`."""
 
     region: Names | None = None
-    """a physical group of cells, or a list of them; needed where there are several materials"""
+    """a physical group of cells, or a list of them; required if there are several materials"""
     elasticity: Effect
-    """the name of the elasticity's model"""
+    """the elastic law: its name is one of those below"""
 
     if TYPE_CHECKING:
 

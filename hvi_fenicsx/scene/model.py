@@ -45,17 +45,17 @@ def _shape(value: Any, info: ValidationInfo) -> Any:
 
 
 class Scene(Table):
-    """A whole scene.
+    """The keys outside of all tables.
 
     Built with keywords, from the tables of a scene file (``Scene.model_validate({...})``), or with
     :func:`read_scene`.
     """
 
     title: Annotated[str, Field(max_length=200), AfterValidator(_title)] = ""
-    """one line that says what this is"""
+    """one line that names the scene"""
     plugins: Names | None = None
-    """Python files with your own laws, effects, methods, domain shapes and target quantities, relative to the scene
-    file; see docs/extending.md"""
+    """Python files with your own laws, smoothings, effects, methods, domain shapes and target quantities; paths are
+    relative to the scene file, see docs/extending.md"""
     domain: Annotated[SerializeAsAny[DomainShape], BeforeValidator(_shape)]
     """the body's shape"""
     material: Materials

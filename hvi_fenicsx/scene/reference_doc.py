@@ -25,17 +25,26 @@ T = TypeVar("T")
 _INTRODUCTION = """\
 # Scene reference
 
-*Written by `python3 -m hvi_fenicsx.scene.reference_doc` from the classes that read scenes, and tested to agree.*
+*This page is written by `python3 -m hvi_fenicsx.scene.reference_doc` from the classes that read a scene. A test
+checks that it is up to date.*
 
-A scene is a TOML file in SI units. Unknown keys are errors; whole numbers serve as numbers, texts and
-booleans do not; `nan` and `inf` are refused. A *formula* is a number or a text in x, y, z (m) with numbers,
-`pi`, `+ - * / **`, `a if x < 1 else b` and abs, sqrt, exp, log, sin, cos, tan, sinh, cosh, tanh, min, max,
-such as `"-1e6*(1 - 1.8*x)"`.
+A scene is a TOML file in SI units. An unknown key is an error. A whole number may stand where a number is expected;
+a text or a boolean may not. `nan` and `inf` are refused.
 
-Every value can be changed on the command line: `--set solver.tolerance=1e-10`, `--set domain.cells.0=64`
-(entries of a list by number from 0), `--set 'solver.method="branch"'` (texts in quotes, and for the shell
-quotes around them), `--set 'solver={}'` (a whole table: here all defaults, so the unsmoothed law).
-The name of a boundary table (`floor` in `[boundary.floor]`) is the part's name in the results.
+A *formula* is a number, or a text in the coordinates x, y, z (m), such as `"-1e6*(1 - 1.8*x)"`. It may contain
+numbers, `pi`, `+ - * / **`, `a if x < 1 else b`, and the functions abs, sqrt, exp, log, sin, cos, tan, sinh, cosh,
+tanh, min, max.
+
+The command line can change every value:
+
+| option | what it changes |
+|---|---|
+| `--set solver.tolerance=1e-10` | one value |
+| `--set domain.cells.0=64` | one entry of a list; entries are counted from 0 |
+| `--set 'solver.method="branch"'` | a text, in quotes; the outer quotes are for the shell |
+| `--set 'solver={}'` | a whole table; here all its keys get their defaults, so the unsmoothed law is solved |
+
+The name of a boundary table (`floor` in `[boundary.floor]`) is the name of the part in the results.
 """
 
 

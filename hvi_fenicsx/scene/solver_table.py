@@ -64,28 +64,28 @@ Start = Annotated[
 
 
 class SolverTable(Table):
-    """Method and accuracy. Without smoothing and epsilon the law itself is solved, not a smoothed one."""
+    """How the problem is solved. Without `smoothing` and `epsilon` the law itself is solved, not a smoothed one."""
 
     method: str = "auto"
-    """auto chooses by the effects: linear, convex or branch; branch is exact; condensed is the paper's own;
-    snes_vi, tao, ssls are there to compare with; or the name of your own method"""
+    """the method: auto chooses linear, convex or branch by the effects; branch solves the exact law; condensed is the
+    procedure of the paper; snes_vi, tao and ssls are for comparison; or the name of your own method"""
     smoothing: Annotated[str | None, OneOf(smoothings)] = None
-    """the plus function that rounds the law's kinks; paper is the paper's S; without it the law is exact"""
+    """the plus function that smooths the kinks of the law; paper is the S of the paper; without it the law is exact"""
     epsilon: Positive | None = None
-    """width of the smoothing, relative to the law's energy at its kink"""
+    """width ε of the smoothing, relative to the energy of the law at its kink"""
     epsilon_absolute: Positive | None = None
-    """the same in N/m (J/m²), as in the paper; one of the two, not both"""
+    """width ε of the smoothing in N/m (J/m²), as in the paper; not together with `epsilon`"""
     start: Start = "unbroken"
-    """where there are several solutions, where to begin: "unbroken" (no slip), "resting" (as the body lies when every
-    bond is a spring), "broken" (beyond every drop), or at a displacement (m), a list of formulas"""
+    """the start value, which matters if there are several solutions: "unbroken" (no slip), "resting" (the equilibrium
+    in which every law is a spring), "broken" (beyond every drop of the laws), or a displacement (m, formulas)"""
     tolerance: Annotated[float, Field(gt=0, lt=1, allow_inf_nan=False)] = 1e-8
-    """relative residual of the inequality at which the iteration ends"""
+    """the iteration ends when the relative residual of the inequality is below it"""
     linear_solver: Literal["auto", "lu", "gamg"] = "auto"
-    """auto chooses by size; any PETSc option overrides it"""
+    """the linear solver; auto chooses by the number of unknowns; PETSc options override it"""
     second_order: bool = False
-    """true: where a falling law leaves open whether the solution is a local minimum, factorise the Hessian to know"""
+    """true: if a softening law leaves open whether the solution is a local minimiser, factorise the Hessian"""
     max_iterations: Count = 100
-    """Newton iterations at most"""
+    """the largest number of Newton iterations"""
 
     @model_validator(mode="before")
     @classmethod

@@ -130,7 +130,7 @@ REFUSED = {
     "missing key": (
         "poisson_ratio = 0.29",
         "",
-        "s.toml:6: material.poisson_ratio: is missing: ν, between -1 and 0.5",
+        "s.toml:6: material.poisson_ratio: is missing: Poisson's ratio ν, between -1 and 0.5",
     ),
     "missing on": (
         'on = "left"',

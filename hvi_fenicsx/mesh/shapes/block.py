@@ -103,21 +103,21 @@ class Block(DomainShape):
 
 
 class Rectangle(Block):
-    """[0, size] cut into right-diagonal triangles."""
+    """A rectangle from the origin to `size`, divided into right-diagonal triangles; sides left, right, bottom, top."""
 
     dimension: ClassVar[int] = 2
     normals: ClassVar[Mapping[str, int | None]] = {"left": 0, "right": 0, "bottom": 1, "top": 1}
 
     shape: Literal["rectangle"] = "rectangle"
-    """a rectangle with its lower left corner at the origin"""
+    """the lower left corner is the origin"""
     size: Annotated[tuple[Length, Length], vector(2)]
-    """width and height in m, a list of 2"""
+    """width and height, m, a list of 2"""
     cells: Annotated[tuple[Count, Count], vector(2)]
-    """cells along width and height, a list of 2 whole numbers"""
+    """number of cells along x and y, a list of 2 whole numbers; two triangles each"""
 
 
 class Box(Block):
-    """[0, size] cut into tetrahedra; z is upwards: bottom and top are its ends, front and back those of y."""
+    """A box from the origin to `size`, in tetrahedra; sides left, right (x), front, back (y), bottom, top (z)."""
 
     dimension: ClassVar[int] = 3
     normals: ClassVar[Mapping[str, int | None]] = {
@@ -127,8 +127,8 @@ class Box(Block):
     }
 
     shape: Literal["box"] = "box"
-    """a box with a corner at the origin"""
+    """one corner is the origin"""
     size: Annotated[tuple[Length, Length, Length], vector(3)]
-    """lengths along x, y, z in m, a list of 3"""
+    """lengths along x, y, z, m, a list of 3"""
     cells: Annotated[tuple[Count, Count, Count], vector(3)]
-    """cells along x, y, z, a list of 3 whole numbers"""
+    """number of cells along x, y, z, a list of 3 whole numbers; six tetrahedra each"""

@@ -41,19 +41,19 @@ class Round(PlaneShape):
 
 
 class Disk(Round):
-    """A disk that touches y = 0 at the origin."""
+    """A disk whose lowest point is the origin."""
 
     part: ClassVar[float] = 1.0
     normals: ClassVar[Mapping[str, int | None]] = {"lower_arc": None, "upper_arc": None}
 
     shape: Literal["disk"] = "disk"
-    """a disk around (0, radius); sides lower_arc and upper_arc"""
+    """the centre is (0, radius); sides lower_arc, upper_arc"""
     radius: Length
-    """m"""
+    """radius of the disk, m"""
     mesh_size: Length
     """edge length of the triangles, m"""
     mesh_size_below: Length | None = None
-    """edge length at the lowest point, m, growing with the distance from there; mesh_size if it is left out"""
+    """edge length at the lowest point, m; it grows with the distance from there; by default `mesh_size`"""
 
     def outline(self) -> Outline:
         """Four arcs, the lowest point being a corner."""
@@ -63,19 +63,19 @@ class Disk(Round):
 
 
 class HalfDisk(Round):
-    """The lower half of a disk that touches y = 0 at the origin."""
+    """The lower half of a disk whose lowest point is the origin."""
 
     part: ClassVar[float] = 0.5
     normals: ClassVar[Mapping[str, int | None]] = {"arc": None, "top": 1}
 
     shape: Literal["half_disk"] = "half_disk"
-    """the lower half of a disk around (0, radius); sides arc and top, the flat one"""
+    """the centre is (0, radius); sides arc, top (the flat side)"""
     radius: Length
-    """m"""
+    """radius of the disk, m"""
     mesh_size: Length
     """edge length of the triangles, m"""
     mesh_size_below: Length | None = None
-    """edge length at the lowest point, m, growing with the distance from there; mesh_size if it is left out"""
+    """edge length at the lowest point, m; it grows with the distance from there; by default `mesh_size`"""
 
     def outline(self) -> Outline:
         """Two arcs, the lowest point being a corner, and the flat top."""

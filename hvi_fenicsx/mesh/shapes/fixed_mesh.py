@@ -76,20 +76,20 @@ def _mesh_path(value: Any, info: ValidationInfo) -> Path:
 
 
 class MeshFile(FixedMesh):
-    """A gmsh file; its physical groups are the boundary parts and regions."""
+    """A gmsh file. Its physical groups are the sides and regions that the scene can name."""
 
     dimension: ClassVar[None] = None
     normals: ClassVar[None] = None
     regions: ClassVar[None] = None
 
     shape: Literal["file"] = "file"
-    """a gmsh file"""
+    """the mesh comes from a gmsh file"""
     file: Annotated[Path, BeforeValidator(_mesh_path), PlainSerializer(str)]
-    """name of the gmsh file (.msh, or .geo, which is meshed then), relative to the scene file"""
+    """the gmsh file, relative to the scene file: .msh, or .geo, which gmsh meshes first"""
     scale: Positive = 1.0
-    """m per unit of the file's coordinates: 1e-3 for a mesh in mm"""
+    """length in m of one unit of the coordinates in the file: 1e-3 for a mesh in mm"""
     refinements: Refinements = 0
-    """how often each cell is cut, in 4 triangles or 8 tetrahedra; the coarser meshes make the fine one fast to solve"""
+    """number of uniform refinements: each divides a cell into 4 triangles or 8 tetrahedra; multigrid uses all meshes"""
 
     def build(self, comm: MPI.Comm, dimension: int) -> Domain:
         """The mesh of the file, unrefined. Collective."""

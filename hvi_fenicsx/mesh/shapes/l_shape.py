@@ -13,7 +13,7 @@ from .plane import PlaneShape
 
 
 class LShape(PlaneShape):
-    """A rectangle without a rectangle at its upper right corner."""
+    """An L: a rectangle without a smaller rectangle at its upper right corner."""
 
     normals: ClassVar[Mapping[str, int | None]] = {
         **{"left": 0, "right": 0, "bottom": 1, "top": 1},
@@ -21,11 +21,11 @@ class LShape(PlaneShape):
     }
 
     shape: Literal["l_shape"] = "l_shape"
-    """an L; sides left, right, bottom, top, and at the re-entrant corner inner_right and inner_top"""
+    """sides left, right, bottom, top, and inner_right, inner_top, which meet at the re-entrant corner"""
     size: Annotated[tuple[Length, Length], vector(2)]
-    """width and height in m, a list of 2; the lower left corner is the origin"""
+    """width and height, m, a list of 2; the lower left corner is the origin"""
     cut: Annotated[tuple[Length, Length], vector(2)]
-    """width and height in m of what is cut off at the upper right, a list of 2"""
+    """width and height of the smaller rectangle, m, a list of 2"""
     mesh_size: Length
     """edge length of the triangles, m"""
 

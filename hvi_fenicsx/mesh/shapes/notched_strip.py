@@ -13,16 +13,16 @@ from .plane import PlaneShape
 
 
 class NotchedStrip(PlaneShape):
-    """A rectangle with a V-notch in the middle of its top."""
+    """A rectangle with a V-shaped notch in the middle of its top side."""
 
     normals: ClassVar[Mapping[str, int | None]] = {"left": 0, "right": 0, "bottom": 1, "top": 1, "notch": None}
 
     shape: Literal["notched_strip"] = "notched_strip"
-    """a strip with a notch; sides left, right, bottom, top (both pieces), notch"""
+    """sides left, right, bottom, top (both pieces), notch (both flanks)"""
     size: Annotated[tuple[Length, Length], vector(2)]
-    """width and height in m, a list of 2; the lower left corner is the origin"""
+    """width and height, m, a list of 2; the lower left corner is the origin"""
     notch: Annotated[tuple[Length, Length], vector(2)]
-    """width and depth in m of the notch, a list of 2"""
+    """width and depth of the notch, m, a list of 2"""
     mesh_size: Length
     """edge length of the triangles, m"""
 
