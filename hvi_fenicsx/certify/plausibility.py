@@ -34,7 +34,7 @@ def foreseen(
         forces: its load vectors by name, nondimensional.
         thresholds: what is plausible.
     """
-    return (*_scales(problem, thresholds), *_weak_laws(problem, forces, thresholds))
+    return (*problem.implausible, *_scales(problem, thresholds), *_weak_laws(problem, forces, thresholds))
 
 
 def found(
@@ -125,8 +125,8 @@ def _distant_obstacle(
     if np.isfinite(gap) and gap > thresholds.unrelated * size > 0:
         metres, moved = (value * problem.scales.displacement for value in (gap, size))
         yield (
-            f"boundary.{state.surface.part}.contact: the gap is {metres:.3g} m at least and the largest displacement "
-            f"{moved:.3g} m: it is never closed; is it in m?"
+            f"{_place_of_bounds(problem, state.surface.part)}: the gap is {metres:.3g} m at least and the largest "
+            f"displacement {moved:.3g} m: it is never closed; is it in m?"
         )
 
 
@@ -168,6 +168,12 @@ def _wide_smoothing(problem: Problem, law: LawState, thresholds: PlausibilityThr
             f"({100 * most / peak:.2g} % of the law's peak), and by more than {100 * limit:.0f} % on "
             f"{100 * share:.2g} % of the part; is a smaller ε meant? (epsilon_absolute is in N/m)"
         )
+
+
+def _place_of_bounds(problem: Problem, part: str) -> str:
+    """The key in the scene of the effect that brought a part's bounds."""
+    keys = (effect.key for where, effect, contribution in problem.made if where == part and contribution.bounds)
+    return f"boundary.{part}.{next(keys)}"
 
 
 def _place(problem: Problem, term: LawTerm) -> str:
