@@ -30,7 +30,7 @@ def write_body(path: Path, problem: Problem, u: fem.Function, von_mises: Singles
         problem: what was solved.
         u: the displacement, nondimensional.
         von_mises: the von Mises stress of the cells that this rank owns, N/m², (c,).
-        estimate: of the error, whose shares are written over the energy norm of u; None leaves them out.
+        estimate: of the error, written cell by cell over the energy norm of u; None leaves it out.
 
     Raises:
         InputError: it cannot be written, on all ranks alike.

@@ -77,11 +77,9 @@ def estimate(found: Mapping[str, float | None] | None) -> list[tuple[str, str]]:
     if not found:
         return []
     norm = float(found.get("energy_norm") or 0.0) or 1.0
-    shares = {name: value if name == "relative" else value / norm for name, value in _known(found)}
+    parts = {name: value if name == "relative" else value / norm for name, value in _known(found)}
     return [
-        (words, f"{number(float(f'{100 * shares[name]:.2g}'))} %")
-        for name, words in _ESTIMATE.items()
-        if name in shares
+        (words, f"{number(float(f'{100 * parts[name]:.2g}'))} %") for name, words in _ESTIMATE.items() if name in parts
     ]
 
 

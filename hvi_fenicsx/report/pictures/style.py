@@ -1,7 +1,7 @@
 """How pictures look, and how they are saved: one width, one palette, one heading, large letters.
 
-Colours are Okabe and Ito's, told apart by colour-blind eyes. A picture is 1200 pixels wide, and its letters are sized
-to be read on a telephone, where it is shown at a third of that.
+Colours are Okabe and Ito's, which colour-blind eyes can distinguish. A picture is 1200 pixels wide, and its letters are
+sized to be read on a telephone, where it is shown at a third of that.
 """
 
 from __future__ import annotations
