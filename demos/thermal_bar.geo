@@ -1,4 +1,4 @@
-// A bar of two materials end to end, 1 m x 0.05 m; lengths in m.
+// A bar of 1 m x 0.05 m: 0.4 m of aluminium, then 0.6 m of steel. Lengths in m; h is the mesh size.
 h = 0.0125;
 Point(1) = {0, 0, 0, h};    Point(2) = {0.4, 0, 0, h};    Point(3) = {1, 0, 0, h};
 Point(4) = {1, 0.05, 0, h}; Point(5) = {0.4, 0.05, 0, h}; Point(6) = {0, 0.05, 0, h};
