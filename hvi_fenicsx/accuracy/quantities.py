@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from dolfinx import fem
 
     from ..certify.contact_state import ContactState
-    from ..certify.estimate.contact_errors import OnContact
+    from ..certify.estimate.contact_errors import ContactErrors
     from .adaptive import AdaptiveLevel
     from .cost_forecast import Step
 
@@ -61,7 +61,7 @@ class ContactField(Observable):
     _ahead: fem.Function | None = None
 
     @abstractmethod
-    def pick(self, errors: OnContact) -> float:
+    def pick(self, errors: ContactErrors) -> float:
         """Its own among the estimated errors on Γc."""
 
     @property
@@ -81,14 +81,15 @@ class ContactField(Observable):
         """See :meth:`.Quantity.error`; with its safety factor."""
         if not self.known_from_one_mesh:
             return super().error()
-        from ..certify.estimate import estimator
+        from ..certify.estimate.contact_errors import estimate_contact_errors
 
         found, self._ahead = self._last.solution, None
         if found.solve_result is None or found.examination is None:
             return np.inf
         last = self._last
-        errors = estimator.on_contact(last.prepared.system, last.levels, found.solve_result.u, found.examination)
-        self._ahead = errors.moved
+        u, examination = found.solve_result.u, found.examination
+        errors = estimate_contact_errors(last.prepared.system, last.levels, u, examination)
+        self._ahead = errors.corrected
         return self.safety * self.pick(errors)
 
     def ahead(self) -> fem.Function | None:
@@ -119,7 +120,7 @@ class Slip(ContactField):
         """u_t, m."""
         return _tangential(level, lambda state: state.slip, level.prepared.problem.scales.displacement)
 
-    def pick(self, errors: OnContact) -> float:
+    def pick(self, errors: ContactErrors) -> float:
         """The slip's."""
         return errors.slip
 
@@ -143,7 +144,7 @@ class Friction(ContactField):
         """-σ_t, N/m²."""
         return _tangential(level, lambda state: state.friction, level.prepared.problem.scales.stress)
 
-    def pick(self, errors: OnContact) -> float:
+    def pick(self, errors: ContactErrors) -> float:
         """The friction's."""
         return errors.friction
 

@@ -19,8 +19,8 @@ from scenes import Table, block, model, quadratic_linear, solved, solved_system
 
 from hvi_fenicsx import Scene, Solution, prepare
 from hvi_fenicsx.certify.certificate import examine
-from hvi_fenicsx.certify.estimate.contact_errors import on_contact
-from hvi_fenicsx.certify.estimate.edge_bubbles import Stiffness, diagonal, space
+from hvi_fenicsx.certify.estimate.contact_errors import estimate_contact_errors
+from hvi_fenicsx.certify.estimate.edge_bubbles import BubbleStiffness, diagonal, space
 from hvi_fenicsx.certify.estimate.estimator import Estimate, estimate
 from hvi_fenicsx.problem.problem import Problem
 from hvi_fenicsx.workflow import finish
@@ -148,7 +148,7 @@ def test_the_bubbles_stiffness_is_dolfinx_own_matrix(name: str) -> None:
     found = diagonal(problem, bubbles)
     assert found.ravel() == pytest.approx(matrix.diagonal(), rel=1e-12)
     e = np.random.default_rng(1).standard_normal(found.shape)
-    assert Stiffness(problem, bubbles).times(e).ravel() == pytest.approx(matrix @ e.ravel(), rel=1e-9, abs=1e-12)
+    assert BubbleStiffness(problem, bubbles).times(e).ravel() == pytest.approx(matrix @ e.ravel(), rel=1e-9, abs=1e-12)
 
 
 @pytest.mark.parametrize("strong", [False, True])
@@ -185,7 +185,7 @@ def test_slip_and_friction_against_a_mesh_far_finer(name: str, cells: int) -> No
     law = quadratic_linear(1e6 if name == "strong" else 1e3)
     prepared = prepare(Scene.model_validate(model(cells, 3e6, friction=law)))
     coarse, fine = finish(prepared), solved(model(128, 3e6, friction=law))
-    found = on_contact(prepared.system, (), coarse.solve_result.u, coarse.examination)
+    found = estimate_contact_errors(prepared.system, (), coarse.solve_result.u, coarse.examination)
     true = [apart(read(coarse), read(fine), power) for read, power in ((slips, 2), (frictions, 1))]
     assert found.slip == pytest.approx(true[0], rel=0.45)
     assert found.friction == pytest.approx(true[1], rel=0.45)

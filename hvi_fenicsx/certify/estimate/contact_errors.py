@@ -1,7 +1,7 @@
 """The estimated errors of the slip and of -σ_t on Γc: the defect's influence on the vertices, by the system's inverse.
 
 The bubbles e of the defect say what a finer mesh would add between the vertices. Tested with P1 functions, they and the
-laws between the vertices leave a force on u_h, and what moves under it is the error at the vertices.
+laws between the vertices leave a force on u_h; the displacement that it causes is the error at the vertices.
 """
 
 from __future__ import annotations
@@ -12,64 +12,70 @@ import numpy as np
 from dolfinx import fem, la
 
 from ...effects import Direction
-from ...problem.problem import Problem
 from ...runtime.mpi import total
 from ...system.levels import Levels
 from ...system.system import System
 from ...typing import Array
 from ..certificate import Examination
-from ..contact_state import ContactState
-from . import defect, edge_bubbles
-from .dual_norm import Dual
-from .law_traces import Along, Change, law, pointwise
+from ..contact_state import ContactState, LawState
+from . import defect
+from .contact_facets import PartTrace
+from .dual_norm import DualNorm
+from .edge_bubbles import BubbleStiffness
+from .law_traces import ErrorField, LawTraces
+from .thresholds import DEFAULT, Thresholds
 
-_TIMES, _ROUNDS = 2, 4
 _PLACE = 1 / (2 * np.sqrt(12))
 """Of a facet: the standard deviation of a drop's place, which may be anywhere in half of it."""
-_SETTLED = 0.05
-"""Of the correction's energy norm, what a further round may change."""
 
 
 @dataclass(frozen=True)
-class OnContact:
-    """Estimated errors on Γc, relative: of the slip in L2, of -σ_t in L1 (0 without a law along Γc).
+class ContactErrors:
+    """Estimated errors on Γc, relative.
 
-    ``moved`` is u_h with its estimated error at the vertices, nondimensional.
+    Attributes:
+        slip: of the slip in L2.
+        friction: of -σ_t in L1; 0 without a law along Γc.
+        corrected: u_h with its estimated error at the vertices, nondimensional.
     """
 
     slip: float
     friction: float
-    moved: fem.Function
+    corrected: fem.Function
 
 
-def on_contact(system: System, levels: Levels, u: fem.Function, examination: Examination) -> OnContact:
+def estimate_contact_errors(
+    system: System, levels: Levels, u: fem.Function, examination: Examination, thresholds: Thresholds = DEFAULT
+) -> ContactErrors:
     """Estimate the errors of slip and -σ_t, what smoothing changes included. Collective.
+
+    Nearly incompressible regions are not for this: their averaged pressure is not in the bubbles' force.
 
     Args:
         system: what was solved.
         levels: its coarser levels; none where there is no mesh hierarchy.
         u: its solution, nondimensional, ghosts updated.
         examination: of the same u.
-
-    Nearly incompressible regions are not for this: their averaged pressure is not in the bubbles' force.
+        thresholds: how accurately.
     """
-    inverse = Dual(system, levels, u)
-    change = _change(system, u, examination, inverse)
-    unsure = _unsure(system.problem, u, examination, inverse, change)
+    traces = LawTraces(system.problem, u, examination.states, thresholds)
+    inverse = DualNorm(system, levels, u, thresholds)
+    error = _error(traces, inverse)
+    uncertain = _uncertainty(traces, inverse)
     inverse.destroy()
-    slips = [_slip(system.problem, state, u, change, unsure) for state in examination.states]
-    tractions = [
-        _traction(system.problem, state, number, u, change, unsure)
+    slips = [_slip(traces, state, error, uncertain) for state in examination.states]
+    frictions = [
+        _friction(traces, state, law, error, uncertain)
         for state in examination.states
-        for number, law in enumerate(state.laws)
+        for law in state.laws
         if law.term.direction is Direction.SLIP
     ]
     comm = system.comm
     apart, whole = (total(comm, sum(pair[i] for pair in slips)) for i in (0, 1))
-    known, unknown, carried = (total(comm, sum(sizes[i] for sizes in tractions)) for i in (0, 1, 2))
+    known, unknown, carried = (total(comm, sum(sizes[i] for sizes in frictions)) for i in (0, 1, 2))
     away = float(np.hypot(known, unknown))
-    change.vertices.x.array[:] += u.x.array
-    return OnContact(float(np.sqrt(ratio(apart, whole))), ratio(away, carried), change.vertices)
+    error.vertices.x.array[:] += u.x.array
+    return ContactErrors(float(np.sqrt(ratio(apart, whole))), ratio(away, carried), error.vertices)
 
 
 def ratio(part: float, whole: float) -> float:
@@ -77,88 +83,84 @@ def ratio(part: float, whole: float) -> float:
     return part / whole if whole > 0 else (np.inf if part > 0 else 0.0)
 
 
-def _change(system: System, u: fem.Function, examination: Examination, inverse: Dual) -> Change:
-    """The defect with its influence on the vertices and, from the second time on, theirs on it. Collective."""
-    problem = system.problem
-    space, moved = edge_bubbles.space(problem.domain.mesh), fem.Function(problem.space)
-    change, stiffness = None, edge_bubbles.Stiffness(problem, space)
-    residual = problem.bulk.residual_in(space, u, problem.linear.values())
-    for _ in range(_TIMES):
-        edges, _ = pointwise(problem, space, u, examination.states, change)
-        load = residual - edges - problem.bulk.force_in(space, moved)
-        change = Change(moved, defect.least(stiffness, u, load))
-        _answer(problem, u, examination, inverse, change)
-    assert change is not None
-    return change
+def _error(traces: LawTraces, inverse: DualNorm) -> ErrorField:
+    """The defect with its influence on the vertices and, from the second round on, theirs on it. Collective."""
+    problem, error = traces.problem, None
+    vertices, stiffness = fem.Function(problem.space), BubbleStiffness(problem, traces.bubbles)
+    residual = problem.bulk.residual_in(traces.bubbles, traces.u, problem.linear.values())
+    for _ in range(traces.thresholds.contact_rounds):
+        edges, _ = traces.tested(error)
+        load = residual - edges - problem.bulk.force_in(traces.bubbles, vertices)
+        error = ErrorField(vertices, defect.least_energy(stiffness, traces.u, load, traces.thresholds))
+        _move_vertices(traces, inverse, error)
+    assert error is not None
+    return error
 
 
-def _answer(problem: Problem, u: fem.Function, examination: Examination, inverse: Dual, change: Change) -> None:
+def _move_vertices(traces: LawTraces, inverse: DualNorm, error: ErrorField) -> None:
     """Move the vertices as the bubbles ask; the laws answer that, so it takes a few rounds. Collective."""
-    size, bubbling = 0.0, problem.bulk.force_in(problem.space, change.edges)
-    for _ in range(_ROUNDS):
-        _, laws = pointwise(problem, change.edges.function_space, u, examination.states, change)
-        step, length = inverse.solve(laws - problem.bulk.force_in(problem.space, change.vertices) - bubbling)
-        change.vertices.x.array[:] += step.x.array
+    problem, thresholds = traces.problem, traces.thresholds
+    size, bubbling = 0.0, problem.bulk.force_in(problem.space, error.edges)
+    for _ in range(thresholds.answer_rounds):
+        _, laws = traces.tested(error)
+        step, length = inverse.solve(laws - problem.bulk.force_in(problem.space, error.vertices) - bubbling)
+        error.vertices.x.array[:] += step.x.array
         size = max(size, length)
-        if length <= _SETTLED * size:
+        if length <= thresholds.answer_change * size:
             break
 
 
-def _unsure(problem: Problem, u: fem.Function, examination: Examination, inverse: Dual, change: Change) -> fem.Function:
+def _uncertainty(traces: LawTraces, inverse: DualNorm) -> fem.Function:
     """What the vertices may move because bubbles do not see where in half an edge a drop lies, P1. Collective.
 
     The facets' places are independent of each other, so n of them add up to a root of n times the effect of one.
     """
-    d, comm = problem.scales.dimension, problem.domain.mesh.comm
-    force, count = fem.Function(problem.space), 0
-    for state in examination.states:
-        for number in range(len(state.laws)):
-            along, tau = _drops(problem, change.edges.function_space, u, state, number)
-            force.x.array[:] += along.tested(tau)[1].ravel()
+    problem, count = traces.problem, 0
+    d, comm, force = problem.scales.dimension, problem.domain.mesh.comm, fem.Function(problem.space)
+    for state in traces.states:
+        for law in state.laws:
+            points, tau = _drops(traces, state, law)
+            force.x.array[:] += points.tested(tau)[1].ravel()
             count += int(np.count_nonzero(np.any(tau, axis=(1, 2))))
     force.x.scatter_reverse(la.InsertMode.add)
     owned = problem.space.dofmap.index_map.size_local
-    moved, _ = inverse.solve(force.x.array.reshape(-1, d)[:owned])
-    moved.x.array[:] /= np.sqrt(max(comm.allreduce(count), 1))
-    return moved
+    field, _ = inverse.solve(force.x.array.reshape(-1, d)[:owned])
+    field.x.array[:] /= np.sqrt(max(comm.allreduce(count), 1))
+    return field
 
 
-def _drops(
-    problem: Problem, space: fem.FunctionSpace, u: fem.Function, state: ContactState, number: int
-) -> tuple[Along, Array]:
+def _drops(traces: LawTraces, state: ContactState, law: LawState) -> tuple[PartTrace, Array]:
     """A law's drops on the facets within which they lie, spread over their uncertain share of them, (f, q, k)."""
-    term = state.laws[number].term
-    along, concave = Along(problem, space, state.surface, term.directions), term.exact.concave
-    ends = along.at_vertices(state.laws[number].argument[:, None])[:, :, 0]
+    points, concave = traces.part(state.surface, law.term.directions), law.term.exact.concave
+    ends = points.at_vertices(law.argument[:, None])[:, :, 0]
     height = np.zeros(len(ends))
     for kink, jump in zip(concave.kinks, concave.jumps, strict=True):
         height += jump * ((ends.min(axis=1, initial=np.inf) < kink) & (kink < ends.max(axis=1, initial=-np.inf)))
-    slip = along.linear(u)
+    slip = points.linear(traces.u)
     length = np.linalg.norm(slip, axis=2, keepdims=True)
     unit = np.divide(slip, length, out=np.zeros_like(slip), where=length > 0)
-    return along, _PLACE * height[:, None, None] * unit
+    return points, _PLACE * height[:, None, None] * unit
 
 
-def _slip(
-    problem: Problem, state: ContactState, u: fem.Function, change: Change, unsure: fem.Function
-) -> tuple[float, float]:
-    """∫ of the squares of the slip's change and of the slip over this rank's share of a part. Collective."""
-    along = Along(problem, change.edges.function_space, state.surface, state.surface.tangents)
-    added, slip = along.linear(change.vertices) + along.quadratic(change.edges), along.linear(u)
-    fields = added, along.linear(unsure), slip
-    squares = [float(np.sum(along.weights * np.sum(values**2, axis=2))) for values in fields]
+def _slip(traces: LawTraces, state: ContactState, error: ErrorField, uncertain: fem.Function) -> tuple[float, float]:
+    """∫ of the squares of the slip's error and of the slip over this rank's share of a part. Collective."""
+    points = traces.part(state.surface, state.surface.tangents)
+    added, slip = points.linear(error.vertices) + points.quadratic(error.edges), points.linear(traces.u)
+    fields = added, points.linear(uncertain), slip
+    squares = [float(np.sum(points.weights * np.sum(values**2, axis=2))) for values in fields]
     return squares[0] + squares[1], squares[2]
 
 
-def _traction(
-    problem: Problem, state: ContactState, number: int, u: fem.Function, change: Change, unsure: fem.Function
+def _friction(
+    traces: LawTraces, state: ContactState, law: LawState, error: ErrorField, uncertain: fem.Function
 ) -> tuple[float, float, float]:
-    """∫ of the law's change against the interpolated nodal tractions, of what is unsure of it, of those. Collective."""
-    space, further = change.edges.function_space, fem.Function(problem.space)
-    further.x.array[:] = change.vertices.x.array + unsure.x.array
-    along, nodal, tau = law(problem, space, u, state, number, change)
-    _, _, other = law(problem, space, u, state, number, Change(further, change.edges))
+    """∫ of the law's change against the interpolated nodal tractions, of its uncertainty, of those. Collective."""
+    further = fem.Function(traces.problem.space)
+    further.x.array[:] = error.vertices.x.array + uncertain.x.array
+    found = traces.of_law(state, law, error)
+    other = traces.of_law(state, law, ErrorField(further, error.edges))
+    fields = found.traction - found.nodal, other.traction - found.traction, found.nodal
     known, unknown, carried = (
-        float(np.sum(along.weights * np.linalg.norm(values, axis=2))) for values in (tau - nodal, other - tau, nodal)
+        float(np.sum(found.points.weights * np.linalg.norm(values, axis=2))) for values in fields
     )
     return known, unknown, carried

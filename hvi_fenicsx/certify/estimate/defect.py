@@ -18,20 +18,23 @@ from mpi4py import MPI
 
 from ...problem.problem import Bounds, Problem
 from ...typing import Array, Entities, Mask
-from .edge_bubbles import Stiffness
+from .edge_bubbles import BubbleStiffness
+from .thresholds import DEFAULT, Thresholds
 
-_RTOL = 0.1
-"""Of the bubbles' solve, in the energy norm: their energy is right to about its square."""
-_ROUNDS = 4
 _FAR = 1e30
 """Stands for no bound: an infinite nodal value has no interpolant."""
 
 
 @dataclass(frozen=True)
-class Midpoints:
-    """Edges of a part with bounds (k of them, owned blocks): lower ≤ e·n ≤ upper.
+class EdgeBounds:
+    """Bounds at the midpoints of a part's edges (k of them): lower ≤ e·n ≤ upper.
 
-    ``side`` is 1 where e is held on the upper bound, -1 on the lower one, else 0.
+    Attributes:
+        blocks: the edges' owned blocks, (k,).
+        normals: outward unit normals, (k, d).
+        lower: lower bounds, (k,).
+        upper: upper bounds, (k,).
+        side: 1 where e is held on the upper bound, -1 on the lower one, else 0; (k,).
     """
 
     blocks: Entities
@@ -41,30 +44,41 @@ class Midpoints:
     side: npt.NDArray[np.int8]
 
     def component(self, e: Array) -> Array:
-        """E·n, (k,)."""
+        """The normal component e·n at the edges, (k,)."""
         return np.asarray(np.sum(e[self.blocks] * self.normals, axis=1))
 
-    def moved(self, e: Array, force: Array) -> Midpoints:
-        """Held where e leaves the bounds, let go where the force (n, d) draws away from the bound that holds."""
+    def updated(self, e: Array, force: Array) -> EdgeBounds:
+        """Held where e leaves the bounds, let go where a force draws away from the bound that holds.
+
+        Args:
+            e: the bubbles, (n, d).
+            force: the force on them, (n, d).
+        """
         along, push = self.component(e), self.component(force)
         upper = np.where(self.side == 1, push >= 0, along > self.upper)
         lower = np.where(self.side == -1, push <= 0, along < self.lower)
         return replace(self, side=np.where(upper, 1, np.where(lower, -1, 0)).astype(np.int8))
 
-    def placed(self, e: Array) -> None:
-        """Put e on the bounds that hold it."""
+    def put_on_bounds(self, e: Array) -> None:
+        """Put e (n, d) on the bounds that hold it, in place."""
         target = np.where(self.side == 1, self.upper, self.lower)
         change = np.where(self.side == 0, 0.0, target - self.component(e))
         e[self.blocks] += change[:, None] * self.normals
 
     def project(self, r: Array) -> None:
-        """Take out of r what the bounds carry."""
+        """Take out of r (n, d) what the bounds carry, in place."""
         carried = np.where(self.side == 0, 0.0, self.component(r))
         r[self.blocks] -= carried[:, None] * self.normals
 
 
 def prescribed(problem: Problem, u: fem.Function, space: fem.FunctionSpace) -> tuple[Mask, Array]:
-    """Whether a bubble is free (n, d), and what prescribed displacements ask of the others (n, d). Collective."""
+    """Whether a bubble is free (n, d), and what prescribed displacements ask of the others (n, d). Collective.
+
+    Args:
+        problem: the prescribed displacements.
+        u: the P1 solution, nondimensional.
+        space: the edge bubbles.
+    """
     d, owned = problem.scales.dimension, space.dofmap.index_map.size_local
     free, value = np.ones((owned, d), dtype=np.bool_), np.zeros((owned, d))
     middle = fem.Function(space)
@@ -78,8 +92,15 @@ def prescribed(problem: Problem, u: fem.Function, space: fem.FunctionSpace) -> t
     return free, value
 
 
-def midpoints(problem: Problem, u: fem.Function, bounds: Bounds, space: fem.FunctionSpace) -> Midpoints:
-    """The bounds of a part at the midpoints of its edges, means of those at their ends. Collective."""
+def edge_bounds(problem: Problem, u: fem.Function, bounds: Bounds, space: fem.FunctionSpace) -> EdgeBounds:
+    """The bounds of a part at the midpoints of its edges, means of those at their ends. Collective.
+
+    Args:
+        problem: what was solved.
+        u: the P1 solution, nondimensional.
+        bounds: at the vertices of the part.
+        space: the edge bubbles.
+    """
     d = problem.scales.dimension
     blocks = _on(space, bounds.surface.facets)
 
@@ -95,7 +116,7 @@ def midpoints(problem: Problem, u: fem.Function, bounds: Bounds, space: fem.Func
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     normal = np.sum(bounds.surface.values(u.x.array) * bounds.surface.normals, axis=1)
     lower, upper = (middle((b - normal)[:, None])[:, 0] for b in (bounds.lower, bounds.upper))
-    return Midpoints(blocks, normals, np.minimum(lower, 0.0), np.maximum(upper, 0.0), np.zeros(len(blocks), np.int8))
+    return EdgeBounds(blocks, normals, np.minimum(lower, 0.0), np.maximum(upper, 0.0), np.zeros(len(blocks), np.int8))
 
 
 def _on(space: fem.FunctionSpace, facets: Entities) -> Entities:
@@ -104,39 +125,61 @@ def _on(space: fem.FunctionSpace, facets: Entities) -> Entities:
     return np.unique(found[found < space.dofmap.index_map.size_local]).astype(np.int32)
 
 
-def least(stiffness: Stiffness, u: fem.Function, load: Array) -> fem.Function:
-    """The admissible bubbles of least energy under a load (n, d), ghosts updated. Collective."""
+def least_energy(
+    stiffness: BubbleStiffness, u: fem.Function, load: Array, thresholds: Thresholds = DEFAULT
+) -> fem.Function:
+    """The admissible bubbles of least energy under a load, ghosts updated. Collective.
+
+    Args:
+        stiffness: a(e, e).
+        u: the P1 solution, nondimensional.
+        load: ρ, (n, d).
+        thresholds: how accurately.
+    """
     problem, space = stiffness.problem, stiffness.space
     free, value = prescribed(problem, u, space)
-    solve(stiffness, load, free, value, [midpoints(problem, u, b, space) for b in problem.bounds], _RTOL)
+    solve(stiffness, load, free, value, [edge_bounds(problem, u, b, space) for b in problem.bounds], thresholds)
     e = fem.Function(space)
     e.x.array[: value.size] = value.ravel()
     e.x.scatter_forward()
     return e
 
 
-def solve(stiffness: Stiffness, load: Array, free: Mask, e: Array, parts: Sequence[Midpoints], rtol: float) -> None:
+def solve(
+    stiffness: BubbleStiffness,
+    load: Array,
+    free: Mask,
+    e: Array,
+    parts: Sequence[EdgeBounds],
+    thresholds: Thresholds = DEFAULT,
+) -> None:
     """The admissible bubbles of least energy, an active set method, a few rounds. Collective.
 
     Args:
-        stiffness: a(e, e). load: ρ (n, d). free: see :func:`prescribed`. parts: bounds. rtol: of each solve.
-        e: (n, d), what is prescribed, which the result takes the place of.
+        stiffness: a(e, e).
+        load: ρ, (n, d).
+        free: where a bubble is not prescribed, (n, d).
+        e: what is prescribed, (n, d); the result takes its place.
+        parts: the bounds.
+        thresholds: how accurately.
     """
     guess = np.where(free, stiffness.diagonal_solve(load), e)
-    parts = [part.moved(guess, load) for part in parts]
+    parts = [part.updated(guess, load) for part in parts]
     del guess
-    for _ in range(_ROUNDS):
+    for _ in range(thresholds.bubble_rounds):
         for part in parts:
-            part.placed(e)
-        force = stiffness.solve(load, e, functools.partial(_project, free, tuple(parts)), rtol)
-        changed = [part.moved(e, force) for part in parts]
+            part.put_on_bounds(e)
+        project = functools.partial(_project, free, tuple(parts))
+        tolerance, steps = thresholds.bubble_tolerance, thresholds.bubble_steps
+        force = stiffness.solve(load, e, project, tolerance=tolerance, max_steps=steps)
+        changed = [part.updated(e, force) for part in parts]
         same = all(np.array_equal(a.side, b.side) for a, b in zip(parts, changed, strict=True))
         parts = changed
         if stiffness.comm.allreduce(same, op=MPI.LAND):
             break
 
 
-def _project(free: Mask, parts: Sequence[Midpoints], r: Array) -> None:
+def _project(free: Mask, parts: Sequence[EdgeBounds], r: Array) -> None:
     """Take out of r (n, d) what is prescribed and what the bounds hold."""
     r *= free
     for part in parts:

@@ -24,23 +24,24 @@ from .. import contact_state
 from ..certificate import Examination
 from ..contact_state import ContactState
 from ..force_attribution import components, on_kink, touches
-from ..thresholds import DEFAULT
 from .law_traces import nearest, tractions
-
-RTOL = 0.1
-"""Of the residual: the energy is then right to about its square."""
+from .thresholds import DEFAULT, Thresholds
 
 
-class Dual:
+class DualNorm:
     """The inverse of the system's stiffness where u is held: by contact, by convex kinks, by supports.
 
     Laws add the rising part of their tangent, so that the body they hold has no free motion. Creation is collective.
+
+    Attributes:
+        system: whose stiffness it is.
+        held: the owned scalar dofs at which u is held.
     """
 
-    def __init__(self, system: System, levels: Levels, u: fem.Function) -> None:
-        self.system, self._before = system, system.jacobian.rates
+    def __init__(self, system: System, levels: Levels, u: fem.Function, thresholds: Thresholds = DEFAULT) -> None:
+        self.system, self._before, self._tolerance = system, system.jacobian.rates, thresholds.dual_tolerance
         x = system.unknowns(u)
-        self.held = _held(system, x)
+        self.held = _held(system, x, thresholds.near)
         system.jacobian.set_rates([_rising(term, x.array_r) for term in system.terms])
         self._inverse = HeldPreconditioner(system, levels, LinearSettings.choose(system, levels=bool(levels)), Timer())
         self._inverse.prepare(self.held)
@@ -51,7 +52,7 @@ class Dual:
         load, x = self._load(functional), system.load.duplicate()
         x.set(0.0)
         if load.norm() > 0:
-            self._inverse.solve(load, x, RTOL)
+            self._inverse.solve(load, x, self._tolerance)
         energy = float(load.dot(x))
         return system.displacement(x), float(np.sqrt(max(energy, 0.0)))
 
@@ -70,15 +71,15 @@ class Dual:
         self.system.jacobian.set_rates(self._before)
 
 
-def _held(system: System, x: PETSc.Vec) -> Entities:
+def _held(system: System, x: PETSc.Vec, near: float) -> Entities:
     """Owned scalar dofs on a bound, or on a convex kink of a law."""
     u = x.array_r
     found: list[Integers] = [np.empty(0, np.int64)]
     for bounds in system.bounds:
         dofs, sign = bounds.component()
-        found.append(dofs[touches(bounds, sign * u[dofs], DEFAULT.near)])
+        found.append(dofs[touches(bounds, sign * u[dofs], near)])
     for term in system.terms:
-        stuck = on_kink(term.law.convex, term.argument(u), DEFAULT.near)
+        stuck = on_kink(term.law.convex, term.argument(u), near)
         found.extend(dofs[stuck] for dofs, _ in components(term))
     return np.setdiff1d(np.unique(np.concatenate(found)), system.problem.fixed).astype(np.int32)
 
@@ -91,15 +92,27 @@ def _rising(term: LawTerm, u: Array) -> Array:
     return term.rate(u, secant, second)
 
 
-def smoothing(problem: Problem, states: Sequence[ContactState]) -> Array:
-    """The smoothed laws' nodal forces minus the nearest ones of the unsmoothed laws, owned blocks (n, d)."""
-    return _law_forces(problem, states, exact=True)
+def smoothing(problem: Problem, states: Sequence[ContactState], near: float) -> Array:
+    """The smoothed laws' nodal forces minus the nearest ones of the unsmoothed laws, owned blocks (n, d).
+
+    Args:
+        problem: what was solved.
+        states: of the parts of Γc.
+        near: distance from a kink that counts as being on it.
+    """
+    return _law_forces(problem, states, near, exact=True)
 
 
-def algebraic(problem: Problem, examination: Examination) -> Array:
-    """Nodal forces that nothing accounts for: off the carriers, beyond the laws, pulling or distant contact; (n, d)."""
+def algebraic(problem: Problem, examination: Examination, near: float) -> Array:
+    """Nodal forces that nothing accounts for: off the carriers, beyond the laws, pulling or distant contact; (n, d).
+
+    Args:
+        problem: what was solved.
+        examination: of its solution.
+        near: distance from a kink that counts as being on it.
+    """
     rest = contact_state.balanced(problem, examination.forces.reaction, examination.states)
-    rest = rest - _law_forces(problem, examination.states, exact=False)  # a law's force is minus its residual
+    rest = rest - _law_forces(problem, examination.states, near, exact=False)  # a law's force is minus its residual
     for state in examination.states:
         if state.bounds is not None:
             force = state.surface.weights * _impossible_pressure(state)
@@ -115,7 +128,12 @@ def _impossible_pressure(state: ContactState) -> Array:
 
 
 def penetration_energy(problem: Problem, states: Sequence[ContactState]) -> float:
-    """Σ force times penetration over the vertices with bounds. Collective."""
+    """Σ force times penetration over the vertices with bounds. Collective.
+
+    Args:
+        problem: what was solved.
+        states: of the parts of Γc.
+    """
     local = 0.0
     for state in states:
         if state.bounds is not None:
@@ -124,15 +142,15 @@ def penetration_energy(problem: Problem, states: Sequence[ContactState]) -> floa
     return total(problem.domain.mesh.comm, local)
 
 
-def _law_forces(problem: Problem, states: Sequence[ContactState], *, exact: bool) -> Array:
+def _law_forces(problem: Problem, states: Sequence[ContactState], near: float, *, exact: bool) -> Array:
     """Nodal law forces that the (exact or solved) law cannot give, owned blocks (n, d)."""
     d = problem.scales.dimension
     forces = np.zeros((problem.space.dofmap.index_map.size_local, d))
     for state in states:
-        for number, law in enumerate(state.laws):
-            term, given = law.term, tractions(state, number)
+        for law in state.laws:
+            term, given = law.term, tractions(state, law)
             slip = state.slip if term.radial else law.argument[:, None]
-            away = given - nearest(term.exact if exact else term.law, slip, given)
+            away = given - nearest(term.exact if exact else term.law, slip, given, near)
             away[law.hidden] = 0.0
             vectors = np.einsum("mk,mkd->md", away * state.surface.weights[:, None], term.directions)
             np.add.at(forces, state.surface.blocks, vectors)

@@ -22,11 +22,14 @@ from mpi4py import MPI
 from ...problem.problem import Problem
 from ...typing import Array
 
-_MOST_STEPS = 30
-
 
 def quadrature(cell: str, degree: int) -> tuple[Array, Array]:
-    """Barycentric points (q, corners) and weights (q,), whose sum is 1, of a simplex."""
+    """Barycentric points (q, corners) and weights (q,), whose sum is 1, of a simplex.
+
+    Args:
+        cell: its name, such as "triangle".
+        degree: of the polynomials that are integrated exactly.
+    """
     made: tuple[Any, Any] = basix.make_quadrature(basix.CellType[cell], degree)
     points, weights = made
     return np.column_stack([1 - points.sum(axis=1), points]), weights / weights.sum()
@@ -66,11 +69,16 @@ def space(mesh: dmesh.Mesh) -> fem.FunctionSpace:
     return fem.functionspace(mesh, basix.ufl.blocked_element(scalar, shape=(mesh.geometry.dim,)))
 
 
-class Stiffness:
+class BubbleStiffness:
     """The elastic stiffness of the bubbles, nondimensional: its products and its diagonal. Creation is collective.
 
     It is not stored. In space it would take 9 kB a vertex, more than all else of a run, and take longer to assemble
     than the few products that are wanted of it.
+
+    Attributes:
+        problem: whose elastic operator it is.
+        space: the edge bubbles.
+        comm: the ranks.
     """
 
     def __init__(self, problem: Problem, bubbles: fem.FunctionSpace) -> None:
@@ -93,22 +101,27 @@ class Stiffness:
         """The diagonal's inverse times r (n, d)."""
         return np.asarray(r * self._inverse)
 
-    def solve(self, load: Array, e: Array, project: Callable[[Array], None], rtol: float) -> Array:
+    def solve(
+        self, load: Array, e: Array, project: Callable[[Array], None], *, tolerance: float, max_steps: int
+    ) -> Array:
         """A e = load among e + the range of a symmetric projection, by conjugate gradients; in place. Collective.
 
         Args:
-            load: (n, d). e: start and result (n, d). project: takes out of a vector what is not free, in place.
-            rtol: of the residual, in the norm of the diagonal's inverse.
+            load: (n, d).
+            e: start and result, (n, d).
+            project: takes out of a vector what is not free, in place.
+            tolerance: relative, of the residual in the norm of the diagonal's inverse.
+            max_steps: of the conjugate gradients.
 
         Returns:
             The residual load - A e, what is not free included, (n, d).
         """
         z = load.copy()
         project(z)
-        goal = rtol**2 * self._dot(z, self.diagonal_solve(z))
+        goal = tolerance**2 * self._dot(z, self.diagonal_solve(z))
         r = load - self.times(e)
         p, rho = np.zeros_like(r), 0.0
-        for _ in range(_MOST_STEPS):
+        for _ in range(max_steps):
             np.copyto(z, r)
             project(z)
             z *= self._inverse
@@ -134,6 +147,10 @@ def diagonal(problem: Problem, bubbles: fem.FunctionSpace) -> Array:
 
     On a cell in which the material is constant, E being the energy of an affine function,
     a(4 λ_a λ_b) = 16 (E(λ_a) + E(λ_b) + E(λ_a + λ_b)) / ((d + 1)(d + 2)).
+
+    Args:
+        problem: whose elastic operator it is.
+        bubbles: the space of edge bubbles.
     """
     affine, d = _Affine(problem), problem.scales.dimension
     hats = np.vstack([-np.ones(d), np.eye(d)])
@@ -165,7 +182,7 @@ class _Affine:
         self._form = fem.form(whole)
 
     def energies(self, slopes: Array) -> Array:
-        """Of such a function with these slopes in reference coordinates (d,), along each axis; owned cells (n, d)."""
+        """The energies of the function with these slopes in reference coordinates (d,), along each axis, (cells, d)."""
         self._slopes.value[:] = slopes
         self._sums.x.array[:] = 0.0
         fem.assemble_vector(self._sums.x.array, self._form)

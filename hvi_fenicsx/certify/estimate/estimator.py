@@ -18,11 +18,11 @@ from ...system.levels import Levels
 from ...system.system import System
 from ...typing import Array
 from ..certificate import Examination
-from . import defect, dual_norm, edge_bubbles, law_traces
-from .contact_errors import OnContact, on_contact, ratio
-
-_ROUNDING = 1e-12
-"""Nondimensional norms up to this are rounding: a body that meets no force has no error, not 100 % of nothing."""
+from . import defect, dual_norm
+from .contact_errors import ratio
+from .edge_bubbles import BubbleStiffness
+from .law_traces import LawTraces
+from .thresholds import DEFAULT, Thresholds
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,9 @@ class Estimate:
 
     Attributes:
         cells: η_K of the cells that this rank owns, Σ η_K² = discretisation² over all ranks.
-        discretisation: of the mesh. smoothing: of the smoothed laws, 0 for exact ones. algebraic: of the solver.
+        discretisation: the mesh's error.
+        smoothing: the smoothed laws' error, 0 for exact ones.
+        algebraic: the solver's error.
         energy_norm: |||u_h|||.
     """
 
@@ -57,7 +59,9 @@ class Estimate:
         return {name: float(getattr(self, name)) for name in names}
 
 
-def estimate(system: System, levels: Levels, u: fem.Function, examination: Examination) -> Estimate:
+def estimate(
+    system: System, levels: Levels, u: fem.Function, examination: Examination, thresholds: Thresholds = DEFAULT
+) -> Estimate:
     """Estimate the error of a displacement. Collective.
 
     Args:
@@ -65,38 +69,43 @@ def estimate(system: System, levels: Levels, u: fem.Function, examination: Exami
         levels: its coarser levels; none where there is no mesh hierarchy.
         u: its solution, nondimensional, ghosts updated.
         examination: of the same u.
+        thresholds: how accurately.
     """
-    problem = system.problem
-    cells, unmet = _between_vertices(problem, u, examination)
-    inverse = dual_norm.Dual(system, levels, u)
+    problem, near = system.problem, thresholds.near
+    cells, unmet = _between_vertices(problem, u, examination, thresholds)
+    inverse = dual_norm.DualNorm(system, levels, u, thresholds)
     if problem.terms:
         cells += problem.bulk.energy_by_cell(inverse.solve(unmet)[0])
-    smoothing = inverse.solve(dual_norm.smoothing(problem, examination.states))[1] if _smoothed(problem) else 0.0
-    _, algebraic = inverse.solve(dual_norm.algebraic(problem, examination))
+    smoothing = inverse.solve(dual_norm.smoothing(problem, examination.states, near))[1] if _smoothed(problem) else 0.0
+    _, algebraic = inverse.solve(dual_norm.algebraic(problem, examination, near))
     inverse.destroy()
     comm = problem.domain.mesh.comm
     beyond = dual_norm.penetration_energy(problem, examination.states)
-    return Estimate(
-        np.sqrt(cells),
-        _norm(total(comm, float(cells.sum()))),
-        _norm(smoothing**2),
-        _norm(algebraic**2 + beyond),
-        _norm(_energy(problem, u, examination)),
-    )
+    squares = {
+        "discretisation": total(comm, float(cells.sum())),
+        "smoothing": smoothing**2,
+        "algebraic": algebraic**2 + beyond,
+        "energy_norm": _energy(problem, u, examination),
+    }
+    norms = {name: _norm(square, thresholds.rounding) for name, square in squares.items()}
+    return Estimate(cells=np.sqrt(cells), **norms)
 
 
-def _norm(square: float) -> float:
+def _norm(square: float, rounding: float) -> float:
     """The root of what is more than rounding, else 0."""
-    return float(np.sqrt(square)) if square > _ROUNDING**2 else 0.0
+    return float(np.sqrt(square)) if square > rounding**2 else 0.0
 
 
-def _between_vertices(problem: Problem, u: fem.Function, examination: Examination) -> tuple[Array, Array]:
+def _between_vertices(
+    problem: Problem, u: fem.Function, examination: Examination, thresholds: Thresholds
+) -> tuple[Array, Array]:
     """η_K² of the owned cells that P1 does not see; nodal forces (n, d) that it takes the laws' for. Collective."""
-    space = edge_bubbles.space(problem.domain.mesh)
-    edges, vertices = law_traces.pointwise(problem, space, u, examination.states)
+    traces = LawTraces(problem, u, examination.states, thresholds)
+    edges, vertices = traces.tested()
     edges *= -1.0
-    edges += problem.bulk.residual_in(space, u, problem.linear.values())
-    cells = problem.bulk.energy_by_cell(defect.least(edge_bubbles.Stiffness(problem, space), u, edges))
+    edges += problem.bulk.residual_in(traces.bubbles, u, problem.linear.values())
+    bubbles = defect.least_energy(BubbleStiffness(problem, traces.bubbles), u, edges, thresholds)
+    cells = problem.bulk.energy_by_cell(bubbles)
     if problem.bulk.averages_dilatation:
         # a(e, e) has the shear part only; the volumetric stress is an unknown of its own
         cells += problem.bulk.dilatation_error(u)
@@ -111,6 +120,3 @@ def _energy(problem: Problem, u: fem.Function, examination: Examination) -> floa
     """a(u, u). Collective."""
     internal = examination.forces.reaction + examination.forces.load
     return total(problem.domain.mesh.comm, float(u.x.array[: internal.size] @ internal.ravel()))
-
-
-__all__ = ["Estimate", "OnContact", "estimate", "on_contact"]
