@@ -3,9 +3,10 @@
     ./hvi exec python3 tests/faults/seeded_faults.py            all faults of seeded_faults.toml, on this tree
     ./hvi exec python3 tests/faults/seeded_faults.py NAME ...   some of them
 
-It takes about an hour of one core. First all fast tests run once, to learn which lines of the package each executes and
-how long it takes (also in the processes that it starts). Then for each fault the tests that execute its lines run, the
-cheapest first, until one fails; tests that start several processes come first where only those can show the fault.
+It takes an hour or two of one core. First all fast tests run once, to learn which lines of the package each executes
+and how long it takes (also in the processes that it starts). Then for each fault the tests that execute its lines run,
+the cheapest first, of each test function four cases at most, until one fails; tests that start several processes come
+first where only those can show the fault.
 
     --check     only: does each fault's code occur exactly once?
     --old       take the words of an older tree (``before`` in the file), together with --tree DIR
@@ -39,6 +40,8 @@ PACKAGE = "hvi_fenicsx"
 TABLE = HERE / "seeded_faults_result.md"
 BATCHES = (5.0, 20.0, 60.0, 200.0, float("inf"))
 """Seconds of tests that are run together: what is caught early shall not wait for all tests to be collected."""
+CASES = 4
+"""Of a test function with many parameters, the cheapest so many are tried: a fault that none catches is dear."""
 _LEFT_OUT = ("/.git", "/build", "/results", "/.hypothesis", "/.pytest_cache", "__pycache__")
 
 
@@ -153,16 +156,16 @@ def lines_of(fault: Fault, file: Path) -> set[int]:
 
 
 def ordered(fault: Fault, tests: dict[str, Any], file: str, lines: set[int]) -> list[str]:
-    """The tests that execute these lines: of each test function the cheapest case, cheapest first, then the others."""
+    """The tests that execute these lines: of each test function the cheapest case, cheapest first, then some more."""
     chosen = [name for name, test in tests.items() if lines & set(test["lines"].get(file, ()))]
     seen: dict[str, int] = {}
     keys = {}
     for name in sorted(chosen, key=lambda n: tests[n]["seconds"]):
         function = re.sub(r"\[.*", "", name)
         seen[function] = seen.get(function, -1) + 1
-        late = 0 if seen[function] == 0 else 1 if seen[function] < 4 else 2
-        keys[name] = (fault.ranks and not tests[name]["parallel"], late, tests[name]["seconds"])
-    return sorted(chosen, key=lambda n: keys[n])
+        if seen[function] < CASES:
+            keys[name] = (fault.ranks and not tests[name]["parallel"], seen[function] > 0, tests[name]["seconds"])
+    return sorted(keys, key=lambda n: keys[n])
 
 
 def batches(names: Sequence[str], tests: dict[str, Any]) -> Iterator[list[str]]:
