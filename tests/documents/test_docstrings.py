@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 PACKAGE = Path(__file__).parents[2] / "hvi_fenicsx"
-COMPLETE = ("cli", "commands", "errors", "geometry", "schema", "typing")
+COMPLETE = ("cli", "commands", "console", "errors", "geometry", "runtime", "scene", "schema", "typing", "workflow")
 """Rooms, and modules that stand alone, whose docstrings obey the rule."""
 PACKED = re.compile(r"^(\*{0,2}\w+, )+\*{0,2}\w+: |[.;] \w+(, \w+)*: ")
 """``a, b: ...``, or ``a: ... . b: ...``"""

@@ -180,8 +180,14 @@ def left_running(monkeypatch: pytest.MonkeyPatch) -> Callable[[], list[str]]:
     return found
 
 
-@pytest.mark.parametrize("value", [pressed, peeled, np.zeros_like], ids=lambda f: f.__name__)
-@pytest.mark.parametrize("summary", [{}, {"smoothing": "paper", "certificate": None}], ids=["exact", "smoothed"])
+SMOOTHED = {"smoothing": "paper", "certificate": None}
+
+
+@pytest.mark.parametrize(
+    ("value", "summary"),
+    [(pressed, {}), (peeled, {}), (np.zeros_like, {}), (peeled, SMOOTHED)],
+    ids=["pressed", "peeled", "still", "peeled-smoothed"],
+)
 def test_a_plane_result_has_its_body_and_its_contact(
     tmp_path: Path, value: Callable[[Array], Array], summary: dict[str, Any]
 ) -> None:
