@@ -131,7 +131,12 @@ class Formula:
         return hash(self.source)
 
     def render(self, x: Any, algebra: Algebra) -> Any:
-        """The formula in another algebra; ``x`` is indexed by coordinate (missing ones count as 0)."""
+        """The formula in another algebra.
+
+        Args:
+            x: the coordinates, by number; missing ones count as 0.
+            algebra: its operations.
+        """
         return _render(self._tree, x, algebra)
 
     def at(self, points: Array) -> Array:

@@ -6,6 +6,7 @@ from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
+from typing_extensions import override
 
 from ..schema import refusal
 from ..typing import Array
@@ -35,6 +36,7 @@ class _ByMatrix(Elasticity):
         """C with σ = C ε in Voigt's order, N/m²; shape (3, 3) or (6, 6)."""
         raise NotImplementedError
 
+    @override
     def contribute(self, context: FormContext, where: str | None) -> Contribution:
         """The bilinear form, strains multiplied by L. The pattern of zeros of C is compiled, its values are not."""
         length, cells = context.number(context.length), context.cells(where)
@@ -48,6 +50,7 @@ class _ByMatrix(Elasticity):
         normal = self.dimension() or 2
         return np.asarray(self.thermal_expansion * self.stiffness()[:, :normal].sum(axis=1))
 
+    @override
     def modulus_scale(self) -> float:
         """The largest diagonal entry of C."""
         return float(np.max(np.diag(self.stiffness())))

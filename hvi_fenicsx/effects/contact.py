@@ -6,6 +6,7 @@ import math
 from typing import Annotated, Any, ClassVar
 
 from pydantic import BaseModel, ConfigDict, Field, model_serializer, model_validator
+from typing_extensions import override
 
 from ..formula import COORDINATES, Formula
 from ..schema import refusal
@@ -69,6 +70,7 @@ class Contact(Effect):
         found = {k: f.source for k in ("gap", "lower", "upper") if (f := getattr(self, k)) is not None}
         return found if self.obstacle is None else {"obstacle": self.obstacle.model_dump(mode="json")}
 
+    @override
     def stress_scale(self, largest: Evaluate, sizes: Sizes) -> float:
         """The stress of the largest displacement that the bounds demand, as a strain over the body's length."""
         bounds = self._bounds()
@@ -76,6 +78,7 @@ class Contact(Effect):
         demanded += [f"max(0, -({f.source}))" for f in (bounds.upper,) if f is not None]
         return max(largest(Formula(formula)) for formula in demanded) * sizes.modulus / sizes.length
 
+    @override
     def contribute(self, context: FormContext, where: str | None) -> Contribution:
         """The bounds on the normal displacement."""
         return Contribution(bounds=(self._bounds(),))
@@ -85,6 +88,7 @@ class Contact(Effect):
             return _towards(self.obstacle)
         return NormalBounds(lower=self.lower if self.gap is None else _negative(self.gap), upper=self.upper)
 
+    @override
     def check(self, dimension: int) -> None:
         """An obstacle has as many components as the scene has dimensions."""
         if self.obstacle is not None:

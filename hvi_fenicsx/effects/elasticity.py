@@ -7,6 +7,7 @@ from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
+from typing_extensions import override
 
 from ..errors import InputError
 from ..typing import Array
@@ -46,20 +47,28 @@ class Elasticity(Effect):
         return np.zeros(3)
 
     def across(self, context: FormContext, cells: Any) -> tuple[Any, ...]:
-        """∫ σ_33(u) q dx over cells, nondimensional; nothing where it is zero."""
+        """∫ σ_33(u) q dx, nondimensional; nothing where it is zero.
+
+        Args:
+            context: what an effect may see of the problem.
+            cells: UFL's measure of the material's cells.
+        """
         deformation = context.number(context.length) * strain(context.trial)
         found = [(i, float(c)) for i, c in enumerate(self.out_of_plane()[:2] / context.modulus) if c]
         sigma = sum(context.number(c) * deformation[i, i] for i, c in found)
         return (sigma * context.scalar_test * cells,) if found else ()
 
+    @override
     def expansion_scale(self) -> float:
         """|α|."""
         return abs(self.thermal_expansion)
 
+    @override
     def dimension(self) -> int | None:
         """2 for the plane models."""
         return 3 if self.model == "three_dimensional" else 2
 
+    @override
     def check(self, dimension: int) -> None:
         """Plane models are for 2D, the other for 3D."""
         if self.dimension() != dimension:
@@ -85,7 +94,13 @@ class IsotropicElasticity(Elasticity):
         return trace, e / (1 + nu)
 
     def stress(self, deformation: Any, number: Any, modulus: float) -> Any:
-        """σ/E0 of a strain tensor, in UFL."""
+        """σ/E0 of a strain tensor, in UFL.
+
+        Args:
+            deformation: the strain tensor, in UFL.
+            number: makes a constant of a number.
+            modulus: E0, N/m².
+        """
         import ufl
 
         lam, two_mu = (number(value / modulus) for value in self.lame())
@@ -96,6 +111,7 @@ class IsotropicElasticity(Elasticity):
         """Whether P1 cells would lock: nearly incompressible, and not free to change thickness."""
         return self.model != "plane_stress" and self.poisson_ratio > _LOCKING
 
+    @override
     def contribute(self, context: FormContext, where: str | None) -> Contribution:
         """The bilinear form, strains multiplied by L: nondimensional. Where P1 locks, div u is averaged by vertex."""
         import ufl
@@ -125,6 +141,7 @@ class IsotropicElasticity(Elasticity):
         normal, shear = (2, 1) if self.dimension() == 2 else (3, 3)
         return self.thermal_expansion * held * np.repeat([1.0, 0.0], [normal, shear])
 
+    @override
     def modulus_scale(self) -> float:
         """E."""
         return self.youngs_modulus

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import ClassVar
 
+from typing_extensions import override
+
 from ..errors import InputError
 from .contribution import Direction
 from .law_effect import LawEffect
@@ -16,6 +18,7 @@ class Friction(LawEffect):
     term: ClassVar[str] = "∫ j⁰(u_t; v_t - u_t) ds on Γc, vertex quadrature"
     direction: ClassVar[Direction] = Direction.SLIP
 
+    @override
     def check(self, dimension: int) -> None:
         """In 3D the law acts on |u_t| and must be even."""
         if dimension == 3 and not self.law.even:

@@ -12,6 +12,7 @@ from pydantic import (
     model_serializer,
     model_validator,
 )
+from typing_extensions import override
 
 from .. import laws
 from ..errors import InputError
@@ -70,10 +71,12 @@ class LawEffect(Effect):
     def _as_table(self, handler: SerializerFunctionWrapHandler) -> Any:
         return handler(self)["law"]
 
+    @override
     def contribute(self, context: FormContext, where: str | None) -> Contribution:
         """The law, acting on its displacement."""
         return Contribution(laws=(BoundaryLaw(self.direction, self.law),))
 
+    @override
     def stress_scale(self, largest: Evaluate, sizes: Sizes) -> float:
         """The law's own."""
         return self.law.traction_scale

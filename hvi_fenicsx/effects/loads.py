@@ -11,6 +11,7 @@ from pydantic import (
     model_serializer,
     model_validator,
 )
+from typing_extensions import override
 
 from ..errors import InputError
 from ..formula import Formula
@@ -38,6 +39,7 @@ class _Listed(Effect):
     def _as_list(self, handler: SerializerFunctionWrapHandler) -> Any:
         return list(handler(self)["values"])
 
+    @override
     def check(self, dimension: int) -> None:
         """As many components as the scene has dimensions."""
         require_components(self.values, dimension, self.key)
@@ -53,6 +55,7 @@ class Traction(_Listed):
 
     values: tuple[FormulaField, ...]
 
+    @override
     def contribute(self, context: FormContext, where: str | None) -> Contribution:
         """The linear form over its part."""
         import ufl  # here and below: a scene is read without it
@@ -62,10 +65,12 @@ class Traction(_Listed):
         vector = ufl.as_vector([context.render(f) for f in self.values]) / context.number(context.stress)
         return Contribution(linear=(ufl.inner(vector, context.test) * context.facets(where),))
 
+    @override
     def surface_load(self) -> SurfaceLoad:
         """Its components."""
         return SurfaceLoad(self.values)
 
+    @override
     def stress_scale(self, largest: Evaluate, sizes: Sizes) -> float:
         """The largest component."""
         return max(largest(f) for f in self.values)
@@ -82,6 +87,7 @@ class BodyForce(_Listed):
 
     values: tuple[FormulaField, ...]
 
+    @override
     def contribute(self, context: FormContext, where: str | None) -> Contribution:
         """The linear form over its region."""
         import ufl
@@ -90,6 +96,7 @@ class BodyForce(_Listed):
         vector = factor * ufl.as_vector([context.render(f) for f in self.values])
         return Contribution(linear=(ufl.inner(vector, context.test) * context.cells(where),))
 
+    @override
     def stress_scale(self, largest: Evaluate, sizes: Sizes) -> float:
         """The largest component times the body's length."""
         return max(largest(f) for f in self.values) * sizes.length
@@ -120,14 +127,17 @@ class PrescribedDisplacement(_Listed):
 
     values: tuple[Component, ...]
 
+    @override
     def contribute(self, context: FormContext, where: str | None) -> Contribution:
         """The conditions of its components that are not free."""
         return Contribution(conditions=tuple(Condition(i, self.values[i]) for i in self.prescribed()))
 
+    @override
     def prescribed(self) -> tuple[int, ...]:
         """Indices of the components that are not free."""
         return tuple(i for i, f in enumerate(self.values) if f != "free")
 
+    @override
     def stress_scale(self, largest: Evaluate, sizes: Sizes) -> float:
         """The stress of the largest component, as a strain over the body's length."""
         return max((largest(f) for f in self.values if f != "free"), default=0.0) * sizes.modulus / sizes.length

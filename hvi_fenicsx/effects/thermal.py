@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from typing import Any, ClassVar
 
 from pydantic import SerializerFunctionWrapHandler, model_serializer, model_validator
+from typing_extensions import override
 
 from ..errors import InputError
 from .base import Drive, Effect, Evaluate, FormContext, Place, Sizes
@@ -37,6 +38,7 @@ class Temperature(Effect):
     def _as_value(self, handler: SerializerFunctionWrapHandler) -> Any:
         return handler(self)["value"]
 
+    @override
     def contribute(self, context: FormContext, where: str | None) -> Contribution:
         """The linear forms over the materials of its region."""
         pairs = [(m, cells) for m, cells in _heated(context, where) if m.thermal_expansion]
@@ -65,6 +67,7 @@ class Temperature(Effect):
         )
         return context.render(self.value) * work
 
+    @override
     def stress_scale(self, largest: Evaluate, sizes: Sizes) -> float:
         """E α ΔT."""
         return sizes.modulus * sizes.expansion * largest(self.value)

@@ -29,7 +29,7 @@ _REGISTRY: dict[str, type] = {}
 
 
 class Superpotential(ABC):
-    """A law j: R → R. To write one's own, see docs/laws.md: usually a simpler base class serves.
+    """A law j: R → R. To write your own, see docs/laws.md: usually a simpler base class is enough.
 
     A subclass with a `name` is registered under it (unless declared with `register=False`) and can then be
     named in a scene file; the parameters there are those of its constructor.
@@ -102,10 +102,12 @@ class Superpotential(ABC):
         return np.union1d(self.convex.kinks, self.concave.kinks)
 
     def interval(self, x: Array, atol: float = 0.0) -> tuple[Array, Array]:
-        """Clarke's subdifferential [lo, hi] of j at x (m,), N/m².
+        """Clarke's subdifferential [lo, hi] of j, N/m², each (m,).
 
-        With `atol` (a length), the hull of the intervals at x and at every kink within atol of x: so a
-        displacement that means a kink but misses it by rounding is given the kink's whole interval.
+        Args:
+            x: displacements (m,), m.
+            atol: a length, m: the hull is taken with the intervals of every kink within it, so that a displacement
+                which means a kink but misses it by rounding is given the kink's whole interval.
         """
         lo, hi = self._clarke(x)
         for kink in self._kinks_within(x, atol):
@@ -116,7 +118,13 @@ class Superpotential(ABC):
         return lo, hi
 
     def distance(self, x: Array, traction: Array, atol: float = 0.0) -> Array:
-        """Distance (m,) of a traction from ∂j(x), N/m², zero if the law allows it. `atol`: see `interval`."""
+        """Distance (m,) of a traction from ∂j(x), N/m²; zero if the law allows it.
+
+        Args:
+            x: displacements (m,), m.
+            traction: (m,), N/m².
+            atol: see `interval`.
+        """
         lo, hi = self.interval(x, atol)
         return np.asarray(np.maximum(np.maximum(lo - traction, traction - hi), 0.0))
 
@@ -125,7 +133,12 @@ class Superpotential(ABC):
         return np.zeros(np.shape(x), dtype=np.int64)
 
     def branch(self, x: Array, atol: float = 0.0) -> Integers:
-        """Index (m,) of the active piece, counted from 0 by |x|; -1 on a kink or within atol of it."""
+        """Index (m,) of the active piece, counted from 0 by |x|; -1 on a kink.
+
+        Args:
+            x: displacements (m,), m.
+            atol: the distance from a kink, m, that counts as being on it.
+        """
         result = self.piece(x)
         for kink in self._kinks_within(x, atol):
             result = np.where(np.abs(x - kink) <= atol, -1, result)
@@ -150,7 +163,12 @@ class Superpotential(ABC):
         return self._extremes.c4
 
     def scaled(self, length: float, traction: float) -> Superpotential:
-        """The same law in units of `length` and `traction`: j(length x) / (length traction)."""
+        """The same law in other units: j(length x) / (length traction).
+
+        Args:
+            length: the unit of displacements, m.
+            traction: the unit of tractions, N/m².
+        """
         return ScaledLaw(self, length, traction)
 
     @cached_property
@@ -185,7 +203,13 @@ def registered() -> dict[str, type[Superpotential]]:
 
 @dataclass(frozen=True)
 class ScaledLaw(Superpotential, register=False):
-    """A law with displacements measured in `length` and tractions in `traction`."""
+    """A law in other units: the default of `Superpotential.scaled`.
+
+    Attributes:
+        law: the law.
+        length: the unit of displacements.
+        traction: the unit of tractions.
+    """
 
     name = "scaled"
     law: Superpotential

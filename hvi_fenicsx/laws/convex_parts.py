@@ -13,14 +13,24 @@ from ..typing import Array
 
 
 def quotient(a: Array, b: Array | float) -> Array:
-    """The quotient a / b; numpy's stubs do not know that of doubles it is one."""
+    """The quotient a / b; NumPy's own types leave open that it is of doubles.
+
+    Args:
+        a: numerator (m,).
+        b: denominator, (m,) or a number.
+    """
     result: Array = np.divide(a, b)
     return result
 
 
 @dataclass(frozen=True)
 class Directional:
-    """A positively homogeneous function on the line: its values in the directions -1 and +1 (may be inf)."""
+    """A positively homogeneous function on the line, by its values in two directions; they may be infinite.
+
+    Attributes:
+        minus: in the direction -1.
+        plus: in the direction +1.
+    """
 
     minus: float
     plus: float
@@ -71,7 +81,13 @@ class DifferentiablePart(ConvexPart):
 
 @dataclass(frozen=True, eq=False)
 class ScaledPart(ConvexPart):
-    """f(length x) / (length traction) for a convex part f."""
+    """A convex part f in other units: f(length x) / (length traction).
+
+    Attributes:
+        part: f.
+        length: the unit of displacements.
+        traction: the unit of tractions.
+    """
 
     part: ConvexPart
     length: float

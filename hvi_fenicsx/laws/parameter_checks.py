@@ -9,14 +9,30 @@ from ..errors import InputError
 
 
 def require_number(law: str, **parameters: object) -> None:
-    """Refuse anything but finite real numbers."""
+    """Refuse anything but finite real numbers.
+
+    Args:
+        law: the law's name, for the message.
+        parameters: by name.
+
+    Raises:
+        InputError: with the first that is none.
+    """
     for key, value in parameters.items():
         if isinstance(value, bool) or not isinstance(value, Real) or not math.isfinite(value):
             raise InputError(f"law {law!r}: {key} = {value!r} is not usable; give a finite number")
 
 
 def require_positive(law: str, **parameters: object) -> None:
-    """Refuse anything but finite numbers > 0."""
+    """Refuse anything but finite numbers > 0.
+
+    Args:
+        law: the law's name, for the message.
+        parameters: by name.
+
+    Raises:
+        InputError: with the first that is none.
+    """
     require_number(law, **parameters)
     for key, value in parameters.items():
         if not float(value) > 0.0:  # type: ignore[arg-type]
@@ -24,7 +40,15 @@ def require_positive(law: str, **parameters: object) -> None:
 
 
 def require_ordered(law: str, **parameters: float) -> None:
-    """Refuse a residual below 0 or above the peak: `require_ordered(law, residual=..., peak=...)`."""
+    """Refuse a residual below 0 or above the peak.
+
+    Args:
+        law: the law's name, for the message.
+        parameters: the residual and the peak, in this order, by name.
+
+    Raises:
+        InputError: they are not 0 ≤ residual ≤ peak, peak > 0.
+    """
     require_number(law, **parameters)
     (low_name, low), (high_name, high) = parameters.items()
     if not 0.0 <= low <= high or high == 0.0:

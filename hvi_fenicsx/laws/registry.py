@@ -24,8 +24,14 @@ def available() -> tuple[str, ...]:
 def create(name: str, parameters: Mapping[str, Any]) -> Superpotential:
     """The law `name` with the given parameters, checked as strictly as a scene file's.
 
-    Integers serve as floats; strings, booleans, infinities and unknown parameters do not. InputError says
-    what is allowed, and names the closest match of a misspelt name.
+    Integers serve as floats; strings, booleans, infinities and unknown parameters do not.
+
+    Args:
+        name: of the law.
+        parameters: by name, as plain data.
+
+    Raises:
+        InputError: with what is allowed, and the closest match of a misspelt name.
     """
     law = registered().get(name)
     if law is None:

@@ -1,4 +1,4 @@
-"""Laws from a Python function of the traction, sampled into a graph: the shortest way to one's own law."""
+"""Laws from a Python function of the traction, sampled into a graph: the shortest way to your own law."""
 
 from __future__ import annotations
 
@@ -58,7 +58,16 @@ class SampledLaw(PolylineLaw):
 def sample_traction(
     traction: Callable[[Array], Array], ends: Sequence[float], samples: int = 200
 ) -> tuple[tuple[float, float], ...]:
-    """Points of a graph law from a traction function, smooth between 0 and the ends (ascending, > 0)."""
+    """Points (displacement, traction) of a graph law from a function.
+
+    Args:
+        traction: the traction (m,) at displacements (m,) > 0, smooth between 0 and the ends.
+        ends: ascending, > 0.
+        samples: intervals between two ends.
+
+    Raises:
+        InputError: ends or samples are of no use, or a traction is not finite.
+    """
     stops = np.append(0.0, np.asarray(ends, dtype=float))
     if stops.size < 2 or not np.all(np.isfinite(stops)) or np.any(np.diff(stops) <= 0.0) or samples < 1:
         raise InputError(

@@ -15,8 +15,11 @@ from ..typing import Array, Integers
 class TractionGraph:
     """A piecewise linear traction over displacement, and its primitive with the value 0 at 0.
 
-    breaks (k,): displacements, strictly ascending, one of them 0. left, right (k,): the limits there.
-    slopes (k+1,): slope of each piece, the first and the last one being unbounded.
+    Attributes:
+        breaks: displacements (k,), strictly ascending, one of them 0.
+        left: limits from the left at the breaks, (k,).
+        right: limits from the right at the breaks, (k,).
+        slopes: of the pieces, (k+1,); the first and the last piece are unbounded.
     """
 
     breaks: Array
@@ -28,8 +31,9 @@ class TractionGraph:
     def from_points(points: Sequence[Sequence[float]], one_sided: bool = False) -> TractionGraph:
         """Graph through points (displacement, traction) from displacement 0 on, constant after the last one.
 
-        Odd, or zero for negative displacements if one_sided. Displacements do not descend; two points
-        at the same displacement make a jump.
+        Args:
+            points: displacements do not descend; two points at the same displacement make a jump.
+            one_sided: zero for negative displacements; otherwise odd.
         """
         table = np.array(points, dtype=float)
         breaks, first = np.unique(table[:, 0], return_index=True)
@@ -48,7 +52,14 @@ class TractionGraph:
 
     @staticmethod
     def from_slopes(breaks: Array, slopes: Array, jumps: Array, start: Array) -> TractionGraph:
-        """Graph of given slopes (k+1,) and jumps (k,), with the limits `start` = (left, right) at 0."""
+        """Graph of given slopes and jumps.
+
+        Args:
+            breaks: displacements (k,), strictly ascending, one of them 0.
+            slopes: of the pieces, (k+1,).
+            jumps: at the breaks, (k,); the one at 0 is not used.
+            start: the limits (left, right) at 0, (2,).
+        """
         zero = int(np.searchsorted(breaks, 0.0))
         near, far = _outward(breaks[zero:], slopes[zero + 1 :], jumps[zero:], start[1])
         near_m, far_m = _outward(-breaks[zero::-1], slopes[zero::-1], jumps[zero::-1], -start[0])
@@ -90,7 +101,12 @@ class TractionGraph:
         return np.concatenate([np.cumsum(steps[:z][::-1])[::-1], [0.0], np.cumsum(steps[z:])])
 
     def traction(self, x: Array, side: str) -> Array:
-        """Limit (m,) of the traction at x from the given side, "left" or "right"; at a break to the bit."""
+        """Limit (m,) of the traction; at a break to the bit.
+
+        Args:
+            x: displacements (m,).
+            side: "left" or "right".
+        """
         next_break, passed = np.searchsorted(self.breaks, x), np.searchsorted(self.breaks, x, side="right")
         piece, limits = (next_break, self.left) if side == "left" else (passed, self.right)
         with np.errstate(over="ignore"):
