@@ -22,7 +22,7 @@ from ..scene import Scene
 from ..workflow import Solution
 from . import adaptive, cost_forecast, quantities
 from .adaptive import AdaptiveLevel, AdaptiveSolver
-from .cost_forecast import Cost, Step
+from .cost_forecast import AdaptiveStep, Cost
 
 _BULK = {2: 0.75, 3: 0.5}
 """Share of the squared error that one step refines, by dimension."""
@@ -77,7 +77,7 @@ class Reached:
     goal: Goal
     rung: AdaptiveLevel
     solution: Solution
-    steps: tuple[Step, ...]
+    steps: tuple[AdaptiveStep, ...]
     why: str | None
     more: Cost | None
 
@@ -124,7 +124,7 @@ class _Climb:
     goal: Goal
     solver: AdaptiveSolver
     tell: Callable[[str], None]
-    steps: list[Step] = field(default_factory=list)
+    steps: list[AdaptiveStep] = field(default_factory=list)
     failures: int = 0
 
     def run(self) -> Reached:
@@ -169,20 +169,20 @@ class _Climb:
         self.tell(_line(len(self.steps), self.steps[-1], self.solver.timer.total))
         return None
 
-    def _step(self, rung: AdaptiveLevel, seconds: float) -> Step:
+    def _step(self, rung: AdaptiveLevel, seconds: float) -> AdaptiveStep:
         estimate = rung.solution.estimate
         assert estimate is not None
         norm, smoothing = estimate.energy_norm or 1.0, self.quantity.smoothing()
-        return Step(
-            rung.dofs,
-            self.quantity.error(),
-            estimate.discretisation / norm,
-            smoothing,
-            estimate.algebraic / norm,
-            rung.solution.epsilon,
-            rung.solution.scene.solver.tolerance,
-            seconds,
-            memory.peak(self.comm),
+        return AdaptiveStep(
+            dofs=rung.dofs,
+            error=self.quantity.error(),
+            discretisation=estimate.discretisation / norm,
+            smoothing=smoothing,
+            algebraic=estimate.algebraic / norm,
+            epsilon=rung.solution.epsilon,
+            tolerance=rung.solution.scene.solver.tolerance,
+            seconds=seconds,
+            memory=memory.peak(self.comm),
         )
 
     def _done(self) -> bool:
@@ -300,7 +300,7 @@ def _narrowed(scene: Scene, factor: float) -> Scene:
     return scene.with_solver(**changed)
 
 
-def _line(level: int, step: Step, elapsed: float) -> str:
+def _line(level: int, step: AdaptiveStep, elapsed: float) -> str:
     width = "" if step.epsilon is None else f", ε {step.epsilon:.2g}"
     error = f"error {step.error:.2e}" if math.isfinite(step.error) else "no error yet"
     return (

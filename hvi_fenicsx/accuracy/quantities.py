@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from ..certify.contact_state import ContactState
     from ..certify.estimate.contact_errors import ContactErrors
     from .adaptive import AdaptiveLevel
-    from .cost_forecast import Step
+    from .cost_forecast import AdaptiveStep
 
 
 class EnergyNorm(Quantity):
@@ -43,7 +43,7 @@ class EnergyNorm(Quantity):
         found = self._last.solution.estimate
         return np.inf if found is None else self.safety * found.relative
 
-    def parts(self, step: Step) -> tuple[float, float, float]:
+    def parts(self, step: AdaptiveStep) -> tuple[float, float, float]:
         """See :meth:`.Quantity.parts`; with the safety factor."""
         return self.safety * step.discretisation, self.safety * step.smoothing, self.safety * step.algebraic
 

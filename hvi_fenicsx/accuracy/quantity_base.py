@@ -17,17 +17,13 @@ import numpy as np
 from ..errors import InputError
 from ..laws.class_registry import enter
 from ..typing import Array
+from .thresholds import EXTRAPOLATION, ExtrapolationThresholds
 
 if TYPE_CHECKING:
     from dolfinx import fem
 
     from .adaptive import AdaptiveLevel
-    from .cost_forecast import Step
-
-_APART = 1.4
-"""Ratio of the mesh sizes of two rungs from which their difference tells something."""
-_ORDERS = (0.5, 2.0)
-_OBSERVED, _ASSUMED = 1.25, 3.0
+    from .cost_forecast import AdaptiveStep
 
 
 class Quantity(ABC):
@@ -71,7 +67,7 @@ class Quantity(ABC):
         """Whether one mesh is enough to estimate the error."""
         return False
 
-    def parts(self, step: Step) -> tuple[float, float, float]:
+    def parts(self, step: AdaptiveStep) -> tuple[float, float, float]:
         """The mesh's, smoothing's and the solver's part of the last level's error, relative.
 
         The last is that of the energy norm, and 0 where the quantity's own is not known.
@@ -115,8 +111,9 @@ class Observable(Quantity):
 
     power: ClassVar[int] = 2
 
-    def __init__(self) -> None:
+    def __init__(self, thresholds: ExtrapolationThresholds = EXTRAPOLATION) -> None:
         super().__init__()
+        self._thresholds = thresholds
         self._values: list[MeshValue] = []
 
     @abstractmethod
@@ -157,15 +154,17 @@ class Observable(Quantity):
     def _change(self) -> float:
         """The error without smoothing's part. Collective."""
         own, *others = reversed(self._values)
-        apart = [other for other in others if other.size >= _APART * own.size]
+        least = self._thresholds.apart
+        apart = [other for other in others if other.size >= least * own.size]
         if not apart:
             return np.inf
         near = apart[0]
-        far = next((v for v in apart if v.size >= _APART * near.size), None)
+        far = next((v for v in apart if v.size >= least * near.size), None)
         largest = self._norm(own, None) or 1.0
         change = self._norm(own, near) / largest
         further = None if far is None else self._norm(own, far) / largest
-        return extrapolated((own.size, near.size, far.size if far else np.nan), change, further)
+        sizes = own.size, near.size, far.size if far else np.nan
+        return extrapolated(sizes, change, further, self._thresholds)
 
     def _norm(self, own: MeshValue, other: MeshValue | None) -> float:
         if isinstance(own.value, np.ndarray):
@@ -174,22 +173,28 @@ class Observable(Quantity):
         return contact_norm(self._last, difference, self.power)
 
 
-def extrapolated(sizes: Sequence[float], change: float, further: float | None) -> float:
+def extrapolated(
+    sizes: Sequence[float],
+    change: float,
+    further: float | None,
+    thresholds: ExtrapolationThresholds = EXTRAPOLATION,
+) -> float:
     """The error of a quantity on the finest of three meshes.
 
     Args:
         sizes: of the meshes, the finest first.
         change: of the quantity from the second to the first.
         further: the change from the third to the first; None where there is no third.
+        thresholds: which orders are believed, and the safety factors.
     """
     if change == 0.0:
         return 0.0
-    order = 1.0 if further is None else _order(sizes, further / change)
-    safety = _ASSUMED if further is None else _OBSERVED
+    order = 1.0 if further is None else _order(sizes, further / change, thresholds)
+    safety = thresholds.assumed_safety if further is None else thresholds.observed_safety
     return safety * change / ((sizes[1] / sizes[0]) ** order - 1.0)
 
 
-def _order(sizes: Sequence[float], ratio: float) -> float:
+def _order(sizes: Sequence[float], ratio: float, thresholds: ExtrapolationThresholds) -> float:
     """The order p at which (h3^p - h1^p)/(h2^p - h1^p) has this value, within what P1 can have."""
     from scipy.optimize import brentq
 
@@ -198,7 +203,7 @@ def _order(sizes: Sequence[float], ratio: float) -> float:
     def excess(order: float) -> float:
         return float((far**order - 1.0) / (near**order - 1.0) - ratio)
 
-    low, high = _ORDERS
+    low, high = thresholds.lowest_order, thresholds.highest_order
     if excess(low) > 0:
         return low
     return high if excess(high) < 0 else float(brentq(excess, low, high))

@@ -20,7 +20,7 @@ from hvi_fenicsx import Scene, read_scene
 from hvi_fenicsx.accuracy import adaptive, control, cost_forecast, quantities
 from hvi_fenicsx.accuracy.adaptive import AdaptiveLevel, AdaptiveSolver
 from hvi_fenicsx.accuracy.control import Goal, Reached
-from hvi_fenicsx.accuracy.cost_forecast import Step
+from hvi_fenicsx.accuracy.cost_forecast import AdaptiveStep
 from hvi_fenicsx.accuracy.quantities import Friction
 from hvi_fenicsx.accuracy.quantity_base import Observable, contact_norm, extrapolated, prolong
 from hvi_fenicsx.certify import contact_state
@@ -183,10 +183,23 @@ def test_extrapolation_knows_the_order(order: float) -> None:
     assert extrapolated((1.0, 2.0, np.nan), 1.0, None) == pytest.approx(3.0)
 
 
-def ladder(rate: float, count: int) -> list[Step]:
+def ladder(rate: float, count: int) -> list[AdaptiveStep]:
     """Rungs of 1000 · 3^k unknowns with error dofs^-rate, each 0.2 s and 1e-5 s per unknown."""
     sizes = [1000 * 3**k for k in range(count)]
-    return [Step(n, n**-rate, n**-rate, 0.0, 0.0, None, 1e-6, 0.2 + 1e-5 * n, 150 + 0.003 * n) for n in sizes]
+    return [
+        AdaptiveStep(
+            dofs=n,
+            error=n**-rate,
+            discretisation=n**-rate,
+            smoothing=0.0,
+            algebraic=0.0,
+            epsilon=None,
+            tolerance=1e-6,
+            seconds=0.2 + 1e-5 * n,
+            memory=150 + 0.003 * n,
+        )
+        for n in sizes
+    ]
 
 
 def test_a_forecast_hits_a_ladder_that_goes_on_as_it_did() -> None:
