@@ -1,12 +1,14 @@
 """Why: docstrings are the reference that users of the package read; one that names half of the arguments misleads.
 
-The rule (Google style): a public function or method of two or more parameters has an ``Args:`` section with a line for
-each of them; no line of a section packs several names into one; no docstring begins in the middle of a thought ("Of").
+The rule (Google style): a public function or method of two or more parameters, unless a base class tells about it, has
+an ``Args:`` section with a line for each of them; no line of a section packs several names into one; no docstring
+begins in the middle of a thought ("Of").
 """
 
 from __future__ import annotations
 
 import ast
+import functools
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -14,17 +16,41 @@ from pathlib import Path
 import pytest
 
 PACKAGE = Path(__file__).parents[2] / "hvi_fenicsx"
-COMPLETE = ("cli", "commands", "console", "errors", "geometry", "runtime", "scene", "schema", "typing", "workflow")
+COMPLETE = (
+    "cli",
+    "commands",
+    "console",
+    "errors",
+    "geometry",
+    "rigid",
+    "runtime",
+    "scene",
+    "schema",
+    "typing",
+    "workflow",
+)
 """Rooms, and modules that stand alone, whose docstrings obey the rule."""
-PACKED = re.compile(r"^(\*{0,2}\w+, )+\*{0,2}\w+: |[.;] \w+(, \w+)*: ")
+PACKED = re.compile(r"^(\*{0,2}\w+, )+\*{0,2}\w+: |\. [a-z]\w*(, \w+)*: ")
 """``a, b: ...``, or ``a: ... . b: ...``"""
 Function = ast.FunctionDef | ast.AsyncFunctionDef
 
 
+@functools.cache
+def parsed() -> dict[str, ast.Module]:
+    """All files of the package."""
+    files = sorted(PACKAGE.rglob("*.py"))
+    return {str(f.relative_to(PACKAGE)): ast.parse(f.read_text(encoding="utf-8")) for f in files}
+
+
+@functools.cache
+def classes() -> dict[str, ast.ClassDef]:
+    """By name."""
+    return {node.name: node for tree in parsed().values() for node in ast.walk(tree) if isinstance(node, ast.ClassDef)}
+
+
 def trees(room: str) -> Iterator[tuple[str, ast.Module]]:
     """The files of a room, or a module, and what they say."""
-    for file in sorted([*(PACKAGE / room).rglob("*.py"), *PACKAGE.glob(f"{room}.py")]):
-        yield str(file.relative_to(PACKAGE)), ast.parse(file.read_text(encoding="utf-8"))
+    yield from ((f, tree) for f, tree in parsed().items() if f == f"{room}.py" or f.startswith(f"{room}/"))
 
 
 def texts(tree: ast.Module) -> Iterator[str]:
@@ -36,21 +62,29 @@ def texts(tree: ast.Module) -> Iterator[str]:
 
 
 def public(body: list[ast.stmt]) -> Iterator[Function]:
-    """Functions and methods whose names, and whose classes' names, begin with no underscore."""
+    """Functions and methods of public names; no methods that a base class tells all about."""
     for node in body:
-        if isinstance(node, Function) and not node.name.startswith("_"):
+        if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
+            known = set(inherited(node))
+            yield from (method for method in public(node.body) if method.name not in known)
+        elif isinstance(node, Function) and not node.name.startswith("_"):
             yield node
-        elif isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
-            yield from public(node.body)
+
+
+def inherited(node: ast.ClassDef) -> Iterator[str]:
+    """The names of its base classes' methods."""
+    for base in node.bases:
+        if isinstance(base, ast.Name) and (above := classes().get(base.id)) and above is not node:
+            yield from (method.name for method in above.body if isinstance(method, Function))
+            yield from inherited(above)
 
 
 def parameters(function: Function) -> set[str]:
-    """Those that a caller gives; none where a base class tells what they are."""
+    """Those that a caller gives, if there are several."""
     given = function.args
     every = [*given.posonlyargs, *given.args, *given.kwonlyargs, given.vararg, given.kwarg]
     names = {a.arg for a in every if a is not None and a.arg not in ("self", "cls") and not a.arg.startswith("_")}
-    overrides = any(isinstance(d, ast.Name) and d.id == "override" for d in function.decorator_list)
-    return set() if overrides or len(names) < 2 else names
+    return set() if len(names) < 2 else names
 
 
 def entries(text: str, *sections: str) -> Iterator[str]:
