@@ -16,6 +16,7 @@ from .elasticity import Elasticity, strain
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 _SYMMETRIC = 1e-9
+"""Difference of two entries of C, over the largest one, that still counts as none."""
 _PAIRS = {2: ((0, 0), (1, 1), (0, 1)), 3: ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))}
 """Voigt's order of tensor components, by dimension."""
 

@@ -6,6 +6,7 @@ from .convex_parts import ConvexPart, DifferentiablePart, Directional
 from .polyline import PolylineLaw, PolylinePart
 from .registry import available, create, describe
 from .sampled import SampledLaw, sample_traction
+from .thresholds import Thresholds
 from .traction_graph import TractionGraph
 from .weakening import Exponential, WeakeningLaw
 
@@ -23,6 +24,7 @@ __all__ = [
     "SampledLaw",
     "Sawtooth",
     "Superpotential",
+    "Thresholds",
     "TractionGraph",
     "Tresca",
     "WeakeningLaw",

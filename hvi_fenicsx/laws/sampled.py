@@ -13,10 +13,8 @@ from typing_extensions import override
 from ..errors import InputError
 from ..typing import Array, Integers
 from .polyline import PolylineLaw
+from .thresholds import DEFAULT, Thresholds
 from .traction_graph import TractionGraph
-
-_JUMP = 1e-9
-"""Relative to the largest traction: a smaller difference of the limits at an end is not meant as a jump."""
 
 
 class SampledLaw(PolylineLaw):
@@ -56,7 +54,7 @@ class SampledLaw(PolylineLaw):
 
 
 def sample_traction(
-    traction: Callable[[Array], Array], ends: Sequence[float], samples: int = 200
+    traction: Callable[[Array], Array], ends: Sequence[float], samples: int = 200, thresholds: Thresholds = DEFAULT
 ) -> tuple[tuple[float, float], ...]:
     """Points (displacement, traction) of a graph law from a function.
 
@@ -64,6 +62,7 @@ def sample_traction(
         traction: the traction (m,) at displacements (m,) > 0, smooth between 0 and the ends.
         ends: ascending, > 0.
         samples: intervals between two ends.
+        thresholds: what is meant as a jump.
 
     Raises:
         InputError: ends or samples are of no use, or a traction is not finite.
@@ -73,22 +72,24 @@ def sample_traction(
         raise InputError(
             f"ends = {list(ends)!r}, samples = {samples!r}: give ascending finite ends > 0 and samples >= 1"
         )
-    pieces = [_sample_piece(traction, a, b, samples) for a, b in itertools.pairwise(stops)]
+    pieces = [_sample_piece(traction, a, b, samples, thresholds.inside) for a, b in itertools.pairwise(stops)]
     size = max(float(np.abs(t).max()) for _, t in pieces)
-    points = [(0.0, float(pieces[0][1][0]) if abs(pieces[0][1][0]) > _JUMP * size else 0.0)]
+    points = [(0.0, float(pieces[0][1][0]) if abs(pieces[0][1][0]) > thresholds.jump * size else 0.0)]
     for (x, t), follower in zip(pieces, [*pieces[1:], None], strict=True):
         points += [(float(a), float(b)) for a, b in zip(x[1:], t[1:], strict=True)]
-        if follower is not None and abs(follower[1][0] - t[-1]) > _JUMP * size:
+        if follower is not None and abs(follower[1][0] - t[-1]) > thresholds.jump * size:
             points.append((float(x[-1]), float(follower[1][0])))
     return tuple(points)
 
 
-def _sample_piece(traction: Callable[[Array], Array], a: float, b: float, samples: int) -> tuple[Array, Array]:
+def _sample_piece(
+    traction: Callable[[Array], Array], a: float, b: float, samples: int, offset: float
+) -> tuple[Array, Array]:
     """Abscissae and tractions of a piece; at its ends those just inside, for the one-sided limits."""
     x: Array = np.linspace(a, b, samples + 1, dtype=np.float64)
     inside = x.copy()
-    inside[0] = max(np.nextafter(a, b), a + 1e-12 * (b - a))
-    inside[-1] = min(np.nextafter(b, a), b - 1e-12 * (b - a))
+    inside[0] = max(np.nextafter(a, b), a + offset * (b - a))
+    inside[-1] = min(np.nextafter(b, a), b - offset * (b - a))
     values = np.asarray(traction(inside), dtype=np.float64)
     if values.shape != x.shape or not np.all(np.isfinite(values)):
         raise InputError(

@@ -15,14 +15,10 @@ import numpy as np
 
 from ..typing import Array
 from .convex_parts import ConvexPart, Directional
+from .thresholds import DEFAULT, Thresholds
 
-_Array = Array
-_Objective = Callable[[_Array, _Array, _Array], _Array]
+_Objective = Callable[[Array, Array, Array], Array]
 """Objective f(lo, hi, |x|) of an interval of tractions lo..hi and a displacement."""
-
-_RESOLUTION = 1e-6
-_FAR = 1e12
-_MOST_CELLS = 200_000
 
 
 class SplitLaw(Protocol):
@@ -54,7 +50,14 @@ class SplitLaw(Protocol):
 
 @dataclass(frozen=True)
 class Extremes:
-    """Upper bounds of the largest resistances and of the paper's growth constants."""
+    """Upper bounds of the largest resistances and of the paper's growth constants.
+
+    Attributes:
+        peak_minus: of the resistance in the direction -1.
+        peak_plus: of the resistance in the direction +1.
+        c3: of the constant of growth condition (i).
+        c4: of the constant of growth condition (ii).
+    """
 
     peak_minus: float
     peak_plus: float
@@ -62,41 +65,52 @@ class Extremes:
     c4: float
 
 
-def extremes(law: SplitLaw) -> Extremes:
-    """Bounds from above, sharp to a relative 1e-6; beyond 1e12 length scales the law's growth is trusted."""
-    right = _grid(law)
+def extremes(law: SplitLaw, thresholds: Thresholds = DEFAULT) -> Extremes:
+    """Bounds from above of a law's extreme tractions.
+
+    Args:
+        law: by its split.
+        thresholds: how sharp, and how far out.
+    """
+    right = _grid(law, thresholds)
     left = -right[::-1]
     both = np.concatenate([left[:-1], right])
+
+    def supremum(grid: Array, objective: _Objective) -> float:
+        return _supremum(law, grid, objective, thresholds)
+
     return Extremes(
-        peak_minus=max(law.growth.minus, _supremum(law, both, lambda lo, hi, r: -lo)),
-        peak_plus=max(law.growth.plus, _supremum(law, both, lambda lo, hi, r: hi)),
-        c3=_supremum(law, both, lambda lo, hi, r: np.maximum(np.abs(lo), np.abs(hi)) / (1.0 + r)),
+        peak_minus=max(law.growth.minus, supremum(both, lambda lo, hi, r: -lo)),
+        peak_plus=max(law.growth.plus, supremum(both, lambda lo, hi, r: hi)),
+        c3=supremum(both, lambda lo, hi, r: np.maximum(np.abs(lo), np.abs(hi)) / (1.0 + r)),
         c4=max(
             0.0,
-            _supremum(law, right, lambda lo, hi, r: np.where(r > 0, -lo, 0.0)),
-            _supremum(law, left, lambda lo, hi, r: np.where(r > 0, hi, 0.0)),
+            supremum(right, lambda lo, hi, r: np.where(r > 0, -lo, 0.0)),
+            supremum(left, lambda lo, hi, r: np.where(r > 0, hi, 0.0)),
         ),
     )
 
 
-def _grid(law: SplitLaw) -> _Array:
+def _grid(law: SplitLaw, thresholds: Thresholds) -> Array:
     """Displacements ≥ 0: zero, every kink, and a geometric progression out to where nothing happens."""
     unit = law.length_scale
     kinks = np.abs(law.kinks)
-    reach = _FAR * max(unit, 1.0, *kinks)
-    return np.asarray(np.unique(np.concatenate([[0.0], kinks, np.geomspace(1e-6 * unit, reach, 400)])))
+    reach = thresholds.far * max(unit, 1.0, *kinks)
+    return np.asarray(
+        np.unique(np.concatenate([[0.0], kinks, np.geomspace(thresholds.near * unit, reach, thresholds.first_samples)]))
+    )
 
 
-def _supremum(law: SplitLaw, grid: _Array, objective: _Objective) -> float:
+def _supremum(law: SplitLaw, grid: Array, objective: _Objective, thresholds: Thresholds) -> float:
     """A bound from above of the objective's supremum over the range of the grid."""
     a, b = grid[:-1], grid[1:]
     best = _sample(law, grid, objective)
-    tolerance = _RESOLUTION * max(abs(best), _typical(law, grid, objective))
+    tolerance = thresholds.resolution * max(abs(best), _typical(law, grid, objective))
     bound = np.array([best])
-    for _ in range(80):
+    for _ in range(thresholds.rounds):
         bound = _bound(law, a, b, objective)
         undecided = bound > best + tolerance
-        if not undecided.any() or a.size > _MOST_CELLS:
+        if not undecided.any() or a.size > thresholds.most_intervals:
             break
         a, b = a[undecided], b[undecided]
         middle = 0.5 * (a + b)
@@ -109,19 +123,19 @@ def _supremum(law: SplitLaw, grid: _Array, objective: _Objective) -> float:
     return best + tolerance if best > 0 else best
 
 
-def _sample(law: SplitLaw, x: _Array, objective: _Objective) -> float:
+def _sample(law: SplitLaw, x: Array, objective: _Objective) -> float:
     lo, hi = law.interval(x)
     return float(objective(lo, hi, np.abs(x)).max())
 
 
-def _typical(law: SplitLaw, x: _Array, objective: _Objective) -> float:
+def _typical(law: SplitLaw, x: Array, objective: _Objective) -> float:
     """The objective's size on tractions of the law's own size, so that the tolerance is never zero."""
     lo, hi = law.interval(x)
     size = np.maximum(np.abs(lo), np.abs(hi))
     return float(np.abs(objective(-size, size, np.abs(x))).max())
 
 
-def _bound(law: SplitLaw, a: _Array, b: _Array, objective: _Objective) -> _Array:
+def _bound(law: SplitLaw, a: Array, b: Array, objective: _Objective) -> Array:
     lo = law.convex.right(a) - law.concave.left(b)
     hi = law.convex.left(b) - law.concave.right(a)
     nearest = np.minimum(np.abs(a), np.abs(b))
