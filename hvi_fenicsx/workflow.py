@@ -230,7 +230,7 @@ def prepare(
     _LOG.info("%d unknowns; existence: %s%s", system.dofs, solvability.state, margin)
     with timer("assembly"):
         system.release(solvability.free)
-        warnings = plausibility.foreseen(system.problem, system.forces)
+        warnings = plausibility.before_solving(system.problem, system.forces)
     _log_warnings(warnings)
     return Preparation(
         scene=scene,
@@ -303,7 +303,7 @@ def finish_with_levels(
             examination = certificate.examine(
                 prepared.problem, found.u, options.tolerance, inertia=options.second_order
             )
-            implausible = plausibility.found(prepared.problem, examination, found.u)
+            implausible = plausibility.of_solution(prepared.problem, examination, found.u)
         _log_warnings(implausible)
         warnings += implausible
         _log_certificate(examination.certificate)

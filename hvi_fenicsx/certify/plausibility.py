@@ -24,7 +24,7 @@ from .contact_state import ContactState, LawState
 from .thresholds import PLAUSIBILITY, PlausibilityThresholds
 
 
-def foreseen(
+def before_solving(
     problem: Problem, forces: Mapping[str, PETSc.Vec], thresholds: PlausibilityThresholds = PLAUSIBILITY
 ) -> tuple[str, ...]:
     """What there is to warn of before anything is solved, in sentences. Collective; the same on all ranks.
@@ -37,7 +37,7 @@ def foreseen(
     return (*problem.implausible, *_scales(problem, thresholds), *_weak_laws(problem, forces, thresholds))
 
 
-def found(
+def of_solution(
     problem: Problem, examination: Examination, u: fem.Function, thresholds: PlausibilityThresholds = PLAUSIBILITY
 ) -> tuple[str, ...]:
     """What there is to warn of in a solution, in sentences. Collective; the same on all ranks.

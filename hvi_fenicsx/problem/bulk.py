@@ -164,7 +164,7 @@ class Bulk:
         return found + [part.across(p, q) for part, p in zip(self._dilatations, pressures, strict=True)]
 
 
-def build(
+def make_bulk(
     space: fem.FunctionSpace,
     scales: Scales,
     made: Sequence[tuple[str | None, Effect, Contribution]],

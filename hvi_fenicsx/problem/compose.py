@@ -124,7 +124,7 @@ def _sum(
     doubts: tuple[str, ...],
 ) -> Problem:
     wanted = [(str(where), c) for where, _, contribution in made for c in contribution.conditions]
-    prescribed = dirichlet.build(context, scales, wanted)
+    prescribed = dirichlet.make_conditions(context, scales, wanted)
     held = tuple((where, bc.dof_indices()[0]) for (where, _), bc in zip(wanted, prescribed, strict=True))
     fixed = np.unique(np.concatenate([np.empty(0, np.int32), *(dofs for _, dofs in held)])).astype(np.int32)
     surfaces = _surfaces(context, made)
@@ -140,7 +140,7 @@ def _sum(
         scales=scales,
         space=context.space,
         points=context.points,
-        bulk=bulk.build(context.space, scales, made, strains),
+        bulk=bulk.make_bulk(context.space, scales, made, strains),
         linear={**linear, **strains},
         conditions=prescribed,
         fixed=fixed,
@@ -157,7 +157,7 @@ def _sum(
 def _surfaces(context: FormContext, made: Sequence[PlacedContribution]) -> dict[str, Surface]:
     """The parts with bounds or laws, in the scene's order. Collective."""
     return {
-        where: contact_surface.build(
+        where: contact_surface.make_surface(
             where,
             context.space,
             context.points,
@@ -260,4 +260,13 @@ def _term(
     density = fem.Function(context.space, name="clarke_derivative")
     ds = Scaled(context.number(context.length ** (1 - context.dimension)), context.boundary(where.part, **_VERTEX))
     residual = ufl.inner(density, context.test) * ds
-    return LawTerm(where, law.direction, solved, exact, directions, free, density, fem.form(residual))
+    return LawTerm(
+        surface=where,
+        direction=law.direction,
+        law=solved,
+        exact=exact,
+        directions=directions,
+        free=free,
+        density=density,
+        residual=fem.form(residual),
+    )

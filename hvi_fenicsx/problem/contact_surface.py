@@ -53,7 +53,7 @@ class Surface:
         return u.reshape(-1, self.normals.shape[1])[self.blocks]
 
 
-def build(
+def make_surface(
     part: str,
     space: fem.FunctionSpace,
     vertices: Array,

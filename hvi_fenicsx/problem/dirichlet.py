@@ -18,7 +18,7 @@ from .scaling import Scales
 from .thresholds import DEFAULT, Thresholds
 
 
-def build(
+def make_conditions(
     context: FormContext,
     scales: Scales,
     wanted: Sequence[tuple[str, Condition]],

@@ -19,7 +19,7 @@ from .contact_surface import Surface
 from .thresholds import DEFAULT, Thresholds
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class LawTerm:
     """One law on one part, nondimensional.
 
