@@ -137,7 +137,7 @@ def table(head: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
 def document(name: str, title: str, parts: Sequence[str], options: argparse.Namespace) -> None:
     """Write docs/benchmarks/NAME.md with the command as it was given, its picture being docs/images/NAME.png."""
     command = shlex.join(["./hvi", "exec", "python3", f"benchmarks/{Path(sys.argv[0]).name}", *sys.argv[1:]])
-    clock = "Processor time, on a machine that others used too." if options.cpu else "Wall time."
+    clock = "Processor time, since other programs used the machine too." if options.cpu else "Wall time."
     text = [f"# {title}", f"    {command}", f"{machine()} {clock}", f"![{title}](../images/{name}.png)", *parts]
     path = ROOT / "docs" / "benchmarks" / f"{name}.md"
     path.parent.mkdir(exist_ok=True)

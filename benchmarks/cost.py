@@ -155,8 +155,9 @@ def main() -> None:
             counted.append(counts(name, runs["contact"][0]))
     draw(rows)
     text = (
-        "Assembly (forms included), setup and solve on all levels, medians with their range; the mesh stated apart. "
-        f"Medians of {options.repeats}."
+        '"Contact" is the time of assembly (forms included), setup and solve on all levels; "with mesh" adds the '
+        f"mesh. Times are medians of {options.repeats} with their range. Each ratio is the time of the contact problem "
+        "over that of one linear solve."
     )
     document("cost", "The cost of contact", [text, table(HEAD, rows), table(COUNTS, counted)], options)
 

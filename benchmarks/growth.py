@@ -47,7 +47,10 @@ def main() -> None:
         ax.legend(frameon=False)
         ax.grid(alpha=0.3)
     picture("growth", figure)
-    text = "Memory is the peak less what the program holds before the mesh, each size in a process of its own."
+    text = (
+        "Memory is the peak memory minus what the program takes before the mesh. Each size runs in a process of "
+        "its own."
+    )
     fitted = table(("scene", "exponent of time", "exponent of memory"), fits)
     document("growth", "Growth with the mesh", [text, fitted, table(HEAD, rows)], options)
 

@@ -23,8 +23,9 @@ def main() -> None:
     options = made.parse_args()
     figure, axes = plt.subplots(1, 2, figsize=(10, 4), sharey=True)
     parts = [
-        f"Seconds of assembly, setup and solve; one run each, given up after {options.limit:.0f} s. `ssls` and `tao` "
-        "refuse the paper's smoothing, which keeps a kink at zero slip."
+        f"The table has the seconds of assembly, setup and solve: one run each, stopped after {options.limit:.0f} s. A "
+        "method that failed is not run on larger meshes. `ssls` and `tao` refuse the paper's smoothing, which keeps "
+        "a kink at zero slip."
     ]
     for ax, (scene, smoothing) in zip(axes, (("paper", []), ("strong law", SMOOTHED)), strict=True):
         times: dict[str, dict[int, float]] = {m: {} for m in METHODS}

@@ -172,10 +172,11 @@ def words(options: argparse.Namespace) -> str:
     """What the table shows."""
     return (
         f"{options.cells} × {options.cells} cells, one rank, medians of {options.repeats}. The base is a plane square, "
-        "clamped at its left, pulled and pressed:\nisotropic elasticity, two tractions, one prescribed displacement. "
-        "Lines with + tell what the named effects add to\nthe base, in the body or on its bottom; it and they "
-        "take the solver that a user gets. Assembly includes composing\nthe forms (JIT cache filled), "
-        "the solve its setup and the coarser rungs; memory is the peak of the process."
+        "clamped at its left side, pulled and pressed:\nisotropic elasticity, two tractions, one prescribed "
+        "displacement. A line with + shows what the named effects add to\nthe base, in the body or on its bottom. All "
+        "use the solver "
+        "that the program chooses by default. Assembly\nincludes composing the forms (with a filled cache of compiled "
+        "forms), and the solve includes its setup and the coarser levels.\nMemory is the peak of the process."
     )
 
 
@@ -184,9 +185,10 @@ def absent(found: dict[str, dict[str, float]]) -> str:
     own, hand = found[DIRECT], found[HAND]
     total = [m["assembly"] + m["solve"] for m in (own, hand)]
     return (
-        f"The base names no contact, no law and no body force, and has the {hand['integrals']:.0f} integrals of the "
-        f"script by hand ({own['integrals']:.0f} here):\nthe stiffness and the two tractions. With the same direct "
-        f"solver it takes {total[0]:.2f} s, the script {total[1]:.2f} s:\na ratio of {total[0] / total[1]:.2f} "
+        f"The base has no contact, no law and no body force. It compiles {own['integrals']:.0f} integrals, and the "
+        f"script written by hand {hand['integrals']:.0f}:\nthe stiffness and the two tractions. With the same direct "
+        f"solver the base takes {total[0]:.2f} s and the script {total[1]:.2f} s:\na ratio of "
+        f"{total[0] / total[1]:.2f} "
         f"(assembly {own['assembly']:.2f} and {hand['assembly']:.2f} s, "
         f"solve {own['solve']:.2f} and {hand['solve']:.2f} s)."
     )

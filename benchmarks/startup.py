@@ -47,7 +47,10 @@ def main() -> None:
     axes.set_xlabel("s")
     axes.invert_yaxis()
     picture("startup", figure)
-    text = "Processes started inside the environment, wall time; `./hvi` adds what entering it takes."
+    text = (
+        "The table has the wall time of processes that are started inside the environment. `./hvi` adds the time "
+        "to enter it."
+    )
     document("startup", "Start-up", [text, table(("what", "s"), rows)], options)
 
 
