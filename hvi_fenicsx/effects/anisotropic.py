@@ -62,10 +62,10 @@ def _voigt(tensor: Any, dimension: int) -> list[Any]:
     return [tensor[i, j] if i == j else 2 * tensor[i, j] for i, j in _PAIRS[dimension]]
 
 
-def _definite(matrix: Array, mend: str) -> None:
+def _definite(matrix: Array, hint: str) -> None:
     lowest = float(np.linalg.eigvalsh(matrix / np.max(np.abs(matrix)))[0])
     if lowest <= 1e-12:
-        raise refusal(f"the elasticity is not positive definite (relative eigenvalue {lowest:.3g}): {mend}")
+        raise refusal(f"the elasticity is not positive definite (relative eigenvalue {lowest:.3g}): {hint}")
 
 
 class OrthotropicElasticity(_ByMatrix):

@@ -184,7 +184,7 @@ class Effect(BaseModel):
         """Refuse what makes no sense in 2D or 3D.
 
         Raises:
-            InputError: with the reason and the mend.
+            InputError: with the reason and how to correct it.
         """
 
     def implausible(self, largest: Evaluate, sizes: Sizes) -> tuple[str, ...]:

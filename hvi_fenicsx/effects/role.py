@@ -1,4 +1,4 @@
-"""What an effect does, as plain data: for those who tell of it or draw it and have only a result folder."""
+"""What an effect does, as plain data: pictures and pages are made from a result folder alone."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Nonmonotone laws: superpotentials as objects, the catalogue, and laws of one's own (docs/laws.md)."""
+"""Nonmonotone laws: superpotentials as objects, the catalogue, and base classes of your own laws (docs/laws.md)."""
 
 from .base import Superpotential
 from .catalogue import Graph, LinearSpring, QuadraticLinear, QuadraticLinearLiteral, Sawtooth, Tresca

@@ -1,4 +1,4 @@
-"""Checks of a law's parameters, with messages that say what, what is allowed and how to mend it."""
+"""Checks of a law's parameters, with messages that say what is wrong, what is allowed and how to correct it."""
 
 from __future__ import annotations
 

@@ -27,7 +27,7 @@ class FixedDirections:
 
     def __post_init__(self) -> None:
         if np.ndim(self.directions) != 2 or np.shape(self.points) != (len(self.directions), 3):
-            raise ValueError("FixedDirections wants points (k, 3) and directions (k, d) with the same k")
+            raise ValueError("FixedDirections needs points (k, 3) and directions (k, d) with the same k")
 
 
 def kernel(

@@ -68,7 +68,7 @@ def mode_of(coefficients: Array, body: RigidBody, *, signed: bool) -> Mode:
     Args:
         coefficients: (3|6,), on the basis of this module.
         body: the body that moves.
-        signed: whether the name tells the sense too.
+        signed: whether the name has the sense too.
     """
     return Mode(describe(coefficients, body, signed=signed), tuple(float(c) for c in coefficients), body.index)
 
@@ -107,7 +107,7 @@ def describe(coefficients: Array, body: RigidBody, *, signed: bool) -> str:
     Args:
         coefficients: (3|6,), on the basis of this module.
         body: the body that moves.
-        signed: whether the sense is told too: "translation along +y".
+        signed: whether the name has the sense too: "translation along +y".
     """
     z = np.where(np.abs(coefficients) <= NEGLIGIBLE * np.abs(coefficients).max(), 0.0, coefficients)
     shift, spin = z[: body.dimension], z[body.dimension :]

@@ -35,7 +35,7 @@ class ContactCone:
 
     def __post_init__(self) -> None:
         if np.ndim(self.normals) != 2 or np.shape(self.points) != (len(self.normals), 3):
-            raise ValueError("ContactCone wants points (m, 3) and normals (m, d) with the same m")
+            raise ValueError("ContactCone needs points (m, 3) and normals (m, d) with the same m")
 
 
 def _linear_part(law: Directional) -> float:
@@ -75,7 +75,7 @@ class Resistance:
     def __post_init__(self) -> None:
         m = len(self.weights)
         if np.shape(self.points) != (m, 3) or np.ndim(self.directions) != 3 or len(self.directions) != m:
-            raise ValueError("Resistance wants points (m, 3), weights (m,), directions (m, r, d), one m")
+            raise ValueError("Resistance needs points (m, 3), weights (m,), directions (m, r, d), one m")
         values = (self.growth.minus, self.growth.plus, self.peak.minus, self.peak.plus)
         if not all(value > -np.inf for value in values):  # also refuses nan
             raise InputError(f"growth and peak of a law are numbers or +inf, not {values}")
@@ -106,7 +106,7 @@ class RigidProblem:
     def __post_init__(self) -> None:
         for name, work in self.loads.items():
             if np.shape(work) != (self.body.motions,):
-                raise ValueError(f"load {name!r} wants {self.body.motions} numbers, one for each rigid motion")
+                raise ValueError(f"load {name!r} needs {self.body.motions} numbers, one for each rigid motion")
             if not np.isfinite(work).all():
                 raise InputError(f"load {name!r}: its work on a rigid motion is not finite")
 
