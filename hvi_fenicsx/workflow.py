@@ -223,13 +223,13 @@ def prepare(
     options, model = options_of(scene.solver, thresholds.solvers), model_of(scene)
     with timer("mesh"):
         domain = domain or scene.domain.build_hierarchy(comm, scene.dimension, thresholds.mesh)
-    system = assemble(domain, model, timer)
+    system = assemble(domain, model, timer, thresholds.solvers.linear)
     with timer("existence"):
         solvability = solvability or existence.solvability(system.problem, system.forces)
     margin = "" if solvability.margin is None else f", margin {solvability.margin:.3g}"
     _LOG.info("%d unknowns; existence: %s%s", system.dofs, solvability.state, margin)
     with timer("assembly"):
-        system.release(solvability.free)
+        system.attach_free_motions(solvability.free)
         warnings = plausibility.before_solving(system.problem, system.forces)
     _log_warnings(warnings)
     return Preparation(
@@ -344,8 +344,8 @@ def _solved(prepared: Preparation, control: RunControl, start: CoarseStart | Non
             found = nested_iteration.ascend(system, start, solvability, options, control)
         else:
             found = nested_iteration.solve(prepared.model, system, solvability, options, control)
-        if system.freedom is not None:
-            free_motions.settle(prepared.problem, solvability.free, found.result.u)
+        if system.free_motions is not None:
+            free_motions.remove_free_motions(prepared.problem, solvability.free, found.result.u)
         return found
     except SolverError as error:
         u = fem.Function(prepared.problem.space, name="displacement")

@@ -23,7 +23,7 @@ from ..runtime.timing import Timer
 from ..scene import Scene
 from ..solvers.context import Progress, never
 from ..solvers.nested_iteration import CoarseStart
-from ..system.levels import Level, Levels, prolongation, stacked
+from ..system.levels import Level, Levels, prolongation, with_coarser_system
 from ..typing import Entities
 from ..workflow import DEFAULT, Preparation, Solution, Thresholds, finish_with_levels, prepare
 
@@ -105,7 +105,7 @@ class AdaptiveSolver:
         prepared, coarse = self._prepared(level, scene, refined.domain), level.prepared.system
         with self.timer("setup"):
             step = prolongation(prepared.system, coarse, refined.transfer)
-            levels = stacked(prepared.system, coarse, level.levels, step)
+            levels = with_coarser_system(prepared.system, coarse, level.levels, step)
         return self._solved(level, prepared, levels, step, ahead)
 
     def again(self, level: AdaptiveLevel, scene: Scene) -> AdaptiveLevel:

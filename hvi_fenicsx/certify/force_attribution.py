@@ -97,9 +97,9 @@ def attribute(problem: Problem, u: Array, residual: Array, near: float) -> Force
         residual: internal forces minus loads at the owned blocks, (blocks, d).
         near: distance (of u0) from a kink or a bound that counts as being on it.
     """
-    local = local_frames.build(problem)
+    local = local_frames.frames_of(problem)
     if local is not None:
-        u, residual = local.turned(u), local.turned(residual)
+        u, residual = local.local_components(u), local.local_components(residual)
     n = residual.size
     found = ForceAttribution(
         terms=problem.terms if local is None else tuple(local.term(t) for t in problem.terms),

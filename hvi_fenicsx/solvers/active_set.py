@@ -84,7 +84,7 @@ class ActiveSetSolver:
         self.interrupted, self.thresholds = interrupted, thresholds
         self.progress: StepReport | None = None
         self._residual = system.load.duplicate()
-        self._allowed = system.allowed(1.0)[system.jacobian.rows.dofs]
+        self._allowed = system.residual_limits(1.0)[system.jacobian.rows.dofs]
 
     def stopped_by(self, interrupted: Callable[[], bool]) -> ActiveSetSolver:
         """The same solver with another way to stop; both share the preconditioner."""
@@ -231,7 +231,7 @@ class ActiveSetSolver:
         if not np.isfinite(found.measure) or not np.isfinite(x.norm()) or found.measure > thresholds.largest_rounding:
             return found
         noise = self.system.load.duplicate()
-        self.system.rounding(x, noise)
+        self.system.rounding_sample(x, noise)
         floors = [thresholds.rounding_safety * size for size in self._sizes(noise.array_r)]
         noise.destroy()
         if any(size > floor for size, floor in zip(sizes, floors, strict=True)):

@@ -184,7 +184,7 @@ class BranchIteration(Method):
 
     def _slides(self, xi: list[Array]) -> bool:
         """Whether the convex step has no solution."""
-        return boundedness.slides(self.system.problem, self.system.forces, self._laws, xi)
+        return boundedness.is_unbounded(self.system.problem, self.system.forces, self._laws, xi, self.thresholds.linear)
 
     def _bounded(self, x: PETSc.Vec, models: Sequence[Majorant], cells: list[Cells], tolerance: float) -> Outcome:
         bounds, attempts = kink_bounds.boxes(self.system, cells), self._attempts(models)
@@ -255,7 +255,7 @@ class BranchIteration(Method):
 
     def _rounding(self, energy: float, x: PETSc.Vec) -> float:
         """What rounding may change of an energy: it is a difference of much larger numbers on stretched meshes."""
-        return max(1e-10 * abs(energy), self.system.energy_noise(x), 1e-300)
+        return max(1e-10 * abs(energy), self.system.energy_rounding(x), 1e-300)
 
     def _check_fall(self, before: float, outcome: Outcome, x: PETSc.Vec) -> None:
         after = self._energy(x)

@@ -100,7 +100,7 @@ def solve(
         _log_level(system, kind)
         return LevelSolution(system=system, levels=levels, result=kind(context).solve())
     coarse, transfer = _assembled(model, system, control)
-    coarse.release(system.freedom.modes if system.freedom else ())
+    coarse.attach_free_motions(system.free_motions.modes if system.free_motions else ())
     found = solve(model, coarse, solvability, _loosened(options), control)
     with control.timer("setup"):
         step = prolongation(system, coarse, transfer)
@@ -166,7 +166,7 @@ def _assembled(model: Model, system: System, control: RunControl) -> tuple[Syste
         coarser = system.problem.domain.coarser()
     assert coarser is not None
     domain, transfer = coarser
-    return assemble(domain, model, control.timer), transfer
+    return assemble(domain, model, control.timer, system.thresholds), transfer
 
 
 def _loosened(options: SolverOptions) -> SolverOptions:

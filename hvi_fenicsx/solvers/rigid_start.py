@@ -111,7 +111,7 @@ def at_rest(
     """
     system, modes = context.system, context.solvability.kernel
     bounded = all(np.isfinite([*astuple(term.law.growth)]).all() for term in system.terms)
-    if not modes or not bounded or system.freedom is not None or not system.bounds:
+    if not modes or not bounded or system.free_motions is not None or not system.bounds:
         return None
     motions = [system.unknowns(field) for field in free_motions.fields(system.problem, modes)]
     x = system.undisplaced()

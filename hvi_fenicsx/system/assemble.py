@@ -1,4 +1,4 @@
-"""A model on a domain made into an assembled system: one level of the mesh hierarchy, or all there is."""
+"""A model on a domain as an assembled system: one level of a mesh hierarchy, or the only one."""
 
 from __future__ import annotations
 
@@ -6,15 +6,17 @@ from ..mesh.domain import Domain
 from ..problem.compose import Model, compose
 from ..runtime.timing import Timer
 from .system import System, compile_forms
+from .thresholds import DEFAULT, Thresholds
 
 
-def assemble(domain: Domain, model: Model, timer: Timer) -> System:
-    """Forms and assembly. Collective.
+def assemble(domain: Domain, model: Model, timer: Timer, thresholds: Thresholds = DEFAULT) -> System:
+    """Compose a model on a domain, compile its forms and assemble them. Collective.
 
     Args:
         domain: the body and its mesh.
-        model: what is solved on it.
+        model: the effects and their places.
         timer: where time goes.
+        thresholds: the numbers that tune the linear solvers.
 
     Raises:
         InputError: the model does not fit the mesh, on all ranks alike.
@@ -22,4 +24,4 @@ def assemble(domain: Domain, model: Model, timer: Timer) -> System:
     with timer("jit"):
         problem = compose(domain, model)
         compiled = compile_forms(problem)
-    return System(problem, compiled, timer)
+    return System(problem, compiled, timer, thresholds)

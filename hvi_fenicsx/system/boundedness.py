@@ -1,4 +1,4 @@
-"""Does a convex step of the branch iteration have a minimiser? The rigid motions of its majorant tell, body by body."""
+"""Does a convex step of the branch iteration have a minimiser? Its energy along rigid motions decides, body by body."""
 
 from __future__ import annotations
 
@@ -15,23 +15,31 @@ from ..problem.problem import Problem
 from ..rigid import Resistance, RigidBody, RigidProblem, analyse, rigid_fields
 from ..typing import Array
 from . import existence
-
-_INFINITE, _UNBOUNDED = 1e100, 1e30
-"""A displacement beyond all scales, and a traction there that grows without bound."""
+from .thresholds import DEFAULT, Thresholds
 
 
-def slides(
-    problem: Problem, forces: Mapping[str, PETSc.Vec], laws: Sequence[Superpotential], xi: Sequence[Array]
+def is_unbounded(
+    problem: Problem,
+    forces: Mapping[str, PETSc.Vec],
+    laws: Sequence[Superpotential],
+    xi: Sequence[Array],
+    thresholds: Thresholds = DEFAULT,
 ) -> bool:
     """Whether the convex energy with H - ξ in the place of each law j = H - G has no minimiser. Collective.
 
-    That is so when the load works more than ∫ H^∞(y) - ξ·y along a rigid motion y that contact admits: a body slides
-    away on what is left of its bonds. A balance within rounding is no proof of it.
+    It has none where the load does more work than ∫ H^∞(y) - ξ·y along a rigid motion y that contact admits: the body
+    slides away, its remaining bonds do not hold it. Work that is equal within rounding is no proof of that.
 
     Args:
-        problem, forces: as for :func:`.existence.solvability`. laws: what is solved, by term. xi: ξ by term, each (m,).
+        problem: the problem.
+        forces: its load vectors by name.
+        laws: what is solved, by term.
+        xi: ξ at the vertices, by term, (m,) each.
+        thresholds: what counts as infinite.
     """
-    comm, terms = problem.domain.mesh.comm, list(zip(problem.terms, laws, xi, strict=True))
+    comm = problem.domain.mesh.comm
+    growths = [_growth(law, thresholds) for law in laws]
+    terms = list(zip(problem.terms, growths, xi, strict=True))
     majorants = (_majorant(problem, forces, body, terms) for body in problem.bodies)
     return any(analyse(comm, one).state in ("metastable", "escapes") for one in majorants)
 
@@ -40,38 +48,38 @@ def _majorant(
     problem: Problem,
     forces: Mapping[str, PETSc.Vec],
     body: RigidBody,
-    terms: Sequence[tuple[LawTerm, Superpotential, Array]],
+    terms: Sequence[tuple[LawTerm, Directional, Array]],
 ) -> RigidProblem:
-    """The existence question of one body with H - ξ in the place of its laws. Collective."""
-    whole = existence.of_body(problem, existence.felt(problem, forces), body)
-    here = [one for one in terms if existence.touches(problem, body, one[0])]
+    """The existence question of one body with H - ξ in the place of its laws, given as (term, H^∞, ξ). Collective."""
+    whole = existence.rigid_problem(problem, existence.loads_of_rigid_motions(problem, forces), body)
+    here = [one for one in terms if existence.acts_on(problem, body, one[0])]
     mine = [xi[existence.inside(problem, body, term.surface.blocks)] for term, _, xi in here]
     parts = list(zip(whole.resistances, here, mine, strict=True))
-    borne = sum((_borne(body, part, term, xi) for part, (term, _, _), xi in parts), np.zeros(body.motions))
+    works = sum((_work(body, part, term, xi) for part, (term, _, _), xi in parts), np.zeros(body.motions))
     return replace(
         whole,
-        loads={**whole.loads, "ξ": problem.domain.mesh.comm.allreduce(borne)},
-        resistances=tuple(_majorised(part, term, _directional(law), xi) for part, (term, law, _), xi in parts),
+        loads={**whole.loads, "ξ": problem.domain.mesh.comm.allreduce(works)},
+        resistances=tuple(_majorised(part, term, growth, xi) for part, (term, growth, _), xi in parts),
     )
 
 
-def _directional(law: Superpotential) -> Directional:
+def _growth(law: Superpotential, thresholds: Thresholds) -> Directional:
     """H^∞: the limits of H' on both sides."""
-    ends = np.array([-_INFINITE, _INFINITE])
+    ends = np.array([-thresholds.infinite_displacement, thresholds.infinite_displacement])
     with np.errstate(over="ignore"):
         minus, plus = law.convex.right(ends) * np.sign(ends)
-    return Directional(*(float(t) if t < _UNBOUNDED else np.inf for t in (minus, plus)))
+    return Directional(*(float(t) if t < thresholds.unbounded_traction else np.inf for t in (minus, plus)))
 
 
 def _majorised(part: Resistance, term: LawTerm, growth: Directional, xi: Array) -> Resistance:
-    """The resistance of H - ξ at infinity; of a law of |u_t| what ξ takes off is a share of it, vertex by vertex."""
+    """The resistance of H - ξ at infinity; for a law of |u_t|, ξ reduces the weights of the vertices."""
     if not term.radial or not np.isfinite(growth.plus) or growth.plus == 0.0:
         return replace(part, growth=growth, peak=growth)
     return replace(part, weights=part.weights * (1.0 - xi / growth.plus), growth=growth, peak=growth)
 
 
-def _borne(body: RigidBody, part: Resistance, term: LawTerm, xi: Array) -> Array:
-    """∫ ξ·y of this rank's vertices on the rigid basis (3|6,), for a law of a signed slip."""
+def _work(body: RigidBody, part: Resistance, term: LawTerm, xi: Array) -> Array:
+    """∫ ξ·y over this rank's vertices for the rigid basis, (3|6,); 0 for a law of |u_t|."""
     if term.radial:
         return np.zeros(body.motions)
     fields = rigid_fields(part.points, body)

@@ -1,8 +1,8 @@
 """The rows of Γc in a system's matrix: the only ones that laws, active sets and branches change.
 
-J = A + W K + H. A is the bulk stiffness. W K is block-diagonal, the laws' tangents by lumped area: ∫ (K du)·v ds by
-vertex quadrature. H holds unknowns by a diagonal so large that a solve leaves them where they are. All three meet in
-the diagonal blocks of Γc's vertices, so that a new tangent or active set rewrites these blocks and nothing else.
+J = A + W K + H. A is the bulk stiffness. W K is block-diagonal, the laws' tangents times lumped areas: ∫ (K du)·v ds by
+vertex quadrature. H holds unknowns: its diagonal is so large that a solve leaves them as they are. W K and H are zero
+outside of the diagonal blocks of Γc's vertices, so a new tangent or active set rewrites these blocks and nothing else.
 """
 
 from __future__ import annotations
@@ -17,19 +17,23 @@ from ..problem.contact_surface import Surface
 from ..problem.law_term import LawTerm
 from ..typing import Array, Integers
 
-_HOLD = 1e20
-"""Times an elastic stiffness (about 1): what a held unknown moves is below rounding."""
-
 
 class ContactRows:
-    """The vertices of Γc that this rank owns (m of them) and their rows. Creation is collective.
+    """The m vertices of Γc that this rank owns, and their rows. Creation is collective.
+
+    Args:
+        matrix: A, which becomes J.
+        surfaces: the parts of Γc.
+        held_stiffness: diagonal of a held unknown.
 
     Attributes:
-        dofs: their scalar unknowns, local, (m d,). bulk: their rows of A. tangent: W K, (m, d, d).
+        dofs: the vertices' scalar unknowns, local, (m d,).
+        bulk: their rows of A.
+        tangent: W K, (m, d, d).
     """
 
-    def __init__(self, matrix: PETSc.Mat, surfaces: Sequence[Surface]) -> None:
-        d = matrix.getBlockSize()
+    def __init__(self, matrix: PETSc.Mat, surfaces: Sequence[Surface], held_stiffness: float) -> None:
+        d, self._held_stiffness = matrix.getBlockSize(), held_stiffness
         self._local = np.unique(np.concatenate([np.empty(0, np.int64), *(s.blocks for s in surfaces)])).astype(np.int64)
         self.dofs: Integers = (self._local[:, None] * d + np.arange(d)).ravel()
         start = matrix.getOwnershipRange()[0]
@@ -45,18 +49,28 @@ class ContactRows:
         return np.array([matrix.getValues(i, i) for i in dofs], dtype=np.float64).reshape(-1, d, d)
 
     def set_tangent(self, terms: Sequence[LawTerm], rates: Sequence[Array]) -> None:
-        """W K of the laws' K (m, d, d) by term."""
+        """Compute W K.
+
+        Args:
+            terms: the laws.
+            rates: K, (m, d, d) by term.
+        """
         self.tangent[:] = 0.0
         for term, k in zip(terms, rates, strict=True):
             at = np.searchsorted(self._local, term.surface.blocks)
             np.add.at(self.tangent, at, term.surface.weights[:, None, None] * k)
 
     def write(self, matrix: PETSc.Mat, held: npt.NDArray[np.integer]) -> None:
-        """Make J of the tangent with these unknowns (local, owned) held, as far as they are Γc's. Collective."""
+        """Write the diagonal blocks of J. Collective.
+
+        Args:
+            matrix: J.
+            held: unknowns to hold (local, owned); those that are not on Γc are left out.
+        """
         values = self._elastic + self.tangent
         d = values.shape[1]
         diagonal = np.zeros(self.dofs.shape)
-        diagonal[np.isin(self.dofs, held)] = _HOLD
+        diagonal[np.isin(self.dofs, held)] = self._held_stiffness
         values[:, np.arange(d), np.arange(d)] += diagonal.reshape(-1, d)
         matrix.setValuesBlockedRCV(self._blocks, self._blocks, values)
         matrix.assemble()
@@ -64,7 +78,11 @@ class ContactRows:
     def overwrite(self, x: PETSc.Vec, out: PETSc.Vec) -> None:
         """Replace these rows of a product with J by those of the product with A. Collective.
 
-        K and H may be larger than A by any factor, and a difference of the two would leave rounding only.
+        K and H may be larger than A by any factor; to subtract their part would leave nothing but rounding.
+
+        Args:
+            x: the vector.
+            out: the product with J, changed in place.
         """
         self.bulk.mult(x, self._product)
         out.array[self.dofs] = self._product.array_r

@@ -1,4 +1,4 @@
-"""Does a solution exist? A problem's rigid motions, contact and laws, body by body, handed to :mod:`.rigid`."""
+"""Does a solution exist? Each body's rigid motions, contact and laws are collected here and judged by :mod:`.rigid`."""
 
 from __future__ import annotations
 
@@ -30,31 +30,41 @@ from ..typing import Array, Entities, Mask
 
 
 def solvability(problem: Problem, forces: Mapping[str, PETSc.Vec]) -> Solvability:
-    """The state of the scene, from its rigid motions and its load vectors by name. Collective."""
+    """Whether a solution exists. Collective.
+
+    Args:
+        problem: the problem.
+        forces: its load vectors by name.
+    """
     comm = problem.domain.mesh.comm
     return combine([analyse(comm, body) for body in rigid_problems(problem, forces)])
 
 
 def load_factors(problem: Problem, forces: Mapping[str, PETSc.Vec], load: str | None = None) -> LoadFactors:
-    """Factors of one named load, the others constant, or of the whole load (None). Collective.
+    """Between which factors of a load the body is held, the other loads constant. Collective.
 
     Args:
-        problem: as composed. forces: its load vectors by name. load: a name of these, or the part or region that the
-            load acts on, where it bears no other one.
+        problem: the problem.
+        forces: its load vectors by name.
+        load: the name of a load, or of the part or region that it acts on alone; None for the whole load.
 
     Raises:
         InputError: on all ranks alike: there is no such load.
     """
-    name = None if load is None else load_name(list(felt(problem, forces)), load)
+    name = None if load is None else load_name(list(loads_of_rigid_motions(problem, forces)), load)
     comm = problem.domain.mesh.comm
     return rigid.combine_factors([rigid.load_factors(comm, body, name) for body in rigid_problems(problem, forces)])
 
 
 def load_name(known: list[str], wanted: str) -> str:
-    """The load that is meant: by its full name, or by the part or region that bears it alone.
+    """The full name of a load.
+
+    Args:
+        known: the full names of all loads.
+        wanted: a full name, or that of a part or region on which one load acts.
 
     Raises:
-        InputError: none or several.
+        InputError: there is no such load, or more than one.
     """
     meant = [name for name in known if name == wanted] or [n for n in known if n.rpartition(".")[0] == wanted]
     if len(meant) == 1:
@@ -64,36 +74,53 @@ def load_name(known: list[str], wanted: str) -> str:
 
 
 def rigid_problems(problem: Problem, forces: Mapping[str, PETSc.Vec]) -> tuple[RigidProblem, ...]:
-    """The data of the existence question, one for each body. Collective."""
-    return tuple(of_body(problem, felt(problem, forces), body) for body in problem.bodies)
+    """The data of the existence question, body by body. Collective.
+
+    Args:
+        problem: the problem.
+        forces: its load vectors by name.
+    """
+    loads = loads_of_rigid_motions(problem, forces)
+    return tuple(rigid_problem(problem, loads, body) for body in problem.bodies)
 
 
 def moves_with_contact_closed(problem: Problem) -> bool:
     """Whether a rigid motion is left when every contact part is held in its normal direction. Collective."""
 
     def moves(body: RigidBody) -> bool:
-        held = (_along(problem, body, b.surface, b.surface.normals) for b in problem.bounds)
+        held = (_normals(problem, body, b.surface) for b in problem.bounds)
         return kernel(problem.domain.mesh.comm, body, (_prescribed(problem, body), *held)).shape[1] > 0
 
     return any(moves(body) for body in problem.bodies)
 
 
-def felt(problem: Problem, forces: Mapping[str, PETSc.Vec]) -> dict[str, PETSc.Vec]:
-    """The loads that rigid motions feel: the work of the others on them is rounding only."""
+def loads_of_rigid_motions(problem: Problem, forces: Mapping[str, PETSc.Vec]) -> dict[str, PETSc.Vec]:
+    """The loads that do work on rigid motions; the work of a given strain is rounding only.
+
+    Args:
+        problem: the problem.
+        forces: its load vectors by name.
+    """
     return {name: force for name, force in forces.items() if name not in problem.bulk.strains}
 
 
-def of_body(problem: Problem, forces: Mapping[str, PETSc.Vec], body: RigidBody) -> RigidProblem:
-    """The data of one body; a law acts on it if it `touches` it. Collective."""
-    held = [_along(problem, body, b.surface, b.surface.normals) for b in problem.bounds if _bilateral(b)]
-    cones = [_along(problem, body, b.surface, b.surface.normals) for b in problem.bounds if not _bilateral(b)]
+def rigid_problem(problem: Problem, forces: Mapping[str, PETSc.Vec], body: RigidBody) -> RigidProblem:
+    """The data of the existence question of one body. Collective.
+
+    Args:
+        problem: the problem.
+        forces: the loads of rigid motions by name.
+        body: the body.
+    """
+    held = [_normals(problem, body, b.surface) for b in problem.bounds if _bilateral(b)]
+    cones = [_normals(problem, body, b.surface) for b in problem.bounds if not _bilateral(b)]
     works, force = _works(problem, forces, body)
     return RigidProblem(
         body=body,
         loads=works,
         fixed=(_prescribed(problem, body), *held),
         contact=tuple(ContactCone(cone.points, cone.directions) for cone in cones),
-        resistances=tuple(_resistance(problem, body, term) for term in problem.terms if touches(problem, body, term)),
+        resistances=tuple(_resistance(problem, body, term) for term in problem.terms if acts_on(problem, body, term)),
         force=force,
     )
 
@@ -103,16 +130,24 @@ def _bilateral(bounds: Bounds) -> bool:
 
 
 def inside(problem: Problem, body: RigidBody, blocks: Entities) -> Mask:
-    """Which of these local vertices are the body's."""
+    """Which vertices belong to a body, (n,).
+
+    Args:
+        problem: the problem.
+        body: the body.
+        blocks: local vertices, (n,).
+    """
     return np.asarray(problem.bodies.labels[blocks] == body.index)
 
 
-def _along(problem: Problem, body: RigidBody, surface: Surface, directions: Array) -> FixedDirections:
+def _normals(problem: Problem, body: RigidBody, surface: Surface) -> FixedDirections:
+    """The normals of a surface at the body's vertices."""
     mine = inside(problem, body, surface.blocks)
-    return FixedDirections(np.asarray(surface.points[mine] / problem.scales.length), directions[mine])
+    return FixedDirections(np.asarray(surface.points[mine] / problem.scales.length), surface.normals[mine])
 
 
 def _prescribed(problem: Problem, body: RigidBody) -> FixedDirections:
+    """The prescribed components at the body's vertices."""
     d, dofs = problem.scales.dimension, problem.fixed_here
     dofs = dofs[inside(problem, body, dofs // d)]
     points = problem.points[dofs // d]
@@ -133,8 +168,14 @@ def _works(problem: Problem, forces: Mapping[str, PETSc.Vec], body: RigidBody) -
     return works, size
 
 
-def touches(problem: Problem, body: RigidBody, term: LawTerm) -> bool:
-    """Whether a law acts on the body. Collective."""
+def acts_on(problem: Problem, body: RigidBody, term: LawTerm) -> bool:
+    """Whether a law acts on a body. Collective.
+
+    Args:
+        problem: the problem.
+        body: the body.
+        term: the law.
+    """
     mine = bool(inside(problem, body, term.surface.blocks).any())
     return bool(problem.domain.mesh.comm.allreduce(mine, op=MPI.LOR))
 

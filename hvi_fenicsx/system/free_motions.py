@@ -1,9 +1,9 @@
-"""Rigid motions that nothing holds and on which the loads are in balance: a singular problem that has solutions.
+"""Free motions: rigid motions that nothing holds and on which the loads do no work. Solutions exist, but not one only.
 
-Along such a motion the whole problem is constant: contact, laws and conditions do not see it. Its field is the null
-space of every tangent there is. It is attached to the matrix; preconditioners and direct solvers, which need a regular
-one, get it with one unknown pinned for each motion. Any two solutions differ by such motions; the one returned is
-orthogonal to them in L².
+Along such a motion the energy is constant: contact, laws and conditions do not change. Its field is in the null space
+of every tangent. That null space is attached to the matrix; preconditioners and direct solvers need a regular matrix,
+and get it with one unknown pinned for each motion. Two solutions differ by such motions; the one returned is orthogonal
+to them in L².
 """
 
 from __future__ import annotations
@@ -25,12 +25,13 @@ from ..typing import Array, Entities
 
 
 @dataclass(frozen=True)
-class Freedom:
+class FreeMotions:
     """The free motions of a system.
 
     Attributes:
-        modes: what they are. null_space: their fields in the unknowns' components, orthonormal (Euclidean).
-        pins: local owned dofs, sorted; with those held (one for each mode in all), no free motion is left.
+        modes: the motions.
+        null_space: their fields in the components of the unknowns, orthonormal (Euclidean).
+        pins: local owned dofs, sorted; where they are held (one for each mode, over all ranks), no motion is free.
     """
 
     modes: tuple[Mode, ...]
@@ -38,14 +39,24 @@ class Freedom:
     pins: Entities
 
 
-def build(vectors: list[PETSc.Vec], modes: Sequence[Mode]) -> Freedom:
-    """The freedom of modes whose fields (consumed) are these vectors of unknowns. Collective."""
+def create(vectors: list[PETSc.Vec], modes: Sequence[Mode]) -> FreeMotions:
+    """The free motions of a system. Collective.
+
+    Args:
+        vectors: the modes' fields in the components of the unknowns; made orthonormal in place.
+        modes: the motions.
+    """
     spanned = null_space(vectors)
-    return Freedom(tuple(modes), spanned, _pins(vectors[0].comm.tompi4py(), [v.array_r for v in vectors]))
+    return FreeMotions(tuple(modes), spanned, _pins(vectors[0].comm.tompi4py(), [v.array_r for v in vectors]))
 
 
 def fields(problem: Problem, modes: Sequence[Mode]) -> list[fem.Function]:
-    """The modes as displacements. Collective."""
+    """Rigid motions as displacement fields. Collective.
+
+    Args:
+        problem: the problem.
+        modes: the motions.
+    """
     points = np.asarray(problem.points / problem.scales.length)
     found = []
     for mode in modes:
@@ -55,8 +66,14 @@ def fields(problem: Problem, modes: Sequence[Mode]) -> list[fem.Function]:
     return found
 
 
-def settle(problem: Problem, modes: Sequence[Mode], u: fem.Function) -> None:
-    """Take out of u what it has, in L², of these modes: the least rigid motion. Collective."""
+def remove_free_motions(problem: Problem, modes: Sequence[Mode], u: fem.Function) -> None:
+    """Make a displacement orthogonal, in L², to the free motions. Collective.
+
+    Args:
+        problem: the problem.
+        modes: the free motions.
+        u: the displacement, changed in place.
+    """
     free = fields(problem, modes)
     gram = np.array([[_product(a, b) for b in free] for a in free])
     parts = np.linalg.solve(gram, [_product(u, a) for a in free])
@@ -70,18 +87,18 @@ def _product(u: fem.Function, v: fem.Function) -> float:
 
 
 def _pins(comm: MPI.Comm, columns: list[Array]) -> Entities:
-    """Dofs at which the columns (orthonormal) are far from dependent: always the largest row of what is left.
-
-    Collective.
-    """
+    """Dofs at which the columns (orthonormal) are far from dependent: always the largest remaining row. Collective."""
     rows = np.array(columns).T.copy()
-    pins = []
+    pins: list[int] = []
     for _ in columns:
         size = np.linalg.norm(rows, axis=1)
         here = (float(size.max(initial=0.0)), comm.rank)
         there = comm.allreduce(here, op=MPI.MAXLOC)
-        at = int(size.argmax()) if there[1] == comm.rank else None
-        row = comm.bcast(rows[at] / size[at] if at is not None else None, root=there[1])
-        pins += [] if at is None else [at]
+        row = None
+        if there[1] == comm.rank:
+            pin = int(size.argmax())
+            pins.append(pin)
+            row = rows[pin] / size[pin]
+        row = comm.bcast(row, root=there[1])
         rows = rows - np.outer(rows @ row, row)
     return np.array(sorted(pins), dtype=np.int32)

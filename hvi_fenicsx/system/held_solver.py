@@ -1,10 +1,10 @@
-"""Linear solves in which some dofs are held, at full size.
+"""Linear solves in which some unknowns are held, at full size.
 
 SNES VI extracts the inactive rows and columns into a matrix without block size and near-null space, and algebraic
-multigrid then fails. Here the full size is kept, whatever is held (solver-notes.md): one preconditioner serves the
-start and every Newton step with the same active set. Algebraic multigrid and the direct solver get a copy of the
-matrix with those rows and columns replaced by the identity; geometric multigrid gets the matrix itself, in which they
-are held by their diagonals (:meth:`.Jacobian.hold`).
+multigrid then fails. Here the matrix keeps its full size whatever is held (solver-notes.md): one preconditioner serves
+the start and every Newton step with the same active set. Algebraic multigrid and the direct solver get a copy of the
+matrix in which those rows and columns are replaced by the identity; geometric multigrid gets the matrix itself, in
+which they are held by their diagonals (:meth:`.Jacobian.hold`).
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from petsc4py import PETSc
 from ..runtime.timing import Timer
 from ..typing import Array, Entities
 from . import multigrid, schur
-from .copied_matrix import CopiedMatrix
 from .levels import Levels
+from .matrix_copy import MatrixCopy
 from .petsc_options import PREFIX, configure
 from .system import System
 from .thresholds import DEFAULT, Thresholds
@@ -52,8 +52,8 @@ class LinearSettings:
     """How linear systems are solved.
 
     Attributes:
-        kind: a factorisation, algebraic or geometric multigrid.
-        thresholds: when that is left for another one, and when it is set up anew.
+        kind: a factorisation (lu), algebraic multigrid (gamg) or geometric multigrid (mg).
+        thresholds: when another kind takes over, and when a preconditioner is made anew.
     """
 
     kind: Kind
@@ -68,30 +68,30 @@ class LinearSettings:
         *,
         levels: bool = False,
     ) -> LinearSettings:
-        """By the number of unknowns, unless the user wants one; a nearly incompressible body goes to the direct one.
+        """The solver that suits the number of unknowns; nearly incompressible bodies are solved directly.
 
         Args:
-            system: to be solved.
-            wanted: by the user.
-            thresholds: up to which size which one is used.
+            system: the system to be solved.
+            wanted: what the user wants.
+            thresholds: up to which size a direct solver is used.
             levels: whether the system has coarser levels when it is solved.
         """
         if wanted != "auto":
             return cls(wanted, thresholds)
         if system.problem.bulk.averages_dilatation:
             return cls("lu", thresholds)
-        if levels and system.freedom is None:
+        if levels and system.free_motions is None:
             return cls("mg", thresholds)
         return cls("lu" if _small(system, thresholds) else "gamg", thresholds)
 
     @property
     def ksp(self) -> dict[str, str]:
-        """The Krylov method that goes with it."""
+        """Default options of the Krylov method."""
         return {"ksp_type": "preonly"} if self.kind == "lu" else {"ksp_type": "cg", "ksp_norm_type": "unpreconditioned"}
 
     @property
     def pc(self) -> dict[str, object]:
-        """The preconditioner's options."""
+        """Default options of the preconditioner."""
         return {"lu": _LU, "gamg": _GAMG, "mg": _MG}[self.kind]
 
 
@@ -104,27 +104,27 @@ class Preconditioner(Protocol):
 
     Attributes:
         pc: PETSc's object.
-        matrix: what it preconditions, and equations are to be solved with.
+        matrix: what it preconditions; equations are solved with this matrix.
     """
 
     pc: PETSc.PC
     matrix: PETSc.Mat
 
     def prepare(self, held: Entities) -> None:
-        """Fit it to the system's matrix as it stands with these unknowns held. Collective."""
+        """Set it up for the system's present matrix with these unknowns held. Collective."""
 
     def free(self) -> None:
         """Free the PETSc objects."""
 
 
 class HeldPreconditioner:
-    """The preconditioner of the system's matrix with some dofs held; set up anew only when it has to be.
+    """The preconditioner of the system's matrix with some unknowns held; made anew only where it has to be.
 
-    A direct solve wants the very matrix. A Krylov method is content with that of a similar active set and tangent, as
-    long as its iterations do not grow.
+    A direct solver needs the exact matrix. A Krylov method also converges with the preconditioner of a similar active
+    set and tangent, as long as its iterations do not grow.
 
     Args:
-        system: whose matrix it is.
+        system: the system.
         levels: its coarser levels; used by geometric multigrid alone.
         settings: how linear systems are solved.
         timer: where time goes.
@@ -142,7 +142,7 @@ class HeldPreconditioner:
         self._runs: list[tuple[slice, slice]] = []
 
     def prepare(self, held: Entities) -> None:
-        """Make it fit for these held dofs (local, owned, sorted). Collective."""
+        """Make it suit these held unknowns (local, owned, sorted). Collective."""
         self.system.jacobian.hold(held if self.settings.kind == "mg" else held[:0])
         if self.system.comm.allreduce(self._fits(held), op=MPI.LAND):
             return
@@ -157,22 +157,23 @@ class HeldPreconditioner:
         changed, drift = len(np.setxor1d(held, self._held, assume_unique=True)), self.system.jacobian.drift(self._rates)
         if self.settings.kind == "lu":
             return changed == 0 and drift == 0.0
-        most = 0 if self.settings.kind == "mg" else max(2, 0.1 * len(held))
-        return changed <= most and drift <= self.settings.thresholds.drift
+        thresholds = self.settings.thresholds
+        most = 0 if self.settings.kind == "mg" else max(2, thresholds.changed_held * len(held))
+        return changed <= most and drift <= thresholds.drift
 
     def report(self, iterations: int) -> None:
-        """Tell what a solve took (the same on all ranks): a preconditioner that serves badly is not used again."""
-        self._first_iterations = self._first_iterations or iterations
-        self._outdated = iterations > 1.5 * self._first_iterations + 5
+        """Report the iterations of a solve (the same on all ranks): where they grow, the preconditioner is outdated."""
         thresholds = self.settings.thresholds
+        self._first_iterations = self._first_iterations or iterations
+        self._outdated = iterations > thresholds.slower * self._first_iterations + 5
         if iterations > thresholds.slow and _small(self.system, thresholds):
             self.settings, self._outdated = LinearSettings("lu", thresholds), True
 
     def _build(self, held: Entities) -> None:
-        kind, worth = self.settings.kind, self._factorised * self.settings.thresholds.condensing
-        condensing = kind == "lu" and schur.pays(self.system, worth)
+        kind, affordable = self.settings.kind, self._factorised * self.settings.thresholds.condensing
+        condensing = kind == "lu" and schur.is_worthwhile(self.system, affordable)
         if kind != self._kind or self._preconditioner is None or (condensing and not self._condensed):
-            self._forget()
+            self.destroy()
             self._preconditioner, self._kind = self._new(condensing=condensing), kind
         self._preconditioner.prepare(held)
         self._factorised += 1
@@ -182,36 +183,43 @@ class HeldPreconditioner:
         return isinstance(self._preconditioner, schur.SchurDirect)
 
     def _new(self, *, condensing: bool) -> Preconditioner:
-        """Condensing: the body's own factorisation, made once, serves a matrix that changes on Γc alone."""
+        """A new preconditioner; condensing, one factorisation of the body serves all matrices that differ on Γc."""
         if condensing:
             return schur.SchurDirect(self.system, self.settings.pc)
         if self.settings.kind == "mg":
             return multigrid.Multigrid(self.system, self.levels, self.settings.pc)
-        return CopiedMatrix(self.system, self.settings.pc, direct=self.settings.kind == "lu")
+        return MatrixCopy(self.system, self.settings.pc, direct=self.settings.kind == "lu")
 
     def destroy(self) -> None:
         """Free the PETSc objects."""
-        self._forget()
-
-    def _forget(self) -> None:
         if self._preconditioner is not None:
             self._preconditioner.free()
         self._preconditioner = self._held = None
 
     def select(self, inactive: PETSc.IS) -> None:
-        """Reduced vectors hold these dofs from now on."""
-        self._runs = list(runs(inactive.getIndices() - self.system.load.owner_range[0]))
+        """Choose the dofs of which reduced vectors consist from now on."""
+        self._runs = list(consecutive_runs(inactive.getIndices() - self.system.load.owner_range[0]))
         self._in.set(0.0)
 
     def multiply_reduced(self, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        """Y = J x on the selected dofs, all others being zero. Collective."""
+        """Multiply y = J x on the selected dofs, all others being zero. Collective.
+
+        Args:
+            x: a reduced vector.
+            y: where the product is written, reduced too.
+        """
         self._reduced(self.system.jacobian.matrix.mult, x, y)
 
     def apply_reduced(self, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        """Y = P^-1 x on the selected dofs. Collective."""
-        self._reduced(self._unpinned, x, y)
+        """Apply the preconditioner, y = P^-1 x, on the selected dofs. Collective.
 
-    def _unpinned(self, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        Args:
+            x: a reduced vector.
+            y: where the result is written, reduced too.
+        """
+        self._reduced(self._precondition, x, y)
+
+    def _precondition(self, x: PETSc.Vec, y: PETSc.Vec) -> None:
         x.array[self.system.pins] = 0.0
         self._preconditioner.pc.apply(x, y)  # type: ignore[union-attr]
 
@@ -225,30 +233,38 @@ class HeldPreconditioner:
             part[of] = whole[at]
 
     def solve(self, load: PETSc.Vec, x: PETSc.Vec, rtol: float) -> tuple[int, int]:
-        """Solve with the held matrix, from the guess in x; iterations and PETSc's reason. Collective.
+        """Solve with the matrix in which unknowns are held. Collective.
 
-        Where motions are free, the load may be changed at pinned dofs, and of all solutions x is the shortest.
+        Where motions are free, x is the shortest of all solutions.
+
+        Args:
+            load: the right-hand side; changed at pinned dofs.
+            x: the first guess; the solution is written into it.
+            rtol: relative tolerance.
+
+        Returns:
+            Iterations, and PETSc's reason for the end.
         """
         load.array[self.system.pins] = 0.0
         ksp = PETSc.KSP().create(self.system.comm)
         assert self._preconditioner is not None
         ksp.setOperators(self._preconditioner.matrix)
         ksp.setPC(self._preconditioner.pc)
-        ksp.setTolerances(rtol=rtol, max_it=2000)
+        ksp.setTolerances(rtol=rtol, max_it=self.settings.thresholds.krylov_iterations)
         ksp.setInitialGuessNonzero(self.settings.kind != "lu")
         configure(ksp, self.settings.ksp, PREFIX)
         with self._timer("solve"):
             ksp.solve(load, x)
-        if self.system.freedom is not None:
-            self.system.freedom.null_space.remove(x)
+        if self.system.free_motions is not None:
+            self.system.free_motions.null_space.remove(x)
         result = int(ksp.getIterationNumber()), int(ksp.getConvergedReason())
         ksp.destroy()
         self.report(result[0])
         return result
 
 
-def runs(chosen: Entities) -> Iterator[tuple[slice, slice]]:
-    """Runs of consecutive dofs, in the whole vector and in the reduced one: copied far faster than dof by dof."""
+def consecutive_runs(chosen: Entities) -> Iterator[tuple[slice, slice]]:
+    """Runs of consecutive dofs, in the whole and in the reduced vector: far faster to copy than dof by dof."""
     breaks = np.flatnonzero(np.diff(chosen) != 1) + 1
     for run in np.split(np.arange(len(chosen)), breaks) if len(chosen) else []:
         begin, end = int(run[0]), int(run[-1]) + 1

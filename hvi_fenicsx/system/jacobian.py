@@ -1,4 +1,4 @@
-"""The matrix of a nonlinear solve: the bulk stiffness with the laws' tangent, and what a step holds.
+"""The matrix of a nonlinear solve: the bulk stiffness, the laws' tangent, and the unknowns that a step holds.
 
 J = A + W K + H, symmetric. Laws and active sets touch only the diagonal blocks of Γc's vertices (:mod:`.contact_rows`).
 """
@@ -15,10 +15,17 @@ from ..problem.law_term import LawTerm
 from ..problem.problem import Bounds
 from ..typing import Array, Entities
 from .contact_rows import ContactRows
+from .thresholds import DEFAULT, Thresholds
 
 
 class Jacobian:
     """J = A + W K + H of one system. Creation is collective; it owns the matrix.
+
+    Args:
+        stiffness: A, which becomes J.
+        terms: the laws.
+        bounds: the contact bounds.
+        thresholds: how unknowns are held.
 
     Attributes:
         matrix: J; Dirichlet rows and columns are those of the identity; block size d.
@@ -26,20 +33,27 @@ class Jacobian:
         held: the unknowns of Γc (local, owned, sorted) that J holds.
     """
 
-    def __init__(self, stiffness: PETSc.Mat, terms: Sequence[LawTerm], bounds: Sequence[Bounds]) -> None:
+    def __init__(
+        self,
+        stiffness: PETSc.Mat,
+        terms: Sequence[LawTerm],
+        bounds: Sequence[Bounds],
+        thresholds: Thresholds = DEFAULT,
+    ) -> None:
         self.matrix, self._terms = stiffness, tuple(terms)
-        self.rows = ContactRows(stiffness, [*(t.surface for t in terms), *(b.surface for b in bounds)])
+        surfaces = [*(t.surface for t in terms), *(b.surface for b in bounds)]
+        self.rows = ContactRows(stiffness, surfaces, thresholds.held_stiffness)
         self._rates = [np.zeros((*t.free.shape, t.free.shape[1])) for t in terms]
         self.held: Entities = np.empty(0, np.int32)
         self._comm = stiffness.comm.tompi4py()
 
     @property
     def rates(self) -> list[Array]:
-        """A copy of the K in force, (m, d, d) by term."""
+        """A copy of the present K, (m, d, d) by term."""
         return [k.copy() for k in self._rates]
 
     def set_rates(self, rates: Sequence[Array]) -> None:
-        """Make K, (m, d, d) by term, the tangent in force, with nothing held. Collective."""
+        """Set the tangent K, (m, d, d) by term; nothing is held then. Collective."""
         changed = any(bool(np.any(new != old)) for new, old in zip(rates, self._rates, strict=True))
         if self._comm.allreduce(changed, op=MPI.LOR):
             self._rates = [k.copy() for k in rates]
@@ -49,12 +63,12 @@ class Jacobian:
             self.hold(np.empty(0, np.int32))
 
     def hold(self, held: Entities) -> None:
-        """Hold these unknowns of Γc (local, owned, sorted) where a solve finds them, and no others. Collective."""
+        """Hold these unknowns of Γc (local, owned, sorted), and no others, as they are in a solve. Collective."""
         if self._comm.allreduce(not np.array_equal(held, self.held), op=MPI.LOR):
             self._write(held)
 
-    def take(self, tangent: Array, held: Entities) -> None:
-        """Take the tangent of a finer level, restricted. Collective.
+    def set_restricted(self, tangent: Array, held: Entities) -> None:
+        """Set the tangent of a finer level, restricted to this one, and hold unknowns. Collective.
 
         Args:
             tangent: W K at the vertices of Γc, (m, d, d).
@@ -63,7 +77,7 @@ class Jacobian:
         changed = not (np.array_equal(tangent, self.rows.tangent) and np.array_equal(held, self.held))
         if self._comm.allreduce(changed, op=MPI.LOR):
             self.rows.tangent[:] = tangent
-            self._rates = [np.full_like(k, np.nan) for k in self._rates]  # its own are no longer in force
+            self._rates = [np.full_like(k, np.nan) for k in self._rates]  # they say nothing about J now
             self._write(held)
 
     def _write(self, held: Entities) -> None:
@@ -79,6 +93,11 @@ class Jacobian:
         return max(changes, default=0.0)
 
     def elastic_product(self, x: PETSc.Vec, out: PETSc.Vec) -> None:
-        """A x into ``out``: by J, but by A's own rows where they differ. Collective."""
+        """The product A x: by J, and by A's own rows where the two differ. Collective.
+
+        Args:
+            x: the vector.
+            out: where the product is written.
+        """
         self.matrix.mult(x, out)
         self.rows.overwrite(x, out)

@@ -1,4 +1,4 @@
-"""The coarser levels under a system, and how they take part in its multigrid."""
+"""The coarser levels of a system, as its multigrid uses them."""
 
 from __future__ import annotations
 
@@ -13,19 +13,14 @@ from ..mesh.transfer import Transfer
 from ..typing import Array
 from .system import System
 
-_GROWTH = 3.0
-"""Factor by which unknowns grow from one level of a multigrid to the next, at least."""
-_MOVES = 0.2
-"""Weight by which an unknown moves another, at least: of those that move a vertex, one in space has 1/4 or more."""
-
 
 class Level:
-    """A coarser level under a finer one.
+    """A level and the next finer one.
 
     Attributes:
-        finer: the system above it.
-        system: its own.
-        prolongation: from its unknowns to the finer one's.
+        finer: the system on the next finer level.
+        system: the system on this level.
+        prolongation: from this level's unknowns to those of the finer one.
     """
 
     def __init__(self, finer: System, system: System, prolongation: PETSc.Mat) -> None:
@@ -33,19 +28,20 @@ class Level:
 
     @property
     def interpolation(self) -> PETSc.Mat:
-        """The prolongation without what is prescribed on either level. Collective when first used."""
+        """The prolongation without the unknowns prescribed on either level. Collective when first used."""
         return self._masked.matrix
 
     @cached_property
     def _masked(self) -> _MaskedProlongation:
         return _MaskedProlongation(self)
 
-    def follow(self) -> None:
-        """Make the level take the finer one's tangent and hold what that holds. Collective.
+    def update(self) -> None:
+        """Take over the finer level's tangent and held unknowns. Collective.
 
-        W K is restricted and lumped. An unknown is held where it moves something held (Hackbusch and Mittelmann 1983),
-        so that J stays the finer one's Galerkin product and the body as well supported. On a curved part the tangent
-        of one vertex has a little of its neighbour's normal: held for that, it would keep the coarse body from sliding.
+        W K is restricted and lumped. A coarse unknown is held where it moves a held fine one (Hackbusch and Mittelmann
+        1983), so that J remains the finer level's Galerkin product, and the body as well supported. On a curved part
+        the tangent at a vertex has a small component along its neighbour's normal: unknowns of such small weight are
+        not held, since that would keep the coarse body from sliding.
         """
         fine, own = self.finer.jacobian, self.system.jacobian
         at = own.rows.dofs
@@ -53,21 +49,22 @@ class Level:
         for column in range(tangent.shape[1]):
             moved = self._masked.restricted(fine.rows.tangent[:, :, column].ravel())
             tangent[:, :, column] = moved[at].reshape(tangent.shape[:2])
-        moves = np.abs(self._masked.restricted(np.isin(fine.rows.dofs, fine.held))[at])
-        own.take(tangent, at[moves > _MOVES].astype(np.int32))
+        weights = np.abs(self._masked.restricted(np.isin(fine.rows.dofs, fine.held))[at])
+        held = at[weights > self.finer.thresholds.held_weight].astype(np.int32)
+        own.set_restricted(tangent, held)
 
 
 Levels = tuple[Level, ...]
-"""The coarser levels of a system, the finest of them first; each one's system is the next one's ``finer``."""
+"""The coarser levels of a system, the finest of them first; the system of each is ``finer`` of the next."""
 
 
 def prolongation(fine: System, coarse: System, transfer: Transfer) -> PETSc.Mat:
-    """The prolongation between the unknowns of two systems, local ones where normals are slanted. Collective.
+    """The prolongation between the unknowns of two systems, in their local components. Collective.
 
     Args:
         fine: the finer system.
         coarse: the system on the next coarser mesh.
-        transfer: how the finer mesh came from the coarser one.
+        transfer: the transfer from the coarser mesh to the finer one.
     """
     points = fine.problem.points, coarse.problem.points
     step = transfer.prolongation(fine.problem.space, coarse.problem.space, points)
@@ -76,26 +73,27 @@ def prolongation(fine: System, coarse: System, transfer: Transfer) -> PETSc.Mat:
     return step if fine.rotation is None else fine.rotation.transposeMatMult(step)
 
 
-def stacked(finer: System, coarser: System, below: Levels, step: PETSc.Mat) -> Levels:
-    """The levels of a system; a coarser one of nearly its size is passed over. Collective.
+def with_coarser_system(finer: System, coarser: System, levels: Levels, step: PETSc.Mat) -> Levels:
+    """The coarser levels of a system; the coarser system is left out where it is of nearly the same size. Collective.
 
-    Multigrid wants levels that grow by a factor, or a cycle costs more than a few sweeps of the finest.
+    The unknowns must grow by a factor from level to level, or a multigrid cycle costs more than a few sweeps of the
+    finest level.
 
     Args:
         finer: the system.
         coarser: the system on the next coarser mesh.
-        below: its own levels.
+        levels: the coarser levels of that one.
         step: the prolongation from its unknowns.
     """
-    if not below or step.size[0] >= _GROWTH * below[0].prolongation.size[1]:
-        return (Level(finer, coarser, step), *below)
-    return (Level(finer, below[0].system, step.matMult(below[0].prolongation)), *below[1:])
+    if not levels or step.size[0] >= finer.thresholds.level_growth * levels[0].prolongation.size[1]:
+        return (Level(finer, coarser, step), *levels)
+    return (Level(finer, levels[0].system, step.matMult(levels[0].prolongation)), *levels[1:])
 
 
 class _MaskedProlongation:
-    """A prolongation (``matrix``) in which what is prescribed has no part, and its rows of Γc. Creation is collective.
+    """A prolongation (``matrix``) that is zero for prescribed unknowns, and its rows of Γc. Creation is collective.
 
-    What is held keeps its part in it: a diagonal of 1e20 times an elastic one leaves it where it is on every level.
+    Held unknowns keep their weights in it: their large diagonal leaves them as they are on every level.
     """
 
     def __init__(self, level: Level) -> None:

@@ -1,7 +1,7 @@
-"""Nodal frames: at vertices with slanted normals the unknowns are (u_n, u_t), so that bounds stay component bounds.
+"""Local frames: at vertices with slanted normals the unknowns are (u_n, u_t), so that bounds are bounds of components.
 
-PETSc's variational inequalities know component bounds only. û = R u at such a vertex, R's rows being its local axes;
-all other vertices keep the Cartesian components (paper, section 5.1, has axis-parallel parts only).
+PETSc's variational inequalities have bounds of components only. At such a vertex û = R u, the rows of R being its local
+axes; all other vertices keep the Cartesian components (in the paper, section 5.1, all parts are parallel to an axis).
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from mpi4py import MPI
 from petsc4py import PETSc
 
 from ..errors import InputError
@@ -18,20 +19,22 @@ from ..problem.law_term import LawTerm
 from ..problem.problem import Bounds, Problem
 from ..runtime.mpi import agree
 from ..typing import Array, Entities, Mask
-
-_PARALLEL = 1e-8
+from .thresholds import DEFAULT, Thresholds
 
 
 @dataclass(frozen=True)
-class Frames:
-    """The rotated vertices of this rank.
+class LocalFrames:
+    """The vertices of this rank whose unknowns have local components.
 
     Attributes:
-        blocks: local vertex indices (k,). axes: R, rows are the local axes, (k, d, d).
+        blocks: local vertex indices, (k,).
+        axes: R at these vertices, rows are the local axes, (k, d, d).
+        axis_parallel: deviation of a direction from an axis that is rounding.
     """
 
     blocks: Entities
     axes: Array
+    axis_parallel: float
 
     def at(self, surface: Surface) -> Array:
         """R at the vertices of a surface, (m, d, d)."""
@@ -43,8 +46,8 @@ class Frames:
                 result[i] = self.axes[place[int(block)]]
         return result
 
-    def turned(self, vectors: Array) -> Array:
-        """Cartesian vectors by vertex (any shape that reshapes to (blocks, d)) in local components, same shape."""
+    def local_components(self, vectors: Array) -> Array:
+        """Vectors at all vertices in local components; of any shape that reshapes to (vertices, d), which is kept."""
         d = self.axes.shape[1]
         result = vectors.copy()
         rows = result.reshape(-1, d)
@@ -57,7 +60,7 @@ class Frames:
         normals = np.einsum("mij,mj->mi", axes, surface.normals)
         return replace(
             surface,
-            normals=np.where(np.abs(normals) > 1 - _PARALLEL, np.round(normals), normals),
+            normals=np.where(np.abs(normals) > 1 - self.axis_parallel, np.round(normals), normals),
             tangents=np.einsum("mij,mkj->mki", axes, surface.tangents),
         )
 
@@ -68,11 +71,16 @@ class Frames:
     def term(self, term: LawTerm) -> LawTerm:
         """The law with its directions in local components."""
         directions = np.einsum("mij,mkj->mki", self.at(term.surface), term.directions)
-        directions = np.where(np.abs(directions) < _PARALLEL, 0.0, directions)
+        directions = np.where(np.abs(directions) < self.axis_parallel, 0.0, directions)
         return replace(term, surface=self.surface(term.surface), directions=directions)
 
     def matrix(self, problem: Problem, like: PETSc.Mat) -> PETSc.Mat:
-        """Q with u = Q û: block-diagonal, Rᵀ at the rotated vertices. Collective."""
+        """The matrix Q with u = Q û: block-diagonal, Rᵀ at the vertices with local components. Collective.
+
+        Args:
+            problem: the problem.
+            like: a matrix with the same rows.
+        """
         d = problem.scales.dimension
         q = PETSc.Mat().createAIJ(like.getSizes(), bsize=d, nnz=d, comm=like.comm)
         start, end = like.getOwnershipRange()
@@ -85,57 +93,64 @@ class Frames:
         return q
 
 
-def build(problem: Problem) -> Frames | None:
-    """The frames that a problem's surfaces call for; None where every normal is parallel to an axis. Collective.
+def frames_of(problem: Problem, thresholds: Thresholds = DEFAULT) -> LocalFrames | None:
+    """The local frames of a problem; None where every normal is parallel to an axis. Collective.
+
+    Args:
+        problem: the problem.
+        thresholds: when a normal is parallel to an axis.
 
     Raises:
-        InputError: on all ranks: two parts meet at a vertex with directions neither orthogonal nor equal, or a slanted
-            one meets a prescribed component.
+        InputError: on all ranks alike: two parts meet at a vertex with directions neither orthogonal nor equal, or a
+            slanted one meets a prescribed component.
     """
-    d, comm = problem.scales.dimension, problem.domain.mesh.comm
-    if not any(agree(comm, any(_slanted(s.normals).any() for s in problem.surfaces))):
+    d, comm, parallel = problem.scales.dimension, problem.domain.mesh.comm, thresholds.axis_parallel
+    if not any(agree(comm, any(_slanted(s.normals, parallel).any() for s in problem.surfaces))):
         return None
-    slanted = _normals_at_slanted(problem)
+    slanted = _normals_at_slanted(problem, parallel)
     fixed = {int(dof) for dof in problem.fixed}
-    axes: list[Array] = []
-    bad: list[tuple[float, ...]] = []
-    for block, normals in slanted.items():
-        frame = _axes(normals, [i for i in range(d) if block * d + i in fixed], d)
-        axes.append(np.eye(d) if frame is None else frame)
-        if frame is None:
-            bad.append(tuple(float(c) for c in problem.points[block]))
-    found = [point for rank in agree(comm, bad) for point in rank]
+    frames = {
+        block: _axes(normals, [i for i in range(d) if block * d + i in fixed], d, parallel)
+        for block, normals in slanted.items()
+    }
+    _refuse(comm, [problem.points[block] for block, frame in frames.items() if frame is None])
+    axes = np.array(list(frames.values()), dtype=np.float64).reshape(-1, d, d)
+    return LocalFrames(np.array(list(slanted), dtype=np.int32), axes, parallel)
+
+
+def _refuse(comm: MPI.Comm, points: Sequence[Array]) -> None:
+    """Raise on all ranks where one has a vertex without a local frame. Collective."""
+    found = [point for rank in agree(comm, [tuple(float(c) for c in x) for x in points]) for point in rank]
     if found:
         raise InputError(
             f"at the vertex {found[0]} a contact part meets another one, or a prescribed displacement, in a direction "
             "that is neither orthogonal nor equal to its own; move the edge, or prescribe all components there"
         )
-    return Frames(np.array(list(slanted), dtype=np.int32), np.array(axes).reshape(-1, d, d))
 
 
-def _slanted(normals: Array) -> Mask:
-    return np.asarray(np.max(np.abs(normals), axis=1, initial=0.0) < 1 - _PARALLEL)
+def _slanted(normals: Array, parallel: float) -> Mask:
+    return np.asarray(np.max(np.abs(normals), axis=1, initial=0.0) < 1 - parallel)
 
 
-def _normals_at_slanted(problem: Problem) -> dict[int, list[Array]]:
-    """By vertex, the normals of all parts there, where one of them is slanted."""
+def _normals_at_slanted(problem: Problem, parallel: float) -> dict[int, list[Array]]:
+    """The normals of all parts at each vertex where one of them is slanted."""
     found: dict[int, list[Array]] = {}
     for surface in problem.surfaces:
         for block, normal in zip(surface.blocks, surface.normals, strict=True):
             found.setdefault(int(block), []).append(np.asarray(normal))
-    return {block: normals for block, normals in found.items() if _slanted(np.array(normals)).any()}
+    return {block: normals for block, normals in found.items() if _slanted(np.array(normals), parallel).any()}
 
 
-def _axes(normals: Sequence[Array], held: Sequence[int], d: int) -> Array | None:
+def _axes(normals: Sequence[Array], held: Sequence[int], d: int, parallel: float) -> Array | None:
     """Local axes as rows: prescribed components and normals among them; None where these are not orthogonal."""
     if len(held) == d:
         return np.eye(d)
     rows: dict[int, Array] = {i: np.eye(d)[i] for i in held}
     for normal in normals:
         along = [abs(float(row @ normal)) for row in rows.values()]
-        if any(a > 1 - _PARALLEL for a in along):
+        if any(a > 1 - parallel for a in along):
             continue
-        if any(a > _PARALLEL for a in along):
+        if any(a > parallel for a in along):
             return None
         free = [i for i in range(d) if i not in rows]
         rows[max(free, key=lambda i: abs(normal[i]))] = normal

@@ -1,9 +1,9 @@
 """Geometric multigrid on the levels of a mesh hierarchy; what is held on the finest level is held on all of them.
 
 The coarse operators are the levels' own stiffness matrices, which nested iteration has assembled: no Galerkin product
-is formed. An active set or a tangent of the laws touches only the rows of Γc, on every level (:meth:`.Level.follow`). A
+is formed. An active set or a tangent of the laws changes only the rows of Γc, on every level (:meth:`.Level.update`). A
 coarse unknown that would move a held one is held too (Hackbusch and Mittelmann 1983), so that the matrices remain the
-Galerkin products, but for normals that turn: the cycle converges whatever the active set is.
+Galerkin products, except where normals turn: the cycle converges for every active set.
 """
 
 from __future__ import annotations
@@ -14,24 +14,24 @@ from petsc4py import PETSc
 
 from ..typing import Entities
 from .levels import Levels
-from .petsc_options import PREFIX, below_the_users
+from .petsc_options import PREFIX, default_options
 from .system import System
 
 
 class Multigrid:
-    """A PC that is the multigrid of a system. Creation is collective.
+    """The multigrid preconditioner of a system. Creation is collective.
 
     Its levels and their memory stay when the active set changes: values are written anew, and the coarsest matrix is
-    factorised again if any of its own has changed.
+    factorised again if it has changed.
 
     Args:
-        system: on the finest level.
-        levels: the coarser ones, finest first.
-        options: of the PC, below the user's own.
+        system: the system on the finest level.
+        levels: the coarser levels, finest first.
+        options: defaults of the PC's options.
 
     Attributes:
         pc: the PC.
-        matrix: the system's, which it preconditions.
+        matrix: the system's matrix, which it preconditions.
     """
 
     def __init__(self, system: System, levels: Levels, options: Mapping[str, object]) -> None:
@@ -45,14 +45,14 @@ class Multigrid:
             self.pc.setMGInterpolation(number + 1, level.interpolation)
             smoother = self.pc.getMGSmoother(number) if number else self.pc.getMGCoarseSolve()
             smoother.setOperators(level.system.jacobian.matrix, level.system.jacobian.matrix)
-        with below_the_users(options):
+        with default_options(options):
             self.pc.setFromOptions()
 
     def prepare(self, held: Entities) -> None:
-        """Make the coarser levels hold what the system holds, each what the one above does. Collective."""
+        """Update the coarser levels, each from the next finer one. Collective."""
         for level in self._levels:
-            level.follow()
-        with below_the_users(self._options):
+            level.update()
+        with default_options(self._options):
             self.pc.setUp()
 
     def free(self) -> None:

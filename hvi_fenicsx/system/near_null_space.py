@@ -1,4 +1,7 @@
-"""The near-null space of a stiffness: the rigid motions, which algebraic multigrid must keep."""
+"""The near-null space of a stiffness: the rigid motions, which algebraic multigrid must keep.
+
+``PETSc.NullSpace.createRigidBody`` spans the same space and takes as many iterations, but it knows no local frames.
+"""
 
 from __future__ import annotations
 
@@ -12,10 +15,11 @@ from ..rigid import rigid_fields
 
 
 def rigid_modes(problem: Problem, rotation: PETSc.Mat | None) -> PETSc.NullSpace:
-    """All rigid motions of the free body in the unknowns' components, orthonormal. Collective.
+    """All rigid motions of the body without supports, orthonormal, in the components of the unknowns. Collective.
 
     Args:
-        problem: whose. rotation: Q with u = Q û for unknowns in local components, else None.
+        problem: the problem.
+        rotation: Q with u = Q û for unknowns û in local components; None where there are none.
     """
     body, vectors = whole(problem.domain), []
     owned = problem.points[: problem.space.dofmap.index_map.size_local]

@@ -1,4 +1,4 @@
-"""PETSc options: the program's defaults, set only where the user set nothing, and never left behind.
+"""PETSc options: the program's defaults, set only where the user set nothing, and removed after use.
 
 Precedence: command line (``--petsc``, PETSC_OPTIONS), then the program's default. One constant prefix on all ranks.
 """
@@ -15,8 +15,15 @@ PREFIX = "hvi_"
 
 
 @contextmanager
-def below_the_users(defaults: Mapping[str, Any], prefix: str = PREFIX) -> Iterator[None]:
-    """Defaults in force within a block. Levels of multigrid read theirs as late as in ``setUp``. Collective."""
+def default_options(defaults: Mapping[str, Any], prefix: str = PREFIX) -> Iterator[None]:
+    """Defaults in force within a block, unless the user set the option. Collective.
+
+    Levels of a multigrid read their options as late as in ``setUp``.
+
+    Args:
+        defaults: values by name, without prefix; None for an option without value.
+        prefix: of the options.
+    """
     database = PETSc.Options()
     unset = {f"{prefix}{k}": v for k, v in defaults.items() if not database.hasName(f"{prefix}{k}")}
     for name, value in unset.items():
@@ -29,8 +36,14 @@ def below_the_users(defaults: Mapping[str, Any], prefix: str = PREFIX) -> Iterat
 
 
 def configure(target: Any, defaults: Mapping[str, Any], prefix: str = PREFIX) -> None:
-    """Call ``target.setFromOptions()`` under a prefix with these defaults below the user's own options. Collective."""
-    with below_the_users(defaults, prefix):
+    """Call ``target.setFromOptions()`` with defaults for the options that the user did not set. Collective.
+
+    Args:
+        target: a PETSc object that takes options.
+        defaults: values by name, without prefix.
+        prefix: of the options.
+    """
+    with default_options(defaults, prefix):
         target.setOptionsPrefix(prefix)
         target.setFromOptions()
 

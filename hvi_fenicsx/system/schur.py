@@ -1,7 +1,7 @@
 """A direct solve for many matrices that differ on Γc alone, as those of an active set method do.
 
-The body is factorised once, with all unknowns of Γc held; what is left of it there is a dense Schur complement. A new
-active set or tangent then costs one small dense factorisation instead of that of the whole matrix. One process only.
+The body is factorised once, with all unknowns of Γc held; on Γc remains a dense Schur complement. A new active set or
+tangent then costs one small dense factorisation instead of one of the whole matrix. One process only.
 """
 
 from __future__ import annotations
@@ -15,37 +15,35 @@ from scipy.linalg import LinAlgWarning, block_diag, lu_factor, lu_solve
 from scipy.sparse import csr_matrix
 
 from ..typing import Array, Entities, Mask
-from .petsc_options import PREFIX, below_the_users
+from .petsc_options import PREFIX, default_options
 from .system import System
 
-_COLUMNS = 64
-"""Right-hand sides that are solved at once."""
 
+def is_worthwhile(system: System, affordable: int) -> bool:
+    """Whether the factorisations so far have cost as much as condensing would: then it loses little, and may save much.
 
-def pays(system: System, worth: int) -> bool:
-    """Whether factorisations have cost what condensing would: then it loses little at worst, and may save much.
-
-    Not where free motions are pinned inside the body, on several processes, or with a preconditioner of the user's.
+    It is not used where free motions are pinned inside the body, on several processes, or with a preconditioner that
+    the user chose.
 
     Args:
-        system: to be condensed.
-        worth: unknowns of Γc whose condensation costs what the factorisations so far have cost.
+        system: the system to be condensed.
+        affordable: unknowns of Γc whose condensation costs as much as the factorisations so far.
     """
-    if system.comm.size > 1 or system.freedom is not None or PETSc.Options().hasName(f"{PREFIX}pc_type"):
+    if system.comm.size > 1 or system.free_motions is not None or PETSc.Options().hasName(f"{PREFIX}pc_type"):
         return False
-    return 0 < len(system.jacobian.rows.dofs) <= worth
+    return 0 < len(system.jacobian.rows.dofs) <= affordable
 
 
 class SchurDirect:
     """The condensed body; the context of its PC of type python. Creation is collective.
 
     Args:
-        system: whose stiffness is condensed to the n unknowns of Γc.
-        options: of the factorisation, below the user's.
+        system: the system, whose stiffness is condensed to the n unknowns of Γc.
+        options: defaults of the factorisation's options.
 
     Attributes:
         pc: the PC.
-        matrix: the system's, which it preconditions.
+        matrix: the system's matrix, which it preconditions.
     """
 
     def __init__(self, system: System, options: Mapping[str, object]) -> None:
@@ -55,8 +53,8 @@ class SchurDirect:
         self._coupling = rows.copy()
         self._coupling.data[np.isin(rows.indices, self._dofs)] = 0.0
         self._coupling.eliminate_zeros()
-        self._factor = self._interior(options)
-        self._stiffness = rows[:, self._dofs].toarray() - self._carried()
+        self._factor = self._factorised_interior(options)
+        self._stiffness = rows[:, self._dofs].toarray() - self._interior_response()
         self._lu: tuple[Array, Entities] | None = None
         self._free: Mask = np.ones(len(self._dofs), dtype=bool)
         self._work = system.load.duplicate()
@@ -65,36 +63,37 @@ class SchurDirect:
         self.pc.setPythonContext(self)
         self.pc.setOperators(self.matrix)
 
-    def _interior(self, options: Mapping[str, object]) -> PETSc.PC:
+    def _factorised_interior(self, options: Mapping[str, object]) -> PETSc.PC:
+        """The factorised body with Γc held."""
         matrix = self._system.jacobian.matrix.copy()
         matrix.zeroRowsColumns(self._dofs.astype(PETSc.IntType), diag=1.0)
         matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
         pc = PETSc.PC().create(self._system.comm)
         pc.setOptionsPrefix(PREFIX)
         pc.setOperators(matrix)
-        with below_the_users(options):
+        with default_options(options):
             pc.setFromOptions()
             pc.setUp()
         return pc
 
-    def _carried(self) -> Array:
-        """What the body inside makes of the displacements of Γc, (n, n)."""
-        columns = self._coupling.T.tocsc()
-        carried = np.empty((len(self._dofs),) * 2)
-        for start in range(0, len(self._dofs), _COLUMNS):
-            block = slice(start, start + _COLUMNS)
+    def _interior_response(self) -> Array:
+        """Forces on Γc by the body inside, for unit displacements of Γc, (n, n)."""
+        columns, at_once = self._coupling.T.tocsc(), self._system.thresholds.dense_columns
+        response = np.empty((len(self._dofs),) * 2)
+        for start in range(0, len(self._dofs), at_once):
+            block = slice(start, start + at_once)
             right = np.asfortranarray(columns[:, block].toarray())
             b = PETSc.Mat().createDense(right.shape, array=right, comm=self._system.comm)
             x = PETSc.Mat().createDense(right.shape, comm=self._system.comm)
             x.assemble()
             self._factor.getFactorMatrix().matSolve(b, x)
-            carried[:, block] = self._coupling @ x.getDenseArray()
+            response[:, block] = self._coupling @ x.getDenseArray()
             b.destroy()
             x.destroy()
-        return carried
+        return response
 
     def prepare(self, held: Entities) -> None:
-        """Take the tangent in force, and hold these dofs, of which all but prescribed ones must be Γc's."""
+        """Take the present tangent, and hold these dofs; all that are not prescribed must be on Γc."""
         self._free = ~np.isin(self._dofs, held)
         matrix = self._stiffness + block_diag(*self._system.jacobian.rows.tangent)
         matrix[~self._free] = matrix[:, ~self._free] = 0.0
@@ -104,7 +103,13 @@ class SchurDirect:
             self._lu = lu_factor(matrix, check_finite=False)
 
     def apply(self, pc: PETSc.PC, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        """Y = J^-1 x, held dofs being decoupled with a diagonal of 1."""
+        """Solve y = J^-1 x, held dofs being decoupled with a diagonal of 1.
+
+        Args:
+            pc: the PC whose context this is.
+            x: the right-hand side.
+            y: where the solution is written.
+        """
         inner = self._work
         x.copy(inner)
         inner.array[self._dofs] = 0.0
@@ -116,6 +121,6 @@ class SchurDirect:
         y.array[self._dofs] = value
 
     def free(self) -> None:
-        """Free the PETSc objects (``destroy`` is what petsc4py calls on a context, with every PC that has it)."""
+        """Free the PETSc objects (not named ``destroy``: petsc4py calls that with every PC of the context)."""
         for thing in (self.pc, self._factor, self._work):
             thing.destroy()

@@ -24,12 +24,13 @@ from ..rigid import Mode
 from ..runtime.timing import Timer
 from ..typing import Array, Entities
 from . import free_motions, local_frames, near_null_space
-from .free_motions import Freedom
+from .free_motions import FreeMotions
 from .jacobian import Jacobian
+from .thresholds import DEFAULT, Thresholds
 
 
 class LawModel(Protocol):
-    """What stands for a law in one nonlinear solve: a function of its argument (m,) with two derivatives."""
+    """What takes the place of a law in one nonlinear solve: a function of its argument (m,) with two derivatives."""
 
     def value(self, x: Array) -> Array:
         """Energy per area."""
@@ -42,44 +43,59 @@ class LawModel(Protocol):
 
 
 @dataclass(frozen=True)
-class Compiled:
-    """A problem's compiled forms."""
+class CompiledForms:
+    """A problem's compiled forms.
+
+    Attributes:
+        bilinear: of the elastic operator.
+        linear: of the loads, by name.
+    """
 
     bilinear: fem.Form
     linear: dict[str, fem.Form]
 
 
-def compile_forms(problem: Problem) -> Compiled:
+def compile_forms(problem: Problem) -> CompiledForms:
     """Compile (or take from the cache) what the assembly needs. Collective."""
-    return Compiled(problem.bulk.compiled, {name: fem.form(f) for name, f in problem.linear.items()})
+    return CompiledForms(problem.bulk.compiled, {name: fem.form(f) for name, f in problem.linear.items()})
 
 
 class System:
-    """A problem's matrix, load and bounds (PETSc objects owned by this, freed with it). Creation is collective.
+    """A problem's matrix, load and bounds; it owns the PETSc objects. Creation is collective.
+
+    Args:
+        problem: the problem.
+        compiled: its forms.
+        timer: where time goes.
+        thresholds: what counts as rounding, and how unknowns are held.
 
     Attributes:
         problem: what was assembled.
+        thresholds: the numbers that tune the linear solvers.
         frames: local frames of vertices with slanted normals; None where there are none.
         rotation: the matrix Q with u = Q û for unknowns û in local components; None likewise.
         terms: the problem's laws, in the unknowns' components.
         bounds: the problem's bounds, likewise.
-        jacobian: the bulk stiffness with what laws and active sets make of it.
-        load: b, lifted; the prescribed values stand in the Dirichlet rows.
+        jacobian: the bulk stiffness with the laws' tangent and the held unknowns.
+        load: b, lifted; the Dirichlet rows contain the prescribed values.
         lower: lower bounds of u; infinite on Dirichlet rows.
         upper: upper bounds, likewise.
-        scale: norm of the load, what residuals are relative to.
+        scale: norm of the load, to which residuals are relative.
         forces: the assembled load vectors by name, unlifted (for the virtual work of rigid motions).
-        freedom: the rigid motions that nothing holds and no load moves; None where there are none (:meth:`release`).
+        free_motions: the rigid motions that nothing holds and no load moves; None where there are none.
     """
 
-    def __init__(self, problem: Problem, compiled: Compiled, timer: Timer) -> None:
-        self.problem, self.frames = problem, local_frames.build(problem)
-        self.freedom: Freedom | None = None
+    def __init__(
+        self, problem: Problem, compiled: CompiledForms, timer: Timer, thresholds: Thresholds = DEFAULT
+    ) -> None:
+        self.problem, self.thresholds = problem, thresholds
+        self.frames = local_frames.frames_of(problem, thresholds)
+        self.free_motions: FreeMotions | None = None
         with timer("assembly"):
             self.forces = {name: assembled(form) for name, form in compiled.linear.items()}
             stiffness, self.load = self._constrained()
-            stiffness, self.rotation, self.terms, self.bounds = self._in_frames(stiffness)
-            self.jacobian = Jacobian(stiffness, self.terms, self.bounds)
+            stiffness, self.rotation, self.terms, self.bounds = self._in_local_components(stiffness)
+            self.jacobian = Jacobian(stiffness, self.terms, self.bounds, thresholds)
         self._work = self.load.duplicate()
         self.lower, self.upper = self._box()
         free = self.load.copy()
@@ -96,29 +112,29 @@ class System:
         """Global number of unknowns."""
         return int(self.load.size)
 
-    def release(self, modes: Sequence[Mode]) -> None:
-        """Attach free motions as the null space, and take out of the load what rounding left of them. Collective."""
+    def attach_free_motions(self, modes: Sequence[Mode]) -> None:
+        """Make rigid motions the matrix's null space, and remove what rounding left of them in the load. Collective."""
         if not modes:
             return
         vectors = [self.unknowns(field) for field in free_motions.fields(self.problem, modes)]
-        self.freedom = free_motions.build(vectors, modes)
-        self.jacobian.matrix.setNullSpace(self.freedom.null_space)
-        self.freedom.null_space.remove(self.load)
+        self.free_motions = free_motions.create(vectors, modes)
+        self.jacobian.matrix.setNullSpace(self.free_motions.null_space)
+        self.free_motions.null_space.remove(self.load)
 
     @property
     def pins(self) -> Entities:
-        """Dofs at which free motions are pinned: where all other equations hold, theirs do too."""
-        return self.freedom.pins if self.freedom else np.empty(0, np.int32)
+        """Dofs at which free motions are pinned: their equations follow from all others."""
+        return self.free_motions.pins if self.free_motions else np.empty(0, np.int32)
 
     @cached_property
     def near_null(self) -> PETSc.NullSpace:
-        """What algebraic multigrid must keep (:mod:`.near_null_space`). Collective when first used."""
+        """The rigid motions, which algebraic multigrid must keep. Collective when first used."""
         return near_null_space.rigid_modes(self.problem, self.rotation)
 
-    def _in_frames(
+    def _in_local_components(
         self, stiffness: PETSc.Mat
     ) -> tuple[PETSc.Mat, PETSc.Mat | None, tuple[LawTerm, ...], tuple[Bounds, ...]]:
-        """Stiffness, rotation, laws and bounds in local components; the load is turned in place. Collective."""
+        """Stiffness, rotation, laws and bounds in local components; the load is rotated in place. Collective."""
         if self.frames is None:
             return stiffness, None, self.problem.terms, self.problem.bounds
         q = self.frames.matrix(self.problem, stiffness)
@@ -131,7 +147,7 @@ class System:
         return rotated, q, terms, tuple(self.frames.bounds(b) for b in self.problem.bounds)
 
     def displacement(self, x: PETSc.Vec) -> fem.Function:
-        """Unknowns as a displacement field (Cartesian, in units of u0, ghosts updated). Collective."""
+        """The displacement field of unknowns x: Cartesian, in units of u0, ghosts updated. Collective."""
         u = fem.Function(self.problem.space, name="displacement")
         cartesian = x if self.rotation is None else self.rotation * x
         u.x.array[: x.local_size] = cartesian.array_r
@@ -139,7 +155,7 @@ class System:
         return u
 
     def unknowns(self, u: fem.Function) -> PETSc.Vec:
-        """A displacement field as unknowns. Collective."""
+        """The unknowns of a displacement field (in units of u0). Collective."""
         x = new_vector(self.problem.space)
         x.array[:] = u.x.array[: x.local_size]
         turn(x, self.rotation)
@@ -170,6 +186,7 @@ class System:
         return matrix, load
 
     def _box(self) -> tuple[PETSc.Vec, PETSc.Vec]:
+        """Lower and upper bounds of the unknowns. Collective."""
         lower, upper = self.load.duplicate(), self.load.duplicate()
         lower.set(-np.inf)
         upper.set(np.inf)
@@ -185,7 +202,13 @@ class System:
         return lower, upper
 
     def residual(self, x: PETSc.Vec, out: PETSc.Vec, models: Sequence[LawModel]) -> None:
-        """A u - b + W τ(u) into ``out``, which must have ghosts. Collective."""
+        """The residual A u - b + W τ(u). Collective.
+
+        Args:
+            x: the unknowns u.
+            out: where it is written; must have ghosts.
+            models: what takes the place of the laws, by term.
+        """
         self.jacobian.elastic_product(x, out)
         out.axpy(-1.0, self.load)
         with out.localForm() as local:
@@ -197,7 +220,12 @@ class System:
         out.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
 
     def tangents(self, x: PETSc.Vec, models: Sequence[LawModel]) -> list[Array]:
-        """K of the models at u, by term."""
+        """The tangent stiffness K of the laws, (m, d, d) by term.
+
+        Args:
+            x: the unknowns u.
+            models: what takes the place of the laws, by term.
+        """
         u = x.array_r
         arguments = [term.argument(u) for term in self.terms]
         return [
@@ -206,7 +234,12 @@ class System:
         ]
 
     def energy(self, x: PETSc.Vec, models: Sequence[LawModel]) -> float:
-        """½ a(u, u) - <g, u> + Σ w models, up to a constant of the prescribed displacements. Collective."""
+        """The energy ½ a(u, u) - <g, u> + Σ w j(u), up to a constant of the prescribed displacements. Collective.
+
+        Args:
+            x: the unknowns u.
+            models: what takes the place of the laws j, by term.
+        """
         self.jacobian.elastic_product(x, self._work)
         u = x.array_r
         local = 0.0
@@ -220,27 +253,32 @@ class System:
         self.jacobian.hold(np.empty(0, np.int32))
         return float(self.jacobian.matrix.norm(PETSc.NormType.INFINITY))
 
-    def energy_noise(self, x: PETSc.Vec) -> float:
-        """What rounding may change of the energy at u: a few ε_machine ‖A‖ ‖u‖². Collective."""
+    def energy_rounding(self, x: PETSc.Vec) -> float:
+        """By how much rounding may change the energy at u: a few ε_machine ‖A‖ ‖u‖². Collective."""
         return 4 * float(np.finfo(float).eps) * self._stiffness_norm * float(x.norm()) ** 2
 
-    def rounding(self, x: PETSc.Vec, out: PETSc.Vec) -> None:
-        """A sample of the rounding error of a residual at u: A times u with its last digits shuffled. Collective."""
+    def rounding_sample(self, x: PETSc.Vec, out: PETSc.Vec) -> None:
+        """A sample of the rounding error of a residual: A times ±ε_machine u, the signs at random. Collective.
+
+        Args:
+            x: the unknowns u.
+            out: where it is written.
+        """
         shuffled = x.duplicate()
         signs = np.random.default_rng(self.comm.rank).choice([-1.0, 1.0], x.local_size)
         shuffled.array[:] = x.array_r * signs * np.finfo(float).eps
         self.jacobian.elastic_product(shuffled, out)
         shuffled.destroy()
 
-    def allowed(self, tolerance: float) -> Array:
-        """Largest residual a dof of Γc may keep for its traction to be right within tolerance; infinite elsewhere."""
-        allowed = np.full(self.load.local_size, np.inf)
+    def residual_limits(self, tolerance: float) -> Array:
+        """The residual up to which a traction on Γc is right within a relative tolerance, by unknown; else infinite."""
+        limits = np.full(self.load.local_size, np.inf)
         for bounds in self.bounds:
             dofs, _ = bounds.component()
-            allowed[dofs] = np.minimum(allowed[dofs], tolerance * bounds.surface.weights)
+            limits[dofs] = np.minimum(limits[dofs], tolerance * bounds.surface.weights)
         for term in self.terms:
             dofs = term.surface.dofs
             touched = np.any(term.directions != 0, axis=1)
             limit = tolerance * term.traction_scale * term.surface.weights
-            allowed[dofs[touched]] = np.minimum(allowed[dofs], limit[:, None])[touched]
-        return allowed
+            limits[dofs[touched]] = np.minimum(limits[dofs], limit[:, None])[touched]
+        return limits

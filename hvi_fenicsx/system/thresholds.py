@@ -1,4 +1,4 @@
-"""The numbers that tune how linear systems are solved."""
+"""The numbers that tune how systems are assembled and linear systems solved."""
 
 from __future__ import annotations
 
@@ -8,22 +8,44 @@ from dataclasses import dataclass, field
 
 @dataclass(frozen=True, kw_only=True)
 class Thresholds:
-    """When which linear solver is used, and when it is set up anew.
+    """When which linear solver is used, when it is set up anew, and what counts as infinite or as rounding.
 
     Attributes:
         largest_direct: unknowns up to which a direct solve is the faster one, by dimension (docs/benchmarks.md).
         drift: change of a law's nodal stiffness, relative to an elastic one (about 1), up to which a Krylov method
             keeps its preconditioner.
+        changed_held: part of the held unknowns that may change while algebraic multigrid keeps its preconditioner.
         slow: iterations from which a direct solver takes over where it can: at 65 a Newton step costs twice as much
             as with it.
+        slower: factor of the first iterations from which a preconditioner is made anew.
+        krylov_iterations: iterations of a Krylov method at most.
         condensing: unknowns of Γc for which condensing costs as much as one factorisation of the whole matrix
             (measured: 13 to 45).
+        dense_columns: right-hand sides that are solved at once where a body is condensed.
+        level_growth: factor by which unknowns grow from one level of a multigrid to the next, at least.
+        held_weight: weight in the prolongation from which a coarse unknown is held with the fine one: of the unknowns
+            that move a vertex, one in space has 1/4 or more.
+        held_stiffness: diagonal of a held unknown, in units of an elastic stiffness (about 1): what the unknown moves
+            is less than rounding.
+        axis_parallel: deviation of a direction from an axis that is rounding.
+        infinite_displacement: a displacement beyond all scales.
+        unbounded_traction: a law's traction there that grows without bound.
     """
 
     largest_direct: Mapping[int, int] = field(default_factory=lambda: {2: 60_000, 3: 15_000})
     drift: float = 0.3
+    changed_held: float = 0.1
     slow: int = 50
+    slower: float = 1.5
+    krylov_iterations: int = 2_000
     condensing: int = 30
+    dense_columns: int = 64
+    level_growth: float = 3.0
+    held_weight: float = 0.2
+    held_stiffness: float = 1e20
+    axis_parallel: float = 1e-8
+    infinite_displacement: float = 1e100
+    unbounded_traction: float = 1e30
 
 
 DEFAULT = Thresholds()

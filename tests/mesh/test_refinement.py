@@ -149,7 +149,7 @@ def test_multigrid_and_starts_on_a_refined_hierarchy(scene: Scene) -> None:
             system=found.system,
             result=found.result,
             prolongation=up,
-            levels=levels.stacked(system, found.system, found.levels, up),
+            levels=levels.with_coarser_system(system, found.system, found.levels, up),
         )
         found = ascend(system, start, coarse.solvability, options, control)
     assert found.result.converged

@@ -165,7 +165,7 @@ def test_a_convex_step_has_a_solution_as_long_as_its_branch_bears_the_push(
     (term,) = prepared.problem.terms
     slip = np.full(len(term.surface.weights), 10 * term.law.length_scale if broken else 0.0)
     xi = [term.law.concave.right(slip)]
-    assert boundedness.slides(prepared.problem, prepared.system.forces, [term.law], xi) == expected
+    assert boundedness.is_unbounded(prepared.problem, prepared.system.forces, [term.law], xi) == expected
 
 
 def test_the_search_for_an_equilibrium_that_need_not_exist_ends() -> None:

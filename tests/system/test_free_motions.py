@@ -151,7 +151,7 @@ def test_the_null_space_is_attached_to_the_matrix() -> None:
     assert system.jacobian.matrix.getNullSpace().test(system.jacobian.matrix)
     assert len(system.jacobian.matrix.getNullSpace().getVecs()) == 3
     held = prepare(Scene.model_validate(block(3, 0.2e6, Q, quadratic_linear(1e6))))
-    assert held.system.freedom is None
+    assert held.system.free_motions is None
     assert held.system.jacobian.matrix.getNullSpace().handle == 0
 
 

@@ -65,7 +65,7 @@ def test_rounding_of_the_bodys_forces_is_no_excuse_for_a_wrong_traction() -> Non
     solver = ActiveSetSolver(system, (), DIRECT, Timer())
     x, noise = system.load.duplicate(), system.load.duplicate()
     x.array[:] = np.random.default_rng(2).standard_normal(x.local_size)
-    system.rounding(x, noise)
+    system.rounding_sample(x, noise)
     norm, nodal = solver._sizes(noise.array_r)
     between = 4.0 * float(np.sqrt(norm * nodal))
     wrong = (between, 0.0) if norm < nodal else (0.0, between)

@@ -1,4 +1,4 @@
-"""Preconditioners of a copy of the matrix, in which held unknowns have the rows and columns of the identity."""
+"""Preconditioners of a copy of the matrix in which held unknowns have the rows and columns of the identity."""
 
 from __future__ import annotations
 
@@ -8,18 +8,18 @@ import numpy as np
 from petsc4py import PETSc
 
 from ..typing import Entities
-from .petsc_options import PREFIX, below_the_users
+from .petsc_options import PREFIX, default_options
 from .system import System
 
 
-class CopiedMatrix:
-    """A PC of the system's matrix with some unknowns held, and its copy. Creation is collective.
+class MatrixCopy:
+    """A copy of the system's matrix with some unknowns held, and its preconditioner. Creation is collective.
 
     Args:
-        system: whose matrix it is; where motions are free, their pins are held in any case.
-        options: of the PC, below the user's own.
-        direct: whether it factorises. Factors and the order of elimination then serve again; algebraic multigrid, whose
-            levels follow the values, is made anew.
+        system: the system; where motions are free, their pins are always held.
+        options: defaults of the PC's options.
+        direct: whether the PC factorises. A factorisation keeps its memory and the order of elimination when values
+            change; algebraic multigrid, whose levels depend on the values, is made anew.
 
     Attributes:
         pc: the PC.
@@ -36,14 +36,14 @@ class CopiedMatrix:
             self.matrix.setNearNullSpace(system.near_null)
 
     def prepare(self, held: Entities) -> None:
-        """Make it that of the matrix as it stands with these unknowns (local, owned, sorted) held. Collective."""
+        """Copy the system's present matrix, hold these unknowns (local, owned, sorted), set up the PC. Collective."""
         self._system.jacobian.matrix.copy(self.matrix, structure=PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
         rows = np.union1d(held, self._system.pins) + self._system.load.owner_range[0]
         self.matrix.zeroRowsColumns(rows.astype(PETSc.IntType), diag=1.0)
         if not self._direct:
             self.pc.destroy()
             self.pc = self._new()
-        with below_the_users(self._options):
+        with default_options(self._options):
             self.pc.setOperators(self.matrix)
             self.pc.setFromOptions()
             self.pc.setUp()
