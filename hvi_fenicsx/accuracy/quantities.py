@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
+from ..class_registry import closest
 from ..errors import InputError
-from ..laws.class_registry import closest
 from ..typing import Array
 from .quantity_base import Observable, Quantity, contact_norm
 

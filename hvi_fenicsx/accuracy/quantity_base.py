@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
+from ..class_registry import enter
 from ..errors import InputError
-from ..laws.class_registry import enter
 from ..typing import Array
 from .thresholds import EXTRAPOLATION, ExtrapolationThresholds
 

@@ -1,5 +1,6 @@
 """The effects: importing the package registers those that come with the program."""
 
+from ..class_registry import load_modules
 from . import anisotropic, contact, elasticity, friction, loads, normal, thermal
 from .base import Drive, Effect, Evaluate, FormContext, Place, Sizes, SurfaceLoad
 from .contribution import Averaged, BoundaryLaw, Condition, Contribution, Direction, NormalBounds
@@ -31,3 +32,5 @@ __all__ = [
     "role_of",
     "thermal",
 ]
+
+load_modules(__name__)

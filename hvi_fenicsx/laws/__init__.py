@@ -1,5 +1,6 @@
 """Nonmonotone laws: superpotentials as objects, the catalogue, and base classes of your own laws (docs/laws.md)."""
 
+from ..class_registry import load_modules
 from .base import Superpotential
 from .catalogue import Graph, LinearSpring, QuadraticLinear, QuadraticLinearLiteral, Sawtooth, Tresca
 from .convex_parts import ConvexPart, DifferentiablePart, Directional
@@ -33,3 +34,5 @@ __all__ = [
     "describe",
     "sample_traction",
 ]
+
+load_modules(__name__)

@@ -18,9 +18,9 @@ from typing import Any, ClassVar
 import numpy as np
 from typing_extensions import override
 
+from ..class_registry import enter
 from ..errors import InputError
 from ..typing import Array, Integers
-from .class_registry import enter
 from .convex_parts import ConvexPart, Directional, ScaledPart, quotient
 from .parameter_checks import require_positive
 from .traction_bounds import Extremes, extremes

@@ -9,9 +9,9 @@ from typing import Any, get_type_hints
 
 from pydantic import ConfigDict, ValidationError, create_model
 
+from ..class_registry import closest
 from ..errors import InputError
 from .base import Superpotential, registered
-from .class_registry import closest
 
 _STRICT = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False, arbitrary_types_allowed=True)
 

@@ -3,24 +3,20 @@
 from __future__ import annotations
 
 import functools
-import importlib
-import pkgutil
 from abc import ABC, abstractmethod
 from typing import ClassVar
 
 from petsc4py import PETSc
 
-from ..errors import InputError
+from ..class_registry import enter, load_modules
 from .context import SolveContext
 from .result import SolveResult
 
 
 @functools.cache
 def load_all() -> None:
-    """Load every module of this room, so that all its methods are registered."""
-    package = __package__ or ""
-    for module in pkgutil.iter_modules(importlib.import_module(package).__path__):
-        importlib.import_module(f"{package}.{module.name}")
+    """Load every module of this room, so that all its methods are known."""
+    load_modules(__package__ or "")
 
 
 class Method(ABC):
@@ -56,10 +52,7 @@ class Method(ABC):
             return
         if cls.__module__.rpartition(".")[0] != __package__:
             load_all()  # a name that the program uses is taken
-        known = Method.registry.get(cls.name, cls)
-        if (known.__module__, known.__qualname__) != (cls.__module__, cls.__qualname__):
-            raise InputError(f"method class {cls.__name__}: the name {cls.name!r} is taken; choose another")
-        Method.registry[cls.name] = cls
+        enter(Method.registry, cls, cls.name, "method")
 
     def __init__(self, context: SolveContext) -> None:
         self.context = context

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import difflib
-
+from ..class_registry import closest
 from ..errors import InputError
 from ..system.system import System
 from .method import Method, load_all
@@ -26,9 +25,8 @@ def find(name: str) -> type[Method]:
     load_all()
     if name in Method.registry:
         return Method.registry[name]
-    match = difflib.get_close_matches(name, available(), n=1)
-    hint = f"; did you mean {match[0]!r}?" if match else ""
-    raise InputError(f"solver.method: unknown method {name!r}{hint} (allowed: {', '.join(available())})")
+    hint = closest(name, available())
+    raise InputError(f"solver.method: unknown method {name!r}{hint}; allowed: {', '.join(available())}")
 
 
 def choose(options: SolverOptions, system: System) -> type[Method]:

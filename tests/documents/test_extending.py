@@ -160,15 +160,15 @@ WRONG = {
 
 
 @pytest.mark.parametrize("name", WRONG)
-def test_a_plugin_that_cannot_be_loaded_is_told_with_its_place(name: str, files: Path) -> None:
+def test_a_plugin_that_cannot_be_loaded_is_told_with_its_place(name: str, tmp_path: Path) -> None:
     text, told = WRONG[name]
     if text is not None:
-        (files / name).write_text(text, encoding="utf-8")
+        (tmp_path / name).write_text(text, encoding="utf-8")
     scene = BLOCKS["pressed.toml"].replace(
         '["my_law.py", "my_smoothing.py", "my_effect.py", "my_method.py", "my_quantity.py"]', f'"{name}"'
     )
-    (files / "pressed.toml").write_text(scene, encoding="utf-8")
+    (tmp_path / "pressed.toml").write_text(scene, encoding="utf-8")
     with pytest.raises(InputError) as caught:
-        read_scene(files / "pressed.toml")
+        read_scene(tmp_path / "pressed.toml")
     assert told in str(caught.value)
     assert "pressed.toml:2: plugins" in str(caught.value)

@@ -1,5 +1,6 @@
 """Smoothings: from a law with kinks to one without, at a stated price (docs/laws.md)."""
 
+from ...class_registry import load_modules
 from .base import SmoothedLaw, Smoothing, registered
 from .paper import PaperSmoothedLaw, PaperSmoothing
 from .plus_functions import QUADRATIC, Chks, LogExp, Quadratic
@@ -21,3 +22,5 @@ __all__ = [
     "create",
     "registered",
 ]
+
+load_modules(__name__)

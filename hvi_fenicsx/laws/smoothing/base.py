@@ -10,10 +10,10 @@ from typing import Any, ClassVar
 
 from typing_extensions import override
 
+from ...class_registry import enter
 from ...errors import InputError
 from ...typing import Array, Integers
 from ..base import Superpotential
-from ..class_registry import enter
 from ..convex_parts import Directional
 
 _REGISTRY: dict[str, type] = {}

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from ...class_registry import closest
 from ...errors import InputError
 from ..base import Superpotential
-from ..class_registry import closest
 from .base import SmoothedLaw, registered, require_epsilon
 
 

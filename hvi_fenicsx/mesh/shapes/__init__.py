@@ -1,6 +1,7 @@
 """The shapes of bodies: importing this registers those that come with the program, in the order users see them in."""
 
 # isort: off
+from ...class_registry import load_modules
 from .base import DomainShape, Thresholds
 from .block import Box, Rectangle
 from .l_shape import LShape
@@ -24,3 +25,5 @@ __all__ = [
     "Refinements",
     "Thresholds",
 ]
+
+load_modules(__name__)

@@ -1,11 +1,13 @@
-"""Classes that are known by their name as soon as they are defined: laws and smoothings."""
+"""Classes that are known by their name as soon as they are defined: laws, effects, shapes, methods and the like."""
 
 from __future__ import annotations
 
 import difflib
+import importlib
+import pkgutil
 from collections.abc import Iterable
 
-from ..errors import InputError
+from .errors import InputError
 
 
 def enter(known: dict[str, type], cls: type, name: str, kind: str) -> None:
@@ -27,6 +29,16 @@ def enter(known: dict[str, type], cls: type, name: str, kind: str) -> None:
             "choose another name"
         )
     known[name] = cls
+
+
+def load_modules(package: str) -> None:
+    """Load every module of a room, so that all classes in it are known; a new one then needs no edit elsewhere.
+
+    Args:
+        package: the room's full name.
+    """
+    for module in pkgutil.iter_modules(importlib.import_module(package).__path__):
+        importlib.import_module(f"{package}.{module.name}")
 
 
 def closest(name: object, names: Iterable[str]) -> str:
