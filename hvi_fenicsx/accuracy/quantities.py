@@ -1,6 +1,6 @@
 """The target quantities: the energy norm, slip and friction on Γc, the contact force, the load factors.
 
-Light, as :mod:`.quantity_base` is: what reads a solution imports what it needs.
+This module loads neither PETSc nor MPI: the functions that read a solution import what they need.
 """
 
 from __future__ import annotations
@@ -182,7 +182,7 @@ class LoadFactor(Observable):
         """A load that can be raised until the body escapes."""
         if np.isfinite(self._factor(level)):
             return None
-        return "no load factor ends what holds the body; hvi check tells the state"
+        return "no load factor ends what holds the body; hvi check reports the state"
 
     def read(self, level: AdaptiveLevel) -> Array:
         """The factor, (1,)."""

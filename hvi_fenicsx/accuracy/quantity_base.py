@@ -1,7 +1,7 @@
 """What a target quantity is: what an accuracy may be asked of, and how its error is estimated.
 
 A new quantity is a subclass of :class:`Observable` with a ``name``: known to ``--quantity`` as soon as its module is
-loaded. Light: neither PETSc nor MPI is loaded with this module.
+loaded. This module loads neither PETSc nor MPI.
 """
 
 from __future__ import annotations

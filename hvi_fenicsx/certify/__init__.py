@@ -1,1 +1,1 @@
-"""What is said of a solution: certificate, second order, plausibility, error estimate."""
+"""How good a solution is: certificate, second order, warnings, error estimates."""

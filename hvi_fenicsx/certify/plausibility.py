@@ -123,10 +123,10 @@ def _distant_obstacle(
         return
     gap = -largest(comm, -float(np.min(state.bounds.upper, initial=np.inf)))
     if np.isfinite(gap) and gap > thresholds.unrelated * size > 0:
-        metres, moved = (value * problem.scales.displacement for value in (gap, size))
+        metres, displacement = (value * problem.scales.displacement for value in (gap, size))
         yield (
             f"{_place_of_bounds(problem, state.surface.part)}: the gap is {metres:.3g} m at least and the largest "
-            f"displacement {moved:.3g} m: it is never closed; is it in m?"
+            f"displacement {displacement:.3g} m: it is never closed; is it in m?"
         )
 
 

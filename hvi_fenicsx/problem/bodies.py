@@ -1,4 +1,4 @@
-"""The bodies of a mesh: its parts that share no facet with each other, told apart alike on all ranks.
+"""The bodies of a mesh: its parts that share no facet with each other, numbered alike on all ranks.
 
 Each rank joins the cells that share a facet; the facets that ranks share join what the ranks found.
 """

@@ -130,7 +130,7 @@ class Bulk:
     def stress(self, u: fem.Function) -> Array:
         """The mean stress of every owned cell, N/m², tension positive; shape (cells, 3, 3). Collective.
 
-        The energy itself tells it, so that a new material needs nothing here: with v = q·x, q being constant in one
+        It follows from the energy itself, so a new material needs nothing here: with v = q·x, q being constant in one
         cell and zero elsewhere, ε(v) is the symmetric part of q, and the stress does the work |K| σ:q in it. σ_33 is
         zero in plane stress, and what holds the thickness in plane strain. Where div u is averaged by vertex, so is the
         volumetric stress.

@@ -11,6 +11,8 @@ from runs import ROOT, hvi, summary, write_scene
 from scenes import block, model, quadratic_linear
 
 from hvi_fenicsx import Scene, prepare, read_scene, solve
+from hvi_fenicsx.certify import plausibility
+from hvi_fenicsx.certify.thresholds import PlausibilityThresholds
 
 LAW = quadratic_linear(1.0e6)
 COARSE = ("domain.cells=[8, 8]",)
@@ -91,6 +93,14 @@ def test_before_solving_only_the_implausible_demos_are_warned_of(demo: Path) -> 
         assert any(expected[demo.stem] in sentence for sentence in found)
     else:
         assert found == ()
+
+
+def test_the_limits_can_be_chosen() -> None:
+    prepared = prepare(Scene.model_validate(model(8)))
+    problem, forces = prepared.problem, prepared.system.forces
+    assert plausibility.before_solving(problem, forces) == prepared.warnings == ()
+    (warning,) = plausibility.before_solving(problem, forces, PlausibilityThresholds(largest_body=0.5))
+    assert "the body is 1 m long" in warning
 
 
 def test_the_papers_own_data_are_warned_of_twice() -> None:

@@ -26,7 +26,7 @@ from .law_traces import ErrorField, LawTraces
 from .thresholds import DEFAULT, Thresholds
 
 _PLACE = 1 / (2 * np.sqrt(12))
-"""Of a facet: the standard deviation of a drop's place, which may be anywhere in half of it."""
+"""Standard deviation, over the facet's length, of the place of a drop that may be anywhere in half of the facet."""
 
 
 @dataclass(frozen=True)
