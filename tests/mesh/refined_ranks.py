@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 from dolfinx import fem
-from domains import BODIES, COMM, measure, towards, volume
+from domains import BODIES, COMM, ghosts_apart, measure, towards, volume
 from petsc4py import PETSc
+
+from hvi_fenicsx.mesh import refinement
 
 
 def main() -> None:
@@ -23,8 +25,9 @@ def main() -> None:
             body, space = step.domain, finer
         sizes = [vector.size, vector.norm(), vector.norm(PETSc.NormType.NORM_1), volume(body)]
         lengths = [measure(body, name) for name in sorted(body.sides)]
+        apart = max(ghosts_apart(body), ghosts_apart(refinement.uniform(body).domain))
         if COMM.rank == 0:
-            print(*sizes, *lengths)
+            print(*sizes, *lengths, apart)
 
 
 if __name__ == "__main__":

@@ -23,6 +23,7 @@ from scenes import model, quadratic_linear, solved_system
 
 from hvi_fenicsx import Scene, workflow
 from hvi_fenicsx.mesh import gmsh_file, refinement
+from hvi_fenicsx.mesh.blocks import block
 from hvi_fenicsx.mesh.domain import Domain
 from hvi_fenicsx.runtime.timing import Timer
 from hvi_fenicsx.solvers.context import RunControl
@@ -71,6 +72,14 @@ def test_prolongation_from_parent_cells(make: Callable[[], Domain]) -> None:
     for step in (refinement.uniform(body), towards(body, np.zeros(d), 1)[0]):
         fine, coarse = (fem.functionspace(b.mesh, ("Lagrange", 1, (d,))) for b in (step.domain, body))
         assert lost(step.transfer.prolongation(fine, coarse), fine, coarse) < 1e-13
+
+
+def test_in_space_the_diagonals_are_cut_and_no_shorter_edges() -> None:
+    """Of n³ cubes cut into six: n³ diagonals of the cubes, 3 n² (n + 1) of their faces."""
+    n, body = 6, block(COMM, [1.0, 1.0, 1.0], [6, 6, 6])
+    everywhere = np.arange(body.mesh.topology.index_map(3).size_local, dtype=np.int32)
+    fine = refinement.marked(body, everywhere).domain
+    assert fine.mesh.topology.index_map(0).size_global == (n + 1) ** 3 + n**3 + 3 * n**2 * (n + 1)
 
 
 def smallest_angle(body: Domain) -> float:
@@ -166,7 +175,7 @@ def assembled(scene: Scene, body: Domain) -> System:
 
 @pytest.mark.parametrize("ranks", RANKS[1:])
 def test_ranks_agree(ranks: int) -> None:
-    """The same lengths, vertices and transferred field, however the mesh is split."""
+    """The same lengths, vertices and transferred field, however the mesh is split; ghosts are where owners are."""
     parallel = _run(ranks)
     serial = _run(1)
     assert parallel == pytest.approx(serial, rel=1e-10)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import ufl
-from dolfinx import fem
+from dolfinx import fem, la
 from dolfinx import mesh as dmesh
 from mpi4py import MPI
 from petsc4py import PETSc
@@ -64,6 +64,15 @@ def measure(body: Domain, name: str) -> float:
 def volume(body: Domain) -> float:
     dx = ufl.Measure("dx", domain=body.mesh)
     return float(COMM.allreduce(fem.assemble_scalar(fem.form(fem.Constant(body.mesh, 1.0) * dx))))
+
+
+def ghosts_apart(body: Domain) -> float:
+    """The largest distance of a ghost node from where the rank that owns it has it."""
+    x = body.mesh.geometry.x
+    owners = la.vector(body.mesh.geometry.index_map(), 3, dtype=np.float64)
+    owners.array[:] = x.ravel()
+    owners.scatter_forward()
+    return float(COMM.allreduce(float(np.max(np.abs(owners.array - x.ravel()), initial=0.0)), op=MPI.MAX))
 
 
 def rough(x: np.ndarray) -> np.ndarray:
