@@ -28,21 +28,38 @@ def geometry_dofmap(mesh: _mesh.Mesh) -> Entities:
 
 
 def mesh_from_gmsh(model: Any, comm: Any, rank: int, dimension: int) -> tuple[Any, Any, Any]:
-    """Mesh, cell tags and facet tags of the gmsh model open on ``rank``. Collective."""
+    """Mesh, cell tags and facet tags of a gmsh model. Collective.
+
+    Args:
+        model: gmsh's model, used on one rank.
+        comm: the ranks that share the mesh.
+        rank: the one that has the model open.
+        dimension: of the coordinates, 2 or 3.
+    """
     return tuple(gmsh_io.model_to_mesh(model, comm, rank, gdim=dimension)[:3])
 
 
 def submesh_nodes(mesh: _mesh.Mesh, dimension: int, entities: Entities) -> tuple[Any, Any]:
-    """Submesh of the entities, and for each of its geometry nodes the node of ``mesh``. Collective."""
+    """Submesh of the entities, and for each of its geometry nodes the node of ``mesh``. Collective.
+
+    Args:
+        mesh: the whole one.
+        dimension: of the entities.
+        entities: local numbers.
+    """
     result = _mesh.create_submesh(mesh, dimension, entities)
     return result[0], np.asarray(result[3])
 
 
 def refine(mesh: _mesh.Mesh, edges: Entities | None) -> tuple[_mesh.Mesh, Entities]:
-    """Bisect the edges (None: all) by Plaza's rule; the fine mesh, its cells on the ranks of their parents.
+    """Bisect edges by Plaza's rule; children stay on the ranks of their parents. Collective.
+
+    Args:
+        mesh: the coarse one.
+        edges: local numbers; None: all edges.
 
     Returns:
-        The fine mesh, without ghost cells, and the local parent cell of each local cell. Collective.
+        The fine mesh, without ghost cells, and the local parent cell of each local cell.
     """
     mesh.topology.create_entities(1)
     fine, parents = _mesh.refine(mesh, edges, None, _mesh.RefinementOption.parent_cell)[:2]
@@ -54,8 +71,10 @@ def simplex_mesh(comm: Any, cells: npt.NDArray[Any], points: Array, kind: str) -
     """Mesh of the simplices (c, d+1) over points (n, d), each rank giving some of both. Collective.
 
     Args:
-        comm: the ranks. cells: stay where they are given; numbers of points, counted through the ranks.
-        points: each of them once, on any rank. kind: triangle or tetrahedron.
+        comm: the ranks.
+        cells: numbers of points, counted through the ranks; each cell stays where it is given.
+        points: each of them once, on any rank.
+        kind: triangle or tetrahedron.
 
     Returns:
         The mesh, without ghost cells.

@@ -125,7 +125,7 @@ class Slip(ContactField):
         return errors.slip
 
 
-class Friction(ContactField):
+class FrictionTraction(ContactField):
     """-σ_t on Γc."""
 
     name = "sigma_t"

@@ -72,7 +72,12 @@ class ForceAttribution:
         return np.where(self.held | ~alone, 0.0, self.by_laws - self.needed)
 
     def enter_law(self, term: LawTerm, u: Array) -> None:
-        """Enter what a law may carry at u (local array)."""
+        """Enter what a law may carry.
+
+        Args:
+            term: the law at its vertices.
+            u: the displacement, nondimensional, a local array.
+        """
         low, high = term.law.interval(term.argument(u), self.near)
         for dofs, sign in components(term):
             ends = np.stack([sign * low, sign * high]) * term.surface.weights
@@ -81,7 +86,12 @@ class ForceAttribution:
             np.add.at(self.weight, dofs, term.surface.weights)
 
     def enter_bounds(self, bounds: Bounds, u: Array) -> None:
-        """Enter which bounds are reached at u (local array)."""
+        """Enter which bounds are reached.
+
+        Args:
+            bounds: of one part.
+            u: the displacement, nondimensional, a local array.
+        """
         dofs, sign = bounds.component()
         reached = touches(bounds, sign * u.ravel()[dofs], self.near)
         self.contact[dofs] |= reached

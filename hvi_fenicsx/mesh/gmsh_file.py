@@ -17,7 +17,7 @@ from .domain import Domain
 from .gmsh_checks import DEFAULT, Thresholds
 
 _MOST_STATEMENTS = 100
-"""Of a broken file, that gmsh's parser may still hold."""
+"""Statements of a broken file that gmsh's parser may still hold."""
 
 
 def read(comm: MPI.Comm, path: Path, dimension: int, scale: float = 1.0, thresholds: Thresholds = DEFAULT) -> Domain:

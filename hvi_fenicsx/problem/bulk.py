@@ -68,7 +68,12 @@ class Bulk:
         return nodal_averaging.add(matrix, self._dilatations)
 
     def between(self, u: Any, v: Any) -> Any:
-        """The UFL form a(u, v) of any functions or arguments, without what is averaged by vertex."""
+        """The UFL form a(u, v), without what is averaged by vertex.
+
+        Args:
+            u: a displacement or trial function of any space.
+            v: a displacement or test function of any space.
+        """
         test, trial = self.form.arguments()
         return ufl.replace(self.form, {test: v, trial: u})
 
@@ -80,9 +85,14 @@ class Bulk:
         return internal
 
     def force_in(self, space: fem.FunctionSpace, u: fem.Function) -> Array:
-        """a(u, v) of the test functions v of any vector space, without what is averaged; owned blocks (n, d).
+        """a(u, v) of the test functions v of any vector space, without what is averaged by vertex. Collective.
 
-        Collective.
+        Args:
+            space: of the test functions.
+            u: P1, ghosts updated.
+
+        Returns:
+            The force at the blocks that this rank owns, (n, d).
         """
         return nodal_sum(self.between(u, ufl.TestFunction(space)))
 
@@ -106,7 +116,12 @@ class Bulk:
         return nodal_sum(form)
 
     def energy_form(self, v: Any, q: Any) -> Any:
-        """The UFL form of a(v, v), without what is averaged, times a test function q that is constant in cells."""
+        """The UFL form of the density of a(v, v) times q, without what is averaged by vertex.
+
+        Args:
+            v: a displacement.
+            q: a test function that is constant in cells.
+        """
         integrals = self.between(v, v).integrals()
         return ufl.Form([integral.reconstruct(integrand=integral.integrand() * q) for integral in integrals])
 

@@ -24,7 +24,7 @@ from ..runtime.mpi import agree
 from ..typing import Array, Entities
 from . import bulk, contact_surface, dirichlet, scaling
 from .contact_surface import Surface
-from .form_context import FormContext, Scaled
+from .domain_forms import DomainForms, Scaled
 from .law_term import LawTerm
 from .problem import Bounds, PlacedContribution, Prescribed, Problem
 from .scaling import Placed, Scales
@@ -71,7 +71,7 @@ def compose(domain: Domain, model: Model) -> Problem:
             raise InputError(f"boundary.{name}: no facet lies on it; see `on`")
     sizes, evaluate = scaling.sizes(domain.length, effects), functools.partial(_evaluation, domain, parts)
     scales = scaling.choose(sizes, domain.dimension, effects, evaluate)
-    context = FormContext(domain, parts, scales, effects)
+    context = DomainForms(domain, parts, scales, effects)
     made = [PlacedContribution(where, effect, effect.contribute(context, where)) for where, effect in effects]
     doubts = [f"{_place(e)}: {text}" for e in effects for text in e[1].implausible(evaluate(e), sizes)]
     return _sum(context, scales, made, model.modify, tuple(doubts))
@@ -117,7 +117,7 @@ def _points(domain: Domain, entities: tuple[int, Any]) -> Array:
 
 
 def _sum(
-    context: FormContext,
+    context: DomainForms,
     scales: Scales,
     made: Sequence[PlacedContribution],
     modify: Modification,
@@ -154,7 +154,7 @@ def _sum(
     )
 
 
-def _surfaces(context: FormContext, made: Sequence[PlacedContribution]) -> dict[str, Surface]:
+def _surfaces(context: DomainForms, made: Sequence[PlacedContribution]) -> dict[str, Surface]:
     """The parts with bounds or laws, in the scene's order. Collective."""
     return {
         where: contact_surface.make_surface(
@@ -192,7 +192,7 @@ def _check_normal_laws(made: Sequence[PlacedContribution]) -> None:
             )
 
 
-def _prescribed(context: FormContext, made: Sequence[PlacedContribution]) -> tuple[Prescribed, ...]:
+def _prescribed(context: DomainForms, made: Sequence[PlacedContribution]) -> tuple[Prescribed, ...]:
     return tuple(
         Prescribed(c.component, context.part_facets[str(where)], c.value)
         for where, _, contribution in made
@@ -200,7 +200,7 @@ def _prescribed(context: FormContext, made: Sequence[PlacedContribution]) -> tup
     )
 
 
-def _bounds(context: FormContext, where: Surface, effect: str, bounds: NormalBounds, scales: Scales) -> Bounds:
+def _bounds(context: DomainForms, where: Surface, effect: str, bounds: NormalBounds, scales: Scales) -> Bounds:
     """The bounds that an effect, by its key, puts on a part. Collective.
 
     Raises:
@@ -220,7 +220,7 @@ def _bounds(context: FormContext, where: Surface, effect: str, bounds: NormalBou
     return Bounds(where, -value(bounds.upper), -value(bounds.lower) if bounds.lower else value(None))
 
 
-def _check_compatible(context: FormContext, bounds: Sequence[Bounds], conditions: Any, fixed: Any) -> None:
+def _check_compatible(context: DomainForms, bounds: Sequence[Bounds], conditions: Any, fixed: Any) -> None:
     """A bound that excludes a prescribed value would silently change it (solver-notes.md)."""
     prescribed = fem.Function(context.space)
     for condition in conditions:
@@ -238,7 +238,7 @@ def _check_compatible(context: FormContext, bounds: Sequence[Bounds], conditions
 
 
 def _term(
-    context: FormContext,
+    context: DomainForms,
     where: Surface,
     law: BoundaryLaw,
     modify: Modification,

@@ -13,13 +13,13 @@ from ..effects import Condition
 from ..errors import InputError
 from ..runtime.mpi import agree
 from ..typing import Array, Entities
-from .form_context import FormContext
+from .domain_forms import DomainForms
 from .scaling import Scales
 from .thresholds import DEFAULT, Thresholds
 
 
 def make_conditions(
-    context: FormContext,
+    context: DomainForms,
     scales: Scales,
     wanted: Sequence[tuple[str, Condition]],
     thresholds: Thresholds = DEFAULT,
@@ -41,7 +41,7 @@ def make_conditions(
     return found
 
 
-def _condition(context: FormContext, scales: Scales, part: str, condition: Condition) -> fem.DirichletBC:
+def _condition(context: DomainForms, scales: Scales, part: str, condition: Condition) -> fem.DirichletBC:
     facets, dim = context.part_facets[part], context.dimension - 1
     component = context.space.sub(condition.component)
     if condition.value.is_number:
@@ -54,7 +54,7 @@ def _condition(context: FormContext, scales: Scales, part: str, condition: Condi
 
 
 def _check_agreement(
-    context: FormContext, scales: Scales, named: Sequence[tuple[str, fem.DirichletBC]], rounding: float
+    context: DomainForms, scales: Scales, named: Sequence[tuple[str, fem.DirichletBC]], rounding: float
 ) -> None:
     """Where two parts meet they must prescribe the same: else the order of the tables would decide."""
     values = np.empty(len(context.points) * context.dimension)
@@ -78,7 +78,7 @@ def _values(condition: fem.DirichletBC, values: Array) -> tuple[Entities, Array]
     return dofs, values[dofs]
 
 
-def _disagreement(context: FormContext, dof: int, parts: tuple[str, str], pair: Sequence[float], scales: Scales) -> str:
+def _disagreement(context: DomainForms, dof: int, parts: tuple[str, str], pair: Sequence[float], scales: Scales) -> str:
     block, component = divmod(dof, context.dimension)
     at = ", ".join(f"{c:.6g}" for c in context.points[block][: context.dimension])
     one, other = (float(value) * scales.displacement for value in pair)

@@ -64,12 +64,22 @@ class Dilatation:
         return np.array(force.array_r)
 
     def work(self, pressure: fem.Function, v: Any) -> Any:
-        """The UFL form ∫ p div v dx over the region, of a displacement or test function v of any space."""
+        """The UFL form ∫ p div v dx over the region.
+
+        Args:
+            pressure: p, a P1 field.
+            v: a displacement or test function of any space.
+        """
         scalar, vector = self.averaged.divergence.arguments()
         return ufl.replace(self.averaged.divergence, {scalar: pressure, vector: v})
 
     def across(self, pressure: fem.Function, q: Any) -> Any:
-        """The UFL form ∫ p q dx over the region: what p adds to σ_33, tested with q."""
+        """The UFL form ∫ p q dx over the region: what p adds to σ_33, tested with q.
+
+        Args:
+            pressure: p, a P1 field.
+            q: a scalar test function.
+        """
         (scalar,) = self.averaged.volume.arguments()
         return ufl.replace(self.averaged.volume, {scalar: pressure * q})
 

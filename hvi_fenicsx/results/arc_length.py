@@ -14,7 +14,7 @@ from ..problem.problem import Problem
 from ..typing import Array, Integers
 
 _DIGITS = 9
-"""Of the part's size: coordinates that should be equal may differ in the last digits."""
+"""Digits of the part's size; coordinates that should be equal may differ in later ones."""
 
 
 def vertices(problem: Problem, surface: Surface) -> Integers:

@@ -72,7 +72,7 @@ class Axis:
         raise NotImplementedError
 
 
-class Mesh(Axis):
+class MeshAxis(Axis):
     """The mesh, in the words of the scene's domain shape."""
 
     name = "mesh"
@@ -106,7 +106,7 @@ class _Number(Axis):
         return with_solver(tables, **{self.name: float(value)})
 
 
-class Epsilon(_Number):
+class EpsilonAxis(_Number):
     """The width of the smoothing, relative to the law's energy at its kink."""
 
     name = "epsilon"
@@ -118,7 +118,7 @@ class Epsilon(_Number):
         return unsmoothed(tables) if value == EXACT else super().apply(without(tables, *WIDTHS), value, beside)
 
 
-class EpsilonAbsolute(Epsilon):
+class EpsilonAbsoluteAxis(EpsilonAxis):
     """The width of the smoothing in N/m."""
 
     name = "epsilon_absolute"
@@ -138,7 +138,7 @@ class _Choice(Axis):
             raise InputError(f"--axis {self.name}: {unknown(self.name, value, self.allowed())}")
 
 
-class Smoothing(_Choice):
+class SmoothingAxis(_Choice):
     """The kind of smoothing. It is applied after the width: where that is exact, nothing is smoothed."""
 
     name = "smoothing"
@@ -154,7 +154,7 @@ class Smoothing(_Choice):
         return tables if exact else super().apply(tables, value, beside)
 
 
-class Method(_Choice):
+class MethodAxis(_Choice):
     """The method that solves."""
 
     name = "method"
@@ -164,14 +164,14 @@ class Method(_Choice):
         return registry.available()
 
 
-class Tolerance(_Number):
+class ToleranceAxis(_Number):
     """The relative residual at which the iteration ends."""
 
     name = "tolerance"
     below = 1.0
 
 
-class LinearSolver(_Choice):
+class LinearSolverAxis(_Choice):
     """The linear solver."""
 
     name = "linear_solver"
@@ -181,7 +181,7 @@ class LinearSolver(_Choice):
         return ("auto", "lu", "gamg")
 
 
-class Accuracy(_Number):
+class AccuracyAxis(_Number):
     """Adaptive meshes: what ``hvi run --accuracy`` is asked for in the energy norm."""
 
     name = "accuracy"

@@ -16,7 +16,7 @@ from ..typing import Array, Integers
 from .solution_fields import PartFields, SolutionFields
 
 _PAIRS = 4_000_000
-"""Of vertices and facets that are looked at together."""
+"""Pairs of vertices and facets that are looked at together."""
 
 
 def body(source: SolutionFields, points: Array) -> sparse.csr_array:

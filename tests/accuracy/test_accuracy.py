@@ -21,7 +21,7 @@ from hvi_fenicsx.accuracy import adaptive, control, cost_forecast, quantities
 from hvi_fenicsx.accuracy.adaptive import AdaptiveLevel, AdaptiveSolver
 from hvi_fenicsx.accuracy.control import Goal, Reached
 from hvi_fenicsx.accuracy.cost_forecast import AdaptiveStep
-from hvi_fenicsx.accuracy.quantities import Friction
+from hvi_fenicsx.accuracy.quantities import FrictionTraction
 from hvi_fenicsx.accuracy.quantity_base import Observable, contact_norm, extrapolated, prolong
 from hvi_fenicsx.certify import contact_state
 from hvi_fenicsx.runtime import memory
@@ -114,10 +114,10 @@ def test_smoothing_is_narrowed_as_far_as_asked_for_without_a_finer_mesh() -> Non
     widths = [step.epsilon for step in reached.steps]
     assert widths[-1] < widths[0] / 10  # type: ignore[operator]
     assert reached.rung.dofs < 100
-    found = Friction().read(reached.rung)
+    found = FrictionTraction().read(reached.rung)
     exact = reached.rung.solution.scene.with_solver(smoothing=None, epsilon_absolute=None)
     law = AdaptiveSolver(timer=Timer()).again(reached.rung, exact)
-    true = Friction().read(law)
+    true = FrictionTraction().read(law)
     apart = contact_norm(law, true.x.array - found.x.array, 1)  # type: ignore[union-attr]
     assert apart < 2e-2 * contact_norm(law, true.x.array, 1)  # type: ignore[union-attr]
 

@@ -170,9 +170,9 @@ def test_a_target_quantity_finds_the_users_law_and_bounds(folder: Path) -> None:
     code = """
 from types import SimpleNamespace
 from hvi_fenicsx import prepare, read_scene
-from hvi_fenicsx.accuracy.quantities import Resultant, Friction
+from hvi_fenicsx.accuracy.quantities import FrictionTraction, Resultant
 level = SimpleNamespace(prepared=prepare(read_scene("own.toml")))
-print(Resultant().missing(level), Friction().missing(level))
+print(Resultant().missing(level), FrictionTraction().missing(level))
 """
     done = subprocess.run([sys.executable, "-c", code], cwd=folder, capture_output=True, text=True, check=True)
     assert done.stdout.split() == ["None", "None"]

@@ -79,7 +79,12 @@ def estimate_contact_errors(
 
 
 def ratio(part: float, whole: float) -> float:
-    """Part over whole; infinite where there is no whole, but 0 of nothing."""
+    """Part over whole; infinite where only the whole is 0, and 0 where both are.
+
+    Args:
+        part: not negative.
+        whole: not negative.
+    """
     return part / whole if whole > 0 else (np.inf if part > 0 else 0.0)
 
 

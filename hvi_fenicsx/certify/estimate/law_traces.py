@@ -45,7 +45,12 @@ def nearest(law: Superpotential, slip: Array, traction: Array, near: float) -> A
 
 
 def tractions(state: ContactState, law: LawState) -> Array:
-    """The nodal tractions of one of a part's laws along its directions, (m, k)."""
+    """The nodal tractions of one of a part's laws along its directions, (m, k).
+
+    Args:
+        state: the contact state of the part.
+        law: the state of the law.
+    """
     return state.friction if law.term.radial else law.traction[:, None]
 
 

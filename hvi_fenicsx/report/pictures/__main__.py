@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
 from ...errors import HviError
+from ...runtime import processes
 from ..errors import PictureError
 from ..reader import Result, read
 from .draw import COMPLAINT
@@ -50,6 +51,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("folder", type=Path, help="a finished result folder")
     folder = parser.parse_args(arguments).folder
     signal.signal(signal.SIGTERM, _terminated)
+    processes.die_with_parent()  # or it would write into the folder of the next run
     try:
         failures = draw_all(read(folder))
     except HviError as error:

@@ -21,7 +21,7 @@ from .outline import normals
 from .style import GREY, INK, ORANGE, PURPLE, VERMILION
 
 LOAD, PRESSURE, ROLLER = 0.13, 0.15, 0.011
-"""Of the body's size: the longest arrow, the highest pressure, a roller's radius."""
+"""Parts of the body's size: the longest arrow, the highest pressure, a roller's radius."""
 OBSTACLE, NOTHING = 0.004, 1e-6
 """How far behind its face an obstacle's line is drawn, of the body's size; what counts as no stress, of the largest."""
 ARROWS = 9

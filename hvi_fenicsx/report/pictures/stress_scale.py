@@ -14,7 +14,7 @@ from .legend import colour_bar
 from .style import EMBER
 
 PEAK, SPOILS = 0.005, 1.25
-"""Of the body's volume, left beyond the end of a scale; how many times its end the peak must be."""
+"""Part of the body's volume that is left beyond the end of a scale; how many times its end the peak must be."""
 
 
 @dataclass(frozen=True)

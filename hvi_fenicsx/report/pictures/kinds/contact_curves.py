@@ -26,7 +26,7 @@ PANEL, GAP, FOOT = 1.75, 0.62, 0.72
 MARKED = 80
 """Vertices up to which each is marked."""
 SHORT = 0.2
-"""Of a part's length: a closed stretch shorter than this is shown alone."""
+"""Part of a part's length; a closed stretch shorter than this is shown alone."""
 IN_RANGE = 1.6
 """A kink of the law is drawn if it lies within this many times the largest slip."""
 

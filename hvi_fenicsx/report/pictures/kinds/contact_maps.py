@@ -26,7 +26,7 @@ WIDEST, TALLEST = 5.8, 2.75
 """Inches: a map."""
 LEFT, GAP, FOOT = 0.95, 0.62, 0.75
 ROOMY = 0.55
-"""Of the width: where a map ends that leaves room for words beside it."""
+"""Part of the width at which a map ends that leaves room for words beside it."""
 ARROWS = 13
 """Along the longer side of a map."""
 

@@ -21,7 +21,7 @@ from ..typing import Array
 from .scaling import Placed, Scales
 
 
-class FormContext:
+class DomainForms:
     """What effects see of the problem while it is composed (:class:`.effects.FormContext`)."""
 
     def __init__(
@@ -78,7 +78,12 @@ class FormContext:
         return Scaled(self.number(self.length ** (1 - self.dimension)), self.boundary(part))
 
     def boundary(self, part: str, **metadata: Any) -> Any:
-        """Ds over a part, SI."""
+        """The measure ds over a part, SI.
+
+        Args:
+            part: its name.
+            **metadata: of the measure, like the quadrature rule.
+        """
         tags, ids = self._facet_tags
         measure = ufl.Measure("ds", domain=self.domain.mesh, subdomain_data=tags, metadata=metadata)
         return measure(ids[part])
