@@ -1,10 +1,10 @@
 """The effects: importing the package registers those that come with the program."""
 
 from ..class_registry import load_modules
-from . import anisotropic, contact, elasticity, friction, loads, normal, thermal
+from . import adhesion_support, anisotropic, contact, elasticity, friction, loads, thermal
 from .base import Drive, Effect, Evaluate, FormContext, Place, Sizes, SurfaceLoad
 from .contribution import Averaged, BoundaryLaw, Condition, Contribution, Direction, NormalBounds
-from .fields import FormulaField
+from .formula_field import FormulaField
 from .role import Role, role_of
 
 __all__ = [
@@ -23,12 +23,12 @@ __all__ = [
     "Role",
     "Sizes",
     "SurfaceLoad",
+    "adhesion_support",
     "anisotropic",
     "contact",
     "elasticity",
     "friction",
     "loads",
-    "normal",
     "role_of",
     "thermal",
 ]

@@ -12,7 +12,7 @@ from ..formula import COORDINATES, Formula
 from ..schema import refusal
 from .base import Drive, Effect, Evaluate, FormContext, Place, Sizes
 from .contribution import Contribution, NormalBounds
-from .fields import FormulaField, require_components
+from .formula_field import FormulaField, require_components
 
 Coordinate = Annotated[float, Field(allow_inf_nan=False)]
 

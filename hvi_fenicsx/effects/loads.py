@@ -18,7 +18,7 @@ from ..formula import Formula
 from ..schema import refusal
 from .base import Drive, Effect, Evaluate, FormContext, Place, Sizes, SurfaceLoad
 from .contribution import Condition, Contribution
-from .fields import FormulaField, require_components
+from .formula_field import FormulaField, require_components
 
 
 class _Listed(Effect):

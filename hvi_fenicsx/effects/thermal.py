@@ -12,7 +12,7 @@ from ..errors import InputError
 from .base import Drive, Effect, Evaluate, FormContext, Place, Sizes
 from .contribution import Contribution
 from .elasticity import Elasticity, strain
-from .fields import FormulaField
+from .formula_field import FormulaField
 
 
 class Temperature(Effect):

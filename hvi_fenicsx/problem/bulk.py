@@ -1,6 +1,6 @@
 """The elastic operator a(u, v): matrix, force, energy by cell, residual in other test spaces, stress by cell.
 
-How the volumetric part is treated, and of which degree the elements are, is known here and nowhere else.
+How the volumetric part is treated is known here and nowhere else; the element itself in :mod:`.spaces`.
 """
 
 from __future__ import annotations

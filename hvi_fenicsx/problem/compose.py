@@ -28,8 +28,8 @@ from .domain_forms import DomainForms, Scaled
 from .law_term import LawTerm
 from .problem import Bounds, PlacedContribution, Prescribed, Problem
 from .scaling import Placed, Scales
+from .spaces import CONTACT_RULE
 
-_VERTEX = {"quadrature_rule": "vertex", "quadrature_degree": 1}
 Modification = Callable[[Superpotential], Superpotential]
 """What is solved in the place of a law, SI: the law smoothed, say."""
 
@@ -162,7 +162,7 @@ def _surfaces(context: DomainForms, made: Sequence[PlacedContribution]) -> dict[
             context.space,
             context.points,
             context.part_facets[where],
-            context.boundary(where, **_VERTEX),
+            context.boundary(where, **CONTACT_RULE),
             context.length ** (context.dimension - 1),
             next((b.direction for w, _, other in made if w == where for b in other.bounds), None),
         )
@@ -258,7 +258,7 @@ def _term(
         )
     free = (~np.isin(where.dofs, fixed)).astype(np.float64)
     density = fem.Function(context.space, name="clarke_derivative")
-    ds = Scaled(context.number(context.length ** (1 - context.dimension)), context.boundary(where.part, **_VERTEX))
+    ds = Scaled(context.number(context.length ** (1 - context.dimension)), context.boundary(where.part, **CONTACT_RULE))
     residual = ufl.inner(density, context.test) * ds
     return LawTerm(
         surface=where,

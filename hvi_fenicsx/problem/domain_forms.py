@@ -19,6 +19,7 @@ from ..mesh.domain import Domain
 from ..runtime.mpi import agree
 from ..typing import Array
 from .scaling import Placed, Scales
+from .spaces import displacement_space, scalar_space
 
 
 class DomainForms:
@@ -29,7 +30,7 @@ class DomainForms:
     ) -> None:
         self.domain, self.dimension = domain, domain.dimension
         self.length, self.stress, self.modulus = scales.length, scales.stress, scales.modulus
-        self.space = fem.functionspace(domain.mesh, ("Lagrange", 1, (self.dimension,)))
+        self.space = displacement_space(domain.mesh)
         self.trial, self.test = ufl.TrialFunction(self.space), ufl.TestFunction(self.space)
         self.normal = ufl.FacetNormal(domain.mesh)
         self.materials = [placed for placed in effects if placed[1].place is Place.MATERIAL]
@@ -43,7 +44,7 @@ class DomainForms:
     @functools.cached_property
     def scalar_test(self) -> Any:
         """A test function of scalar P1; few effects want it, and its space takes time."""
-        return ufl.TestFunction(fem.functionspace(self.domain.mesh, ("Lagrange", 1)))
+        return ufl.TestFunction(scalar_space(self.domain.mesh))
 
     def number(self, value: float) -> Any:
         """A constant that is not compiled into the form."""

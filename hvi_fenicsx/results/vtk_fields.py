@@ -16,6 +16,7 @@ from ..certify.estimate.estimator import Estimate
 from ..errors import InputError
 from ..mesh.vertex_dofs import dof_of_node
 from ..problem.problem import Problem
+from ..problem.spaces import scalar_space
 from ..report.solution_arrays import Singles
 from ..rigid import Mode
 from ..runtime.mpi import agree
@@ -99,7 +100,7 @@ def write_contact(path: Path, problem: Problem, states: Sequence[ContactState]) 
 
 def _nodal(problem: Problem, states: Sequence[ContactState]) -> dict[str, Array]:
     """By name, values at all local vertices of the body (NaN where there is none). Collective."""
-    scalar = fem.functionspace(problem.domain.mesh, ("Lagrange", 1))
+    scalar = scalar_space(problem.domain.mesh)
     u, p = problem.scales.displacement, problem.scales.stress
     found: dict[str, fem.Function] = {}
 

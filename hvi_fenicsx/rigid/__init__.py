@@ -1,12 +1,12 @@
 """Rigid motions: the kernel of a scene, the name of each motion, and whether the load can be borne."""
 
 from ..laws.convex_parts import Directional
+from .analyse import analyse, load_factors
 from .kernel import FixedDirections, kernel, modes
 from .motions import Mode, RigidBody, describe, motion_at, rigid_fields
 from .reduction import ContactCone, Resistance, RigidProblem
-from .solvability import analyse, load_factors
+from .solvability import ExistenceState, LoadFactors, PaperConditions, Solvability, combine, combine_factors, undecided
 from .thresholds import Thresholds
-from .verdict import ExistenceState, LoadFactors, PaperConditions, Solvability, combine, combine_factors, undecided
 
 __all__ = [
     "ContactCone",

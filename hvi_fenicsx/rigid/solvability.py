@@ -1,88 +1,203 @@
-"""Can a solution exist, along which rigid motion would the body escape, and how much more load would it bear?
-
-With C = Y ∩ K∞ the rigid motions that the contact admits, j^∞ the growth and ĵ the peak of the laws:
-held if <g,y> < ∫ j^∞(y) for all y ≠ 0 in C, escapes if <g,y> > ∫ ĵ(y) for some y in C, metastable in between,
-borderline where one of these is an equality, undecided where rounding lets no programme end. The theory and the closed
-forms are in docs/solvability.md.
-"""
+"""The verdict on a scene before it is solved: its state, margins, load factors and modes, as data."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import TypeVar, cast
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
-from mpi4py import MPI
 
-from ..errors import HviError, InputError, SolverError
-from .analysis import Analysis
-from .kernel import modes
-from .reduction import ReducedProblem, RigidProblem, reduce
-from .thresholds import DEFAULT, Thresholds
-from .verdict import LoadFactors, Solvability, undecided, unmovable
+from .motions import Mode
 
-Result = TypeVar("Result")
+ExistenceState = Literal["held", "metastable", "escapes", "borderline", "undecided"]
+WORST_FIRST: tuple[ExistenceState, ...] = ("escapes", "undecided", "metastable", "borderline", "held")
 
 
-def analyse(comm: MPI.Comm, problem: RigidProblem, thresholds: Thresholds = DEFAULT) -> Solvability:
-    """The state of a scene and its margins, before anything is solved. Collective; the same on all ranks.
+@dataclass(frozen=True)
+class PaperConditions:
+    """The paper's conditions (A2s), nondimensional.
+
+    Attributes:
+        c: (Σ c4² area)^½ γ0 with γ0 = 1.
+        margin: min of -<g,y> over y in Y∩K∞ with |y| = 1, None if there is no such y.
+    """
+
+    c: float
+    margin: float | None
+
+    @property
+    def obtuse(self) -> bool:
+        """(A2s)(i) or (ii): the load makes an obtuse angle with every direction of escape."""
+        return self.margin is None or self.margin > 0.0
+
+    @property
+    def satisfied(self) -> bool:
+        """(A2s)(i) or (iii): the paper's Theorem 1 asserts a solution."""
+        return self.margin is None or (self.margin > 0.0 and self.margin > self.c)
+
+
+@dataclass(frozen=True)
+class LoadFactors:
+    """The factors of a load, the others constant, between which a body is held, and where the peak ends.
+
+    For λ in (held_from, held) the state is `held`; for λ > peak it is `escapes`.
+
+    Attributes:
+        held_from: see above.
+        held: see above; inf: no factor is too large; at most held_from: no factor is held.
+        peak: see above.
+        mode: the motion that limits the load at `held`, None where nothing does.
+        peak_mode: the motion that limits the load at `peak`, likewise.
+    """
+
+    held_from: float
+    held: float
+    peak: float
+    mode: Mode | None
+    peak_mode: Mode | None
+
+    def summary(self) -> dict[str, object]:
+        """For JSON: null for infinite. Where no factor is held, or every factor escapes, a flag says so."""
+        some = self.held_from < self.held
+        return {
+            "never_held": not some,
+            "always_escapes": self.peak == -np.inf,
+            "held_from": _finite(self.held_from) if some else None,
+            "held": _finite(self.held) if some else None,
+            "peak": _finite(self.peak),
+            "direction": self.mode.name if self.mode else None,
+            "peak_direction": self.peak_mode.name if self.peak_mode else None,
+        }
+
+
+@dataclass(frozen=True, kw_only=True)
+class Solvability:
+    """What the rigid motions say about a scene; nondimensional, |y| is the largest rigid coefficient.
+
+    Attributes:
+        state: held, metastable, escapes or borderline; undecided where the programmes broke down.
+        margin: min over y in C with |y| = 1 of ∫ j^∞(y_t) - <g,y>, None (infinite) if C = {0}.
+        lambda_held: see LoadFactors.held, for the whole load; ±inf where there is no limit.
+        lambda_peak: see LoadFactors.peak.
+        direction: the motion of escape (in the state borderline: the one in balance), None if held.
+        critical: the motion that limits lambda_held.
+        kernel: a basis of Y.
+        free: a basis of the motions that nothing holds and on which the load does no work, both ways.
+        paper: the paper's own conditions.
+        exact: False if a growth is not convex; margin and lambda_held are then upper bounds, and `held` is
+            not claimed (`metastable` without a direction: only solving decides).
+        trouble: in the state undecided, what broke down; margin and factors are then unknown (None, nan).
+    """
+
+    state: ExistenceState
+    margin: float | None
+    lambda_held: float
+    lambda_peak: float
+    direction: Mode | None
+    critical: Mode | None
+    kernel: tuple[Mode, ...]
+    free: tuple[Mode, ...]
+    paper: PaperConditions
+    exact: bool = True
+    trouble: str = ""
+
+    def summary(self) -> dict[str, object]:
+        """The `solvability` entry of summary.json: null for infinite or absent."""
+        return {
+            "state": self.state,
+            "margin": self.margin,
+            "lambda_held": _finite(self.lambda_held),
+            "lambda_peak": _finite(self.lambda_peak),
+            "direction": self.direction.name if self.direction else None,
+            "kernel": [mode.name for mode in self.kernel],
+            "free": [mode.name for mode in self.free],
+            "paper": {"c": self.paper.c, "satisfied": self.paper.satisfied if self.state != "undecided" else None},
+        }
+
+
+def unmovable(c: float) -> Solvability:
+    """The verdict on a body whose conditions leave no rigid motion: coercive, held under any load."""
+    return Solvability(
+        state="held",
+        margin=None,
+        lambda_held=np.inf,
+        lambda_peak=np.inf,
+        direction=None,
+        critical=None,
+        kernel=(),
+        free=(),
+        paper=PaperConditions(c, None),
+    )
+
+
+def undecided(kernel: tuple[Mode, ...], c: float, trouble: str) -> Solvability:
+    """No verdict. Solving may show more, since a certificate needs no verdict.
 
     Args:
-        comm: the ranks of the mesh.
-        problem: the body and what it meets.
-        thresholds: what counts as zero, and when to give up.
+        kernel: the motions that the conditions leave.
+        c: the paper's constant.
+        trouble: what broke down.
     """
-    basis, reduced = reduce(comm, problem, thresholds)
-    c = _paper_c(comm, problem)
-    if basis.shape[1] == 0:
-        return unmovable(c)
-    return _on_root(comm, reduced, lambda found: _verdict(problem, found, c))
+    return Solvability(
+        state="undecided",
+        margin=None,
+        lambda_held=np.nan,
+        lambda_peak=np.nan,
+        direction=None,
+        critical=None,
+        kernel=kernel,
+        free=(),
+        paper=PaperConditions(c, np.nan),
+        exact=False,
+        trouble=trouble,
+    )
 
 
-def _verdict(problem: RigidProblem, reduced: ReducedProblem, c: float) -> Solvability:
-    try:
-        return Analysis(problem, reduced).solvability()
-    except SolverError as error:
-        return undecided(modes(reduced.frame, problem.body), c, str(error))
+def combine(bodies: Sequence[Solvability]) -> Solvability:
+    """The verdict on several bodies that do not touch each other: worst state, smallest margins. Local.
 
-
-def load_factors(
-    comm: MPI.Comm, problem: RigidProblem, load: str | None = None, thresholds: Thresholds = DEFAULT
-) -> LoadFactors:
-    """Factors of one load, the others constant, or of the whole load. Collective; the same on all ranks.
-
-    Args:
-        comm: the ranks of the mesh.
-        problem: the body and what it meets.
-        load: its name; None: the whole load.
-        thresholds: what counts as zero, and when to give up.
-
-    Raises:
-        InputError: there is no such load.
-        SolverError: the linear programmes broke down.
+    The direction is that of the body in the worst state; the other bodies rest.
     """
-    if load is not None and load not in problem.loads:
-        raise InputError(f"there is no load {load!r}; there are: {', '.join(problem.loads) or 'none'}")
-    basis, reduced = reduce(comm, problem, thresholds)
-    if basis.shape[1] == 0:
-        return LoadFactors(-np.inf, np.inf, np.inf, None, None)
-    return _on_root(comm, reduced, lambda found: Analysis(problem, found).load_factors(load))
+    worst = min(bodies, key=lambda body: (WORST_FIRST.index(body.state), _number(body.margin)))
+    kernel = tuple(mode for body in bodies for mode in body.kernel)
+    c = float(np.linalg.norm([body.paper.c for body in bodies]))
+    if worst.state == "undecided":
+        return undecided(kernel, c, worst.trouble)
+    known = [body for body in bodies if body.state != "undecided"]
+    first = min(known, key=lambda body: body.lambda_held)
+    return replace(
+        worst,
+        margin=_combined_margin([body.margin for body in known]),
+        lambda_held=first.lambda_held,
+        lambda_peak=min(body.lambda_peak for body in known),
+        critical=first.critical,
+        kernel=kernel,
+        free=tuple(mode for body in known for mode in body.free),
+        paper=PaperConditions(c, _combined_margin([body.paper.margin for body in known])),
+        exact=all(body.exact for body in bodies),
+    )
 
 
-def _paper_c(comm: MPI.Comm, problem: RigidProblem) -> float:
-    square = sum(part.c4**2 * float(part.weights.sum()) for part in problem.resistances)
-    return float(np.sqrt(comm.allreduce(square)))
+def combine_factors(bodies: Sequence[LoadFactors]) -> LoadFactors:
+    """The factors of a load on several bodies: the scene is held where all of them are. Local."""
+    last, peak = min(bodies, key=lambda one: one.held), min(bodies, key=lambda one: one.peak)
+    start = max(one.held_from for one in bodies)
+    return LoadFactors(start, last.held, peak.peak, last.mode, peak.peak_mode)
 
 
-def _on_root(comm: MPI.Comm, reduced: ReducedProblem | None, work: Callable[[ReducedProblem], Result]) -> Result:
-    """Do the work on the rank that holds the data and send the result, or its error, to all ranks."""
-    outcome: Result | HviError | None = None
-    if reduced is not None:
-        try:
-            outcome = work(reduced)
-        except HviError as error:
-            outcome = error
-    outcome = comm.bcast(outcome, root=0)
-    if isinstance(outcome, HviError):
-        raise outcome
-    return cast(Result, outcome)
+def _combined_margin(margins: Sequence[float | None]) -> float | None:
+    """Minimum with |y| the largest of the norms: all bodies that escape move, else only the weakest."""
+    known = [margin for margin in margins if margin is not None]
+    lost = sum(margin for margin in known if margin < 0.0)
+    if not known:
+        return None
+    return lost if lost < 0.0 else min(known)
+
+
+def _finite(value: float) -> float | None:
+    return value if np.isfinite(value) else None
+
+
+def _number(margin: float | None) -> float:
+    return np.inf if margin is None else margin

@@ -1,8 +1,8 @@
 """The scene: what the user asked for, from a TOML file (:func:`read_scene`) or Python (:class:`Scene`)."""
 
 from .effect_tables import BodyTable, BoundaryTable, MaterialTable
-from .model import PlacedEffect, Scene
 from .reader import read_scene, with_place
+from .scene import PlacedEffect, Scene
 from .solver_table import SolverTable
 from .writer import dump_scene
 

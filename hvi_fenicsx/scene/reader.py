@@ -16,9 +16,9 @@ from pydantic import ValidationError
 
 from ..errors import InputError
 from ..schema import Mistake, mistakes_of
-from .model import Scene
 from .named_tables import WHOLE
 from .overrides import override
+from .scene import Scene
 from .toml_lines import line_of, lines_of
 
 _LARGEST = 1_000_000

@@ -17,7 +17,7 @@ from ..effects import Effect, Place
 from ..laws.base import registered
 from ..mesh.shapes import DomainShape
 from .effect_tables import DEFAULT_ELASTICITY, BodyTable, BoundaryTable, MaterialTable
-from .model import Scene
+from .scene import Scene
 from .solver_table import OneOf, SolverTable
 
 T = TypeVar("T")

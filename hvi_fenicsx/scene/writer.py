@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tomli_w
 
-from .model import Scene
+from .scene import Scene
 
 
 def dump_scene(scene: Scene) -> str:

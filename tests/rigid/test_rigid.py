@@ -34,7 +34,7 @@ from hvi_fenicsx.rigid import (
     motion_at,
     rigid_fields,
 )
-from hvi_fenicsx.rigid.verdict import undecided
+from hvi_fenicsx.rigid.solvability import undecided
 
 Array = NDArray[np.float64]
 ALONE = MPI.COMM_SELF

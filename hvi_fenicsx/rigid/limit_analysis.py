@@ -14,8 +14,8 @@ from .cutting_planes import Functional, Minimum, Programme, Region, ball, cross
 from .kernel import modes, natural_basis, null_space, triangle
 from .motions import Mode, mode_of
 from .reduction import ReducedProblem, RigidProblem
+from .solvability import ExistenceState, LoadFactors, PaperConditions, Solvability
 from .thresholds import Thresholds
-from .verdict import ExistenceState, LoadFactors, PaperConditions, Solvability
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,88 @@
+"""Can a solution exist, along which rigid motion would the body escape, and how much more load would it bear?
+
+With C = Y ∩ K∞ the rigid motions that the contact admits, j^∞ the growth and ĵ the peak of the laws:
+held if <g,y> < ∫ j^∞(y) for all y ≠ 0 in C, escapes if <g,y> > ∫ ĵ(y) for some y in C, metastable in between,
+borderline where one of these is an equality, undecided where rounding lets no programme end. The theory and the closed
+forms are in docs/solvability.md.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TypeVar, cast
+
+import numpy as np
+from mpi4py import MPI
+
+from ..errors import HviError, InputError, SolverError
+from .kernel import modes
+from .limit_analysis import Analysis
+from .reduction import ReducedProblem, RigidProblem, reduce
+from .solvability import LoadFactors, Solvability, undecided, unmovable
+from .thresholds import DEFAULT, Thresholds
+
+Result = TypeVar("Result")
+
+
+def analyse(comm: MPI.Comm, problem: RigidProblem, thresholds: Thresholds = DEFAULT) -> Solvability:
+    """The state of a scene and its margins, before anything is solved. Collective; the same on all ranks.
+
+    Args:
+        comm: the ranks of the mesh.
+        problem: the body and what it meets.
+        thresholds: what counts as zero, and when to give up.
+    """
+    basis, reduced = reduce(comm, problem, thresholds)
+    c = _paper_c(comm, problem)
+    if basis.shape[1] == 0:
+        return unmovable(c)
+    return _on_root(comm, reduced, lambda found: _verdict(problem, found, c))
+
+
+def _verdict(problem: RigidProblem, reduced: ReducedProblem, c: float) -> Solvability:
+    try:
+        return Analysis(problem, reduced).solvability()
+    except SolverError as error:
+        return undecided(modes(reduced.frame, problem.body), c, str(error))
+
+
+def load_factors(
+    comm: MPI.Comm, problem: RigidProblem, load: str | None = None, thresholds: Thresholds = DEFAULT
+) -> LoadFactors:
+    """Factors of one load, the others constant, or of the whole load. Collective; the same on all ranks.
+
+    Args:
+        comm: the ranks of the mesh.
+        problem: the body and what it meets.
+        load: its name; None: the whole load.
+        thresholds: what counts as zero, and when to give up.
+
+    Raises:
+        InputError: there is no such load.
+        SolverError: the linear programmes broke down.
+    """
+    if load is not None and load not in problem.loads:
+        raise InputError(f"there is no load {load!r}; there are: {', '.join(problem.loads) or 'none'}")
+    basis, reduced = reduce(comm, problem, thresholds)
+    if basis.shape[1] == 0:
+        return LoadFactors(-np.inf, np.inf, np.inf, None, None)
+    return _on_root(comm, reduced, lambda found: Analysis(problem, found).load_factors(load))
+
+
+def _paper_c(comm: MPI.Comm, problem: RigidProblem) -> float:
+    square = sum(part.c4**2 * float(part.weights.sum()) for part in problem.resistances)
+    return float(np.sqrt(comm.allreduce(square)))
+
+
+def _on_root(comm: MPI.Comm, reduced: ReducedProblem | None, work: Callable[[ReducedProblem], Result]) -> Result:
+    """Do the work on the rank that holds the data and send the result, or its error, to all ranks."""
+    outcome: Result | HviError | None = None
+    if reduced is not None:
+        try:
+            outcome = work(reduced)
+        except HviError as error:
+            outcome = error
+    outcome = comm.bcast(outcome, root=0)
+    if isinstance(outcome, HviError):
+        raise outcome
+    return cast(Result, outcome)
