@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import functools
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
 _START = """
@@ -68,10 +70,18 @@ mesh.generate(2)
 
 
 def make(path: Path, body: str) -> Path:
-    """A file by gmsh; ``body`` is run in its API, with a few helpers."""
-    script = _START + body + _END
-    subprocess.run([sys.executable, "-c", script, str(path)], check=True, capture_output=True, timeout=60)
+    """A file by gmsh; ``body`` is run in its API, with a few helpers. What was made before is written again."""
+    path.write_bytes(_made(path.suffix, body))
     return path
+
+
+@functools.cache
+def _made(suffix: str, body: str) -> bytes:
+    with tempfile.TemporaryDirectory() as folder:
+        made = Path(folder, f"made{suffix}")
+        script = _START + body + _END
+        subprocess.run([sys.executable, "-c", script, str(made)], check=True, capture_output=True, timeout=60)
+        return made.read_bytes()
 
 
 def transformed(path: Path, source: Path, matrix: list[float]) -> Path:
