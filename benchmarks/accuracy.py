@@ -26,7 +26,7 @@ from mpi4py import MPI
 from hvi_fenicsx import Scene, read_scene
 from hvi_fenicsx.accuracy import adaptive, control, quantities
 from hvi_fenicsx.accuracy.adaptive import AdaptiveLevel, AdaptiveSolver
-from hvi_fenicsx.accuracy.control import Goal, Reached
+from hvi_fenicsx.accuracy.control import AccuracyResult, Goal
 from hvi_fenicsx.accuracy.quantity_base import Observable, contact_norm, prolong
 from hvi_fenicsx.certify import contact_state
 from hvi_fenicsx.runtime.timing import Timer
@@ -117,9 +117,9 @@ def exact(scene: Scene) -> Scene:
     return scene.with_solver(smoothing=None, epsilon=None, epsilon_absolute=None, tolerance=1e-8)
 
 
-def true_error(reached: Reached, scene: Scene, requested: float, largest: int) -> tuple[float | None, float]:
+def true_error(reached: AccuracyResult, scene: Scene, requested: float, largest: int) -> tuple[float | None, float]:
     """The relative error, and the reference's own estimated one (energy norm)."""
-    rung, quantity = reached.rung, reached.goal.quantity
+    rung, quantity = reached.level, reached.goal.quantity
     field = reader(quantity)(rung)
     wanted = min(requested, rung.solution.estimate.relative) / 3  # type: ignore[union-attr]
     go = solver()
@@ -127,7 +127,7 @@ def true_error(reached: Reached, scene: Scene, requested: float, largest: int) -
         below, rung = rung, go.refine(rung, adaptive.refined(rung, 0.75), scene, ahead(rung, quantity))
         field = prolong(field, rung, below)
     own = rung.solution.estimate.relative  # type: ignore[union-attr]
-    if own > 0.7 * reached.rung.solution.estimate.relative:  # type: ignore[union-attr]
+    if own > 0.7 * reached.level.solution.estimate.relative:  # type: ignore[union-attr]
         return None, own  # no reference worth the name within the largest number of unknowns
     apart = distance(rung, field, quantity)
     return (float(np.hypot(apart, own)) if quantity == "energy" else apart), own

@@ -10,6 +10,7 @@ from __future__ import annotations
 import argparse
 import time
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +22,7 @@ from mpi4py import MPI
 from hvi_fenicsx import Scene, read_scene
 from hvi_fenicsx.accuracy import adaptive, control
 from hvi_fenicsx.accuracy.control import Goal
+from hvi_fenicsx.accuracy.thresholds import CONTROL
 
 ROOT = Path(__file__).parents[1]
 CORNERS = {
@@ -103,12 +105,11 @@ def tolerance_savings() -> Iterator[str]:
     for name, requested in (("strong_law", 1e-3), ("lift_off", 2e-3), ("hertz", 1e-2)):
         scene = read_scene(ROOT / "demos" / f"{name}.toml")
         spent = []
-        for limits in (control.TOLERANCES, (1e-10, 1e-10)):
-            control.TOLERANCES, kept = limits, control.TOLERANCES
+        for coarsest in (CONTROL.coarsest_tolerance, CONTROL.finest_tolerance):
+            limits = replace(CONTROL, coarsest_tolerance=coarsest)
             start = time.process_time()
-            reached = control.reach(scene, MPI.COMM_WORLD, Goal(requested), solver(), lambda line: None)
+            reached = control.reach(scene, MPI.COMM_WORLD, Goal(requested), solver(), lambda line: None, limits)
             spent.append((time.process_time() - start, reached.solution.solve_result.counts.linear))  # type: ignore[union-attr]
-            control.TOLERANCES = kept
         (tied, few), (tight, many) = spent
         yield f"| {name} | {requested:g} | {tied:.1f} | {tight:.1f} | {tight / tied:.2f} | {few}, {many} |"
 

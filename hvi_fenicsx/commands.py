@@ -15,7 +15,7 @@ from mpi4py import MPI
 from . import console, results
 from .accuracy import control, quantities
 from .accuracy.adaptive import AdaptiveSolver
-from .accuracy.control import Goal, Reached
+from .accuracy.control import AccuracyResult, Goal
 from .errors import ExitCode, HviError, InputError
 from .report.html import render
 from .report.pictures import draw as pictures
@@ -117,7 +117,7 @@ def _finish(run_logs: Iterable[log.RunLog]) -> None:
         run_log.finish()
 
 
-def _solve(request: RunRequest, interrupt: Interrupt) -> tuple[Solution, Reached | None]:
+def _solve(request: RunRequest, interrupt: Interrupt) -> tuple[Solution, AccuracyResult | None]:
     """The solution; with it, where an accuracy was asked for, how it was reached. Collective."""
     if request.goal is not None:
         solver = AdaptiveSolver(timer=request.timer, interrupted=interrupt.requested)
@@ -143,7 +143,7 @@ def _say(lines: Iterable[str]) -> None:
         _LOG.info(line)
 
 
-def _write(request: RunRequest, solution: Solution, reached: Reached | None) -> dict[str, Any]:
+def _write(request: RunRequest, solution: Solution, reached: AccuracyResult | None) -> dict[str, Any]:
     """All files of the result but ``run.log``; the summary. Collective."""
     work, timer = request.folder.work, request.timer
     with timer("output"):
@@ -158,7 +158,7 @@ def _write(request: RunRequest, solution: Solution, reached: Reached | None) -> 
     return record
 
 
-def _accuracy(reached: Reached) -> dict[str, Any]:
+def _accuracy(reached: AccuracyResult) -> dict[str, Any]:
     """What differs in ``summary.json`` where an accuracy was asked for."""
     return {"accuracy": results.plain(reached.as_dict()), "exit_code": reached.exit_code}
 

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 from .accuracy import quantities
-from .accuracy.control import Reached
+from .accuracy.control import AccuracyResult
 from .certify.estimate.estimator import Estimate
 from .problem import effect_summary
 from .rigid import LoadFactors, Mode, RigidBody
@@ -143,7 +143,7 @@ def percent(value: float) -> str:
     return f"{100 * value:.2g} %" if value >= 1e-5 or value == 0 else f"{value:.0e}"
 
 
-def accuracy(reached: Reached) -> Iterator[str]:
+def accuracy(reached: AccuracyResult) -> Iterator[str]:
     """What was chosen for an accuracy, what it cost, and what a tenth of the error would cost."""
     goal, steps = reached.goal, reached.steps
     if reached.why is not None:

@@ -26,9 +26,7 @@ from ..solvers.nested_iteration import CoarseStart
 from ..system.levels import Level, Levels, prolongation, with_coarser_system
 from ..typing import Entities
 from ..workflow import DEFAULT, Preparation, Solution, Thresholds, finish_with_levels, prepare
-
-_CLOSE, _CORRECTIONS = 1.05, 2
-"""How near to the share wanted is near enough, and how often the marking is corrected for it."""
+from .thresholds import CONTROL, ControlThresholds
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -145,7 +143,12 @@ def _identity(like: PETSc.Vec) -> PETSc.Mat:
 
 
 def refined(level: AdaptiveLevel, bulk: float) -> Refinement:
-    """The mesh with so much of the squared error refined; the whole mesh where nothing was estimated. Collective."""
+    """The mesh with so much of the squared error refined; the whole mesh where nothing was estimated. Collective.
+
+    Args:
+        level: solved.
+        bulk: share of the squared error whose cells are marked.
+    """
     domain, estimate = level.prepared.problem.domain, level.solution.estimate
     with level.prepared.timer("mesh"):
         if estimate is None or bulk >= 1.0 or estimate.discretisation == 0.0:
@@ -153,14 +156,19 @@ def refined(level: AdaptiveLevel, bulk: float) -> Refinement:
         return refinement.marked(domain, marked(level.comm, estimate, bulk))
 
 
-def sparing(level: AdaptiveLevel, share: float) -> Refinement:
-    """The mesh with so much of the squared error refined, neighbours that are cut with the marked cells included.
+def refined_with_neighbours(level: AdaptiveLevel, share: float, thresholds: ControlThresholds = CONTROL) -> Refinement:
+    """The mesh with a share of the squared error refined, neighbours that are cut with marked cells included.
 
     On coarse meshes they are many: to mark such a share would refine far more than it. Collective.
+
+    Args:
+        level: solved.
+        share: of the squared error, to be refined in all.
+        thresholds: how near to the share is near enough.
     """
     bulk, step = share, refined(level, share)
-    for _ in range(_CORRECTIONS):
-        if (reached := _refined_share(level, step, bulk)) <= _CLOSE * share:
+    for _ in range(thresholds.corrections):
+        if (reached := _refined_share(level, step, bulk)) <= thresholds.close * share:
             break
         bulk *= share / reached
         step = refined(level, bulk)
@@ -168,7 +176,7 @@ def sparing(level: AdaptiveLevel, share: float) -> Refinement:
 
 
 def _refined_share(level: AdaptiveLevel, step: Refinement, bulk: float) -> float:
-    """Of the squared error: a marked cell counts in full, others by the cuts they have beside a marked one's."""
+    """Share of the squared error refined: marked cells in full, others by their cuts beside a marked one's."""
     found = level.solution.estimate
     if found is None or found.discretisation == 0.0:
         return 0.0
@@ -182,6 +190,11 @@ def marked(comm: MPI.Comm, estimate: Estimate, bulk: float) -> Entities:
     """The cells (local, owned) of the largest errors, which make up this share of the squared error. Collective.
 
     The threshold is one for all ranks; cells that tie with the last one are marked too, so symmetry stays.
+
+    Args:
+        comm: the ranks.
+        estimate: with the error of each cell.
+        bulk: share of the squared error.
     """
     squares = estimate.cells**2
     everything = np.sort(np.concatenate(agree(comm, squares)))[::-1]

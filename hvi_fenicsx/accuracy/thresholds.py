@@ -1,4 +1,4 @@
-"""The numbers that tune how errors of quantities are extrapolated and costs are forecast."""
+"""The numbers that tune how an accuracy is reached, errors are extrapolated and costs are forecast."""
 
 from __future__ import annotations
 
@@ -45,5 +45,51 @@ class ForecastThresholds:
     kilobytes_3d: float = 6.0
 
 
+@dataclass(frozen=True, kw_only=True)
+class ControlThresholds:
+    """How mesh, smoothing and tolerance follow from the estimated error.
+
+    Attributes:
+        bulk_2d: share of the squared error that one step refines in 2D.
+        bulk_3d: the same in 3D.
+        bulk_on_contact: the same for errors on Γc: they fall as the square of the energy norm's, so a smaller share
+            goes as far.
+        smallest_bulk: the least share that a step refines.
+        aim: part of the accuracy asked for at which the last step aims.
+        smoothing: part of the accuracy asked for that smoothing may take.
+        narrowest_step: least factor on ε in one step: what smoothing changes may fall much faster than ε.
+        algebraic: the solver's relative tolerance as a part of the estimated error.
+        finest_tolerance: the least tolerance of the solver.
+        coarsest_tolerance: the greatest tolerance of the solver.
+        tighter: factor on the tolerance where a mesh has no certified solution at first: a loose one may end where
+            the law is undecided.
+        meshes_before_forecast: meshes with an error of a quantity without an estimator before its cost is forecast.
+        failures: times in a row without a certified solution after which no equilibrium is expected.
+        most_levels: meshes at most.
+        usable_memory: part of the machine's memory that may be used.
+        close: how near to the wanted share a marking must come, as a factor.
+        corrections: how often a marking is corrected for that.
+    """
+
+    bulk_2d: float = 0.75
+    bulk_3d: float = 0.5
+    bulk_on_contact: float = 0.5
+    smallest_bulk: float = 0.2
+    aim: float = 0.9
+    smoothing: float = 0.3
+    narrowest_step: float = 1 / 3
+    algebraic: float = 0.03
+    finest_tolerance: float = 1e-10
+    coarsest_tolerance: float = 1e-4
+    tighter: float = 1e-3
+    meshes_before_forecast: int = 4
+    failures: int = 4
+    most_levels: int = 80
+    usable_memory: float = 0.8
+    close: float = 1.05
+    corrections: int = 2
+
+
+CONTROL = ControlThresholds()
 EXTRAPOLATION = ExtrapolationThresholds()
 FORECAST = ForecastThresholds()

@@ -19,7 +19,7 @@ from scenes import STEEL, model, quadratic_linear
 from hvi_fenicsx import Scene, read_scene
 from hvi_fenicsx.accuracy import adaptive, control, cost_forecast, quantities
 from hvi_fenicsx.accuracy.adaptive import AdaptiveLevel, AdaptiveSolver
-from hvi_fenicsx.accuracy.control import Goal, Reached
+from hvi_fenicsx.accuracy.control import AccuracyResult, Goal
 from hvi_fenicsx.accuracy.cost_forecast import AdaptiveStep
 from hvi_fenicsx.accuracy.quantities import FrictionTraction
 from hvi_fenicsx.accuracy.quantity_base import Observable, contact_norm, extrapolated, prolong
@@ -32,7 +32,7 @@ DEMOS = Path(__file__).parents[2] / "demos"
 STRONG = model(64, 3e6, friction=quadratic_linear(1e6))
 
 
-def reach(scene: Scene, goal: Goal) -> Reached:
+def reach(scene: Scene, goal: Goal) -> AccuracyResult:
     return control.reach(scene, COMM, goal, AdaptiveSolver(timer=Timer()), lambda line: None)
 
 
@@ -65,13 +65,13 @@ def test_what_is_asked_for_is_kept_and_not_overdone(table: dict[str, Any], reque
     reached = reach(Scene.model_validate(table), Goal(requested))
     assert reached.exit_code == 0
     assert reached.steps[-1].error <= requested
-    assert requested / 5 < far_in_energy(finer(reached.rung, 2)) < requested
+    assert requested / 5 < far_in_energy(finer(reached.level, 2)) < requested
 
 
 @pytest.mark.parametrize("quantity", ["u_t", "sigma_t"])
 def test_a_quantity_on_the_floor_is_kept(quantity: str) -> None:
     reached = reach(Scene.model_validate(STRONG), Goal(5e-2, quantity))
-    rungs = finer(reached.rung, 3)
+    rungs = finer(reached.level, 3)
     observable = quantities.find(quantity)()
     assert isinstance(observable, Observable)
     field = observable.value(rungs[0])
@@ -87,7 +87,7 @@ def test_the_first_wild_errors_of_a_quantity_refuse_nothing() -> None:
     """The slip under a half-disk is 100 % off on the second mesh, which would make it 10 million unknowns."""
     reached = reach(read_scene(DEMOS / "hertz.toml"), Goal(1e-2, "u_t"))
     assert reached.why is None
-    assert reached.rung.dofs < 100_000
+    assert reached.level.dofs < 100_000
 
 
 def test_a_mesh_without_a_solution_at_a_loose_tolerance_is_not_refined_for_that() -> None:
@@ -97,14 +97,14 @@ def test_a_mesh_without_a_solution_at_a_loose_tolerance_is_not_refined_for_that(
     reached = control.reach(scene, COMM, Goal(0.17), AdaptiveSolver(timer=Timer()), told.append)
     assert any("not certified" in line for line in told)
     assert reached.why is None
-    assert reached.rung.dofs < 8_000
+    assert reached.level.dofs < 8_000
 
 
 def test_a_drop_does_not_stay_where_the_coarser_mesh_had_it() -> None:
     """Of neighbouring vertices each may be the last before it: started from u_h alone this takes 116,788 unknowns."""
     reached = reach(read_scene(DEMOS / "lift_off.toml"), Goal(1e-3, "u_t"))
     assert reached.why is None
-    assert reached.rung.dofs < 20_000
+    assert reached.level.dofs < 20_000
 
 
 def test_smoothing_is_narrowed_as_far_as_asked_for_without_a_finer_mesh() -> None:
@@ -113,10 +113,10 @@ def test_smoothing_is_narrowed_as_far_as_asked_for_without_a_finer_mesh() -> Non
     reached = reach(scene, Goal(2e-2, "sigma_t"))
     widths = [step.epsilon for step in reached.steps]
     assert widths[-1] < widths[0] / 10  # type: ignore[operator]
-    assert reached.rung.dofs < 100
-    found = FrictionTraction().read(reached.rung)
-    exact = reached.rung.solution.scene.with_solver(smoothing=None, epsilon_absolute=None)
-    law = AdaptiveSolver(timer=Timer()).again(reached.rung, exact)
+    assert reached.level.dofs < 100
+    found = FrictionTraction().read(reached.level)
+    exact = reached.level.solution.scene.with_solver(smoothing=None, epsilon_absolute=None)
+    law = AdaptiveSolver(timer=Timer()).again(reached.level, exact)
     true = FrictionTraction().read(law)
     apart = contact_norm(law, true.x.array - found.x.array, 1)  # type: ignore[union-attr]
     assert apart < 2e-2 * contact_norm(law, true.x.array, 1)  # type: ignore[union-attr]
@@ -169,7 +169,7 @@ def test_a_last_step_refines_as_much_of_the_error_as_it_is_to(share: float) -> N
     rung = AdaptiveSolver(timer=Timer()).begin(scene, COMM)
     for _ in range(3):
         rung = AdaptiveSolver(timer=Timer()).refine(rung, adaptive.refined(rung, 0.75), scene)
-    finest = AdaptiveSolver(timer=Timer()).refine(rung, adaptive.sparing(rung, share), scene)
+    finest = AdaptiveSolver(timer=Timer()).refine(rung, adaptive.refined_with_neighbours(rung, share), scene)
     left = [r.solution.estimate.discretisation for r in (finest, rung)]  # type: ignore[union-attr]
     assert 1.0 - (left[0] / left[1]) ** 2 == pytest.approx(0.75 * share, abs=0.02)
 
