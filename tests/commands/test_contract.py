@@ -255,8 +255,15 @@ def test_a_killed_run_leaves_no_result_and_the_next_one_works(scene: Path, tmp_p
     assert sorted(f.name for f in tmp_path.iterdir()) == ["r", "square.toml"]
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-@pytest.mark.parametrize("ranks", [(), ("--np", "2")])
+@pytest.mark.parametrize(
+    ("number", "ranks"),
+    [
+        (signal.SIGINT, ()),
+        (signal.SIGTERM, ()),
+        (signal.SIGINT, ("--np", "2")),
+        pytest.param(signal.SIGTERM, ("--np", "2"), marks=pytest.mark.long),  # passed on by the same few lines
+    ],
+)
 def test_an_interrupted_run_writes_what_it_has_and_says_so(
     number: int, ranks: tuple[str, ...], scene: Path, tmp_path: Path
 ) -> None:
