@@ -134,6 +134,15 @@ def test_bodies_without_regions_of_their_own_are_numbered_from_the_left(folder: 
     assert verdict.kernel[2].name == "rotation about (0.5, 0.5) of body 1 at (0.5, 0.5)"
 
 
+def test_bodies_are_numbered_from_the_left_though_the_right_one_lies_lower(folder: Path, tmp_path: Path) -> None:
+    file = meshes.transformed(tmp_path / "m.msh", folder / "nameless.msh", [1, 0, 0, 0, -0.1, 1, 0, 0, 0, 0, 1, 0])
+    table = blocks(file, 2, 0.0, 0.0)
+    table["boundary"] = {"left": {"on": ["left_a"], "displacement": [0.0, 0.0]}}
+    bodies = list(prepare(Scene.model_validate(table)).problem.bodies)
+    assert bodies[0].centre[0] < bodies[1].centre[0]
+    assert bodies[0].centre[1] > bodies[1].centre[1]
+
+
 @pytest.mark.parametrize(
     ("conditions", "left"),
     [
