@@ -2,7 +2,7 @@
 
     ./hvi exec python3 benchmarks/accuracy.py [--only NAME] [--quantity NAME] [--accuracy X] [--again] [--write]
 
-The true error is the distance to a solution on the same ladder climbed on until its own estimated error is a third of
+The true error is the distance to a solution on the same meshes, refined on until its own estimated error is a third of
 what was requested (or the mesh has the largest number of unknowns); that error is added in quadrature and stated.
 CPU times are of one rank. Each row is stored in docs/benchmarks/accuracy.json as soon as it is known; what is there
 already is not measured again. ``--write`` puts the table and the picture of all stored rows into docs/accuracy.md.
@@ -119,24 +119,24 @@ def exact(scene: Scene) -> Scene:
 
 def true_error(reached: AccuracyResult, scene: Scene, requested: float, largest: int) -> tuple[float | None, float]:
     """The relative error, and the reference's own estimated one (energy norm)."""
-    rung, quantity = reached.level, reached.goal.quantity
-    field = reader(quantity)(rung)
-    wanted = min(requested, rung.solution.estimate.relative) / 3  # type: ignore[union-attr]
+    level, quantity = reached.level, reached.goal.quantity
+    field = reader(quantity)(level)
+    wanted = min(requested, level.solution.estimate.relative) / 3  # type: ignore[union-attr]
     go = solver()
-    while rung.solution.estimate.relative > wanted and rung.dofs < largest:  # type: ignore[union-attr]
-        below, rung = rung, go.refine(rung, adaptive.refined(rung, 0.75), scene, ahead(rung, quantity))
-        field = prolong(field, rung, below)
-    own = rung.solution.estimate.relative  # type: ignore[union-attr]
+    while level.solution.estimate.relative > wanted and level.dofs < largest:  # type: ignore[union-attr]
+        below, level = level, go.refine(level, adaptive.refined(level, 0.75), scene, ahead(level, quantity))
+        field = prolong(field, level, below)
+    own = level.solution.estimate.relative  # type: ignore[union-attr]
     if own > 0.7 * reached.level.solution.estimate.relative:  # type: ignore[union-attr]
         return None, own  # no reference worth the name within the largest number of unknowns
-    apart = distance(rung, field, quantity)
+    apart = distance(level, field, quantity)
     return (float(np.hypot(apart, own)) if quantity == "energy" else apart), own
 
 
-def ahead(rung: AdaptiveLevel, quantity: str) -> fem.Function | None:
+def ahead(level: AdaptiveLevel, quantity: str) -> fem.Function | None:
     """What `hvi run --accuracy` would start the next mesh from."""
     found = quantities.find(quantity)()
-    found.add(rung)
+    found.add(level)
     found.error()
     return found.ahead()
 
@@ -146,26 +146,26 @@ def reader(quantity: str) -> Callable[[AdaptiveLevel], Any]:
     return found.value if isinstance(found, Observable) else displacement
 
 
-def displacement(rung: AdaptiveLevel) -> fem.Function:
+def displacement(level: AdaptiveLevel) -> fem.Function:
     """The displacement, m."""
-    field = fem.Function(rung.prepared.problem.space)
-    field.x.array[:] = rung.solution.solve_result.u.x.array * rung.prepared.problem.scales.displacement  # type: ignore[union-attr]
+    field = fem.Function(level.prepared.problem.space)
+    field.x.array[:] = level.solution.solve_result.u.x.array * level.prepared.problem.scales.displacement  # type: ignore[union-attr]
     return field
 
 
-def distance(rung: AdaptiveLevel, field: fem.Function, quantity: str) -> float:
-    """Of a field from the one on this rung, relative."""
-    own, found = reader(quantity)(rung), quantities.find(quantity)
+def distance(level: AdaptiveLevel, field: fem.Function, quantity: str) -> float:
+    """Of a field from the one on this level, relative."""
+    own, found = reader(quantity)(level), quantities.find(quantity)
     apart = field.x.array - own.x.array
     if issubclass(found, Observable):
-        return contact_norm(rung, apart, found.power) / contact_norm(rung, own.x.array, found.power)
-    return energy_norm(rung, apart) / energy_norm(rung, own.x.array)
+        return contact_norm(level, apart, found.power) / contact_norm(level, own.x.array, found.power)
+    return energy_norm(level, apart) / energy_norm(level, own.x.array)
 
 
-def energy_norm(rung: AdaptiveLevel, values: Any) -> float:
-    field = fem.Function(rung.prepared.problem.space)
+def energy_norm(level: AdaptiveLevel, values: Any) -> float:
+    field = fem.Function(level.prepared.problem.space)
     field.x.array[:] = values
-    forces = contact_state.forces(rung.prepared.problem, field)
+    forces = contact_state.forces(level.prepared.problem, field)
     internal = (forces.reaction + forces.load).ravel()
     return float(np.sqrt(values[: internal.size] @ internal))
 

@@ -50,17 +50,17 @@ def corner(name: str) -> Scene:
     )
 
 
-def climbed(scene: Scene, bulk: float, most: int) -> tuple[list[int], list[float]]:
-    """Unknowns and estimated errors of a ladder up to so many unknowns."""
+def refined_to(scene: Scene, bulk: float, most: int) -> tuple[list[int], list[float]]:
+    """Unknowns and estimated errors of a mesh hierarchy up to so many unknowns."""
     go = solver()
-    rung = go.begin(scene, MPI.COMM_WORLD)
+    level = go.begin(scene, MPI.COMM_WORLD)
     sizes, errors = [], []
     while True:
-        sizes.append(rung.dofs)
-        errors.append(rung.solution.estimate.relative)  # type: ignore[union-attr]
-        if rung.dofs > most:
+        sizes.append(level.dofs)
+        errors.append(level.solution.estimate.relative)  # type: ignore[union-attr]
+        if level.dofs > most:
             return sizes, errors
-        rung = go.refine(rung, adaptive.refined(rung, bulk), scene)
+        level = go.refine(level, adaptive.refined(level, bulk), scene)
 
 
 def order(sizes: Sequence[float], errors: Sequence[float]) -> float:
@@ -72,7 +72,7 @@ def order(sizes: Sequence[float], errors: Sequence[float]) -> float:
 def orders(path: Path | None, most: int) -> Iterator[str]:
     """Observed orders in unknowns, as a table, and a picture."""
     yield "| body | uniform | adaptive | of P1 at best |\n|---|---|---|---|"
-    curves = {name: (climbed(corner(name), 1.0, most), climbed(corner(name), 0.75, most)) for name in CORNERS}
+    curves = {name: (refined_to(corner(name), 1.0, most), refined_to(corner(name), 0.75, most)) for name in CORNERS}
     for name, (uniform, adapted) in curves.items():
         yield f"| {name} | {order(*uniform):.2f} | {order(*adapted):.2f} | -0.50 |"
     if path is not None:
@@ -116,7 +116,7 @@ def tolerance_savings() -> Iterator[str]:
 
 def main() -> None:
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    options.add_argument("--most", type=int, default=100_000, help="unknowns of a ladder")
+    options.add_argument("--most", type=int, default=100_000, help="unknowns of a mesh hierarchy")
     options.add_argument("--write", action="store_true")
     given = options.parse_args()
     image = ROOT / "docs" / "images" / "adaptive_orders.png" if given.write else None

@@ -3,7 +3,7 @@
     ./hvi exec python3 benchmarks/cost.py [--cells 512 1024] [--boxes] [--unstructured] [--algebraic gamg hypre mumps]
 
 The linear solve has contact closed and the laws at rest; algebraic ones on the one mesh, the geometric one with the
-ladder's coarser meshes. All to 1e-8, in turn, medians of the repeats.
+hierarchy's coarser meshes. All to 1e-8, in turn, medians of the repeats.
 """
 
 from __future__ import annotations

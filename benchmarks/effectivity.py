@@ -1,4 +1,4 @@
-"""Estimated against true errors, scene by scene and up a ladder of uniformly refined meshes.
+"""Estimated against true errors, scene by scene and on uniformly refined meshes.
 
     ./hvi exec python3 benchmarks/effectivity.py [--levels 4] [--scenes NAME ...] [--picture FILE.png]
 
@@ -72,7 +72,7 @@ def steps(scene: Scene, count: int) -> list[Step]:
 
 
 def distance(step: Step, finer: Sequence[Step]) -> float:
-    """|||u_h - u||| for u on the last of the finer rungs. Collective."""
+    """|||u_h - u||| for u on the last of the finer meshes. Collective."""
     fine = finer[-1].system.problem
     away = _raised(step.u, step, finer)
     away.x.array[:] = finer[-1].u.x.array - away.x.array
@@ -127,7 +127,7 @@ class Row:
 
 
 def rows(scene: Scene, levels: int, extra: int = 2) -> list[Row]:
-    """Estimates on a ladder against the solution without smoothing ``extra`` refinements further up. Collective."""
+    """Estimates on refined meshes against the solution without smoothing ``extra`` refinements further up. Collective."""
     exact = steps(_exact(scene), levels + extra)
     found = exact if scene.solver.smoothing is None else steps(scene, levels)
     return [_row(step, exact[k + 1 :], scene) for k, step in enumerate(found[:levels])]

@@ -2,7 +2,7 @@
 
     ./hvi exec python3 benchmarks/one_run.py '{"scene": "demos/wall_left.toml", "overrides": [], "solver": "contact"}'
 
-``solver``: ``contact`` is what a user gets; ``gamg``, ``hypre``, ``mumps`` and ``mg`` (multigrid on the ladder)
+``solver``: ``contact`` is what a user gets; ``gamg``, ``hypre``, ``mumps`` and ``mg`` (multigrid on the mesh hierarchy)
 are one linear solve of the same mesh, contact closed and laws at rest; ``plain`` is PETSc's SNES VI as it is usually
 written. A small run before it loads the libraries and fills the JIT cache.
 """

@@ -3,7 +3,7 @@
     ./hvi exec python3 benchmarks/price_of_effects.py [--cells 512] [--repeats 3] [--cpu]
 
 Every scene but the first two differs from the base by the effects in its name only. They take the solver that a user
-gets (multigrid on the ladder from a few thousand unknowns). The base by MUMPS stands beside the same work
+gets (multigrid on the mesh hierarchy from a few thousand unknowns). The base by MUMPS stands beside the same work
 "by hand": mesh, forms, conditions and solver in plain dolfinx, nothing of this program. Each run has a process of its
 own (its peak memory is then its own), after a small one that loads the libraries and fills the JIT cache.
 """
@@ -70,7 +70,7 @@ def integrals(forms: list[Any]) -> int:
 
 
 def by_program(name: str, cells: int, clock: Callable[[], float]) -> dict[str, float]:
-    """Assembly holds the composition of the forms, the solve its setup and the coarser rungs."""
+    """Assembly holds the composition of the forms, the solve its setup and the coarser levels."""
     import dolfinx
     from mpi4py import MPI
 

@@ -2,7 +2,7 @@
 
     ./hvi exec python3 benchmarks/ranks.py [--cells 512]
 
-Strong: the same mesh. Weak: the same body in twice the cells (704 x 736 for 512 x 512, on as many rungs); the gain
+Strong: the same mesh. Weak: the same body in twice the cells (704 x 736 for 512 x 512, on as many levels); the gain
 is that of unknowns per second. The loops: one that only computes, and one that reads memory as a sparse product does,
 each alone and twice at once. Everything runs in turn, as often as ``--repeats`` says, and a gain is the median of those
 of the repeats, so that a machine that drifts does so for all.

@@ -36,21 +36,21 @@ def reach(scene: Scene, goal: Goal) -> AccuracyResult:
     return control.reach(scene, COMM, goal, AdaptiveSolver(timer=Timer()), lambda line: None)
 
 
-def finer(rung: AdaptiveLevel, times: int) -> list[AdaptiveLevel]:
+def finer(level: AdaptiveLevel, times: int) -> list[AdaptiveLevel]:
     """Uniform refinements, solved: a reference."""
-    found = [rung]
+    found = [level]
     for _ in range(times):
         last, solver = found[-1], AdaptiveSolver(timer=Timer())
-        found.append(solver.refine(last, adaptive.refined(last, 1.0), rung.solution.scene))
+        found.append(solver.refine(last, adaptive.refined(last, 1.0), level.solution.scene))
     return found
 
 
-def far_in_energy(rungs: list[AdaptiveLevel]) -> float:
+def far_in_energy(levels: list[AdaptiveLevel]) -> float:
     """Relative distance of the first solution from the last, energy norm."""
-    field = rungs[0].solution.solve_result.u  # type: ignore[union-attr]
-    for below, rung in itertools.pairwise(rungs):
-        field = prolong(field, rung, below)
-    problem, own = rungs[-1].prepared.problem, rungs[-1].solution.solve_result.u  # type: ignore[union-attr]
+    field = levels[0].solution.solve_result.u  # type: ignore[union-attr]
+    for below, level in itertools.pairwise(levels):
+        field = prolong(field, level, below)
+    problem, own = levels[-1].prepared.problem, levels[-1].solution.solve_result.u  # type: ignore[union-attr]
     norms = []
     for sign in (1.0, 0.0):
         field.x.array[:] = own.x.array - sign * field.x.array
@@ -71,15 +71,15 @@ def test_what_is_asked_for_is_kept_and_not_overdone(table: dict[str, Any], reque
 @pytest.mark.parametrize("quantity", ["u_t", "sigma_t"])
 def test_a_quantity_on_the_floor_is_kept(quantity: str) -> None:
     reached = reach(Scene.model_validate(STRONG), Goal(5e-2, quantity))
-    rungs = finer(reached.level, 3)
+    levels = finer(reached.level, 3)
     observable = quantities.find(quantity)()
     assert isinstance(observable, Observable)
-    field = observable.value(rungs[0])
-    for below, rung in itertools.pairwise(rungs):
-        field = prolong(field, rung, below)  # type: ignore[arg-type]
-    own, power = observable.value(rungs[-1]), 1 if quantity == "sigma_t" else 2
-    apart = contact_norm(rungs[-1], own.x.array - field.x.array, power)  # type: ignore[union-attr]
-    whole = contact_norm(rungs[-1], own.x.array, power)  # type: ignore[union-attr]
+    field = observable.value(levels[0])
+    for below, level in itertools.pairwise(levels):
+        field = prolong(field, level, below)  # type: ignore[arg-type]
+    own, power = observable.value(levels[-1]), 1 if quantity == "sigma_t" else 2
+    apart = contact_norm(levels[-1], own.x.array - field.x.array, power)  # type: ignore[union-attr]
+    whole = contact_norm(levels[-1], own.x.array, power)  # type: ignore[union-attr]
     assert 1e-2 * whole < apart < 5e-2 * whole
 
 
@@ -137,10 +137,10 @@ def l_shape() -> Scene:
 
 def slope(bulk: float, most: int) -> float:
     """Observed order in unknowns of the estimated error, over the last factor of about ten."""
-    rung, points = AdaptiveSolver(timer=Timer()).begin(l_shape(), COMM), []
-    while rung.dofs < most:
-        rung = AdaptiveSolver(timer=Timer()).refine(rung, adaptive.refined(rung, bulk), rung.solution.scene)
-        points.append((rung.dofs, rung.solution.estimate.relative))  # type: ignore[union-attr]
+    level, points = AdaptiveSolver(timer=Timer()).begin(l_shape(), COMM), []
+    while level.dofs < most:
+        level = AdaptiveSolver(timer=Timer()).refine(level, adaptive.refined(level, bulk), level.solution.scene)
+        points.append((level.dofs, level.solution.estimate.relative))  # type: ignore[union-attr]
     kept = np.log([p for p in points if p[0] >= points[-1][0] / 20])
     return float(np.polyfit(kept[:, 0], kept[:, 1], 1)[0])
 
@@ -166,11 +166,11 @@ def test_the_bulk_criterion_marks_as_few_cells_as_it_can(bulk: float) -> None:
 def test_a_last_step_refines_as_much_of_the_error_as_it_is_to(share: float) -> None:
     """What halves its edges leaves a quarter of its square, so the step after it tells what share was refined."""
     scene = Scene.model_validate(model(4, pull=6e6, friction=quadratic_linear(3e6)))
-    rung = AdaptiveSolver(timer=Timer()).begin(scene, COMM)
+    level = AdaptiveSolver(timer=Timer()).begin(scene, COMM)
     for _ in range(3):
-        rung = AdaptiveSolver(timer=Timer()).refine(rung, adaptive.refined(rung, 0.75), scene)
-    finest = AdaptiveSolver(timer=Timer()).refine(rung, adaptive.refined_with_neighbours(rung, share), scene)
-    left = [r.solution.estimate.discretisation for r in (finest, rung)]  # type: ignore[union-attr]
+        level = AdaptiveSolver(timer=Timer()).refine(level, adaptive.refined(level, 0.75), scene)
+    finest = AdaptiveSolver(timer=Timer()).refine(level, adaptive.refined_with_neighbours(level, share), scene)
+    left = [r.solution.estimate.discretisation for r in (finest, level)]  # type: ignore[union-attr]
     assert 1.0 - (left[0] / left[1]) ** 2 == pytest.approx(0.75 * share, abs=0.02)
 
 
@@ -183,8 +183,8 @@ def test_extrapolation_knows_the_order(order: float) -> None:
     assert extrapolated((1.0, 2.0, np.nan), 1.0, None) == pytest.approx(3.0)
 
 
-def ladder(rate: float, count: int) -> list[AdaptiveStep]:
-    """Rungs of 1000 · 3^k unknowns with error dofs^-rate, each 0.2 s and 1e-5 s per unknown."""
+def mesh hierarchy(rate: float, count: int) -> list[AdaptiveStep]:
+    """Levels of 1000 · 3^k unknowns with error dofs^-rate, each 0.2 s and 1e-5 s per unknown."""
     sizes = [1000 * 3**k for k in range(count)]
     return [
         AdaptiveStep(
@@ -203,7 +203,7 @@ def ladder(rate: float, count: int) -> list[AdaptiveStep]:
 
 
 def test_a_forecast_hits_a_ladder_that_goes_on_as_it_did() -> None:
-    steps = ladder(0.4, 9)
+    steps = mesh hierarchy(0.4, 9)
     known = steps[:7]
     found = cost_forecast.cost(known, steps[-1].error, 2, 150.0)
     assert found.dofs == pytest.approx(steps[-1].dofs, rel=1e-6)
