@@ -127,7 +127,7 @@ class Row:
 
 
 def rows(scene: Scene, levels: int, extra: int = 2) -> list[Row]:
-    """Estimates on refined meshes against the solution without smoothing ``extra`` refinements further up. Collective."""
+    """Estimates on refined meshes against the unsmoothed solution ``extra`` refinements further up. Collective."""
     exact = steps(_exact(scene), levels + extra)
     found = exact if scene.solver.smoothing is None else steps(scene, levels)
     return [_row(step, exact[k + 1 :], scene) for k, step in enumerate(found[:levels])]

@@ -183,7 +183,7 @@ def test_extrapolation_knows_the_order(order: float) -> None:
     assert extrapolated((1.0, 2.0, np.nan), 1.0, None) == pytest.approx(3.0)
 
 
-def mesh hierarchy(rate: float, count: int) -> list[AdaptiveStep]:
+def hierarchy(rate: float, count: int) -> list[AdaptiveStep]:
     """Levels of 1000 · 3^k unknowns with error dofs^-rate, each 0.2 s and 1e-5 s per unknown."""
     sizes = [1000 * 3**k for k in range(count)]
     return [
@@ -203,7 +203,7 @@ def mesh hierarchy(rate: float, count: int) -> list[AdaptiveStep]:
 
 
 def test_a_forecast_hits_a_ladder_that_goes_on_as_it_did() -> None:
-    steps = mesh hierarchy(0.4, 9)
+    steps = hierarchy(0.4, 9)
     known = steps[:7]
     found = cost_forecast.cost(known, steps[-1].error, 2, 150.0)
     assert found.dofs == pytest.approx(steps[-1].dofs, rel=1e-6)
