@@ -16,34 +16,9 @@ from pathlib import Path
 import pytest
 
 PACKAGE = Path(__file__).parents[2] / "hvi_fenicsx"
-COMPLETE = (
-    "__init__",
-    "accuracy",
-    "certify",
-    "class_registry",
-    "cli",
-    "commands",
-    "compat",
-    "console",
-    "effects",
-    "errors",
-    "formula",
-    "geometry",
-    "laws",
-    "mesh",
-    "problem",
-    "report",
-    "results",
-    "rigid",
-    "runtime",
-    "scene",
-    "schema",
-    "solvers",
-    "studies",
-    "system",
-    "typing",
-    "workflow",
-)
+ROOMS = sorted(p.stem for p in PACKAGE.iterdir() if p.suffix == ".py" or (p / "__init__.py").exists())
+UNFINISHED = ("solvers",)
+COMPLETE = [room for room in ROOMS if room not in UNFINISHED]
 """Rooms, and modules that stand alone, whose docstrings obey the rule."""
 PACKED = re.compile(r"^(\*{0,2}\w+, )+\*{0,2}\w+: |\. [a-z]\w*(, \w+)*: ")
 """``a, b: ...``, or ``a: ... . b: ...``"""

@@ -10,24 +10,6 @@ from collections.abc import Iterator
 from pathlib import Path
 
 TESTS = Path(__file__).parents[1]
-ALLOWED = {
-    ("conftest.py", "_LARGEST_DIRECT"),
-    ("conftest.py", "_WORTHWHILE"),
-    ("mesh/test_coarsening_2d.py", "_COARSEST"),
-    ("mesh/test_coarsening_2d.py", "_DIFFERENT"),
-    ("mesh/test_coarsening_2d.py", "_WORTHWHILE"),
-    ("mesh/test_coarsening_3d.py", "_COARSEST"),
-    ("mesh/test_coarsening_3d.py", "_DIFFERENT"),
-    ("mesh/test_coarsening_3d.py", "_PATIENCE"),
-    ("mesh/test_coarsening_3d.py", "_PER_TRIANGLE"),
-    ("mesh/test_coarsening_3d.py", "_WORTHWHILE"),
-    ("mesh/test_refinement.py", "_LARGEST_DIRECT"),
-    ("problem/test_composition.py", "_LARGEST_DIRECT"),
-    ("problem/test_composition.py", "_WORTHWHILE"),
-    ("solvers/test_existence_states.py", "_BUDGET"),
-    ("system/test_schur.py", "_WORTH"),
-}
-"""Files and private names for which there is no other way yet."""
 
 
 def patched(call: ast.Call) -> str | None:
@@ -57,4 +39,4 @@ def test_no_test_patches_a_private_name() -> None:
             names = [patched(node)] if isinstance(node, ast.Call) else []
             names += assigned(node) if isinstance(node, ast.Assign) else []
             found |= {(str(file.relative_to(TESTS)), name) for name in names if name}
-    assert sorted(found - ALLOWED) == []
+    assert sorted(found) == []
