@@ -24,6 +24,7 @@ from hvi_fenicsx.mesh.thresholds import Thresholds
 from hvi_fenicsx.runtime import timing
 from hvi_fenicsx.runtime.timing import Timer
 from hvi_fenicsx.scene import Scene
+from hvi_fenicsx.scene_model import model_of, options_of
 from hvi_fenicsx.solvers import nested_iteration
 from hvi_fenicsx.solvers.active_set import ActiveSetSolver
 from hvi_fenicsx.solvers.closed_start import resting_start
@@ -32,7 +33,7 @@ from hvi_fenicsx.system import petsc_options
 from hvi_fenicsx.system.assemble import assemble
 from hvi_fenicsx.system.held_solver import LinearSettings
 from hvi_fenicsx.system.system import System
-from hvi_fenicsx.workflow import finish, model_of, options_of, prepare
+from hvi_fenicsx.workflow import finish, prepare
 
 COMM = MPI.COMM_WORLD
 HYPRE = (

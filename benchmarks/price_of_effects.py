@@ -76,11 +76,11 @@ def by_program(name: str, cells: int, clock: Callable[[], float]) -> dict[str, f
 
     from hvi_fenicsx import Scene
     from hvi_fenicsx.runtime.timing import Timer
+    from hvi_fenicsx.scene_model import model_of, options_of
     from hvi_fenicsx.solvers import nested_iteration
     from hvi_fenicsx.solvers.context import RunControl
     from hvi_fenicsx.system import existence
     from hvi_fenicsx.system.assemble import assemble
-    from hvi_fenicsx.workflow import model_of, options_of
 
     forms, make = [], dolfinx.fem.form
 

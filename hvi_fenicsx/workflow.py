@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 
@@ -12,17 +11,17 @@ from mpi4py import MPI
 from .certify import certificate, plausibility
 from .certify.certificate import Examination
 from .certify.estimate.estimator import Estimate, estimate
-from .errors import ExitCode, InputError, SolverError
-from .laws import smoothing
+from .errors import ExitCode, SolverError
 from .mesh.domain import Domain
 from .mesh.thresholds import Thresholds as MeshThresholds
-from .problem.compose import Model, Modification, unchanged
+from .problem.compose import Model
 from .problem.problem import Problem
 from .rigid import LoadFactors, Solvability
 from .runtime.log import logger, newton_step
 from .runtime.timing import Timer
-from .scene import Scene, SolverTable
-from .solvers import nested_iteration, registry
+from .scene import Scene
+from .scene_model import model_of, options_of
+from .solvers import nested_iteration
 from .solvers.context import Progress, RunControl, never
 from .solvers.nested_iteration import CoarseStart, LevelSolution
 from .solvers.options import SolverOptions
@@ -147,55 +146,6 @@ class Preparation:
             InputError: on all ranks alike: there is no such load.
         """
         return existence.load_factors(self.problem, self.system.forces, load)
-
-
-def model_of(scene: Scene) -> Model:
-    """The effects of a scene and their places, its laws smoothed where it says so."""
-    return Model(
-        scene.parts, [(placed.where, placed.effect) for placed in scene.effects()], _modification(scene.solver)
-    )
-
-
-def _modification(wanted: SolverTable) -> Modification:
-    """What the solver table does to a law: smooth it, or nothing."""
-    if wanted.smoothing is None:
-        return unchanged
-    return functools.partial(
-        smoothing.create, wanted.smoothing, epsilon=wanted.epsilon, epsilon_absolute=wanted.epsilon_absolute
-    )
-
-
-def options_of(wanted: SolverTable, thresholds: SolverThresholds = DEFAULT.solvers) -> SolverOptions:
-    """The options of a scene's solver table.
-
-    Args:
-        wanted: the table.
-        thresholds: the numbers that tune the methods.
-
-    Raises:
-        InputError: there is no such method, or it does not take what the table asks for.
-    """
-    method = registry.find(wanted.method)
-    if wanted.smoothing is not None and not method.takes_smoothing:
-        raise InputError(
-            f'solver.method: "{wanted.method}" solves the law without smoothing; leave out smoothing and epsilon, '
-            'or use "auto"'
-        )
-    if wanted.start != "unbroken" and not method.takes_pieces:
-        raise InputError(
-            f'solver.start: is for the branch iteration; leave it out, or use method = "auto", not "{wanted.method}"'
-        )
-    return SolverOptions(
-        method=wanted.method,
-        epsilon=wanted.epsilon,
-        epsilon_absolute=wanted.epsilon_absolute,
-        start=wanted.start,
-        tolerance=wanted.tolerance,
-        linear_solver=wanted.linear_solver,
-        second_order=wanted.second_order,
-        max_iterations=wanted.max_iterations,
-        thresholds=thresholds,
-    )
 
 
 def prepare(

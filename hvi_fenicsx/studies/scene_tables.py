@@ -11,7 +11,7 @@ from pydantic import ValidationError
 from ..laws import smoothing
 from ..scene import Scene, dump_scene
 from ..schema import input_error
-from ..workflow import options_of
+from ..scene_model import options_of
 from .setting import Setting
 
 Tables = dict[str, Any]

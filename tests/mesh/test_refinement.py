@@ -26,6 +26,7 @@ from hvi_fenicsx.mesh import gmsh_file, refinement
 from hvi_fenicsx.mesh.blocks import block
 from hvi_fenicsx.mesh.domain import Domain
 from hvi_fenicsx.runtime.timing import Timer
+from hvi_fenicsx.scene_model import model_of, options_of
 from hvi_fenicsx.solvers.context import RunControl
 from hvi_fenicsx.solvers.nested_iteration import CoarseStart, ascend
 from hvi_fenicsx.solvers.thresholds import Thresholds as SolverThresholds
@@ -146,7 +147,7 @@ def test_prolongation_turns_with_the_frames() -> None:
 @pytest.mark.parametrize("scene", [Scene.model_validate(model(8, 3e6, friction=quadratic_linear(1e6))), slanted(0.1)])
 def test_multigrid_and_starts_on_a_refined_hierarchy(scene: Scene) -> None:
     """The solution of the finest mesh is that of a direct solve from rest; few steps remain from the coarser one."""
-    coarse, options = workflow.prepare(scene, COMM), workflow.options_of(scene.solver)
+    coarse, options = workflow.prepare(scene, COMM), options_of(scene.solver)
     options = replace(options, thresholds=SolverThresholds(linear=LinearThresholds(largest_direct={2: 500, 3: 500})))
     control, found = RunControl(timer=Timer()), solved_system(coarse)
     for k in range(3):
@@ -170,7 +171,7 @@ def test_multigrid_and_starts_on_a_refined_hierarchy(scene: Scene) -> None:
 
 
 def assembled(scene: Scene, body: Domain) -> System:
-    return assemble(body, workflow.model_of(scene), Timer())
+    return assemble(body, model_of(scene), Timer())
 
 
 @pytest.mark.parametrize("ranks", RANKS[1:])
