@@ -10,8 +10,8 @@ from pydantic import ValidationError
 
 from ..laws import smoothing
 from ..scene import Scene, dump_scene
-from ..schema import input_error
 from ..scene_model import options_of
+from ..schema import input_error
 from .setting import Setting
 
 Tables = dict[str, Any]
