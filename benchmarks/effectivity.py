@@ -28,7 +28,7 @@ from hvi_fenicsx.mesh import refinement
 from hvi_fenicsx.problem.problem import Problem
 from hvi_fenicsx.runtime.timing import Timer
 from hvi_fenicsx.solvers.context import RunControl
-from hvi_fenicsx.solvers.nested_iteration import CoarseStart, LevelSolution, ascend, solve
+from hvi_fenicsx.solvers.nested_iteration import CoarseStart, LevelSolution, solve, solve_from_coarser
 from hvi_fenicsx.system.assemble import assemble
 from hvi_fenicsx.system.levels import Level, prolongation
 from hvi_fenicsx.system.system import System
@@ -67,7 +67,7 @@ def steps(scene: Scene, count: int) -> list[Step]:
         lift = prolongation(system, below.system, refined.transfer)
         levels = (Level(system, below.system, lift), *below.levels)
         start = CoarseStart(system=below.system, result=below.result, prolongation=lift, levels=levels)
-        found.append(Step(ascend(system, start, verdict, options, control), refined))
+        found.append(Step(solve_from_coarser(system, start, verdict, options, control), refined))
     return found
 
 

@@ -70,7 +70,7 @@ def linear(scene: Scene, kind: str) -> Figures:
     timer = Timer()
     system, options, levels = assembled(scene, timer), options_of(scene.solver), ()
     if kind == "mg":
-        levels = nested_iteration.hierarchy(model_of(scene), system, options, RunControl(timer=timer))
+        levels = nested_iteration.coarser_levels(model_of(scene), system, options, RunControl(timer=timer))
     solver = ActiveSetSolver(system, levels, LinearSettings(KINDS[kind]), timer)
     _, iterations = resting_start(solver, [t.law for t in system.terms], scene.solver.tolerance)
     return {**timer.report(), "linear": iterations, "dofs": system.dofs, "certified": True}

@@ -102,7 +102,7 @@ def solver(prepared: Preparation) -> str:
     kind = nested_iteration.linear_settings(prepared.system, prepared.options).kind
     linear = {"lu": "MUMPS", "gamg": "CG with GAMG", "mg": "CG with geometric multigrid on the mesh hierarchy"}[kind]
     bounds = "" if prepared.problem.bounds else ", no bounds"
-    return f"{registry.choose(prepared.options, prepared.system).words}{bounds}, {linear}"
+    return f"{registry.choose(prepared.options, prepared.system).description}{bounds}, {linear}"
 
 
 def outcome(solution: Solution) -> Iterator[str]:

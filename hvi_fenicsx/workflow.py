@@ -291,7 +291,7 @@ def _solved(prepared: Preparation, control: RunControl, start: CoarseStart | Non
     system, options, solvability = prepared.system, prepared.options, prepared.solvability
     try:
         if start is not None:
-            found = nested_iteration.ascend(system, start, solvability, options, control)
+            found = nested_iteration.solve_from_coarser(system, start, solvability, options, control)
         else:
             found = nested_iteration.solve(prepared.model, system, solvability, options, control)
         if system.free_motions is not None:

@@ -16,7 +16,7 @@ from petsc4py import PETSc
 
 from ..problem.problem import Problem
 from ..runtime.timing import Timer
-from ..solvers.law_models import Cells, Full
+from ..solvers.law_models import Cells, ExactLaw
 from ..system.system import System, compile_forms
 from ..typing import Integers, Mask
 from .contact_state import ContactState, LawState
@@ -40,7 +40,7 @@ def by_inertia(problem: Problem, u: fem.Function, states: Sequence[ContactState]
     models = []
     for term in system.terms:
         argument = term.argument(x.array_r)
-        models.append(Full(term.law, Cells.around(term.law.convex, argument, radial=term.radial)))
+        models.append(ExactLaw(term.law, Cells.around(term.law.convex, argument, radial=term.radial)))
     system.jacobian.set_rates(system.tangents(x, models))
     strong, weak = _active(system, states, tolerance)
     if _negative(system, strong) == 0:

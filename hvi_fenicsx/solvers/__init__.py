@@ -1,4 +1,4 @@
-"""The solution methods, one file each, and nested iteration."""
+"""The solution methods, one module each, and nested iteration."""
 
 from .context import SolveContext
 from .method import Method

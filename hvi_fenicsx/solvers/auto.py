@@ -1,10 +1,10 @@
-"""What is solved with where no method is named: the branch iteration, begun again elsewhere if it finds no equilibrium.
+"""The method where none is named: the branch iteration, from other starts too if it finds no equilibrium.
 
-The unbroken branch comes first. A narrowly smoothed law is then approached from the solution of the unsmoothed one. A
-body that rolls or tips on its way to rest is put down as a rigid one first (:mod:`.rigid_start`). In the metastable
-state the iteration may slide off while an equilibrium exists on other pieces of the laws: starts on the pieces of the
-resting slips, with every bond broken, and a continuation in the smoothing look for it there. Where no equilibrium need
-exist, the search ends after so many Newton steps.
+The unbroken branch comes first. For a narrowly smoothed law, the solution of the unsmoothed law is the next start. For
+a body that rolls or tips on its way to rest, it is the position at rest of the rigid body (:mod:`.rigid_start`). In the
+metastable state the iteration may slide off while an equilibrium exists on other pieces of the laws: starts on the
+pieces of the resting slips, with every bond broken, and a continuation in the smoothing look for it there. Where an
+equilibrium may not exist, the search ends after a number of Newton steps.
 """
 
 from __future__ import annotations
@@ -25,12 +25,9 @@ from .law_models import Majorant
 from .result import Counts, SolveResult
 from .rigid_start import at_rest
 
-_BROKEN = 1e6
-"""Times the resting slip: beyond every kink."""
-
 
 class _StepLimit:
-    """Whether to stop: the user asks for it, or all starts together have taken so many Newton steps (None: any)."""
+    """Whether to stop: the user asks for it, or all starts together have taken too many Newton steps (None: any)."""
 
     def __init__(self, interrupted: Callable[[], bool], most: int | None) -> None:
         self._interrupted, self._most = interrupted, most
@@ -46,7 +43,7 @@ class _StepLimit:
 
 
 class Auto(BranchIteration):
-    """The branch iteration with further starts where the first finds nothing."""
+    """The branch iteration, with further starts where the first finds no equilibrium."""
 
     name = "auto"
     label = "branch"
@@ -54,16 +51,16 @@ class Auto(BranchIteration):
 
     def __init__(self, context: SolveContext) -> None:
         held = context.solvability.state == "held"
-        most = None if held else context.options.thresholds.search_steps
+        most = None if held else context.options.thresholds.branch.search_steps
         self._limit = _StepLimit(context.solver.interrupted, most)
-        super().__init__(replace(context, solver=context.solver.stopped_by(self._limit)))
+        super().__init__(replace(context, solver=context.solver.with_interruption(self._limit)))
 
     def solve(self, start: PETSc.Vec | None = None, branches: PETSc.Vec | None = None) -> SolveResult:
-        """A stationary point; that of the first start that finds one, else what the first start left. Collective.
+        """A stationary point from the first start that finds one, else the result of the first start. Collective.
 
         Args:
             start: where to begin; by default the resting start.
-            branches: a displacement whose pieces of the laws to begin on.
+            branches: a displacement that says on which pieces of the laws to begin.
         """
         found = self._search(start, branches)
         if not self._limit.exceeded:
@@ -84,47 +81,47 @@ class Auto(BranchIteration):
         return first
 
     def _others(self) -> Iterator[SolveResult]:
-        exact = [term.exact for term in self.system.terms]
+        """Results from further starts, one after the other."""
+        exact, broken = [term.exact for term in self.system.terms], self.thresholds.broken_slip
         if any(law is not true for law, true in zip(self._laws, exact, strict=True)):
-            for found in self._attempt(self._anew(exact).solve):
-                yield from self._beside(found)
+            for found in self._attempt(self._iteration(exact).solve):
+                yield from self._from_exact(found)
         yield from self._from_rest()
         resting, _ = resting_start(self.solver, self._laws)
-        for factor in (1.0, _BROKEN, -_BROKEN):
+        for factor in (1.0, broken, -broken):
             pieces = resting.copy()
             pieces.scale(factor)
-            yield from self._attempt(self._anew().solve, None, pieces)
+            yield from self._attempt(self._iteration().solve, None, pieces)
         yield from self._attempt(Continuation(self.context).solve)
 
     def _from_rest(self) -> Iterator[SolveResult]:
-        """From bodies at rest on their supports, bonds as they are there, or unbroken.
+        """From bodies at rest on their supports, since closed contact is no start where bodies roll.
 
-        Where bodies roll, closed contact is no start.
+        The bonds are as they are at rest, then unbroken.
         """
-        rested = at_rest(self.context, self._majorants, 1e-4)
+        rested = at_rest(self.context, self._majorants, self.thresholds.rest_tolerance)
         if rested is None:
             return
         unbroken = rested[0].duplicate()
         unbroken.set(0.0)
         for bonds in (rested[0], unbroken):
-            yield from self._attempt(self._anew().solve, rested[0], bonds)
+            yield from self._attempt(self._iteration().solve, rested[0], bonds)
 
     def _majorants(self, x: PETSc.Vec) -> list[Majorant]:
-        parts = zip(self._laws, self._cells(x), self._subgradients(x, 0.0), strict=True)
-        return [Majorant(law, cells, xi) for law, cells, xi in parts]
+        return self._convex.majorants(self._convex.cells(x), self._convex.subgradients(x))
 
-    def _beside(self, exact: SolveResult) -> Iterator[SolveResult]:
-        """From the unsmoothed law's solution: what sticks there is within the narrow band that smoothing leaves."""
+    def _from_exact(self, exact: SolveResult) -> Iterator[SolveResult]:
+        """From the unsmoothed law's solution: its sticking vertices slip by less than the width of the smoothing."""
         if exact.converged:
-            yield from self._attempt(self._anew().solve, self.system.unknowns(exact.u))
+            yield from self._attempt(self._iteration().solve, self.system.unknowns(exact.u))
 
-    def _anew(self, laws: Sequence[Superpotential] | None = None) -> BranchIteration:
+    def _iteration(self, laws: Sequence[Superpotential] | None = None) -> BranchIteration:
         """A branch iteration in the same context, by default on the same laws."""
         laws = self._laws if laws is None else laws
         return BranchIteration(self.context, laws, self._epsilon, check_bounded=True)
 
     @staticmethod
     def _attempt(solve: Callable[..., SolveResult], *start: PETSc.Vec | None) -> Iterator[SolveResult]:
-        """One attempt; a breakdown is no result."""
+        """The result of one attempt; none where the method breaks down."""
         with suppress(SolverError):
             yield solve(*start)

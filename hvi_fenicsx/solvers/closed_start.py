@@ -1,4 +1,4 @@
-"""The start that holds every rigid motion: contact closed, laws at rest."""
+"""The resting start, which holds every rigid motion: contact closed, laws at rest."""
 
 from __future__ import annotations
 
@@ -12,19 +12,20 @@ from ..system import existence
 from ..system.system import LawModel, System
 from ..typing import Array, Entities, Integers
 from .active_set import ActiveSetSolver
-from .law_models import Resting
+from .law_models import TangentAtRest
 
 
 def contact_dofs(system: System) -> Integers:
-    """Scalar dofs (local, owned, sorted) of the normal displacements that have bounds."""
+    """Scalar dofs (local, owned, sorted) of normal displacements with contact bounds."""
     normal = (b.component()[0] for b in system.bounds)
     return np.unique(np.concatenate([np.empty(0, np.int64), *normal]))
 
 
 def held_dofs(system: System, laws: Sequence[Superpotential]) -> Entities:
-    """Scalar dofs (local, owned, sorted) that the start holds. Collective.
+    """Scalar dofs (local, owned, sorted) that the resting start holds. Collective.
 
-    The normal ones of contact parts; where these leave a rigid motion, also slips at which a law has a convex kink.
+    These are normal displacements of contact parts; where they leave a rigid motion, also slips at which a law has a
+    convex kink.
 
     Args:
         system: the assembled problem.
@@ -53,7 +54,7 @@ def resting_start(
         rtol: relative tolerance of the linear solve; by default that of a start.
 
     Returns:
-        The displacement, and linear iterations.
+        The displacement, and iterations of the linear solver.
     """
     rtol = solver.thresholds.start_tolerance if rtol is None else rtol
     system = solver.system
@@ -63,17 +64,17 @@ def resting_start(
     contact = contact_dofs(system)
     x.array[contact] = closed(low[contact], high[contact])
     system.prescribe(x)
-    held, models = held_dofs(system, laws), [Resting(law) for law in laws]
+    held, models = held_dofs(system, laws), [TangentAtRest(law) for law in laws]
     linear = solver.newton_step(x, held, models, rtol).linear
-    if _pushed(solver, x, contact, models):
+    if _push_onto_bounds(solver, x, contact, models):
         linear += solver.newton_step(x, held, models, rtol).linear
     return x, linear
 
 
-def _pushed(solver: ActiveSetSolver, x: PETSc.Vec, contact: Integers, models: Sequence[LawModel]) -> bool:
-    """Bilateral contact: put vertices between their bounds on the one that the reaction points to. Collective.
+def _push_onto_bounds(solver: ActiveSetSolver, x: PETSc.Vec, contact: Integers, models: Sequence[LawModel]) -> bool:
+    """Bilateral contact: move vertices between two bounds onto the one that the reaction points to. Collective.
 
-    Between its bounds a vertex is held by nothing, and the body could drift. Whether any vertex was moved.
+    Nothing holds a vertex between its bounds, and the body could slide. Returns whether a vertex was moved.
     """
     system = solver.system
     residual = system.load.duplicate()
@@ -87,7 +88,12 @@ def _pushed(solver: ActiveSetSolver, x: PETSc.Vec, contact: Integers, models: Se
 
 
 def closed(lower: Array, upper: Array) -> Array:
-    """The bounds (n,) to close on: the only finite one, or of two the point nearest 0; 0 where there is none."""
+    """Displacements that close contact: a single finite bound, between two bounds the point nearest to 0, else 0, (n,).
+
+    Args:
+        lower: lower bounds, (n,).
+        upper: upper bounds, (n,).
+    """
     both = np.isfinite(lower) & np.isfinite(upper)
     one = np.where(np.isfinite(lower), lower, np.where(np.isfinite(upper), upper, 0.0))
     return np.where(both, np.clip(0.0, lower, upper), one)

@@ -1,4 +1,4 @@
-"""The paper's own procedure (Ovcharova and Gwinner, section 5.2): what every other method is compared with.
+"""The paper's own procedure (Ovcharova and Gwinner, section 5.2), with which the other methods are compared.
 
 The stiffness is condensed to the contact displacements, a dense Schur complement. The variational inequality there is
 written as a mixed complementarity problem, that as a system of equations by the Fischer-Burmeister function
@@ -26,24 +26,22 @@ from .method import Method
 from .result import Counts, SolveResult
 from .ssls import onto_bounds
 
-_EVALUATIONS = 100
-"""The paper's limit of lsqnonlin's iterations, each of which evaluates the functions once."""
-_COLUMNS = 64
-"""Right-hand sides that are solved at once."""
-_STOP = {"ftol": 1e-10, "xtol": 1e-14, "gtol": None}
-"""A decrease so small is a merit function that is stuck; a small gradient says nothing, as Φ itself is small."""
-_WORDS = {
+_STATUS = {
     0: "the evaluations are used up",
     2: "the merit function falls no more",
     3: "the steps vanish",
     4: "the merit function falls no more and the steps vanish",
 }
-"""scipy's status in words."""
+"""Texts for scipy's status."""
 
 
 @dataclass(frozen=True)
 class MeanDerivative:
-    """The law as the paper's formula has it in MATLAB: at a kink the mean of both sides, sign(0) being 0."""
+    """The law as in the paper's MATLAB formula: at a kink the mean of both sides, sign(0) being 0.
+
+    Attributes:
+        law: j.
+    """
 
     law: Superpotential
 
@@ -68,7 +66,7 @@ class Condensation(Method):
     """
 
     name = "condensed"
-    words = "the paper's procedure: condensation and least squares"
+    description = "the paper's procedure: condensation and least squares"
     takes_pieces = False
 
     def __init__(self, context: SolveContext) -> None:
@@ -82,7 +80,7 @@ class Condensation(Method):
         self.stopped = False
 
     def solve(self, start: PETSc.Vec | None = None) -> SolveResult:
-        """A stationary point of the smoothed energy, or what was reached.
+        """A stationary point of the smoothed energy, or what was found instead.
 
         Args:
             start: not used; the paper begins at zero.
@@ -97,12 +95,12 @@ class Condensation(Method):
             values, reason, counts = self._minimise(mixed)
             found, measure = self._judge(schur.expand(values))
         converged = measure <= self.options.tolerance
-        words = "stationary" if converged else f"least squares stopped: {reason}, residual {measure:.1e}"
+        failure = f"least squares stopped: {reason}, residual {measure:.1e}"
         return SolveResult(
             u=self.system.displacement(found),
             method=self.name,
             converged=converged,
-            reason=words,
+            reason="stationary" if converged else failure,
             counts=counts,
             energies=(self.system.energy(found, self.models),),
             interrupted=self.stopped,
@@ -110,7 +108,7 @@ class Condensation(Method):
 
     def _minimise(self, mixed: _Complementarity) -> tuple[Array, str, Counts]:
         """Contact displacements, why it ended there, and evaluations."""
-        counts, limit = Counts(), min(_EVALUATIONS, self.options.max_iterations)
+        counts = Counts()
         if not mixed.schur.kept.size:
             return np.empty(0), "there is nothing to minimise over", counts
         points: list[Array] = []
@@ -120,17 +118,23 @@ class Condensation(Method):
             return mixed.function(x)
 
         def jacobian(x: Array) -> Array:
-            self._watch(mixed, x, points)
+            self._record(mixed, x, points)
             return mixed.jacobian(x)
 
         try:
-            found = least_squares(function, np.zeros(mixed.schur.kept.size), jacobian, max_nfev=limit, **_STOP)
+            found = least_squares(function, np.zeros(mixed.schur.kept.size), jacobian, **self._limits())
         except _Stop:
             return points[-1], "interrupted", counts
-        return found.x, f"{_WORDS.get(found.status, found.message)}, merit {found.cost:.1e}", counts
+        return found.x, f"{_STATUS.get(found.status, found.message)}, merit {found.cost:.1e}", counts
 
-    def _watch(self, mixed: _Complementarity, x: Array, points: list[Array]) -> None:
-        """Called at each accepted point."""
+    def _limits(self) -> dict[str, Any]:
+        """When least squares end; not by the gradient, which is small wherever Φ is."""
+        thresholds = self.options.thresholds
+        most = min(thresholds.evaluations, self.options.max_iterations)
+        return {"max_nfev": most, "ftol": thresholds.least_decrease, "xtol": thresholds.least_step, "gtol": None}
+
+    def _record(self, mixed: _Complementarity, x: Array, points: list[Array]) -> None:
+        """Keep and report an accepted point."""
         points.append(x.copy())
         size = float(np.linalg.norm(mixed.function(x))) / self.system.scale
         self.context.progress(self.name, self.context.epsilon, len(points) - 1, size, mixed.in_contact(x))
@@ -139,7 +143,7 @@ class Condensation(Method):
             raise _Stop
 
     def _judge(self, x: PETSc.Vec) -> tuple[PETSc.Vec, float]:
-        """The candidate that x stands for, and its residual of the inequality in the full space."""
+        """The candidate for a solution at x, and its residual of the inequality in the full space."""
         residual = x.duplicate()
         self.system.residual(x, residual, self.models)
         found = onto_bounds(self.system, x, residual)
@@ -155,9 +159,12 @@ class _Schur:
     """The stiffness condensed to the contact displacements: S = A_cc - G and q = b_c - g take the place of A and b.
 
     Attributes:
-        kept: the dofs of Γc's vertices that are not prescribed, ascending (n,).
-        G, g: what the rest of the body makes of the contact displacements and of its loads, (n, n) and (n,).
-        lower, upper: bounds (n,).
+        kept: the dofs of Γc's vertices that are not prescribed, ascending, (n,).
+        rest: all other dofs.
+        G: forces on Γc by the rest of the body, for unit contact displacements, (n, n).
+        g: forces on Γc by the loads on the rest of the body, (n,).
+        lower: lower bounds, (n,).
+        upper: upper bounds, (n,).
     """
 
     def __init__(self, system: System) -> None:
@@ -167,8 +174,9 @@ class _Schur:
         self._factor = self._factorised()
         self._coupling = _sparse(system.jacobian.matrix)[self.rest][:, self.kept].tocsc()
         self.G = np.empty((self.kept.size, self.kept.size))
-        for start in range(0, self.kept.size, _COLUMNS):
-            block = slice(start, start + _COLUMNS)
+        at_once = system.thresholds.dense_columns
+        for start in range(0, self.kept.size, at_once):
+            block = slice(start, start + at_once)
             self.G[:, block] = self._coupling.T @ self._solve(self._coupling[:, block].toarray())
         self.g = self._coupling.T @ self._solve(system.load.array_r[self.rest])
         self.lower, self.upper = system.lower.array_r[self.kept], system.upper.array_r[self.kept]
@@ -194,7 +202,7 @@ class _Schur:
         return np.array(x.getDenseArray()).reshape(right.shape)
 
     def spread(self, values: Array) -> PETSc.Vec:
-        """A displacement of the whole body that is right on Γc, and zero elsewhere."""
+        """A displacement of the whole body with these values on Γc, and zero elsewhere."""
         x = self.system.undisplaced()
         x.array[self.kept] = values
         return x
@@ -227,40 +235,48 @@ class _Complementarity:
         self._residual = self.system.load.duplicate()
 
     def force(self, x: Array) -> Array:
-        """F, shape (n,): the residual on Γc of a body at rest inside, corrected by what it does inside."""
+        """F, (n,): the residual on Γc of a body that is undisplaced inside, corrected by its response."""
         self.system.residual(self.schur.spread(x), self._residual, self.models)
         return np.asarray(self._residual.array_r[self.schur.kept] - self.schur.G @ x + self.schur.g)
 
     def tangent(self, x: Array) -> Array:
-        """F', shape (n, n)."""
+        """F', (n, n)."""
         self.system.jacobian.set_rates(self.system.tangents(self.schur.spread(x), self.models))
         kept = self.schur.kept
         return np.asarray(_sparse(self.system.jacobian.matrix)[kept][:, kept].toarray() - self.schur.G)
 
     def function(self, x: Array) -> Array:
-        """Φ, shape (n,)."""
+        """Φ, (n,)."""
         return _mixed(x, self.force(x), self.schur.lower, self.schur.upper)[0]
 
     def jacobian(self, x: Array) -> Array:
-        """An element of Φ's B-subdifferential, shape (n, n)."""
+        """An element of Φ's B-subdifferential, (n, n)."""
         _, by_x, by_force = _mixed(x, self.force(x), self.schur.lower, self.schur.upper)
         return np.asarray(np.diag(by_x) + by_force[:, None] * self.tangent(x))
 
     def in_contact(self, x: Array) -> int:
-        """How many dofs are nearer to a bound than their force is large."""
+        """The number of dofs whose distance from a bound is smaller than their force."""
         force, low, high = self.force(x), self.schur.lower, self.schur.upper
         return int(np.count_nonzero((x - low <= force) | (high - x <= -force)))
 
 
 def fischer_burmeister(a: Array, b: Array) -> tuple[Array, Array, Array]:
-    """f(a, b) = √(a² + b²) - (a + b) and its derivatives; at the origin, where f has none, those along a = b > 0."""
+    """f(a, b) = √(a² + b²) - (a + b) and its derivatives; at the origin, where f has none, those along a = b > 0.
+
+    Args:
+        a: (n,).
+        b: (n,).
+
+    Returns:
+        f and its derivatives by a and by b, (n,) each.
+    """
     root = np.hypot(a, b)
     cos, sin = (np.divide(v, root, out=np.full_like(root, np.sqrt(0.5)), where=root > 0) for v in (a, b))
     return root - (a + b), cos - 1.0, sin - 1.0
 
 
 def _mixed(x: Array, force: Array, lower: Array, upper: Array) -> tuple[Array, Array, Array]:
-    """Φ and its derivatives by x and F: Billups' f(x - l, f(u - x, -F)), of which an infinite bound drops its f."""
+    """Φ and its derivatives by x and F: Billups' f(x - l, f(u - x, -F)); for an infinite bound its f is left out."""
     capped, bounded = np.isfinite(upper), np.isfinite(lower)
     value, by_distance, by_force = fischer_burmeister(np.where(capped, upper - x, 0.0), -force)
     inner = np.where(capped, value, force)

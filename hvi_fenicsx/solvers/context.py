@@ -1,9 +1,10 @@
-"""What a method is given: one record for the system, its levels, what is known of it, and how to solve it."""
+"""The context of a method: the system, its solver, what is known about existence, and how to solve."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 from ..rigid import Solvability
 from ..runtime.log import newton_step
@@ -19,13 +20,13 @@ Progress = Callable[[str, float | None, int, float, int], None]
 
 
 def never() -> bool:
-    """Whether to stop: no."""
+    """Never stop."""
     return False
 
 
 @dataclass(frozen=True, kw_only=True)
 class RunControl:
-    """What surrounds a solve.
+    """What a run hands to its solves.
 
     Attributes:
         timer: where time goes.
@@ -40,16 +41,17 @@ class RunControl:
 
 @dataclass(frozen=True, kw_only=True)
 class SolveContext:
-    """What a method is given.
+    """The context of a method.
 
     Attributes:
         system: the assembled problem.
-        solver: bound-constrained solves on it; keeps its preconditioner from solve to solve.
+        solver: solves with bounds on the system; keeps its preconditioner from solve to solve.
         solvability: whether a solution can exist, and which rigid motions the supports leave.
         options: method, tolerance, limits.
         timer: where time goes.
         progress: called at each Newton step; by default it is logged.
-        steady: whether the pieces and the active set of a start from the coarser level are expected to stand.
+        steady: whether the pieces and the active set of a start from the coarser level are expected to be the final
+            ones.
     """
 
     system: System
@@ -76,10 +78,10 @@ class SolveContext:
         Args:
             system: the assembled problem.
             levels: its coarser levels; none where there is no mesh hierarchy.
-            solvability: the verdict on existence.
+            solvability: whether a solution can exist.
             options: method, tolerance, limits.
             control: timer, progress and interruption.
-            steady: whether the pieces and the active set of the start are expected to stand.
+            steady: whether the pieces and the active set of the start are expected to be the final ones.
         """
         thresholds = options.thresholds
         linear = LinearSettings.choose(system, options.linear_solver, thresholds.linear, levels=bool(levels))
@@ -93,6 +95,14 @@ class SolveContext:
             progress=control.progress,
             steady=steady,
         )
+
+    def with_options(self, **changes: Any) -> SolveContext:
+        """The context with some options changed.
+
+        Args:
+            changes: fields of :class:`.SolverOptions` and their values.
+        """
+        return replace(self, options=replace(self.options, **changes))
 
     @property
     def epsilon(self) -> float | None:

@@ -1,6 +1,7 @@
-"""SNES VI on the smoothed problem with ε-continuation: from a wide smoothing to the one that was asked for.
+"""SNES VI on the smoothed problem with ε-continuation: from a wide smoothing to the wanted one.
 
-Each width is solved from the last one's solution. Where the scene smooths nothing, the last step solves the law itself.
+Each width starts from the solution of the width before. Where the scene smooths nothing, the last step solves the law
+itself.
 """
 
 from __future__ import annotations
@@ -14,27 +15,24 @@ from .branch import BranchIteration
 from .method import Method
 from .result import Counts, SolveResult
 
-_WIDTHS = (1.0, 1e-1, 1e-2, 1e-3)
-"""Relative widths that are passed through, as long as they are wider than the wanted one."""
-
 
 class Continuation(Method):
     """The continuation on one system; call :meth:`solve` once."""
 
     name = "snes_vi"
-    words = "a continuation in the smoothing over branch iterations"
+    description = "a continuation in the smoothing over branch iterations"
     takes_pieces = False
 
     def solve(self, start: PETSc.Vec | None = None) -> SolveResult:
-        """A stationary point of the wanted law, reached along the widths. Collective.
+        """A stationary point of the wanted law. Collective.
 
         Args:
-            start: not used; each width starts from the last one's solution.
+            start: not used; each width starts from the solution of the width before.
         """
         counts, start, context = Counts(), None, self.context
-        options = replace(context.options, tolerance=max(self._loose, context.options.tolerance))
-        loose = replace(context, options=options)
-        for width in (w for w in _WIDTHS if w > (context.epsilon or 0.0)):
+        thresholds = self.options.thresholds.branch
+        loose = context.with_options(tolerance=max(thresholds.loose_tolerance, self.options.tolerance))
+        for width in (w for w in thresholds.widths if w > (context.epsilon or 0.0)):
             laws = [QUADRATIC.relative(t.exact, width) for t in self.system.terms]
             found = BranchIteration(loose, laws, width, check_bounded=True).solve(start)
             counts.add(found.counts)
@@ -43,7 +41,3 @@ class Continuation(Method):
         last = BranchIteration(context, check_bounded=True).solve(start)
         counts.add(last.counts)
         return replace(last, method=self.name, counts=counts)
-
-    @property
-    def _loose(self) -> float:
-        return self.options.thresholds.loose_tolerance

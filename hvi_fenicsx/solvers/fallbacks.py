@@ -1,4 +1,4 @@
-"""A convex step tried in several ways, until one of them converges: no line search of PETSc's solves all of them."""
+"""A convex step tried in several ways until one converges: none of PETSc's line searches solves all steps."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ import numpy as np
 from petsc4py import PETSc
 
 from ..system.system import LawModel
-from .active_set import ActiveSetSolver, Outcome
+from .active_set import ActiveSetSolver
+from .convergence import Outcome
 from .result import Counts
 
 
@@ -18,19 +19,19 @@ class Attempt:
     """One way to solve a step.
 
     Attributes:
-        models: what stands for the laws.
+        models: what takes the place of the laws, by term.
         line_search: PETSc's name.
         max_iterations: Newton steps at most.
-        kept: whether the next one goes on from where this one fails, since this one lowers the energy, whatever it
-            leaves undone; else the next one begins where this one did.
-        start: where to begin instead, this one and the next.
+        lowers_energy: whether it lowers the energy even where it does not converge; the next attempt then begins where
+            this one ended, else where this one began.
+        start: where to begin instead; None for where it would.
         steady: as in :meth:`.ActiveSetSolver.solve`.
     """
 
     models: Sequence[LawModel]
     line_search: str
     max_iterations: int
-    kept: bool
+    lowers_energy: bool
     start: PETSc.Vec | None = None
     steady: bool = False
 
@@ -43,14 +44,14 @@ def first_success(
     bounds: tuple[PETSc.Vec, PETSc.Vec],
     counts: Counts,
 ) -> Outcome:
-    """The outcome of the first attempt that converges, else of the one that came nearest. Collective.
+    """The outcome of the first attempt that converges, else of the one with the smallest residual. Collective.
 
     Args:
-        solver: of each.
+        solver: of all attempts.
         x: start and result.
-        attempts: the next is asked for only when the last has failed; words in place of one say why there is none.
+        attempts: the next is asked for only after the last has failed; a text instead of one is the reason to end.
         tolerance: as in :meth:`.ActiveSetSolver.solve`.
-        bounds: from below and from above.
+        bounds: lower and upper bounds.
         counts: gets the iterations of all.
     """
     begin, best = x.copy(), x.copy()
@@ -62,14 +63,14 @@ def first_success(
         if attempt.start is not None:
             attempt.start.copy(begin)
         begin.copy(x)
-        found = _solved(solver, x, attempt, tolerance, bounds)
-        counts.spend(found)
+        found = _solve(solver, x, attempt, tolerance, bounds)
+        counts.add_outcome(found)
         if found.measure < outcome.measure or found.converged:
             outcome = found
             x.copy(best)
         if found.converged or found.interrupted:
             break
-        if attempt.kept and np.isfinite(found.measure):
+        if attempt.lowers_energy and np.isfinite(found.measure):
             x.copy(begin)
     best.copy(x)
     for vector in (begin, best):
@@ -77,7 +78,7 @@ def first_success(
     return replace(outcome, interrupted=found.interrupted)
 
 
-def _solved(
+def _solve(
     solver: ActiveSetSolver, x: PETSc.Vec, attempt: Attempt, tolerance: float, bounds: tuple[PETSc.Vec, PETSc.Vec]
 ) -> Outcome:
     """How one attempt ends, from and into x. Collective."""

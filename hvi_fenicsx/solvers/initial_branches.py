@@ -14,28 +14,28 @@ from ..system.system import System
 from ..typing import Array
 from .options import Start
 
-_FAR = 1e6
-"""Times the law's length and the slip at rest: beyond every drop."""
 
-
-def arguments(system: System, resting: PETSc.Vec, start: Start) -> list[Array]:
-    """What the laws act on there, by term; (m,) each.
+def arguments(system: System, resting: PETSc.Vec, start: Start, broken_slip: float) -> list[Array]:
+    """Arguments of the laws on the pieces to begin on, by term, (m,) each.
 
     Args:
         system: the assembled problem.
         resting: the displacement with contact closed and laws at rest.
-        start: the name of a start, or a displacement by component.
+        start: the name of a start, or a displacement by component (m).
+        broken_slip: slip of a broken bond, relative to the law's length or to the slip at rest.
     """
     if start == "unbroken":
         return [np.zeros(len(t.surface.blocks)) for t in system.terms]
     if not isinstance(start, str):
         return _displaced(system, start)
     found = [t.argument(resting.array_r) for t in system.terms]
-    return found if start == "resting" else [_broken(t, a) for t, a in zip(system.terms, found, strict=True)]
+    if start == "resting":
+        return found
+    return [_broken(t, a, broken_slip) for t, a in zip(system.terms, found, strict=True)]
 
 
 def _displaced(system: System, start: Sequence[Formula]) -> list[Array]:
-    """Arguments of a Cartesian displacement, so by the problem's terms, whose directions are Cartesian too."""
+    """Arguments of a displacement; the directions of the problem's own terms are Cartesian, as it is."""
     found = []
     for term in system.problem.terms:
         u = np.column_stack([f.at(term.surface.points) for f in start]) / system.problem.scales.displacement
@@ -44,7 +44,7 @@ def _displaced(system: System, start: Sequence[Formula]) -> list[Array]:
     return found
 
 
-def _broken(term: LawTerm, slip: Array) -> Array:
-    """Far off in the direction of the slip at rest; opened, or pressed in, where the law is one of that."""
+def _broken(term: LawTerm, slip: Array, far: float) -> Array:
+    """A large slip in the direction of the slip at rest; positive for laws of an opening or a penetration."""
     sign = np.where(slip < 0, -1.0, 1.0) if term.direction is Direction.SLIP else np.ones_like(slip)
-    return np.asarray(sign * _FAR * np.maximum(np.abs(slip), term.exact.length_scale))
+    return np.asarray(sign * far * np.maximum(np.abs(slip), term.exact.length_scale))

@@ -12,15 +12,18 @@ from ..problem.contact_surface import component_dofs
 from ..problem.law_term import LawTerm
 from ..system.system import System
 from ..typing import Array, Integers, Mask
-from .law_models import Cells, Full, Majorant
+from .law_models import Cells, ExactLaw, Majorant
 
 
-def boxes(system: System, cells: Sequence[Cells]) -> tuple[PETSc.Vec, PETSc.Vec]:
-    """The system's bounds cut with the cells of the laws; the very same where no law has a convex kink.
+def slip_bounds(system: System, cells: Sequence[Cells]) -> tuple[PETSc.Vec, PETSc.Vec]:
+    """The system's bounds, with those that keep each vertex in its cell. Collective.
 
     Args:
         system: the assembled problem.
         cells: by term.
+
+    Returns:
+        Lower and upper bounds; the system's own vectors where no law has a convex kink.
     """
     if not any(len(c.kinks) for c in cells):
         return system.lower, system.upper
@@ -28,46 +31,54 @@ def boxes(system: System, cells: Sequence[Cells]) -> tuple[PETSc.Vec, PETSc.Vec]
     for term, c in zip(system.terms, cells, strict=True):
         if term.radial:
             _hold_stuck(term, c, lower, upper)
-            continue
-        dofs, sign, free = _slip_dofs(term)
-        low, high = np.where(sign > 0, c.lower, -c.upper), np.where(sign > 0, c.upper, -c.lower)
-        lower.array[dofs[free]] = np.maximum(lower.array[dofs], low)[free]
-        upper.array[dofs[free]] = np.minimum(upper.array[dofs], high)[free]
+        else:
+            _keep_in_cells(term, c, lower, upper)
     return lower, upper
 
 
+def _keep_in_cells(term: LawTerm, cells: Cells, lower: PETSc.Vec, upper: PETSc.Vec) -> None:
+    """Keep the signed slip of each vertex in its cell."""
+    dofs, sign, free = _slip_dofs(term)
+    low, high = np.where(sign > 0, cells.lower, -cells.upper), np.where(sign > 0, cells.upper, -cells.lower)
+    lower.array[dofs[free]] = np.maximum(lower.array[dofs], low)[free]
+    upper.array[dofs[free]] = np.minimum(upper.array[dofs], high)[free]
+
+
 def overloaded(
-    system: System, x: PETSc.Vec, residual: PETSc.Vec, models: Sequence[Majorant | Full], tolerance: float
+    system: System, x: PETSc.Vec, residual: PETSc.Vec, models: Sequence[Majorant | ExactLaw], slack: float
 ) -> list[Integers]:
-    """Per vertex -1, 0 or 1: where it goes if the kink it sits on cannot carry its force.
+    """To which cell a vertex moves whose kink cannot carry its force: -1, 0 or 1, (m,) by term.
 
     Args:
         system: the assembled problem.
         x: the displacement.
-        residual: that of the convex step, H' being taken from within the cell: at the lower end the right derivative,
-            from which the kink's jump leads to the left one.
+        residual: of the convex step, H' being taken from inside of the cell: at the lower end the right derivative;
+            the left one differs from it by the kink's jump.
         models: of the step, by term.
-        tolerance: relative, of a traction.
+        slack: traction by which the kink may be exceeded, relative to the law's scale.
     """
     moves = []
     for term, model in zip(system.terms, models, strict=True):
-        c, part = model.cells, model.law.convex
-        argument = term.argument(x.array_r)
-        if term.radial:
-            moves.append(_radial_moves(term, model, argument, residual, tolerance))
-            continue
-        force = np.einsum("md,md->m", term.directions[:, 0, :], term.surface.values(residual.array_r))
-        weight = term.surface.weights
-        slack = 0.1 * tolerance * term.traction_scale * weight
-        _, _, free = _slip_dofs(term)
-        down = free & (argument <= c.lower) & (force - weight * _jump(part, c.lower) > slack)
-        up = free & (argument >= c.upper) & (force + weight * _jump(part, c.upper) < -slack)
-        moves.append(up.astype(np.int64) - down.astype(np.int64))
+        find = _radial_moves if term.radial else _signed_moves
+        moves.append(find(term, model, term.argument(x.array_r), residual, slack))
     return moves
 
 
+def _signed_moves(
+    term: LawTerm, model: Majorant | ExactLaw, argument: Array, residual: PETSc.Vec, slack: float
+) -> Integers:
+    """The moves for a law of a signed slip."""
+    c, part, weight = model.cells, model.law.convex, term.surface.weights
+    force = np.einsum("md,md->m", term.directions[:, 0, :], term.surface.values(residual.array_r))
+    excess = slack * term.traction_scale * weight
+    _, _, free = _slip_dofs(term)
+    down = free & (argument <= c.lower) & (force - weight * _jump(part, c.lower) > excess)
+    up = free & (argument >= c.upper) & (force + weight * _jump(part, c.upper) < -excess)
+    return up.astype(np.int64) - down.astype(np.int64)
+
+
 def _hold_stuck(term: LawTerm, cells: Cells, lower: PETSc.Vec, upper: PETSc.Vec) -> None:
-    """Both components of a stuck vertex's slip are kept at zero."""
+    """Keep both components of a stuck vertex's slip at zero."""
     dofs = term.surface.dofs
     stuck = (cells.index == 0)[:, None] & np.any(np.abs(term.directions) > 0.5, axis=1) & (term.free > 0)
     if len(cells.kinks):
@@ -75,17 +86,17 @@ def _hold_stuck(term: LawTerm, cells: Cells, lower: PETSc.Vec, upper: PETSc.Vec)
 
 
 def _radial_moves(
-    term: LawTerm, model: Majorant | Full, argument: Array, residual: PETSc.Vec, tolerance: float
+    term: LawTerm, model: Majorant | ExactLaw, argument: Array, residual: PETSc.Vec, slack: float
 ) -> Integers:
-    """A law of |u_t|: a stuck vertex goes when the force leaves the kink's disc, a free one sticks below the ramp."""
+    """The moves for a law of |u_t|: a stuck vertex slips if the force leaves the kink's disc, a slow one sticks."""
     cells = model.cells
     if not len(cells.kinks):
         return np.zeros(len(argument), dtype=np.int64)
     force = np.einsum("mkd,md->mk", term.directions, term.surface.values(residual.array_r) * term.free)
     weight = term.surface.weights
     disc = weight * model.law.convex.right(np.zeros_like(argument))
-    slack = 0.1 * tolerance * term.traction_scale * weight
-    go = (cells.index == 0) & (np.linalg.norm(force, axis=1) > disc + slack)
+    excess = slack * term.traction_scale * weight
+    go = (cells.index == 0) & (np.linalg.norm(force, axis=1) > disc + excess)
     stick = (cells.index == 1) & (argument <= cells.ramp)
     return go.astype(np.int64) - stick.astype(np.int64)
 

@@ -1,8 +1,8 @@
-"""What stands for a law j = H - G in one nonlinear solve, kept within one cell between H's kinks.
+"""Models of a law j = H - G in one nonlinear solve, in which each vertex stays in one cell between H's kinks.
 
-H's kinks (Tresca, |u_t| at zero, upward jumps) stay in the convex step: each vertex is kept in the cell between two
-kinks by bounds on its slip, where H is smooth up to the ends; a vertex on a kink that cannot
-carry its force moves on to the next cell.
+H's kinks (Tresca, |u_t| at zero, upward jumps) stay in the convex step: bounds on its slip keep each vertex in the cell
+between two kinks, where H is smooth up to the ends. A vertex on a kink that cannot carry its force moves on to the next
+cell.
 """
 
 from __future__ import annotations
@@ -14,19 +14,20 @@ import numpy as np
 
 from ..laws import ConvexPart, Superpotential
 from ..typing import Array, Integers
-
-_FIRST_RAMP = 1e-2
-"""Of the largest slip; it shrinks whenever a stuck vertex is let go."""
-_SHRINK = 0.3
+from .thresholds import DEFAULT, BranchThresholds
 
 
 @dataclass(frozen=True)
 class Cells:
-    """For each vertex the cell [lower, upper] between two kinks of H that it is kept in; shape (m,).
+    """For each of m vertices, the cell [lower, upper] between two kinks of H in which it stays.
 
-    For a law of |u_t| in 3D there is one kink, at zero, and two cells: stuck (0) and free (1). ``ramp`` is then the
-    slip below which a free vertex meets a traction that grows from zero, so that its direction may still turn; a vertex
-    that stays below it is stuck. It is 0 for laws of a signed slip.
+    For a law of |u_t| in 3D there is one kink, at zero, and two cells: stuck (0) and free (1).
+
+    Attributes:
+        kinks: the kinks of H, ascending.
+        index: number of each vertex's cell, (m,).
+        ramp: for a law of |u_t|, the slip up to which the traction of a free vertex grows from zero, so that its
+            direction may still turn; a vertex whose slip remains smaller is stuck. 0 for laws of a signed slip.
     """
 
     kinks: Array
@@ -34,10 +35,21 @@ class Cells:
     ramp: float = 0.0
 
     @classmethod
-    def around(cls, part: ConvexPart, x: Array, *, radial: bool = False) -> Cells:
-        """The cells that hold x; on a kink the one above, for a law of |u_t| stuck."""
+    def around(
+        cls, part: ConvexPart, x: Array, *, radial: bool = False, thresholds: BranchThresholds = DEFAULT.branch
+    ) -> Cells:
+        """The cells that hold x; on a kink the cell to its right, for a law of |u_t| the stuck one.
+
+        Args:
+            part: H.
+            x: arguments, (m,).
+            radial: whether it is a law of |u_t|.
+            thresholds: how long the ramp is.
+        """
         side: Literal["left", "right"] = "left" if radial else "right"
-        ramp = _FIRST_RAMP * max(float(np.max(x, initial=0.0)), 1e-6) if radial and len(part.kinks) else 0.0
+        ramp = 0.0
+        if radial and len(part.kinks):
+            ramp = thresholds.first_ramp * max(float(np.max(x, initial=0.0)), thresholds.least_slip)
         return cls(part.kinks, np.searchsorted(part.kinks, x, side=side), ramp)
 
     @property
@@ -50,13 +62,18 @@ class Cells:
         """Upper ends; inf where there is none."""
         return np.concatenate([self.kinks, [np.inf]])[self.index]
 
-    def moved(self, step: Integers) -> Cells:
-        """The cells after each vertex moved by -1, 0 or 1."""
-        return Cells(self.kinks, self.index + step, self.ramp * (_SHRINK if np.any(step > 0) else 1.0))
+    def moved(self, step: Integers, shrinks: float) -> Cells:
+        """The cells after each vertex moved to a neighbouring one, or stayed.
+
+        Args:
+            step: -1, 0 or 1, (m,).
+            shrinks: factor of the ramp if a vertex moved to the right.
+        """
+        return Cells(self.kinks, self.index + step, self.ramp * (shrinks if np.any(step > 0) else 1.0))
 
 
 def _inside(part: ConvexPart, cells: Cells, x: Array) -> Array:
-    """Derivative of H, extended from within the cell to its ends."""
+    """Derivative of H, continued from inside of the cell to its ends."""
     if cells.ramp > 0:
         return part.right(np.maximum(x, cells.ramp)) * np.minimum(x / cells.ramp, 1.0)
     at_lower, at_upper = x <= cells.lower, x >= cells.upper
@@ -65,7 +82,7 @@ def _inside(part: ConvexPart, cells: Cells, x: Array) -> Array:
 
 
 def _curvature(part: ConvexPart, cells: Cells, x: Array) -> Array:
-    """Second derivative of H, that of the ramp below it."""
+    """Second derivative of H; on the ramp, that of the ramp."""
     if cells.ramp > 0:
         steep = part.right(np.array([cells.ramp])) / cells.ramp
         return np.where(x < cells.ramp, steep, part.second(np.maximum(x, cells.ramp)))
@@ -74,7 +91,13 @@ def _curvature(part: ConvexPart, cells: Cells, x: Array) -> Array:
 
 @dataclass(frozen=True)
 class Majorant:
-    """H(x) - ξ x: the convex function that touches j at the point where ξ ∈ ∂G was taken, up to a constant."""
+    """H(x) - ξ x: a convex function that is nowhere less than j, and equal where ξ ∈ ∂G, up to a constant.
+
+    Attributes:
+        law: j.
+        cells: where each vertex stays.
+        xi: ξ, (m,).
+    """
 
     law: Superpotential
     cells: Cells
@@ -95,14 +118,18 @@ class Majorant:
 
 @dataclass(frozen=True)
 class SecantMajorant:
-    """A majorant with the secant stiffness H'/x where it exceeds H'': a step that cannot run away on a flat law.
+    """A majorant with the secant stiffness H'/x where it exceeds H'': where the law is flat, steps remain finite.
 
-    Where H'/x falls with |x| (friction, adhesion) the secant parabola lies above H, so that full steps lower the energy
-    (iteratively reweighted least squares; Kačanov). ``reach``: slip below which the secant is not taken.
+    Where H'/x falls with |x| (friction, adhesion) the secant parabola is greater than H, so that full steps lower the
+    energy (iteratively reweighted least squares; Kačanov).
+
+    Attributes:
+        model: the majorant.
+        least: the slip of the secant is this at least.
     """
 
     model: Majorant
-    reach: float
+    least: float
 
     def value(self, x: Array) -> Array:
         """Energy per area."""
@@ -115,12 +142,17 @@ class SecantMajorant:
     def second(self, x: Array) -> Array:
         """The larger of tangent and secant stiffness."""
         traction = np.abs(_inside(self.model.law.convex, self.model.cells, x))
-        return np.maximum(self.model.second(x), traction / np.maximum(np.abs(x), self.reach))
+        return np.maximum(self.model.second(x), traction / np.maximum(np.abs(x), self.least))
 
 
 @dataclass(frozen=True)
-class Full:
-    """j itself, with its true (perhaps negative) curvature."""
+class ExactLaw:
+    """The law j itself, with its true (perhaps negative) curvature.
+
+    Attributes:
+        law: j.
+        cells: where each vertex stays.
+    """
 
     law: Superpotential
     cells: Cells
@@ -140,8 +172,12 @@ class Full:
 
 
 @dataclass(frozen=True)
-class Resting:
-    """The tangent of j at rest: what holds a body at the start, x ↦ H'(0)x + ½ H''(0) x²."""
+class TangentAtRest:
+    """The law's tangent at zero slip, x ↦ H'(0)x + ½ H''(0) x²: it holds a body at the start.
+
+    Attributes:
+        law: j.
+    """
 
     law: Superpotential
 

@@ -1,4 +1,4 @@
-"""What a solution method is. A new one is a new subclass, known by its name as soon as its module is loaded."""
+"""The base class of solution methods. A new method is a new subclass; loading its module makes its name known."""
 
 from __future__ import annotations
 
@@ -23,20 +23,23 @@ class Method(ABC):
     """A way to solve the inequality on a system; one instance solves once.
 
     Class attributes:
-        name: in scenes (``solver.method``) and in ``summary.json``.
-        words: what it is, for ``hvi check``.
-        takes_start: whether ``solve`` takes a displacement to begin at, and so goes up the mesh hierarchy.
+        name: the method's name in scenes (``solver.method``) and in ``summary.json``.
+        description: what it is, for ``hvi check``.
+        takes_start: whether :meth:`solve` can begin at a displacement; it is then used for nested iteration.
         takes_pieces: whether it begins on pieces of the laws that the user chooses (``solver.start``).
         takes_smoothing: whether it solves smoothed laws.
         in_scenes: whether a scene may name it.
-        label: what ``summary.json`` and the progress display call it; by default its name.
+        label: its name in ``summary.json`` and on the progress display, where that is another one.
 
     Attributes:
         context: the system and how to solve it.
+        system: the assembled problem: matrix, load, bounds, laws.
+        solver: solves with bounds on the system.
+        options: method, tolerance, limits.
     """
 
     name: ClassVar[str]
-    words: ClassVar[str] = "a method of the user's own"
+    description: ClassVar[str] = "a method of the user's own"
     takes_start: ClassVar[bool] = False
     takes_pieces: ClassVar[bool] = True
     takes_smoothing: ClassVar[bool] = True
@@ -51,7 +54,7 @@ class Method(ABC):
         if not cls.in_scenes:
             return
         if cls.__module__.rpartition(".")[0] != __package__:
-            load_all()  # a name that the program uses is taken
+            load_all()  # all names of the program are known then
         enter(Method.registry, cls, cls.name, "method")
 
     def __init__(self, context: SolveContext) -> None:
@@ -60,8 +63,8 @@ class Method(ABC):
 
     @abstractmethod
     def solve(self, start: PETSc.Vec | None = None) -> SolveResult:
-        """A stationary point, or what was reached. Collective. The certificate judges it afterwards.
+        """A stationary point, or what the method found instead; the certificate judges it afterwards. Collective.
 
         Args:
-            start: a displacement to begin at, from the coarser level; given only where ``takes_start`` says so.
+            start: a displacement to begin at, from the coarser level; None unless the class has ``takes_start``.
         """

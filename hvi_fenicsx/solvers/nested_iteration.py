@@ -1,7 +1,7 @@
-"""Nested iteration: each level of the mesh hierarchy starts from the solution on the coarser one.
+"""Nested iteration: each level of the mesh hierarchy starts from the solution on the next coarser level.
 
-Displacement, active set and pieces of the laws come with it, so that one or two steps remain on the finest mesh; the
-prolongations also build its geometric multigrid. Meshes without a hierarchy, and small ones, are solved as they are.
+That solution gives displacement, active set and pieces of the laws, so that one or two steps remain on the finest mesh;
+the prolongations also serve its geometric multigrid. Meshes without a hierarchy, and small ones, are solved directly.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ _LOG = logger("solvers")
 
 @dataclass(frozen=True, kw_only=True)
 class LevelSolution:
-    """A system solved, and the coarser levels that it was solved with.
+    """The result on one level, and the coarser levels that were used.
 
     Attributes:
         system: the assembled problem.
@@ -45,12 +45,12 @@ class LevelSolution:
 
 @dataclass(frozen=True, kw_only=True)
 class CoarseStart:
-    """A solution on a coarser mesh to start from.
+    """A solution on a coarser mesh, as the start on a finer one.
 
     Attributes:
-        system: on the coarser mesh.
+        system: the system on the coarser mesh.
         result: what was found there.
-        prolongation: from its unknowns to the finer system's.
+        prolongation: from the coarser system's unknowns to the finer one's.
         levels: the coarser levels of the finer system.
     """
 
@@ -73,19 +73,19 @@ def linear_settings(system: System, options: SolverOptions) -> LinearSettings:
 
 
 def _has_coarser(system: System, options: SolverOptions) -> bool:
-    """Whether there is a coarser mesh, and it pays."""
+    """Whether there is a coarser mesh, and the system is large enough for it to pay."""
     return system.dofs >= options.thresholds.nested_from and system.problem.domain.coarsening is not None
 
 
 def solve(
     model: Model, system: System, solvability: Solvability, options: SolverOptions, control: RunControl
 ) -> LevelSolution:
-    """Solve a system, from the coarsest level up where there is one and the method takes a start. Collective.
+    """Solve a system; with a mesh hierarchy and a method that takes a start, from the coarsest level on. Collective.
 
     Args:
         model: what is solved, for the coarser meshes.
         system: assembled on the finest mesh.
-        solvability: the verdict on existence.
+        solvability: whether a solution can exist.
         options: method, tolerance, limits.
         control: timer, progress and interruption.
 
@@ -95,21 +95,21 @@ def solve(
     kind = registry.choose(options, system)
     nested = _has_coarser(system, options)
     if not nested or not kind.takes_start:
-        levels = hierarchy(model, system, options, control) if nested and kind is LinearSolve else ()
+        levels = coarser_levels(model, system, options, control) if nested and kind is LinearSolve else ()
         context = SolveContext.create(system, levels, solvability, options, control)
         _log_level(system, kind)
         return LevelSolution(system=system, levels=levels, result=kind(context).solve())
-    coarse, transfer = _assembled(model, system, control)
+    coarse, transfer = _coarser_system(model, system, control)
     coarse.attach_free_motions(system.free_motions.modes if system.free_motions else ())
-    found = solve(model, coarse, solvability, _loosened(options), control)
+    found = solve(model, coarse, solvability, _with_coarse_tolerance(options), control)
     with control.timer("setup"):
         step = prolongation(system, coarse, transfer)
     levels = (Level(system, coarse, step), *found.levels)
     start = CoarseStart(system=coarse, result=found.result, prolongation=step, levels=levels)
-    return ascend(system, start, solvability, options, control)
+    return solve_from_coarser(system, start, solvability, options, control)
 
 
-def ascend(
+def solve_from_coarser(
     system: System, start: CoarseStart, solvability: Solvability, options: SolverOptions, control: RunControl
 ) -> LevelSolution:
     """Solve a system from a solution on a coarser mesh. Collective.
@@ -117,7 +117,7 @@ def ascend(
     Args:
         system: assembled on the finer mesh.
         start: the solution on the coarser mesh.
-        solvability: the verdict on existence.
+        solvability: whether a solution can exist.
         options: method, tolerance, limits.
         control: timer, progress and interruption.
 
@@ -134,7 +134,7 @@ def ascend(
     counts = Counts()
     counts.add(found.counts)
     counts.add(result.counts)
-    steady = result.steady and (found.steady or found.levels == 1)  # one level that stood is no sign yet
+    steady = result.steady and (found.steady or found.levels == 1)  # a single coarser level says too little
     result = replace(result, counts=counts, levels=found.levels + 1, steady=steady)
     return LevelSolution(system=system, levels=start.levels, result=result)
 
@@ -143,8 +143,8 @@ def _log_level(system: System, kind: type[Method]) -> None:
     _LOG.info("level of %d unknowns: method %s", system.dofs, kind.label)
 
 
-def hierarchy(model: Model, system: System, options: SolverOptions, control: RunControl) -> Levels:
-    """The coarser levels for the multigrid of an equation, which needs no start. Collective.
+def coarser_levels(model: Model, system: System, options: SolverOptions, control: RunControl) -> Levels:
+    """The coarser levels for the multigrid of an equation, which needs no solutions on them. Collective.
 
     Args:
         model: what is solved.
@@ -154,13 +154,13 @@ def hierarchy(model: Model, system: System, options: SolverOptions, control: Run
     """
     if not _has_coarser(system, options):
         return ()
-    coarse, transfer = _assembled(model, system, control)
-    below = hierarchy(model, coarse, options, control)
+    coarse, transfer = _coarser_system(model, system, control)
+    levels = coarser_levels(model, coarse, options, control)
     with control.timer("setup"):
-        return (Level(system, coarse, prolongation(system, coarse, transfer)), *below)
+        return (Level(system, coarse, prolongation(system, coarse, transfer)), *levels)
 
 
-def _assembled(model: Model, system: System, control: RunControl) -> tuple[System, Transfer]:
+def _coarser_system(model: Model, system: System, control: RunControl) -> tuple[System, Transfer]:
     """The system on the next coarser mesh, and the transfer from that mesh. Collective."""
     with control.timer("mesh"):
         coarser = system.problem.domain.coarser()
@@ -169,8 +169,8 @@ def _assembled(model: Model, system: System, control: RunControl) -> tuple[Syste
     return assemble(domain, model, control.timer, system.thresholds), transfer
 
 
-def _loosened(options: SolverOptions) -> SolverOptions:
-    """The options with a tolerance that suits a start."""
+def _with_coarse_tolerance(options: SolverOptions) -> SolverOptions:
+    """The options with the tolerance of a coarser level."""
     return replace(options, tolerance=max(options.thresholds.coarse_tolerance, options.tolerance))
 
 

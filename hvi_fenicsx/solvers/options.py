@@ -11,7 +11,10 @@ from ..system.system import System
 from .thresholds import DEFAULT, Thresholds
 
 Start = Literal["unbroken", "resting", "broken"] | Sequence[Formula]
-"""No slip; the slips at rest (contact closed, every bond a spring); beyond every drop; those of a displacement (m)."""
+"""Slips by which the first pieces of the laws are chosen.
+
+None; those at rest (contact closed, every bond a spring); very large ones; those of a displacement (m) by component.
+"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -21,10 +24,10 @@ class SolverOptions:
     Attributes:
         method: name of the method; auto chooses by the effects.
         epsilon: width of the laws' smoothing relative to their energy scale; None for exact laws.
-        epsilon_absolute: the same in N/m (J/m²) instead.
-        start: the pieces of the laws that the branch iteration begins on.
+        epsilon_absolute: the width in N/m (J/m²) instead.
+        start: the pieces of the laws on which the branch iteration begins.
         tolerance: relative residual of the inequality.
-        linear_solver: by the user; auto chooses by size.
+        linear_solver: what the user wants; auto chooses by size.
         second_order: whether to factorise the Hessian where a falling law leaves open if u is a local minimum.
         max_iterations: Newton iterations of one solve at most.
         thresholds: the numbers that tune the methods.

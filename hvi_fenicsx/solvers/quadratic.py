@@ -1,4 +1,4 @@
-"""What needs no iteration over branches: one linear solve, or one convex quadratic programme.
+"""Problems without nonsmooth laws: one linear solve, or one convex quadratic programme.
 
 Without contact and with laws that are linear springs at most, the inequality is an equation: one KSP solve, no SNES.
 With contact it is a convex quadratic programme with bounds on u·n: one SNES VI solve.
@@ -12,21 +12,14 @@ import numpy as np
 from petsc4py import PETSc
 
 from ..system.system import System
-from .active_set import Outcome
 from .closed_start import resting_start
+from .convergence import Outcome
 from .fallbacks import Attempt, first_success
-from .law_models import Full
+from .law_models import ExactLaw
 from .method import Method
 from .result import Counts, SolveResult
 from .rigid_start import at_rest
 from .smooth_method import smooth_models
-
-_MARGIN = 0.5
-"""Of the tolerance, for Krylov's recursive residual to stay below it."""
-_REFINEMENTS = 3
-"""Linear solves at most: further ones only where rounding, or the traction of a spring, is coarser than the norm."""
-_ATTEMPTS = (("basic", 30), ("basic", 30), ("bt", 60), ("basic", 60), ("bt", 200))
-"""Of a programme, until one converges: PETSc's line search, most iterations."""
 
 
 def is_equation(system: System) -> bool:
@@ -43,7 +36,7 @@ class LinearSolve(Method):
     """The equation on one system; call :meth:`solve` once."""
 
     name = "linear"
-    words = "one linear solve"
+    description = "one linear solve"
     in_scenes = False
 
     def solve(self, start: PETSc.Vec | None = None) -> SolveResult:
@@ -54,7 +47,7 @@ class LinearSolve(Method):
         """
         x, models, counts = self.system.undisplaced(), smooth_models(self.system), Counts()
         outcome = Outcome(False, 0, 0, float("inf"), "not started")
-        for _ in range(_REFINEMENTS):
+        for _ in range(self.options.thresholds.linear_solves):
             outcome = self._step(x, models)
             counts.linear += outcome.linear
             if outcome.converged:
@@ -65,17 +58,18 @@ class LinearSolve(Method):
             u=self.system.displacement(x), method=self.name, converged=outcome.converged, reason=reason, counts=counts
         )
 
-    def _step(self, x: PETSc.Vec, models: Sequence[Full]) -> Outcome:
-        """One solve of the residual equation, and how far x is then from the solution. Collective."""
-        step = self.solver.newton_step(x, np.empty(0, np.int32), models, _MARGIN * self.options.tolerance)
-        return self.solver.judged(step, x, models, self.options.tolerance)
+    def _step(self, x: PETSc.Vec, models: Sequence[ExactLaw]) -> Outcome:
+        """One solve of the residual equation, and the residual that is left. Collective."""
+        rtol = self.options.thresholds.linear_margin * self.options.tolerance
+        step = self.solver.newton_step(x, np.empty(0, np.int32), models, rtol)
+        return self.solver.check_step(step, x, models, self.options.tolerance)
 
 
 class ConvexProgramme(Method):
     """The quadratic programme on one system; call :meth:`solve` once."""
 
     name = "convex"
-    words = "one convex quadratic programme by SNES VI (reduced space)"
+    description = "one convex quadratic programme by SNES VI (reduced space)"
     takes_start = True
     in_scenes = False
 
@@ -108,14 +102,14 @@ class ConvexProgramme(Method):
         self.context.progress(self.name, None, iteration, residual, contact)
 
     def _minimise(self, x: PETSc.Vec, counts: Counts) -> Outcome:
-        """Attempts until one converges, into x; the best one's outcome. Collective."""
+        """Attempts until one converges, from and into x; the outcome of the best one. Collective."""
         bounds = self.system.lower, self.system.upper
         return first_success(self.solver, x, self._attempts(counts), self.options.tolerance, bounds, counts)
 
     def _attempts(self, counts: Counts) -> Iterator[Attempt]:
         """From the start, then from bodies at rest on their supports."""
         models = smooth_models(self.system)
-        for number, (search, most) in enumerate(_ATTEMPTS):
+        for number, (search, most) in enumerate(self.options.thresholds.programme_attempts):
             start = self._from_rest(models, counts) if number == 1 else None
             limit = min(most, self.options.max_iterations)
             steady = self.context.steady and number == 0
@@ -123,13 +117,15 @@ class ConvexProgramme(Method):
                 models=models,
                 line_search=search,
                 max_iterations=limit,
-                kept=search == "bt",
+                lowers_energy=search == "bt",
                 start=start,
                 steady=steady,
             )
 
-    def _from_rest(self, models: list[Full], counts: Counts) -> PETSc.Vec | None:
-        rested = at_rest(self.context, lambda _: models, min(1e-4, self.options.tolerance))
+    def _from_rest(self, models: list[ExactLaw], counts: Counts) -> PETSc.Vec | None:
+        """The displacement of bodies at rest on their supports; None where there is none."""
+        rtol = min(self.options.thresholds.branch.rest_tolerance, self.options.tolerance)
+        rested = at_rest(self.context, lambda _: models, rtol)
         if rested is None:
             return None
         counts.linear += rested[1]

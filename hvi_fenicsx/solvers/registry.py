@@ -1,4 +1,4 @@
-"""The methods by name. Every module of this room is loaded: a new method is a new file and no edit elsewhere."""
+"""The methods by name. Every module of this room is loaded, so a new method needs a new file and no edit elsewhere."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def find(name: str) -> type[Method]:
     """The method of this name.
 
     Raises:
-        InputError: there is none; with the allowed names.
+        InputError: there is none; the message has the allowed names.
     """
     load_all()
     if name in Method.registry:
@@ -30,7 +30,11 @@ def find(name: str) -> type[Method]:
 
 
 def choose(options: SolverOptions, system: System) -> type[Method]:
-    """The class that solves a system: the one that is named, or the simplest that the effects allow.
+    """The method that solves a system: the one that is named, or the simplest that the effects allow.
+
+    Args:
+        options: with the name of the method.
+        system: the assembled problem.
 
     Raises:
         InputError: there is no such method.

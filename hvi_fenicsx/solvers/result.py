@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 from dolfinx import fem
 
-from .active_set import Outcome
+from .convergence import Outcome
 
 
 @dataclass
@@ -23,13 +23,13 @@ class Counts:
     linear: int = 0
     branch: int = 0
 
-    def spend(self, step: Outcome) -> None:
-        """Count one solve of the active set solver in."""
+    def add_outcome(self, step: Outcome) -> None:
+        """Add the iterations of one solve of the active set solver."""
         self.newton += step.newton
         self.linear += step.linear
 
     def add(self, other: Counts) -> None:
-        """Count another method's in."""
+        """Add the iterations of another method."""
         self.newton += other.newton
         self.linear += other.linear
         self.branch += other.branch
@@ -43,12 +43,12 @@ class SolveResult:
         u: the displacement in units of u0, ghosts updated.
         method: its name.
         converged: by the method's own test.
-        reason: in words.
+        reason: why it ended, for people.
         counts: iterations.
         energies: after each convex step, nondimensional.
         interrupted: whether it ended because it was asked to.
-        levels: levels of the mesh hierarchy that it went up.
-        steady: whether the pieces and the active set that it began with stood, on every level.
+        levels: levels of the mesh hierarchy on which it was solved, one after the other.
+        steady: whether the pieces and the active set of the start were the final ones, on every level.
     """
 
     u: fem.Function

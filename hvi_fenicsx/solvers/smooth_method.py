@@ -1,4 +1,4 @@
-"""What methods that differentiate the law share: they refuse kinks, begin at rest, and are judged by the inequality."""
+"""The base of methods that differentiate the law: they refuse kinks, begin at rest, and converge by the inequality."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ from ..errors import InputError
 from ..system.system import System
 from .closed_start import resting_start
 from .context import SolveContext
-from .law_models import Cells, Full
+from .law_models import Cells, ExactLaw
 from .method import Method
 from .result import Counts, SolveResult
 
 
-class Run(ABC):
-    """One solve by a method: a PETSc object (SNES, TAO) and what it calls back.
+class SolverRun(ABC):
+    """One solve by a PETSc object (SNES, TAO), and its callbacks.
 
     Attributes:
-        models: what stands for the laws.
+        models: what takes the place of the laws, by term.
         counts: iterations.
         stopped: whether it was asked to end.
         matrix: for the Hessian; a copy of the system's, which PETSc scales or shifts, and which may be indefinite.
-        reasons: PETSc's enumeration of why it ended.
+        reasons: PETSc's enumeration of reasons to end.
     """
 
     reasons: type
@@ -45,19 +45,19 @@ class Run(ABC):
 
     @abstractmethod
     def iterate(self, solver: Any, x: PETSc.Vec) -> None:
-        """Let it solve, from and into x. Collective.
+        """Let the PETSc object solve. Collective.
 
         Args:
-            solver: what :meth:`create` made.
+            solver: the object that :meth:`create` returned.
             x: start and result.
         """
 
     def execute(self, x: PETSc.Vec) -> str:
-        """Iterate from and into x; PETSc's name of its reason to end. Collective."""
+        """Solve from and into x; PETSc's name of the reason to end. Collective."""
         solver = self.create()
         try:
             self.iterate(solver, x)
-            reason = self._words(solver.getConvergedReason())
+            reason = self._name_of(solver.getConvergedReason())
         except PETSc.Error as error:
             reason = f"PETSc error {error.ierr}"
         self.count(solver)
@@ -65,16 +65,16 @@ class Run(ABC):
             thing.destroy()
         return "interrupted" if self.stopped else reason
 
-    def _words(self, reason: int) -> str:
+    def _name_of(self, reason: int) -> str:
         names = {v: k for k, v in vars(self.reasons).items() if isinstance(v, int) and "_" in k}
         return names.get(int(reason), str(reason))
 
     def count(self, solver: Any) -> None:
-        """Read off its iterations."""
+        """Take the iterations from the PETSc object."""
         self.counts.newton = solver.getIterationNumber()
 
     def judge(self, x: PETSc.Vec) -> tuple[PETSc.Vec, float]:
-        """The candidate that x stands for, and its residual of the inequality. Collective."""
+        """The candidate for a solution at x, and its residual of the inequality. Collective."""
         self.system.residual(x, self.residual, self.models)
         return x, self.solver.measure(x, self.residual, self.system.lower, self.system.upper)
 
@@ -84,14 +84,14 @@ class SmoothMethod(Method):
 
     Class attributes:
         run: the class of its solve.
-        solver_words: what it calls itself where it failed.
+        solver_name: the solver's name in messages.
 
     Raises:
         InputError: a law has kinks.
     """
 
-    run: ClassVar[type[Run]]
-    solver_words: ClassVar[str]
+    run: ClassVar[type[SolverRun]]
+    solver_name: ClassVar[str]
     takes_pieces = False
 
     def __init__(self, context: SolveContext) -> None:
@@ -99,7 +99,7 @@ class SmoothMethod(Method):
         refuse_kinks(context.system, self.name)
 
     def solve(self, start: PETSc.Vec | None = None) -> SolveResult:
-        """A stationary point of the smoothed energy, or what was reached. Collective.
+        """A stationary point of the smoothed energy, or what was found instead. Collective.
 
         Args:
             start: not used; it begins at rest.
@@ -112,12 +112,12 @@ class SmoothMethod(Method):
             found, measure = run.judge(x)
         run.counts.linear += linear
         converged = measure <= self.options.tolerance
-        words = "stationary" if converged else f"{self.solver_words} stopped: {reason}, residual {measure:.1e}"
+        failure = f"{self.solver_name} stopped: {reason}, residual {measure:.1e}"
         return SolveResult(
             u=system.displacement(found),
             method=self.name,
             converged=converged,
-            reason=words,
+            reason="stationary" if converged else failure,
             counts=run.counts,
             energies=(system.energy(found, run.models),),
             interrupted=run.stopped,
@@ -125,7 +125,7 @@ class SmoothMethod(Method):
 
 
 def refuse_kinks(system: System, method: str) -> None:
-    """Methods that differentiate a law cannot solve one with kinks.
+    """Refuse laws with kinks, which methods that differentiate a law cannot solve.
 
     Args:
         system: the assembled problem.
@@ -144,6 +144,6 @@ def refuse_kinks(system: System, method: str) -> None:
             )
 
 
-def smooth_models(system: System) -> list[Full]:
-    """The laws with their true curvature; they have no kinks, so each has one cell."""
-    return [Full(t.law, Cells.around(t.law.convex, np.zeros(len(t.surface.blocks)))) for t in system.terms]
+def smooth_models(system: System) -> list[ExactLaw]:
+    """The laws with their true curvature, by term; they have no kinks, so each has one cell."""
+    return [ExactLaw(t.law, Cells.around(t.law.convex, np.zeros(len(t.surface.blocks)))) for t in system.terms]

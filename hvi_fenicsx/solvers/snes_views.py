@@ -1,4 +1,4 @@
-"""What PETSc's SNES VI sees of the matrix and of the preconditioner, which both stay at full size."""
+"""The matrix and the preconditioner as PETSc's SNES VI sees them; both stay at full size."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ..typing import Entities
 
 
 def unextracted(held: HeldPreconditioner) -> PETSc.Mat:
-    """J as SNES VI sees it: its inactive part is multiplied at full size instead of being copied out."""
+    """J for SNES VI: its inactive part is multiplied at full size instead of being copied."""
     sizes = held.system.jacobian.matrix.getSizes()
     matrix = PETSc.Mat().createPython(sizes, _Whole(held), comm=held.system.comm)
     matrix.setUp()
@@ -26,13 +26,26 @@ class _Whole:
         self._held = held
 
     def mult(self, _: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        """Y = J x, where a line search that fails looks for a stationary point of the residual's norm. Collective."""
+        """Multiply y = J x; a line search that fails needs it to test for a minimum of the residual's norm. Collective.
+
+        Args:
+            _: the matrix whose context this is.
+            x: the vector.
+            y: where the product is written.
+        """
         self._held.system.jacobian.matrix.mult(x, y)
 
     multTranspose = mult
 
     def createSubMatrix(self, _: PETSc.Mat, rows: PETSc.IS, columns: PETSc.IS, into: PETSc.Mat | None) -> PETSc.Mat:
-        """The rows and columns of the inactive dofs. Collective."""
+        """The rows and columns of the inactive dofs. Collective.
+
+        Args:
+            _: the matrix whose context this is.
+            rows: the inactive dofs.
+            columns: the same.
+            into: not used.
+        """
         self._held.select(rows)
         sizes = (rows.getLocalSize(), rows.getSize())
         matrix = PETSc.Mat().createPython((sizes, sizes), _Reduced(self._held), comm=rows.comm)
@@ -47,12 +60,24 @@ class _Reduced:
         self._held = held
 
     def mult(self, _: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        """Y = J x. Collective."""
+        """Multiply y = J x. Collective.
+
+        Args:
+            _: the matrix whose context this is.
+            x: the vector, on the inactive dofs.
+            y: where the product is written.
+        """
         self._held.multiply_reduced(x, y)
 
 
 class ReducedPreconditioner:
-    """PETSc's view of :class:`HeldPreconditioner` on the inactive dofs of a SNES VI step."""
+    """PETSc's view of :class:`HeldPreconditioner` on the inactive dofs of a SNES VI step.
+
+    Args:
+        snes: the solver, which knows the inactive dofs.
+        held: the preconditioner.
+        accuracy: relative tolerance of a linear solve, by whether the active set has changed.
+    """
 
     def __init__(self, snes: PETSc.SNES, held: HeldPreconditioner, accuracy: Callable[..., float]) -> None:
         self._snes, self._held, self._accuracy = snes, held, accuracy
@@ -71,5 +96,11 @@ class ReducedPreconditioner:
         self._held.prepare(found)
 
     def apply(self, pc: PETSc.PC, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        """Y = P^-1 x on the inactive dofs."""
+        """Apply the preconditioner, y = P^-1 x.
+
+        Args:
+            pc: the PC whose context this is.
+            x: the vector, on the inactive dofs.
+            y: where the result is written.
+        """
         self._held.apply_reduced(x, y)

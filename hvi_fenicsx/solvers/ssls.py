@@ -1,9 +1,9 @@
 """PETSc's semismooth Newton method (SNES VI, ``vinewtonssls``) on the smoothed law: a method to compare with.
 
 It writes the inequality as a system of Fischer-Burmeister functions and searches along Newton's direction for a smaller
-norm of them. PETSc's own test asks for a small norm relative to the first one and has been seen to claim what is not so
-(solver-notes.md); here the residual of the inequality decides, at the iterate moved onto the bounds it nearly touches.
-Any option may be overridden under the prefix ``hvi_``.
+norm of them. PETSc's own test asks for a small norm relative to the first one, and has accepted points that are no
+solutions (solver-notes.md); here the residual of the inequality decides, at the iterate moved onto the bounds that it
+nearly touches. Any option may be overridden under the prefix ``hvi_``.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from petsc4py import PETSc
 
 from ..system.petsc_options import configure
 from ..system.system import System
-from .smooth_method import Run, SmoothMethod
+from .smooth_method import SmoothMethod, SolverRun
 
 _DIRECT = {"ksp_type": "preonly", "pc_type": "lu", "pc_factor_mat_solver_type": "mumps"}
 _KRYLOV = {
@@ -30,10 +30,15 @@ _Reason = PETSc.SNES.ConvergedReason
 
 
 def onto_bounds(system: System, x: PETSc.Vec, residual: PETSc.Vec) -> PETSc.Vec:
-    """A copy of x, admissible, with those dofs on their bound whose force there outweighs their distance from it.
+    """An admissible copy of x, with those dofs on their bound whose force there is larger than their distance from it.
 
     Fischer-Burmeister iterates come near their bounds without ever being on them. Nondimensional nodal stiffnesses are
     about 1, so distances compare with forces, as in the primal-dual active set method.
+
+    Args:
+        system: the assembled problem.
+        x: the displacement.
+        residual: of the equations at x.
     """
     found = x.copy()
     value, force = x.array_r, residual.array_r
@@ -43,7 +48,7 @@ def onto_bounds(system: System, x: PETSc.Vec, residual: PETSc.Vec) -> PETSc.Vec:
     return found
 
 
-class _Run(Run):
+class _SnesRun(SolverRun):
     """The callbacks of one SNES solve."""
 
     reasons = _Reason
@@ -96,6 +101,6 @@ class SemismoothNewton(SmoothMethod):
     """``vinewtonssls``."""
 
     name = "ssls"
-    words = "a semismooth Newton method on the Fischer-Burmeister function"
-    run = _Run
-    solver_words = "vinewtonssls"
+    description = "a semismooth Newton method on the Fischer-Burmeister function"
+    run = _SnesRun
+    solver_name = "vinewtonssls"

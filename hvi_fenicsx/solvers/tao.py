@@ -15,14 +15,12 @@ from ..system.petsc_options import configure
 from ..system.system import System
 from ..typing import Array
 from .result import Counts
-from .smooth_method import Run, SmoothMethod
+from .smooth_method import SmoothMethod, SolverRun
 
-_FOUNDATION = 1e-3
-"""Stiffness per area, in units of E0/L, that keeps the preconditioner regular where the body is free to move."""
 _Reason = PETSc.TAO.ConvergedReason
 
 
-class _Run(Run):
+class _TaoRun(SolverRun):
     """The callbacks of one TAO solve; each step of the preconditioner counts its linear iteration."""
 
     reasons = _Reason
@@ -56,12 +54,13 @@ class _Run(Run):
         self.system.jacobian.set_rates(self._convex(x))
 
     def _convex(self, x: PETSc.Vec) -> list[Array]:
-        rates = []
+        """The tangent of the laws' convex parts, with a foundation on Γc, by term."""
+        rates, foundation = [], self.options.thresholds.foundation
         for term in self.system.terms:
             argument = term.argument(x.array_r)
             part = term.law.convex
             rate = term.rate(x.array_r, part.right(argument), part.second(argument))
-            rates.append(rate + _FOUNDATION * term.free[:, :, None] * np.eye(term.free.shape[1]))
+            rates.append(rate + foundation * term.free[:, :, None] * np.eye(term.free.shape[1]))
         return rates
 
     def _converged(self, tao: PETSc.TAO) -> int | None:
@@ -81,7 +80,7 @@ class _Run(Run):
 def _numbered_rows(system: System) -> PETSc.Mat:
     """A diagonal matrix that holds each row's number.
 
-    TAO offers its active set to nobody, but it does hand the preconditioner the inactive rows of this matrix.
+    TAO has no function that returns its active set, but it gives the preconditioner the inactive rows of this matrix.
     """
     numbers = system.load.duplicate()
     numbers.array[:] = np.arange(*numbers.owner_range)
@@ -99,7 +98,7 @@ class _ReducedPC:
         self._held, self._counts = held, counts
 
     def setUp(self, pc: PETSc.PC) -> None:
-        """Read off the inactive rows and prepare for them."""
+        """Find the inactive rows and prepare for them."""
         rows = np.round(pc.getOperators()[1].getDiagonal().array_r).astype(PETSc.IntType)
         self._held.select(PETSc.IS().createGeneral(rows, comm=pc.comm))
         start, end = self._held.system.load.owner_range
@@ -107,8 +106,14 @@ class _ReducedPC:
         self._held.prepare((active - start).astype(np.int32))
 
     def apply(self, pc: PETSc.PC, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        """Y = P^-1 x on the inactive rows."""
-        self._counts.linear += 1  # one a conjugate gradient step; TAO tells those of the last solve only
+        """Apply the preconditioner, y = P^-1 x, on the inactive rows.
+
+        Args:
+            pc: the PC whose context this is.
+            x: the vector, on the inactive rows.
+            y: where the result is written.
+        """
+        self._counts.linear += 1  # one for each conjugate gradient step; TAO has the number of the last solve only
         self._held.apply_reduced(x, y)
 
 
@@ -116,6 +121,6 @@ class BoundedNewton(SmoothMethod):
     """``bnls``."""
 
     name = "tao"
-    words = "PETSc TAO's bound-constrained Newton line search"
-    run = _Run
-    solver_words = "TAO"
+    description = "PETSc TAO's bound-constrained Newton line search"
+    run = _TaoRun
+    solver_name = "TAO"

@@ -2,47 +2,45 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from ..system.thresholds import Thresholds as LinearThresholds
 
+BRANCH_ATTEMPTS = (
+    (False, "basic", 30),
+    (False, "bt", 60),
+    (True, "bt", 40),
+    (False, "basic", 30),
+    (True, "bt", 200),
+    (False, "bt", 60),
+    (False, "basic", 30),
+)
+PROGRAMME_ATTEMPTS = (("basic", 30), ("basic", 30), ("bt", 60), ("basic", 60), ("bt", 200))
+
 
 @dataclass(frozen=True, kw_only=True)
-class Thresholds:
-    """When nested iteration pays, how exact intermediate steps are, and when a method gives up.
+class ActiveSetThresholds:
+    """How exact the steps of the active set solver are, and when it gives up.
 
     Attributes:
-        linear: of the linear solvers.
-        nested_from: unknowns from which a coarser level pays.
-        coarse_tolerance: of the solution on a coarser level.
-        start_tolerance: of a start's linear solve: what its active set needs; laws that do not rest make it no better.
-        loose_tolerance: of convex steps while the pieces of the laws still change.
-        convex_steps: of the branch iteration at most.
-        cell_changes: times that vertices may change their cell between convex kinks in one convex step.
-        kink_distance: distance (of u0) from a kink that counts as being on it.
-        search_steps: Newton steps of all starts together, unless the body is held; hard cases took at most 589.
-        still: fraction of the residual; two steps that change it by less show a line search that stalls.
+        on_bound: distance (of u0) from a bound that counts as being on it.
+        still: fraction of the residual; a step that changes it by less shows a line search that stalls.
+        stalled_steps: such steps in a row after which a solve ends.
         rounding_below: residual below which twice as many steps without halving it mean that rounding allows no more.
-        largest_rounding: a residual above this is no rounding.
+        largest_rounding: a residual larger than this is no rounding.
         rounding_safety: the sample of the rounding error is trusted within this factor.
-        moving_accuracy: relative tolerance of a step's linear solve while the active set moves.
-        forcing: relative tolerance of a linear solve as a part of what is left.
+        moving_accuracy: relative tolerance of a step's linear solve while the active set changes.
+        forcing: relative tolerance of a linear solve, as a part of the reduction that is still needed.
         finest_accuracy: the least relative tolerance of a linear solve.
-        straight: part of the tolerance that one step shall reach: nodal tractions fall by a quarter as much as the
-            norm where ranks meet on Γc.
+        straight: part of the tolerance that a step from a steady start shall reach: nodal tractions fall by a quarter
+            as much as the norm where ranks meet on Γc.
         runaway: a displacement of so many times p0 L / E0 is a body that slides away.
     """
 
-    linear: LinearThresholds = field(default_factory=LinearThresholds)
-    nested_from: int = 5_000
-    coarse_tolerance: float = 1e-4
-    start_tolerance: float = 1e-2
-    loose_tolerance: float = 1e-4
-    convex_steps: int = 200
-    cell_changes: int = 200
-    kink_distance: float = 1e-11
-    search_steps: int = 1_000
+    on_bound: float = 1e-12
     still: float = 1e-3
+    stalled_steps: int = 2
     rounding_below: float = 1e-7
     largest_rounding: float = 1e-4
     rounding_safety: float = 4.0
@@ -51,6 +49,93 @@ class Thresholds:
     finest_accuracy: float = 1e-4
     straight: float = 0.125
     runaway: float = 1e8
+
+
+@dataclass(frozen=True, kw_only=True)
+class BranchThresholds:
+    """How convex steps of the branch iteration are solved, and when it gives up.
+
+    Attributes:
+        attempts: ways to solve a convex step, until one converges: whether with secant stiffness, PETSc's line search,
+            Newton steps at most.
+        loose_tolerance: of convex steps while the pieces of the laws still change.
+        convex_steps: convex steps at most.
+        cell_changes: times that vertices may change their cell between convex kinks in one convex step.
+        kink_distance: distance (of u0) from a kink that counts as being on it.
+        kink_jump: change of a traction within that distance, relative to the law's scale, that is no kink.
+        kink_slack: part of the tolerance of a traction by which the force on a kink may exceed what the kink carries.
+        energy_rounding: change of an energy, relative to it, that is rounding.
+        newton_steps: Newton steps with the true curvature, at most.
+        first_ramp: slip up to which the traction of a law of |u_t| grows from zero at first, relative to the largest
+            slip: a free vertex may turn its direction there.
+        least_slip: the largest slip is taken to be this (of u0) at least.
+        ramp_shrinks: factor of that slip when a stuck vertex becomes free.
+        broken_slip: slip beyond every kink, relative to the slip at rest.
+        rest_tolerance: relative tolerance of the linear solve that puts bodies on their supports.
+        search_steps: Newton steps of all starts together, unless the body is held; hard cases took at most 589.
+        widths: relative widths of the smoothing that a continuation goes through, if wider than the wanted one.
+    """
+
+    attempts: Sequence[tuple[bool, str, int]] = BRANCH_ATTEMPTS
+    loose_tolerance: float = 1e-4
+    convex_steps: int = 200
+    cell_changes: int = 200
+    kink_distance: float = 1e-11
+    kink_jump: float = 1e-6
+    kink_slack: float = 0.1
+    energy_rounding: float = 1e-10
+    newton_steps: int = 15
+    first_ramp: float = 1e-2
+    least_slip: float = 1e-6
+    ramp_shrinks: float = 0.3
+    broken_slip: float = 1e6
+    rest_tolerance: float = 1e-4
+    search_steps: int = 1_000
+    widths: Sequence[float] = (1.0, 1e-1, 1e-2, 1e-3)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Thresholds:
+    """When nested iteration pays, and how the methods solve.
+
+    Attributes:
+        linear: of the linear solvers.
+        active_set: of the active set solver.
+        branch: of the branch iteration.
+        nested_from: unknowns from which a coarser level pays.
+        coarse_tolerance: tolerance of the solution on a coarser level.
+        start_tolerance: relative tolerance of a start's linear solve: enough for its active set; an exact solution
+            of the laws at rest would be no better start.
+        linear_margin: part of the tolerance that a linear solve is given, since Krylov's recursive residual differs
+            from the true one.
+        linear_solves: linear solves of an equation at most; further ones only where rounding, or the traction of a
+            spring, is coarser than the norm.
+        programme_attempts: ways to solve a convex quadratic programme, until one converges: PETSc's line search,
+            Newton steps at most.
+        touching: distance from its bound, relative to the largest, at which a vertex rests on it.
+        independent: part of a support's row that must not be spanned by others.
+        foundation: stiffness per area, in units of E0/L, that keeps the preconditioner of ``tao`` regular where the
+            body is free to move.
+        evaluations: evaluations of the functions in ``condensed`` at most: the paper's limit of lsqnonlin's iterations.
+        least_decrease: relative decrease of the merit function at which ``condensed`` stops.
+        least_step: relative step at which ``condensed`` stops.
+    """
+
+    linear: LinearThresholds = field(default_factory=LinearThresholds)
+    active_set: ActiveSetThresholds = field(default_factory=ActiveSetThresholds)
+    branch: BranchThresholds = field(default_factory=BranchThresholds)
+    nested_from: int = 5_000
+    coarse_tolerance: float = 1e-4
+    start_tolerance: float = 1e-2
+    linear_margin: float = 0.5
+    linear_solves: int = 3
+    programme_attempts: Sequence[tuple[str, int]] = PROGRAMME_ATTEMPTS
+    touching: float = 1e-7
+    independent: float = 1e-6
+    foundation: float = 1e-3
+    evaluations: int = 100
+    least_decrease: float = 1e-10
+    least_step: float = 1e-14
 
 
 DEFAULT = Thresholds()

@@ -28,7 +28,7 @@ from hvi_fenicsx.mesh.domain import Domain
 from hvi_fenicsx.runtime.timing import Timer
 from hvi_fenicsx.scene_model import model_of, options_of
 from hvi_fenicsx.solvers.context import RunControl
-from hvi_fenicsx.solvers.nested_iteration import CoarseStart, ascend
+from hvi_fenicsx.solvers.nested_iteration import CoarseStart, solve_from_coarser
 from hvi_fenicsx.solvers.thresholds import Thresholds as SolverThresholds
 from hvi_fenicsx.system import levels
 from hvi_fenicsx.system.assemble import assemble
@@ -161,7 +161,7 @@ def test_multigrid_and_starts_on_a_refined_hierarchy(scene: Scene) -> None:
             prolongation=up,
             levels=levels.with_coarser_system(system, found.system, found.levels, up),
         )
-        found = ascend(system, start, coarse.solvability, options, control)
+        found = solve_from_coarser(system, start, coarse.solvability, options, control)
     assert found.result.converged
     assert found.result.levels == 4
     direct = workflow.finish(workflow.prepare(scene, COMM, domain=step.domain)).solve_result

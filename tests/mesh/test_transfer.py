@@ -22,7 +22,7 @@ from hvi_fenicsx.runtime.timing import Timer
 from hvi_fenicsx.solvers.active_set import ActiveSetSolver
 from hvi_fenicsx.solvers.closed_start import held_dofs
 from hvi_fenicsx.solvers.context import RunControl
-from hvi_fenicsx.solvers.nested_iteration import hierarchy
+from hvi_fenicsx.solvers.nested_iteration import coarser_levels
 from hvi_fenicsx.system import held_solver as linear
 from hvi_fenicsx.system.held_solver import LinearSettings
 from hvi_fenicsx.system.levels import Levels
@@ -113,7 +113,7 @@ def with_levels(demo: str, cells: int) -> tuple[System, Levels]:
     """A demo on a square of so many cells a side, with its coarser levels."""
     scene = read_scene(DEMOS / f"{demo}.toml", [f"domain.cells=[{cells}, {cells}]"])
     prepared, control = workflow.prepare(scene, thresholds=NESTED), RunControl(timer=Timer())
-    return prepared.system, hierarchy(prepared.model, prepared.system, prepared.options, control)
+    return prepared.system, coarser_levels(prepared.model, prepared.system, prepared.options, control)
 
 
 def tangent(system: System, stiffness: float) -> list[np.ndarray]:
@@ -148,7 +148,7 @@ def test_a_refined_file_is_solved_from_level_to_level(body: str, tmp_path: Path)
         read_scene(DEMOS / "strong_law.toml", [*convex, f'domain={{shape="file", file="{file}", {more}}}', *solver])
         for more, solver in (("refinements=3", []), ("scale=1.0", ['solver={linear_solver="lu"}']))
     )
-    mesh = replace(scene.domain.build_hierarchy(MPI.COMM_WORLD, 2, NESTED.mesh), coarsening=None)
+    mesh = replace(scene.domain.build_coarser_levels(MPI.COMM_WORLD, 2, NESTED.mesh), coarsening=None)
     direct = workflow.finish(workflow.prepare(alone, domain=mesh, thresholds=NESTED))
     found = workflow.solve(scene, thresholds=NESTED)
     assert found.solve_result is not None

@@ -1,0 +1,204 @@
+"""One convex step of the branch iteration: the inequality that remains when G is linearised at ξ ∈ ∂G.
+
+The kinks of H stay in the step: each vertex is kept in a cell between two kinks, and changes its cell until no kink is
+overloaded. Where a step fails, other line searches and a secant stiffness are tried, and it is asked whether the step
+has a minimiser at all.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+from petsc4py import PETSc
+
+from ..laws import Superpotential
+from ..system import boundedness
+from ..typing import Array
+from . import kink_bounds
+from .context import SolveContext
+from .convergence import Outcome
+from .fallbacks import Attempt, first_success
+from .law_models import Cells, ExactLaw, Majorant, SecantMajorant
+from .result import Counts
+
+UNBOUNDED = "the body slides away on what is left of its bonds"
+
+
+class ConvexStep:
+    """Convex steps on one system.
+
+    Args:
+        context: the system and how to solve it.
+        laws: what is solved in the place of the system's laws, by term (nondimensional).
+        counts: gets the iterations.
+        check_bounded: whether to ask before each step if it has a solution; else only where a step fails.
+    """
+
+    def __init__(
+        self, context: SolveContext, laws: Sequence[Superpotential], counts: Counts, *, check_bounded: bool
+    ) -> None:
+        self._context, self._system, self._solver = context, context.system, context.solver
+        self._laws, self._counts, self._check_bounded = laws, counts, check_bounded
+        self._options, self._thresholds = context.options, context.options.thresholds.branch
+        self._residual = context.system.load.duplicate()
+
+    def arguments(self, x: PETSc.Vec) -> list[Array]:
+        """What the laws act on at x, by term, (m,) each."""
+        return [t.argument(x.array_r) for t in self._system.terms]
+
+    def cells(self, x: PETSc.Vec) -> list[Cells]:
+        """The cells between convex kinks that hold x, by term."""
+        terms = zip(self._system.terms, self._laws, self.arguments(x), strict=True)
+        return [Cells.around(law.convex, a, radial=t.radial, thresholds=self._thresholds) for t, law, a in terms]
+
+    def subgradients(self, x: PETSc.Vec, shift: float = 0.0) -> list[Array]:
+        """ξ ∈ ∂G at x, by term, (m,) each.
+
+        Args:
+            x: the displacement.
+            shift: of the arguments, to one side of a kink.
+        """
+        return [law.concave.left(a + shift) for law, a in zip(self._laws, self.arguments(x), strict=True)]
+
+    def majorants(self, cells: Sequence[Cells], xi: Sequence[Array]) -> list[Majorant]:
+        """H - ξ, by term.
+
+        Args:
+            cells: where each vertex is kept, by term.
+            xi: ξ by term, (m,) each.
+        """
+        return [Majorant(law, c, s) for law, c, s in zip(self._laws, cells, xi, strict=True)]
+
+    def energy(self, x: PETSc.Vec) -> float:
+        """The true energy at x. Collective."""
+        return self._system.energy(x, self._laws)  # type: ignore[arg-type]
+
+    def energy_rounding(self, energy: float, x: PETSc.Vec) -> float:
+        """By how much rounding may change an energy: on stretched meshes it is a difference of much larger numbers.
+
+        Args:
+            energy: at x.
+            x: the displacement.
+        """
+        return max(self._thresholds.energy_rounding * abs(energy), self._system.energy_rounding(x), 1e-300)
+
+    def anywhere(self, flags: Sequence[npt.NDArray[np.generic]]) -> bool:
+        """Whether any flag is set, on any rank. Collective."""
+        return bool(self._system.comm.allreduce(any(bool(np.any(f)) for f in flags)))
+
+    def known_unbounded(self, xi: Sequence[Array]) -> bool:
+        """Whether the step has no solution, where that is to be asked before a step. Collective."""
+        return self._check_bounded and self._is_unbounded(xi)
+
+    def minimise(
+        self, x: PETSc.Vec, cells: list[Cells], xi: Sequence[Array], tolerance: float, *, steady: bool
+    ) -> tuple[list[Cells], Outcome]:
+        """Minimise the majorant within the bounds; cells change until no kink is overloaded. Collective.
+
+        Args:
+            x: start and result.
+            cells: where each vertex is kept at first, by term.
+            xi: ξ by term, (m,) each.
+            tolerance: of the residual.
+            steady: whether x's active set is expected to be the final one.
+
+        Returns:
+            The cells at the end, and how it ended.
+        """
+        for _ in range(self._thresholds.cell_changes):
+            models = self.majorants(cells, xi)
+            outcome = self._within(x, models, cells, tolerance, steady=steady)
+            moves = self._overloaded(x, models)
+            if not outcome.converged or not self.anywhere(moves):
+                return cells, outcome
+            cells = [c.moved(m, self._thresholds.ramp_shrinks) for c, m in zip(cells, moves, strict=True)]
+        return cells, replace(outcome, converged=False, reason="the states of the convex kinks keep changing")
+
+    def measure(self, x: PETSc.Vec, cells: Sequence[Cells], xi: Sequence[Array]) -> float:
+        """The residual of the true inequality: small if ξ is still in ∂G. Collective.
+
+        Args:
+            x: the displacement.
+            cells: where each vertex is kept, by term.
+            xi: ξ by term, (m,) each.
+        """
+        arguments = zip(self._laws, xi, self.arguments(x), strict=True)
+        nearest = [np.clip(s, law.concave.left(a), law.concave.right(a)) for law, s, a in arguments]
+        self._system.residual(x, self._residual, self.majorants(cells, nearest))
+        lower, upper = kink_bounds.slip_bounds(self._system, cells)
+        return self._solver.measure(x, self._residual, lower, upper)
+
+    def accelerate(self, x: PETSc.Vec, cells: Sequence[Cells], outcome: Outcome) -> tuple[Outcome, bool]:
+        """Newton steps with the true curvature, where G is curved. Collective.
+
+        They are dropped unless they end at no higher energy and solve the inequality.
+
+        Args:
+            x: start and result.
+            cells: where each vertex is kept, by term.
+            outcome: of the convex step that led to x.
+
+        Returns:
+            How it ended, and whether x is stationary.
+        """
+        arguments = zip(self._laws, self.arguments(x), strict=True)
+        if not self.anywhere([np.asarray(law.concave.second(a) > 0) for law, a in arguments]):
+            return outcome, False
+        trial = x.copy()
+        exact = [ExactLaw(law, c) for law, c in zip(self._laws, cells, strict=True)]
+        found = self._newton(trial, exact, cells)
+        if not found.converged or self.energy(trial) > self.energy(x) + self.energy_rounding(self.energy(x), x):
+            return outcome, False
+        trial.copy(x)
+        return found, not self.anywhere(self._overloaded(x, exact))
+
+    def _newton(self, x: PETSc.Vec, exact: Sequence[ExactLaw], cells: Sequence[Cells]) -> Outcome:
+        lower, upper = kink_bounds.slip_bounds(self._system, cells)
+        most = self._thresholds.newton_steps
+        found = self._solver.solve(
+            x, exact, self._options.tolerance, lower=lower, upper=upper, line_search="bt", max_iterations=most
+        )
+        self._counts.add_outcome(found)
+        return found
+
+    def _overloaded(self, x: PETSc.Vec, models: Sequence[Majorant | ExactLaw]) -> list[npt.NDArray[np.int64]]:
+        self._system.residual(x, self._residual, models)
+        slack = self._thresholds.kink_slack * self._options.tolerance
+        return kink_bounds.overloaded(self._system, x, self._residual, models, slack)
+
+    def _within(
+        self, x: PETSc.Vec, models: Sequence[Majorant], cells: Sequence[Cells], tolerance: float, *, steady: bool
+    ) -> Outcome:
+        """Minimise the majorant with each vertex kept in its cell, from and into x."""
+        bounds = kink_bounds.slip_bounds(self._system, cells)
+        attempts = self._attempts(models, steady=steady)
+        return first_success(self._solver, x, attempts, tolerance, bounds, self._counts)
+
+    def _attempts(self, models: Sequence[Majorant], *, steady: bool) -> Iterator[Attempt | str]:
+        """Ways to solve the step; after the first failure a reason instead, where it has no solution."""
+        secants = [SecantMajorant(m, m.law.length_scale) for m in models]
+        for secant, search, most in self._thresholds.attempts:
+            yield Attempt(
+                models=secants if secant else models,
+                line_search=search,
+                max_iterations=min(most, self._options.max_iterations),
+                lowers_energy=secant,
+                steady=steady,
+            )
+            if not self._check_bounded:
+                self._check_bounded = True
+                if self._is_unbounded([m.xi for m in models]):
+                    yield UNBOUNDED
+
+    def _is_unbounded(self, xi: Sequence[Array]) -> bool:
+        system = self._system
+        return boundedness.is_unbounded(system.problem, system.forces, self._laws, xi, system.thresholds)
+
+
+def no_step() -> Outcome:
+    """The outcome before the first step."""
+    return Outcome(False, 0, 0, math.inf, "no convex step")
