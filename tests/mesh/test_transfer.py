@@ -148,7 +148,7 @@ def test_a_refined_file_is_solved_from_level_to_level(body: str, tmp_path: Path)
         read_scene(DEMOS / "strong_law.toml", [*convex, f'domain={{shape="file", file="{file}", {more}}}', *solver])
         for more, solver in (("refinements=3", []), ("scale=1.0", ['solver={linear_solver="lu"}']))
     )
-    mesh = replace(scene.domain.build_coarser_levels(MPI.COMM_WORLD, 2, NESTED.mesh), coarsening=None)
+    mesh = replace(scene.domain.build_hierarchy(MPI.COMM_WORLD, 2, NESTED.mesh), coarsening=None)
     direct = workflow.finish(workflow.prepare(alone, domain=mesh, thresholds=NESTED))
     found = workflow.solve(scene, thresholds=NESTED)
     assert found.solve_result is not None
