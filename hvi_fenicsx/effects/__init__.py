@@ -1,7 +1,7 @@
 """The effects: importing the package registers those that come with the program."""
 
 from ..class_registry import load_modules
-from . import adhesion_support, anisotropic, contact, elasticity, friction, loads, thermal
+from . import anisotropic, contact, elasticity, friction, loads, normal_laws, thermal
 from .base import Drive, Effect, Evaluate, FormContext, Place, Sizes, SurfaceLoad
 from .contribution import Averaged, BoundaryLaw, Condition, Contribution, Direction, NormalBounds
 from .formula_field import FormulaField
@@ -23,12 +23,12 @@ __all__ = [
     "Role",
     "Sizes",
     "SurfaceLoad",
-    "adhesion_support",
     "anisotropic",
     "contact",
     "elasticity",
     "friction",
     "loads",
+    "normal_laws",
     "role_of",
     "thermal",
 ]
