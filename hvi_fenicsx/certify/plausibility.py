@@ -172,7 +172,9 @@ def _wide_smoothing(problem: Problem, law: LawState, thresholds: PlausibilityThr
 
 def _place_of_bounds(problem: Problem, part: str) -> str:
     """The key in the scene of the effect that brought a part's bounds."""
-    keys = (effect.key for where, effect, contribution in problem.made if where == part and contribution.bounds)
+    keys = (
+        effect.key for where, effect, contribution in problem.contributions if where == part and contribution.bounds
+    )
     return f"boundary.{part}.{next(keys)}"
 
 
@@ -181,7 +183,7 @@ def _place(problem: Problem, term: LawTerm) -> str:
     part = term.surface.part
     keys = (
         effect.key
-        for where, effect, contribution in problem.made
+        for where, effect, contribution in problem.contributions
         if where == part and any(law.direction is term.direction for law in contribution.laws)
     )
     return f"boundary.{part}.{next(keys)}"

@@ -55,8 +55,8 @@ class EffectSummary:
 
 def summaries(problem: Problem) -> list[EffectSummary]:
     """The summaries of all effects, in the scene's order. Collective."""
-    first = next((i for i, (_, e, _) in enumerate(problem.made) if e.place is Place.MATERIAL), None)
-    return [_summary(problem, made, brings=i == first) for i, made in enumerate(problem.made)]
+    first = next((i for i, (_, e, _) in enumerate(problem.contributions) if e.place is Place.MATERIAL), None)
+    return [_summary(problem, made, brings=i == first) for i, made in enumerate(problem.contributions)]
 
 
 def _summary(problem: Problem, made: PlacedContribution, *, brings: bool) -> EffectSummary:

@@ -1,7 +1,7 @@
-"""The problem: nondimensional forms, conditions, bounds and laws, whatever effects they came from.
+"""The problem: nondimensional forms, conditions, bounds and laws of all effects together.
 
-Displacements are in units of u0, stresses of p0, lengths of L (:mod:`.scaling`); the mesh itself stays in SI, the forms
-carry the factors.
+Displacements are in units of u0, stresses in units of p0, lengths in units of L (:mod:`.scaling`). The mesh stays in
+SI; the forms contain the factors.
 """
 
 from __future__ import annotations
@@ -26,7 +26,13 @@ from .scaling import Scales
 
 
 class PlacedContribution(NamedTuple):
-    """An effect with its place and what it contributed."""
+    """An effect, its place and its contribution.
+
+    Attributes:
+        where: boundary part or region; None for the whole body.
+        effect: the effect.
+        contribution: its forms, conditions, bounds and laws.
+    """
 
     where: str | None
     effect: Effect
@@ -35,24 +41,36 @@ class PlacedContribution(NamedTuple):
 
 @dataclass(frozen=True)
 class Bounds:
-    """lower ≤ u·n ≤ upper at a surface's vertices, nondimensional, shape (m,), infinite where there is none."""
+    """Bounds on u·n at the m vertices of a surface, nondimensional.
+
+    Attributes:
+        surface: the surface.
+        lower: lower bounds, -inf where there is none, (m,).
+        upper: upper bounds, inf where there is none, (m,).
+    """
 
     surface: Surface
     lower: Array
     upper: Array
 
     def beyond(self, normal: Array) -> Array:
-        """How far u·n (m,) is outside of the bounds; negative within."""
+        """The distance of u·n (m,) beyond its bounds, (m,); negative within them."""
         return np.maximum(normal - self.upper, self.lower - normal)
 
     def component(self) -> tuple[Integers, Array]:
-        """The scalar dof (m,) of u·n where n is along an axis of its vertex's frame, and n's sign there (m,)."""
+        """The scalar dof of u·n where n is along an axis of its vertex's frame, and the sign of n there, (m,) both."""
         return contact_surface.component_dofs(self.surface.blocks, self.surface.normals)
 
 
 @dataclass(frozen=True)
-class Prescribed:
-    """A displacement component that is prescribed on facets (local), its value in SI."""
+class PrescribedComponent:
+    """A displacement component that is prescribed.
+
+    Attributes:
+        component: its number.
+        facets: where, local facets.
+        value: its value, m.
+    """
 
     component: int
     facets: Entities
@@ -61,23 +79,23 @@ class Prescribed:
 
 @dataclass(frozen=True, kw_only=True)
 class Problem:
-    """Minimise ½a(u, u) - <g, u> + Σ laws over the admissible u, nondimensional.
+    """Minimise ½a(u, u) - <g, u> + Σ ∫ j(u) over the admissible u, nondimensional.
 
     Attributes:
         domain: the body.
         scales: of length, stress and displacement.
         space: P1 vectors.
-        points: its local vertices (owned and ghost), m, (n, 3).
+        points: local vertices (owned and ghost), m, (n, 3).
         bulk: the elastic operator, a(u, v).
         linear: UFL forms <g, v> by name of their place and effect.
         conditions: Dirichlet conditions, nondimensional values.
         fixed: local scalar dofs (owned and ghost) that they prescribe.
-        prescribed: where and what they prescribe.
-        bounds: by part.
+        prescribed: the prescribed components.
+        bounds: contact bounds, by part.
         terms: the laws at their vertices.
-        surfaces: of the parts with bounds or laws, in the order of the parts.
-        implausible: what effects doubt of their own numbers, in sentences.
-        made: what each effect contributed.
+        surfaces: surfaces of the parts with bounds or laws, in the order of the parts.
+        implausible: warnings of effects about their own numbers, in sentences.
+        contributions: what each effect contributed.
         held: the dofs of each condition, with its part.
     """
 
@@ -89,12 +107,12 @@ class Problem:
     linear: dict[str, Any]
     conditions: tuple[fem.DirichletBC, ...]
     fixed: Entities
-    prescribed: tuple[Prescribed, ...]
+    prescribed: tuple[PrescribedComponent, ...]
     bounds: tuple[Bounds, ...]
     terms: tuple[LawTerm, ...]
     surfaces: tuple[Surface, ...]
     implausible: tuple[str, ...]
-    made: tuple[PlacedContribution, ...]
+    contributions: tuple[PlacedContribution, ...]
     held: tuple[tuple[str, Entities], ...]
 
     @functools.cached_property

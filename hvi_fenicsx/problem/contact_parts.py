@@ -1,0 +1,196 @@
+"""The parts with contact or laws: their surfaces, the bounds on u·n and the laws there, nondimensional."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import ufl
+from dolfinx import fem
+
+from ..effects import BoundaryLaw, Direction, NormalBounds
+from ..errors import InputError
+from ..formula import Formula
+from ..laws import Superpotential
+from ..runtime.mpi import agree
+from ..typing import Array, Entities
+from . import contact_surface
+from .contact_surface import Surface
+from .domain_forms import DomainForms, Scaled
+from .law_term import LawTerm
+from .problem import Bounds, PlacedContribution
+from .scaling import Scales
+from .spaces import CONTACT_RULE
+from .thresholds import Thresholds
+
+Modification = Callable[[Superpotential], Superpotential]
+"""The law that is solved in the place of a law, SI: the same law, smoothed for example."""
+
+
+def unchanged(law: Superpotential) -> Superpotential:
+    """The law itself."""
+    return law
+
+
+def make_surfaces(context: DomainForms, contributions: Sequence[PlacedContribution]) -> dict[str, Surface]:
+    """The surfaces of the parts with bounds or laws, by part, in the scene's order. Collective.
+
+    Args:
+        context: spaces, parts and vertices.
+        contributions: of all effects.
+    """
+    parts = dict.fromkeys(w for w, _, c in contributions if w is not None and (c.bounds or c.laws))
+    return {
+        where: contact_surface.make_surface(
+            where,
+            context.space,
+            context.points,
+            context.part_facets[where],
+            context.boundary(where, **CONTACT_RULE),
+            context.length ** (context.dimension - 1),
+            next((b.direction for w, _, other in contributions if w == where for b in other.bounds), None),
+        )
+        for where in parts
+    }
+
+
+def make_bounds(
+    context: DomainForms,
+    scales: Scales,
+    surfaces: Mapping[str, Surface],
+    contributions: Sequence[PlacedContribution],
+) -> tuple[Bounds, ...]:
+    """The bounds on u·n. Collective.
+
+    Args:
+        context: spaces, parts and vertices.
+        scales: what one unit is in SI.
+        surfaces: by part.
+        contributions: of all effects.
+
+    Raises:
+        InputError: on all ranks alike: a bound that is not a finite number at some vertex.
+    """
+    wanted = [(surfaces[w], e.key, b) for w, e, c in contributions if w is not None for b in c.bounds]
+    return tuple(_bounds(context, surface, key, bounds, scales) for surface, key, bounds in wanted)
+
+
+def _bounds(context: DomainForms, where: Surface, effect: str, bounds: NormalBounds, scales: Scales) -> Bounds:
+    """The bounds that an effect, by its key, puts on a part. Collective."""
+
+    def value(formula: Formula | None) -> Array:
+        if formula is None:
+            return np.full(len(where.blocks), np.inf)
+        found = formula.at(where.points) / scales.displacement
+        if not all(agree(context.domain.mesh.comm, bool(np.all(np.isfinite(found))))):
+            reason = "the gap is not finite everywhere there; see its formula"
+            raise InputError(f"boundary.{where.part}.{effect}: {reason}")
+        return np.asarray(found)
+
+    # lower ≤ -u·n ≤ upper
+    return Bounds(where, -value(bounds.upper), -value(bounds.lower) if bounds.lower else value(None))
+
+
+def check_bounds(
+    context: DomainForms, bounds: Sequence[Bounds], conditions: Any, fixed: Entities, thresholds: Thresholds
+) -> None:
+    """Refuse bounds that exclude a prescribed value: PETSc would silently change it (solver-notes.md). Collective.
+
+    Args:
+        context: spaces, parts and vertices.
+        bounds: the bounds.
+        conditions: the Dirichlet conditions.
+        fixed: local scalar dofs that they prescribe.
+        thresholds: how far a value may be outside of its bounds.
+
+    Raises:
+        InputError: on all ranks alike.
+    """
+    prescribed = fem.Function(context.space)
+    for condition in conditions:
+        condition.set(prescribed.x.array)
+    bad: list[str] = []
+    for b in bounds:
+        un = np.sum(b.surface.values(prescribed.x.array) * b.surface.normals, axis=1)
+        axis = np.argmax(np.abs(b.surface.normals), axis=1)
+        held = np.isin(b.surface.blocks * context.dimension + axis, fixed)
+        out = held & ((un < b.lower - thresholds.outside_bounds) | (un > b.upper + thresholds.outside_bounds))
+        bad += [f"{b.surface.part} at {tuple(map(float, b.surface.points[i]))}" for i in np.flatnonzero(out)[:1]]
+    found = [b for rank in agree(context.domain.mesh.comm, bad) for b in rank]
+    if found:
+        raise InputError(f"boundary.{found[0]}: the prescribed displacement violates the contact bound there")
+
+
+def check_normal_laws(contributions: Sequence[PlacedContribution]) -> None:
+    """Refuse two normal laws on one part: together they are one law of the opening, which the user has to state.
+
+    Raises:
+        InputError: on all ranks alike.
+    """
+    normal = [(w, e.key) for w, e, c in contributions for law in c.laws if law.direction is not Direction.SLIP]
+    for where in dict.fromkeys(w for w, _ in normal):
+        keys = sorted(key for w, key in normal if w == where)
+        if len(keys) > 1:
+            raise InputError(
+                f"boundary.{where}: {' and '.join(keys)} act on the same displacement; state them as one law of the "
+                'opening, adhesion = { law = "graph", ... }'
+            )
+
+
+def make_terms(
+    context: DomainForms,
+    scales: Scales,
+    surfaces: Mapping[str, Surface],
+    contributions: Sequence[PlacedContribution],
+    fixed: Entities,
+    modify: Modification,
+) -> tuple[LawTerm, ...]:
+    """The laws at the vertices of their parts. Collective.
+
+    Args:
+        context: spaces, parts and vertices.
+        scales: what one unit is in SI.
+        surfaces: by part.
+        contributions: of all effects.
+        fixed: local scalar dofs that are prescribed.
+        modify: the law that is solved in the place of each law.
+
+    Raises:
+        InputError: on all ranks alike: a law that cannot be solved in 3D.
+    """
+    laws = [(surfaces[w], law) for w, _, c in contributions if w is not None for law in c.laws]
+    return tuple(_term(context, surface, law, modify, scales, fixed) for surface, law in laws)
+
+
+def _term(
+    context: DomainForms, where: Surface, law: BoundaryLaw, modify: Modification, scales: Scales, fixed: Entities
+) -> LawTerm:
+    directions = {
+        Direction.SLIP: where.tangents,
+        Direction.OPENING: -where.normals[:, None, :],
+        Direction.PENETRATION: where.normals[:, None, :],
+    }[law.direction]
+    solved, exact = (j.scaled(scales.displacement, scales.stress) for j in (modify(law.law), law.law))
+    if directions.shape[1] > 1 and np.any(solved.convex.kinks > 0):
+        raise InputError(
+            f'boundary.{where.part}: law = "{law.law.name}" jumps upwards at a slip > 0, which in 3D is a ring that '
+            "bounds cannot follow; smooth it: [solver] smoothing and epsilon"
+        )
+    density = fem.Function(context.space, name="clarke_derivative")
+    return LawTerm(
+        surface=where,
+        direction=law.direction,
+        law=solved,
+        exact=exact,
+        directions=directions,
+        free=(~np.isin(where.dofs, fixed)).astype(np.float64),
+        density=density,
+        residual=fem.form(_residual(context, where, density)),
+    )
+
+
+def _residual(context: DomainForms, where: Surface, density: fem.Function) -> Any:
+    """∫ density·v ds over a part, nondimensional."""
+    area = context.number(context.length ** (1 - context.dimension))
+    return ufl.inner(density, context.test) * Scaled(area, context.boundary(where.part, **CONTACT_RULE))
