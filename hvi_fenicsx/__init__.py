@@ -13,7 +13,7 @@ _HOME = {
     "__version__": "runtime.versions",
     "InputError": "errors",
     "Scene": "scene",
-    "Solution": "workflow",
+    "Solution": "solution",
     "Superpotential": "laws",
     "dump_scene": "scene",
     "prepare": "workflow",
@@ -37,7 +37,8 @@ if TYPE_CHECKING:
     from .laws import Superpotential
     from .runtime.versions import __version__
     from .scene import Scene, dump_scene, read_scene
-    from .workflow import Solution, prepare, solve
+    from .solution import Solution
+    from .workflow import prepare, solve
 
 
 def __getattr__(name: str) -> Any:

@@ -25,8 +25,9 @@ from .runtime.mpi import on_root
 from .runtime.signals import Interrupt
 from .runtime.timing import Timer
 from .scene import Scene, dump_scene, read_scene
+from .solution import Solution
 from .system import petsc_options
-from .workflow import Preparation, Solution, finish, prepare
+from .workflow import Preparation, finish, prepare
 
 COMM = MPI.COMM_WORLD
 H = TypeVar("H", bound=logging.Handler)

@@ -11,8 +11,9 @@ from .accuracy.control import AccuracyResult
 from .certify.estimate.estimator import Estimate
 from .problem import effect_summary
 from .rigid import LoadFactors, Mode, RigidBody
+from .solution import Solution
 from .solvers import nested_iteration, registry
-from .workflow import Preparation, Solution
+from .workflow import Preparation
 
 _LISTED = 3
 """So many rigid motions are named one by one; of more, only the number is given."""

@@ -1,4 +1,4 @@
-"""From a scene to a certified solution: domain, problem, existence, solve, certificate, in one direction."""
+"""From a scene to a certified solution: domain, problem, existence, solve, certificate, estimate, in this order."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from mpi4py import MPI
 from .certify import certificate, plausibility
 from .certify.certificate import Examination
 from .certify.estimate.estimator import Estimate, estimate
-from .errors import ExitCode, SolverError
+from .errors import SolverError
 from .mesh.domain import Domain
 from .mesh.thresholds import Thresholds as MeshThresholds
 from .problem.compose import Model
@@ -21,6 +21,7 @@ from .runtime.log import logger, newton_step
 from .runtime.timing import Timer
 from .scene import Scene
 from .scene_model import model_of, options_of
+from .solution import Solution
 from .solvers import nested_iteration
 from .solvers.context import Progress, RunControl, never
 from .solvers.nested_iteration import CoarseStart, LevelSolution
@@ -52,65 +53,8 @@ DEFAULT = Thresholds()
 
 
 @dataclass(frozen=True, kw_only=True)
-class Solution:
-    """What a run found.
-
-    Attributes:
-        scene: what the user asked for.
-        problem: what was solved; its laws are the smoothed ones where the scene smooths.
-        solvability: whether a solution can exist.
-        solve_result: what the method found, None when the state is *escapes* (nothing was solved).
-        examination: the certificate and the state of Γc, None likewise.
-        estimate: of the error; None where nothing was certified.
-        dofs: unknowns.
-        epsilon: relative width of the smoothing, None for exact laws.
-        timer: wall time by phase.
-        warnings: what is implausible, see :mod:`.plausibility`.
-    """
-
-    scene: Scene
-    problem: Problem
-    solvability: Solvability
-    solve_result: SolveResult | None
-    examination: Examination | None
-    estimate: Estimate | None
-    dofs: int
-    epsilon: float | None
-    timer: Timer
-    warnings: tuple[str, ...] = ()
-
-    @property
-    def converged(self) -> bool:
-        """Certified within the tolerance."""
-        return self.examination is not None and self.examination.certificate.passed
-
-    @property
-    def exit_code(self) -> int:
-        """By the contract: certified, no solution exists, or not converged."""
-        if self.converged:
-            return ExitCode.CERTIFIED
-        if self.solve_result is None:
-            return ExitCode.NO_SOLUTION
-        return ExitCode.INTERRUPTED if self.solve_result.interrupted else ExitCode.NOT_CONVERGED
-
-    @property
-    def reason(self) -> str:
-        """Why it ended as it did, in words."""
-        if self.solve_result is None:
-            return "no solution exists: the load moves the body away"
-        if self.converged:
-            local = " (a local equilibrium: the state is metastable)" if self.solvability.state == "metastable" else ""
-            free = ", ".join(mode.name for mode in self.solvability.free)
-            return f"certified{local}" + (f"; determined up to {free}" if free else "")
-        if self.solvability.state == "metastable" and not self.solve_result.interrupted:
-            return f"metastable, and no equilibrium found ({self.solve_result.reason})"
-        unknown = "; whether a solution exists could not be decided" if self.solvability.state == "undecided" else ""
-        return f"not certified ({self.solve_result.reason}){unknown}"
-
-
-@dataclass(frozen=True, kw_only=True)
 class Preparation:
-    """A scene made into an assembled problem whose existence is known.
+    """A scene as an assembled problem, before the solve.
 
     Attributes:
         scene: what the user asked for.
@@ -119,7 +63,7 @@ class Preparation:
         system: the assembled problem.
         solvability: whether a solution can exist.
         timer: wall time by phase.
-        warnings: what is implausible so far.
+        warnings: sentences about numbers that may be mistakes, as far as they are known before the solve.
     """
 
     scene: Scene
@@ -161,9 +105,9 @@ def prepare(
     Args:
         scene: what to solve.
         comm: the ranks.
-        timer: to go on with.
-        domain: the body where its mesh is there already, refined.
-        solvability: the verdict on existence, where it is known.
+        timer: where time goes; by default a new one.
+        domain: the body on its mesh, where that exists already; by default it is meshed.
+        solvability: whether a solution can exist, where that is known.
         thresholds: the numbers that tune the run.
 
     Raises:
@@ -207,7 +151,7 @@ def solve(
         scene: what to solve.
         comm: the ranks.
         progress: called at each Newton step; by default it is logged.
-        timer: to go on with.
+        timer: where time goes; by default a new one.
         thresholds: the numbers that tune the run.
 
     Raises:
@@ -219,7 +163,7 @@ def solve(
 def finish(
     prepared: Preparation, progress: Progress = newton_step, interrupted: Callable[[], bool] = never
 ) -> Solution:
-    """Solve, certificate and estimate of a prepared scene; nothing is solved when no solution exists. Collective.
+    """Solve a prepared scene, certify and estimate; nothing is solved where no solution exists. Collective.
 
     Args:
         prepared: the scene.
@@ -243,24 +187,37 @@ def finish_with_levels(
         interrupted: whether to stop (collective, asked at each Newton step).
         start: a solution on a coarser mesh, where the mesh was refined from it.
     """
-    found = examination = errors = None
-    levels: Levels = ()
-    warnings, options = prepared.warnings, prepared.options
-    if prepared.solvability.state != "escapes":
-        solved = _solved(prepared, RunControl(timer=prepared.timer, progress=progress, interrupted=interrupted), start)
-        found, levels = solved.result, solved.levels
-        with prepared.timer("certificate"):
-            examination = certificate.examine(
-                prepared.problem, found.u, options.tolerance, inertia=options.second_order
-            )
-            implausible = plausibility.of_solution(prepared.problem, examination, found.u)
-        _log_warnings(implausible)
-        warnings += implausible
-        _log_certificate(examination.certificate)
-        if examination.certificate.passed:
-            with prepared.timer("estimate"):
-                errors = estimate(prepared.system, levels, found.u, examination)
-    solution = Solution(
+    if prepared.solvability.state == "escapes":
+        return _solution(prepared, None, None, None, prepared.warnings), ()
+    control = RunControl(timer=prepared.timer, progress=progress, interrupted=interrupted)
+    solved = _solved(prepared, control, start)
+    examination, warnings = _examined(prepared, solved.result)
+    errors = None
+    if examination.certificate.passed:
+        with prepared.timer("estimate"):
+            errors = estimate(prepared.system, solved.levels, solved.result.u, examination)
+    return _solution(prepared, solved.result, examination, errors, prepared.warnings + warnings), solved.levels
+
+
+def _examined(prepared: Preparation, found: SolveResult) -> tuple[Examination, tuple[str, ...]]:
+    """The certificate, and warnings about the solution. Collective."""
+    options = prepared.options
+    with prepared.timer("certificate"):
+        examination = certificate.examine(prepared.problem, found.u, options.tolerance, inertia=options.second_order)
+        warnings = plausibility.of_solution(prepared.problem, examination, found.u)
+    _log_warnings(warnings)
+    _log_certificate(examination.certificate)
+    return examination, warnings
+
+
+def _solution(
+    prepared: Preparation,
+    found: SolveResult | None,
+    examination: Examination | None,
+    errors: Estimate | None,
+    warnings: tuple[str, ...],
+) -> Solution:
+    return Solution(
         scene=prepared.scene,
         problem=prepared.problem,
         solvability=prepared.solvability,
@@ -268,11 +225,10 @@ def finish_with_levels(
         examination=examination,
         estimate=errors,
         dofs=prepared.system.dofs,
-        epsilon=options.relative_width(prepared.system),
+        epsilon=prepared.options.relative_width(prepared.system),
         timer=prepared.timer,
         warnings=warnings,
     )
-    return solution, levels
 
 
 def _log_warnings(warnings: Iterable[str]) -> None:
@@ -288,6 +244,7 @@ def _log_certificate(found: certificate.Certificate) -> None:
 
 
 def _solved(prepared: Preparation, control: RunControl, start: CoarseStart | None) -> LevelSolution:
+    """What the method found; a displacement of zero where it broke down. Collective."""
     system, options, solvability = prepared.system, prepared.options, prepared.solvability
     try:
         if start is not None:

@@ -21,11 +21,12 @@ from ..runtime.log import newton_step
 from ..runtime.mpi import agree, total
 from ..runtime.timing import Timer
 from ..scene import Scene
+from ..solution import Solution
 from ..solvers.context import Progress, never
 from ..solvers.nested_iteration import CoarseStart
 from ..system.levels import Level, Levels, prolongation, with_coarser_system
 from ..typing import Entities
-from ..workflow import DEFAULT, Preparation, Solution, Thresholds, finish_with_levels, prepare
+from ..workflow import DEFAULT, Preparation, Thresholds, finish_with_levels, prepare
 from .thresholds import CONTROL, ControlThresholds
 
 

@@ -19,7 +19,7 @@ from ..mesh.refinement import Refinement
 from ..runtime import memory
 from ..runtime.mpi import largest
 from ..scene import Scene
-from ..workflow import Solution
+from ..solution import Solution
 from . import adaptive, cost_forecast, quantities
 from .adaptive import AdaptiveLevel, AdaptiveSolver
 from .cost_forecast import AdaptiveStep, Cost

@@ -16,8 +16,8 @@ from ..effects import Direction
 from ..mesh.vertex_dofs import dof_of_node
 from ..problem.problem import Problem
 from ..report.solution_arrays import PartArrays, Singles, SolutionArrays
+from ..solution import Solution
 from ..typing import Array, Entities, Integers
-from ..workflow import Solution
 from . import arc_length, contact_table
 
 

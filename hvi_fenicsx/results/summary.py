@@ -11,7 +11,7 @@ from ..problem import effect_summary
 from ..problem.problem import Problem
 from ..runtime import memory, versions
 from ..runtime.mpi import agree, largest
-from ..workflow import Solution
+from ..solution import Solution
 
 
 def summary(solution: Solution) -> dict[str, Any]:

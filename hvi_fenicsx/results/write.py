@@ -12,7 +12,7 @@ from ..problem.stress import von_mises
 from ..report.solution_arrays import FILE, SolutionArrays, save
 from ..runtime.mpi import on_root
 from ..scene import dump_scene
-from ..workflow import Solution
+from ..solution import Solution
 from . import boundary_table, contact_table, gathering, vtk_fields
 from .summary import summary
 

@@ -25,7 +25,8 @@ from ..results.summary import summary
 from ..runtime.mpi import ended_together, on_root
 from ..runtime.timing import Timer
 from ..scene import Scene, read_scene
-from ..workflow import Solution, finish, prepare
+from ..solution import Solution
+from ..workflow import finish, prepare
 from . import cost
 from .solution_fields import width
 from .stiffness import stiffness

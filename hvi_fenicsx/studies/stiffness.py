@@ -9,7 +9,7 @@ import numpy.typing as npt
 from mpi4py import MPI
 from scipy import sparse
 
-from ..workflow import Solution
+from ..solution import Solution
 
 
 def stiffness(solution: Solution) -> sparse.csr_array | None:

@@ -1,0 +1,71 @@
+"""The solution of a scene: what was solved, what was found, and how far it is certified."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from .certify.certificate import Examination
+from .certify.estimate.estimator import Estimate
+from .errors import ExitCode
+from .problem.problem import Problem
+from .rigid import Solvability
+from .runtime.timing import Timer
+from .scene import Scene
+from .solvers.result import SolveResult
+
+
+@dataclass(frozen=True, kw_only=True)
+class Solution:
+    """What a run found.
+
+    Attributes:
+        scene: what the user asked for.
+        problem: what was solved; its laws are the smoothed ones where the scene smooths.
+        solvability: whether a solution can exist.
+        solve_result: what the method found; None where the state is *escapes* and nothing was solved.
+        examination: the certificate and the state of Γc; None likewise.
+        estimate: of the error; None where nothing was certified.
+        dofs: unknowns.
+        epsilon: relative width of the smoothing, None for exact laws.
+        timer: wall time by phase.
+        warnings: sentences about numbers that may be mistakes (:mod:`.plausibility`).
+    """
+
+    scene: Scene
+    problem: Problem
+    solvability: Solvability
+    solve_result: SolveResult | None
+    examination: Examination | None
+    estimate: Estimate | None
+    dofs: int
+    epsilon: float | None
+    timer: Timer
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def converged(self) -> bool:
+        """Certified within the tolerance."""
+        return self.examination is not None and self.examination.certificate.passed
+
+    @property
+    def exit_code(self) -> int:
+        """By the contract: certified, no solution exists, or not converged."""
+        if self.converged:
+            return ExitCode.CERTIFIED
+        if self.solve_result is None:
+            return ExitCode.NO_SOLUTION
+        return ExitCode.INTERRUPTED if self.solve_result.interrupted else ExitCode.NOT_CONVERGED
+
+    @property
+    def reason(self) -> str:
+        """Why it ended, for people."""
+        if self.solve_result is None:
+            return "no solution exists: the load moves the body away"
+        if self.converged:
+            local = " (a local equilibrium: the state is metastable)" if self.solvability.state == "metastable" else ""
+            free = ", ".join(mode.name for mode in self.solvability.free)
+            return f"certified{local}" + (f"; determined up to {free}" if free else "")
+        if self.solvability.state == "metastable" and not self.solve_result.interrupted:
+            return f"metastable, and no equilibrium found ({self.solve_result.reason})"
+        unknown = "; whether a solution exists could not be decided" if self.solvability.state == "undecided" else ""
+        return f"not certified ({self.solve_result.reason}){unknown}"
