@@ -26,7 +26,7 @@ from mpi4py import MPI
 from hvi_fenicsx import Scene, read_scene
 from hvi_fenicsx.accuracy import adaptive, control, quantities
 from hvi_fenicsx.accuracy.adaptive import AdaptiveLevel, AdaptiveSolver
-from hvi_fenicsx.accuracy.control import AccuracyResult, Goal
+from hvi_fenicsx.accuracy.goal import AccuracyResult, Goal
 from hvi_fenicsx.accuracy.quantity_base import Observable, contact_norm, prolong
 from hvi_fenicsx.certify import contact_state
 from hvi_fenicsx.runtime.timing import Timer
@@ -101,7 +101,7 @@ def measured(name: str, quantity: str, requested: float, largest: int) -> Row:
     """One request, carried out and checked."""
     scene = read_scene(ROOT / "demos" / f"{name}.toml")
     start = time.process_time()
-    reached = control.reach(scene, MPI.COMM_WORLD, Goal(requested, quantity), solver(), lambda line: None)
+    reached = control.solve_to_goal(scene, MPI.COMM_WORLD, Goal(requested, quantity), solver(), lambda line: None)
     seconds, last = time.process_time() - start, reached.steps[-1]
     true = reference = None
     if reached.why is None:
@@ -124,8 +124,8 @@ def true_error(reached: AccuracyResult, scene: Scene, requested: float, largest:
     wanted = min(requested, level.solution.estimate.relative) / 3  # type: ignore[union-attr]
     go = solver()
     while level.solution.estimate.relative > wanted and level.dofs < largest:  # type: ignore[union-attr]
-        below, level = level, go.refine(level, adaptive.refined(level, 0.75), scene, ahead(level, quantity))
-        field = prolong(field, level, below)
+        coarser, level = level, go.refine(level, adaptive.refined(level, 0.75), scene, ahead(level, quantity))
+        field = prolong(field, level, coarser)
     own = level.solution.estimate.relative  # type: ignore[union-attr]
     if own > 0.7 * reached.level.solution.estimate.relative:  # type: ignore[union-attr]
         return None, own  # no reference worth the name within the largest number of unknowns

@@ -21,7 +21,7 @@ from mpi4py import MPI
 
 from hvi_fenicsx import Scene, read_scene
 from hvi_fenicsx.accuracy import adaptive, control
-from hvi_fenicsx.accuracy.control import Goal
+from hvi_fenicsx.accuracy.goal import Goal
 from hvi_fenicsx.accuracy.thresholds import CONTROL
 
 ROOT = Path(__file__).parents[1]
@@ -108,7 +108,7 @@ def tolerance_savings() -> Iterator[str]:
         for coarsest in (CONTROL.coarsest_tolerance, CONTROL.finest_tolerance):
             limits = replace(CONTROL, coarsest_tolerance=coarsest)
             start = time.process_time()
-            reached = control.reach(scene, MPI.COMM_WORLD, Goal(requested), solver(), lambda line: None, limits)
+            reached = control.solve_to_goal(scene, MPI.COMM_WORLD, Goal(requested), solver(), lambda line: None, limits)
             spent.append((time.process_time() - start, reached.solution.solve_result.counts.linear))  # type: ignore[union-attr]
         (tied, few), (tight, many) = spent
         yield f"| {name} | {requested:g} | {tied:.1f} | {tight:.1f} | {tight / tied:.2f} | {few}, {many} |"

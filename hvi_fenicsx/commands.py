@@ -15,7 +15,7 @@ from mpi4py import MPI
 from . import console, results
 from .accuracy import control, quantities
 from .accuracy.adaptive import AdaptiveSolver
-from .accuracy.control import AccuracyResult, Goal
+from .accuracy.goal import AccuracyResult, Goal
 from .errors import ExitCode, HviError, InputError
 from .report.html import render
 from .report.pictures import draw as pictures
@@ -122,7 +122,7 @@ def _solve(request: RunRequest, interrupt: Interrupt) -> tuple[Solution, Accurac
     """The solution; with it, where an accuracy was asked for, how it was reached. Collective."""
     if request.goal is not None:
         solver = AdaptiveSolver(timer=request.timer, interrupted=interrupt.requested)
-        reached = control.reach(request.scene, COMM, request.goal, solver, _LOG.info)
+        reached = control.solve_to_goal(request.scene, COMM, request.goal, solver, _LOG.info)
         _say(
             [
                 *console.outcome(reached.solution),

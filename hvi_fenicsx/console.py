@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 from .accuracy import quantities
-from .accuracy.control import AccuracyResult
+from .accuracy.goal import AccuracyResult
 from .certify.estimate.estimator import Estimate
 from .problem import effect_summary
 from .rigid import LoadFactors, Mode, RigidBody

@@ -1,4 +1,4 @@
-"""Adaptivity: solve, estimate, mark, refine, transfer, and again: a scene is solved on a hierarchy of adapted meshes.
+"""Adaptivity: solve, estimate, mark, refine, transfer, and so on: a scene is solved on a hierarchy of adapted meshes.
 
 Cells are marked by Dörfler's bulk criterion (Dörfler 1996) on the estimated error by cell.
 """
@@ -32,13 +32,13 @@ from .thresholds import CONTROL, ControlThresholds
 
 @dataclass(frozen=True, kw_only=True)
 class AdaptiveLevel:
-    """One mesh of an adaptive hierarchy, solved.
+    """One mesh of an adaptive hierarchy, and the solution on it.
 
     Attributes:
-        prepared: what was solved on it.
+        prepared: the assembled problem.
         solution: what was found.
-        levels: the coarser levels that it was solved with.
-        step: the prolongation from the coarser mesh's unknowns, None on the first mesh.
+        levels: the coarser levels that were used.
+        step: the prolongation from the coarser mesh's unknowns; None on the first mesh.
     """
 
     prepared: Preparation
@@ -65,7 +65,7 @@ class AdaptiveSolver:
         timer: where time goes.
         progress: called at each Newton step; by default it is logged.
         interrupted: whether to stop (collective, asked at each Newton step).
-        existence: whether it is asked for on each mesh anew, not on the first only.
+        existence: whether existence is analysed on each mesh, and not on the first only.
         thresholds: the numbers that tune the runs.
     """
 
@@ -76,7 +76,7 @@ class AdaptiveSolver:
     thresholds: Thresholds = DEFAULT
 
     def begin(self, scene: Scene, comm: MPI.Comm) -> AdaptiveLevel:
-        """A scene solved on its own mesh, without a coarser one. Collective.
+        """Solve a scene on its own mesh, without a coarser one. Collective.
 
         Args:
             scene: what to solve.
@@ -92,14 +92,15 @@ class AdaptiveSolver:
     def refine(
         self, level: AdaptiveLevel, refined: Refinement, scene: Scene, ahead: fem.Function | None = None
     ) -> AdaptiveLevel:
-        """A scene solved on the refined mesh, from the solution on the one before. Collective.
+        """Solve a scene on the refined mesh, from the solution on the coarser one. Collective.
 
         Args:
-            level: the one before.
-            refined: its mesh refined.
-            scene: to solve on it.
-            ahead: a displacement on the mesh before that is nearer to the next solution than its own one. At a drop
-                neighbouring vertices may each be the last before it, all in equilibrium; a start decides which.
+            level: the coarser mesh.
+            refined: its refinement.
+            scene: to solve on the refined mesh.
+            ahead: a displacement on the coarser mesh that is nearer to the next solution than the solution there. The
+                start decides which vertex is the last one before a drop of a law, as there may be an equilibrium for
+                each of several neighbours.
         """
         prepared, coarse = self._prepared(level, scene, refined.domain), level.prepared.system
         with self.timer("setup"):
@@ -108,11 +109,11 @@ class AdaptiveSolver:
         return self._solved(level, prepared, levels, step, ahead)
 
     def again(self, level: AdaptiveLevel, scene: Scene) -> AdaptiveLevel:
-        """The same mesh with another solver table. Collective.
+        """Solve a scene with another solver table on the same mesh. Collective.
 
         Args:
-            level: solved before.
-            scene: to solve on its mesh.
+            level: the mesh, with an earlier solution.
+            scene: to solve on it.
         """
         prepared, before = self._prepared(level, scene, level.prepared.problem.domain), level.prepared.system
         first = [Level(prepared.system, one.system, one.prolongation) for one in level.levels[:1]]
@@ -144,11 +145,11 @@ def _identity(like: PETSc.Vec) -> PETSc.Mat:
 
 
 def refined(level: AdaptiveLevel, bulk: float) -> Refinement:
-    """The mesh with so much of the squared error refined; the whole mesh where nothing was estimated. Collective.
+    """Refine the cells of the largest errors; all cells where nothing was estimated. Collective.
 
     Args:
-        level: solved.
-        bulk: share of the squared error whose cells are marked.
+        level: the mesh, with its estimate.
+        bulk: part of the squared error whose cells are marked.
     """
     domain, estimate = level.prepared.problem.domain, level.solution.estimate
     with level.prepared.timer("mesh"):
@@ -158,14 +159,14 @@ def refined(level: AdaptiveLevel, bulk: float) -> Refinement:
 
 
 def refined_with_neighbours(level: AdaptiveLevel, share: float, thresholds: ControlThresholds = CONTROL) -> Refinement:
-    """The mesh with a share of the squared error refined, neighbours that are cut with marked cells included.
+    """Refine a part of the squared error, including the neighbours that are cut with marked cells. Collective.
 
-    On coarse meshes they are many: to mark such a share would refine far more than it. Collective.
+    On coarse meshes these neighbours are many: with that part marked, far more than it would be refined.
 
     Args:
-        level: solved.
-        share: of the squared error, to be refined in all.
-        thresholds: how near to the share is near enough.
+        level: the mesh, with its estimate.
+        share: part of the squared error to be refined in all.
+        thresholds: how near to that part is near enough.
     """
     bulk, step = share, refined(level, share)
     for _ in range(thresholds.corrections):
@@ -177,7 +178,7 @@ def refined_with_neighbours(level: AdaptiveLevel, share: float, thresholds: Cont
 
 
 def _refined_share(level: AdaptiveLevel, step: Refinement, bulk: float) -> float:
-    """Share of the squared error refined: marked cells in full, others by their cuts beside a marked one's."""
+    """Part of the squared error that is refined: marked cells count in full, others by their number of cuts."""
     found = level.solution.estimate
     if found is None or found.discretisation == 0.0:
         return 0.0
@@ -188,14 +189,14 @@ def _refined_share(level: AdaptiveLevel, step: Refinement, bulk: float) -> float
 
 
 def marked(comm: MPI.Comm, estimate: Estimate, bulk: float) -> Entities:
-    """The cells (local, owned) of the largest errors, which make up this share of the squared error. Collective.
+    """The cells (local, owned) of the largest errors, which together are a part of the squared error. Collective.
 
-    The threshold is one for all ranks; cells that tie with the last one are marked too, so symmetry stays.
+    The limit is the same on all ranks; cells whose error equals the last one's are marked too, which keeps symmetry.
 
     Args:
         comm: the ranks.
         estimate: with the error of each cell.
-        bulk: share of the squared error.
+        bulk: part of the squared error.
     """
     squares = estimate.cells**2
     everything = np.sort(np.concatenate(agree(comm, squares)))[::-1]

@@ -17,7 +17,8 @@ from mpi4py import MPI
 from scipy import sparse
 
 from ..accuracy.adaptive import AdaptiveSolver
-from ..accuracy.control import Goal, reach
+from ..accuracy.control import solve_to_goal
+from ..accuracy.goal import Goal
 from ..errors import HviError
 from ..report.solution_arrays import save
 from ..results.gathering import solution_arrays
@@ -72,7 +73,9 @@ def _point(options: argparse.Namespace) -> None:
 def _solved(scene: Scene, options: argparse.Namespace, timer: Timer) -> Solution:
     """The scene on its mesh, or on one made for an accuracy. Collective."""
     if options.accuracy is not None:
-        found = reach(scene, COMM, Goal(options.accuracy), AdaptiveSolver(timer=timer), lambda line: None).solution
+        found = solve_to_goal(
+            scene, COMM, Goal(options.accuracy), AdaptiveSolver(timer=timer), lambda line: None
+        ).solution
         timer.seconds["solve"] += timer.seconds["estimate"]  # which steers the refinement: part of what it costs
         return found
     return finish(prepare(scene, COMM, timer))

@@ -1,6 +1,6 @@
 """Why: an accuracy that is promised and not kept is worse than none, and so is one that is paid for twice.
 
-What is promised is held to solutions on much finer meshes; the forecasts to ladders whose cost is known.
+What is promised is held to solutions on much finer meshes; the forecasts to steps whose cost is known.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ from scenes import STEEL, model, quadratic_linear
 from hvi_fenicsx import Scene, read_scene
 from hvi_fenicsx.accuracy import adaptive, control, cost_forecast, quantities
 from hvi_fenicsx.accuracy.adaptive import AdaptiveLevel, AdaptiveSolver
-from hvi_fenicsx.accuracy.control import AccuracyResult, Goal
 from hvi_fenicsx.accuracy.cost_forecast import AdaptiveStep
+from hvi_fenicsx.accuracy.goal import AccuracyResult, Goal
 from hvi_fenicsx.accuracy.quantities import FrictionTraction
 from hvi_fenicsx.accuracy.quantity_base import Observable, contact_norm, extrapolated, prolong
 from hvi_fenicsx.certify import contact_state
@@ -33,7 +33,7 @@ STRONG = model(64, 3e6, friction=quadratic_linear(1e6))
 
 
 def reach(scene: Scene, goal: Goal) -> AccuracyResult:
-    return control.reach(scene, COMM, goal, AdaptiveSolver(timer=Timer()), lambda line: None)
+    return control.solve_to_goal(scene, COMM, goal, AdaptiveSolver(timer=Timer()), lambda line: None)
 
 
 def finer(level: AdaptiveLevel, times: int) -> list[AdaptiveLevel]:
@@ -48,8 +48,8 @@ def finer(level: AdaptiveLevel, times: int) -> list[AdaptiveLevel]:
 def far_in_energy(levels: list[AdaptiveLevel]) -> float:
     """Relative distance of the first solution from the last, energy norm."""
     field = levels[0].solution.solve_result.u  # type: ignore[union-attr]
-    for below, level in itertools.pairwise(levels):
-        field = prolong(field, level, below)
+    for coarser, level in itertools.pairwise(levels):
+        field = prolong(field, level, coarser)
     problem, own = levels[-1].prepared.problem, levels[-1].solution.solve_result.u  # type: ignore[union-attr]
     norms = []
     for sign in (1.0, 0.0):
@@ -75,8 +75,8 @@ def test_a_quantity_on_the_floor_is_kept(quantity: str) -> None:
     observable = quantities.find(quantity)()
     assert isinstance(observable, Observable)
     field = observable.value(levels[0])
-    for below, level in itertools.pairwise(levels):
-        field = prolong(field, level, below)  # type: ignore[arg-type]
+    for coarser, level in itertools.pairwise(levels):
+        field = prolong(field, level, coarser)  # type: ignore[arg-type]
     own, power = observable.value(levels[-1]), 1 if quantity == "sigma_t" else 2
     apart = contact_norm(levels[-1], own.x.array - field.x.array, power)  # type: ignore[union-attr]
     whole = contact_norm(levels[-1], own.x.array, power)  # type: ignore[union-attr]
@@ -92,10 +92,10 @@ def test_the_first_wild_errors_of_a_quantity_refuse_nothing() -> None:
 
 def test_a_mesh_without_a_solution_at_a_loose_tolerance_is_not_refined_for_that() -> None:
     """Peeling is undecided on its fourth mesh at 1e-4; at 1e-7 it is certified there, and good enough."""
-    told: list[str] = []
+    lines: list[str] = []
     scene = read_scene(DEMOS / "peeling.toml")
-    reached = control.reach(scene, COMM, Goal(0.17), AdaptiveSolver(timer=Timer()), told.append)
-    assert any("not certified" in line for line in told)
+    reached = control.solve_to_goal(scene, COMM, Goal(0.17), AdaptiveSolver(timer=Timer()), lines.append)
+    assert any("not certified" in line for line in lines)
     assert reached.why is None
     assert reached.level.dofs < 8_000
 
@@ -202,7 +202,7 @@ def hierarchy(rate: float, count: int) -> list[AdaptiveStep]:
     ]
 
 
-def test_a_forecast_hits_a_ladder_that_goes_on_as_it_did() -> None:
+def test_a_forecast_holds_where_the_steps_go_on_as_they_did() -> None:
     steps = hierarchy(0.4, 9)
     known = steps[:7]
     found = cost_forecast.cost(known, steps[-1].error, 2, 150.0)
@@ -234,14 +234,16 @@ class Late(Timer):
 def test_a_time_budget_ends_before_the_step_that_would_exceed_it(seconds: float, meshes: int) -> None:
     """With the accuracy at which three meshes are enough."""
     scene = Scene.model_validate(STRONG)
-    reached = control.reach(scene, COMM, Goal(3e-2, seconds=seconds), AdaptiveSolver(timer=Late()), lambda line: None)
+    reached = control.solve_to_goal(
+        scene, COMM, Goal(3e-2, seconds=seconds), AdaptiveSolver(timer=Late()), lambda line: None
+    )
     assert len(reached.steps) == meshes
     assert (reached.why is None) == (meshes > 1)
-    best = control.reach(scene, COMM, Goal(None, seconds=10.0), AdaptiveSolver(timer=Late()), lambda line: None)
+    best = control.solve_to_goal(scene, COMM, Goal(None, seconds=10.0), AdaptiveSolver(timer=Late()), lambda line: None)
     assert (len(best.steps), best.exit_code) == (1, 0)
 
 
-def test_the_ladder_begins_coarse() -> None:
+def test_the_first_mesh_is_coarse() -> None:
     cells = [(scene, adaptive.coarsest(read_scene(DEMOS / f"{scene}.toml")).domain) for scene in ("peeling", "hertz")]
     assert cells[0][1].cells == (75, 3)  # type: ignore[union-attr]
     assert cells[1][1].mesh_size == pytest.approx(0.02)  # type: ignore[union-attr]
