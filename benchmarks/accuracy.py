@@ -154,7 +154,7 @@ def displacement(level: AdaptiveLevel) -> fem.Function:
 
 
 def distance(level: AdaptiveLevel, field: fem.Function, quantity: str) -> float:
-    """Of a field from the one on this level, relative."""
+    """Relative distance of a field from the one on this level."""
     own, found = reader(quantity)(level), quantities.find(quantity)
     apart = field.x.array - own.x.array
     if issubclass(found, Observable):

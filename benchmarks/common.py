@@ -94,7 +94,7 @@ def work(figures: Figures) -> float:
 
 
 def median(runs: Sequence[Figures], measure: Any = work) -> float:
-    """Of a measure of the runs; NaN where there is none."""
+    """Median of a measure over the runs; NaN without runs."""
     return statistics.median([measure(r) for r in runs]) if runs else float("nan")
 
 

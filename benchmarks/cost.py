@@ -124,7 +124,7 @@ def bored(folder: Path, size: float) -> list[str]:
     return [f'domain={{shape="file", file="{file}"}}']
 
 
-def main() -> None:
+def command_line() -> argparse.Namespace:
     made = parser(__doc__)
     made.add_argument("--cells", type=int, nargs="*", default=[512], help="a side: 128, 256, 512, 1024 in full")
     made.add_argument("--algebraic", nargs="*", default=["gamg"], help="of gamg, hypre, mumps")
@@ -133,20 +133,29 @@ def main() -> None:
     made.add_argument("--refined", type=float, nargs="*", default=[], help="such sizes, refined four times: 0.064")
     made.add_argument("--bored", type=float, nargs="*", default=[], help="cell sizes of gmsh meshes in 3D: 0.028")
     made.add_argument("--scenes", nargs="*", choices=[*SCENES], default=[*PLANE])
-    options = made.parse_args()
+    return made.parse_args()
+
+
+def cases(options: argparse.Namespace, folder: Path) -> Iterator[tuple[str, str, list[str], list[str]]]:
+    """Name, scene, overrides and linear solvers of each case."""
+    algebraic, both = options.algebraic, [*options.algebraic, "mg"]
+    for n in options.cells:
+        yield from ((s, s, square(n), both) for s in options.scenes)
+    for n in options.boxes:
+        yield "block", "block", [f"domain.cells=[{n}, {n}, {n}]"], both
+    for h in options.unstructured:
+        yield from ((f"{s}, gmsh", s, plate(folder, h), algebraic) for s in options.scenes)
+    for h in options.refined:
+        yield from ((f"{s}, gmsh refined", s, plate(folder, h, refinements=4), both) for s in options.scenes)
+    for h in options.bored:
+        yield "lifted block, gmsh", "lifted block", bored(folder, h), algebraic
+
+
+def main() -> None:
+    options = command_line()
     rows, counted = [], []
     with tempfile.TemporaryDirectory() as folder:
-        both = [*options.algebraic, "mg"]
-        cases = [(s, s, square(n), both) for n in options.cells for s in options.scenes]
-        cases += [("block", "block", [f"domain.cells=[{n}, {n}, {n}]"], both) for n in options.boxes]
-        for h in options.unstructured:
-            cases += [(f"{s}, gmsh", s, plate(Path(folder), h), options.algebraic) for s in options.scenes]
-        for h in options.refined:
-            cases += [(f"{s}, gmsh refined", s, plate(Path(folder), h, refinements=4), both) for s in options.scenes]
-        cases += [
-            ("lifted block, gmsh", "lifted block", bored(Path(folder), h), options.algebraic) for h in options.bored
-        ]
-        for name, scene, overrides, kinds in cases:
+        for name, scene, overrides, kinds in cases(options, Path(folder)):
             runs = measured(scene, overrides, kinds, options)
             if not runs["contact"] or not any(runs[kind] for kind in options.algebraic):
                 say(f"{name}, {overrides[0]}: left out, since its runs failed")

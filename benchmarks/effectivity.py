@@ -61,12 +61,12 @@ def steps(scene: Scene, count: int) -> list[Step]:
     model, options, verdict = prepared.model, prepared.options, prepared.solvability
     found = [Step(solve(model, prepared.system, verdict, options, control), None)]
     for _ in range(count - 1):
-        below = found[-1].solved
-        refined = refinement.uniform(below.system.problem.domain)
+        coarse = found[-1].solved
+        refined = refinement.uniform(coarse.system.problem.domain)
         system = assemble(refined.domain, model, Timer())
-        lift = prolongation(system, below.system, refined.transfer)
-        levels = (Level(system, below.system, lift), *below.levels)
-        start = CoarseStart(system=below.system, result=below.result, prolongation=lift, levels=levels)
+        lift = prolongation(system, coarse.system, refined.transfer)
+        levels = (Level(system, coarse.system, lift), *coarse.levels)
+        start = CoarseStart(system=coarse.system, result=coarse.result, prolongation=lift, levels=levels)
         found.append(Step(solve_from_coarser(system, start, verdict, options, control), refined))
     return found
 
@@ -74,7 +74,7 @@ def steps(scene: Scene, count: int) -> list[Step]:
 def distance(step: Step, finer: Sequence[Step]) -> float:
     """|||u_h - u||| for u on the last of the finer meshes. Collective."""
     fine = finer[-1].system.problem
-    away = _raised(step.u, step, finer)
+    away = _on_finest(step.u, step, finer)
     away.x.array[:] = finer[-1].u.x.array - away.x.array
     force = fem.assemble_scalar(fem.form(fine.bulk.between(away, away)))
     pressures = zip(
@@ -84,7 +84,9 @@ def distance(step: Step, finer: Sequence[Step]) -> float:
         strict=True,
     )
     for part, coarse, exact in pressures:
-        exact.x.array[:] -= _raised(_padded(step.system.problem, coarse), step, finer).x.array[:: fine.scales.dimension]
+        exact.x.array[:] -= _on_finest(_padded(step.system.problem, coarse), step, finer).x.array[
+            :: fine.scales.dimension
+        ]
         (scalar,) = part.volume.arguments()
         force += fem.assemble_scalar(fem.form(ufl.replace(part.volume, {scalar: exact * exact}))) / part.modulus
     return float(np.sqrt(MPI.COMM_WORLD.allreduce(force)))
@@ -97,14 +99,14 @@ def _padded(problem: Problem, scalar: fem.Function) -> fem.Function:
     return field
 
 
-def _raised(u: fem.Function, step: Step, finer: Sequence[Step]) -> fem.Function:
+def _on_finest(u: fem.Function, step: Step, finer: Sequence[Step]) -> fem.Function:
     """A P1 field on the last of the finer meshes."""
     x: PETSc.Vec = u.x.petsc_vec
-    below = step
-    for above in finer:
-        assert above.refined is not None
-        x = above.refined.transfer.prolongation(above.system.problem.space, below.system.problem.space) * x
-        below = above
+    coarse = step
+    for fine_step in finer:
+        assert fine_step.refined is not None
+        x = fine_step.refined.transfer.prolongation(fine_step.system.problem.space, coarse.system.problem.space) * x
+        coarse = fine_step
     result = fem.Function(finer[-1].system.problem.space)
     result.x.array[: x.local_size] = x.array_r
     result.x.scatter_forward()
@@ -176,7 +178,7 @@ def _demo(name: str, *overrides: str) -> Scene:
 
 
 def scenes() -> dict[str, Scene]:
-    """By name; meshes are the coarsest of their ladders."""
+    """By name; meshes are the coarsest of their mesh hierarchies."""
     plane = "domain.cells=[8, 8]"
     return {
         "wall_left": _demo("wall_left", plane, EXACT),
@@ -212,9 +214,9 @@ def draw(path: Path, found: dict[str, list[Row]]) -> None:
     import matplotlib.pyplot as plt
 
     figure, axes = plt.subplots(figsize=(8, 4.5), layout="constrained")
-    for number, (name, ladder_rows) in enumerate(found.items()):
+    for number, (name, rows_of_scene) in enumerate(found.items()):
         style = {"marker": "osD^vP*"[number % 7], "linestyle": "-" if number < 7 else "--"}
-        axes.semilogx([r.dofs for r in ladder_rows], [r.index for r in ladder_rows], label=name, **style)
+        axes.semilogx([r.dofs for r in rows_of_scene], [r.index for r in rows_of_scene], label=name, **style)
     axes.axhline(1.0, color="black", linewidth=0.8)
     axes.set(xlabel="unknowns", ylabel="estimated over true error", ylim=(0.5, 2.2))
     axes.grid(alpha=0.3)

@@ -30,7 +30,7 @@ COLOURS = {"quadratic": "#0072B2", "chks": "#D55E00", "log_exp": "#009E73"}
 
 @dataclass(frozen=True)
 class Error:
-    """Of one smoothed solution: in the energy (J/m) with its bound, and, relative to the largest, in u_t and -σ_t."""
+    """Errors of a smoothed solution: energy (J/m) with its bound; u_t and -σ_t relative to their largest values."""
 
     energy: float
     bound: float

@@ -33,12 +33,12 @@ MOST = 4_000
 """Linear programmes of one case that are worth it: half a minute."""
 LARGEST = 8
 """Cells along the floor."""
-_RELAXED = 1e-7
+_LP_ERROR = 1e-7
 """What a linear programme may be wrong by, of the largest load or displacement unit: for less it gives up nothing."""
 _INFEASIBLE = 2
 """Status of ``scipy.optimize.linprog``."""
 _SLACK, _SINGULAR = 1e-9, 1e-12
-"""Of the largest load or displacement unit; of the largest eigenvalue of a body that is held by something."""
+"""Rounding: relative to the largest load or displacement unit; to the largest eigenvalue of a body with supports."""
 
 
 @dataclass(frozen=True)
@@ -113,7 +113,7 @@ class _Search:
     programmes: int = 0
 
     def __post_init__(self) -> None:
-        self._slack = _RELAXED * max(1.0, float(np.abs(self.load).max()))
+        self._slack = _LP_ERROR * max(1.0, float(np.abs(self.load).max()))
 
     def count(self) -> int:
         """Combinations that are equilibria.
@@ -188,10 +188,10 @@ def _condensed(system: System) -> tuple[Array, Array, npt.NDArray[np.int64]]:
 
 def _states(system: System, dof: int) -> list[State]:
     """All states of one unknown: its law's pieces and kinks within its bounds, and its bound."""
-    bound = float(system.lower.array_r[dof])  # the floor is below: no upper ones
+    bound = float(system.lower.array_r[dof])  # the floor is under the body: there are no upper ones
     pieces = _law_states(system, dof) or [State(-np.inf, np.inf)]
     found = [replace(s, low=max(s.low, bound)) for s in pieces if s.high > bound]
-    # on its bound the floor adds a force of one sign to what the law bears just above
+    # on its bound the floor adds a force of one sign to what the law bears for slightly larger x
     return [*found, State(bound, bound, most=_force(found, bound), least=-np.inf)] if np.isfinite(bound) else found
 
 
@@ -224,7 +224,7 @@ def _between(a: float, b: float) -> float:
 
 
 def _pieces(law: Superpotential, weight: float, sign: float) -> Iterator[State]:
-    """Of the force on the body's own unknown x, the law's argument being sign times x."""
+    """Pieces of the force on the body's own unknown x, the law's argument being sign times x."""
     breaks = _breaks(law)
     for a, b in itertools.pairwise([-np.inf, *breaks, np.inf]):
         inside = _between(a, b)
@@ -240,7 +240,7 @@ def _pieces(law: Superpotential, weight: float, sign: float) -> Iterator[State]:
 
 
 def _force(pieces: Sequence[State], x: float) -> float:
-    """The law's force just above x."""
+    """The law's force for slightly larger x."""
     inside = [s for s in pieces if not s.held and s.low <= x < s.high]
     return inside[0].at + inside[0].slope * x
 

@@ -1,4 +1,4 @@
-"""One case with one method: solved, certified, told in a record. Imports dolfinx, so only workers import it."""
+"""One case with one method: solved, certified, recorded. Imports dolfinx, so only workers import it."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def attempt(case: Case, data: Mapping[str, Any], method: str, limit: float) -> R
     try:
         record = _attempt(case, data, method, lambda: _late(used, limit))
     except Exception as error:
-        # An unforeseen error of one rank leaves the others waiting: only those that all ranks share are told.
+        # After an unforeseen error of one rank the others would wait: only errors of all ranks are recorded.
         if COMM.size > 1 and not isinstance(error, HviError):
             traceback.print_exc()
             COMM.Abort(1)

@@ -77,7 +77,7 @@ def linear(scene: Scene, kind: str) -> Figures:
 
 
 def assembled(scene: Scene, timer: Timer) -> System:
-    """The scene's system, with the mesh hierarchy below its mesh."""
+    """The scene's system, on its mesh with its mesh hierarchy."""
     with timer("mesh"):
         domain = scene.domain.build_hierarchy(COMM, scene.dimension, Thresholds())
     return assemble(domain, model_of(scene), timer)

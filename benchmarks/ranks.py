@@ -27,7 +27,7 @@ PHASES = ("assembly", "jit", "setup", "solve")
 TWICE = (11 / 8, 23 / 16)
 """Times the cells each way: 1.98 times as many, and as often halved as those of a square."""
 Runs = Mapping[str, Figures]
-"""Of one repeat and scene: on one rank, on two, and on two in twice the cells."""
+"""Figures of one repeat and scene: on one rank, on two, and on two with twice the cells."""
 
 
 def together(code: str, processes: int) -> float:

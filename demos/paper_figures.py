@@ -3,7 +3,7 @@
 Ovcharova and Gwinner solve their model problem (section 5.1) with a wall on the left and on the right, on four meshes,
 with the nonmonotone law smoothed by ε = 0.1. Their figures show the deformed square, u1 on Γc and -σ_t on Γc. This
 script draws the same, and next to it what the law gives when nothing is smoothed: the limit ε → 0, which the branch
-iteration solves exactly. The captions tell what ε = 0.1 does, in numbers taken from the two runs.
+iteration solves exactly. The captions say what ε = 0.1 does, in numbers taken from the two runs.
 
     ./hvi exec python3 demos/paper_figures.py [--out DIR]
     ./hvi exec mpirun -n 2 python3 -m mpi4py demos/paper_figures.py
@@ -96,7 +96,7 @@ def law_of(wall: str) -> tuple[QuadraticLinear, float]:
 
 
 def effect(paper: Run, limit: Run, law: QuadraticLinear, epsilon: float) -> dict[str, float]:
-    """The smoothing's doings on the finest mesh, in the units in which they are told."""
+    """What the smoothing changes on the finest mesh, in the units of the captions."""
     slip = np.abs(paper.u1)
     pieces = np.abs(law.gamma2 * slip - law.gamma1 / (2 * law.delta) * slip**2)
     away = np.abs(paper.friction - limit.friction)
@@ -123,21 +123,21 @@ CAPTION = (
     "What ε = {epsilon:g} N/m does. On Γc the two pieces of j differ by at most {pieces:.2g} N/m, less than ε/2: the "
     "smoothing acts on every vertex. At zero slip, where the law gives 0, it allows anything within "
     "±{false_kink:.0f} N/m²; at x₁ = {s:.2f} m it makes −σₜ = {there:.0f} N/m², where the law itself (right) gives "
-    "{truly:.0f}; at the free end {end:.0f} instead of {end_truly:.0f}. The displacement hardly notices: it changes by "
+    "{truly:.0f}; at the free end {end:.0f} instead of {end_truly:.0f}. The displacement hardly changes: by "
     "at most {moved_nm:.1g} nm ({moved_percent:.1g} %), friction being at most {share:.1g} % of the pressure. And |u₁| "
     "ends at {largest_um:.1f} µm, below δ = {delta_um:g} µm: the law’s drop is never reached."
 )
 
 
-def caption(told: dict[str, float]) -> str:
+def caption(numbers: dict[str, float]) -> str:
     """What ε = 0.1 does, in words."""
-    return CAPTION.format(**told).replace("-", "−")
+    return CAPTION.format(**numbers).replace("-", "−")
 
 
 # ## The pictures
 #
 # The colours are the paper's: red, green, dark blue and light blue for h = 1/4, 1/8, 1/16 and 1/32. The markers differ
-# as well, since not every eye tells red from green, and the curves lie upon each other.
+# as well, since not every reader can distinguish red from green, and the curves overlap.
 
 COLOURS = {4: "#E41A1C", 8: "#1B9E4B", 16: "#1F3A93", 32: "#56B4E9"}
 STYLES: dict[int, dict[str, Any]] = {
@@ -150,25 +150,25 @@ COLUMNS = {"paper": "ε = {epsilon:g}, as in the paper", "limit": "ε → 0: the
 Runs = dict[tuple[str, int], Run]
 
 
-def draw_curves(path: Path, wall: str, runs: Runs, told: dict[str, float]) -> None:
+def draw_curves(path: Path, wall: str, runs: Runs, numbers: dict[str, float]) -> None:
     """Figure 4 or 5: (a) u1 and (b) -σ_t on Γc, smoothed on the left, the law itself on the right."""
     from hvi_fenicsx.report.pictures.style import figure, save
 
-    made = figure(9.3)
-    panels = made.subplots(2, 2, sharex=True, sharey="row")
-    made.subplots_adjust(left=0.11, right=0.97, top=0.86, bottom=0.285, hspace=0.26, wspace=0.08)
-    for column, (solver, words) in enumerate(COLUMNS.items()):
-        panels[0, column].set_title(words.format(**told), size=14, weight="bold", loc="left", pad=30)
+    drawing = figure(9.3)
+    panels = drawing.subplots(2, 2, sharex=True, sharey="row")
+    drawing.subplots_adjust(left=0.11, right=0.97, top=0.86, bottom=0.285, hspace=0.26, wspace=0.08)
+    for column, (solver, title) in enumerate(COLUMNS.items()):
+        panels[0, column].set_title(title.format(**numbers), size=14, weight="bold", loc="left", pad=30)
         curves(panels[:, column], {n: runs[solver, n] for n in CELLS})
-    for axes, words in zip(panels[:, 0], ("(a)  u₁ in µm", "(b)  −σₜ in N/m²"), strict=True):
-        axes.text(0, 1.035, words, transform=axes.transAxes, size=13)
+    for axes, label in zip(panels[:, 0], ("(a)  u₁ in µm", "(b)  −σₜ in N/m²"), strict=True):
+        axes.text(0, 1.035, label, transform=axes.transAxes, size=13)
     panels[0, 1].legend(frameon=False, fontsize=12, loc="best", handlelength=2.4)
-    words_around(made, f"Wall {wall}: what happens on Γc (the paper’s Fig. {WALLS[wall]})", caption(told))
-    save(made, path)
+    add_texts(drawing, f"Wall {wall}: what happens on Γc (the paper’s Fig. {WALLS[wall]})", caption(numbers))
+    save(drawing, path)
 
 
 def curves(column: Any, runs: dict[int, Run]) -> None:
-    """One column of a figure: u1 above, -σ_t below, all meshes."""
+    """One column of a figure: u1 at the top, -σ_t under it, all meshes."""
     for cells, run in runs.items():
         style = {"color": COLOURS[cells], "label": f"h = 1/{cells}", **STYLES[cells]}
         column[0].plot(run.x, run.u1 * 1e6, **style)
@@ -186,24 +186,24 @@ BODIES = (
 )
 
 
-def draw_bodies(path: Path, wall: str, runs: Runs, told: dict[str, float]) -> None:
+def draw_bodies(path: Path, wall: str, runs: Runs, numbers: dict[str, float]) -> None:
     """Figure 3: reference and deformed configuration with the displacement on all of Γ, one panel for each mesh."""
     from hvi_fenicsx.report.pictures.style import figure, save
     from hvi_fenicsx.report.units import round_below, thousands
 
     factor = round_below(0.1 / max(float(np.abs(run.displacement).max()) for run in runs.values()))
-    made = figure(9.9)
-    panels = made.subplots(2, 2, sharex=True, sharey=True)
-    made.subplots_adjust(left=0.095, right=0.98, top=0.9, bottom=0.205, hspace=0.16, wspace=0.06)
+    drawing = figure(9.9)
+    panels = drawing.subplots(2, 2, sharex=True, sharey=True)
+    drawing.subplots_adjust(left=0.095, right=0.98, top=0.9, bottom=0.205, hspace=0.16, wspace=0.06)
     for axes, cells in zip(panels.flat, CELLS, strict=True):
         body(axes, runs["paper", cells], runs["limit", cells], factor, COLOURS[cells])
         axes.set_title(f"h = 1/{cells}", loc="left", size=13, color=COLOURS[cells], weight="bold")
-    for below, beside in zip(panels[1], panels[:, 0], strict=True):
-        below.set_xlabel("x₁ in cm")
-        beside.set_ylabel("x₂ in cm")
-    words = BODIES.format(**told, factor=thousands(int(factor)))
-    words_around(made, f"Wall {wall}: the deformed square (the paper’s Fig. 3{PARTS[wall]})", words)
-    save(made, path)
+    for bottom, left in zip(panels[1], panels[:, 0], strict=True):
+        bottom.set_xlabel("x₁ in cm")
+        left.set_ylabel("x₂ in cm")
+    text = BODIES.format(**numbers, factor=thousands(int(factor)))
+    add_texts(drawing, f"Wall {wall}: the deformed square (the paper’s Fig. 3{PARTS[wall]})", text)
+    save(drawing, path)
 
 
 def body(axes: Any, paper: Run, limit: Run, factor: float, colour: str) -> None:
@@ -222,11 +222,11 @@ def closed(points: Array) -> Array:
     return np.concatenate([points, points[:1]]).T
 
 
-def words_around(made: Any, title: str, below: str) -> None:
-    """The title above and the caption below."""
-    tall = made.get_figheight()
-    made.text(0.04, 1 - 0.18 / tall, title, size=15.5, weight="bold", va="top")
-    made.text(0.04, 0.2 / tall, "\n".join(textwrap.wrap(below, 87)), size=12, va="bottom", linespacing=1.35)
+def add_texts(drawing: Any, title: str, text: str) -> None:
+    """Title at the top and caption at the bottom."""
+    height = drawing.get_figheight()
+    drawing.text(0.04, 1 - 0.18 / height, title, size=15.5, weight="bold", va="top")
+    drawing.text(0.04, 0.2 / height, "\n".join(textwrap.wrap(text, 87)), size=12, va="bottom", linespacing=1.35)
 
 
 # ## All together
@@ -235,7 +235,7 @@ def words_around(made: Any, title: str, below: str) -> None:
 
 
 def main() -> None:
-    """Compute, draw, and tell what ε = 0.1 does."""
+    """Compute, draw, and print what ε = 0.1 does."""
     parser = argparse.ArgumentParser(description="Draw the paper's Figures 3, 4 and 5, with the limit beside them.")
     parser.add_argument("--out", type=Path, default=Path("results/paper_figures"), help="a folder for the pictures")
     out = parser.parse_args().out
@@ -244,10 +244,10 @@ def main() -> None:
         runs = {key: run for key, run in found.items() if run is not None}
         if COMM.rank == 0:
             out.mkdir(parents=True, exist_ok=True)
-            told = effect(runs["paper", 32], runs["limit", 32], *law_of(wall))
-            draw_bodies(out / f"figure_3{PARTS[wall]}.png", wall, runs, told)
-            draw_curves(out / f"figure_{number}.png", wall, runs, told)
-            print(f"{out}/figure_3{PARTS[wall]}.png, {out}/figure_{number}.png\n{caption(told)}")
+            numbers = effect(runs["paper", 32], runs["limit", 32], *law_of(wall))
+            draw_bodies(out / f"figure_3{PARTS[wall]}.png", wall, runs, numbers)
+            draw_curves(out / f"figure_{number}.png", wall, runs, numbers)
+            print(f"{out}/figure_3{PARTS[wall]}.png, {out}/figure_{number}.png\n{caption(numbers)}")
             print(f"norm of -σ_t on Γc, h = 1/32: {np.linalg.norm(runs['limit', 32].friction):.9g} N/m²")
 
 

@@ -17,7 +17,7 @@ from ..runtime.mpi import agree
 from ..typing import Array, Entities
 from . import contact_surface
 from .contact_surface import Surface
-from .domain_forms import DomainForms, Scaled
+from .domain_forms import DomainForms, ScaledMeasure
 from .law_term import LawTerm
 from .problem import Bounds, PlacedContribution
 from .scaling import Scales
@@ -193,4 +193,4 @@ def _term(
 def _residual(context: DomainForms, where: Surface, density: fem.Function) -> Any:
     """∫ density·v ds over a part, nondimensional."""
     area = context.number(context.length ** (1 - context.dimension))
-    return ufl.inner(density, context.test) * Scaled(area, context.boundary(where.part, **CONTACT_RULE))
+    return ufl.inner(density, context.test) * ScaledMeasure(area, context.boundary(where.part, **CONTACT_RULE))

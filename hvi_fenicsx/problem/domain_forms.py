@@ -67,16 +67,16 @@ class DomainForms:
         scale = self.number(self.length**-self.dimension)
         named = [region for region in regions if region is not None]
         if not named:
-            return Scaled(scale, ufl.dx(domain=self.domain.mesh))
+            return ScaledMeasure(scale, ufl.dx(domain=self.domain.mesh))
         self.domain.cells(named)
         tags, ids = self._cell_tags
         shared = tuple(sorted(set.intersection(*(set(ids[region]) for region in named))))
         measure = ufl.Measure("dx", domain=self.domain.mesh, subdomain_data=tags)
-        return Scaled(scale, measure(shared)) if shared else None
+        return ScaledMeasure(scale, measure(shared)) if shared else None
 
     def facets(self, part: str) -> Any:
         """ds/L^(d-1)."""
-        return Scaled(self.number(self.length ** (1 - self.dimension)), self.boundary(part))
+        return ScaledMeasure(self.number(self.length ** (1 - self.dimension)), self.boundary(part))
 
     def boundary(self, part: str, **metadata: Any) -> Any:
         """The measure ds over a part, SI.
@@ -90,8 +90,8 @@ class DomainForms:
         return measure(ids[part])
 
 
-class Scaled:
-    """A measure with a factor: ``integrand * Scaled`` is ``factor * integrand * measure``."""
+class ScaledMeasure:
+    """A measure with a factor: ``integrand * ScaledMeasure`` is ``factor * integrand * measure``."""
 
     def __init__(self, factor: Any, measure: Any) -> None:
         self.factor, self.measure = factor, measure

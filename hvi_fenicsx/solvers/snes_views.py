@@ -14,12 +14,12 @@ from ..typing import Entities
 def unextracted(held: HeldPreconditioner) -> PETSc.Mat:
     """J for SNES VI: its inactive part is multiplied at full size instead of being copied."""
     sizes = held.system.jacobian.matrix.getSizes()
-    matrix = PETSc.Mat().createPython(sizes, _Whole(held), comm=held.system.comm)
+    matrix = PETSc.Mat().createPython(sizes, _FullMatrix(held), comm=held.system.comm)
     matrix.setUp()
     return matrix
 
 
-class _Whole:
+class _FullMatrix:
     """PETSc's view of J, which is symmetric."""
 
     def __init__(self, held: HeldPreconditioner) -> None:
@@ -48,12 +48,12 @@ class _Whole:
         """
         self._held.select(rows)
         sizes = (rows.getLocalSize(), rows.getSize())
-        matrix = PETSc.Mat().createPython((sizes, sizes), _Reduced(self._held), comm=rows.comm)
+        matrix = PETSc.Mat().createPython((sizes, sizes), _InactiveMatrix(self._held), comm=rows.comm)
         matrix.setUp()
         return matrix
 
 
-class _Reduced:
+class _InactiveMatrix:
     """PETSc's view of J on the inactive dofs of a step."""
 
     def __init__(self, held: HeldPreconditioner) -> None:

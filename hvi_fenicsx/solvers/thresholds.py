@@ -16,7 +16,9 @@ BRANCH_ATTEMPTS = (
     (False, "bt", 60),
     (False, "basic", 30),
 )
+"""See :attr:`BranchThresholds.attempts`; the order was found on the hard cases (docs/hard-cases.md)."""
 PROGRAMME_ATTEMPTS = (("basic", 30), ("basic", 30), ("bt", 60), ("basic", 60), ("bt", 200))
+"""See :attr:`Thresholds.programme_attempts`."""
 
 
 @dataclass(frozen=True, kw_only=True)
