@@ -154,13 +154,13 @@ def test_an_interrupt_ends_the_iteration(method: str) -> None:
 
 @pytest.mark.parametrize("method", METHODS)
 def test_progress_is_told(method: str) -> None:
-    told: list[tuple[Any, ...]] = []
+    steps: list[tuple[Any, ...]] = []
     prepared = prepare(Scene.model_validate(strong(8, 3 * P, 1.0e6, epsilon=0.1, method=method)))
-    finish(prepared, progress=lambda *args: told.append(args))
-    assert {context for context, *_ in told} == {method}
-    assert [iteration for _, _, iteration, _, _ in told] == sorted(iteration for _, _, iteration, _, _ in told)
-    assert all(epsilon == 0.1 for _, epsilon, *_ in told)
-    assert told[-1][-1] > 0
+    finish(prepared, progress=lambda *args: steps.append(args))
+    assert {context for context, *_ in steps} == {method}
+    assert [iteration for _, _, iteration, _, _ in steps] == sorted(iteration for _, _, iteration, _, _ in steps)
+    assert all(epsilon == 0.1 for _, epsilon, *_ in steps)
+    assert steps[-1][-1] > 0
 
 
 @pytest.mark.parametrize("method", ["tao", "ssls"])

@@ -79,19 +79,19 @@ def test_a_body_at_rest_is_borne_by_as_many_vertices_as_it_has_motions() -> None
     assert carried == pytest.approx(-float(system.load.dot(lift)), rel=1e-8)
 
 
-def told() -> list[Any]:
+def answers() -> list[Any]:
     """Of one case: exit code and energy."""
     found = solve(rolling("tresca", 0.08, 0.04, 2e4))
     return [found.exit_code, found.examination.energy if found.examination else None]
 
 
 def test_on_two_ranks_it_rests_where_it_does_on_one() -> None:
-    one, two = told(), on_ranks(2, __file__)
+    one, two = answers(), on_ranks(2, __file__)
     assert one[0] == two[0] == 0
     assert two[1] == pytest.approx(one[1], rel=1e-9)
 
 
 if __name__ == "__main__":
-    answered = told()
+    answered = answers()
     if MPI.COMM_WORLD.rank == 0:
         print(json.dumps(answered))

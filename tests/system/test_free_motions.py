@@ -1,7 +1,7 @@
 """A balanced load on motions that nothing holds: singular, and solved all the same, up to what is free.
 
 The reference is a manufactured uniform stress, which P1 reproduces, less its share of the free motions in L².
-Run as a script under mpirun this file prints what `told` says.
+Run as a script under mpirun this file prints what `solve_cases` returns.
 """
 
 from __future__ import annotations
@@ -117,8 +117,8 @@ STILL = {"slot": [0.0, 0.5], "ice": [1.0, 0.0]}
 """The point that stays where it is; elsewhere the middle."""
 
 
-def told(comm: MPI.Comm) -> dict[str, Any]:
-    """Of each case: state, exit code, number of free motions, error."""
+def solve_cases(comm: MPI.Comm) -> dict[str, Any]:
+    """By case: state, exit code, number of free motions, error."""
     found = {}
     for name, (table, gradient, _) in CASES.items():
         solution = solve(Scene.model_validate(table), comm)
@@ -131,8 +131,8 @@ def told(comm: MPI.Comm) -> dict[str, Any]:
 
 @pytest.fixture(scope="module", params=RANKS)
 def answers(request: pytest.FixtureRequest) -> dict[str, Any]:
-    """What `told` says on one, two and three ranks."""
-    found: dict[str, Any] = told(MPI.COMM_SELF) if request.param == 1 else on_ranks(request.param, __file__)
+    """What `solve_cases` returns on one, two and three ranks."""
+    found: dict[str, Any] = solve_cases(MPI.COMM_SELF) if request.param == 1 else on_ranks(request.param, __file__)
     return found
 
 
@@ -207,6 +207,6 @@ def test_what_stays_free_is_told(tmp_path: Path) -> None:
 
 
 if __name__ == "__main__":
-    answered = told(MPI.COMM_WORLD)
+    answered = solve_cases(MPI.COMM_WORLD)
     if MPI.COMM_WORLD.rank == 0:
         print(json.dumps(answered))
