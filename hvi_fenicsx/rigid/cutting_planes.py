@@ -1,7 +1,6 @@
 """Minimising a positively homogeneous convex function over a polyhedral cone of rigid motions.
 
-The function is  linear·y + Σ_p factors_p G_p(y)  with the slip integrals  G_p(y) = Σ_i |B_pi y|, y in R^k,
-k <= 6, and factors >= 0. Kelley's cutting planes: a subgradient of G_p bounds G_p from below everywhere,
+Kelley's cutting planes: a subgradient of a slip integral bounds it from below everywhere,
 whatever the load and the strength of the law, so the cuts are kept and shared by all programmes.
 Each linear programme has k unknowns plus one for each part and is solved by HiGHS; of the cone it sees only
 the rows that were once violated. With scalar slips the result is exact after finitely many cuts; with vector
@@ -13,76 +12,14 @@ Everything here is serial and deterministic: one rank runs it and sends the resu
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
-from itertools import product
 
 import numpy as np
 
 from ..errors import SolverError
 from ..typing import Array
+from .functional import Functional, Region, SlipIntegral, ball, faces
 from .thresholds import DEFAULT, Thresholds
-
-
-@dataclass(frozen=True)
-class SlipIntegral:
-    """G(y) = Σ_i |B_i y|.
-
-    Attributes:
-        rows: the B_i, each times its lumped area, (m, r, k); r = 1 or 2 slips.
-    """
-
-    rows: Array
-
-    def value(self, y: Array) -> float:
-        """The integral at y, (k,)."""
-        return float(np.linalg.norm(self.rows @ y, axis=1).sum())
-
-    def subgradient(self, y: Array) -> Array:
-        """One subgradient at y, (k,): a vertex without slip contributes the zero of its ball."""
-        slip = self.rows @ y
-        size = np.linalg.norm(slip, axis=1, keepdims=True)
-        unit = np.divide(slip, size, out=np.zeros_like(slip), where=size > 0.0)
-        return np.asarray(np.tensordot(unit, self.rows, axes=2))
-
-
-@dataclass(frozen=True)
-class Functional:
-    """The function linear·y + Σ_p factors_p G_p(y) on the cone {cone @ y <= 0}.
-
-    Attributes:
-        linear: (k,).
-        factors: of the slip integrals, (p,).
-        cone: rows of length one, (c, k).
-    """
-
-    linear: Array
-    factors: Array
-    cone: Array
-
-    def minus(self, load: Array, factor: float = 1.0) -> Functional:
-        """The functional less the work of a load.
-
-        Args:
-            load: its work on the basis motions, (k,).
-            factor: what the load is multiplied by.
-        """
-        return replace(self, linear=self.linear - factor * load)
-
-
-@dataclass(frozen=True)
-class Region:
-    """The bounded set {upper @ y <= 1, equal @ y = value} to search.
-
-    Attributes:
-        upper: (q, k).
-        equal: (e, k).
-        value: (e,).
-    """
-
-    upper: Array
-    equal: Array
-    value: Array
 
 
 @dataclass(frozen=True)
@@ -124,30 +61,6 @@ class GapHistory:
         if gap <= limits.tight_gap * self.scale:
             return True
         return self.stalled >= limits.patience and gap <= limits.loose_gap * self.scale
-
-
-def ball(frame: Array) -> Region:
-    """|y| <= 1 in the largest of the rigid coefficients z = frame @ y, frame (n, k)."""
-    none = np.zeros((0, frame.shape[1]))
-    return Region(np.vstack([frame, -frame]), none, np.zeros(0))
-
-
-def cross(frame: Array) -> Region:
-    """Σ|z_j| <= 1: its corners are pure translations and rotations, so it yields directions easy to name."""
-    signs = np.array(list(product((1.0, -1.0), repeat=frame.shape[0])))
-    return replace(ball(frame), upper=signs @ frame)
-
-
-def faces(frame: Array, across: Array) -> Iterator[Region]:
-    """The faces of the sphere |y| = 1 in the space orthogonal to some motions.
-
-    Args:
-        frame: rigid coefficients of the basis motions, (n, k).
-        across: the motions to which y is to be orthogonal, (q, k).
-    """
-    whole = ball(frame)
-    for row in whole.upper[np.abs(whole.upper).max(axis=1) > 0.0]:
-        yield replace(whole, equal=np.vstack([row, across]), value=np.r_[1.0, np.zeros(len(across))])
 
 
 @dataclass

@@ -10,7 +10,8 @@ import numpy as np
 
 from ..laws.convex_parts import Directional
 from ..typing import Array
-from .cutting_planes import Functional, Minimum, Programme, Region, ball, cross
+from .cutting_planes import Minimum, Programme
+from .functional import Functional, Region, ball, cross
 from .kernel import modes, natural_basis, null_space, triangle
 from .motions import Mode, mode_of
 from .reduction import ReducedProblem, RigidProblem

@@ -15,7 +15,7 @@ from mpi4py import MPI
 from ..errors import InputError
 from ..laws.convex_parts import Directional
 from ..typing import Array
-from .cutting_planes import Functional, SlipIntegral
+from .functional import Functional, SlipIntegral
 from .kernel import FixedDirections, kernel
 from .motions import RigidBody, rigid_fields
 from .thresholds import DEFAULT, Thresholds

@@ -37,7 +37,7 @@ def run(folder: Path, first: int, last: int, step: int, ranks: int = 1) -> list[
     """What came of each case; a dead or stuck process is an outcome of the case that it was at."""
     found: list[dict[str, Any]] = []
     while first < last:
-        words = [sys.executable, *(["-m", "mpi4py"] if ranks > 1 else []), str(ROOT / "tests" / "fuzz_runner.py")]
+        words = [sys.executable, *(["-m", "mpi4py"] if ranks > 1 else []), str(ROOT / "tests" / "support" / "fuzz_runner.py")]
         launch = ["mpirun", "-n", str(ranks)] if ranks > 1 else []
         fault = started([*launch, *words, str(folder), str(first), str(last), str(step)])
         file = folder / "outcomes"
@@ -53,7 +53,7 @@ def run(folder: Path, first: int, last: int, step: int, ranks: int = 1) -> list[
 
 def started(words: list[str]) -> str:
     """How a process ended; nothing if well."""
-    environment = os.environ | {"PYTHONPATH": f"{ROOT}:{os.environ.get('PYTHONPATH', '')}"}
+    environment = os.environ | {"PYTHONPATH": f"{ROOT}:{ROOT}/tests/support:{os.environ.get('PYTHONPATH', '')}"}
     try:
         done = subprocess.run(words, env=environment, capture_output=True, text=True, check=False, timeout=LIMIT)
     except subprocess.TimeoutExpired:
