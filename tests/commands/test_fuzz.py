@@ -26,6 +26,7 @@ from hvi_fenicsx import InputError, read_scene
 
 pytestmark = pytest.mark.long
 
+RUNNER = ROOT / "tests" / "support" / "fuzz_runner.py"
 CASES, SLICES = 600, 6
 LIMIT = 600.0
 """Seconds that the cases of a process may take."""
@@ -37,7 +38,7 @@ def run(folder: Path, first: int, last: int, step: int, ranks: int = 1) -> list[
     """What came of each case; a dead or stuck process is an outcome of the case that it was at."""
     found: list[dict[str, Any]] = []
     while first < last:
-        words = [sys.executable, *(["-m", "mpi4py"] if ranks > 1 else []), str(ROOT / "tests" / "support" / "fuzz_runner.py")]
+        words = [sys.executable, *(["-m", "mpi4py"] if ranks > 1 else []), str(RUNNER)]
         launch = ["mpirun", "-n", str(ranks)] if ranks > 1 else []
         fault = started([*launch, *words, str(folder), str(first), str(last), str(step)])
         file = folder / "outcomes"
