@@ -16,8 +16,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from typing_extensions import override
 
 from .errors import InputError
+from .spatial_value import SpatialValue
 from .typing import Array
 
 COORDINATES = ("x", "y", "z")
@@ -88,7 +90,7 @@ def ufl_algebra(number: Callable[[float], Any]) -> Algebra:
     return Algebra(number=number, functions=functions, compare=compare, where=ufl.conditional)
 
 
-class Formula:
+class Formula(SpatialValue):
     """A number or a checked formula in x, y, z (SI).
 
     Args:
@@ -116,11 +118,6 @@ class Formula:
         if not np.isfinite(value):
             raise InputError(f"{self.source!r} is {value}, not a finite number; give a finite one")
 
-    @property
-    def is_number(self) -> bool:
-        """Whether it is a plain number."""
-        return isinstance(self.source, float)
-
     def __repr__(self) -> str:
         return f"Formula({self.source!r})"
 
@@ -139,8 +136,21 @@ class Formula:
         """
         return _render(self._tree, x, algebra)
 
+    @override
+    def in_ufl(self, mesh: Any, number: Callable[[float], Any]) -> Any:
+        """The formula in the coordinates of the mesh."""
+        import ufl
+
+        return self.render(ufl.SpatialCoordinate(mesh), ufl_algebra(number))
+
+    @override
+    def negative(self) -> Formula:
+        """The formula, or the number, with the other sign."""
+        return Formula(f"-({self.source})" if isinstance(self.source, str) else -self.source)
+
+    @override
     def at(self, points: Array) -> Array:
-        """Values at points of shape (n, 3), SI; shape (n,). Not checked for finiteness."""
+        """Values at points of shape (n, 3), m; shape (n,). Not checked for finiteness."""
         with np.errstate(all="ignore"):
             value = self.render(points.T, NUMPY)
         return np.broadcast_to(np.asarray(value, dtype=np.float64), (points.shape[0],)).copy()

@@ -15,8 +15,8 @@ from typing import Any, ClassVar, Protocol
 
 from pydantic import BaseModel, ConfigDict
 
-from ..formula import Formula
 from ..laws import Superpotential
+from ..spatial_value import SpatialValue
 from .contribution import Contribution
 
 
@@ -70,8 +70,8 @@ class FormContext(Protocol):
     def number(self, value: float) -> Any:
         """A ``fem.Constant``, so that the value is not compiled into the form."""
 
-    def render(self, formula: Formula) -> Any:
-        """A formula in UFL, in the SI coordinates of the mesh."""
+    def render(self, value: SpatialValue) -> Any:
+        """A value in UFL, in the SI coordinates of the mesh."""
 
     @property
     def materials(self) -> Sequence[tuple[str | None, Effect]]:
@@ -99,8 +99,8 @@ class Sizes:
     expansion: float
 
 
-Evaluate = Callable[[Formula], float]
-"""Largest absolute value of a formula over the place of an effect."""
+Evaluate = Callable[[SpatialValue], float]
+"""Largest absolute value of a value over the place of an effect."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,8 +112,8 @@ class SurfaceLoad:
         pressure: N/m², against the boundary; None: none.
     """
 
-    components: tuple[Formula, ...] = ()
-    pressure: Formula | None = None
+    components: tuple[SpatialValue, ...] = ()
+    pressure: SpatialValue | None = None
 
 
 class Effect(BaseModel):
@@ -163,7 +163,7 @@ class Effect(BaseModel):
         """The largest stress (N/m²) it brings.
 
         Args:
-            largest: gives the largest absolute value of a formula where the effect acts. Collective.
+            largest: gives the largest absolute value of a spatial value where the effect acts. Collective.
             sizes: of the body and its materials.
         """
         return 0.0
@@ -191,7 +191,7 @@ class Effect(BaseModel):
         """What may be mistakes in its numbers, in sentences. Advice: nothing is refused.
 
         Args:
-            largest: gives the largest absolute value of a formula where the effect acts. Collective.
+            largest: gives the largest absolute value of a spatial value where the effect acts. Collective.
             sizes: of the body and its materials.
         """
         return ()

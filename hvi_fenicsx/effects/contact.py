@@ -74,9 +74,9 @@ class Contact(Effect):
     def stress_scale(self, largest: Evaluate, sizes: Sizes) -> float:
         """The stress of the largest displacement that the bounds demand, as a strain over the body's length."""
         bounds = self._bounds()
-        demanded = [f"max(0, {f.source})" for f in (bounds.lower,) if f is not None]
-        demanded += [f"max(0, -({f.source}))" for f in (bounds.upper,) if f is not None]
-        return max(largest(Formula(formula)) for formula in demanded) * sizes.modulus / sizes.length
+        demanded = [bounds.lower] if bounds.lower else []
+        demanded += [bounds.upper.negative()] if bounds.upper else []
+        return max(largest(value.positive_part()) for value in demanded) * sizes.modulus / sizes.length
 
     @override
     def contribute(self, context: FormContext, where: str | None) -> Contribution:
@@ -86,7 +86,7 @@ class Contact(Effect):
     def _bounds(self) -> NormalBounds:
         if self.obstacle is not None:
             return _towards(self.obstacle)
-        return NormalBounds(lower=self.lower if self.gap is None else _negative(self.gap), upper=self.upper)
+        return NormalBounds(lower=self.lower if self.gap is None else self.gap.negative(), upper=self.upper)
 
     @override
     def check(self, dimension: int) -> None:
@@ -103,8 +103,3 @@ def _towards(obstacle: Obstacle) -> NormalBounds:
     terms = zip(normal, COORDINATES[: len(normal)], obstacle.point, strict=True)
     gap = " + ".join(f"({n!r})*({x} - ({p!r}))" for n, x, p in terms)
     return NormalBounds(lower=Formula(f"-({gap})"), upper=None, direction=tuple(-c for c in normal))
-
-
-def _negative(formula: Formula) -> Formula:
-    source = formula.source
-    return Formula(f"-({source})") if isinstance(source, str) else Formula(-source)

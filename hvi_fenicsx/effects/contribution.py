@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Any
 
-from ..formula import Formula
 from ..laws import Superpotential
+from ..spatial_value import SpatialValue
 
 
 class Direction(Enum):
@@ -31,7 +31,7 @@ class Condition:
     """
 
     component: int
-    value: Formula
+    value: SpatialValue
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,8 +44,8 @@ class NormalBounds:
         direction: the unit vector towards a flat obstacle, which stands for n; None: the part's own normal.
     """
 
-    lower: Formula | None
-    upper: Formula | None
+    lower: SpatialValue | None
+    upper: SpatialValue | None
     direction: tuple[float, ...] | None = None
 
 

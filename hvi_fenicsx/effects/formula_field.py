@@ -9,17 +9,18 @@ from pydantic import BeforeValidator, PlainSerializer
 from ..errors import InputError
 from ..formula import Formula
 from ..schema import refusal
+from ..spatial_value import SpatialValue
 
 
-def _formula(value: Any) -> Formula:
+def _formula(value: Any) -> SpatialValue:
     try:
-        return value if isinstance(value, Formula) else Formula(value)
+        return value if isinstance(value, SpatialValue) else Formula(value)
     except InputError as error:
         raise refusal(str(error)) from None
 
 
 FormulaField = Annotated[
-    Formula,
+    SpatialValue,
     BeforeValidator(_formula),
     PlainSerializer(lambda f: f.source),
 ]

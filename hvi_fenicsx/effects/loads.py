@@ -16,6 +16,7 @@ from typing_extensions import override
 from ..errors import InputError
 from ..formula import Formula
 from ..schema import refusal
+from ..spatial_value import SpatialValue
 from .base import Drive, Effect, Evaluate, FormContext, Place, Sizes, SurfaceLoad
 from .contribution import Condition, Contribution
 from .formula_field import FormulaField, require_components
@@ -104,7 +105,7 @@ class BodyForce(_Listed):
 
 def _component(value: Any) -> Any:
     try:
-        return value if value == "free" or isinstance(value, Formula) else Formula(value)
+        return value if isinstance(value, SpatialValue) or value == "free" else Formula(value)
     except InputError as error:
         raise refusal(f'{error}; or write "free" to leave the component alone') from None
 
@@ -112,7 +113,7 @@ def _component(value: Any) -> Any:
 Component = Annotated[
     Any,
     BeforeValidator(_component),
-    PlainSerializer(lambda value: value.source if isinstance(value, Formula) else value),
+    PlainSerializer(lambda value: value.source if isinstance(value, SpatialValue) else value),
 ]
 """A formula or "free"."""
 

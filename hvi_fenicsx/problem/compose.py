@@ -16,9 +16,9 @@ from dolfinx import fem
 
 from ..effects import Evaluate, Place
 from ..errors import InputError
-from ..formula import Formula
 from ..mesh.domain import Domain
 from ..runtime.mpi import agree
+from ..spatial_value import SpatialValue
 from ..typing import Array, Entities
 from . import bulk, contact_parts, dirichlet, scaling
 from .contact_parts import Modification, unchanged
@@ -78,7 +78,7 @@ def _evaluation(domain: Domain, parts: Mapping[str, Sequence[str]], placed: Plac
     return functools.partial(_largest, domain, parts, placed)
 
 
-def _largest(domain: Domain, parts: Mapping[str, Sequence[str]], placed: Placed, formula: Formula) -> float:
+def _largest(domain: Domain, parts: Mapping[str, Sequence[str]], placed: Placed, formula: SpatialValue) -> float:
     """The largest absolute value of a formula where an effect acts. Collective."""
     values = formula.at(_points(domain, _entities(domain, parts, placed)))
     finite = bool(np.all(np.isfinite(values)))

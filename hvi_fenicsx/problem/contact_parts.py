@@ -11,9 +11,9 @@ from dolfinx import fem
 
 from ..effects import BoundaryLaw, Direction, NormalBounds
 from ..errors import InputError
-from ..formula import Formula
 from ..laws import Superpotential
 from ..runtime.mpi import agree
+from ..spatial_value import SpatialValue
 from ..typing import Array, Entities
 from . import contact_surface
 from .contact_surface import Surface
@@ -79,7 +79,7 @@ def make_bounds(
 def _bounds(context: DomainForms, where: Surface, effect: str, bounds: NormalBounds, scales: Scales) -> Bounds:
     """The bounds that an effect, by its key, puts on a part. Collective."""
 
-    def value(formula: Formula | None) -> Array:
+    def value(formula: SpatialValue | None) -> Array:
         if formula is None:
             return np.full(len(where.blocks), np.inf)
         found = formula.at(where.points) / scales.displacement

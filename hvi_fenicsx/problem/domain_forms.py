@@ -13,10 +13,10 @@ from dolfinx import fem
 from petsc4py import PETSc
 
 from ..effects import Place
-from ..formula import Formula, ufl_algebra
 from ..mesh import vertex_dofs
 from ..mesh.domain import Domain
 from ..runtime.mpi import agree
+from ..spatial_value import SpatialValue
 from ..typing import Array
 from .scaling import Placed, Scales
 from .spaces import displacement_space, scalar_space
@@ -50,9 +50,9 @@ class DomainForms:
         """A constant that is not compiled into the form."""
         return fem.Constant(self.domain.mesh, PETSc.ScalarType(value))
 
-    def render(self, formula: Formula) -> Any:
-        """A formula in UFL, in SI coordinates."""
-        return formula.render(ufl.SpatialCoordinate(self.domain.mesh), ufl_algebra(self.number))
+    def render(self, value: SpatialValue) -> Any:
+        """A value in UFL, in SI coordinates."""
+        return value.in_ufl(self.domain.mesh, self.number)
 
     @functools.cached_property
     def _facet_tags(self) -> tuple[Any, dict[str, tuple[int, ...]]]:

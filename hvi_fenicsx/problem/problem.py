@@ -14,8 +14,8 @@ import numpy as np
 from dolfinx import fem
 
 from ..effects import Contribution, Effect
-from ..formula import Formula
 from ..mesh.domain import Domain
+from ..spatial_value import SpatialValue
 from ..typing import Array, Entities, Integers
 from . import bodies, contact_surface
 from .bodies import MeshBodies
@@ -74,7 +74,7 @@ class PrescribedComponent:
 
     component: int
     facets: Entities
-    value: Formula
+    value: SpatialValue
 
 
 @dataclass(frozen=True, kw_only=True)
