@@ -125,8 +125,12 @@ class Bulk:
         integrals = self.between(v, v).integrals()
         return ufl.Form([integral.reconstruct(integrand=integral.integrand() * q) for integral in integrals])
 
-    def energy_by_cell(self, v: fem.Function) -> Array:
-        """a(v, v) of every owned cell, without what is averaged, (cells,). Collective."""
+    def energy_by_cell(self, v: Any) -> Array:
+        """a(v, v) of every owned cell, without what is averaged, (cells,). Collective.
+
+        Args:
+            v: a displacement of any space, or a sum of such in UFL.
+        """
         q = ufl.TestFunction(fem.functionspace(self.space.mesh, ("Discontinuous Lagrange", 0)))
         return np.maximum(nodal_sum(self.energy_form(v, q))[:, 0], 0.0)
 

@@ -18,10 +18,9 @@ from ...system.system import System
 from ...typing import Array
 from ..certificate import Examination
 from ..contact_state import ContactState, LawState
-from . import defect
+from . import drop_errors
 from .contact_facets import PartTrace
 from .dual_norm import DualNorm
-from .edge_bubbles import BubbleStiffness
 from .law_traces import ErrorField, LawTraces
 from .thresholds import DEFAULT, Thresholds
 
@@ -60,7 +59,7 @@ def estimate_contact_errors(
     """
     traces = LawTraces(system.problem, u, examination.states, thresholds)
     inverse = DualNorm(system, levels, u, thresholds)
-    error = _error(traces, inverse)
+    error = drop_errors.of_solution(traces, inverse)
     uncertain = _uncertainty(traces, inverse)
     inverse.destroy()
     slips = [_slip(traces, state, error, uncertain) for state in examination.states]
@@ -88,33 +87,6 @@ def ratio(part: float, whole: float) -> float:
     return part / whole if whole > 0 else (np.inf if part > 0 else 0.0)
 
 
-def _error(traces: LawTraces, inverse: DualNorm) -> ErrorField:
-    """The defect with its influence on the vertices and, from the second round on, theirs on it. Collective."""
-    problem, error = traces.problem, None
-    vertices, stiffness = fem.Function(problem.space), BubbleStiffness(problem, traces.bubbles)
-    residual = problem.bulk.residual_in(traces.bubbles, traces.u, problem.linear.values())
-    for _ in range(traces.thresholds.contact_rounds):
-        edges, _ = traces.tested(error)
-        load = residual - edges - problem.bulk.force_in(traces.bubbles, vertices)
-        error = ErrorField(vertices, defect.least_energy(stiffness, traces.u, load, traces.thresholds))
-        _move_vertices(traces, inverse, error)
-    assert error is not None
-    return error
-
-
-def _move_vertices(traces: LawTraces, inverse: DualNorm, error: ErrorField) -> None:
-    """Move the vertices as the bubbles ask; the laws answer that, so it takes a few rounds. Collective."""
-    problem, thresholds = traces.problem, traces.thresholds
-    size, bubbling = 0.0, problem.bulk.force_in(problem.space, error.edges)
-    for _ in range(thresholds.answer_rounds):
-        _, laws = traces.tested(error)
-        step, length = inverse.solve(laws - problem.bulk.force_in(problem.space, error.vertices) - bubbling)
-        error.vertices.x.array[:] += step.x.array
-        size = max(size, length)
-        if length <= thresholds.answer_change * size:
-            break
-
-
 def _uncertainty(traces: LawTraces, inverse: DualNorm) -> fem.Function:
     """What the vertices may move because bubbles do not see where in half an edge a drop lies, P1. Collective.
 
@@ -136,11 +108,8 @@ def _uncertainty(traces: LawTraces, inverse: DualNorm) -> fem.Function:
 
 def _drops(traces: LawTraces, state: ContactState, law: LawState) -> tuple[PartTrace, Array]:
     """A law's drops on the facets within which they lie, spread over their uncertain share of them, (f, q, k)."""
-    points, concave = traces.part(state.surface, law.term.directions), law.term.exact.concave
-    ends = points.at_vertices(law.argument[:, None])[:, :, 0]
-    height = np.zeros(len(ends))
-    for kink, jump in zip(concave.kinks, concave.jumps, strict=True):
-        height += jump * ((ends.min(axis=1, initial=np.inf) < kink) & (kink < ends.max(axis=1, initial=-np.inf)))
+    points = traces.part(state.surface, law.term.directions)
+    height = drop_errors.heights(points, law, law.term.exact)
     slip = points.linear(traces.u)
     length = np.linalg.norm(slip, axis=2, keepdims=True)
     unit = np.divide(slip, length, out=np.zeros_like(slip), where=length > 0)

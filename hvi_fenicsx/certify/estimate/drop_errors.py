@@ -1,0 +1,79 @@
+"""The error that bubbles, vertices and laws make together: it moves the place where a law drops.
+
+A law that drops within an edge leaves a force on the vertices. They move, the place of the drop moves with them, and
+the force with that place. On one mesh several neighbouring vertices may be the last before the drop, each of them in
+equilibrium, so the place is wrong by several edges: more than the bubbles of one edge see.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from dolfinx import fem
+from mpi4py import MPI
+
+from ...laws import Superpotential
+from ...typing import Array
+from ..contact_state import LawState
+from . import defect
+from .contact_facets import PartTrace
+from .dual_norm import DualNorm
+from .edge_bubbles import BubbleStiffness
+from .law_traces import ErrorField, LawTraces
+
+
+def within_facets(traces: LawTraces) -> bool:
+    """Whether a law, as it is solved, drops between the vertices of a facet. Collective."""
+    found = [
+        bool(np.any(heights(traces.part(state.surface, law.term.directions), law, law.term.law)))
+        for state in traces.states
+        for law in state.laws
+    ]
+    return bool(traces.problem.domain.mesh.comm.allreduce(any(found), op=MPI.LOR))
+
+
+def heights(points: PartTrace, law: LawState, of: Superpotential) -> Array:
+    """By how much the law drops within each facet, (f,). Collective.
+
+    Args:
+        points: of the law's part.
+        law: its state.
+        of: the law, as it is or as it is solved.
+    """
+    ends = points.at_vertices(law.argument[:, None])[:, :, 0]
+    low, high = ends.min(axis=1, initial=np.inf), ends.max(axis=1, initial=-np.inf)
+    height = np.zeros(len(ends))
+    for kink, jump in zip(of.concave.kinks, of.concave.jumps, strict=True):
+        height += jump * ((low < kink) & (kink < high))
+    return height
+
+
+def of_solution(traces: LawTraces, inverse: DualNorm) -> ErrorField:
+    """The bubbles with their influence on the vertices and, from the second round on, theirs on them. Collective.
+
+    Args:
+        traces: the laws between the vertices.
+        inverse: of the system.
+    """
+    problem, error = traces.problem, None
+    vertices, stiffness = fem.Function(problem.space), BubbleStiffness(problem, traces.bubbles)
+    residual = problem.bulk.residual_in(traces.bubbles, traces.u, problem.linear.values())
+    for _ in range(traces.thresholds.contact_rounds):
+        edges, _ = traces.tested(error)
+        load = residual - edges - problem.bulk.force_in(traces.bubbles, vertices)
+        error = ErrorField(vertices, defect.least_energy(stiffness, traces.u, load, traces.thresholds))
+        _move_vertices(traces, inverse, error)
+    assert error is not None
+    return error
+
+
+def _move_vertices(traces: LawTraces, inverse: DualNorm, error: ErrorField) -> None:
+    """Move the vertices as the bubbles ask; the laws answer that, so it takes a few rounds. Collective."""
+    problem, thresholds = traces.problem, traces.thresholds
+    size, bubbling = 0.0, problem.bulk.force_in(problem.space, error.edges)
+    for _ in range(thresholds.answer_rounds):
+        _, laws = traces.tested(error)
+        step, length = inverse.solve(laws - problem.bulk.force_in(problem.space, error.vertices) - bubbling)
+        error.vertices.x.array[:] += step.x.array
+        size = max(size, length)
+        if length <= thresholds.answer_change * size:
+            break
