@@ -92,6 +92,11 @@ def simplex_mesh(comm: Any, cells: npt.NDArray[Any], points: Array, kind: str) -
     return _mesh.create_mesh(comm, cells=cells, x=points, e=element, partitioner=partitioner)
 
 
+def comm_of(form: Any) -> Any:
+    """The ranks of the mesh that a UFL form is integrated over."""
+    return next(iter(form.subdomain_data())).ufl_cargo().comm
+
+
 def petsc_version() -> str:
     """PETSc's version, as text."""
     return ".".join(str(n) for n in PETSc.Sys.getVersion())

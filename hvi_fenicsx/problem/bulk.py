@@ -18,6 +18,7 @@ from dolfinx.fem.petsc import assemble_matrix
 from petsc4py import PETSc
 
 from ..effects import Averaged, Contribution, Effect, Place
+from ..runtime import forms
 from ..typing import Array
 from . import nodal_averaging, stress
 from .nodal_averaging import Dilatation
@@ -50,7 +51,7 @@ class Bulk:
     @functools.cached_property
     def compiled(self) -> fem.Form:
         """The compiled ``form``. Collective when first used."""
-        return fem.form(self.form)
+        return forms.compiled(self.form)
 
     @functools.cached_property
     def _dilatations(self) -> list[Dilatation]:

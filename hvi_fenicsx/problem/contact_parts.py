@@ -12,6 +12,7 @@ from dolfinx import fem
 from ..effects import BoundaryLaw, Direction, NormalBounds
 from ..errors import InputError
 from ..laws import Superpotential
+from ..runtime import forms
 from ..runtime.mpi import agree
 from ..spatial_value import SpatialValue
 from ..typing import Array, Entities
@@ -186,7 +187,7 @@ def _term(
         directions=directions,
         free=(~np.isin(where.dofs, fixed)).astype(np.float64),
         density=density,
-        residual=fem.form(_residual(context, where, density)),
+        residual=forms.compiled(_residual(context, where, density)),
     )
 
 

@@ -19,6 +19,7 @@ from dolfinx.fem.petsc import assemble_matrix
 from petsc4py import PETSc
 
 from ..effects import Averaged
+from ..runtime import forms
 from ..typing import Array
 from .vectors import assembled, nodal_sum
 
@@ -102,9 +103,9 @@ def assemble(averaged: Sequence[Averaged]) -> list[Dilatation]:
 
 
 def _assembled(averaged: Averaged) -> Dilatation:
-    divergence = assemble_matrix(fem.form(averaged.divergence))
+    divergence = assemble_matrix(forms.compiled(averaged.divergence))
     divergence.assemble()
-    volume = assembled(fem.form(averaged.volume))
+    volume = assembled(forms.compiled(averaged.volume))
     stiffness = divergence.createVecLeft()
     v = volume.array_r
     # vertices outside of the region have no volume and average nothing

@@ -10,6 +10,7 @@ from dolfinx import fem, la
 from dolfinx.fem.petsc import assemble_vector
 from petsc4py import PETSc
 
+from ..runtime import forms
 from ..typing import Array
 
 
@@ -30,7 +31,7 @@ def assembled(form: fem.Form) -> PETSc.Vec:
 
 def nodal(form: Any) -> Array:
     """A UFL linear form's values at the blocks that this rank owns, (n, d). Collective."""
-    compiled = fem.form(form)
+    compiled = forms.compiled(form)
     dofs = compiled.function_spaces[0].dofmap
     vector = fem.assemble_vector(compiled)
     vector.scatter_reverse(la.InsertMode.add)

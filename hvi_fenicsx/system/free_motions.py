@@ -20,6 +20,7 @@ from petsc4py import PETSc
 from ..problem.problem import Problem
 from ..problem.vectors import null_space
 from ..rigid import Mode
+from ..runtime import forms
 from ..runtime.mpi import total
 from ..typing import Array, Entities
 
@@ -83,7 +84,7 @@ def remove_free_motions(problem: Problem, modes: Sequence[Mode], u: fem.Function
 
 def _product(u: fem.Function, v: fem.Function) -> float:
     """∫ u·v dx."""
-    return total(u.function_space.mesh.comm, float(fem.assemble_scalar(fem.form(ufl.inner(u, v) * ufl.dx))))
+    return total(u.function_space.mesh.comm, float(fem.assemble_scalar(forms.compiled(ufl.inner(u, v) * ufl.dx))))
 
 
 def _pins(comm: MPI.Comm, columns: list[Array]) -> Entities:

@@ -21,6 +21,7 @@ from ..problem.law_term import LawTerm
 from ..problem.problem import Bounds, Problem
 from ..problem.vectors import assembled, new_vector, turn
 from ..rigid import Mode
+from ..runtime import forms
 from ..runtime.timing import Timer
 from ..typing import Array, Entities
 from . import free_motions, local_frames, near_null_space
@@ -57,7 +58,7 @@ class CompiledForms:
 
 def compile_forms(problem: Problem) -> CompiledForms:
     """Compile (or take from the cache) what the assembly needs. Collective."""
-    return CompiledForms(problem.bulk.compiled, {name: fem.form(f) for name, f in problem.linear.items()})
+    return CompiledForms(problem.bulk.compiled, {name: forms.compiled(f) for name, f in problem.linear.items()})
 
 
 class System:

@@ -20,6 +20,7 @@ from dolfinx import mesh as dmesh
 from mpi4py import MPI
 
 from ...problem.problem import Problem
+from ...runtime import forms
 from ...typing import Array
 
 
@@ -85,7 +86,7 @@ class BubbleStiffness:
         self.problem, self.space = problem, bubbles
         self.comm: MPI.Comm = bubbles.mesh.comm
         self._in, self._out = fem.Function(bubbles), fem.Function(bubbles)
-        self._action = fem.form(problem.bulk.between(self._in, ufl.TestFunction(bubbles)))
+        self._action = forms.compiled(problem.bulk.between(self._in, ufl.TestFunction(bubbles)))
         self._inverse: Array = np.reciprocal(diagonal(problem, bubbles))
 
     def times(self, e: Array) -> Array:
@@ -179,7 +180,7 @@ class _Affine:
         for i, axis in enumerate(np.eye(d)):
             v = height * ufl.as_vector(axis.tolist())
             whole += problem.bulk.energy_form(v, q[i])
-        self._form = fem.form(whole)
+        self._form = forms.compiled(whole)
 
     def energies(self, slopes: Array) -> Array:
         """The energies of the function with these slopes in reference coordinates (d,), along each axis, (cells, d)."""

@@ -1,0 +1,251 @@
+"""Compiled forms: kept on disk for later runs, whatever becomes of the run that compiles them.
+
+dolfinx's own cache marks a form that is being compiled by a file. The file stays when the process is killed; later runs
+wait for it and fail. Here a form is compiled in a folder of its own, which gets its final name when it is complete. A
+lock of the kernel, which ends with its process, has a second run wait instead of compile the same form.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import hashlib
+import os
+import shutil
+import sysconfig
+import tempfile
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import dolfinx.jit
+import ffcx
+import ffcx.options
+from dolfinx import fem
+from mpi4py import MPI
+
+from .. import compat
+from ..errors import HviError, InputError
+from . import log
+from .mpi import agree, on_root
+
+_LOG = log.logger("runtime")
+
+
+@dataclass(frozen=True)
+class Thresholds:
+    """How long one run waits for another.
+
+    Attributes:
+        patience: for the lock of a form, s; after it the form is compiled twice.
+        pause: between two looks at a lock, s.
+        compilation: of a form on a rank that shares no disk with rank 0, s.
+    """
+
+    patience: float = 300.0
+    pause: float = 0.05
+    compilation: int = 600
+
+
+DEFAULT = Thresholds()
+
+
+class CompilationError(HviError):
+    """A form cannot be compiled."""
+
+
+@dataclass(frozen=True)
+class _Entry:
+    """A form and its place in a cache.
+
+    Attributes:
+        form: UFL.
+        comm: the ranks of its mesh.
+        cache: the folder of all forms.
+        name: the form's own.
+    """
+
+    form: Any
+    comm: MPI.Comm
+    cache: Path
+    name: str
+
+    @property
+    def folder(self) -> Path:
+        """Where the form is kept; it is complete if it is there."""
+        return self.cache / self.name
+
+    def is_there(self) -> bool:
+        """Whether all ranks see it. Collective."""
+        return all(agree(self.comm, self.folder.is_dir()))
+
+
+class FormCache:
+    """Compiles forms and keeps them; where the cache cannot be written, in a folder that goes with this process.
+
+    Args:
+        folder: of the cache; None: dolfinx's, from XDG_CACHE_HOME or the options of dolfinx.
+        thresholds: how long to wait.
+    """
+
+    def __init__(self, folder: Path | None = None, thresholds: Thresholds = DEFAULT) -> None:
+        self._folder, self._thresholds = folder, thresholds
+        self._temporary: tempfile.TemporaryDirectory[str] | None = None
+
+    def compiled(self, form: Any) -> fem.Form:
+        """The compiled form. Collective.
+
+        Args:
+            form: UFL, not empty.
+
+        Raises:
+            CompilationError: it cannot be compiled, on all ranks alike.
+        """
+        comm = compat.comm_of(form)
+        entry = _Entry(form, comm, on_root(comm, self._current), _name(form))
+        try:
+            return self._found(entry)
+        except HviError as error:
+            return self._in_temporary_folder(entry, error)
+
+    def _current(self) -> Path:
+        return self._folder or Path(options()["cache_dir"]) / "hvi_fenicsx"
+
+    def _found(self, entry: _Entry) -> fem.Form:
+        """The form as it is kept, or compiled now. Collective."""
+        if entry.is_there():
+            with contextlib.suppress(CompilationError):
+                return self._made(entry, entry.folder)
+            on_root(entry.comm, lambda: shutil.rmtree(entry.folder, ignore_errors=True))  # damaged
+        on_root(entry.comm, lambda: entry.cache.mkdir(parents=True, exist_ok=True))
+        with self._locked(entry):
+            if entry.is_there():  # compiled by the run that held the lock
+                return self._made(entry, entry.folder)
+            return self._built(entry)
+
+    def _built(self, entry: _Entry) -> fem.Form:
+        """Compile a form; its folder gets its name when it is complete. Collective; rank 0 holds the lock."""
+        folder = on_root(entry.comm, lambda: _new_folder(entry))
+        try:
+            result = self._made(entry, folder)
+            with contextlib.suppress(OSError):  # another rank has done it, or a run that waited too long
+                folder.rename(entry.folder)
+            return result
+        finally:
+            shutil.rmtree(folder, ignore_errors=True)
+
+    def _made(self, entry: _Entry, folder: Path) -> fem.Form:
+        """What dolfinx makes of the form in a folder. Collective.
+
+        Raises:
+            CompilationError: on all ranks alike.
+        """
+        result, fault = None, ""
+        asked = {**options(), "cache_dir": folder, "timeout": self._thresholds.compilation}
+        try:
+            result = fem.form(entry.form, jit_options=asked)
+        except Exception as error:  # dolfinx, ffcx, cffi, setuptools and the file system have errors of their own
+            fault = f"{type(error).__name__}: {error}"
+        faults = [text for text in agree(entry.comm, fault) if text]
+        if faults:
+            raise CompilationError(
+                f"a form cannot be compiled: {faults[0]}; it needs a C compiler and Python's headers"
+            )
+        return result
+
+    @contextlib.contextmanager
+    def _locked(self, entry: _Entry) -> Iterator[None]:
+        """Hold the lock of a form on rank 0, unless its holder takes too long. Collective."""
+        descriptor = on_root(entry.comm, lambda: os.open(entry.folder.with_suffix(".lock"), os.O_RDWR | os.O_CREAT))
+        try:
+            on_root(entry.comm, lambda: self._lock(descriptor))
+            yield
+        finally:
+            if entry.comm.rank == 0:
+                os.close(descriptor)
+
+    def _lock(self, descriptor: int) -> None:
+        end = time.monotonic() + self._thresholds.patience
+        while not _is_locked(descriptor) and time.monotonic() < end:
+            time.sleep(self._thresholds.pause)
+
+    def _in_temporary_folder(self, entry: _Entry, reason: HviError) -> fem.Form:
+        """Compile where the cache did not allow it. Collective."""
+        temporary = _Entry(entry.form, entry.comm, on_root(entry.comm, self._temporary_folder), entry.name)
+        if temporary.cache == entry.cache:
+            raise reason
+        result = self._found(temporary)
+        if entry.comm.rank == 0:
+            self._folder = temporary.cache
+        _LOG.warning(
+            "compiled forms cannot be kept in %s (%s); they are compiled again at each start: make room there, or set "
+            "XDG_CACHE_HOME to a folder that can be written",
+            entry.cache,
+            str(reason).splitlines()[0],
+        )
+        return result
+
+    def _temporary_folder(self) -> Path:
+        self._temporary = self._temporary or tempfile.TemporaryDirectory(
+            prefix="hvi-forms-", ignore_cleanup_errors=True
+        )
+        return Path(self._temporary.name)
+
+
+_CACHE = FormCache()
+
+
+def compiled(form: Any) -> fem.Form:
+    """A UFL form, compiled now or by an earlier run. Collective.
+
+    Args:
+        form: UFL, not empty.
+
+    Raises:
+        CompilationError: it cannot be compiled, on all ranks alike.
+    """
+    return _CACHE.compiled(form)
+
+
+@cache
+def options() -> dict[str, Any]:
+    """The options of dolfinx's compiler: its defaults and the user's, without those of the current folder.
+
+    Raises:
+        InputError: a file of options is damaged.
+    """
+    try:
+        with contextlib.chdir(Path(__file__).parent):  # both read a file of the current folder, once
+            ffcx.options.get_options()
+            return dict(dolfinx.jit.get_options())
+    except ValueError as error:
+        raise InputError(f"the user's dolfinx_jit_options.json or ffcx_options.json is not valid: {error}") from None
+
+
+def _name(form: Any) -> str:
+    """A name for all that the compiled form depends on."""
+    free = {key: value for key, value in options().items() if key not in ("cache_dir", "timeout")}
+    system = [sysconfig.get_config_var(name) for name in ("SOABI", "CFLAGS")]
+    parts = [form.signature(), ffcx.__version__, compat.VERSION, system, sorted(free.items())]
+    return hashlib.sha256(repr([*parts, sorted(ffcx.options.get_options().items())]).encode()).hexdigest()[:40]
+
+
+def _new_folder(entry: _Entry) -> Path:
+    """An empty folder to compile in; what killed runs have left of the same form goes. Rank 0 only, with the lock."""
+    for left in entry.cache.glob(f"{entry.name}.building-*"):
+        shutil.rmtree(left, ignore_errors=True)
+    return Path(tempfile.mkdtemp(prefix=f"{entry.name}.building-", dir=entry.cache))
+
+
+def _is_locked(descriptor: int) -> bool:
+    """Whether the lock is ours now, or the file system has no locks."""
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    except OSError:
+        return True
+    return True

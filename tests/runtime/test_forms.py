@@ -1,0 +1,151 @@
+"""Compiled forms are kept; no run that is killed while it compiles, and no full cache, stops a later one."""
+
+from __future__ import annotations
+
+import fcntl
+import json
+import logging
+import os
+import signal
+import subprocess
+import threading
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+import ufl
+from dolfinx import fem, mesh
+from mpi4py import MPI
+from runs import command, process, summary, write_scene
+from scenes import model, quadratic_linear
+
+from hvi_fenicsx.errors import HviError
+from hvi_fenicsx.runtime import forms
+from hvi_fenicsx.runtime.forms import FormCache, Thresholds
+
+
+def area(power: int = 1) -> Any:
+    """A small form; each power is another one."""
+    square = mesh.create_unit_square(MPI.COMM_SELF, 1, 1)
+    return fem.Constant(square, 3.0) ** power * ufl.dx
+
+
+def value(form: fem.Form) -> float:
+    return float(fem.assemble_scalar(form))
+
+
+@pytest.fixture(scope="module")
+def kept(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A cache that holds the area alone."""
+    folder = tmp_path_factory.mktemp("cache")
+    assert value(FormCache(folder).compiled(area())) == pytest.approx(3.0)
+    return folder
+
+
+def entry(cache: Path) -> Path:
+    return next(folder for folder in cache.iterdir() if folder.is_dir())
+
+
+def test_a_form_is_compiled_once(kept: Path) -> None:
+    before = sorted((f.name, f.stat().st_mtime_ns) for f in entry(kept).iterdir())
+    assert value(FormCache(kept).compiled(area())) == pytest.approx(3.0)
+    assert sorted((f.name, f.stat().st_mtime_ns) for f in entry(kept).iterdir()) == before
+
+
+def test_what_a_killed_run_left_is_removed(kept: Path, tmp_path: Path) -> None:
+    """A folder of the same form, with the file by which dolfinx would wait for ever."""
+    left = tmp_path / f"{entry(kept).name}.building-killed"
+    left.mkdir()
+    (left / next(entry(kept).glob("*.c")).name).touch()
+    assert value(FormCache(tmp_path).compiled(area())) == pytest.approx(3.0)
+    assert not left.exists()
+
+
+def test_a_damaged_form_is_compiled_again(kept: Path, tmp_path: Path) -> None:
+    """As a power cut leaves it: the names are there, the content is not."""
+    damaged = tmp_path / entry(kept).name
+    damaged.mkdir()
+    for file in entry(kept).iterdir():
+        (damaged / file.name).touch()
+    assert value(FormCache(tmp_path).compiled(area())) == pytest.approx(3.0)
+    assert all(file.stat().st_size for file in damaged.glob("*.so"))
+
+
+@pytest.mark.parametrize(("patience", "waits"), [(300.0, True), (0.1, False)])
+def test_a_lock_that_is_held_is_waited_for_but_not_for_ever(
+    patience: float, waits: bool, kept: Path, tmp_path: Path
+) -> None:
+    lock = os.open(tmp_path / f"{entry(kept).name}.lock", os.O_RDWR | os.O_CREAT)
+    fcntl.flock(lock, fcntl.LOCK_EX)
+    released: list[float] = []
+
+    def release() -> None:
+        released.append(time.monotonic())
+        os.close(lock)
+
+    holder = threading.Timer(0.5 if waits else 30.0, release)
+    holder.start()
+    assert value(FormCache(tmp_path, Thresholds(patience=patience)).compiled(area())) == pytest.approx(3.0)
+    assert bool(released) == waits
+    holder.cancel()
+
+
+def test_a_cache_that_cannot_be_written_is_replaced_with_a_warning(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    (tmp_path / "file").touch()
+    cache = FormCache(tmp_path / "file" / "cache")
+    with caplog.at_level(logging.WARNING, logger="hvi_fenicsx"):
+        assert value(cache.compiled(area())) == pytest.approx(3.0)
+        assert value(cache.compiled(area(2))) == pytest.approx(9.0)
+    assert [r.getMessage().partition(" (")[0] for r in caplog.records] == [
+        f"compiled forms cannot be kept in {tmp_path / 'file' / 'cache'}"
+    ]
+
+
+def test_a_form_that_cannot_be_compiled_is_one_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("CC", "/no/such/compiler")
+    with pytest.raises(HviError, match="cannot be compiled"):
+        FormCache(tmp_path).compiled(area())
+    assert [f.suffix for f in tmp_path.iterdir()] == [".lock"]
+
+
+def test_options_in_the_current_folder_are_not_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    before = forms.options()
+    forms.options.cache_clear()
+    forms.dolfinx.jit._load_options.cache_clear()
+    (tmp_path / "dolfinx_jit_options.json").write_text(json.dumps({"cffi_extra_compile_args": ["-O0"]}))
+    (tmp_path / "ffcx_options.json").write_text("not JSON")
+    monkeypatch.chdir(tmp_path)
+    assert forms.options() == before
+
+
+SLOW = """#!/bin/sh
+touch "$0.started"
+sleep 2
+"""
+WAYS = {"KILL": [signal.SIGKILL], "HUP": [signal.SIGHUP] * 2, "TERM": [signal.SIGTERM] * 2}
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("way", WAYS)
+def test_a_run_killed_while_forms_compile_does_not_stop_the_next(
+    way: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scene = write_scene(tmp_path / "square.toml", model(2, friction=quadratic_linear(1e3)))
+    compiler = tmp_path / "slow"
+    compiler.write_text(SLOW)
+    compiler.chmod(0o755)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    run = ("run", scene, "--out", tmp_path / "r", "--no-pictures")
+    child = subprocess.Popen(command(*run), env=os.environ | {"CC": str(compiler)}, stderr=subprocess.PIPE, text=True)
+    while not (tmp_path / "slow.started").exists():
+        time.sleep(0.01)
+    for number in WAYS[way]:
+        child.send_signal(number)
+        time.sleep(0.1)
+    assert "Traceback" not in child.communicate(timeout=60)[1]
+    done = process(*run)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert summary(tmp_path / "r")["converged"]
