@@ -34,7 +34,12 @@ def before_solving(
         forces: its load vectors by name, nondimensional.
         thresholds: what is plausible.
     """
-    return (*problem.implausible, *_scales(problem, thresholds), *_weak_laws(problem, forces, thresholds))
+    return (
+        *problem.implausible,
+        *_scales(problem, thresholds),
+        *_uneven_parts(problem, thresholds),
+        *_weak_laws(problem, forces, thresholds),
+    )
 
 
 def of_solution(
@@ -70,6 +75,21 @@ def _scales(problem: Problem, thresholds: PlausibilityThresholds) -> Iterator[st
         )
     if scales.length > thresholds.largest_body:
         yield f"the body is {scales.length:.4g} m long; is it in m? (for a mesh file in mm: scale = 1e-3)"
+
+
+def _uneven_parts(problem: Problem, thresholds: PlausibilityThresholds) -> Iterator[str]:
+    """Contact parts that seem to be meant flat, in a mesh with few digits in its coordinates."""
+    comm = problem.domain.mesh.comm
+    for surface in (bounds.surface for bounds in problem.bounds):
+        mean = np.asarray(comm.allreduce(surface.weights @ surface.normals))
+        away = surface.normals - mean / (np.linalg.norm(mean) or 1.0)
+        turn = largest(comm, float(np.max(np.linalg.norm(away, axis=1), initial=0.0)))
+        if thresholds.flat < turn < thresholds.uneven:
+            yield (
+                f"{_place_of_bounds(problem, surface.part)}: the part is nearly flat, its normals turn by up to {turn:.1e} "
+                "rad, and this unevenness is what is solved; if it is rounding of the mesh's coordinates, state the flat "
+                "part: contact = { obstacle = { point = [...], normal = [...] } }"
+            )
 
 
 def _weak_laws(problem: Problem, forces: Mapping[str, PETSc.Vec], thresholds: PlausibilityThresholds) -> Iterator[str]:

@@ -35,6 +35,8 @@ class PlausibilityThresholds:
         smoothing_share: share of a part on which smoothing may change the traction so much.
         nearly_all: share of a part that counts as all of it: a vertex on a support does not slip.
         rounding: displacement or work of a rigid motion, nondimensional, up to which it is none.
+        flat: angle (rad) between the normals of a part, up to which the part is flat.
+        uneven: angle up to which it may be meant to be flat.
     """
 
     largest_strain: float = 0.1
@@ -47,6 +49,8 @@ class PlausibilityThresholds:
     smoothing_share: float = 0.25
     nearly_all: float = 0.9
     rounding: float = 1e-10
+    flat: float = 1e-8
+    uneven: float = 0.02
 
 
 DEFAULT = Thresholds()

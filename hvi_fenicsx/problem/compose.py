@@ -118,9 +118,10 @@ def _problem(
 ) -> Problem:
     """All contributions together. Collective."""
     conditions, held, fixed = _conditions(context, scales, contributions, thresholds)
-    surfaces = contact_parts.make_surfaces(context, contributions)
-    bounds = contact_parts.make_bounds(context, scales, surfaces, contributions)
-    contact_parts.check_bounds(context, bounds, conditions, fixed, thresholds)
+    prescribed = dirichlet.values(context, conditions)
+    surfaces = contact_parts.make_surfaces(context, contributions, fixed, thresholds)
+    bounds = contact_parts.make_bounds(context, scales, surfaces, contributions, prescribed)
+    contact_parts.check_bounds(context, bounds, prescribed, fixed, thresholds)
     contact_parts.check_normal_laws(contributions)
     terms = contact_parts.make_terms(context, scales, surfaces, contributions, fixed, modify)
     linear, strains = (_by_name(contributions, kind) for kind in ("linear", "strains"))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,7 @@ from ..runtime import forms
 from ..runtime.mpi import agree
 from ..spatial_value import SpatialValue
 from ..typing import Array, Entities
-from . import contact_surface
+from . import contact_normals, contact_surface
 from .contact_surface import Surface
 from .domain_forms import DomainForms, ScaledMeasure
 from .law_term import LawTerm
@@ -34,15 +35,24 @@ def unchanged(law: Superpotential) -> Superpotential:
     return law
 
 
-def make_surfaces(context: DomainForms, contributions: Sequence[PlacedContribution]) -> dict[str, Surface]:
+def make_surfaces(
+    context: DomainForms, contributions: Sequence[PlacedContribution], fixed: Entities, thresholds: Thresholds
+) -> dict[str, Surface]:
     """The surfaces of the parts with bounds or laws, by part, in the scene's order. Collective.
 
     Args:
         context: spaces, parts and vertices.
         contributions: of all effects.
+        fixed: local scalar dofs that are prescribed.
+        thresholds: what is rounding of a normal, and how far it may be turned.
+
+    Raises:
+        InputError: on all ranks alike: a facet lies inside the body, or two directions that meet at a vertex are
+            neither orthogonal nor equal.
     """
     parts = dict.fromkeys(w for w, _, c in contributions if w is not None and (c.bounds or c.laws))
-    return {
+    stated = {w: b.direction for w, _, c in contributions for b in c.bounds if w and b.direction is not None}
+    surfaces = {
         where: contact_surface.make_surface(
             where,
             context.space,
@@ -50,10 +60,10 @@ def make_surfaces(context: DomainForms, contributions: Sequence[PlacedContributi
             context.part_facets[where],
             context.boundary(where, **CONTACT_RULE),
             context.length ** (context.dimension - 1),
-            next((b.direction for w, _, other in contributions if w == where for b in other.bounds), None),
         )
         for where in parts
     }
+    return contact_normals.decide(context.domain.mesh.comm, surfaces, stated, fixed, context.length, thresholds)
 
 
 def make_bounds(
@@ -61,6 +71,7 @@ def make_bounds(
     scales: Scales,
     surfaces: Mapping[str, Surface],
     contributions: Sequence[PlacedContribution],
+    prescribed: Array,
 ) -> tuple[Bounds, ...]:
     """The bounds on u·n. Collective.
 
@@ -69,16 +80,30 @@ def make_bounds(
         scales: what one unit is in SI.
         surfaces: by part.
         contributions: of all effects.
+        prescribed: the prescribed values at the local scalar dofs, zero at the others.
 
     Raises:
         InputError: on all ranks alike: a bound that is not a finite number at some vertex.
     """
     wanted = [(surfaces[w], e.key, b) for w, e, c in contributions if w is not None for b in c.bounds]
-    return tuple(_bounds(context, surface, key, bounds, scales) for surface, key, bounds in wanted)
+    return tuple(
+        _along_normal(_bounds(context, surface, key, bounds, scales), prescribed) for surface, key, bounds in wanted
+    )
+
+
+def _along_normal(stated: Bounds, prescribed: Array) -> Bounds:
+    """The bounds on u·n, from those on u·m along the normal m of the scene.
+
+    u·m = (m·n)(u·n) + u·(m - (m·n) n). Where n was turned towards a prescribed component the last summand is known.
+    """
+    surface = stated.surface
+    along = np.sum(surface.measured * surface.normals, axis=1, keepdims=True)
+    known = np.sum(surface.values(prescribed) * (surface.measured - along * surface.normals), axis=1)
+    return replace(stated, lower=(stated.lower - known) / along[:, 0], upper=(stated.upper - known) / along[:, 0])
 
 
 def _bounds(context: DomainForms, where: Surface, effect: str, bounds: NormalBounds, scales: Scales) -> Bounds:
-    """The bounds that an effect, by its key, puts on a part. Collective."""
+    """The bounds on u·m, m being the normal of the scene, that an effect puts on a part. Collective."""
 
     def value(formula: SpatialValue | None) -> Array:
         if formula is None:
@@ -94,26 +119,23 @@ def _bounds(context: DomainForms, where: Surface, effect: str, bounds: NormalBou
 
 
 def check_bounds(
-    context: DomainForms, bounds: Sequence[Bounds], conditions: Any, fixed: Entities, thresholds: Thresholds
+    context: DomainForms, bounds: Sequence[Bounds], prescribed: Array, fixed: Entities, thresholds: Thresholds
 ) -> None:
     """Refuse bounds that exclude a prescribed value: PETSc would silently change it (solver-notes.md). Collective.
 
     Args:
         context: spaces, parts and vertices.
         bounds: the bounds.
-        conditions: the Dirichlet conditions.
-        fixed: local scalar dofs that they prescribe.
+        prescribed: the prescribed values at the local scalar dofs, zero at the others.
+        fixed: local scalar dofs that are prescribed.
         thresholds: how far a value may be outside of its bounds.
 
     Raises:
         InputError: on all ranks alike.
     """
-    prescribed = fem.Function(context.space)
-    for condition in conditions:
-        condition.set(prescribed.x.array)
     bad: list[str] = []
     for b in bounds:
-        un = np.sum(b.surface.values(prescribed.x.array) * b.surface.normals, axis=1)
+        un = np.sum(b.surface.values(prescribed) * b.surface.normals, axis=1)
         axis = np.argmax(np.abs(b.surface.normals), axis=1)
         held = np.isin(b.surface.blocks * context.dimension + axis, fixed)
         out = held & ((un < b.lower - thresholds.outside_bounds) | (un > b.upper + thresholds.outside_bounds))

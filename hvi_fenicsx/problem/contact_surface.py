@@ -5,7 +5,6 @@ Vertex (trapezoidal) quadrature makes every boundary term a sum over these nodes
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,7 +15,6 @@ from mpi4py import MPI
 
 from ..errors import InputError
 from ..typing import Array, Entities, Integers
-from .thresholds import DEFAULT, Thresholds
 from .vectors import nodal
 
 
@@ -29,7 +27,9 @@ class Surface:
         facets: its local facets.
         blocks: local indices of its vertices (blocks of the space), (m,).
         points: the vertices, m, (m, 3).
-        normals: outward unit normals, (m, d).
+        normals: outward unit normals (:mod:`.contact_normals`), (m, d).
+        measured: the unit normals along which the scene states the gap; they differ from `normals` only where the part
+            shares a vertex with a prescribed component or with another part, (m, d).
         tangents: unit tangents (:func:`tangents`), (m, d-1, d).
         weights: lumped area of each vertex over L^(d-1), (m,).
     """
@@ -39,6 +39,7 @@ class Surface:
     blocks: Entities
     points: Array
     normals: Array
+    measured: Array
     tangents: Array
     weights: Array
 
@@ -60,10 +61,8 @@ def make_surface(
     facets: Entities,
     measure: Any,
     area: float,
-    direction: Sequence[float] | None = None,
-    thresholds: Thresholds = DEFAULT,
 ) -> Surface:
-    """The vertices of a part. Collective.
+    """The vertices of a part, with the mean normals of the facets there. Collective.
 
     Args:
         part: its name.
@@ -72,8 +71,6 @@ def make_surface(
         facets: the part's local facets.
         measure: ds with vertex quadrature over the part, SI.
         area: L^(d-1), what the weights are divided by.
-        direction: a constant unit vector that stands for the normal (that towards a flat obstacle).
-        thresholds: which normals are parallel to an axis.
 
     Raises:
         InputError: on all ranks alike: a vertex is on none but facets inside the body, which have no outward normal.
@@ -87,18 +84,14 @@ def make_surface(
     weights = nodal(ufl.inner(ones, test) * measure)[blocks, 0] / area
     if space.mesh.comm.allreduce(bool(np.any(weights == 0.0)), op=MPI.LOR):
         raise InputError(f"boundary.{part}: contact and laws act on the body's surface, and facets of it lie inside")
-    if direction is not None:
-        normal = np.broadcast_to(np.asarray(direction, dtype=np.float64), normal.shape)
     normals = normal / np.linalg.norm(normal, axis=1, keepdims=True)
-    # Rounding must not make an axis-parallel part a slanted one.
-    parallel = np.max(np.abs(normals), axis=1, keepdims=True) > 1 - thresholds.axis_parallel
-    normals = np.where(parallel, np.round(normals), normals)
     return Surface(
         part=part,
         facets=facets,
         blocks=blocks,
         points=vertices[blocks],
         normals=normals,
+        measured=normals,
         tangents=tangents(normals),
         weights=weights,
     )

@@ -41,6 +41,19 @@ def make_conditions(
     return found
 
 
+def values(context: DomainForms, conditions: Sequence[fem.DirichletBC]) -> Array:
+    """What the conditions prescribe at the local scalar dofs, zero at the others.
+
+    Args:
+        context: spaces, parts and vertices.
+        conditions: the conditions.
+    """
+    found = np.zeros(len(context.points) * context.dimension)
+    for condition in conditions:
+        condition.set(found)
+    return found
+
+
 def _condition(context: DomainForms, scales: Scales, part: str, condition: Condition) -> fem.DirichletBC:
     facets, dim = context.part_facets[part], context.dimension - 1
     component = context.space.sub(condition.component)

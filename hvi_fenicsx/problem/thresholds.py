@@ -11,13 +11,21 @@ class Thresholds:
 
     Attributes:
         same_displacement: difference of two prescribed displacements, relative to the largest, that is rounding.
-        axis_parallel: distance of a normal's largest component from 1 up to which the normal is parallel to an axis.
+        rounding: relative rounding of the mesh's coordinates, and of a direction that the scene states.
+        uneven: angle (rad) by which the normal of a part of the mesh may be turned at a vertex that it shares with
+            another part or with a prescribed component: few digits in the coordinates explain so much.
+        turned_to_prescribed: the same for a normal that the scene states, at a prescribed component. Contact stays
+            exact; a law sees the square of this angle.
+        same_direction: angle up to which two directions that the scene states are orthogonal or equal.
         outside_bounds: distance (of u0) by which a prescribed displacement may be outside of a contact bound.
         law_scale: smallest scale of a law's traction, in units of the load's stress: a weaker law is not judged finer.
     """
 
     same_displacement: float = 1e-9
-    axis_parallel: float = 1e-10
+    rounding: float = 1e-14
+    uneven: float = 0.02
+    turned_to_prescribed: float = 1e-4
+    same_direction: float = 1e-8
     outside_bounds: float = 1e-12
     law_scale: float = 1e-3
 

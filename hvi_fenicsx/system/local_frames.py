@@ -2,6 +2,7 @@
 
 PETSc's variational inequalities have bounds of components only. At such a vertex û = R u, the rows of R being its local
 axes; all other vertices keep the Cartesian components (in the paper, section 5.1, all parts are parallel to an axis).
+That the normals of a vertex are orthogonal or equal is decided in ``problem/contact_normals``.
 """
 
 from __future__ import annotations
@@ -10,10 +11,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from mpi4py import MPI
 from petsc4py import PETSc
 
-from ..errors import InputError
 from ..problem.contact_surface import Surface
 from ..problem.law_term import LawTerm
 from ..problem.problem import Bounds, Problem
@@ -29,12 +28,12 @@ class LocalFrames:
     Attributes:
         blocks: local vertex indices, (k,).
         axes: R at these vertices, rows are the local axes, (k, d, d).
-        axis_parallel: deviation of a direction from an axis that is rounding.
+        rounding: of the local components of a unit vector.
     """
 
     blocks: Entities
     axes: Array
-    axis_parallel: float
+    rounding: float
 
     def at(self, surface: Surface) -> Array:
         """R at the vertices of a surface, (m, d, d)."""
@@ -60,7 +59,7 @@ class LocalFrames:
         normals = np.einsum("mij,mj->mi", axes, surface.normals)
         return replace(
             surface,
-            normals=np.where(np.abs(normals) > 1 - self.axis_parallel, np.round(normals), normals),
+            normals=np.where(np.abs(normals) > 1 - self.rounding, np.round(normals), normals),
             tangents=np.einsum("mij,mkj->mki", axes, surface.tangents),
         )
 
@@ -71,7 +70,7 @@ class LocalFrames:
     def term(self, term: LawTerm) -> LawTerm:
         """The law with its directions in local components."""
         directions = np.einsum("mij,mkj->mki", self.at(term.surface), term.directions)
-        directions = np.where(np.abs(directions) < self.axis_parallel, 0.0, directions)
+        directions = np.where(np.abs(directions) < self.rounding, 0.0, directions)
         return replace(term, surface=self.surface(term.surface), directions=directions)
 
     def matrix(self, problem: Problem, like: PETSc.Mat) -> PETSc.Mat:
@@ -98,62 +97,40 @@ def frames_of(problem: Problem, thresholds: Thresholds = DEFAULT) -> LocalFrames
 
     Args:
         problem: the problem.
-        thresholds: when a normal is parallel to an axis.
-
-    Raises:
-        InputError: on all ranks alike: two parts meet at a vertex with directions neither orthogonal nor equal, or a
-            slanted one meets a prescribed component.
+        thresholds: what is rounding of a local component.
     """
-    d, comm, parallel = problem.scales.dimension, problem.domain.mesh.comm, thresholds.axis_parallel
-    if not any(agree(comm, any(_slanted(s.normals, parallel).any() for s in problem.surfaces))):
+    d, comm = problem.scales.dimension, problem.domain.mesh.comm
+    if not any(agree(comm, any(_slanted(s.normals).any() for s in problem.surfaces))):
         return None
-    slanted = _normals_at_slanted(problem, parallel)
+    slanted = _normals_at_slanted(problem)
     fixed = {int(dof) for dof in problem.fixed}
-    frames = {
-        block: _axes(normals, [i for i in range(d) if block * d + i in fixed], d, parallel)
-        for block, normals in slanted.items()
-    }
-    _refuse(comm, [problem.points[block] for block, frame in frames.items() if frame is None])
-    axes = np.array(list(frames.values()), dtype=np.float64).reshape(-1, d, d)
-    return LocalFrames(np.array(list(slanted), dtype=np.int32), axes, parallel)
+    frames = [_axes(normals, [i for i in range(d) if block * d + i in fixed], d) for block, normals in slanted.items()]
+    axes = np.array(frames, dtype=np.float64).reshape(-1, d, d)
+    return LocalFrames(np.array(list(slanted), dtype=np.int32), axes, thresholds.rounding)
 
 
-def _refuse(comm: MPI.Comm, points: Sequence[Array]) -> None:
-    """Raise on all ranks where one has a vertex without a local frame. Collective."""
-    found = [point for rank in agree(comm, [tuple(float(c) for c in x) for x in points]) for point in rank]
-    if found:
-        raise InputError(
-            f"at the vertex {found[0]} a contact part meets another one, or a prescribed displacement, in a direction "
-            "that is neither orthogonal nor equal to its own; move the edge, or prescribe all components there"
-        )
+def _slanted(normals: Array) -> Mask:
+    return np.asarray(np.count_nonzero(normals, axis=1) > 1)
 
 
-def _slanted(normals: Array, parallel: float) -> Mask:
-    return np.asarray(np.max(np.abs(normals), axis=1, initial=0.0) < 1 - parallel)
-
-
-def _normals_at_slanted(problem: Problem, parallel: float) -> dict[int, list[Array]]:
+def _normals_at_slanted(problem: Problem) -> dict[int, list[Array]]:
     """The normals of all parts at each vertex where one of them is slanted."""
     found: dict[int, list[Array]] = {}
     for surface in problem.surfaces:
         for block, normal in zip(surface.blocks, surface.normals, strict=True):
             found.setdefault(int(block), []).append(np.asarray(normal))
-    return {block: normals for block, normals in found.items() if _slanted(np.array(normals), parallel).any()}
+    return {block: normals for block, normals in found.items() if _slanted(np.array(normals)).any()}
 
 
-def _axes(normals: Sequence[Array], held: Sequence[int], d: int, parallel: float) -> Array | None:
-    """Local axes as rows: prescribed components and normals among them; None where these are not orthogonal."""
+def _axes(normals: Sequence[Array], held: Sequence[int], d: int) -> Array:
+    """Local axes as rows: the prescribed components, and the normals, which are orthogonal or equal to these."""
     if len(held) == d:
         return np.eye(d)
     rows: dict[int, Array] = {i: np.eye(d)[i] for i in held}
     for normal in normals:
-        along = [abs(float(row @ normal)) for row in rows.values()]
-        if any(a > 1 - parallel for a in along):
-            continue
-        if any(a > parallel for a in along):
-            return None
-        free = [i for i in range(d) if i not in rows]
-        rows[max(free, key=lambda i: abs(normal[i]))] = normal
+        if all(abs(float(row @ normal)) < 0.5 for row in rows.values()):
+            free = [i for i in range(d) if i not in rows]
+            rows[max(free, key=lambda i: abs(normal[i]))] = normal
     return _completed(rows, d)
 
 

@@ -27,7 +27,7 @@ class Thresholds:
             that move a vertex, one in space has 1/4 or more.
         held_stiffness: diagonal of a held unknown, in units of an elastic stiffness (about 1): what the unknown moves
             is less than rounding.
-        axis_parallel: deviation of a direction from an axis that is rounding.
+        rounding: of the local components of a unit vector.
         infinite_displacement: a displacement beyond all scales.
         unbounded_traction: a law's traction there that grows without bound.
     """
@@ -43,7 +43,7 @@ class Thresholds:
     level_growth: float = 3.0
     held_weight: float = 0.2
     held_stiffness: float = 1e20
-    axis_parallel: float = 1e-8
+    rounding: float = 1e-12
     infinite_displacement: float = 1e100
     unbounded_traction: float = 1e30
 
