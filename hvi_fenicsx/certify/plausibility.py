@@ -81,14 +81,14 @@ def _uneven_parts(problem: Problem, thresholds: PlausibilityThresholds) -> Itera
     """Contact parts that seem to be meant flat, in a mesh with few digits in its coordinates."""
     comm = problem.domain.mesh.comm
     for surface in (bounds.surface for bounds in problem.bounds):
-        mean = np.asarray(comm.allreduce(surface.weights @ surface.normals))
-        away = surface.normals - mean / (np.linalg.norm(mean) or 1.0)
+        mean = np.asarray(comm.allreduce(surface.weights @ surface.measured))
+        away = surface.measured - mean / (np.linalg.norm(mean) or 1.0)
         turn = largest(comm, float(np.max(np.linalg.norm(away, axis=1), initial=0.0)))
         if thresholds.flat < turn < thresholds.uneven:
             yield (
-                f"{_place_of_bounds(problem, surface.part)}: the part is nearly flat, its normals turn by up to {turn:.1e} "
-                "rad, and this unevenness is what is solved; if it is rounding of the mesh's coordinates, state the flat "
-                "part: contact = { obstacle = { point = [...], normal = [...] } }"
+                f"{_place_of_bounds(problem, surface.part)}: the part is nearly flat, its normals turn by up to "
+                f"{turn:.1e} rad; this unevenness is part of the problem. If it is rounding of the mesh's coordinates, "
+                "state the flat part: contact = { obstacle = { point = [...], normal = [...] } }"
             )
 
 
