@@ -11,37 +11,95 @@ from typing import TYPE_CHECKING, Any
 
 _HOME = {
     "__version__": "runtime.versions",
+    "Adhesion": "modelling",
+    "Anisotropic": "modelling",
+    "Body": "modelling",
+    "BodyForce": "modelling",
+    "Contact": "modelling",
+    "Displacement": "modelling",
+    "Energy": "modelling",
+    "Friction": "modelling",
     "InputError": "errors",
+    "Isotropic": "modelling",
+    "Model": "modelling",
+    "On": "modelling",
+    "Orthotropic": "modelling",
     "Scene": "scene",
-    "Solution": "solution",
+    "Solution": "modelling",
     "Superpotential": "laws",
+    "Support": "modelling",
+    "Temperature": "modelling",
+    "Traction": "modelling",
+    "check": "modelling",
     "dump_scene": "scene",
     "prepare": "workflow",
     "read_scene": "scene",
-    "solve": "workflow",
+    "set_log_level": "runtime.log",
+    "solve": "modelling",
 }
 __all__ = [
+    "Adhesion",
+    "Anisotropic",
+    "Body",
+    "BodyForce",
+    "Contact",
+    "Displacement",
+    "Energy",
+    "Friction",
     "InputError",
+    "Isotropic",
+    "Model",
+    "On",
+    "Orthotropic",
     "Scene",
     "Solution",
     "Superpotential",
+    "Support",
+    "Temperature",
+    "Traction",
     "__version__",
+    "check",
     "dump_scene",
+    "laws",
     "prepare",
     "read_scene",
+    "set_log_level",
     "solve",
 ]
 
 if TYPE_CHECKING:
+    from . import laws
     from .errors import InputError
     from .laws import Superpotential
+    from .modelling import (
+        Adhesion,
+        Anisotropic,
+        Body,
+        BodyForce,
+        Contact,
+        Displacement,
+        Energy,
+        Friction,
+        Isotropic,
+        Model,
+        On,
+        Orthotropic,
+        Solution,
+        Support,
+        Temperature,
+        Traction,
+        check,
+        solve,
+    )
+    from .runtime.log import set_log_level
     from .runtime.versions import __version__
     from .scene import Scene, dump_scene, read_scene
-    from .solution import Solution
-    from .workflow import prepare, solve
+    from .workflow import prepare
 
 
 def __getattr__(name: str) -> Any:
+    if name == "laws":
+        return importlib.import_module(".laws", __name__)
     if name not in _HOME:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     return getattr(importlib.import_module(f".{_HOME[name]}", __name__), name)

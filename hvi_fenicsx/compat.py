@@ -7,7 +7,7 @@ from typing import Any
 import dolfinx
 import numpy as np
 import numpy.typing as npt
-from dolfinx import graph
+from dolfinx import fem, graph
 from dolfinx import mesh as _mesh
 from petsc4py import PETSc
 
@@ -100,3 +100,14 @@ def comm_of(form: Any) -> Any:
 def petsc_version() -> str:
     """PETSc's version, as text."""
     return ".".join(str(n) for n in PETSc.Sys.getVersion())
+
+
+def expression(value: Any, space: Any) -> Any:
+    """A UFL expression that functions of a space can interpolate.
+
+    Args:
+        value: in UFL.
+        space: of the functions.
+    """
+    points = space.element.interpolation_points
+    return fem.Expression(value, points() if callable(points) else points, comm=space.mesh.comm)

@@ -127,6 +127,7 @@ class Effect(BaseModel):
         drive: how it drives the body.
         exclusive: whether a side of the body bears only one of its kind.
         bounds_normal: whether it bounds the normal displacement, as contact does.
+        in_files: whether its key may stand in scene files.
     """
 
     model_config = ConfigDict(
@@ -140,12 +141,13 @@ class Effect(BaseModel):
     drive: ClassVar[Drive] = Drive.RESISTANCE
     exclusive: ClassVar[bool] = False
     bounds_normal: ClassVar[bool] = False
+    in_files: ClassVar[bool] = True
     registry: ClassVar[dict[Place, dict[str, type[Effect]]]] = {place: {} for place in Place}
 
     @classmethod
     def __pydantic_init_subclass__(cls, **kwargs: Any) -> None:
         super().__pydantic_init_subclass__(**kwargs)
-        if "key" in cls.__dict__:
+        if "key" in cls.__dict__ and cls.in_files:
             known = Effect.registry[cls.place].setdefault(cls.key, cls)
             if known is not cls and known.__qualname__ != cls.__qualname__:
                 raise TypeError(f"two effects are called {cls.key!r}: {known} and {cls}")

@@ -41,7 +41,7 @@ def solution_arrays(solution: Solution, von_mises: Singles | None = None) -> Sol
         fields["von_mises"] = von_mises
     gathered = {name: _joined(comm, values) for name, values in fields.items()}
     sides = {name: _facets(problem, problem.domain.facets(on)) for name, on in solution.scene.parts.items()}
-    parts = _parts(problem, () if solution.examination is None else solution.examination.states)
+    parts = part_arrays(problem, () if solution.examination is None else solution.examination.states)
     return None if comm.rank else SolutionArrays(**gathered, sides=sides, parts=parts)
 
 
@@ -73,8 +73,13 @@ def _facets(problem: Problem, facets: Entities) -> Integers:
     return np.unique(np.sort(_joined(mesh.comm, _globally(problem, corners)), axis=1), axis=0)
 
 
-def _parts(problem: Problem, states: Sequence[ContactState]) -> dict[str, PartArrays]:
-    """The parts of Γc by name, sorted by it, on rank 0; elsewhere empty. Collective."""
+def part_arrays(problem: Problem, states: Sequence[ContactState]) -> dict[str, PartArrays]:
+    """The parts of Γc by name, sorted by it, on rank 0; elsewhere empty. Collective.
+
+    Args:
+        problem: what was solved.
+        states: of the parts.
+    """
     ordered = sorted(states, key=lambda state: state.surface.part)
     found = {state.surface.part: _part(problem, state) for state in ordered}
     return {name: part for name, part in found.items() if part is not None}

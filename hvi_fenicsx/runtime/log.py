@@ -26,6 +26,23 @@ def logger(room: str) -> logging.Logger:
     return found
 
 
+def set_log_level(level: int | str = logging.INFO) -> None:
+    """Show what the program does on the terminal (rank 0), as ``logging`` does it.
+
+    Args:
+        level: such as ``"INFO"``; ``"DEBUG"`` tells every Newton step.
+
+    Raises:
+        ValueError: there is no such level.
+    """
+    package = logging.getLogger(PACKAGE)
+    package.setLevel(level)
+    if not any(type(handler) is logging.StreamHandler for handler in package.handlers):
+        handler = logging.StreamHandler()
+        handler.setFormatter(logging.Formatter("%(name)s: %(message)s"))
+        package.addHandler(handler)
+
+
 def _on_first_rank(record: logging.LogRecord) -> bool:
     """Whether this process is rank 0; one that has not started MPI is alone."""
     mpi = sys.modules.get("mpi4py.MPI")

@@ -97,8 +97,8 @@ class Scene(Table):
     @property
     def dimension(self) -> int:
         """2 or 3: the shape's, or that of the material models where only the mesh knows."""
-        if self.domain.dimension is not None:
-            return self.domain.dimension
+        if (own := self.domain.space_dimension()) is not None:
+            return own
         known = (material.elasticity.dimension() for material in self.material.values())
         return next((dimension for dimension in known if dimension), 2)
 

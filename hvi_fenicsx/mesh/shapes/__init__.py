@@ -8,6 +8,7 @@ from .l_shape import LShape
 from .disk import Disk, HalfDisk
 from .notched_strip import NotchedStrip
 from .fixed_mesh import FixedMesh, MeshFile, Refinements
+from .given_mesh import GivenMesh
 from .plane import PlaneShape
 # isort: on
 
@@ -16,6 +17,7 @@ __all__ = [
     "Disk",
     "DomainShape",
     "FixedMesh",
+    "GivenMesh",
     "HalfDisk",
     "LShape",
     "MeshFile",

@@ -75,6 +75,10 @@ class DomainShape(Table):
             raise InputError(f"domain shape {cls.__name__}: the name {name!r} is taken; choose another")
         DomainShape.registry[name] = cls
 
+    def space_dimension(self) -> int | None:
+        """2 or 3; None where only the opened mesh knows it."""
+        return self.dimension
+
     @abstractmethod
     def build(self, comm: MPI.Comm, dimension: int) -> Domain:
         """The meshed body. Collective.

@@ -1,0 +1,108 @@
+"""A dolfinx mesh with tags, as a user's program brings it, checked and turned into a domain."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+from dolfinx import mesh as dmesh
+
+from ..errors import InputError
+from ..runtime.mpi import agree
+from ..typing import Entities
+from .domain import Domain
+
+_SIMPLICES = ("triangle", "tetrahedron")
+
+
+def domain_of(
+    mesh: dmesh.Mesh, facets: Any, cells: Any, sides: Mapping[str, int], regions: Mapping[str, int]
+) -> Domain:
+    """The domain of a mesh with tags. Collective.
+
+    Args:
+        mesh: of triangles or tetrahedra, in m.
+        facets: tags of facets, or None.
+        cells: tags of cells, or None.
+        sides: tags of facets by the names of the sides.
+        regions: tags of cells by the names of the regions.
+
+    Raises:
+        InputError: on all ranks alike, with what is wrong and how to mend it.
+    """
+    _check_mesh(mesh)
+    d = mesh.topology.dim
+    mesh.topology.create_connectivity(d - 1, d)
+    if regions and cells is None:
+        raise InputError(
+            f"body: the region {next(iter(regions))!r} is named, but no tags of cells are given: cells=..."
+        )
+    if sides and facets is None:
+        raise InputError(f"body: {next(iter(sides))!r} is a side, but no tags of facets are given: facets=...")
+    named_sides = _named(mesh, facets, d - 1, sides)
+    _check_outer(mesh, named_sides)
+    return Domain.from_mesh(mesh, named_sides, _named(mesh, cells, d, regions))
+
+
+def tags_present(mesh: dmesh.Mesh, tags: Any) -> set[int]:
+    """All tags that some entity of any rank has. Collective.
+
+    Args:
+        mesh: the mesh.
+        tags: its tags, or None.
+    """
+    own = set() if tags is None else {int(tag) for tag in np.unique(tags.values)}
+    return set().union(*agree(mesh.comm, own))
+
+
+def _check_mesh(mesh: dmesh.Mesh) -> None:
+    kind, d = mesh.topology.cell_name(), mesh.geometry.dim
+    if kind not in _SIMPLICES:
+        raise InputError(
+            f"body: the mesh has cells of the kind {kind}; the program solves on triangles and tetrahedra: make the "
+            "mesh with CellType.triangle or CellType.tetrahedron, in gmsh without Recombine"
+        )
+    if mesh.topology.dim != d:
+        raise InputError(
+            f"body: the mesh has cells of dimension {mesh.topology.dim} in {d} coordinates; give as many coordinates "
+            f"as dimensions, such as gdim={mesh.topology.dim} where the mesh is read"
+        )
+    if mesh.geometry.cmap.degree != 1:
+        raise InputError(
+            f"body: the cells are curved (degree {mesh.geometry.cmap.degree}); give straight ones, degree 1"
+        )
+
+
+def _named(mesh: dmesh.Mesh, tags: Any, dimension: int, names: Mapping[str, int]) -> dict[str, Entities]:
+    """Local entities by name. Collective."""
+    if tags is None:
+        return {}
+    kind = "cells" if dimension == mesh.topology.dim else "facets"
+    if tags.dim != dimension:
+        raise InputError(f"body: {kind} are tags of dimension {tags.dim}; {kind} of this mesh have {dimension}")
+    if tags.topology != mesh.topology._cpp_object:
+        raise InputError(f"body: {kind} are tags of another mesh; make them with meshtags(mesh, {dimension}, ...)")
+    present = tags_present(mesh, tags)
+    for name, tag in names.items():
+        if tag not in present:
+            known = ", ".join(map(str, sorted(present))) or "none"
+            raise InputError(f"body: {name!r} is the tag {tag} of {kind}, which no entity has; there are: {known}")
+    return {name: tags.find(tag) for name, tag in names.items()}
+
+
+def _check_outer(mesh: dmesh.Mesh, sides: Mapping[str, Entities]) -> None:
+    found = [side for rank in agree(mesh.comm, list(_with_inner_facets(mesh, sides))) for side in rank]
+    if found:
+        raise InputError(
+            f"body: the side {found[0]!r} has facets inside of the body; tag facets of its surface only "
+            "(dolfinx.mesh.exterior_facet_indices)"
+        )
+
+
+def _with_inner_facets(mesh: dmesh.Mesh, sides: Mapping[str, Entities]) -> Iterator[str]:
+    d = mesh.topology.dim
+    offsets = mesh.topology.connectivity(d - 1, d).offsets
+    for name, facets in sides.items():
+        if np.any(np.diff(offsets)[facets] > 1):
+            yield name

@@ -1,0 +1,46 @@
+"""Models from Python: a body on any dolfinx mesh, effects on named places, solutions in SI (docs/python.md)."""
+
+from .body import Body
+from .contact_arrays import ContactArrays
+from .model import Model
+from .placed_effects import (
+    Adhesion,
+    Anisotropic,
+    BodyForce,
+    Contact,
+    Displacement,
+    Energy,
+    Friction,
+    Isotropic,
+    On,
+    Orthotropic,
+    PlacedEffect,
+    Support,
+    Temperature,
+    Traction,
+)
+from .solution import ModelSolution as Solution
+from .solving import check, solve
+
+__all__ = [
+    "Adhesion",
+    "Anisotropic",
+    "Body",
+    "BodyForce",
+    "Contact",
+    "ContactArrays",
+    "Displacement",
+    "Energy",
+    "Friction",
+    "Isotropic",
+    "Model",
+    "On",
+    "Orthotropic",
+    "PlacedEffect",
+    "Solution",
+    "Support",
+    "Temperature",
+    "Traction",
+    "check",
+    "solve",
+]

@@ -1,0 +1,187 @@
+"""The body of a model: a dolfinx mesh with named tags, or a shape that the program meshes."""
+
+from __future__ import annotations
+
+import functools
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from functools import cached_property
+from typing import Any, Self
+
+from dolfinx import mesh as dmesh
+from mpi4py import MPI
+from pydantic import ValidationError
+
+from ..errors import InputError
+from ..mesh import given
+from ..mesh.domain import Domain
+from ..mesh.shapes import Box, DomainShape, GivenMesh, MeshFile, Rectangle
+from ..mesh.thresholds import DEFAULT
+from ..mesh.transfer import Transfer
+from ..schema import input_error
+
+
+class Body:
+    """A body on its mesh, with names for its sides and regions; coordinates in m. Creation is collective.
+
+    It keeps its mesh, and the coarser meshes that solvers make of it, for all models that use it.
+
+    Args:
+        mesh: of triangles or tetrahedra, on any communicator.
+        facets: tags of facets (``dolfinx.mesh.MeshTags``), for the sides.
+        cells: tags of cells, for the regions.
+        names: tags by name. A name whose tag facets have is a side; one whose tag cells have is a region.
+        regions: tags of cells by name, where a number means something else for facets; ``names`` are then sides only.
+
+    Raises:
+        InputError: on all ranks alike: cells that are no simplices, tags of another mesh, a name without a tag, a side
+            with facets inside of the body.
+    """
+
+    def __init__(
+        self,
+        mesh: dmesh.Mesh,
+        facets: Any = None,
+        cells: Any = None,
+        names: Mapping[str, int] | None = None,
+        regions: Mapping[str, int] | None = None,
+    ) -> None:
+        sides, within = _sorted_out(mesh, facets, cells, dict(names or {}), regions)
+        domain = given.domain_of(mesh, facets, cells, sides, within)
+        self._set(GivenMesh(shape="given mesh", given=domain), mesh.comm)
+
+    def _set(self, shape: DomainShape, comm: MPI.Comm) -> None:
+        self.shape, self.comm = shape, comm
+
+    @classmethod
+    def from_shape(cls, shape: DomainShape, comm: MPI.Comm = MPI.COMM_WORLD) -> Self:
+        """A body of one of the program's shapes, or of your own.
+
+        Args:
+            shape: the shape with its mesh.
+            comm: the ranks that share the mesh.
+        """
+        body = cls.__new__(cls)
+        body._set(shape, comm)
+        return body
+
+    @classmethod
+    def rectangle(cls, size: Sequence[float], cells: Sequence[int], comm: MPI.Comm = MPI.COMM_WORLD) -> Self:
+        """A rectangle [0, size] with the sides left, right, bottom and top.
+
+        Args:
+            size: width and height, m.
+            cells: numbers of cells each way.
+            comm: the ranks that share the mesh.
+
+        Raises:
+            InputError: a number is not allowed.
+        """
+        return cls.from_shape(_shape(Rectangle, size=_floats(size), cells=tuple(cells)), comm)
+
+    @classmethod
+    def box(cls, size: Sequence[float], cells: Sequence[int], comm: MPI.Comm = MPI.COMM_WORLD) -> Self:
+        """A box [0, size] with the sides left, right, front, back, bottom and top.
+
+        Args:
+            size: along x, y, z, m.
+            cells: numbers of cells each way.
+            comm: the ranks that share the mesh.
+
+        Raises:
+            InputError: a number is not allowed.
+        """
+        return cls.from_shape(_shape(Box, size=_floats(size), cells=tuple(cells)), comm)
+
+    @classmethod
+    def file(
+        cls,
+        path: str | os.PathLike[str],
+        *,
+        scale: float = 1.0,
+        refinements: int = 0,
+        dimension: int = 2,
+        comm: MPI.Comm = MPI.COMM_WORLD,
+    ) -> Self:
+        """A gmsh file; its physical groups are the sides and regions.
+
+        Args:
+            path: the .msh or .geo file.
+            scale: m per unit of the file's coordinates.
+            refinements: how often each cell is cut.
+            dimension: of the cells, 2 or 3.
+            comm: the ranks that share the mesh.
+
+        Raises:
+            InputError: there is no such file, or a number is not allowed.
+        """
+        keys = {"file": os.fspath(path), "scale": float(scale), "refinements": refinements}
+        body = cls.from_shape(_shape(MeshFile, **keys), comm)
+        body.dimension = dimension
+        return body
+
+    @cached_property
+    def dimension(self) -> int:
+        """2 or 3."""
+        return self.shape.space_dimension() or 2
+
+    @cached_property
+    def domain(self) -> Domain:
+        """The mesh with its named sides and regions, and coarser meshes. Collective when first used."""
+        return _remembering(self.shape.build_hierarchy(self.comm, self.dimension, DEFAULT))
+
+    @property
+    def mesh(self) -> dmesh.Mesh:
+        """The mesh. Collective when first used."""
+        return self.domain.mesh
+
+    @property
+    def sides(self) -> tuple[str, ...]:
+        """The names of the sides. Collective when first used."""
+        return tuple(self.domain.sides)
+
+    @property
+    def regions(self) -> tuple[str, ...]:
+        """The names of the regions. Collective when first used."""
+        return tuple(self.domain.regions)
+
+    def __repr__(self) -> str:
+        return f"Body({self.shape.shape}, {self.dimension}D)"
+
+
+def _sorted_out(
+    mesh: dmesh.Mesh, facets: Any, cells: Any, names: dict[str, int], regions: Mapping[str, int] | None
+) -> tuple[dict[str, int], dict[str, int]]:
+    """The sides and the regions among names. Collective."""
+    if regions is not None:
+        return names, dict(regions)
+    on_facets, on_cells = given.tags_present(mesh, facets), given.tags_present(mesh, cells)
+    within = {name: tag for name, tag in names.items() if tag in on_cells}
+    sides = {name: tag for name, tag in names.items() if tag in on_facets or tag not in on_cells}
+    return sides, within
+
+
+def _remembering(domain: Domain) -> Domain:
+    """The domain, whose coarser ones are made once."""
+    if domain.coarsening is None:
+        return domain
+    make = domain.coarsening
+
+    @functools.cache
+    def coarser() -> tuple[Domain, Transfer]:
+        found, transfer = make()
+        return _remembering(found), transfer
+
+    return replace(domain, coarsening=coarser)
+
+
+def _floats(values: Sequence[float]) -> tuple[float, ...]:
+    return tuple(float(value) for value in values)
+
+
+def _shape(kind: type[DomainShape], **keys: Any) -> DomainShape:
+    try:
+        return kind(**keys)
+    except ValidationError as error:
+        raise InputError(f"body: {input_error(error, kind)}") from None

@@ -1,0 +1,129 @@
+"""A model: a body, and the effects on its sides and in its regions."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+from pydantic import ValidationError
+
+from ..effects import Effect, Place
+from ..errors import InputError
+from ..scene import BodyTable, BoundaryTable, MaterialTable, Scene
+from ..schema import mistakes_of, unknown
+from .body import Body
+from .placed_effects import PlacedEffect
+
+_WHOLE = "whole body"
+_Key = tuple[Place, str, str | None]
+
+
+class Model:
+    """What is solved: effects on a body. Creation is collective.
+
+    A scene file and a model are two ways to the same thing: a model has its scene, which is checked as a file is.
+
+    Args:
+        body: the body on its mesh.
+        effects: with their places.
+        title: one line that names the model.
+
+    Raises:
+        InputError: on all ranks alike: a value is not allowed, or effects contradict each other.
+
+    Attributes:
+        body: the body.
+        effects: the effects, with their places.
+        scene: the same as a scene.
+    """
+
+    def __init__(self, body: Body, effects: Sequence[PlacedEffect], title: str = "") -> None:
+        self.body, self.effects, self.title = body, tuple(effects), title
+        for one in self.effects:
+            _check_place(body, one)
+        self._made = [(one, one.effect(body.mesh)) for one in self.effects]
+        self.scene = _scene(body, [(one.where, effect) for one, effect in self._made], title)
+
+    def replace(self, *effects: PlacedEffect) -> Model:
+        """The model with other effects in the place of those of the same kind at the same place. Collective.
+
+        Mesh and coarser meshes are kept.
+
+        Args:
+            *effects: the new effects.
+
+        Raises:
+            InputError: on all ranks alike: the model has no such effect there, or several.
+        """
+        places = [_key(one, effect) for one, effect in self._made]
+        changed = list(self.effects)
+        for one in effects:
+            changed[_position(places, _key(one, one.effect(self.body.mesh)))] = one
+        return Model(self.body, changed, self.title)
+
+    def __repr__(self) -> str:
+        names = ", ".join(f"{type(one).__name__} on {one.where or 'the body'}" for one in self.effects)
+        return f"Model({self.body!r}: {names})"
+
+
+def _check_place(body: Body, placed: PlacedEffect) -> None:
+    known = placed.places(body.domain)
+    if placed.where is not None and placed.where not in known:
+        reason = unknown("place", placed.where, known) if known else f"the body has no place {placed.where!r}"
+        raise InputError(f"{type(placed).__name__}: {reason}")
+
+
+def _key(placed: PlacedEffect, effect: Effect) -> _Key:
+    return effect.place, effect.key, placed.where
+
+
+def _position(places: Sequence[_Key], wanted: _Key) -> int:
+    found = [number for number, key in enumerate(places) if key == wanted]
+    if len(found) == 1:
+        return found[0]
+    _, kind, where = wanted
+    known = ", ".join(f"{key} on {place or 'the body'}" for _, key, place in places)
+    count = "no" if not found else "several effects"
+    raise InputError(f"replace: the model has {count} {kind} on {where or 'the body'}; it has {known}")
+
+
+def _scene(body: Body, effects: Iterable[tuple[str | None, Effect]], title: str) -> Scene:
+    tables: dict[Place, list[tuple[str | None, dict[str, Any]]]] = {place: [] for place in Place}
+    for where, effect in effects:
+        _add(tables[effect.place], where, effect)
+    try:
+        return Scene(
+            title=title,
+            domain=body.shape,
+            material=_materials(tables[Place.MATERIAL]),
+            body={where or _WHOLE: BodyTable(region=where, **own) for where, own in tables[Place.BODY]},
+            boundary=dict(_boundary(tables[Place.BOUNDARY])),
+        )
+    except ValidationError as error:
+        mistakes = mistakes_of(error, Scene)
+        raise InputError("\n".join(f"{'.'.join(map(str, m.where))}: {m.text}" for m in mistakes)) from None
+
+
+def _add(tables: list[tuple[str | None, dict[str, Any]]], where: str | None, effect: Effect) -> None:
+    """Put an effect into the first table of its place that has none of its kind."""
+    for place, own in tables:
+        if place == where and effect.key not in own:
+            own[effect.key] = effect
+            return
+    tables.append((where, {effect.key: effect}))
+
+
+def _materials(tables: Sequence[tuple[str | None, dict[str, Any]]]) -> Any:
+    made = [(where, MaterialTable(region=where, elasticity=e)) for where, own in tables for e in own.values()]
+    if len(made) == 1 and made[0][0] is None:
+        return made[0][1]
+    return {where or f"{_WHOLE} {number}": table for number, (where, table) in enumerate(made)}
+
+
+def _boundary(tables: Sequence[tuple[str | None, dict[str, Any]]]) -> Iterable[tuple[str, BoundaryTable]]:
+    """Tables by name: that of the side, with a number from the second one on."""
+    seen: dict[str | None, int] = {}
+    for where, own in tables:
+        seen[where] = seen.get(where, 0) + 1
+        name = f"{where}" if seen[where] == 1 else f"{where}.{seen[where]}"
+        yield name, BoundaryTable(on=where, **own)

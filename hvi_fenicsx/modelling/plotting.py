@@ -1,0 +1,69 @@
+"""Pictures of a solution that is still in memory: those of a result folder, as matplotlib figures."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+from types import MethodType
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from ..errors import InputError
+from ..problem.stress import von_mises
+from ..report.pictures.xserver import XServer
+from ..report.reader import Result
+from ..results import gathering
+from ..results.summary import summary
+from ..runtime.mpi import on_root
+from ..solution import Solution
+
+
+def draw(solution: Solution, picture: str) -> Figure | None:
+    """One picture of a solution. Collective.
+
+    Args:
+        solution: what was found.
+        picture: its name.
+
+    Returns:
+        The figure on rank 0, None elsewhere.
+
+    Raises:
+        InputError: on all ranks alike: there is no such picture of this solution.
+    """
+    found = solution.solve_result
+    stress = None
+    if found is not None:
+        stress = von_mises(solution.problem.bulk.stress(found.u)).astype(np.float32)
+    arrays, record = gathering.solution_arrays(solution, stress), summary(solution)
+    figures: list[Figure] = []
+
+    def make() -> None:
+        assert arrays is not None
+        title = {"title": solution.scene.title or "solution"}
+        figures.append(_figure(Result(Path("."), title, record, arrays), picture))
+
+    on_root(solution.problem.domain.mesh.comm, make)
+    return figures[0] if figures else None
+
+
+def _figure(result: Result, wanted: str) -> Figure:
+    """Draw on rank 0."""
+    with XServer(wanted=result.body.dimension == 3) as server:
+        from ..report.pictures.drawings import drawings  # loads the plotting library while the server starts
+
+        server.wait()
+        known = {drawing.path.stem: drawing for drawing in drawings(result)}
+        if wanted not in known:
+            raise InputError(f"plot: there is no picture {wanted!r} of this solution; there are: {', '.join(known)}")
+        figure = known[wanted].make()
+    # A figure that pyplot did not make has no other way to show itself in a notebook.
+    figure._repr_png_ = MethodType(_png, figure)  # type: ignore[attr-defined]
+    return figure
+
+
+def _png(figure: Figure) -> bytes:
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format="png")
+    return buffer.getvalue()

@@ -1,0 +1,153 @@
+"""What was found, for people: fields and tables in SI."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from html import escape
+
+from dolfinx import fem
+from matplotlib.figure import Figure
+
+from ..certify.certificate import Certificate, Examination
+from ..errors import InputError
+from ..results import gathering
+from ..solution import Solution
+from ..solvers.result import SolveResult
+from ..typing import Array
+from . import plotting, resultants
+from .contact_arrays import ContactArrays
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class ModelSolution(Solution):
+    """A solution with its fields in SI, on the body's mesh.
+
+    ``u``, ``stress``, ``contact`` and resultants are computed when they are first used; that is collective. They are
+    the same on all ranks but for the fields, of which each rank has its own part.
+    """
+
+    @cached_property
+    def u(self) -> fem.Function:
+        """The displacement, m, ghosts updated; P1 on the body's mesh. Collective when first used.
+
+        Raises:
+            InputError: on all ranks alike: nothing was solved, since no solution exists.
+        """
+        field = fem.Function(self.problem.space, name="displacement")
+        field.x.array[:] = self._solved.u.x.array * self.problem.scales.displacement
+        return field
+
+    @cached_property
+    def stress(self) -> fem.Function:
+        """The stress, N/m², tension positive: (3, 3), constant in each cell. Collective when first used.
+
+        Raises:
+            InputError: on all ranks alike: nothing was solved, since no solution exists.
+        """
+        space = fem.functionspace(self.problem.domain.mesh, ("Discontinuous Lagrange", 0, (3, 3)))
+        field = fem.Function(space, name="stress")
+        values = self.problem.bulk.stress(self._solved.u)
+        field.x.array[: values.size] = values.ravel()
+        field.x.scatter_forward()
+        return field
+
+    @property
+    def energy(self) -> float:
+        """The potential energy, J/m in 2D, J in 3D.
+
+        Raises:
+            InputError: on all ranks alike: nothing was solved, since no solution exists.
+        """
+        return self._examined.energy * self.problem.scales.energy
+
+    @property
+    def certificate(self) -> Certificate | None:
+        """How far the conditions of a solution are met; None where nothing was solved."""
+        return None if self.examination is None else self.examination.certificate
+
+    @cached_property
+    def contact(self) -> Mapping[str, ContactArrays]:
+        """The parts with contact or laws, by name; the same on all ranks. Collective when first used.
+
+        Raises:
+            InputError: on all ranks alike: nothing was solved, since no solution exists.
+        """
+        parts = gathering.part_arrays(self.problem, self._examined.states)
+        made = {name: ContactArrays.of(part) for name, part in parts.items()}
+        found: dict[str, ContactArrays] = self.problem.domain.mesh.comm.bcast(made, root=0)
+        return found
+
+    @cached_property
+    def resultants(self) -> Mapping[str, Array]:
+        """The forces on the body by the side or region they act on, N/m in 2D, N in 3D; (d,) each.
+
+        Loads, reactions of supports, contact and laws of a place are added up; all places together are in balance.
+        The same on all ranks. Collective when first used.
+
+        Raises:
+            InputError: on all ranks alike: nothing was solved, since no solution exists.
+        """
+        found = resultants.by_part(self.problem, self._solved.u, self._examined.states)
+        return {name: force * self.problem.scales.force for name, force in found.items()}
+
+    def resultant(self, part: str) -> Array:
+        """The force on the body at a side or region, N/m in 2D, N in 3D; (d,). Collective when first used.
+
+        Args:
+            part: the name; "body" for a load on the whole body.
+
+        Raises:
+            InputError: on all ranks alike: there is no such place, or nothing was solved.
+        """
+        if part not in self.resultants:
+            raise InputError(f"nothing acts on {part!r}; there are: {', '.join(self.resultants)}")
+        return self.resultants[part]
+
+    def plot(self, picture: str = "body") -> Figure | None:
+        """A picture of it as a matplotlib figure, which a notebook shows. Collective; None on ranks other than 0.
+
+        Args:
+            picture: one of those that a result folder has: body, stress, scene, contact, escape; with several contact
+                parts contact_NAME.
+
+        Raises:
+            InputError: on all ranks alike: there is no such picture of it.
+        """
+        return plotting.draw(self, picture)
+
+    @property
+    def _solved(self) -> SolveResult:
+        if self.solve_result is None:
+            raise InputError(self._nothing)
+        return self.solve_result
+
+    @property
+    def _examined(self) -> Examination:
+        if self.examination is None:
+            raise InputError(self._nothing)
+        return self.examination
+
+    @property
+    def _nothing(self) -> str:
+        way = self.solvability.direction
+        return f"nothing was solved: {self.reason}" + (f" ({way.name})" if way else "")
+
+    def _rows(self) -> list[tuple[str, str]]:
+        """What is said of it at a glance."""
+        unit = "J/m" if self.problem.scales.dimension == 2 else "J"
+        rows = [("result", self.reason), ("existence", self.solvability.state), ("unknowns", f"{self.dofs:,}")]
+        if self.examination is not None:
+            rows += [("energy", f"{self.energy:.10g} {unit}"), ("certificate", str(self.certificate))]
+        if self.estimate is not None:
+            part = self.estimate.total / (self.estimate.energy_norm or 1.0)
+            rows.append(("estimated error", f"{100 * part:.2g} % in the energy norm"))
+        return rows + [("warning", warning) for warning in self.warnings]
+
+    def __repr__(self) -> str:
+        return "\n".join(f"{name}: {text}" for name, text in self._rows())
+
+    def _repr_html_(self) -> str:
+        rows = "".join(f"<tr><th>{escape(name)}</th><td>{escape(text)}</td></tr>" for name, text in self._rows())
+        return f"<table>{rows}</table>"

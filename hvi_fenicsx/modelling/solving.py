@@ -1,0 +1,91 @@
+"""Solve and check models and scenes from Python."""
+
+from __future__ import annotations
+
+from dataclasses import fields, replace
+from typing import Any
+
+from mpi4py import MPI
+from pydantic import ValidationError
+
+from .. import workflow
+from ..errors import InputError
+from ..mesh.domain import Domain
+from ..runtime.log import newton_step
+from ..runtime.timing import Timer
+from ..scene import Scene, SolverTable
+from ..schema import mistakes_of
+from ..solvers.context import Progress
+from ..workflow import DEFAULT, Preparation, Thresholds
+from .model import Model
+from .solution import ModelSolution
+from .user_energy import UserEnergy
+
+
+def solve(
+    model: Model | Scene,
+    comm: MPI.Comm | None = None,
+    *,
+    progress: Progress = newton_step,
+    timer: Timer | None = None,
+    thresholds: Thresholds = DEFAULT,
+    **options: Any,
+) -> ModelSolution:
+    """Solve a model or a scene, and certify what was found. Collective.
+
+    Args:
+        model: what to solve.
+        comm: the ranks; by default those of the body, for a scene all.
+        progress: called at each Newton step; by default it is logged.
+        timer: where time goes; by default a new one.
+        thresholds: the numbers that tune the run.
+        **options: the keys of the scene's table ``[solver]``, such as ``tolerance=1e-8``.
+
+    Raises:
+        InputError: on all ranks alike: an option is not allowed, or the model does not fit its mesh.
+    """
+    found = workflow.finish(check(model, comm, timer=timer, thresholds=thresholds, **options), progress)
+    return ModelSolution(**{field.name: getattr(found, field.name) for field in fields(found)})
+
+
+def check(
+    model: Model | Scene,
+    comm: MPI.Comm | None = None,
+    *,
+    timer: Timer | None = None,
+    thresholds: Thresholds = DEFAULT,
+    **options: Any,
+) -> Preparation:
+    """Assemble a model or a scene and say whether a solution can exist; solves nothing. Collective.
+
+    Args:
+        model: what to check.
+        comm: the ranks; by default those of the body, for a scene all.
+        timer: where time goes; by default a new one.
+        thresholds: the numbers that tune the run.
+        **options: the keys of the scene's table ``[solver]``.
+
+    Raises:
+        InputError: on all ranks alike: an option is not allowed, or the model does not fit its mesh.
+    """
+    if isinstance(model, Scene):
+        scene, domain = model, None
+    else:
+        scene, domain, comm = model.scene, _domain(model), model.body.comm
+    scene = _with_options(scene, options)
+    return workflow.prepare(scene, comm or MPI.COMM_WORLD, timer, domain, thresholds=thresholds)
+
+
+def _with_options(scene: Scene, options: dict[str, Any]) -> Scene:
+    try:
+        return scene.with_solver(**options) if options else scene
+    except ValidationError as error:
+        mistakes = mistakes_of(error, SolverTable)
+        raise InputError("; ".join(f"{'.'.join(map(str, m.where))}: {m.text}" for m in mistakes)) from None
+
+
+def _domain(model: Model) -> Domain:
+    """The body's domain; without coarser meshes where an energy can be formed on its own mesh only."""
+    domain = model.body.domain
+    own = [m.elasticity for m in model.scene.material.values() if isinstance(m.elasticity, UserEnergy)]
+    return domain if all(energy.is_portable(domain.mesh) for energy in own) else replace(domain, coarsening=None)

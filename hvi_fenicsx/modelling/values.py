@@ -1,0 +1,148 @@
+"""Loads, gaps and prescribed values as Python programs give them: numbers, formulas, functions, UFL, fem.Functions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+import ufl
+from dolfinx import fem
+from dolfinx import mesh as dmesh
+from scipy.spatial import cKDTree
+from typing_extensions import override
+
+from .. import compat
+from ..errors import InputError
+from ..formula import Formula
+from ..mesh import vertex_dofs
+from ..spatial_value import SpatialValue
+from ..typing import Array
+
+
+class PythonFunction(SpatialValue):
+    """A Python function of space, as dolfinx interpolates it: x of shape (3, n) in m, values of shape (n,).
+
+    In forms it is its interpolation by quadratic functions.
+
+    Args:
+        function: the function.
+    """
+
+    __slots__ = ("_function", "source")
+
+    def __init__(self, function: Callable[[Array], Any]) -> None:
+        self._function = function
+        self.source = f"Python function {getattr(function, '__name__', type(function).__name__)}"
+
+    @override
+    def at(self, points: Array) -> Array:
+        values = np.asarray(self._function(np.ascontiguousarray(points.T)), dtype=np.float64)
+        if values.shape not in ((), (len(points),)):
+            raise InputError(f"{self.source}: returns an array {values.shape} at {len(points)} points; return (n,)")
+        return np.broadcast_to(values, (len(points),)).copy()
+
+    @override
+    def in_ufl(self, mesh: Any, number: Callable[[float], Any]) -> Any:
+        found = fem.Function(fem.functionspace(mesh, ("Lagrange", 2)))
+        found.interpolate(lambda x: self.at(x.T))
+        return found
+
+
+class Expression(SpatialValue):
+    """A scalar UFL expression, or fem.Function, on the body's own mesh.
+
+    On the mesh itself it stands in forms as it is. At vertices, and on coarser meshes, which only give start values, it
+    is sampled at the nearest vertex.
+
+    Args:
+        expression: in SI.
+        mesh: the body's mesh.
+    """
+
+    __slots__ = ("_expression", "_mesh", "source")
+
+    def __init__(self, expression: Any, mesh: dmesh.Mesh) -> None:
+        self._expression, self._mesh = expression, mesh
+        self.source = f"UFL expression {_shortened(str(expression))}"
+
+    @override
+    def at(self, points: Array) -> Array:
+        space = fem.functionspace(self._mesh, ("Lagrange", 1))
+        sampled = fem.Function(space)
+        sampled.interpolate(compat.expression(self._expression, space))
+        vertices = vertex_dofs.points(space)
+        if not len(vertices):
+            return np.zeros(len(points))
+        return np.asarray(sampled.x.array[cKDTree(vertices).query(points)[1]], dtype=np.float64)
+
+    @override
+    def in_ufl(self, mesh: Any, number: Callable[[float], Any]) -> Any:
+        if mesh is self._mesh:
+            return self._expression
+        found = fem.Function(fem.functionspace(mesh, ("Lagrange", 1)))
+        found.interpolate(lambda x: self.at(x.T))
+        return found
+
+
+def spatial_value(given: Any, mesh: dmesh.Mesh) -> SpatialValue:
+    """A value in space.
+
+    Args:
+        given: a number, a formula in x, y, z, a Python function, a scalar UFL expression or a scalar fem.Function.
+        mesh: the body's mesh.
+
+    Raises:
+        InputError: it is none of these, or of another mesh.
+    """
+    if isinstance(given, SpatialValue):
+        return given
+    if isinstance(given, ufl.core.expr.Expr):
+        return _expression(given, mesh)
+    if callable(given):
+        return PythonFunction(given)
+    return Formula(float(given) if isinstance(given, np.floating | np.integer) else given)
+
+
+def components(given: Any, mesh: dmesh.Mesh) -> list[Any]:
+    """The components of a vector; None where a component is left alone.
+
+    Args:
+        given: a list with an entry for each component, or the whole vector as a Python function with values (d, n), a
+            UFL expression or a fem.Function.
+        mesh: the body's mesh.
+
+    Raises:
+        InputError: it is none of these.
+    """
+    d = mesh.geometry.dim
+    if isinstance(given, ufl.core.expr.Expr):
+        if given.ufl_shape != (d,):
+            raise InputError(f"a vector has {d} components in {d}D; the UFL expression has the shape {given.ufl_shape}")
+        return [_expression(given[i], mesh) for i in range(d)]
+    if callable(given):
+        return [PythonFunction(_component(given, i)) for i in range(d)]
+    if not isinstance(given, Sequence | np.ndarray) or isinstance(given, str):
+        raise InputError(f"a vector is a list with {d} entries, a function or a UFL expression, not {given!r}")
+    return [None if value is None else spatial_value(value, mesh) for value in given]
+
+
+def _component(function: Callable[[Array], Any], number: int) -> Callable[[Array], Any]:
+    def component(x: Array) -> Any:
+        return np.asarray(function(x))[number]
+
+    component.__name__ = f"{getattr(function, '__name__', 'function')}[{number}]"
+    return component
+
+
+def _expression(given: Any, mesh: dmesh.Mesh) -> Expression:
+    if given.ufl_shape != ():
+        raise InputError(f"a scalar is wanted; the UFL expression has the shape {given.ufl_shape}")
+    domains = [domain.ufl_cargo() for domain in ufl.domain.extract_domains(given)]
+    if any(domain is not mesh._cpp_object for domain in domains):
+        raise InputError("a UFL expression or fem.Function is of another mesh than the body; make it on body.mesh")
+    return Expression(given, mesh)
+
+
+def _shortened(text: str) -> str:
+    return text if len(text) <= 40 else text[:37] + "..."
