@@ -15,11 +15,6 @@ from .typing import Array, Entities
 
 VERSION: str = dolfinx.__version__
 
-if hasattr(dolfinx.io, "gmsh"):
-    from dolfinx.io import gmsh as gmsh_io
-else:
-    from dolfinx.io import gmshio as gmsh_io
-
 
 def geometry_dofmap(mesh: _mesh.Mesh) -> Entities:
     """Geometry nodes of each cell, shape (cells, nodes)."""
@@ -27,16 +22,22 @@ def geometry_dofmap(mesh: _mesh.Mesh) -> Entities:
     return geometry.dofmaps[0] if hasattr(geometry, "dofmaps") else geometry.dofmap
 
 
-def mesh_from_gmsh(model: Any, comm: Any, rank: int, dimension: int) -> tuple[Any, Any, Any]:
-    """Mesh, cell tags and facet tags of a gmsh model. Collective.
+def local_entities(
+    mesh: _mesh.Mesh, dimension: int, nodes: npt.NDArray[np.int64], tags: Entities
+) -> tuple[Entities, Entities]:
+    """The local entities that some of the input's entities have become, with their tags. Collective.
 
     Args:
-        model: gmsh's model, used on one rank.
-        comm: the ranks that share the mesh.
-        rank: the one that has the model open.
-        dimension: of the coordinates, 2 or 3.
+        mesh: the mesh.
+        dimension: of the entities.
+        nodes: of each entity, numbered as when the mesh was made, (n, dimension + 1); on any rank.
+        tags: a number for each entity, (n,).
     """
-    return tuple(gmsh_io.model_to_mesh(model, comm, rank, gdim=dimension)[:3])
+    vertices, values = dolfinx.io.distribute_entity_data(mesh, dimension, nodes, tags)
+    mesh.topology.create_connectivity(dimension, 0)
+    mesh.topology.create_connectivity(dimension, mesh.topology.dim)
+    found = _mesh.meshtags_from_entities(mesh, dimension, graph.adjacencylist(vertices), values.astype(np.int32))
+    return np.asarray(found.indices), np.asarray(found.values)
 
 
 def submesh_nodes(mesh: _mesh.Mesh, dimension: int, entities: Entities) -> tuple[Any, Any]:
@@ -67,14 +68,15 @@ def refine(mesh: _mesh.Mesh, edges: Entities | None) -> tuple[_mesh.Mesh, Entiti
     return fine, np.asarray(parents[fine.topology.original_cell_index - offset], dtype=np.int32)
 
 
-def simplex_mesh(comm: Any, cells: npt.NDArray[Any], points: Array, kind: str) -> _mesh.Mesh:
+def simplex_mesh(comm: Any, cells: npt.NDArray[Any], points: Array, kind: str, *, spread: bool = False) -> _mesh.Mesh:
     """Mesh of the simplices (c, d+1) over points (n, d), each rank giving some of both. Collective.
 
     Args:
         comm: the ranks.
-        cells: numbers of points, counted through the ranks; each cell stays where it is given.
+        cells: numbers of points, counted through the ranks.
         points: each of them once, on any rank.
         kind: triangle or tetrahedron.
+        spread: whether the cells are shared among the ranks; else each stays where it is given.
 
     Returns:
         The mesh, without ghost cells.
@@ -88,7 +90,8 @@ def simplex_mesh(comm: Any, cells: npt.NDArray[Any], points: Array, kind: str) -
         return getattr(places, "_cpp_object", places)
 
     cells, points = np.asarray(cells, dtype=np.int64), np.ascontiguousarray(points)
-    partitioner = stay if comm.size > 1 else None  # without, dolfinx does not even distribute
+    # with one rank and no partitioner, dolfinx does not even distribute
+    partitioner = stay if comm.size > 1 and not spread else None
     return _mesh.create_mesh(comm, cells=cells, x=points, e=element, partitioner=partitioner)
 
 

@@ -38,3 +38,9 @@ class SolverError(HviError, RuntimeError):
     """A solver broke down; the message carries PETSc's own name for the reason."""
 
     exit_code = ExitCode.NOT_CONVERGED
+
+
+class Interrupted(HviError):
+    """A signal came before there was anything to write."""
+
+    exit_code = ExitCode.INTERRUPTED

@@ -11,8 +11,9 @@ import numpy as np
 
 from ..errors import InputError
 from ..typing import Integers
+from . import gmsh_arrays
 
-_SIMPLEX = {2: 2, 3: 4}
+_SIMPLEX = {1: 1, 2: 2, 3: 4}
 """Gmsh's element type of the linear simplex, by dimension."""
 
 
@@ -55,10 +56,13 @@ def check(gmsh: Any, path: Path, dimension: int, thresholds: Thresholds = DEFAUL
 
 def _check_cells(gmsh: Any, path: Path, dimension: int) -> None:
     """Refuse cells of another dimension, or that are no linear simplices."""
-    if gmsh.model.getDimension() != dimension:
-        found = gmsh.model.getDimension()
+    found = gmsh.model.getDimension()
+    if found < 0:
+        raise InputError(f"mesh file {path}: it holds neither a mesh nor a geometry; give a file that gmsh has saved")
+    if found != dimension:
         raise InputError(f"mesh file {path}: its cells have dimension {found}, the material's model wants {dimension}")
-    if list(gmsh.model.mesh.getElements(dimension)[0]) != [_SIMPLEX[dimension]]:
+    cells, sides = (set(gmsh.model.mesh.getElements(d)[0]) for d in (dimension, dimension - 1))
+    if cells != {_SIMPLEX[dimension]} or not sides <= {_SIMPLEX[dimension - 1]}:
         shape = "triangles" if dimension == 2 else "tetrahedra"
         raise InputError(f"mesh file {path}: linear {shape} only; remesh with order 1 and without recombination")
 
@@ -102,13 +106,8 @@ def _check_connections(gmsh: Any, path: Path, dimension: int) -> None:
 
 
 def _elements(gmsh: Any, dimension: int) -> Integers:
-    """Node tags of the simplices in named groups, shape (n, dimension + 1), sorted in each row."""
-    found = [np.empty((0, dimension + 1), dtype=np.int64)]
-    for _, group in gmsh.model.getPhysicalGroups(dimension):
-        for entity in gmsh.model.getEntitiesForPhysicalGroup(dimension, group):
-            for nodes in gmsh.model.mesh.getElements(dimension, entity)[2]:
-                found.append(np.asarray(nodes, dtype=np.int64).reshape(-1, dimension + 1))
-    return np.sort(np.concatenate(found), axis=1)
+    """Node tags of the simplices in groups, shape (n, dimension + 1), sorted in each row."""
+    return np.sort(gmsh_arrays.grouped(gmsh, dimension)[0] + 1, axis=1)
 
 
 def _refuse_more_than(most: int, rows: Integers, what: str, fault: str) -> None:

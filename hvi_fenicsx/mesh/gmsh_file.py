@@ -2,22 +2,27 @@
 
 from __future__ import annotations
 
-import contextlib
-import tempfile
+import io
+import json
+import signal
+import subprocess
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from mpi4py import MPI
 
 from ..errors import InputError
+from ..runtime import helper_process, memory
 from ..runtime.mpi import on_root
-from . import gmsh_checks, gmsh_model
+from . import gmsh_checks, gmsh_model, gmsh_script
 from .domain import Domain
-from .gmsh_checks import DEFAULT, Thresholds
+from .gmsh_arrays import MeshArrays
+from .gmsh_reader import Request
+from .thresholds import DEFAULT, Thresholds
 
-_MOST_STATEMENTS = 100
-"""Statements of a broken file that gmsh's parser may still hold."""
+_SCRIPTS = (".geo", ".geo_unrolled")
+_HEADER = b"$MeshFormat"
+"""How a mesh begins; all else gmsh would take for a script."""
 
 
 def read(comm: MPI.Comm, path: Path, dimension: int, scale: float = 1.0, thresholds: Thresholds = DEFAULT) -> Domain:
@@ -28,63 +33,75 @@ def read(comm: MPI.Comm, path: Path, dimension: int, scale: float = 1.0, thresho
         path: the file.
         dimension: of the cells, 2 or 3.
         scale: m per unit of the file's coordinates.
-        thresholds: what makes a mesh unusable.
+        thresholds: how long gmsh may take.
 
     Raises:
-        InputError: on all ranks alike: not readable, no named groups, wrong dimension, no linear simplices, inverted
-            or degenerate cells.
+        InputError: on all ranks alike: not readable, no mesh nor harmless script, no named groups, wrong dimension, no
+            linear simplices, inverted or degenerate cells.
+        Interrupted: on all ranks alike: a signal came.
     """
-    with gmsh_model.session(comm) as gmsh:
-        names = on_root(comm, lambda: _open(gmsh, path, dimension, thresholds))
-        mesh, sides, regions = gmsh_model.distribute(comm, gmsh, dimension, names)
+    found: list[MeshArrays] = []
+    names = on_root(comm, lambda: _read(path, dimension, found, thresholds.gmsh_file_seconds))
+    mesh, sides, regions = gmsh_model.distribute(comm, found.pop() if found else None, dimension, names)
     mesh.geometry.x[:] *= scale
     return Domain.from_mesh(mesh, sides, regions)
 
 
-def _open(gmsh: Any, path: Path, dimension: int, thresholds: Thresholds) -> dict[int, dict[str, int]]:
-    """Open the file in gmsh and check it; its physical groups by dimension and name. Rank 0 only."""
+def _read(path: Path, dimension: int, found: list[MeshArrays], seconds: float) -> dict[int, dict[str, int]]:
+    """Read the file in a process of its own; its physical groups by dimension and name. Rank 0 only.
+
+    Args:
+        path: the file.
+        dimension: of the cells.
+        found: the mesh is added here.
+        seconds: how long gmsh may take.
+    """
+    request = Request(
+        path=str(path.absolute()),
+        is_script=_is_script(path),
+        dimension=dimension,
+        memory=memory.limit(),
+        thresholds=gmsh_checks.DEFAULT,
+    )
+    try:
+        done = helper_process.run("hvi_fenicsx.mesh.gmsh_reader", [request.dumps()], seconds)
+    except subprocess.TimeoutExpired:
+        text = (
+            f"gmsh has not done with it after {seconds:g} s; look for an endless loop, or give the .msh that gmsh saves"
+        )
+        raise InputError(f"mesh file {path}: {text}") from None
+    if done.returncode or not done.stdout:
+        raise InputError(f"mesh file {path}: {_end(done)}")
+    with np.load(io.BytesIO(done.stdout)) as arrays:
+        if "fault" in arrays:
+            raise InputError(str(arrays["fault"]))
+        found.append(MeshArrays(**{name: arrays[name] for name in MeshArrays.__annotations__}))
+        return {int(d): named for d, named in json.loads(str(arrays["names"])).items()}
+
+
+def _is_script(path: Path) -> bool:
+    """Whether the file is a script, and not a mesh.
+
+    Raises:
+        InputError: it is neither, or a script that does more than to describe a mesh.
+    """
     if not path.is_file():
         raise InputError(f"mesh file {path}: there is no such file; give the path from the scene's folder")
-    try:
-        gmsh.open(str(path))
-        if not len(gmsh.model.mesh.getNodes()[0]):
-            gmsh.model.mesh.generate(dimension)
-        _number_without_gaps(gmsh)
-    except Exception as error:
-        # gmsh raises bare Exceptions, whatever is wrong with a file
-        _empty_parser(gmsh)
-        raise InputError(f"mesh file {path}: gmsh cannot read it: {error}") from None
-    gmsh_checks.check(gmsh, path, dimension, thresholds)
-    return {d: _names(gmsh, path, d) for d in (dimension - 1, dimension)}
+    if path.suffix in _SCRIPTS:
+        gmsh_script.check(path)
+        return True
+    with path.open("rb") as stream:
+        if stream.read(len(_HEADER)) != _HEADER:
+            text = f"is no mesh: it does not begin with {_HEADER.decode()}; save it by gmsh, or name a script .geo"
+            raise InputError(f"mesh file {path}: {text}")
+    return False
 
 
-def _empty_parser(gmsh: Any) -> None:
-    """Empty gmsh's parser: the rest of a broken file stays in it, and would spoil the next file."""
-    with tempfile.NamedTemporaryFile(mode="w", suffix=".geo") as empty:
-        empty.write("nothing = 0;\n")  # a statement, which makes the parser read on
-        empty.flush()
-        for _ in range(_MOST_STATEMENTS):
-            gmsh.finalize()  # without this, gmsh does not even look at the file
-            gmsh_model.start(gmsh)
-            with contextlib.suppress(Exception):
-                gmsh.open(empty.name)
-                return
-
-
-def _number_without_gaps(gmsh: Any) -> None:
-    """Number the nodes from 1 without gaps, which dolfinx demands: a file may have lost some with their cells."""
-    tags = gmsh.model.mesh.getNodes()[0]
-    if len(tags) and np.max(tags) != len(tags):
-        gmsh.model.mesh.renumberNodes()
-
-
-def _names(gmsh: Any, path: Path, dimension: int) -> dict[str, int]:
-    """Tags of the physical groups of a dimension by name; a nameless one is called by its tag."""
-    named = {gmsh.model.getPhysicalName(d, tag): tag for d, tag in gmsh.model.getPhysicalGroups(dimension)}
-    for name, tag in named.items():
-        if not len(gmsh.model.mesh.getNodesForPhysicalGroup(dimension, tag)[0]):
-            raise InputError(f"mesh file {path}: physical group {name!r} is empty; remove it or fill it")
-    if not named:
-        kind = "region" if dimension == gmsh.model.getDimension() else "boundary part"
-        raise InputError(f"mesh file {path}: no physical group of dimension {dimension} (a {kind}); add one in gmsh")
-    return {name or str(tag): tag for name, tag in named.items()}
+def _end(done: subprocess.CompletedProcess[bytes]) -> str:
+    """Why gmsh came to an end without a mesh."""
+    if done.returncode == 0 or not done.stderr.strip():
+        code = done.returncode
+        how = signal.Signals(-code).name if code < 0 else f"exit code {code}"
+        return f"it ended gmsh ({how}); remove Exit and Abort, and see whether gmsh itself can mesh it"
+    last = done.stderr.decode(errors="replace").strip().splitlines()[-1]
+    return f"gmsh cannot read it: {last[:200]}"

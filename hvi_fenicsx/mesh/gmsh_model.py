@@ -1,4 +1,4 @@
-"""The mesh in gmsh's model, and how it becomes a dolfinx mesh: sides and regions are its named physical groups."""
+"""How a mesh that gmsh has made becomes a dolfinx mesh: sides and regions are its named physical groups."""
 
 from __future__ import annotations
 
@@ -6,11 +6,14 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
+import numpy as np
 from dolfinx import mesh as dmesh
 from mpi4py import MPI
 
 from .. import compat
-from ..typing import Entities
+from ..typing import Entities, Integers
+from . import gmsh_arrays
+from .gmsh_arrays import MeshArrays
 
 
 @contextmanager
@@ -21,38 +24,37 @@ def session(comm: MPI.Comm) -> Iterator[Any]:
         return
     import gmsh
 
-    start(gmsh)
+    gmsh_arrays.start(gmsh)
     try:
         yield gmsh
     finally:
         gmsh.finalize()
 
 
-def start(gmsh: Any) -> None:
-    """Start gmsh without the user's settings, and without its own messages."""
-    gmsh.initialize(["-noenv"], readConfigFiles=False, interruptible=False)
-    gmsh.option.setNumber("General.Terminal", 0)
-
-
 def distribute(
-    comm: MPI.Comm, gmsh: Any, dimension: int, names: Mapping[int, Mapping[str, int]]
+    comm: MPI.Comm, found: MeshArrays | None, dimension: int, names: Mapping[int, Mapping[str, int]]
 ) -> tuple[dmesh.Mesh, dict[str, Entities], dict[str, Entities]]:
-    """The mesh that is open in rank 0's gmsh, shared among the ranks. Collective.
+    """A mesh that one rank has, shared among the ranks. Collective.
 
     Args:
         comm: the ranks.
-        gmsh: the module, see :func:`session`.
+        found: the mesh; None on the ranks that do not have it.
         dimension: of the cells.
         names: physical groups of facets and of cells with their tags, by dimension; on all ranks.
 
     Returns:
         Mesh, sides and regions (local facets and cells by name).
     """
-    model = gmsh.model if comm.rank == 0 else None
-    mesh, cell_tags, facet_tags = compat.mesh_from_gmsh(model, comm, 0, dimension)
-    mesh.topology.create_connectivity(dimension - 1, dimension)
-    return mesh, _by_name(facet_tags, names[dimension - 1]), _by_name(cell_tags, names[dimension])
+    found = found or MeshArrays.empty(dimension)
+    kind = "triangle" if dimension == 2 else "tetrahedron"
+    mesh = compat.simplex_mesh(comm, found.cells, found.points[:, :dimension], kind, spread=True)
+    regions = _by_name(mesh, dimension, found.cells, found.cell_tags, names)
+    sides = _by_name(mesh, dimension - 1, found.facets, found.facet_tags, names)
+    return mesh, sides, regions
 
 
-def _by_name(tags: Any, names: Mapping[str, int]) -> dict[str, Entities]:
-    return {name: tags.find(tag) for name, tag in names.items()}
+def _by_name(
+    mesh: dmesh.Mesh, dimension: int, nodes: Integers, tags: Entities, names: Mapping[int, Mapping[str, int]]
+) -> dict[str, Entities]:
+    local, found = compat.local_entities(mesh, dimension, nodes, tags)
+    return {name: np.unique(local[found == tag]) for name, tag in names[dimension].items()}

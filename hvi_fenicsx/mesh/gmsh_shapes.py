@@ -9,7 +9,7 @@ from mpi4py import MPI
 from ..errors import InputError
 from ..geometry import Outline
 from ..runtime.mpi import on_root
-from . import gmsh_model
+from . import gmsh_arrays, gmsh_model
 from .domain import Domain
 
 _BODY = "body"
@@ -28,7 +28,7 @@ def build(comm: MPI.Comm, outline: Outline, size: float) -> Domain:
     """
     with gmsh_model.session(comm) as gmsh:
         names = on_root(comm, lambda: _meshed(gmsh, outline, size))
-        mesh, sides, _ = gmsh_model.distribute(comm, gmsh, 2, names)
+        mesh, sides, _ = gmsh_model.distribute(comm, gmsh and gmsh_arrays.extract(gmsh, 2), 2, names)
     return Domain.from_mesh(mesh, sides, curves=outline.arcs(), one_piece=True)
 
 

@@ -115,7 +115,7 @@ gmsh.model.removePhysicalGroups([(1, t) for t in whole])
 
 
 def test_a_broken_file_does_not_spoil_the_next(tmp_path: Path) -> None:
-    """What gmsh's parser has left of a broken file is emptied out."""
+    """Each file is read in a process of its own: gmsh's parser would keep the rest of a broken one."""
     broken = tmp_path / "broken.geo"
     broken.write_text("Point(1) = {0, 0, 0 this is broken; letters\nfoo bar {")
     good = Path(__file__).parents[2] / "demos" / "thermal_bar.geo"

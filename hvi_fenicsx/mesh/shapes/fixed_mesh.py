@@ -76,7 +76,10 @@ def _mesh_path(value: Any, info: ValidationInfo) -> Path:
 
 
 class MeshFile(FixedMesh):
-    """A gmsh file. Its physical groups are the sides and regions that the scene can name."""
+    """A gmsh file. Its physical groups are the sides and regions that the scene can name.
+
+    It may hold a mesh or describe one, and do nothing else: see docs/tutorial.md.
+    """
 
     dimension: ClassVar[None] = None
     normals: ClassVar[None] = None
@@ -85,7 +88,8 @@ class MeshFile(FixedMesh):
     shape: Literal["file"] = "file"
     """the mesh comes from a gmsh file"""
     file: Annotated[Path, BeforeValidator(_mesh_path), PlainSerializer(str)]
-    """the gmsh file, relative to the scene file: .msh, or .geo, which gmsh meshes first"""
+    """the gmsh file, relative to the scene file: .msh, or .geo, which gmsh meshes first; a .geo that runs programs or
+    writes files is refused"""
     scale: Positive = 1.0
     """length in m of one unit of the coordinates in the file: 1e-3 for a mesh in mm"""
     refinements: Refinements = 0

@@ -1,0 +1,143 @@
+"""A gmsh file read, meshed and checked: ``python3 -m hvi_fenicsx.mesh.gmsh_reader REQUEST`` prints the mesh.
+
+REQUEST is JSON, see :class:`Request`; what is printed is an npz: the arrays of :class:`.gmsh_arrays.MeshArrays` and,
+as JSON, ``names``, the tags of the physical groups by dimension and name; or ``fault``, what is wrong with the file.
+
+It is a process of its own since gmsh reads all kinds of programs: whatever a file holds, from the moment on that it is
+opened nothing can be started or written (:mod:`..runtime.confinement`).
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import signal
+import sys
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError
+from ..runtime import confinement, processes
+from . import gmsh_arrays, gmsh_checks
+
+_LINKED = "mesh.msh"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Request:
+    """What is to be read.
+
+    Attributes:
+        path: of the file.
+        is_script: whether it is a script; else it is a mesh.
+        dimension: of the cells, 2 or 3.
+        memory: what may be used, MB.
+        thresholds: what makes a mesh unusable.
+    """
+
+    path: str
+    is_script: bool
+    dimension: int
+    memory: float
+    thresholds: gmsh_checks.Thresholds
+
+    def dumps(self) -> str:
+        """As text."""
+        return json.dumps(asdict(self))
+
+    @classmethod
+    def loads(cls, text: str) -> Request:
+        """From that text."""
+        found = json.loads(text)
+        return cls(**{**found, "thresholds": gmsh_checks.Thresholds(**found["thresholds"])})
+
+
+def main() -> None:
+    """Print the mesh that the request wants."""
+    processes.die_with_parent(signal.SIGKILL)
+    signal.signal(signal.SIGINT, signal.SIG_DFL)  # Python's own handler would wait for gmsh
+    result = os.fdopen(os.dup(1), "wb")
+    os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # what a script prints is no part of the result
+    result.write(_packed(Request.loads(sys.argv[1])))
+    result.close()
+
+
+def _packed(request: Request) -> bytes:
+    buffer = io.BytesIO()
+    try:
+        np.savez(buffer, **_read(request))
+    except InputError as error:
+        np.savez(buffer, fault=np.array(str(error)))
+    return buffer.getvalue()
+
+
+def _read(request: Request) -> dict[str, Any]:
+    """The arrays of the mesh, and its names as JSON.
+
+    Raises:
+        InputError: gmsh cannot read the file, or the mesh cannot be used.
+    """
+    import gmsh
+
+    gmsh_arrays.start(gmsh)
+    path, dimension = Path(request.path), request.dimension
+    opened = path if request.is_script else _linked(path)
+    confinement.confine(request.memory)
+    try:
+        _open(gmsh, opened, dimension)
+    except Exception as error:
+        # gmsh raises bare Exceptions, whatever is wrong with a file
+        reason = str(error).replace(str(opened), str(path))
+        raise InputError(f"mesh file {path}: gmsh cannot read it: {reason}") from None
+    gmsh_checks.check(gmsh, path, dimension, request.thresholds)
+    names = {d: _names(gmsh, path, d) for d in (dimension - 1, dimension)}
+    found = gmsh_arrays.extract(gmsh, dimension)
+    return {**{name: getattr(found, name) for name in found.__annotations__}, "names": np.array(json.dumps(names))}
+
+
+def _linked(path: Path) -> Path:
+    """The mesh by another name: gmsh chooses by names what it does, and would read options beside the file."""
+    os.symlink(path, _LINKED)
+    return Path(_LINKED)
+
+
+def _open(gmsh: Any, path: Path, dimension: int) -> None:
+    gmsh.open(str(path))
+    if not len(gmsh.model.mesh.getNodes()[0]):
+        gmsh.model.mesh.generate(dimension)
+    if gmsh.model.getNumberOfPartitions():
+        gmsh.model.mesh.unpartition()  # the ranks are shared out anew
+    tags = gmsh.model.mesh.getNodes()[0]
+    if len(tags) and np.max(tags) != len(tags):
+        gmsh.model.mesh.renumberNodes()  # a file may have lost some with their cells
+
+
+def _names(gmsh: Any, path: Path, dimension: int) -> dict[str, int]:
+    """Tags of the physical groups of a dimension by name; a nameless one is called by its tag."""
+    named = {_name(gmsh, path, d, tag): tag for d, tag in gmsh.model.getPhysicalGroups(dimension)}
+    for name, tag in named.items():
+        if not len(gmsh.model.mesh.getNodesForPhysicalGroup(dimension, tag)[0]):
+            raise InputError(f"mesh file {path}: physical group {name!r} is empty; remove it or fill it")
+    if not named:
+        kind = "region" if dimension == gmsh.model.getDimension() else "boundary part"
+        raise InputError(f"mesh file {path}: no physical group of dimension {dimension} (a {kind}); add one in gmsh")
+    return named
+
+
+def _name(gmsh: Any, path: Path, dimension: int, tag: int) -> str:
+    try:
+        return gmsh.model.getPhysicalName(dimension, tag) or str(tag)
+    except UnicodeDecodeError as error:
+        shown = error.object.decode("latin-1")
+        line = path.read_bytes().partition(error.object)[0].count(b"\n") + 1
+        raise InputError(
+            f"mesh file {path}:{line}: the name {shown!r} is not in UTF-8; save the file as UTF-8"
+        ) from None
+
+
+if __name__ == "__main__":
+    main()

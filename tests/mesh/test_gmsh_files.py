@@ -1,0 +1,166 @@
+"""Mesh files that hold more than a mesh: programs, writing, endless loops. They are data, and can do no harm."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+from pathlib import Path
+
+import meshes
+import pytest
+from mpi4py import MPI
+
+from hvi_fenicsx import InputError
+from hvi_fenicsx.errors import Interrupted
+from hvi_fenicsx.mesh import gmsh_checks, gmsh_file, gmsh_script
+from hvi_fenicsx.mesh.domain import Domain
+from hvi_fenicsx.mesh.gmsh_reader import Request
+from hvi_fenicsx.mesh.thresholds import Thresholds
+from hvi_fenicsx.runtime import helper_process
+from hvi_fenicsx.runtime.signals import Interrupt
+
+TRIANGLE = """Point(1) = {0, 0, 0}; Point(2) = {1, 0, 0}; Point(3) = {0, 1, 0};
+Line(1) = {1, 2}; Line(2) = {2, 3}; Line(3) = {3, 1};
+Curve Loop(1) = {1, 2, 3}; Plane Surface(1) = {1};
+Physical Curve("bottom") = {1}; Physical Curve("rest") = {2, 3}; Physical Surface("body") = {1};
+"""
+MARK = "HARM"
+"""The name of the file that harm would leave."""
+
+
+def written(path: Path, text: str) -> Path:
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def read(path: Path, seconds: float = 60.0) -> Domain:
+    return gmsh_file.read(MPI.COMM_WORLD, path, 2, thresholds=Thresholds(gmsh_file_seconds=seconds))
+
+
+COMMANDS = {
+    'SystemCall "touch HARM";': "SystemCall runs a program",
+    'System "touch HARM";': "System runs a program",
+    'NonBlockingSystemCall StrCat("touch ", "HARM");': "NonBlockingSystemCall runs a program",
+    'OnelabRun("a", "touch HARM");': "OnelabRun runs a program",
+    "Field[1] = ExternalProcess;": "ExternalProcess runs a program",
+    'Printf("%g", 1) > "HARM";': "Printf writes a file",
+    'Printf("a > b", 1)>>Str("HARM");': "Printf writes a file",
+    'Save "HARM";': "Save writes a file",
+    'Save View[0] "HARM";': "Save writes a file",
+    'CreateDir "HARM";': "CreateDir writes a file",
+    'Print /* here */ "HARM";': "Print writes a file",
+    'S2N[StrCat("System", "Call")] "touch HARM";': "S2N makes names",
+    'Include StrCat("o", "ther");': "Include wants the name of a file in quotes",
+    'Include "other";': "SystemCall runs a program",
+    'Merge "other";': "SystemCall runs a program",
+    'Merge "HARM.gz";': "would start a program",
+    'If (0) SystemCall "touch HARM"; EndIf': "SystemCall runs a program",
+}
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_a_command_that_does_more_than_describe_a_mesh_is_refused_by_name(command: str, tmp_path: Path) -> None:
+    written(tmp_path / "other", 'SystemCall "touch HARM";')
+    script = written(tmp_path / "m.geo", TRIANGLE + command)
+    with pytest.raises(InputError, match=COMMANDS[command]) as refused:
+        gmsh_script.check(script)
+    assert any(f"{script.with_name(name)}:" in str(refused.value) for name in ("m.geo:5", "other:1", "HARM.gz"))
+
+
+def test_an_option_file_beside_a_script_is_part_of_it(tmp_path: Path) -> None:
+    script = written(tmp_path / "m.geo", TRIANGLE)
+    written(tmp_path / "m.geo.opt", '\n\nSystemCall "touch HARM";')
+    with pytest.raises(InputError, match=r"m\.geo\.opt:3: SystemCall runs a program"):
+        read(script)
+
+
+def test_the_words_of_harmless_scripts_are_allowed(tmp_path: Path) -> None:
+    words = """
+    // Print "x"; SystemCall "x"
+    /* Save "y"; */ Print.Background = 1; Save = 2; Printf("Save > Print"); Include "more.geo";
+    Physical Point('SystemCall "here"') = {1}; Printf("%g", Save > 1);
+    """
+    written(tmp_path / "more.geo", "Printf('%g', 1);")
+    assert set(read(written(tmp_path / "m.geo", TRIANGLE + words)).sides) == {"bottom", "rest"}
+
+
+def test_a_script_under_the_name_of_a_mesh_is_refused(tmp_path: Path) -> None:
+    file = written(tmp_path / "m.msh", TRIANGLE + f'SystemCall "touch {tmp_path / MARK}";')
+    with pytest.raises(InputError, match=r"does not begin with \$MeshFormat"):
+        read(file)
+    assert not (tmp_path / MARK).exists()
+
+
+def test_options_beside_a_mesh_are_not_read(tmp_path: Path) -> None:
+    file = meshes.make(tmp_path / "m.msh", meshes.GOOD)
+    written(tmp_path / "m.msh.opt", f'Printf("x") > "{tmp_path / MARK}"; Exit;')
+    assert set(read(file).sides) == {"left", "right", "bottom", "top"}
+    assert not (tmp_path / MARK).exists()
+
+
+def test_what_gets_past_the_names_is_kept_from_harm_by_the_kernel(tmp_path: Path) -> None:
+    """The same process that reads a mesh file, without the names looked at before."""
+    theirs, harm = written(tmp_path / "theirs", "precious"), tmp_path / MARK
+    commands = f'SystemCall "touch {harm}"; Printf("x") > "{harm}"; Printf("x") > "{theirs}"; CreateDir "{harm}";'
+    script = written(
+        tmp_path / "m.geo", TRIANGLE + commands + f'System "rm {theirs}"; NonBlockingSystemCall "id > {harm}";'
+    )
+    request = Request(path=str(script), is_script=True, dimension=2, memory=4e3, thresholds=gmsh_checks.DEFAULT)
+    helper_process.run("hvi_fenicsx.mesh.gmsh_reader", [request.dumps()], 60.0)
+    assert not harm.exists()
+    assert theirs.read_text() == "precious"
+
+
+LOOP = "For i In {1:1e12}\n a = i;\nEndFor\n"
+ENDS = {
+    "Exit;": ("ended gmsh", 60.0),
+    "Exit 7;": ("exit code 7", 60.0),
+    "Abort;": ("mesh file", 60.0),
+    "For": ("gmsh cannot read it", 60.0),
+    "Macro again\n Call again;\nReturn\nCall again;": ("mesh file", 3.0),
+    LOOP: ("not done with it after 1 s", 1.0),
+}
+
+
+@pytest.mark.parametrize("command", ENDS)
+def test_a_script_that_ends_gmsh_or_never_ends_is_refused(command: str, tmp_path: Path) -> None:
+    words, seconds = ENDS[command]
+    with pytest.raises(InputError, match=words) as refused:
+        read(written(tmp_path / "m.geo", command + "\n" + TRIANGLE), seconds)
+    assert str(tmp_path / "m.geo") in str(refused.value)
+
+
+def test_a_signal_ends_the_meshing(tmp_path: Path) -> None:
+    script = written(tmp_path / "m.geo", LOOP)
+    handler = signal.getsignal(signal.SIGUSR1)
+    signal.signal(signal.SIGUSR1, Interrupt(MPI.COMM_WORLD)._on_signal)
+    try:
+        threading.Timer(0.5, os.kill, (os.getpid(), signal.SIGUSR1)).start()
+        with pytest.raises(Interrupted):
+            read(script)
+    finally:
+        signal.signal(signal.SIGUSR1, handler)
+
+
+@pytest.mark.parametrize("version", [2.2, 4.1])
+def test_a_mesh_that_was_partitioned_is_read_as_a_whole(version: float, tmp_path: Path) -> None:
+    saved = f'\nmesh.partition(2)\ngmsh.option.setNumber("Mesh.MshFileVersion", {version})'
+    whole, parted = (meshes.make(tmp_path / f"{n}.msh", meshes.GOOD + text) for n, text in (("a", ""), ("b", saved)))
+    found, wanted = read(parted), read(whole)
+    assert {n: len(s) for n, s in found.sides.items()} == {n: len(s) for n, s in wanted.sides.items()}
+    assert found.mesh.topology.index_map(2).size_local == wanted.mesh.topology.index_map(2).size_local
+
+
+def test_a_name_that_is_not_in_utf_8_is_refused_with_its_line(tmp_path: Path) -> None:
+    file = meshes.make(tmp_path / "m.msh", meshes.GOOD)
+    file.write_bytes(file.read_bytes().replace(b'"left"', '"côté"'.encode("latin-1")))
+    lines = file.read_bytes().decode("latin-1").splitlines()
+    line = next(number for number, text in enumerate(lines, 1) if "côté" in text)
+    with pytest.raises(InputError, match=rf"m\.msh:{line}: the name 'côté' is not in UTF-8"):
+        read(file)
+
+
+def test_a_file_without_a_mesh_says_so(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="neither a mesh nor a geometry"):
+        read(written(tmp_path / "m.geo", "a = 1;\n"))
