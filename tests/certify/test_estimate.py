@@ -194,6 +194,24 @@ def test_slip_and_friction_against_a_mesh_far_finer(name: str, cells: int) -> No
     assert found.friction == pytest.approx(true[1], rel=0.45)
 
 
+def test_slip_where_friction_holds_some_vertices_and_others_slide() -> None:
+    """A slip that the estimated error turns round is held by the kink at zero: its friction does not change its sign."""
+    prepared = prepare(Scene.model_validate(guided(8)))
+    coarse, fine = finish(prepared), solved(guided(64))
+    found = estimate_contact_errors(prepared.system, (), coarse.solve_result.u, coarse.examination)
+    true = apart(slips(coarse), slips(fine), 2)
+    assert 0.8 * true < found.slip < 1.7 * true
+
+
+def guided(cells: int) -> Table:
+    """A block that is pushed along a guide and rubs on a floor, where it sticks in part."""
+    table = model(cells, friction={"law": "tresca", "yield_traction": 2e5}, gap="4e-6*(x - 0.7)**2")
+    table["domain"] |= {"size": [2.0, 1.0], "cells": [2 * cells, cells]}
+    table["body"] = {"force": [2e5, -2e6]}
+    del table["boundary"]["pull"], table["boundary"]["press"]
+    return table
+
+
 def slips(solution: Solution) -> npt.NDArray[np.float64]:
     (state,) = solution.examination.states
     return np.asarray(state.slip[np.argsort(state.surface.points[:, 0]), 0] * solution.problem.scales.displacement)

@@ -44,6 +44,25 @@ def nearest(law: Superpotential, slip: Array, traction: Array, near: float) -> A
     return np.where(moving, sliding, inside[:, None] * traction)
 
 
+def stopped(law: Superpotential, before: Array, after: Array) -> Array:
+    """Slips after a change, stopped at the convex kinks that they would pass; (..., k).
+
+    A convex kink holds the slip by as much traction as its jump gives. To the explicit answer of a law a slip that
+    changes its sign would give that jump in full, and the answer would not settle.
+
+    Args:
+        law: its superpotential j.
+        before: the slips before the change; with k = 1 signed.
+        after: the slips after the change.
+    """
+    if after.shape[-1] > 1:
+        turned = np.sum(before * after, axis=-1, keepdims=True) < 0
+        return np.where(turned, 0.0, after) if len(law.convex.kinks) else after
+    for kink in law.convex.kinks:
+        after = np.where((before - kink) * (after - kink) < 0, kink, after)
+    return after
+
+
 def tractions(state: ContactState, law: LawState) -> Array:
     """The nodal tractions of one of a part's laws along its directions, (m, k).
 
@@ -115,7 +134,7 @@ class LawTraces:
             state: of its part.
             law: one of the part's.
             error: added to u_h before the law, the unsmoothed one then, is evaluated; nothing is added where a whole
-                facet sticks (its vertices on a convex kink).
+                facet sticks (its vertices on a convex kink), and elsewhere no slip passes a convex kink.
         """
         term = law.term
         points = self.part(state.surface, term.directions)
@@ -123,7 +142,8 @@ class LawTraces:
         if error is not None:
             sticks = points.interpolated(law.on_convex_kink()[:, None].astype(float))
             added = points.linear(error.vertices) + points.quadratic(error.edges)
-            slip = slip + np.where(sticks > 1 - self.thresholds.near, 0.0, added)
+            added = np.where(sticks > 1 - self.thresholds.near, 0.0, added)
+            slip = stopped(term.exact, slip, slip + added)
         k, asked = slip.shape[2], term.law if error is None else term.exact
         traction = nearest(asked, slip.reshape(-1, k), nodal.reshape(-1, k), self.thresholds.near)
         return LawTrace(points, nodal, traction.reshape(slip.shape))
