@@ -139,6 +139,38 @@ class Bulk:
         """The averaged volumetric stress of each region in ``averaged``, P1 fields. Collective."""
         return [part.pressure(u) for part in self._dilatations]
 
+    def dilated(self, v: Any) -> list[Any]:
+        """The UFL forms ∫ φ_i div v dx of the regions in ``averaged``, φ_i being scalar P1.
+
+        Args:
+            v: a displacement of any space, or a sum of such.
+        """
+        return [part.dilated(v) for part in self._dilatations]
+
+    def volumetric_rates(self) -> list[Array]:
+        """The averaged volumetric stress by unit of :meth:`dilated` at the owned vertices, by region."""
+        return [np.array(part.stiffness.array_r) for part in self._dilatations]
+
+    def pressed(self, pressures: Sequence[fem.Function], v: Any) -> Any:
+        """The UFL form of the work of averaged volumetric stresses in v.
+
+        Args:
+            pressures: P1 fields, by region in ``averaged``.
+            v: a displacement or test function of any space.
+        """
+        return sum((part.work(p, v) for part, p in zip(self._dilatations, pressures, strict=True)), ufl.Form([]))
+
+    def pressure_energy(self, pressures: Sequence[fem.Function]) -> Array:
+        """∫ p²/λ of every owned cell, (cells,). Collective.
+
+        Args:
+            pressures: P1 fields p, by region in ``averaged``.
+        """
+        q = ufl.TestFunction(fem.functionspace(self.space.mesh, ("Discontinuous Lagrange", 0)))
+        pairs = zip(self._dilatations, pressures, strict=True)
+        found = [nodal_sum(part.across(p, p * q))[:, 0] / part.averaged.modulus for part, p in pairs]
+        return np.asarray(sum(found))
+
     def dilatation_error(self, u: fem.Function) -> Array:
         """2μ/d ∫ (div u - p/λ)² of every owned cell, p being the averaged volumetric stress, (cells,). Collective.
 

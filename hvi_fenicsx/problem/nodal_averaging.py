@@ -64,6 +64,15 @@ class Dilatation:
         self.divergence.multTranspose(self._nodal_pressure(u), force)
         return np.array(force.array_r)
 
+    def dilated(self, v: Any) -> Any:
+        """The UFL form ∫ φ_i div v dx over the region.
+
+        Args:
+            v: a displacement of any space, or a sum of such.
+        """
+        _, vector = self.averaged.divergence.arguments()
+        return ufl.replace(self.averaged.divergence, {vector: v})
+
     def work(self, pressure: fem.Function, v: Any) -> Any:
         """The UFL form ∫ p div v dx over the region.
 

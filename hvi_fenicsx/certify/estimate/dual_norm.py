@@ -46,13 +46,18 @@ class DualNorm:
         self._inverse = HeldPreconditioner(system, levels, LinearSettings.choose(system, levels=bool(levels)), Timer())
         self._inverse.prepare(self.held)
 
-    def solve(self, functional: Array) -> tuple[fem.Function, float]:
-        """The Riesz representative of a functional (owned blocks (n, d), Cartesian) and its energy norm. Collective."""
+    def solve(self, functional: Array, tolerance: float | None = None) -> tuple[fem.Function, float]:
+        """The Riesz representative of a functional and its energy norm. Collective.
+
+        Args:
+            functional: at the owned blocks, Cartesian, (n, d).
+            tolerance: of the relative residual; by default that of the thresholds.
+        """
         system = self.system
         load, x = self._load(functional), system.load.duplicate()
         x.set(0.0)
         if load.norm() > 0:
-            self._inverse.solve(load, x, self._tolerance)
+            self._inverse.solve(load, x, self._tolerance if tolerance is None else tolerance)
         energy = float(load.dot(x))
         return system.displacement(x), float(np.sqrt(max(energy, 0.0)))
 

@@ -18,7 +18,7 @@ from ...system.levels import Levels
 from ...system.system import System
 from ...typing import Array
 from ..certificate import Examination
-from . import defect, drop_errors, dual_norm
+from . import defect, drop_errors, dual_norm, nearly_incompressible
 from .contact_errors import ratio
 from .edge_bubbles import BubbleStiffness
 from .law_traces import LawTraces
@@ -74,8 +74,7 @@ def estimate(
     problem, near = system.problem, thresholds.near
     traces = LawTraces(problem, u, examination.states, thresholds)
     inverse = dual_norm.DualNorm(system, levels, u, thresholds)
-    drops = not problem.bulk.averages_dilatation and drop_errors.within_facets(traces)
-    cells = _with_drops(traces, inverse) if drops else _between_vertices(traces, inverse)
+    cells = _discretisation(traces, inverse)
     smoothing = inverse.solve(dual_norm.smoothing(problem, examination.states, near))[1] if _smoothed(problem) else 0.0
     _, algebraic = inverse.solve(dual_norm.algebraic(problem, examination, near))
     inverse.destroy()
@@ -96,6 +95,16 @@ def _norm(square: float, rounding: float) -> float:
     return float(np.sqrt(square)) if square > rounding**2 else 0.0
 
 
+def _discretisation(traces: LawTraces, inverse: dual_norm.DualNorm) -> Array:
+    """η_K² of the owned cells. Collective."""
+    if traces.problem.bulk.averages_dilatation:
+        return nearly_incompressible.squares(traces, inverse)
+    if drop_errors.within_facets(traces):
+        error = drop_errors.of_solution(traces, inverse)
+        return traces.problem.bulk.energy_by_cell(error.vertices + error.edges)
+    return _between_vertices(traces, inverse)
+
+
 def _between_vertices(traces: LawTraces, inverse: dual_norm.DualNorm) -> Array:
     """η_K² of the owned cells: of the bubbles, and of the nodal forces that P1 takes the laws' for. Collective."""
     problem, u = traces.problem, traces.u
@@ -104,18 +113,9 @@ def _between_vertices(traces: LawTraces, inverse: dual_norm.DualNorm) -> Array:
     edges += problem.bulk.residual_in(traces.bubbles, u, problem.linear.values())
     bubbles = defect.least_energy(BubbleStiffness(problem, traces.bubbles), u, edges, traces.thresholds)
     cells = problem.bulk.energy_by_cell(bubbles)
-    if problem.bulk.averages_dilatation:
-        # a(e, e) has the shear part only; the volumetric stress is an unknown of its own
-        cells += problem.bulk.dilatation_error(u)
     if problem.terms:
         cells += problem.bulk.energy_by_cell(inverse.solve(unmet)[0])
     return cells
-
-
-def _with_drops(traces: LawTraces, inverse: dual_norm.DualNorm) -> Array:
-    """η_K² of the owned cells where a law drops within a facet: bubbles and vertices in one. Collective."""
-    error = drop_errors.of_solution(traces, inverse)
-    return traces.problem.bulk.energy_by_cell(error.vertices + error.edges)
 
 
 def _smoothed(problem: Problem) -> bool:

@@ -19,6 +19,7 @@ class Thresholds:
         bubble_steps: conjugate gradient steps at most of such a solve.
         bubble_rounds: of the active set of the bounds at midpoints, at most.
         dual_tolerance: of a solve with the system's matrix, relative residual: the energy is right to about its square.
+        vertex_tolerance: the same, where conjugate gradients on the bubbles solve for the vertices at each step.
         rounding: nondimensional norms up to this are rounding: a body that meets no force has no error, not 100 % of
             nothing.
         contact_rounds: times that the bubbles are solved for where the errors on Γc are estimated.
@@ -32,6 +33,7 @@ class Thresholds:
     bubble_steps: int = 30
     bubble_rounds: int = 4
     dual_tolerance: float = 0.1
+    vertex_tolerance: float = 1e-6
     rounding: float = 1e-12
     contact_rounds: int = 2
     answer_rounds: int = 4

@@ -1,0 +1,103 @@
+"""The defect of a nearly incompressible body, whose elements average the volumetric strain by vertex.
+
+Bubbles on vertices that stay cannot keep the volume around each vertex: with the volumetric energy they are far too
+stiff, without it far too soft. Bubbles and vertices together are quadratic displacements over linear pressures (Taylor
+and Hood), which lock nowhere. So the vertices are eliminated: each bubble moves with what the vertices answer to it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import ufl
+from dolfinx import fem, la
+
+from ...problem.problem import Problem
+from ...typing import Array
+from . import defect
+from .dual_norm import DualNorm
+from .edge_bubbles import BubbleStiffness
+from .law_traces import LawTraces
+from .thresholds import Thresholds
+
+
+class CondensedStiffness(BubbleStiffness):
+    """The bubbles' stiffness with the vertices that follow them and the averaged volumetric energy of both.
+
+    The diagonal is that of the shear alone: a preconditioner. Creation is collective.
+
+    Attributes:
+        vertices: the vertices' displacement, as :meth:`follow` found it last.
+        pressures: the averaged volumetric stress of bubbles and vertices, by region.
+    """
+
+    def __init__(self, problem: Problem, bubbles: fem.FunctionSpace, inverse: DualNorm, thresholds: Thresholds) -> None:
+        super().__init__(problem, bubbles)
+        self._vertex_inverse, self._tolerance = inverse, thresholds.vertex_tolerance
+        self.vertices = fem.Function(problem.space)
+        bulk, moved = problem.bulk, self._in + self.vertices
+        self.pressures = bulk.pressures(self.vertices)
+        self._dilated = [fem.form(form) for form in bulk.dilated(moved)]
+        tests = ufl.TestFunction(problem.space), ufl.TestFunction(bubbles)
+        self._at_vertices, self._action = (
+            fem.form(bulk.between(moved, v) + bulk.pressed(self.pressures, v)) for v in tests
+        )
+
+    def times(self, e: Array) -> Array:
+        """The force on the bubbles of owned values (n, d), the vertices following. Collective."""
+        self.follow(e)
+        return super().times(e)
+
+    def follow(self, e: Array, unmet: Array | None = None) -> None:
+        """Let the vertices follow bubbles (n, d) and a force on them (n, d), and the pressures both. Collective."""
+        self._in.x.array[: e.size] = e.ravel()
+        self._in.x.scatter_forward()
+        self.vertices.x.array[:] = 0.0
+        self._press()
+        force = -_assembled(self._at_vertices, self.vertices)
+        if unmet is not None:
+            force += unmet
+        self.vertices.x.array[:] = self._vertex_inverse.solve(force, self._tolerance)[0].x.array
+        self._press()
+
+    def _press(self) -> None:
+        """The pressures of the bubbles and the vertices as they are. Collective."""
+        for pressure, dilated, rate in zip(
+            self.pressures, self._dilated, self.problem.bulk.volumetric_rates(), strict=True
+        ):
+            average = _assembled(dilated, pressure).ravel()
+            pressure.x.array[: len(average)] = rate * average
+            pressure.x.scatter_forward()
+
+    def on_bubbles(self, unmet: Array) -> Array:
+        """What a force at the vertices (n, d) leaves at the bubbles (n, d) through the vertices. Collective."""
+        none = np.zeros((self.space.dofmap.index_map.size_local, unmet.shape[1]))
+        self.follow(none, unmet)
+        return super().times(none)
+
+
+def _assembled(form: fem.Form, like: fem.Function) -> Array:
+    """A linear form's values at the owned blocks of a function's space, (n, block size). Collective."""
+    vector = fem.assemble_vector(form)
+    vector.scatter_reverse(la.InsertMode.add)
+    dofs = like.function_space.dofmap
+    found = vector.array[: dofs.index_map.size_local * dofs.index_map_bs]
+    return np.array(found).reshape(-1, dofs.index_map_bs)
+
+
+def squares(traces: LawTraces, inverse: DualNorm) -> Array:
+    """η_K² of the owned cells: shear and volumetric energy of bubbles and vertices. Collective.
+
+    Args:
+        traces: the laws between the vertices.
+        inverse: of the system.
+    """
+    problem, u = traces.problem, traces.u
+    stiffness = CondensedStiffness(problem, traces.bubbles, inverse, traces.thresholds)
+    edges, unmet = traces.tested()
+    load = problem.bulk.residual_in(traces.bubbles, u, problem.linear.values()) - edges
+    if problem.terms:
+        load -= stiffness.on_bubbles(unmet)
+    bubbles = defect.least_energy(stiffness, u, load, traces.thresholds)
+    stiffness.follow(bubbles.x.array.reshape(-1, unmet.shape[1])[: len(edges)], unmet)
+    shear = problem.bulk.energy_by_cell(bubbles + stiffness.vertices)
+    return shear + problem.bulk.pressure_energy(stiffness.pressures) + problem.bulk.dilatation_error(u)
