@@ -195,7 +195,7 @@ def test_slip_and_friction_against_a_mesh_far_finer(name: str, cells: int) -> No
 
 
 def test_slip_where_friction_holds_some_vertices_and_others_slide() -> None:
-    """A slip that the estimated error turns round is held by the kink at zero: its friction does not change its sign."""
+    """A slip that the estimated error turns round is held by the kink at zero: friction does not change its sign."""
     prepared = prepare(Scene.model_validate(guided(8)))
     coarse, fine = finish(prepared), solved(guided(64))
     found = estimate_contact_errors(prepared.system, (), coarse.solve_result.u, coarse.examination)

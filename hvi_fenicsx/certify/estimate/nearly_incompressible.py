@@ -25,6 +25,12 @@ class CondensedStiffness(BubbleStiffness):
 
     The diagonal is that of the shear alone: a preconditioner. Creation is collective.
 
+    Args:
+        problem: whose elastic operator it is.
+        bubbles: the space of edge bubbles.
+        inverse: of the system, for the vertices.
+        thresholds: how accurately.
+
     Attributes:
         vertices: the vertices' displacement, as :meth:`follow` found it last.
         pressures: the averaged volumetric stress of bubbles and vertices, by region.
@@ -43,12 +49,21 @@ class CondensedStiffness(BubbleStiffness):
         )
 
     def times(self, e: Array) -> Array:
-        """The force on the bubbles of owned values (n, d), the vertices following. Collective."""
+        """The force on the bubbles by owned values, the vertices following. Collective.
+
+        Args:
+            e: the bubbles, (n, d).
+        """
         self.follow(e)
         return super().times(e)
 
     def follow(self, e: Array, unmet: Array | None = None) -> None:
-        """Let the vertices follow bubbles (n, d) and a force on them (n, d), and the pressures both. Collective."""
+        """Let the vertices follow the bubbles and a force, and the pressures both. Collective.
+
+        Args:
+            e: the bubbles, (n, d).
+            unmet: the force on the vertices, (n, d).
+        """
         self._in.x.array[: e.size] = e.ravel()
         self._in.x.scatter_forward()
         self.vertices.x.array[:] = 0.0
@@ -69,7 +84,11 @@ class CondensedStiffness(BubbleStiffness):
             pressure.x.scatter_forward()
 
     def on_bubbles(self, unmet: Array) -> Array:
-        """What a force at the vertices (n, d) leaves at the bubbles (n, d) through the vertices. Collective."""
+        """What a force at the vertices leaves at the bubbles through the vertices, (n, d). Collective.
+
+        Args:
+            unmet: the force on the vertices, (n, d).
+        """
         none = np.zeros((self.space.dofmap.index_map.size_local, unmet.shape[1]))
         self.follow(none, unmet)
         return super().times(none)
