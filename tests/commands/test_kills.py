@@ -15,9 +15,6 @@ import pytest
 from runs import command, contact, hvi, summary, write_scene
 from scenes import model, quadratic_linear
 
-from hvi_fenicsx.results.output_folder import OutputFolder
-from hvi_fenicsx.runtime import manifest
-
 pytestmark = pytest.mark.long
 
 ROUNDS, KILLS = 20, 5
@@ -87,12 +84,7 @@ def children(pid: int) -> list[int]:
 
 
 def assert_whole(out: Path) -> None:
-    """Every file is there and speaks of one scene, after a kill between the moves once the rest is moved."""
-    if not (out / "summary.json").exists():
-        OutputFolder(out, "result").close()
-    found = manifest.read(out)
-    assert found is not None
-    assert found.damaged(out) is None
+    """Every file is there and speaks of one scene, whichever it is."""
     record = summary(out)
     title = record["scene"]
     assert tomllib.loads((out / "scene.toml").read_text(encoding="utf-8"))["title"] == title

@@ -10,7 +10,7 @@ from typing import Any
 
 from .. import png_file
 from ..reader import Result
-from . import numbers, paths, scene_text, verdict
+from . import numbers, scene_text, verdict
 from .certificate_text import certificate, estimate
 
 _FIRST = ("escape", "scene", "body", "stress")
@@ -66,14 +66,14 @@ def picture(path: Path) -> dict[str, Any]:
 
 def reproduce(result: Result) -> dict[str, Any]:
     """The command that gave the result, the one that gives it again, the scene and the versions."""
-    summary = result.summary
-    text = paths.beside((result.folder / "scene.toml").read_text(encoding="utf-8"), result.scene)
+    summary, text = result.summary, (result.folder / "scene.toml").read_text(encoding="utf-8")
+    mesh = (result.scene.get("domain") or {}).get("file")
     return {
-        "given": paths.command(str(summary.get("command") or "")),
+        "given": summary.get("command"),
         "again": shlex.join(_again(summary)),
         "scene": text,
         "download": f"data:application/toml;base64,{base64.b64encode(text.encode()).decode()}",
-        "files": [Path(file).name for file in paths.files(result.scene)],
+        "mesh": mesh,
         "versions": versions(summary.get("versions") or {}),
     }
 

@@ -7,7 +7,6 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ...runtime import manifest
 from ..errors import PageError
 from ..reader import read
 
@@ -26,12 +25,7 @@ def write(folder: Path) -> Path:
     """
     from .content import content
 
-    page = render("run.html.j2", content(read(folder)), folder / NAME)
-    try:
-        manifest.add(folder, [NAME])
-    except OSError as error:
-        raise PageError(f"{folder / manifest.NAME}: cannot be written: {error.strerror or error}") from None
-    return page
+    return render("run.html.j2", content(read(folder)), folder / NAME)
 
 
 def render(template: str, values: dict[str, Any], path: Path) -> Path:

@@ -1,0 +1,206 @@
+"""The verdict on one scene: agrees, contradicts or undecided, with one line that says why."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from program import Answer
+from referee import programmes
+from referee.assembly import Problem, assemble
+from referee.coordinates import Floor
+from referee.equilibria import find
+from referee.meshes import Array, Mesh, block, boundary
+from referee.minimality import examine, sampled_descent
+from referee.solution import Check
+
+AGREES, CONTRADICTS, UNDECIDED = "agrees", "contradicts", "undecided"
+Table = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What the referee says of one answer."""
+
+    word: str
+    why: str
+
+
+def mesh_of(scene: Table, drawn: Mesh | None, answer: Answer) -> Mesh | None:
+    """The mesh of a scene: our own, or the cells of the program where gmsh made them."""
+    domain = scene["domain"]
+    if drawn is not None:
+        return drawn
+    if domain["shape"] in ("rectangle", "box"):
+        return block(domain["size"], domain["cells"])
+    if answer.points is None or answer.cells is None:
+        return None
+    facets = boundary(answer.cells)
+    return Mesh(answer.points, answer.cells, _sides(domain, answer.points, facets), np.zeros(len(answer.cells), int))
+
+
+def _sides(domain: Table, points: Array, facets: Any) -> dict[str, Any]:
+    ends = points[facets]
+    shape = domain["shape"]
+    if shape == "half_disk":
+        top = np.all(np.abs(ends[:, :, 1] - domain["radius"]) < 1e-9, axis=1)
+        return {"top": facets[top], "arc": facets[~top]}
+    if shape == "disk":
+        upper = ends[:, :, 1].mean(axis=1) > domain["radius"]
+        return {"upper_arc": facets[upper], "lower_arc": facets[~upper]}
+
+    def along(axis: int, value: float) -> Any:
+        return np.all(np.abs(ends[:, :, axis] - value) < 1e-9, axis=1)
+
+    width, height = domain["size"]
+    found = {"left": along(0, 0), "right": along(0, width), "bottom": along(1, 0), "top": along(1, height)}
+    rest = ~np.any(list(found.values()), axis=0)
+    if shape == "l_shape":
+        flat = along(1, height - domain["cut"][1])
+        found |= {"inner_top": rest & flat, "inner_right": rest & ~flat}
+    else:
+        found["notch"] = rest
+    return {name: facets[mask] for name, mask in found.items()}
+
+
+def displacement(mesh: Mesh, answer: Answer) -> Array | None:
+    """The program's displacement in the order of our vertices; None if the vertices differ."""
+    assert answer.points is not None
+    assert answer.u is not None
+    if len(mesh.points) != len(answer.points):
+        return None
+    scale = mesh.size
+    keys = [np.lexsort(np.round(p / scale, 9).T) for p in (mesh.points, answer.points)]
+    if np.abs(mesh.points[keys[0]] - answer.points[keys[1]]).max() > 1e-9 * scale:
+        from scipy.spatial import cKDTree
+
+        distance, index = cKDTree(answer.points).query(mesh.points)
+        return answer.u[index] if distance.max() < 1e-9 * scale and len(set(index)) == len(index) else None
+    u = np.empty_like(answer.u)
+    u[keys[0]] = answer.u[keys[1]]
+    return u
+
+
+def judge(scene: Table, drawn: Mesh | None, answer: Answer, seed: int = 0) -> Verdict:
+    """Compare an answer with what the referee finds."""
+    if answer.code == 2:
+        return Verdict(UNDECIDED, f"refused: {answer.text[:160]}")
+    if answer.code == 130:
+        return Verdict(UNDECIDED, "took too long")
+    if answer.code == 1:
+        return Verdict(CONTRADICTS, f"broke down: {answer.text[:200]}")
+    mesh = mesh_of(scene, drawn, answer)
+    if mesh is None:
+        return Verdict(UNDECIDED, "no mesh")
+    problem = assemble(scene, mesh)
+    if not problem.stress.any() and not Check(problem, np.zeros_like(mesh.points)).wrongs():
+        word = AGREES if answer.code == 0 else CONTRADICTS
+        return Verdict(word, "nothing drives, so u = 0 is a solution")
+    truth = programmes.verdict(problem)
+    wrong = _existence(problem, truth, answer)
+    if answer.code == 0:
+        more, note = _solution(problem, answer, seed)
+        wrong += more
+    elif answer.code == 4:
+        more, note = _unsolved(problem, truth, answer, seed, scene["solver"].get("method", "auto"))
+        wrong += more
+    else:
+        note = "no solution exists"
+    if wrong:
+        return Verdict(CONTRADICTS, "; ".join(wrong))
+    sure = truth.state != "unclear" or answer.code == 0
+    return Verdict(UNDECIDED if note.startswith("?") or not sure else AGREES, f"{truth.state}: {note}")
+
+
+def _existence(problem: Problem, truth: programmes.Verdict, answer: Answer) -> list[str]:
+    """State, load factors, and the paper's conditions."""
+    found = []
+    tie = "" if answer.margin is None else f", margin {answer.margin:.1e}"
+    allowed = {"unclear": ("held", "borderline", "metastable", "escapes", "undecided")}
+    tied = answer.state == "borderline" and min(abs(truth.growth), abs(truth.peak)) < truth.equal
+    if answer.state not in allowed.get(truth.state, (truth.state,)) and not tied:
+        found.append(f"state {answer.state}{tie}, in truth {truth.state} ({truth.growth:.2e}, {truth.peak:.2e})")
+    sure = truth.state in ("held", "metastable") and abs(truth.growth) > programmes.TIE
+    if answer.margin is not None and sure and (answer.margin > 0) != (truth.growth > 0):
+        found.append(f"margin {answer.margin:.2e}, in truth {truth.growth:.2e}")
+    if answer.paper and truth.state in ("metastable", "escapes"):
+        found.append(f"paper's condition satisfied, but {truth.state}")
+    held, peak = answer.factors
+    if np.isfinite(held) and held > 0:
+        inside = programmes.verdict(problem, held * (1 - 1e-4))
+        if inside.state in ("metastable", "escapes"):
+            found.append(f"held up to {held:.4g} times the load, but {inside.state} just below")
+        outside = programmes.verdict(problem, held * (1 + 1e-4))
+        if outside.state == "held":
+            found.append(f"held up to {held:.4g} times the load, but held beyond")
+    if (
+        np.isfinite(peak)
+        and peak > 0
+        and programmes.verdict(problem, peak * (1 + 1e-3)).state in ("held", "metastable")
+    ):
+        found.append(f"peak at {peak:.4g} times the load, but no escape beyond")
+    return found
+
+
+def _solution(problem: Problem, answer: Answer, seed: int) -> tuple[list[str], str]:
+    """A certified solution: inequality, energy, second order."""
+    u = displacement(problem.mesh, answer)
+    if u is None:
+        return [], "? vertices differ"
+    check = Check(problem, u)
+    found = check.wrongs()
+    if found:
+        return ["certified, but " + "; ".join(found)], ""
+    found += _energy(problem, u, answer)
+    assert answer.certificate is not None
+    said = answer.certificate["second_order"]
+    floor = Floor(problem)
+    if said == "undecided":
+        return found, "solution right, second order left open"
+    seen = examine(check, floor)
+    if seen.minimiser is False and said == "local minimiser":
+        found.append(f"called a local minimiser, but {seen.why}")
+    elif seen.minimiser is True and said == "not a minimiser":
+        found.append(f"called no minimiser, but {seen.why}")
+    elif said == "local minimiser" and seen.why not in ("not looked at", "the inside is not held"):
+        lowest = sampled_descent(check, floor, np.random.default_rng(seed))
+        if lowest < -1e-4:
+            found.append(f"called a local minimiser, but sampling descends by {lowest:.1e}")
+    return found, f"solution right, {said}"
+
+
+def _energy(problem: Problem, u: Array, answer: Answer) -> list[str]:
+    ours, flat = problem.energy(u), u.ravel()
+    size = float(np.abs(flat) @ (abs(problem.matrix) @ np.abs(flat)) + np.abs(problem.force) @ np.abs(flat))
+    elastic = float(flat @ (problem.matrix @ flat))
+    off = abs(ours - answer.energy)
+    if off > 1e-6 * (abs(ours) + elastic) + 1e-13 * size:
+        return [f"energy {answer.energy:.9g}, ours {ours:.9g}"]
+    return []
+
+
+def _unsolved(
+    problem: Problem, truth: programmes.Verdict, answer: Answer, seed: int, method: str
+) -> tuple[list[str], str]:
+    """Exit code 4: is there a solution?"""
+    if method not in ("auto", "branch"):
+        return [], f"? not solved by {method}, which is there for comparison"
+    u = displacement(problem.mesh, answer)
+    if u is not None and not Check(problem, u, 1e-7).wrongs():
+        return [f"{truth.state}, exit 4, but its own point is a solution ({answer.text[:100]}{_failed(answer)})"], ""
+    if truth.state == "held":
+        why = "C = {0}" if np.isinf(truth.growth) else f"margin {truth.growth:.2e}"
+        return [f"held ({why}), so a solution exists, and none was found: {answer.text[:100]}{_failed(answer)}"], ""
+    seen = find(problem, np.random.default_rng(seed))
+    if seen is not None:
+        return [f"{truth.state}, exit 4, and there is a solution: {seen} ({answer.text[:100]}{_failed(answer)})"], ""
+    return [], "? no solution found by either"
+
+
+def _failed(answer: Answer) -> str:
+    """The certificate's entries above its tolerance."""
+    entries = answer.certificate or {}
+    limit = float(entries.get("tolerance", 1e-8))
+    names = ("equilibrium", "penetration", "tension", "complementarity", "inclusion")
+    return "".join(f", {n} {entries[n]:.1e}" for n in names if n in entries and not entries[n] <= limit)

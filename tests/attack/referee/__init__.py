@@ -1,0 +1,1 @@
+"""The referee: an assembly, programmes and checks of its own, in numpy and scipy; nothing of the package."""

@@ -1,0 +1,115 @@
+"""Is a stationary point a local minimiser? One-sided derivatives first, then the curvature where they vanish."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from referee.coordinates import Coordinate, Floor
+from referee.laws import Law
+from referee.meshes import Array
+from referee.solution import Check
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What is known: ``minimiser`` is True, False or None (not decided), with the reason."""
+
+    minimiser: bool | None
+    why: str
+
+
+def examine(check: Check, floor: Floor) -> Finding:
+    """A solution's second order. Only for laws of one displacement, unsmoothed."""
+    p = check.problem
+    if not floor.ok or any(q.law.smoothing for q in p.laws) or len(floor.coordinates) > 200 or p.matrix.shape[0] > 900:
+        return Finding(None, "not looked at")
+    if not floor.regular:
+        return Finding(None, "the inside is not held")
+    free, weak, curvatures = [], [], []
+    for i, c in enumerate(floor.coordinates):
+        sides = [_side(check, c, s) for s in (-1.0, 1.0)]
+        slopes = [d for d, _ in sides]
+        if min(slopes) < -1.0:
+            return Finding(False, f"descent at {tuple(p.mesh.points[c.vertex])} along {tuple(c.direction)}")
+        if all(d > 1.0 for d in slopes):
+            continue
+        open_sides = [k for d, k in sides if d <= 1.0]
+        (free if max(slopes) <= 1.0 else weak).append(i)
+        curvatures.append((i, min(open_sides), max(open_sides)))
+    if not floor.coordinates:
+        return Finding(True, "linear")
+    s, *_ = floor.condensed
+    low, high = (s + np.diag(_diagonal(len(s), curvatures, k)) for k in (1, 2))
+    size = float(np.abs(s).max()) or 1.0
+    if _least(high, free) < -1e-7 * size:
+        return Finding(False, f"curvature {_least(high, free) / size:.1e} on the free coordinates")
+    if _least(low, sorted(free + weak)) > 1e-7 * size:
+        return Finding(True, "positive curvature wherever nothing blocks")
+    return Finding(None, "a tie")
+
+
+def _diagonal(n: int, curvatures: list[tuple[int, float, float]], which: int) -> Array:
+    found = np.zeros(n)
+    for entry in curvatures:
+        found[int(entry[0])] = entry[which]
+    return found
+
+
+def _least(matrix: Array, where: list[int]) -> float:
+    return float(np.linalg.eigvalsh(matrix[np.ix_(where, where)])[0]) if where else np.inf
+
+
+def _side(check: Check, c: Coordinate, sign: float) -> tuple[float, float]:
+    """The derivative of the energy to one side, in units of what rounding may be, and the law's curvature there."""
+    near, x = check.near(c.vertex), float(c.direction @ check.u[c.vertex])
+    if (sign > 0 and x >= c.upper - near) or (sign < 0 and x <= c.lower + near):
+        return np.inf, 0.0
+    slope = -sign * float(c.direction @ check.missing[c.vertex])
+    curvature = 0.0
+    for law, turn, weight in c.laws:
+        at = turn * x
+        kinks = law.breaks[np.abs(law.breaks - at) <= near]
+        at, to = (float(kinks[0]) if len(kinks) else at), sign * turn
+        traction = float(law.side(np.array([at]), "right" if to > 0 else "left")[0])
+        slope += weight * to * traction
+        curvature += weight * _slope(law, at, to)
+    tolerance = weight_of(check, c) * check.wrong
+    return slope / tolerance, curvature
+
+
+def weight_of(check: Check, c: Coordinate) -> float:
+    """The force that a body's traction exerts at a vertex."""
+    return float(check.weights[c.vertex] * check.traction[check.problem.labels[c.vertex]])
+
+
+def _slope(law: Law, at: float, to: float) -> float:
+    """One-sided slope of the traction."""
+    breaks, slopes = law.breaks, law.slopes
+    i = int(np.searchsorted(breaks, at, side="right" if to > 0 else "left"))
+    drop, length = law.decay
+    return float(slopes[i] - drop / length * np.exp(-abs(at) / length))
+
+
+def sampled_descent(check: Check, floor: Floor, rng: np.random.Generator) -> float:
+    """The lowest energy found nearby, relative to what tractions could do over the step; negative beyond -1e-5."""
+    s, _, lift, _ = floor.condensed
+    p, worst = check.problem, 0.0
+    residual = -(lift.T @ check.missing.ravel())
+    u0 = float(check.traction.max() * p.mesh.size / p.modulus)
+    for _ in range(40):
+        d = rng.standard_normal(len(s)) * (rng.random(len(s)) < rng.choice([0.1, 0.5, 1.0]))
+        step = d * u0 * 10.0 ** rng.uniform(-6, -2)
+        force, laws = 0.0, 0.0
+        for i, c in enumerate(floor.coordinates):
+            x = float(c.direction @ check.u[c.vertex])
+            step[i] = np.clip(x + step[i], c.lower, c.upper) - x if c.lower <= x <= c.upper else 0.0
+            for law, turn, weight in c.laws:
+                values = law.value(np.array([turn * (x + step[i]), turn * x]))
+                laws += weight * float(values[0] - values[1])
+            force += abs(step[i]) * weight_of(check, c)
+        change = float(step @ residual + step @ s @ step / 2) + laws
+        if np.abs(step).max(initial=0.0) > 1e-8 * u0:  # else it is rounding
+            worst = min(worst, change / force)
+    return worst
