@@ -2,7 +2,8 @@
 
 from ..laws.convex_parts import Directional
 from .analyse import analyse, load_factors
-from .kernel import FixedDirections, kernel, modes
+from .kernel import FixedDirections, kernel, modes, null_space
+from .least_energy import Rest, Sides, least_energy
 from .motions import Mode, RigidBody, describe, motion_at, rigid_fields
 from .reduction import ContactCone, Resistance, RigidProblem
 from .solvability import ExistenceState, LoadFactors, PaperConditions, Solvability, combine, combine_factors, undecided
@@ -17,8 +18,10 @@ __all__ = [
     "Mode",
     "PaperConditions",
     "Resistance",
+    "Rest",
     "RigidBody",
     "RigidProblem",
+    "Sides",
     "Solvability",
     "Thresholds",
     "analyse",
@@ -26,9 +29,11 @@ __all__ = [
     "combine_factors",
     "describe",
     "kernel",
+    "least_energy",
     "load_factors",
     "modes",
     "motion_at",
+    "null_space",
     "rigid_fields",
     "undecided",
 ]

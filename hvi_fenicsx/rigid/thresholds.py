@@ -22,6 +22,12 @@ class Thresholds:
         loose_gap: gap that will do where it shrinks no more.
         patience: linear programmes without a smaller gap after which it counts as shrinking no more.
         shrunk: what a gap must fall to, of the last smallest, to count as smaller.
+        at_edge: distance from the edge of a box, over its half width, within which a position is at the edge.
+        touching: distance from its bound, over the largest bound, at which a vertex rests on it.
+        independent: part of a support's row that must not be spanned by others.
+        rest_gap: energy by which a position at rest may be above the least one, over the largest work.
+        rest_rounds: linear programmes for a position at rest, at most; it is a start, so the best position will do.
+        farthest: a displacement of so many times p0 L / E0 is a body that slides away.
         solver_tolerances: of HiGHS, with and without presolve, the narrowest first; where rounding leaves it without a
             verdict, the next.
     """
@@ -36,6 +42,12 @@ class Thresholds:
     loose_gap: float = 1e-9
     patience: int = 4
     shrunk: float = 0.9
+    at_edge: float = 1e-9
+    touching: float = 1e-7
+    independent: float = 1e-6
+    rest_gap: float = 1e-10
+    rest_rounds: int = 200
+    farthest: float = 1e8
     solver_tolerances: tuple[tuple[bool, float], ...] = ((False, 1e-10), (True, 1e-10), (False, 1e-9), (True, 1e-9))
 
     def solver_options(self) -> list[dict[str, Any]]:

@@ -99,7 +99,7 @@ class Auto(BranchIteration):
 
         The bonds are as they are at rest, then unbroken.
         """
-        rested = at_rest(self.context, self._majorants, self.thresholds.rest_tolerance)
+        rested = at_rest(self.context, self._laws, self._majorants, self.thresholds.rest_tolerance)
         if rested is None:
             return
         unbroken = rested[0].duplicate()

@@ -1,10 +1,10 @@
 """The exact branch iteration: a DC (difference of convex) algorithm for the unsmoothed inequality.
 
-j = H - G; G is linearised at the current slips, the convex inequality that remains is solved (:mod:`.convex_step`), and
-so on (majorisation-minimisation; Tao and An 1997). The true energy falls at each step; for piecewise laws the iteration
-ends after finitely many changes of ξ ∈ ∂G. No Hessian is ever indefinite. Where G is curved (a smoothed law, slip
-weakening) it converges linearly, so a Newton step with the true curvature is tried and kept if the energy does not
-rise.
+j = H - G; G is linearised at the current slips, the inequality that remains is solved (:mod:`.convex_step`), and so on
+(majorisation-minimisation; Tao and An 1997). The true energy falls at each step. Of a signed slip that inequality is
+convex; of |u_t| in 3D only where ξ ≤ H'. If the law falls by jumps alone, the iteration ends after finitely many
+changes of ξ ∈ ∂G. Where G has slopes (a falling part, a smoothed law, slip weakening) it converges linearly, so a
+Newton step with the true curvature is tried and kept if the energy does not rise.
 """
 
 from __future__ import annotations
@@ -62,8 +62,8 @@ class BranchIteration(Method):
         """A stationary point. Collective.
 
         Args:
-            start: where to begin; by default the resting start, which holds every rigid motion. Any other start must
-                hold them too.
+            start: where to begin; by default the resting start. Another one must be near to where contact and laws
+                hold the bodies.
             branches: a displacement that says on which pieces of the laws to begin; by default those of the options,
                 which unless the user says otherwise are those of no slip, an unbroken bond, so that a vertex passes a
                 drop only when the load drives it there.

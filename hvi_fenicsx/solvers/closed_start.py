@@ -1,4 +1,4 @@
-"""The resting start, which holds every rigid motion: contact closed, laws at rest."""
+"""The resting start: contact closed, and laws at rest, or where they hold the motions that closed contact leaves."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ import numpy as np
 from petsc4py import PETSc
 
 from ..laws import Superpotential
-from ..system import existence
 from ..system.system import LawModel, System
-from ..typing import Array, Entities, Integers
+from ..typing import Array, Integers
+from . import rigid_position
 from .active_set import ActiveSetSolver
 from .law_models import TangentAtRest
 
@@ -21,32 +21,14 @@ def contact_dofs(system: System) -> Integers:
     return np.unique(np.concatenate([np.empty(0, np.int64), *normal]))
 
 
-def held_dofs(system: System, laws: Sequence[Superpotential]) -> Entities:
-    """Scalar dofs (local, owned, sorted) that the resting start holds. Collective.
-
-    These are normal displacements of contact parts; where they leave a rigid motion, also slips at which a law has a
-    convex kink.
-
-    Args:
-        system: the assembled problem.
-        laws: what is solved, by term.
-    """
-    dofs = [contact_dofs(system)]
-    loose = existence.moves_with_contact_closed(system.problem)
-    for term, law in zip(system.terms, laws, strict=True):
-        if loose and np.any(law.convex.kinks == 0.0):
-            touched = np.any(term.directions != 0, axis=1)
-            dofs.append(term.surface.dofs[touched])
-    return np.setdiff1d(np.concatenate(dofs), system.problem.fixed).astype(np.int32)
-
-
 def resting_start(
     solver: ActiveSetSolver, laws: Sequence[Superpotential], rtol: float | None = None
 ) -> tuple[PETSc.Vec, int]:
     """Contact closed, laws at rest: one linear solve in which no rigid motion is free. Collective.
 
-    From u = 0 no vertex counts as active, the reduced matrix is singular and the first step is 1e9;
-    the reactions of this start give the active set instead.
+    From u = 0 no vertex counts as active, the reduced matrix is singular and the first step is 1e9; the reactions of
+    this start give the active set instead. What closed contact leaves free, the laws hold, and they may do so only far
+    from rest (a dead zone, a support at a distance): there the bodies are moved first.
 
     Args:
         solver: of the linear solve.
@@ -58,17 +40,43 @@ def resting_start(
     """
     rtol = solver.thresholds.start_tolerance if rtol is None else rtol
     system = solver.system
+    x = _closed_contact(system)
+    models, kinks = _held_by_laws(solver, laws, x)
+    contact = contact_dofs(system)
+    held = np.setdiff1d(np.union1d(contact, kinks), system.problem.fixed).astype(np.int32)
+    linear = solver.newton_step(x, held, models, rtol).linear
+    if _push_onto_bounds(solver, x, contact, models):
+        linear += solver.newton_step(x, held, models, rtol).linear
+    return x, linear
+
+
+def _held_by_laws(
+    solver: ActiveSetSolver, laws: Sequence[Superpotential], x: PETSc.Vec
+) -> tuple[Sequence[LawModel], Integers]:
+    """Move x to where the laws hold what closed contact leaves free. Collective.
+
+    Returns:
+        What takes the place of the laws in the elastic step from there, by term, and the scalar dofs (local, owned) of
+        slips at convex kinks.
+    """
+    system, at_rest = solver.system, [TangentAtRest(law) for law in laws]
+    moves = rigid_position.motions(system, contact_closed=True)
+    if not moves:
+        return at_rest, np.empty(0, np.int64)
+    settled = rigid_position.settle(system, laws, x, moves) is not None
+    kinks = rigid_position.at_kinks(system, laws, x, solver.thresholds.touching)
+    return rigid_position.models(solver, laws, x) if settled else at_rest, kinks
+
+
+def _closed_contact(system: System) -> PETSc.Vec:
+    """A new x: contact closed, the prescribed values, and zero elsewhere. Collective."""
     x = system.load.duplicate()
     x.set(0.0)
     low, high = system.lower.array_r, system.upper.array_r
     contact = contact_dofs(system)
     x.array[contact] = closed(low[contact], high[contact])
     system.prescribe(x)
-    held, models = held_dofs(system, laws), [TangentAtRest(law) for law in laws]
-    linear = solver.newton_step(x, held, models, rtol).linear
-    if _push_onto_bounds(solver, x, contact, models):
-        linear += solver.newton_step(x, held, models, rtol).linear
-    return x, linear
+    return x
 
 
 def _push_onto_bounds(solver: ActiveSetSolver, x: PETSc.Vec, contact: Integers, models: Sequence[LawModel]) -> bool:

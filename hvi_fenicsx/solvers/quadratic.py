@@ -125,7 +125,8 @@ class ConvexProgramme(Method):
     def _from_rest(self, models: list[ExactLaw], counts: Counts) -> PETSc.Vec | None:
         """The displacement of bodies at rest on their supports; None where there is none."""
         rtol = min(self.options.thresholds.branch.rest_tolerance, self.options.tolerance)
-        rested = at_rest(self.context, lambda _: models, rtol)
+        laws = [term.law for term in self.system.terms]
+        rested = at_rest(self.context, laws, lambda _: models, rtol)
         if rested is None:
             return None
         counts.linear += rested[1]

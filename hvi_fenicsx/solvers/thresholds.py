@@ -114,8 +114,8 @@ class Thresholds:
             spring, is coarser than the norm.
         programme_attempts: ways to solve a convex quadratic programme, until one converges: PETSc's line search,
             Newton steps at most.
-        touching: distance from its bound, relative to the largest, at which a vertex rests on it.
-        independent: part of a support's row that must not be spanned by others.
+        touching: distance (of u0, or relative to a kink further away) from a convex kink within which a rigid position
+            is on it.
         foundation: stiffness per area, in units of E0/L, that keeps the preconditioner of ``tao`` regular where the
             body is free to move.
         evaluations: evaluations of the functions in ``condensed`` at most: the paper's limit of lsqnonlin's iterations.
@@ -133,7 +133,6 @@ class Thresholds:
     linear_solves: int = 3
     programme_attempts: Sequence[tuple[str, int]] = PROGRAMME_ATTEMPTS
     touching: float = 1e-7
-    independent: float = 1e-6
     foundation: float = 1e-3
     evaluations: int = 100
     least_decrease: float = 1e-10

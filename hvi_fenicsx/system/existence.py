@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from mpi4py import MPI
@@ -17,6 +17,7 @@ from ..rigid import (
     ContactCone,
     FixedDirections,
     LoadFactors,
+    Mode,
     Resistance,
     RigidBody,
     RigidProblem,
@@ -24,6 +25,8 @@ from ..rigid import (
     analyse,
     combine,
     kernel,
+    modes,
+    null_space,
     rigid_fields,
 )
 from ..typing import Array, Entities, Mask
@@ -84,14 +87,23 @@ def rigid_problems(problem: Problem, forces: Mapping[str, PETSc.Vec]) -> tuple[R
     return tuple(rigid_problem(problem, loads, body) for body in problem.bodies)
 
 
-def moves_with_contact_closed(problem: Problem) -> bool:
-    """Whether a rigid motion is left when every contact part is held in its normal direction. Collective."""
+def motions(problem: Problem, *, contact_closed: bool, without: Sequence[Mode] = ()) -> list[Mode]:
+    """The rigid motions that prescribed displacements leave. Collective.
 
-    def moves(body: RigidBody) -> bool:
-        held = (_normals(problem, body, b.surface) for b in problem.bounds)
-        return kernel(problem.domain.mesh.comm, body, (_prescribed(problem, body), *held)).shape[1] > 0
-
-    return any(moves(body) for body in problem.bodies)
+    Args:
+        problem: the problem.
+        contact_closed: only those that do not move the contact parts in their normal direction.
+        without: motions to which the others are orthogonal, as coefficients.
+    """
+    found: list[Mode] = []
+    for body in problem.bodies:
+        held = [_normals(problem, body, b.surface) for b in problem.bounds] if contact_closed else []
+        basis = kernel(problem.domain.mesh.comm, body, (_prescribed(problem, body), *held))
+        left_out = np.array([mode.coefficients for mode in without if mode.body == body.index])
+        if len(left_out):
+            basis = basis @ null_space(left_out @ basis)
+        found += modes(basis, body)
+    return found
 
 
 def loads_of_rigid_motions(problem: Problem, forces: Mapping[str, PETSc.Vec]) -> dict[str, PETSc.Vec]:

@@ -64,7 +64,7 @@ def test_a_body_that_rolls_comes_to_rest(case: tuple[str, float, float, float]) 
 def test_a_body_at_rest_is_borne_by_as_many_vertices_as_it_has_motions() -> None:
     """Their reactions push, and carry all of its weight."""
     prepared = prepare(rolling("none", 0.1, 0.02, 2e4), MPI.COMM_SELF)
-    system, rested = prepared.system, at_rest(context_of(prepared), lambda _: [], 1e-10)
+    system, rested = prepared.system, at_rest(context_of(prepared), [], lambda _: [], 1e-10)
     assert rested is not None
     residual = system.load.duplicate()
     system.residual(rested[0], residual, [])

@@ -1,0 +1,166 @@
+"""Bodies that a law holds, but only at a distance: at rest nothing resists their rigid motion."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import meshes
+import pytest
+from enumeration import Floor, polyline
+from scenes import STEEL, Table, block, displacement, energy, far, points, solved
+
+PRESS = {"on": "top", "traction": [0.0, -1e6]}
+PUSH = {"on": "left", "traction": [3e5, 0.0]}
+GUIDE = {"on": "left", "displacement": [0.0, "free"]}
+
+
+def graph(*points: tuple[float, float], one_sided: bool = False) -> Table:
+    law: Table = {"law": "graph", "points": [list(p) for p in points]}
+    return law | ({"one_sided": True} if one_sided else {})
+
+
+def at_distance(width: float, peak: float, rise: float = 0.0) -> Table:
+    """A support that the body meets at a distance, with a rise of some length or a jump."""
+    return graph((0, 0), (width, 0), (width + rise, peak), one_sided=True)
+
+
+DEAD = graph((0, 0), (1e-5, 0), (2e-5, 1e6))
+JUMP = graph((0, 0), (1e-5, 0), (1e-5, 1e6))
+SUPPORT = at_distance(1e-5, 1e7, 1e-5)
+
+
+def square(cells: int = 4, solver: Table | None = None, **boundary: Table) -> Table:
+    return {
+        "domain": {"shape": "rectangle", "size": [1.0, 1.0], "cells": [cells, cells]},
+        "material": dict(STEEL),
+        "boundary": boundary,
+        "solver": solver or {},
+    }
+
+
+def cube(solver: Table | None = None, **boundary: Table) -> Table:
+    return {
+        "domain": {"shape": "box", "size": [1.0, 1.0, 1.0], "cells": [2, 2, 2]},
+        "material": STEEL | {"model": "three_dimensional"},
+        "boundary": boundary,
+        "solver": solver or {},
+    }
+
+
+def floor(law: Table | None = None, **more: Any) -> Table:
+    return {"on": "bottom", "contact": {"gap": 0.0}} | ({"friction": law} if law else {}) | more
+
+
+def pushed(law: Table, **solver: Any) -> Table:
+    return square(4, solver, left=PUSH, top=PRESS, floor=floor(law))
+
+
+SPACE_PUSH = {"on": "left", "traction": [3e5, 1e5, 0.0]}
+SPACE_PRESS = {"on": "top", "traction": [0.0, 0.0, -1e6]}
+SCENES: dict[str, Table] = {
+    "friction": pushed(DEAD),
+    "broken": pushed(DEAD, start="broken"),
+    "resting": pushed(DEAD, start="resting"),
+    "from beyond": pushed(DEAD, start=["3e-5", "0"]),
+    "hardly stiff at rest": pushed(graph((0, 0), (1e-5, 1), (2e-5, 1e6))),
+    "a jump": pushed(JUMP),
+    "smoothed": pushed(DEAD, smoothing="quadratic", epsilon=0.01),
+    "smoothed everywhere": pushed(JUMP, smoothing="log_exp", epsilon=0.1),
+    "foundation": square(top=PRESS, wall=GUIDE, floor={"on": "bottom", "support": SUPPORT}),
+    "foundation that tilts": square(
+        top={"on": "top", "traction": [0.0, "-1e6*(0.5 + x)"]},
+        floor={"on": "bottom", "support": SUPPORT, "friction": DEAD},
+    ),
+    "in space": cube(left=SPACE_PUSH, top=SPACE_PRESS, floor=floor(DEAD)),
+    "in space, smoothed": cube(
+        {"smoothing": "quadratic", "epsilon": 0.1}, left=SPACE_PUSH, top=SPACE_PRESS, floor=floor(JUMP)
+    ),
+    "in space, turning": cube(
+        left={"on": "left", "traction": [0.0, "4e5*(y - 0.3)", 0.0]}, top=SPACE_PRESS, floor=floor(DEAD)
+    ),
+    "two parts": square(
+        left=PUSH,
+        top=PRESS,
+        floor=floor(DEAD),
+        right={"on": "right", "friction": graph((0, 0), (4e-6, 0), (9e-6, 5e5))},
+    ),
+    "three widths": square(
+        5,
+        left={"on": "left", "friction": graph((0, 0), (3e-5, 0), (5e-5, 2e6))},
+        top={"on": "top", "traction": [2e5, -1e6]},
+        right={"on": "right", "support": at_distance(3e-6, 3e6, 6e-6)},
+        floor={"on": "bottom", "support": SUPPORT},
+    ),
+    "a wall on both sides": square(
+        6,
+        left={"on": "left", "contact": {"lower": -3e-5, "upper": 3e-5}},
+        right={"on": "right", "traction": [-4e5, 0.0]},
+        top=PRESS,
+        floor={"on": "bottom", "support": SUPPORT},
+    ),
+    "gaps at both walls": square(
+        left={"on": "left", "contact": {"gap": 1e-5}},
+        right={"on": "right", "contact": {"gap": 2e-5}},
+        top={"on": "top", "traction": [3e5, -1e6]},
+        floor={"on": "bottom", "support": SUPPORT},
+    ),
+    "wide": pushed(graph((0, 0), (0.1, 0), (0.1001, 1e6))),
+    "narrow": pushed(graph((0, 0), (1e-8, 0), (2e-8, 1e6))),
+    "stairs": pushed(graph((0, 0), (1e-5, 0), (1e-5, 2e5), (3e-5, 2e5), (4e-5, 1e6))),
+    "hardly held": pushed(graph((0, 0), (1e-5, 0), (1.2e-5, 3.2e5))),
+    "a drop beyond": pushed(graph((0, 0), (1e-5, 0), (2e-5, 1e6), (3e-5, 1e6), (3e-5, 6e5))),
+    "Tresca at the side": square(
+        left=PUSH,
+        top=PRESS,
+        floor=floor(DEAD),
+        right={"on": "right", "friction": {"law": "tresca", "yield_traction": 2e5}},
+    ),
+    "supports on three sides": square(
+        left={"on": "left", "support": SUPPORT},
+        right={"on": "right", "support": at_distance(5e-6, 1e7, 4e-6)},
+        top={"on": "top", "traction": ["2e5*(x - 0.3)", -1e6]},
+        floor={"on": "bottom", "support": at_distance(2e-5, 4e6)},
+    ),
+    "glued at a distance": square(
+        top={"on": "top", "traction": ["1e5*(1 - 2*x)", 1e5]},
+        floor={"on": "bottom", "friction": DEAD, "adhesion": graph((0, 0), (1e-6, 0), (1e-5, 2e6))},
+    ),
+    "no push": square(left={"on": "left", "traction": [0.0, 0.0]}, top=PRESS, floor=floor(JUMP)),
+    "multigrid": pushed(DEAD, linear_solver="gamg"),
+}
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_what_is_held_beyond_a_dead_zone_is_solved(name: str) -> None:
+    found = solved(SCENES[name])
+    assert found.solvability.state == "held"
+    assert found.exit_code == 0, found.reason
+
+
+def test_two_bodies_each_beyond_its_own_dead_zone(tmp_path: Path) -> None:
+    path = meshes.make(tmp_path / "two.msh", meshes.BLOCKS.format(size=0.5, dimension=2, named=False))
+    table = square(
+        press={"on": ["top_a", "top_b"], "traction": [0.0, -1e6]},
+        push_a={"on": "left_a", "traction": [3e5, 0.0]},
+        push_b={"on": "right_b", "traction": [-2e5, 0.0]},
+        floor_a={"on": "bottom_a", "contact": {"gap": 0.0}, "friction": DEAD},
+        floor_b={"on": "bottom_b", "support": SUPPORT, "friction": graph((0, 0), (4e-5, 0), (4e-5, 1e6))},
+    )
+    found = solved(table | {"domain": {"shape": "file", "file": str(path)}})
+    assert found.solvability.state == "held"
+    assert found.exit_code == 0, found.reason
+
+
+@pytest.mark.parametrize(
+    "law", [[(0, 0), (1e-5, 0), (2e-5, 1e6)], [(0, 0), (1e-5, 0), (1e-5, 1e6)]], ids=["rise", "jump"]
+)
+def test_the_solution_is_the_only_stationary_point_there_is(law: list[tuple[float, float]]) -> None:
+    """By enumeration, without the package."""
+    wanted = Floor(2, 3e5, 1e6, polyline(law), wall=False).stationary()
+    assert len(wanted) == 1
+    found = solved(block(2, 3e5, 1e6, graph(*law)))
+    assert energy(found) == pytest.approx(wanted[0].energy, rel=1e-9)
+    order = points(found)[:, [0, 1]]
+    rows = (2 * order[:, 1] * 3 + 2 * order[:, 0]).round().astype(int)
+    assert far(displacement(found), wanted[0].u[rows]) < 1e-7
