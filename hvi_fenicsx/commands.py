@@ -19,12 +19,13 @@ from .accuracy.goal import AccuracyResult, Goal
 from .errors import ExitCode, HviError, InputError
 from .report.html import render
 from .report.pictures import draw as pictures
+from .results.output_folder import Existing
 from .results.write import write_record
 from .runtime import log
 from .runtime.mpi import on_root
 from .runtime.signals import Interrupt
 from .runtime.timing import Timer
-from .scene import Scene, dump_scene, read_scene
+from .scene import Scene, read_scene
 from .solution import Solution
 from .system import petsc_options
 from .workflow import Preparation, finish, prepare
@@ -69,10 +70,11 @@ def run(options: argparse.Namespace) -> int:
     scene = on_root(COMM, lambda: read_scene(options.scene, options.overrides))
     if goal is not None:
         quantities.find(goal.quantity)  # known only now: a plugin of the scene may define it
-    target = options.out or Path("results") / options.scene.stem
+    target = on_root(COMM, lambda: results.resolved(options.out or Path("results") / options.scene.stem))
     if options.resume and (code := on_root(COMM, lambda: _finished(target, scene, goal))) is not None:
         return code
-    folder = results.ResultFolder(COMM, target, "replace" if options.force or options.resume else "refuse")
+    existing: Existing = "replace" if options.force or options.resume else "refuse"
+    folder = results.ResultFolder(COMM, target, existing, inputs=[options.scene])
     given = {"command": options.given, "petsc": options.petsc}
     draw = not options.no_pictures
     try:
@@ -101,9 +103,15 @@ def _run(request: RunRequest) -> int:
             solution, reached = _solve(request, interrupt)
             record = _write(request, solution, reached)
         on_root(COMM, lambda: _finish(run_logs))
-        folder.commit()
-        _LOG.info(f"{folder.target}: {request.timer.total:.1f} s in all; open report.html there")
+        folder.commit(request.scene)
+        _say([*(f"warning: {text}" for text in folder.kept), on_root(COMM, lambda: _where(request))])
     return int(record["exit_code"])
+
+
+def _where(request: RunRequest) -> str:
+    """Where the result is, and with what to begin."""
+    first = f"; open {render.NAME} there" if (request.folder.target / render.NAME).is_file() else ""
+    return f"{request.folder.target}: {request.timer.total:.1f} s in all{first}"
 
 
 def _on_first_rank(make: Callable[[], H]) -> list[H]:
@@ -148,7 +156,8 @@ def _write(request: RunRequest, solution: Solution, reached: AccuracyResult | No
     """All files of the result but ``run.log``; the summary. Collective."""
     work, timer = request.folder.work, request.timer
     with timer("output"):
-        record = {**results.write(work, solution), **request.given, **(_accuracy(reached) if reached else {})}
+        found = results.write(work, solution, request.folder.target)
+        record = {**found, **request.given, **(_accuracy(reached) if reached else {})}
         if request.draw:
             on_root(COMM, lambda: _from_files("pictures", pictures.draw, work, record))
     with timer("output"):
@@ -175,13 +184,12 @@ def _from_files(what: str, make: Callable[[Path], object], folder: Path, record:
 
 def _finished(target: Path, scene: Scene, goal: Goal | None) -> int | None:
     """The exit code of a finished result of the same scene and goal; None where there is none. Rank 0 only."""
-    try:
-        same = (target / "scene.toml").read_text(encoding="utf-8") == dump_scene(scene)
-        record = json.loads((target / results.folder.MARK).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+    record, fault = results.finished.read(target, scene)
+    if fault is not None:
+        print(f"{target}: {fault}; the scene is run again")
+    if record is None or record["exit_code"] not in (ExitCode.CERTIFIED, ExitCode.NO_SOLUTION):
         return None
-    final = record["exit_code"] in (ExitCode.CERTIFIED, ExitCode.NO_SOLUTION)
-    if not (same and final and _same_goal(goal, record["accuracy"])):
+    if not _same_goal(goal, record["accuracy"]):
         return None
     print(f"{target}: finished already ({record['reason']})")
     return int(record["exit_code"])

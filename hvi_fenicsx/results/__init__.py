@@ -1,7 +1,9 @@
-"""A solution as files: by the contract, written aside and renamed, so that a result is whole or not there."""
+"""A solution as files: by the contract, written aside and moved in, so that a result is whole or not there."""
 
+from . import finished
 from .folder import ResultFolder
+from .output_folder import resolved
 from .summary import plain
 from .write import write
 
-__all__ = ["ResultFolder", "plain", "write"]
+__all__ = ["ResultFolder", "finished", "plain", "resolved", "write"]

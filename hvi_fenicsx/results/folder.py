@@ -1,26 +1,22 @@
-"""The result folder: refused when it holds a result, written aside, renamed when whole. Rank 0 moves files."""
+"""The folder of a run: refused when it holds a result, written aside, moved in when whole. Rank 0 moves files."""
 
 from __future__ import annotations
 
-import contextlib
 import os
-import shutil
-import signal
+from collections.abc import Iterable
 from pathlib import Path
-from typing import Literal
 
 from mpi4py import MPI
 
 from ..errors import InputError
+from ..runtime import manifest
 from ..runtime.mpi import on_root
-from ..runtime.signals import SIGNALS
+from ..scene import Scene
+from .output_folder import Existing, OutputFolder
 
-MARK = "summary.json"
-"""A folder with this file holds a finished result; it is always moved last."""
 _XML, _PNG = b"</VTKFile>", b"IEND\xaeB`\x82"
 _ENDS = {".pvd": _XML, ".vtu": _XML, ".pvtu": _XML, ".png": _PNG, ".html": b"</html>"}
 _LONGEST_END = 64
-Existing = Literal["refuse", "replace"]
 
 
 class ResultFolder:
@@ -30,69 +26,50 @@ class ResultFolder:
         comm: the ranks that write.
         target: where the result goes.
         existing: what to do with a result that is there already.
+        inputs: files that must not be replaced.
+
+    Attributes:
+        target: where the result goes, without symbolic links; the same on all ranks, as all attributes.
+        work: the hidden folder that the files are to be written into.
+        kept: what became of files of others that had the name of one of the result's, in words.
 
     Raises:
-        InputError: on all ranks alike: it holds a result or other files, or cannot be written. Collective.
+        InputError: on all ranks alike: it holds a result or other files, another run writes it, or it cannot be
+            written. Collective.
     """
 
-    def __init__(self, comm: MPI.Comm, target: Path, existing: Existing = "refuse") -> None:
-        self.comm, self.target = comm, Path(os.path.abspath(target))
-        self.work = self.target.parent / f".{self.target.name}.partial"
-        self._old = self.target.parent / f".{self.target.name}.old"
-        self._made: list[Path] = []
-        on_root(comm, lambda: self._open(existing))
+    def __init__(
+        self, comm: MPI.Comm, target: Path, existing: Existing = "refuse", inputs: Iterable[Path] = ()
+    ) -> None:
+        self.comm = comm
+        self.kept: tuple[str, ...] = ()
+        self._folder: OutputFolder | None = None
+        self.target, self.work = on_root(comm, lambda: self._open(target, existing, inputs))
 
-    def _open(self, existing: Existing) -> None:
-        try:
-            self._recover()
-            self._check(existing)
-            shutil.rmtree(self.work, ignore_errors=True)
-            self._made = [folder for folder in self.target.parents if not folder.exists()]
-            self.work.mkdir(parents=True)
-        except OSError as error:
-            raise InputError(
-                f"--out {self.target}: cannot be written: {error.strerror or error}; choose another folder"
-            ) from None
+    def _open(self, target: Path, existing: Existing, inputs: Iterable[Path]) -> tuple[Path, Path]:
+        self._folder = OutputFolder(target, "result")
+        self._folder.check(existing, inputs)
+        return self._folder.target, self._folder.stage()
 
-    def _recover(self) -> None:
-        """Put back a result that a killed run had moved aside."""
-        if self._old.exists():
-            if (self.target / MARK).exists():
-                shutil.rmtree(self._old)
-            else:
-                shutil.rmtree(self.target, ignore_errors=True)
-                os.replace(self._old, self.target)
-
-    def _check(self, existing: Existing) -> None:
-        if self.target.exists() and not self.target.is_dir():
-            raise InputError(f"--out {self.target}: is a file; choose a folder")
-        if not self.target.exists() or not any(self.target.iterdir()):
-            return
-        if not (self.target / MARK).exists():
-            raise InputError(f"--out {self.target}: holds other files; choose a new or empty folder")
-        if existing == "refuse":
-            raise InputError(
-                f"--out {self.target}: already holds a result; --force replaces it, --out DIR writes beside"
-            )
-
-    def commit(self) -> None:
+    def commit(self, scene: Scene) -> None:
         """Make the written files the result, all at once. Collective.
 
+        Args:
+            scene: what was solved.
+
         Raises:
-            InputError: the folder cannot be renamed, on all ranks alike.
+            InputError: the files are not whole or cannot be moved, on all ranks alike.
         """
         self.comm.barrier()
-        on_root(self.comm, self._commit)
+        self.kept = on_root(self.comm, lambda: self._commit(scene))
 
-    def _commit(self) -> None:
-        held = signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)
-        try:
+    def _commit(self, scene: Scene) -> tuple[str, ...]:
+        assert self._folder is not None
+        with self._folder.told():
             self._refuse_torn()
-            self._swap()
-        except OSError as error:
-            raise InputError(f"--out {self.target}: {error.strerror or error}; the result is in {self.work}") from None
-        finally:
-            signal.pthread_sigmask(signal.SIG_SETMASK, held)
+        kept = self._folder.move_in(inputs_of(scene, self.target))
+        self._folder.close()
+        return kept
 
     def _refuse_torn(self) -> None:
         """VTK's writers do not say that a disk was full."""
@@ -100,29 +77,21 @@ class ResultFolder:
             if not _is_whole(file):
                 raise InputError(f"--out {self.target}: {file.name} could not be written whole; is the disk full?")
 
-    def _swap(self) -> None:
-        if os.path.ismount(self.target):
-            self._move_files()
-            return
-        if self.target.exists():
-            os.replace(self.target, self._old)
-        os.replace(self.work, self.target)
-        shutil.rmtree(self._old, ignore_errors=True)
-
-    def _move_files(self) -> None:
-        """Into a mount point, which cannot be renamed: the mark goes first and comes last."""
-        (self.target / MARK).unlink(missing_ok=True)
-        for file in sorted(self.work.iterdir(), key=lambda f: f.name == MARK):
-            shutil.move(file, self.target / file.name)
-        self.work.rmdir()
-
     def discard(self) -> None:
         """Remove what was written, with the folders around it that were made for it. Rank 0 acts; not collective."""
-        if self.comm.rank == 0:
-            shutil.rmtree(self.work, ignore_errors=True)
-            for folder in self._made:
-                with contextlib.suppress(OSError):  # not empty: something else is there by now
-                    folder.rmdir()
+        if self._folder is not None:
+            self._folder.close()
+
+
+def inputs_of(scene: Scene, folder: Path) -> dict[str, str]:
+    """SHA-256 of the files that a scene names.
+
+    Args:
+        scene: the scene.
+        folder: from which their paths are given.
+    """
+    files = [*scene.domain.files(), *map(Path, scene.plugins or ())]
+    return {os.path.relpath(file, folder): manifest.digest(file) or "" for file in files}
 
 
 def _is_whole(file: Path) -> bool:

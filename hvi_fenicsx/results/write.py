@@ -17,7 +17,7 @@ from . import boundary_table, contact_table, gathering, vtk_fields
 from .summary import summary
 
 
-def write(folder: Path, solution: Solution) -> dict[str, Any]:
+def write(folder: Path, solution: Solution, target: Path) -> dict[str, Any]:
     """Write the fields (all ranks), the tables and the arrays (rank 0). Collective.
 
     ``summary.json`` is written by :func:`write_record`, once the pictures are there too.
@@ -25,6 +25,7 @@ def write(folder: Path, solution: Solution) -> dict[str, Any]:
     Args:
         folder: where to.
         solution: what was found.
+        target: the folder that the files will be in, from which the scene's paths are given.
 
     Returns:
         The summary, on all ranks.
@@ -44,7 +45,7 @@ def write(folder: Path, solution: Solution) -> dict[str, Any]:
     on_root(comm, lambda: boundary_table.write_csv(folder / "boundary.csv", points, problem.scales.dimension))
     arrays = gathering.solution_arrays(solution, stress)
     on_root(comm, lambda: _write_arrays(folder, arrays))
-    on_root(comm, lambda: _text(folder / "scene.toml", dump_scene(solution.scene)))
+    on_root(comm, lambda: _text(folder / "scene.toml", dump_scene(solution.scene, target)))
     return summary(solution)
 
 

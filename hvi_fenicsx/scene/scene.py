@@ -2,11 +2,21 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, Self
 
-from pydantic import AfterValidator, BeforeValidator, Field, SerializeAsAny, ValidationInfo, model_validator
+from pydantic import (
+    AfterValidator,
+    BeforeValidator,
+    Field,
+    SerializationInfo,
+    SerializeAsAny,
+    ValidationInfo,
+    field_serializer,
+    model_validator,
+)
 from pydantic_core import PydanticCustomError
 
 from ..effects import Effect, Place
@@ -82,6 +92,14 @@ class Scene(Table):
             return {**data, "plugins": plugins.load(data["plugins"], (info.context or {}).get("folder", "."))}
         except PydanticCustomError as error:
             raise validation_error([Mistake(("plugins",), error.message())]) from None
+
+    @field_serializer("plugins")
+    def _written_plugins(self, paths: tuple[str, ...] | None, info: SerializationInfo) -> list[str] | None:
+        """Their paths from the folder that the scene is written into; absolute where that is not known."""
+        folder = (info.context or {}).get("folder")
+        if paths is None:
+            return None
+        return [path if folder is None else os.path.relpath(path, folder) for path in paths]
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickled as its tables: another rank must load the plugins before it can know their classes."""

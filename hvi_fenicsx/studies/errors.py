@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+
 from ..errors import ExitCode, HviError
 
 
@@ -11,6 +13,12 @@ class NoReferenceError(HviError):
     def __init__(self, message: str, code: int) -> None:
         super().__init__(message)
         self.exit_code = code
+
+
+class NotStoredError(HviError):
+    """A point's files cannot be written: the study ends, and the point is not finished."""
+
+    exit_code = os.EX_IOERR
 
 
 class StudyInterruptedError(HviError):

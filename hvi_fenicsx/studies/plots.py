@@ -70,7 +70,7 @@ def study_picture(name: str, *, caption: str) -> Callable[[Maker], Maker]:
 
 
 def draw(study: Study, folder: Path) -> None:
-    """Draw all that the study has values for; pictures of an earlier one that it has none for are removed.
+    """Draw all that the study has values for.
 
     Args:
         study: what was found.
@@ -78,9 +78,7 @@ def draw(study: Study, folder: Path) -> None:
     """
     for name, picture in PICTURES.items():
         fig = picture.make(study)
-        if fig is None:
-            (folder / f"{name}.png").unlink(missing_ok=True)
-        else:
+        if fig is not None:
             save(fig, folder / f"{name}.png", picture.caption)
 
 

@@ -2,7 +2,8 @@
 
 Solved once to fill caches and to read the peak memory off, then again until the median of its cost is steady. Writes
 RESULT.npz (the solution), then RESULT.json (what it cost), each whole or not at all; with ``--stiffness`` also
-RESULT.stiffness.npz. Exit code 0 whatever the outcome of the solve; 2 for a scene that does not fit its mesh.
+RESULT.stiffness.npz. Exit code 0 whatever the outcome of the solve; 2 for a scene that does not fit its mesh; that of
+:class:`.errors.NotStoredError` where its files cannot be written.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from __future__ import annotations
 import argparse
 import gc
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -19,8 +21,8 @@ from scipy import sparse
 from ..accuracy.adaptive import AdaptiveSolver
 from ..accuracy.control import solve_to_goal
 from ..accuracy.goal import Goal
-from ..errors import HviError
-from ..report.solution_arrays import save
+from ..errors import HviError, InputError
+from ..report.solution_arrays import SolutionArrays, save
 from ..results.gathering import solution_arrays
 from ..results.summary import summary
 from ..runtime.mpi import ended_together, on_root
@@ -29,6 +31,7 @@ from ..scene import Scene, read_scene
 from ..solution import Solution
 from ..workflow import finish, prepare
 from . import cost
+from .errors import NotStoredError
 from .solution_fields import width
 from .stiffness import stiffness
 from .store import write_json
@@ -67,7 +70,7 @@ def _point(options: argparse.Namespace) -> None:
     if converged:
         times = _repeated(scene, options, times)
     record["cost"] = cost.cost_record(times)
-    on_root(COMM, lambda: write_json(options.result.with_suffix(".json"), record))
+    _store(lambda: write_json(options.result.with_suffix(".json"), record))
 
 
 def _solved(scene: Scene, options: argparse.Namespace, timer: Timer) -> Solution:
@@ -87,9 +90,27 @@ def _keep(options: argparse.Namespace, solution: Solution, record: dict[str, Any
     matrix = stiffness(solution) if options.stiffness else None
     if found is not None:
         record["h"] = width(found.points, found.cells)
-        save(options.result.with_suffix(".npz"), found)
+    _store(lambda: _save(options.result, found, matrix))
+
+
+def _save(result: Path, found: SolutionArrays | None, matrix: sparse.csr_array | None) -> None:
+    """Rank 0 only."""
+    if found is not None:
+        save(result.with_suffix(".npz"), found)
     if matrix is not None:
-        sparse.save_npz(options.result.with_suffix(".stiffness.npz"), matrix, compressed=False)
+        sparse.save_npz(result.with_suffix(".stiffness.npz"), matrix, compressed=False)
+
+
+def _store(write: Callable[[], None]) -> None:
+    """Write files on rank 0. Collective.
+
+    Raises:
+        NotStoredError: they cannot be written, on all ranks alike.
+    """
+    try:
+        on_root(COMM, write)
+    except InputError as error:
+        raise NotStoredError(str(error)) from None
 
 
 def _repeated(scene: Scene, options: argparse.Namespace, times: list[dict[str, float]]) -> list[dict[str, float]]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import os
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -11,6 +10,9 @@ from typing import Any
 
 from ..errors import ExitCode
 from ..report.html import study_page
+from ..results.folder import inputs_of
+from ..results.output_folder import Existing, OutputFolder
+from ..runtime.manifest import MARKS
 from ..runtime.versions import __version__, versions
 from ..scene import read_scene
 from . import axes, plots, table
@@ -21,9 +23,11 @@ from .progress import StudyProgress
 from .runner import PointRun, Runner, watched
 from .sentences import headlines, percent, sentences, share_of_epsilon
 from .setting import Setting
-from .store import MARK, Existing, Store, write_json, write_text
+from .store import Store, write_json, write_text
 from .study import Study, evaluate
 from .thresholds import DEFAULT
+
+MARK = MARKS["study"]
 
 
 def run(options: argparse.Namespace) -> int:
@@ -36,19 +40,32 @@ def run(options: argparse.Namespace) -> int:
     """
     scene = read_scene(options.scene, options.overrides)
     plan = make(scene, [axes.read(text) for text in options.axis])
-    folder = Path(os.path.abspath(options.out or Path("results") / f"{options.scene.stem}-study"))
-    store = Store(folder, options.np or 1)
-    store.open(_existing(options))
-    with watched(folder):
-        with StudyProgress() as progress:
-            repeat, limit = options.repeat or DEFAULT.repetitions, options.limit or DEFAULT.time_limit
-            _run(plan, Runner(store, repeat, limit, progress))
-        study = evaluate(plan, store)
-        plots.draw(study, folder)
-        write(study, folder)
-        study_page.write(folder)
-    print("\n".join([*_heading(study), *said(study), f"{folder}: {MARK}, study.csv, pictures"]))
+    folder = OutputFolder(options.out or Path("results") / f"{options.scene.stem}-study", "study")
+    try:
+        folder.check(_existing(options), [options.scene])
+        if options.force:
+            folder.clear()
+        with watched(folder.target), folder.told():
+            _fill(folder, plan, options)
+    finally:
+        folder.close()
     return 0
+
+
+def _fill(folder: OutputFolder, plan: Plan, options: argparse.Namespace) -> None:
+    """Run the points, measure them, write and tell what they say."""
+    store = Store(folder.target, options.np or 1)
+    store.open()
+    with StudyProgress() as progress:
+        repeat, limit = options.repeat or DEFAULT.repetitions, options.limit or DEFAULT.time_limit
+        _run(plan, Runner(store, repeat, limit, progress))
+    study, work = evaluate(plan, store), folder.stage()
+    plots.draw(study, work)
+    write(study, work)
+    study_page.write(work)
+    kept = folder.move_in(inputs_of(plan.own.scene, folder.target), store.listed())
+    warnings = [f"warning: {text}" for text in kept]
+    print("\n".join([*_heading(study), *said(study), *warnings, f"{folder.target}: {MARK}, study.csv, pictures"]))
 
 
 def _existing(options: argparse.Namespace) -> Existing:

@@ -12,14 +12,17 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from types import FrameType
 
-from ..errors import ExitCode
+from ..errors import ExitCode, InputError
 from ..runtime import processes
 from ..scene import dump_scene
-from .errors import StudyInterruptedError
+from .errors import NotStoredError, StudyInterruptedError
 from .progress import StudyProgress
 from .setting import Setting
 from .store import Store, is_whole, write_json, write_text
 from .thresholds import DEFAULT, Thresholds
+
+_OWN_FAULTS = (signal.SIGSEGV, signal.SIGBUS, signal.SIGABRT, signal.SIGFPE, signal.SIGILL)
+"""Signals that a process raises itself when it crashes."""
 
 
 @contextlib.contextmanager
@@ -100,7 +103,7 @@ class Runner:
     def finished(self, one: PointRun) -> bool:
         """Whether a point is in the store, whole and with all that is wanted, or was given up after no less time."""
         record = self.store.record(one.setting)
-        if record is None or record.get("limit", self._limit(one)) < self._limit(one):
+        if record is None or record.get("killed") or record.get("limit", self._limit(one)) < self._limit(one):
             return False
         if "limit" in record:
             return True
@@ -120,6 +123,7 @@ class Runner:
 
     def _one(self, one: PointRun) -> None:
         path, began = self.store.path(one.setting), self.progress.seconds
+        self.store.announce(one.setting)
         path.with_suffix(".json").unlink(missing_ok=True)
         write_text(path.with_suffix(".toml"), dump_scene(one.setting.scene))
         child = subprocess.Popen(
@@ -129,6 +133,7 @@ class Runner:
             stderr=subprocess.PIPE,
             text=True,
             start_new_session=True,
+            preexec_fn=processes.die_with_parent,
         )
         try:
             with _ended(child, path, self.thresholds.kill_after):
@@ -146,9 +151,22 @@ class Runner:
         return [*arguments, *([f"--accuracy={one.setting.accuracy}"] if one.setting.accuracy is not None else [])]
 
     def _failed(self, path: Path, code: int, errors: str) -> None:
-        """A point that ended without a result is a result: it is listed with its reason, and not run again."""
+        """A point that ended without a result is a result: it is listed with its reason, and not run again.
+
+        One that was killed from outside is listed too, but not finished.
+
+        Raises:
+            InputError: its files could not be written: nor can those of the others.
+        """
         reason = (errors.strip().splitlines() or [f"ended with code {code}"])[-1]
-        write_json(path.with_suffix(".json"), {"converged": False, "reason": reason, "exit_code": code, "cost": None})
+        if code == NotStoredError.exit_code:
+            raise InputError(
+                f"--out {self.store.folder}: {reason}; finished points are kept, --resume goes on from there"
+            )
+        record = {"converged": False, "reason": reason, "exit_code": code, "cost": None}
+        if (killer := _killer(code)) is not None:
+            record |= {"reason": f"killed from outside ({killer.name}); --resume runs it again", "killed": True}
+        write_json(path.with_suffix(".json"), record)
 
     def _given_up(self, path: Path, limit: float) -> None:
         """A method that hangs must not hang a study: the point is run again only with a longer limit."""
@@ -161,6 +179,13 @@ class Runner:
             "limit": limit,
         }
         write_json(path.with_suffix(".json"), record)
+
+
+def _killer(code: int) -> signal.Signals | None:
+    """The signal that ended a process (or, by its own exit code, mpirun's ranks), if it came from outside."""
+    number = -code if code < 0 else code - 128
+    found = next((known for known in signal.Signals if known == number), None)
+    return None if found in _OWN_FAULTS else found
 
 
 def _python(ranks: int) -> list[str]:

@@ -1,4 +1,4 @@
-"""The folder of a study: finished points by the scene that they solve, each file whole or not there.
+"""The points of a study in its folder: finished ones by the scene that they solve, each file whole or not there.
 
 A point's name is a digest of its scene, the mesh file's content, the number of ranks and the program's version; so a
 study that is resumed, or widened by further axes, finds what it has.
@@ -9,29 +9,29 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-import shutil
 import zipfile
 import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
-from ..errors import InputError
+from ..runtime import manifest
+from ..runtime.manifest import Manifest
 from ..runtime.versions import __version__
 from ..scene import dump_scene
 from .setting import Setting
 
-MARK = "study.json"
 POINTS = "points"
-Existing = Literal["refuse", "replace", "resume"]
+_ENDINGS = (".toml", ".json", ".npz", ".stiffness.npz")
+"""How the names of a point's files end."""
 _RECORDED = {"converged", "reason", "exit_code", "cost"}
 """What every record has, also that of a point that failed."""
 
 
 @dataclass(frozen=True)
 class Store:
-    """The folder of a study.
+    """The points in the folder of a study.
 
     Attributes:
         folder: the folder.
@@ -68,40 +68,29 @@ class Store:
             return None
         return found if isinstance(found, dict) and found.keys() >= _RECORDED else None
 
-    def open(self, existing: Existing) -> None:
-        """Make the folder ready.
+    def open(self) -> None:
+        """Make the folder ready for points.
 
         Raises:
-            InputError: it holds a study and that is to be refused, or other files, or cannot be written.
+            OSError: it cannot be written.
         """
-        try:
-            if self.folder.exists():
-                self._check(existing)
-            if existing == "replace":
-                self._clear()
-            (self.folder / POINTS).mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise InputError(
-                f"--out {self.folder}: cannot be written: {error.strerror or error}; choose another folder"
-            ) from None
+        (self.folder / POINTS).mkdir(parents=True, exist_ok=True)
+        if manifest.read(self.folder) is None:
+            manifest.write(self.folder, Manifest(kind="study", files={}))
 
-    def _check(self, existing: Existing) -> None:
-        if not self.folder.is_dir():
-            raise InputError(f"--out {self.folder}: is a file; choose a folder")
-        inside = {entry.name for entry in self.folder.iterdir()}
-        if inside and not inside & {MARK, POINTS}:
-            raise InputError(f"--out {self.folder}: holds other files; choose a new or empty folder")
-        if inside and existing == "refuse":
-            state = "already holds a study" if MARK in inside else "holds an unfinished study"
-            raise InputError(
-                f"--out {self.folder}: {state}; --resume keeps its finished points, --force begins anew, "
-                "--out DIR writes beside"
-            )
+    def announce(self, setting: Setting) -> None:
+        """List a point's files as the program's own, before they are there.
 
-    def _clear(self) -> None:
-        shutil.rmtree(self.folder / POINTS, ignore_errors=True)
-        for file in (MARK, "study.csv", *(p.name for p in self.folder.glob("*.png"))):
-            (self.folder / file).unlink(missing_ok=True)
+        Raises:
+            OSError: the list cannot be written.
+        """
+        names = [f"{POINTS}/{self.name(setting)}{ending}" for ending in _ENDINGS]
+        manifest.add(self.folder, names, changing=True)
+
+    def listed(self) -> dict[str, str | None]:
+        """The files of all points, as a manifest lists them."""
+        found = manifest.read(self.folder)
+        return {name: known for name, known in (found.files if found else {}).items() if name.startswith(f"{POINTS}/")}
 
 
 def is_whole(archive: Path) -> bool:

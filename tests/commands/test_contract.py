@@ -278,17 +278,6 @@ def test_an_interrupted_run_writes_what_it_has_and_says_so(
     assert len(contact(tmp_path / "r")) == 201
 
 
-def test_a_result_moved_aside_by_a_killed_run_comes_back(scene: Path, tmp_path: Path) -> None:
-    """Killed between the two renames of --force: the old result stands beside, under another name."""
-    out = tmp_path / "r"
-    assert hvi("run", scene, "--out", out, "--no-pictures").returncode == 0
-    out.rename(tmp_path / ".r.old")
-    done = hvi("run", scene, "--out", out, "--no-pictures")
-    assert done.returncode == 2
-    assert "already holds a result" in done.stderr
-    assert (out / "summary.json").exists()
-
-
 def test_values_are_overridden_in_order_and_wrong_ones_are_named(scene: Path, tmp_path: Path) -> None:
     done = hvi(
         *("run", scene, "--out", tmp_path / "r", "--no-pictures"),

@@ -15,6 +15,9 @@ import pytest
 from runs import command, contact, hvi, summary, write_scene
 from scenes import model, quadratic_linear
 
+from hvi_fenicsx.results.output_folder import OutputFolder
+from hvi_fenicsx.runtime import manifest
+
 pytestmark = pytest.mark.long
 
 ROUNDS, KILLS = 20, 5
@@ -84,7 +87,12 @@ def children(pid: int) -> list[int]:
 
 
 def assert_whole(out: Path) -> None:
-    """Every file is there and speaks of one scene, whichever it is."""
+    """Every file is there and speaks of one scene, after a kill between the moves once the rest is moved."""
+    if not (out / "summary.json").exists():
+        OutputFolder(out, "result").close()
+    found = manifest.read(out)
+    assert found is not None
+    assert found.damaged(out) is None
     record = summary(out)
     title = record["scene"]
     assert tomllib.loads((out / "scene.toml").read_text(encoding="utf-8"))["title"] == title

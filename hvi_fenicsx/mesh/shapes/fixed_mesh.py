@@ -8,7 +8,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
 
-from pydantic import BeforeValidator, Field, PlainSerializer, ValidationInfo
+from pydantic import BeforeValidator, Field, PlainSerializer, SerializationInfo, ValidationInfo
 
 from ...errors import InputError
 from ...schema import Positive, refusal
@@ -75,6 +75,12 @@ def _mesh_path(value: Any, info: ValidationInfo) -> Path:
     return path
 
 
+def _written_path(path: Path, info: SerializationInfo) -> str:
+    """The path from the folder that the scene is written into; absolute where that is not known."""
+    folder = (info.context or {}).get("folder")
+    return str(path) if folder is None else os.path.relpath(path, folder)
+
+
 class MeshFile(FixedMesh):
     """A gmsh file. Its physical groups are the sides and regions that the scene can name.
 
@@ -87,7 +93,7 @@ class MeshFile(FixedMesh):
 
     shape: Literal["file"] = "file"
     """the mesh comes from a gmsh file"""
-    file: Annotated[Path, BeforeValidator(_mesh_path), PlainSerializer(str)]
+    file: Annotated[Path, BeforeValidator(_mesh_path), PlainSerializer(_written_path)]
     """the gmsh file, relative to the scene file: .msh, or .geo, which gmsh meshes first; a .geo that runs programs or
     writes files is refused"""
     scale: Positive = 1.0

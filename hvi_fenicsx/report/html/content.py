@@ -10,7 +10,7 @@ from typing import Any
 
 from .. import png_file
 from ..reader import Result
-from . import numbers, scene_text, verdict
+from . import numbers, paths, scene_text, verdict
 from .certificate_text import certificate, estimate
 
 _FIRST = ("escape", "scene", "body", "stress")
@@ -66,14 +66,14 @@ def picture(path: Path) -> dict[str, Any]:
 
 def reproduce(result: Result) -> dict[str, Any]:
     """The command that gave the result, the one that gives it again, the scene and the versions."""
-    summary, text = result.summary, (result.folder / "scene.toml").read_text(encoding="utf-8")
-    mesh = (result.scene.get("domain") or {}).get("file")
+    summary = result.summary
+    text = paths.beside((result.folder / "scene.toml").read_text(encoding="utf-8"), result.scene)
     return {
-        "given": summary.get("command"),
+        "given": paths.command(str(summary.get("command") or "")),
         "again": shlex.join(_again(summary)),
         "scene": text,
         "download": f"data:application/toml;base64,{base64.b64encode(text.encode()).decode()}",
-        "mesh": mesh,
+        "files": [Path(file).name for file in paths.files(result.scene)],
         "versions": versions(summary.get("versions") or {}),
     }
 

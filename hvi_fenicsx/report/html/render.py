@@ -7,6 +7,7 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ...runtime import manifest
 from ..errors import PageError
 from ..reader import read
 
@@ -25,7 +26,12 @@ def write(folder: Path) -> Path:
     """
     from .content import content
 
-    return render("run.html.j2", content(read(folder)), folder / NAME)
+    page = render("run.html.j2", content(read(folder)), folder / NAME)
+    try:
+        manifest.add(folder, [NAME])
+    except OSError as error:
+        raise PageError(f"{folder / manifest.NAME}: cannot be written: {error.strerror or error}") from None
+    return page
 
 
 def render(template: str, values: dict[str, Any], path: Path) -> Path:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from pathlib import PurePath
 from typing import Any
 
 from ..reader import Result
@@ -13,7 +14,10 @@ _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 def body(result: Result) -> Iterator[tuple[str, str]]:
     """The body's shape and what it is made of, each with a name."""
-    yield "body", _entries(result.scene.get("domain") or {})
+    domain = dict(result.scene.get("domain") or {})
+    if "file" in domain:
+        domain["file"] = PurePath(str(domain["file"])).name
+    yield "body", _entries(domain)
     for name, table in _named(result.scene.get("material") or {}):
         yield f"material{name}", _entries(table)
     for name, table in _named(result.scene.get("body") or {}):

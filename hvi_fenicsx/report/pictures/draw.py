@@ -13,7 +13,7 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-from ...runtime import processes
+from ...runtime import manifest, processes
 from ..errors import PictureError
 
 UNFINISHED = ".part.png"
@@ -50,6 +50,10 @@ def draw(folder: Path, *, timeout: float = 120) -> list[Path]:
             raise PictureError(f"not drawn within {timeout:g} s; {' '.join(command)} tries again") from None
     if child.returncode != 0:
         raise PictureError(_message(errors, child.returncode))
+    try:
+        manifest.add(Path(folder), names.splitlines())
+    except OSError as error:
+        raise PictureError(f"{folder}/{manifest.NAME}: cannot be written: {error.strerror or error}") from None
     return [Path(folder) / name for name in names.splitlines()]
 
 

@@ -1,0 +1,264 @@
+"""A folder that the program fills: one process at a time, files moved in when all are whole, no other file touched.
+
+The files are written into a hidden folder of their own beside it (in it, where it is a mount point). A new folder is
+that one, renamed. In a folder that exists the program's earlier files make room: the mark goes first, it and the
+manifest come last. A process that is killed between leaves the hidden folder with its manifest; the next one goes on
+from there.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import glob
+import itertools
+import os
+import re
+import secrets
+import shutil
+import signal
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import Literal
+
+from ..errors import InputError
+from ..runtime import manifest
+from ..runtime.folder_lock import FolderLock
+from ..runtime.manifest import MARKS, Kind, Manifest
+from ..runtime.signals import SIGNALS
+
+Existing = Literal["refuse", "replace", "resume"]
+_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+_WAYS = {"result": "--force replaces it", "study": "--resume keeps its finished points, --force begins anew"}
+"""What a user may do with a folder that is there, by its kind."""
+
+
+class OutputFolder:
+    """A folder that this process alone writes, from its making to :meth:`close`. Not collective.
+
+    Args:
+        target: the folder; a symbolic link stands for what it points to.
+        kind: what goes into it.
+
+    Raises:
+        InputError: another process writes it, or it cannot be written.
+    """
+
+    def __init__(self, target: Path, kind: Kind) -> None:
+        self.kind, self.target = kind, resolved(target)
+        self.work: Path | None = None
+        self._left = False
+        with self.told():
+            self._made = [folder for folder in self.target.parents if not folder.exists()]
+            self.target.parent.mkdir(parents=True, exist_ok=True)
+            self._lock = FolderLock(self.target)
+            with self._closed_on_error():
+                self._recover()
+
+    def _recover(self) -> None:
+        """Go on where a killed process was: a whole result is moved in, another one removed."""
+        name = self._lock.left or ""
+        if not re.fullmatch(re.escape(f".{self.target.name}.hvi-") + "[0-9a-f]{8}", name):
+            return
+        for left in (self.target.parent / name, self.target / name):
+            if left.is_dir() and not left.is_symlink():
+                self._finish(left)
+
+    def _finish(self, left: Path) -> None:
+        if manifest.read(left) is not None:
+            move_in(left, self.target)
+        else:
+            shutil.rmtree(left)
+
+    def check(self, existing: Existing, inputs: Iterable[Path] = ()) -> None:
+        """Refuse a folder that may not be written.
+
+        Args:
+            existing: what to do with a folder of this kind that is there already.
+            inputs: files that must not be replaced.
+
+        Raises:
+            InputError: it holds other files, or such a folder; it would replace an input.
+        """
+        with self.told(), self._closed_on_error():
+            if not self.target.exists():
+                return
+            if not self.target.is_dir():
+                raise self._refused("is a file; choose a folder")
+            if any(self.target.iterdir()):
+                self._check_files(existing, inputs)
+
+    def _check_files(self, existing: Existing, inputs: Iterable[Path]) -> None:
+        found = manifest.read(self.target)
+        if found is None:
+            text = f"holds other files, and no {manifest.NAME} of this program; choose a new or empty folder"
+            raise self._refused(text)
+        if found.kind != self.kind:
+            raise self._refused(f"holds a {found.kind}, and this is a {self.kind}; choose a new or empty folder")
+        if existing == "refuse":
+            state = "already holds a" if (self.target / MARKS[self.kind]).exists() else "holds an unfinished"
+            raise self._refused(f"{state} {self.kind}; {_WAYS[self.kind]}, --out DIR writes beside")
+        owned = {self.target / name for name in found.owned}
+        for file in inputs:
+            if Path(os.path.realpath(file)) in owned:
+                raise self._refused(f"{file}, which is to be read, would be replaced; choose another folder")
+
+    def stage(self) -> Path:
+        """Make the hidden folder that the files are to be written into.
+
+        Raises:
+            InputError: it cannot be made.
+        """
+        name = f".{self.target.name}.hvi-{secrets.token_hex(4)}"
+        work = (self.target if os.path.ismount(self.target) else self.target.parent) / name
+        with self.told(), self._closed_on_error():
+            self._lock.note(name)
+            work.mkdir()
+        self.work = work
+        return work
+
+    def move_in(self, inputs: Mapping[str, str], other: Mapping[str, str | None] | None = None) -> tuple[str, ...]:
+        """Make the written files the folder's, in the place of those that the program wrote before.
+
+        Args:
+            inputs: SHA-256 of the files that the scene named, by their name there.
+            other: files in the folder that stay, as a manifest lists them.
+
+        Returns:
+            What became of files of others that had the name of one of these, in words.
+
+        Raises:
+            InputError: files cannot be written or moved.
+        """
+        assert self.work is not None
+        with self.told():
+            files = {**manifest.listed(self.work), **(other or {})}
+            manifest.write(self.work, Manifest(kind=self.kind, files=files, inputs=inputs))
+        try:
+            with _signals_held():
+                kept = move_in(self.work, self.target)
+                self.work = None
+        except OSError as error:
+            self._left = True
+            raise self._refused(
+                f"{error.strerror or error}; the whole {self.kind} is in {self.work}, the next run into this folder "
+                "moves it there"
+            ) from None
+        return kept
+
+    def clear(self) -> None:
+        """Remove all that the program wrote into the folder, with what killed processes left half-written.
+
+        Raises:
+            InputError: a file cannot be removed.
+        """
+        found = manifest.read(self.target)
+        with self.told():
+            for file in [self.target / name for name in sorted(found.owned if found else ())]:
+                for half in file.parent.glob(f".{glob.escape(file.name)}.*"):
+                    half.unlink()
+                if not _is_folder(file):
+                    file.unlink(missing_ok=True)
+
+    def close(self) -> None:
+        """Let the folder go, and remove what was not moved in, with the empty folders around it that were made."""
+        if self.work is not None and not self._left:
+            shutil.rmtree(self.work, ignore_errors=True)
+        self._lock.release(keep=self._left)
+        for folder in self._made:
+            with contextlib.suppress(OSError):  # not empty: something else is there by now
+                folder.rmdir()
+
+    @contextlib.contextmanager
+    def _closed_on_error(self) -> Iterator[None]:
+        try:
+            yield
+        except BaseException:
+            self.close()
+            raise
+
+    @contextlib.contextmanager
+    def told(self) -> Iterator[None]:
+        """Say of what the file system refuses where the output was to go.
+
+        Raises:
+            InputError: what was refused, and why.
+        """
+        try:
+            yield
+        except OSError as error:
+            name = f"{Path(error.filename).name} " if error.filename and self.work is not None else ""
+            mend = "make room on the disk" if error.errno in _FULL else "choose another folder"
+            raise self._refused(f"{name}could not be written: {error.strerror or error}; {mend}") from None
+
+    def _refused(self, reason: str) -> InputError:
+        return InputError(f"--out {self.target}: {reason}")
+
+
+@contextlib.contextmanager
+def _signals_held() -> Iterator[None]:
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def resolved(target: Path) -> Path:
+    """A folder without symbolic links.
+
+    Raises:
+        InputError: the links go round in a circle.
+    """
+    try:
+        return target.resolve()
+    except (OSError, RuntimeError) as error:
+        raise InputError(f"--out {target}: {error}; choose another folder") from None
+
+
+def move_in(work: Path, target: Path) -> tuple[str, ...]:
+    """Move the files of a hidden folder into a folder; again, it goes on where it was killed.
+
+    Args:
+        work: the hidden folder, with the manifest of what the other is to hold.
+        target: the folder; one that does not exist is the hidden one, renamed.
+
+    Returns:
+        What became of files of others that had the name of one of these, in words.
+
+    Raises:
+        OSError: a file cannot be moved; what is not yet moved is still there.
+    """
+    if not target.exists():
+        os.rename(work, target)
+        return ()
+    new, old = manifest.read(work), manifest.read(target)
+    assert new is not None
+    owned = old.owned if old else frozenset()
+    mark = MARKS[new.kind]
+    for name in [*([mark] if mark in owned and (work / mark).exists() else []), *sorted(owned - new.owned)]:
+        if not _is_folder(target / name):
+            (target / name).unlink(missing_ok=True)
+    last = {mark: 1, manifest.NAME: 2}
+    there = (n for n in sorted(new.owned, key=lambda n: (last.get(n, 0), n)) if (work / n).exists())
+    kept = tuple(filter(None, [_move(work / name, target / name, name in owned) for name in there]))
+    shutil.rmtree(work)
+    return kept
+
+
+def _move(source: Path, goal: Path, owned: bool) -> str | None:
+    """Move a file; another's that has its name gets a new one."""
+    aside = None
+    if os.path.lexists(goal) and (not owned or _is_folder(goal)):
+        aside = next(free for n in itertools.count(1) if not os.path.lexists(free := _aside(goal, n)))
+        os.rename(goal, aside)
+    os.replace(source, goal)
+    return f"{goal.name} was there, and not of this program; it is {aside.name} now" if aside else None
+
+
+def _aside(path: Path, number: int) -> Path:
+    return path.with_name(f"{path.name}.kept" + (f"-{number}" if number > 1 else ""))
+
+
+def _is_folder(path: Path) -> bool:
+    return path.is_dir() and not path.is_symlink()

@@ -1,0 +1,251 @@
+"""Folders that the program fills: nothing of others is touched, one process at a time, a kill at any moment mended."""
+
+from __future__ import annotations
+
+import itertools
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from hvi_fenicsx import InputError
+from hvi_fenicsx.results import output_folder
+from hvi_fenicsx.results.output_folder import OutputFolder
+from hvi_fenicsx.runtime import manifest
+
+
+def written(out: Path, existing: output_folder.Existing = "replace", **files: str) -> tuple[str, ...]:
+    """A result of these files, by their names before the ending; what became of the files of others."""
+    folder = OutputFolder(out, "result")
+    try:
+        folder.check(existing)
+        work = folder.stage()
+        for name, text in files.items():
+            (work / f"{name}.json").write_text(text)
+        return folder.move_in({})
+    finally:
+        folder.close()
+
+
+def names(folder: Path) -> list[str]:
+    return sorted(f.name for f in folder.iterdir())
+
+
+RESULT = ["a.json", "manifest.json", "summary.json"]
+
+
+def test_only_what_the_manifest_lists_makes_room(tmp_path: Path) -> None:
+    out = tmp_path / "r"
+    written(out, summary="1", a="1", b="1")
+    (out / "mesh.msh").write_text("mine")
+    (out / "notes").mkdir()
+    for beside in (".r.old", ".r.partial"):
+        (tmp_path / beside).mkdir()
+        (tmp_path / beside / "thesis.txt").write_text("mine")
+    assert written(out, summary="2", a="2") == ()
+    assert names(out) == sorted([*RESULT, "mesh.msh", "notes"])
+    assert (out / "a.json").read_text() == "2"
+    assert names(tmp_path) == [".r.old", ".r.partial", "r"]
+    assert all((tmp_path / beside / "thesis.txt").exists() for beside in (".r.old", ".r.partial"))
+
+
+def test_files_put_there_meanwhile_are_kept_and_one_with_a_name_of_ours_gets_another(tmp_path: Path) -> None:
+    out = tmp_path / "r"
+    out.mkdir()
+    folder = OutputFolder(out, "result")
+    folder.check("refuse")
+    (folder.stage() / "summary.json").write_text("ours")
+    (out / "notes.txt").write_text("mine")
+    (out / "summary.json").write_text("mine")
+    (out / "summary.json.kept").write_text("mine too")
+    kept = folder.move_in({})
+    folder.close()
+    assert names(out) == ["manifest.json", "notes.txt", "summary.json", "summary.json.kept", "summary.json.kept-2"]
+    assert (out / "summary.json").read_text() == "ours"
+    assert (out / "summary.json.kept-2").read_text() == "mine"
+    assert len(kept) == 1
+    assert "summary.json.kept-2" in kept[0]
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        '{"name": "web app"}',
+        "[]",
+        "",
+        '{"program": "hvi_fenicsx", "format": 1, "kind": "result", "files": {"../thesis.txt": null}, "inputs": {}}',
+        '{"program": "hvi_fenicsx", "format": 1, "kind": "result", "files": {"/etc/x": null}, "inputs": {}}',
+        '{"program": "hvi_fenicsx", "format": 1, "kind": "result", "files": 3, "inputs": {}}',
+    ],
+)
+def test_a_manifest_of_others_or_one_that_points_outside_is_none(text: str, tmp_path: Path) -> None:
+    (tmp_path / "r").mkdir()
+    (tmp_path / "thesis.txt").write_text("mine")
+    (tmp_path / "r" / "manifest.json").write_text(text)
+    (tmp_path / "r" / "summary.json").write_text("{}")
+    with pytest.raises(InputError, match="holds other files"):
+        written(tmp_path / "r", summary="2")
+    assert names(tmp_path) == ["r", "thesis.txt"]
+    assert names(tmp_path / "r") == ["manifest.json", "summary.json"]
+
+
+def test_a_link_stands_for_what_it_points_to(tmp_path: Path) -> None:
+    (tmp_path / "disk").mkdir()
+    (tmp_path / "out").symlink_to(tmp_path / "disk" / "r")  # dangling: made there
+    written(tmp_path / "out", summary="1")
+    written(tmp_path / "out", summary="2")
+    assert (tmp_path / "out").is_symlink()
+    assert (tmp_path / "disk" / "r" / "summary.json").read_text() == "2"
+    (tmp_path / "loop").symlink_to(tmp_path / "loop")
+    with pytest.raises(InputError, match="--out"):
+        written(tmp_path / "loop", summary="1")
+
+
+def test_the_folder_itself_stays_so_that_a_shell_in_it_does_too(tmp_path: Path) -> None:
+    (tmp_path / "r").mkdir()
+    before = (tmp_path / "r").stat().st_ino
+    written(tmp_path / "r", summary="1")
+    assert (tmp_path / "r").stat().st_ino == before
+
+
+def test_an_input_is_never_replaced(tmp_path: Path) -> None:
+    written(tmp_path / "r", summary="1", a="1")
+    folder = OutputFolder(tmp_path / "r", "result")
+    with pytest.raises(InputError, match="is to be read"):
+        folder.check("replace", [tmp_path / "r" / "a.json"])
+    assert names(tmp_path) == ["r"]
+
+
+def test_the_second_writer_is_refused_at_once_and_the_lock_goes_with_the_first(tmp_path: Path) -> None:
+    first = OutputFolder(tmp_path / "deep" / "r", "result")
+    first.stage()
+    with pytest.raises(InputError, match=f"process {os.getpid()} on"):
+        OutputFolder(tmp_path / "deep" / "r", "result")
+    OutputFolder(tmp_path / "deep" / "other", "result").close()
+    first.close()
+    assert names(tmp_path) == []
+    written(tmp_path / "r", summary="1")
+
+
+def test_a_lock_file_of_others_is_left_alone(tmp_path: Path) -> None:
+    (tmp_path / ".r.hvi-lock").write_text("mine")
+    with pytest.raises(InputError, match="move it away"):
+        written(tmp_path / "r", summary="1")
+    assert (tmp_path / ".r.hvi-lock").read_text() == "mine"
+
+
+def test_without_flock_nothing_of_others_is_removed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    first = OutputFolder(tmp_path / "r", "result")
+    work = first.stage()
+
+    def refused(*_: object) -> None:
+        raise OSError(38, "Function not implemented")
+
+    monkeypatch.setattr("fcntl.flock", refused)
+    written(tmp_path / "r", summary="1")
+    assert work.is_dir()
+
+
+class Killed(BaseException):
+    """The end of the process: nothing of the program's own runs after it."""
+
+
+def killed_at(step: int, out: Path, patch: pytest.MonkeyPatch) -> bool:
+    """Replace a result, killed at a system call that changes files, counted from 0; whether there were so many."""
+    calls = itertools.count()
+    folder = OutputFolder(out, "result")
+    folder.check("replace")
+    work = folder.stage()
+    for name in ("summary", "a", "c"):
+        (work / f"{name}.json").write_text("2")
+
+    def counted(real: Any) -> Any:
+        def call(*arguments: Any, **keys: Any) -> Any:
+            if next(calls) >= step:
+                raise Killed
+            return real(*arguments, **keys)
+
+        return call
+
+    with patch.context() as patched:
+        for name in ("rename", "replace", "unlink", "rmdir", "fsync"):
+            patched.setattr(os, name, counted(getattr(os, name)))
+        try:
+            folder.move_in({})
+            folder.close()
+        except Killed:
+            pass
+        else:
+            return False
+    folder._lock.release(keep=True)  # as the kernel does
+    return True
+
+
+def test_killed_at_any_call_the_result_is_the_old_or_the_new_one_and_the_next_run_works(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each system call that changes files, in turn. In between there is no summary, or all files are of one result."""
+    kinds = {"1": ["a", "b", "summary"], "2": ["a", "c", "summary"]}
+    seen = []
+    for step in itertools.count():
+        out = tmp_path / str(step) / "r"
+        written(out, summary="1", a="1", b="1")
+        (out / "notes.txt").write_text("mine")
+        alive = not killed_at(step, out, monkeypatch)
+        if (out / "summary.json").exists():
+            now = (out / "summary.json").read_text()
+            assert all((out / f"{name}.json").read_text() == now for name in kinds[now])
+        with pytest.raises(InputError, match="already holds a result"):
+            written(out, "refuse", summary="3")
+        found = manifest.read(out)
+        assert found is not None
+        assert found.damaged(out) is None
+        now = (out / "summary.json").read_text()
+        assert names(out) == sorted([*(f"{n}.json" for n in kinds[now]), "manifest.json", "notes.txt"])
+        assert names(out.parent) == ["r"]
+        seen.append(now)
+        if alive:
+            break
+    assert seen == sorted(seen)
+    assert seen[0] == "1"
+    assert seen.count("2") > 6
+
+
+def test_what_cannot_be_moved_stays_whole_and_the_next_run_moves_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out = tmp_path / "r"
+    written(out, summary="1", a="1")
+
+    replace = os.replace
+
+    def refused(source: Path, goal: Path) -> None:
+        if goal.parent == out:
+            raise OSError(5, "Input/output error")
+        replace(source, goal)
+
+    with monkeypatch.context() as patched:
+        patched.setattr(os, "replace", refused)
+        with pytest.raises(InputError, match="the whole result is in") as error:
+            written(out, summary="2", a="2")
+    left = Path(str(error.value).split("the whole result is in ")[1].split(",")[0])
+    assert (left / "summary.json").read_text() == "2"
+    with pytest.raises(InputError, match="already holds a result"):
+        written(out, "refuse", summary="3")
+    assert (out / "summary.json").read_text() == "2"
+    assert names(tmp_path) == ["r"]
+
+
+def test_a_damaged_file_is_found_whichever_it_is(tmp_path: Path) -> None:
+    out = tmp_path / "r"
+    written(out, summary="1", a="1")
+    found = manifest.read(out)
+    assert found is not None
+    assert found.damaged(out) is None
+    (out / "a.json").write_text("")
+    assert found.damaged(out) == "a.json"
+    (out / "a.json").unlink()
+    assert found.damaged(out) == "a.json"
+    assert json.loads((out / "manifest.json").read_text())["kind"] == "result"
