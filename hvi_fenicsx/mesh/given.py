@@ -8,9 +8,11 @@ from typing import Any
 import numpy as np
 from dolfinx import mesh as dmesh
 
+from .. import compat
 from ..errors import InputError
 from ..runtime.mpi import agree
 from ..typing import Entities
+from . import folds
 from .domain import Domain
 
 _SIMPLICES = ("triangle", "tetrahedron")
@@ -72,6 +74,16 @@ def _check_mesh(mesh: dmesh.Mesh) -> None:
         raise InputError(
             f"body: the cells are curved (degree {mesh.geometry.cmap.degree}); give straight ones, degree 1"
         )
+    _check_folds(mesh)
+
+
+def _check_folds(mesh: dmesh.Mesh) -> None:
+    points, cells = mesh.geometry.x[:, : mesh.geometry.dim], compat.geometry_dofmap(mesh).astype(np.int64)
+    folded = folds.folded_cells(points, cells)
+    middles = [tuple(map(float, points[cells[k]].mean(axis=0))) for k in folded[:1]]
+    found = [middle for rank in agree(mesh.comm, middles) for middle in rank]
+    if found:
+        raise InputError(f"body: the mesh is folded at {found[0]}: cells lie over each other there; move its vertices")
 
 
 def _named(mesh: dmesh.Mesh, tags: Any, dimension: int, names: Mapping[str, int]) -> dict[str, Entities]:

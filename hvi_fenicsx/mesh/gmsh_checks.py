@@ -11,7 +11,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..typing import Integers
-from . import gmsh_arrays
+from . import folds, gmsh_arrays
 
 _SIMPLEX = {1: 1, 2: 2, 3: 4}
 """Gmsh's element type of the linear simplex, by dimension."""
@@ -52,6 +52,7 @@ def check(gmsh: Any, path: Path, dimension: int, thresholds: Thresholds = DEFAUL
     _check_points(gmsh, path, dimension, thresholds)
     _check_quality(gmsh, path, dimension, thresholds)
     _check_connections(gmsh, path, dimension)
+    _check_folds(gmsh, path, dimension)
 
 
 def _check_cells(gmsh: Any, path: Path, dimension: int) -> None:
@@ -103,6 +104,17 @@ def _check_connections(gmsh: Any, path: Path, dimension: int) -> None:
     if np.any(counts == 1):
         first = ", ".join(map(str, together[np.argmax(counts == 1)]))
         raise InputError(f"mesh file {path}: the boundary element of nodes {first} lies on no cell; remesh")
+
+
+def _check_folds(gmsh: Any, path: Path, dimension: int) -> None:
+    """Refuse cells that lie over each other."""
+    found = gmsh_arrays.extract(gmsh, dimension)
+    folded = folds.folded_cells(found.points[:, :dimension], found.cells)
+    if len(folded):
+        nodes = found.cells[folded[0]]
+        where = ", ".join(f"{c:g}" for c in found.points[nodes].mean(axis=0)[:dimension])
+        text = f"the mesh is folded at ({where}): the cell of nodes {', '.join(map(str, nodes + 1))} lies over another"
+        raise InputError(f"mesh file {path}: {text} one; remesh")
 
 
 def _elements(gmsh: Any, dimension: int) -> Integers:

@@ -122,6 +122,7 @@ def _problem(
     surfaces = contact_parts.make_surfaces(context, contributions, fixed, thresholds)
     bounds = contact_parts.make_bounds(context, scales, surfaces, contributions, prescribed)
     contact_parts.check_bounds(context, bounds, prescribed, fixed, thresholds)
+    contact_parts.check_contradictions(context, scales, bounds, thresholds)
     contact_parts.check_normal_laws(contributions)
     terms = contact_parts.make_terms(context, scales, surfaces, contributions, fixed, modify)
     linear, strains = (_by_name(contributions, kind) for kind in ("linear", "strains"))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from itertools import combinations_with_replacement
 from typing import Any
 
 import numpy as np
@@ -143,6 +144,43 @@ def check_bounds(
     found = [b for rank in agree(context.domain.mesh.comm, bad) for b in rank]
     if found:
         raise InputError(f"boundary.{found[0]}: the prescribed displacement violates the contact bound there")
+
+
+def check_contradictions(
+    context: DomainForms, scales: Scales, bounds: Sequence[Bounds], thresholds: Thresholds
+) -> None:
+    """Refuse bounds that no displacement satisfies: within a part, or of two parts at a vertex of both. Collective.
+
+    Args:
+        context: spaces, parts and vertices.
+        scales: what one unit is in SI.
+        bounds: the bounds.
+        thresholds: by how much bounds may contradict each other.
+
+    Raises:
+        InputError: on all ranks alike, with the first such vertex.
+    """
+    pairs = combinations_with_replacement(bounds, 2)
+    bad = [text for one, other in pairs for text in _contradiction(one, other, scales.displacement, thresholds)]
+    found = [text for rank in agree(context.domain.mesh.comm, bad) for text in rank]
+    if found:
+        raise InputError(f"boundary.{found[0]}; change one of them, or leave the vertex out of one part")
+
+
+def _contradiction(one: Bounds, other: Bounds, unit: float, thresholds: Thresholds) -> list[str]:
+    """The first vertex at which two bounds (or one and itself) contradict each other, in words."""
+    _, i, j = np.intersect1d(one.surface.blocks, other.surface.blocks, return_indices=True)
+    along = np.sum(one.surface.normals[i] * other.surface.normals[j], axis=1)  # 1, -1, or 0: independent bounds
+    low = np.where(along > 0, other.lower[j], -other.upper[j])
+    high = np.where(along > 0, other.upper[j], -other.lower[j])
+    low, high = np.maximum(low, one.lower[i]), np.minimum(high, one.upper[i])
+    bad = np.flatnonzero((np.abs(along) > 0.5) & (low - high > thresholds.outside_bounds * (1.0 + np.abs(low))))
+    shared = "" if one is other else f", a vertex of boundary.{other.surface.part} too"
+    return [
+        f"{one.surface.part}: at {tuple(map(float, one.surface.points[i[k]]))}{shared}, u·n would have to be at least "
+        f"{low[k] * unit:.6g} m and at most {high[k] * unit:.6g} m"
+        for k in bad[:1]
+    ]
 
 
 def check_normal_laws(contributions: Sequence[PlacedContribution]) -> None:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import re
+from typing import Any
+
 import numpy as np
 import pytest
 from scenes import model
@@ -41,3 +44,39 @@ def test_a_support_beyond_either_of_two_bounds_is_refused(rise: float) -> None:
     table["boundary"]["wall"]["displacement"] = [0.0, rise]
     with pytest.raises(InputError, match="violates the contact bound"):
         prepare(Scene.model_validate(table))
+
+
+def obstacle(height: float, normal: float) -> dict[str, dict[str, list[float]]]:
+    """A flat obstacle at a height, above (-1) or below (1) the body."""
+    return {"obstacle": {"point": [0.0, height], "normal": [0.0, normal]}}
+
+
+@pytest.mark.parametrize(
+    ("parts", "text"),
+    [
+        ({"floor": ("bottom", {"lower": "1e-6*(1 - 4*x)", "upper": 0.0})}, "boundary.floor: at (0.0, 0.0, 0.0), u·n"),
+        (
+            {"floor": ("bottom", {"lower": 1e-6, "upper": 2e-6}), "stop": ("right", obstacle(3e-6, 1.0))},
+            "at (1.0, 0.0, 0.0), a vertex of boundary.stop too, u·n would have to be at least -2e-06 m",
+        ),
+        (
+            {"floor": ("bottom", {"gap": 0.0}), "stop": ("right", obstacle(-1e-6, -1.0))},
+            "at (1.0, 0.0, 0.0), a vertex of boundary.stop too, u·n would have to be at least 1e-06 m and at most 0 m",
+        ),
+    ],
+)
+def test_bounds_that_no_displacement_satisfies_are_bad_input(
+    parts: dict[str, tuple[str, dict[str, Any]]], text: str
+) -> None:
+    table = model(4)
+    del table["boundary"]["floor"]
+    for name, (side, contact) in parts.items():
+        table["boundary"][name] = {"on": side, "contact": contact}
+    with pytest.raises(InputError, match=re.escape(text)):
+        prepare(Scene.model_validate(table))
+
+
+def test_bounds_that_meet_in_one_value_are_no_contradiction() -> None:
+    table = model(4)
+    table["boundary"]["floor"]["contact"] = {"lower": "1e-6*x", "upper": "1e-6*x"}
+    prepare(Scene.model_validate(table))
