@@ -194,6 +194,8 @@ class _Schur:
 
     def _solve(self, right: Array) -> Array:
         """The solutions for right-hand sides (n,) or (n, k)."""
+        if not right.size:  # every unknown is on Γc
+            return right
         columns = np.asfortranarray(right.reshape(len(right), -1))
         b = PETSc.Mat().createDense(columns.shape, array=columns, comm=self.system.comm)
         x = PETSc.Mat().createDense(columns.shape, comm=self.system.comm)

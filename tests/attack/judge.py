@@ -17,6 +17,8 @@ from referee.solution import Check
 
 AGREES, CONTRADICTS, UNDECIDED = "agrees", "contradicts", "undecided"
 Table = dict[str, Any]
+SMALLEST_FACTOR = 1e-6
+"""A load factor below this is a rounded zero: the programmes have a tie of their own."""
 
 
 @dataclass(frozen=True)
@@ -127,7 +129,7 @@ def _existence(problem: Problem, truth: programmes.Verdict, answer: Answer) -> l
     if answer.paper and truth.state in ("metastable", "escapes"):
         found.append(f"paper's condition satisfied, but {truth.state}")
     held, peak = answer.factors
-    if np.isfinite(held) and held > 0:
+    if np.isfinite(held) and held > SMALLEST_FACTOR:
         inside = programmes.verdict(problem, held * (1 - 1e-4))
         if inside.state in ("metastable", "escapes"):
             found.append(f"held up to {held:.4g} times the load, but {inside.state} just below")
@@ -136,7 +138,7 @@ def _existence(problem: Problem, truth: programmes.Verdict, answer: Answer) -> l
             found.append(f"held up to {held:.4g} times the load, but held beyond")
     if (
         np.isfinite(peak)
-        and peak > 0
+        and peak > SMALLEST_FACTOR
         and programmes.verdict(problem, peak * (1 + 1e-3)).state in ("held", "metastable")
     ):
         found.append(f"peak at {peak:.4g} times the load, but no escape beyond")
@@ -187,7 +189,10 @@ def _unsolved(
     if method not in ("auto", "branch"):
         return [], f"? not solved by {method}, which is there for comparison"
     u = displacement(problem.mesh, answer)
-    if u is not None and not Check(problem, u, 1e-7).wrongs():
+    check = None if u is None else Check(problem, u, 1e-7)
+    if check and check.blur > 1e-7:
+        return [], f"? rounding moves the tractions by {check.blur:.0e}"
+    if check and not check.wrongs():
         return [f"{truth.state}, exit 4, but its own point is a solution ({answer.text[:100]}{_failed(answer)})"], ""
     if truth.state == "held":
         why = "C = {0}" if np.isinf(truth.growth) else f"margin {truth.growth:.2e}"

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from petsc4py import PETSc
-from scenes import P, Table, displacement, energy, far, model, quadratic_linear, solved
+from scenes import P, Table, block, displacement, energy, far, model, quadratic_linear, solved
 
 from hvi_fenicsx import Scene, Solution, prepare
 from hvi_fenicsx.errors import InputError
@@ -192,3 +192,10 @@ def test_the_fischer_burmeister_function_is_zero_on_complementary_pairs_only() -
     assert by_a[4] == pytest.approx(3 / 5 - 1)
     assert by_b[4] == pytest.approx(4 / 5 - 1)
     assert np.all(np.isfinite(by_a + by_b))
+
+
+def test_the_condensed_problem_may_be_the_whole_one() -> None:
+    """A body of two cells between floor and roof has no vertex off Γc."""
+    table = block(1, P, P, quadratic_linear(4 * P), epsilon=0.1, method="condensed")
+    table["boundary"]["press"] |= {k: table["boundary"]["floor"][k] for k in ("contact", "friction")}
+    assert solved(table).converged

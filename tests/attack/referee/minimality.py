@@ -100,7 +100,7 @@ def sampled_descent(check: Check, floor: Floor, rng: np.random.Generator) -> flo
     u0 = float(check.traction.max() * p.mesh.size / p.modulus)
     for _ in range(40):
         d = rng.standard_normal(len(s)) * (rng.random(len(s)) < rng.choice([0.1, 0.5, 1.0]))
-        step = d * u0 * 10.0 ** rng.uniform(-6, -2)
+        step = _within_pieces(check, floor, d * u0 * 10.0 ** rng.uniform(-6, -2))
         force, laws = 0.0, 0.0
         for i, c in enumerate(floor.coordinates):
             x = float(c.direction @ check.u[c.vertex])
@@ -113,3 +113,16 @@ def sampled_descent(check: Check, floor: Floor, rng: np.random.Generator) -> flo
         if np.abs(step).max(initial=0.0) > 1e-8 * u0:  # else it is rounding
             worst = min(worst, change / force)
     return worst
+
+
+def _within_pieces(check: Check, floor: Floor, step: Array) -> Array:
+    """The step, shortened so that no vertex reaches another piece of its law: beyond it the energy may fall again."""
+    share = 1.0
+    for c, change in zip(floor.coordinates, step, strict=True):
+        x = float(c.direction @ check.u[c.vertex])
+        for law, turn, _ in c.laws:
+            far = np.abs(law.breaks - turn * x)
+            far = far[far > check.near(c.vertex)]
+            if len(far) and abs(change) > 0.5 * far.min():
+                share = min(share, 0.5 * float(far.min()) / abs(change))
+    return np.asarray(share * step)

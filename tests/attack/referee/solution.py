@@ -6,6 +6,7 @@ motions of a body as a whole are balanced apart, since elasticity takes no part 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -20,6 +21,8 @@ WRONG = 1e-5
 """A relative violation above this is a contradiction; the program claims its tolerance, 1e-8 as a rule."""
 BALANCE = 1e-4
 """The same for the balance of rigid motions, relative to what acts along them."""
+FLOOR = 1e-8
+"""What a body is judged by at least, in shares of the most loaded one: of a body at rest only rounding moves."""
 EPS = float(np.finfo(float).eps)
 
 
@@ -30,6 +33,11 @@ class Column:
     direction: Array
     low: float
     high: float
+
+
+def _floored(sizes: Sequence[float] | Array) -> Array:
+    """Sizes by body; one that nothing drives has but the rounding of the others."""
+    return np.maximum(sizes, FLOOR * np.max(sizes) or 1.0)
 
 
 class Check:
@@ -70,7 +78,7 @@ class Check:
     def displacement(self) -> Array:
         """Largest displacement of each body."""
         size = np.abs(self.u).max(axis=1)
-        return np.array([size[self.problem.labels == k].max() for k in range(self.problem.bodies)])
+        return _floored([size[self.problem.labels == k].max() for k in range(self.problem.bodies)])
 
     @cached_property
     def traction(self) -> Array:
@@ -79,7 +87,14 @@ class Check:
         for v in self._at:
             carried = float(np.abs(self.missing[v][self.free[v]]).max(initial=0.0)) / self.weights[v]
             found[self.problem.labels[v]] = max(found[self.problem.labels[v]], carried)
-        return np.where(found > 0, found, 1.0)
+        return _floored(found)
+
+    @cached_property
+    def blur(self) -> float:
+        """What rounding alone makes of the tractions on Γc, relative to what drives their body."""
+        sizes = np.maximum(self.problem.stress, FLOOR * self.problem.stress.max())
+        found = [np.abs(self.rounding[v]).max() / self.weights[v] / sizes[self.problem.labels[v]] for v in self._at]
+        return float(max(found, default=0.0))
 
     def columns(self, vertex: int) -> list[Column]:
         """What may act at a vertex, forces that the rest of the problem has to balance."""
@@ -145,7 +160,7 @@ class Check:
             load = np.linalg.norm(self.problem.force.reshape(self.u.shape) * mine)
             carried = np.linalg.norm(self.missing * ~inner * mine)
             rest = np.linalg.norm(np.maximum(np.abs(self.missing) - self.rounding, 0.0) * inner * mine)
-            size = max(load, carried)
+            size = max(load, carried, FLOOR * float(np.linalg.norm(self.problem.force)))
             if rest > self.wrong * size:
                 found.append(f"equilibrium of body {k} missed by {rest / size:.1e}")
         return found
@@ -210,7 +225,7 @@ class Check:
             return 0.0
         g = self.problem.load.reshape(self.u.shape)
         work = sum((g[v] @ body.fields(int(v)) for v in body.vertices), np.zeros(motions)) @ kernel
-        loads = float(np.abs(g[body.vertices]).sum())
+        loads = max(float(np.abs(g[body.vertices]).sum()), 0.1 * float(np.abs(g).sum()))
         columns, ranges = [], []
         for v in (v for v in self._at if v in body.mine):
             for c in self.columns(v):
