@@ -31,6 +31,16 @@ class Arc:
         return np.asarray(self.centre + self.radius * away / np.linalg.norm(away, axis=1, keepdims=True))
 
 
+def _swept(p: Point, q: Point, centre: Point | None) -> float:
+    """½ ∫ x dy - y dx from p to q, along a line or an arc of less than half a circle: what it adds to an area, m²."""
+    x, y = centre or (0.0, 0.0)
+    (a, b), (c, d) = (p[0] - x, p[1] - y), (q[0] - x, q[1] - y)
+    if centre is None:
+        return 0.5 * (a * d - b * c)
+    turned = np.arctan2(a * d - b * c, a * c + b * d)
+    return float(0.5 * (np.hypot(a, b) ** 2 * turned + x * (d - b) - y * (c - a)))
+
+
 @dataclass(frozen=True, slots=True)
 class Outline:
     """The closed boundary of a plane body, counterclockwise, with the mesh size wanted at its corners.
@@ -61,6 +71,12 @@ class Outline:
         """Area of the box around the corners, m²."""
         x, y = zip(*self.points, strict=True)
         return (max(x) - min(x)) * (max(y) - min(y))
+
+    @property
+    def area(self) -> float:
+        """Area within, m²."""
+        ends = zip(self.points, [*self.points[1:], self.points[0]], self.sides, strict=True)
+        return sum(_swept(p, q, centre) for p, q, (_, centre) in ends)
 
     def arcs(self) -> dict[str, Arc]:
         """The curved sides by name."""

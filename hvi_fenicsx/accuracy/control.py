@@ -65,7 +65,7 @@ class _AdaptiveRun:
     failures: int = 0
 
     def run(self) -> AccuracyResult:
-        self.base, self.room = memory.peak(self.comm), memory.limit() * self.thresholds.usable_memory
+        self.base, self.room = memory.peak(self.comm), memory.room(self.comm) * self.thresholds.usable_memory
         self.quantity = quantities.find(self.goal.quantity)()
         self.solver = replace(self.solver, existence=self.quantity.needs_existence)
         self.balance = ErrorBalance(
@@ -108,7 +108,8 @@ class _AdaptiveRun:
         if not self.steps or not math.isfinite(self.steps[-1].error) or self.steps[-1].error <= 0:
             return None
         wanted = (self.goal.accuracy or self.steps[-1].error) / 10
-        return cost_forecast.cost(self.steps, wanted, self.scene.dimension, self.base)
+        needed = cost_forecast.cost(self.steps, wanted, self.scene.dimension, self.base)
+        return needed if math.isfinite(needed.dofs) else None
 
     def _record(self, level: AdaptiveLevel, start: float) -> str | None:
         """Record a level; why to stop at it, or None. Collective."""
@@ -185,6 +186,8 @@ class _AdaptiveRun:
         needed = cost_forecast.cost(self.steps, self.goal.accuracy, self.scene.dimension, self.base)
         if needed.dofs <= _LARGEST and needed.memory <= self.room:
             return None
+        if not math.isfinite(needed.dofs):
+            return f"{self.goal.accuracy:g} is beyond any number of unknowns"
         return (
             f"{self.goal.accuracy:g} would need about {needed.dofs:.1e} unknowns and {needed.memory / 1024:.3g} GB; "
             f"{self.room / 1024:.3g} GB can be used"

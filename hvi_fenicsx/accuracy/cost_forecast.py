@@ -8,6 +8,7 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
+from ..runtime.memory import DEFAULT
 from .thresholds import FORECAST, ForecastThresholds
 
 
@@ -97,10 +98,18 @@ def cost(
         thresholds: of the forecast.
     """
     last = steps[-1]
-    growth = max(1.0, last.error / accuracy) ** (1.0 / rate(steps, dimension, thresholds))
+    growth = _power(max(1.0, last.error / accuracy), 1.0 / rate(steps, dimension, thresholds))
     ahead = _duration(steps, last.dofs, last.dofs * growth)
     needed = memory(steps, last.dofs * growth, dimension, base, thresholds)
     return Cost(accuracy, last.dofs * growth, sum(s.seconds for s in steps) + ahead, needed)
+
+
+def _power(base: float, exponent: float) -> float:
+    """The power, infinite where it is beyond all numbers."""
+    try:
+        return float(base**exponent)
+    except OverflowError:
+        return math.inf
 
 
 def _duration(steps: Sequence[AdaptiveStep], dofs: float, wanted: float) -> float:
@@ -134,7 +143,7 @@ def memory(
         thresholds: of the forecast.
     """
     last = steps[-1]
-    each = (thresholds.kilobytes_2d if dimension == 2 else thresholds.kilobytes_3d) / 1024
+    each = DEFAULT.adaptive[dimension] / 1024
     if last.dofs >= thresholds.measurable:
         each = (last.memory - base) / last.dofs
     return base + each * dofs

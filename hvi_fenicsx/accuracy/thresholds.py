@@ -33,16 +33,12 @@ class ForecastThresholds:
         trusted: number of steps from which a rate below the optimal one is believed.
         slowest: share of the optimal rate: what is slower is a mesh too coarse to tell.
         measurable: unknowns from which their memory can be told from the program's own.
-        kilobytes_2d: per unknown in 2D, before that (docs/accuracy.md).
-        kilobytes_3d: per unknown in 3D, before that.
     """
 
     fitted: int = 5
     trusted: int = 6
     slowest: float = 0.5
     measurable: int = 20_000
-    kilobytes_2d: float = 3.0
-    kilobytes_3d: float = 6.0
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -63,7 +63,10 @@ def _voigt(tensor: Any, dimension: int) -> list[Any]:
 
 
 def _definite(matrix: Array, hint: str) -> None:
-    lowest = float(np.linalg.eigvalsh(matrix / np.max(np.abs(matrix)))[0])
+    largest = float(np.max(np.abs(matrix)))
+    if not 0.0 < largest < np.inf:
+        raise refusal("the elasticity is zero, or its numbers are too large or too far apart; give moduli in N/m²")
+    lowest = float(np.linalg.eigvalsh(matrix / largest)[0])
     if lowest <= 1e-12:
         raise refusal(f"the elasticity is not positive definite (relative eigenvalue {lowest:.3g}): {hint}")
 

@@ -15,8 +15,9 @@ from typing_extensions import override
 
 from ..errors import InputError
 from .base import Superpotential
-from .parameter_checks import require_number, require_ordered, require_positive
+from .parameter_checks import require_count, require_number, require_ordered, require_positive
 from .polyline import PolylineLaw
+from .thresholds import DEFAULT
 from .traction_graph import TractionGraph
 
 
@@ -160,8 +161,7 @@ class Sawtooth(PolylineLaw):
                 f"law {self.name!r}: residual_traction = peak_traction = {self.peak_traction!r} leaves no "
                 f"drop; lower residual_traction"
             )
-        if isinstance(self.drops, bool) or not isinstance(self.drops, int) or self.drops < 1:
-            raise InputError(f"law {self.name!r}: drops = {self.drops!r} must be a whole number >= 1")
+        require_count(self.name, DEFAULT.most_drops, drops=self.drops)
 
     @override
     def build(self) -> TractionGraph:

@@ -39,6 +39,22 @@ def require_positive(law: str, **parameters: object) -> None:
             raise InputError(f"law {law!r}: {key} = {value!r} must be > 0; give its magnitude, in the scene's units")
 
 
+def require_count(law: str, most: int, **parameters: object) -> None:
+    """Refuse anything but whole numbers from 1 on.
+
+    Args:
+        law: the law's name, for the message.
+        most: the largest number allowed.
+        parameters: by name.
+
+    Raises:
+        InputError: with the first that is none.
+    """
+    for key, value in parameters.items():
+        if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= most:
+            raise InputError(f"law {law!r}: {key} = {value!r} must be a whole number from 1 to {most}")
+
+
 def require_ordered(law: str, **parameters: float) -> None:
     """Refuse a residual below 0 or above the peak.
 

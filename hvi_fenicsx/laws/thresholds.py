@@ -18,6 +18,7 @@ class Thresholds:
         rounds: bisections at most.
         most_intervals: intervals up to which bisection goes on.
         jump: relative to the largest traction, a smaller difference of the limits at an end is not meant as a jump.
+        most_drops: drops of a sawtooth: each is a piece of the law, which is looked at at every vertex.
         inside: how far inside of a piece its one-sided limits are taken, over the piece's length.
     """
 
@@ -28,6 +29,7 @@ class Thresholds:
     rounds: int = 80
     most_intervals: int = 200_000
     jump: float = 1e-9
+    most_drops: int = 1_000
     inside: float = 1e-12
 
 

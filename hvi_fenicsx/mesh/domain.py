@@ -15,7 +15,6 @@ from ..geometry import Arc
 from ..runtime import memory
 from ..runtime.mpi import agree
 from ..typing import Array, Entities
-from .thresholds import DEFAULT, Thresholds
 from .transfer import Transfer
 
 
@@ -121,23 +120,24 @@ Coarsening: TypeAlias = Callable[[], tuple[Domain, Transfer]]
 """Makes the next coarser domain, and the transfer from it. Collective."""
 
 
-def check_affordable(comm: MPI.Comm, unknowns: int, key: str, thresholds: Thresholds = DEFAULT) -> None:
-    """Refuse a mesh that needs more memory than there is, before it is made. Collective.
+def check_affordable(comm: MPI.Comm, unknowns: float, dimension: int, key: str, mend: str) -> None:
+    """Refuse a mesh that cannot be solved on in the memory that there is, before it is made. Collective.
 
     Args:
         comm: all ranks.
         unknowns: number of unknowns of the mesh to be made.
+        dimension: 2 or 3.
         key: the key of ``[domain]`` that makes them so many.
-        thresholds: memory of one unknown.
+        mend: what to do about it.
 
     Raises:
         InputError: on all ranks alike.
     """
-    least, room = unknowns * thresholds.bytes_per_unknown / 2**20, memory.room(comm)
-    if least > room:
+    needed, room = memory.needed(unknowns, dimension), memory.room(comm)
+    if needed > room:
         raise InputError(
-            f"domain.{key}: make {unknowns:.1e} unknowns, which need {least / 1024:.3g} GB at least; there are "
-            f"{room / 1024:.3g} GB: use fewer {key}"
+            f"domain.{key}: {unknowns:.1e} unknowns need {needed / 1024:.3g} GB or more; there are "
+            f"{room / 1024:.3g} GB: {mend}"
         )
 
 

@@ -14,8 +14,9 @@ from mpi4py import MPI
 from ..errors import InputError
 from ..runtime import helper_process, memory
 from ..runtime.mpi import on_root
+from ..schema import LONGEST, SHORTEST
 from . import gmsh_checks, gmsh_model, gmsh_script
-from .domain import Domain
+from .domain import Domain, check_affordable
 from .gmsh_arrays import MeshArrays
 from .gmsh_reader import Request
 from .thresholds import DEFAULT, Thresholds
@@ -41,20 +42,27 @@ def read(comm: MPI.Comm, path: Path, dimension: int, scale: float = 1.0, thresho
         Interrupted: on all ranks alike: a signal came.
     """
     found: list[MeshArrays] = []
-    names = on_root(comm, lambda: _read(path, dimension, found, thresholds.gmsh_file_seconds))
+    names, nodes = on_root(comm, lambda: _read(path, dimension, scale, found, thresholds.gmsh_file_seconds))
+    check_affordable(comm, dimension * nodes, dimension, "file", "mesh the body coarser")
     mesh, sides, regions = gmsh_model.distribute(comm, found.pop() if found else None, dimension, names)
     mesh.geometry.x[:] *= scale
     return Domain.from_mesh(mesh, sides, regions)
 
 
-def _read(path: Path, dimension: int, found: list[MeshArrays], seconds: float) -> dict[int, dict[str, int]]:
-    """Read the file in a process of its own; its physical groups by dimension and name. Rank 0 only.
+def _read(
+    path: Path, dimension: int, scale: float, found: list[MeshArrays], seconds: float
+) -> tuple[dict[int, dict[str, int]], int]:
+    """Read the file in a process of its own. Rank 0 only.
 
     Args:
         path: the file.
         dimension: of the cells.
+        scale: m per unit of the file's coordinates.
         found: the mesh is added here.
         seconds: how long gmsh may take.
+
+    Returns:
+        The physical groups by dimension and name, and the number of nodes.
     """
     request = Request(
         path=str(path.absolute()),
@@ -75,8 +83,19 @@ def _read(path: Path, dimension: int, found: list[MeshArrays], seconds: float) -
     with np.load(io.BytesIO(done.stdout)) as arrays:
         if "fault" in arrays:
             raise InputError(str(arrays["fault"]))
-        found.append(MeshArrays(**{name: arrays[name] for name in MeshArrays.__annotations__}))
-        return {int(d): named for d, named in json.loads(str(arrays["names"])).items()}
+        mesh = MeshArrays(**{name: arrays[name] for name in MeshArrays.__annotations__})
+        names = {int(d): named for d, named in json.loads(str(arrays["names"])).items()}
+    _check_length(mesh, scale)
+    found.append(mesh)
+    return names, len(mesh.points)
+
+
+def _check_length(mesh: MeshArrays, scale: float) -> None:
+    """Refuse a body that is longer or shorter than lengths may be."""
+    length = float(np.max(np.ptp(mesh.points, axis=0))) * scale
+    if not SHORTEST <= length <= LONGEST:
+        allowed = f"{SHORTEST:g} to {LONGEST:g} m; it is the length in m of one unit of the file"
+        raise InputError(f"domain.scale: makes the body {length:.1e} m long; allowed is {allowed}")
 
 
 def _is_script(path: Path) -> bool:

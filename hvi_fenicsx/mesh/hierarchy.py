@@ -35,5 +35,5 @@ def with_hierarchy(domain: Domain, thresholds: Thresholds = DEFAULT) -> Domain:
     if coarsest is None:
         return domain
     growth = unknowns / (d * coarsest.mesh.topology.index_map(0).size_global)  # round bodies may need more vertices
-    coarser = refinement.repeated(coarsest, max(0, round(np.log2(growth) / d) - 1), thresholds)
+    coarser = refinement.repeated(coarsest, max(0, round(np.log2(growth) / d) - 1))
     return replace(domain, coarsening=lambda: (coarser, InterpolationTransfer()))

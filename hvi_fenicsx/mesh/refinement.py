@@ -43,20 +43,19 @@ def uniform(domain: Domain) -> Refinement:
     return _refined(domain, None)
 
 
-def repeated(domain: Domain, times: int, thresholds: Thresholds = DEFAULT) -> Domain:
+def repeated(domain: Domain, times: int) -> Domain:
     """Refine every cell several times; each domain knows the one that it came from as its coarser level. Collective.
 
     Args:
         domain: the body on the mesh to be refined.
         times: how often every cell is cut into 2^d.
-        thresholds: memory of one unknown.
 
     Raises:
         InputError: on all ranks alike: memory cannot suffice.
     """
     d, vertices = domain.dimension, domain.mesh.topology.index_map(0).size_global
     if times:
-        check_affordable(domain.mesh.comm, d * vertices * 2 ** (d * times), "refinements", thresholds)
+        check_affordable(domain.mesh.comm, d * vertices * 2 ** (d * times), d, "refinements", "use fewer refinements")
     for _ in range(times):
         domain = _with_coarser(domain, uniform(domain))
     return domain

@@ -12,8 +12,6 @@ class Thresholds:
     """When coarser meshes are made, which of them are used, and what counts as rounding.
 
     Attributes:
-        bytes_per_unknown: memory that one unknown needs at least: its row of the matrix and its part of the mesh,
-            without any solver.
         coarsest_block: cells each way of a block below which a coarser level does not help.
         bisected_edges: length of the edges of a marked cell that are bisected, relative to its longest one, by
             dimension. In space all six edges would make a step of 4 to 5 times the unknowns; the longest and, in a
@@ -35,7 +33,6 @@ class Thresholds:
             vertex.
     """
 
-    bytes_per_unknown: float = 300.0
     coarsest_block: int = 8
     bisected_edges: Mapping[int, float] = field(default_factory=lambda: {2: 0.0, 3: 0.76})
     hierarchy_from: int = 20_000

@@ -14,7 +14,7 @@ import dolfinx
 import numpy as np
 from dolfinx import fem
 
-from ..effects import Evaluate, Place
+from ..effects import Effect, Evaluate, Place
 from ..errors import InputError
 from ..mesh.domain import Domain
 from ..runtime.mpi import agree
@@ -60,17 +60,11 @@ def compose(domain: Domain, model: Model, thresholds: Thresholds = DEFAULT) -> P
         if not sum(agree(domain.mesh.comm, len(domain.facets(on)))):
             raise InputError(f"boundary.{name}: no facet lies on it; see `on`")
     sizes, evaluate = scaling.sizes(domain.length, effects), functools.partial(_evaluation, domain, parts)
-    scales = scaling.choose(sizes, domain.dimension, effects, evaluate)
+    scales = scaling.choose(sizes, domain.dimension, effects, evaluate, thresholds)
     context = DomainForms(domain, parts, scales, effects)
     contributions = [PlacedContribution(where, effect, effect.contribute(context, where)) for where, effect in effects]
-    implausible = [f"{_place(e)}: {text}" for e in effects for text in e[1].implausible(evaluate(e), sizes)]
+    implausible = [f"{scaling.place(e)}: {text}" for e in effects for text in e[1].implausible(evaluate(e), sizes)]
     return _problem(context, scales, contributions, model.modify, tuple(implausible), thresholds)
-
-
-def _place(placed: Placed) -> str:
-    """Where the scene states an effect."""
-    where, effect = placed
-    return ".".join(filter(None, (effect.place.value, where, effect.key)))
 
 
 def _evaluation(domain: Domain, parts: Mapping[str, Sequence[str]], placed: Placed) -> Evaluate:
@@ -84,7 +78,7 @@ def _largest(domain: Domain, parts: Mapping[str, Sequence[str]], placed: Placed,
     finite = bool(np.all(np.isfinite(values)))
     gathered = agree(domain.mesh.comm, (finite, float(np.max(np.abs(values), initial=0.0))))
     if not all(ok for ok, _ in gathered):
-        raise InputError(f"{_place(placed)}: the formula {formula.source!r} is not finite everywhere there")
+        raise InputError(f"{scaling.place(placed)}: the formula {formula.source!r} is not finite everywhere there")
     return max(value for _, value in gathered)
 
 
@@ -156,12 +150,22 @@ def _conditions(
     return conditions, held, fixed
 
 
+def load_name(where: str | None, effect: Effect) -> str:
+    """The name of a load among all.
+
+    Args:
+        where: a boundary part, a region, or None for the whole body.
+        effect: what loads it.
+    """
+    return f"{where or 'body'}.{effect.key}"
+
+
 def _by_name(contributions: Sequence[PlacedContribution], kind: str) -> dict[str, Any]:
     """Forms of one kind by the name of their place and effect; several tables may load one place."""
     found: dict[str, Any] = {}
     for where, effect, contribution in contributions:
         for form in getattr(contribution, kind):
-            name = f"{where or 'body'}.{effect.key}"
+            name = load_name(where, effect)
             found[name] = found[name] + form if name in found else form
     return found
 

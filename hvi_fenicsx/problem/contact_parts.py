@@ -220,19 +220,25 @@ def make_terms(
     Raises:
         InputError: on all ranks alike: a law that cannot be solved in 3D.
     """
-    laws = [(surfaces[w], law) for w, _, c in contributions if w is not None for law in c.laws]
-    return tuple(_term(context, surface, law, modify, scales, fixed) for surface, law in laws)
+    laws = [(surfaces[w], e.key, law) for w, e, c in contributions if w is not None for law in c.laws]
+    return tuple(_term(context, surface, key, law, modify, scales, fixed) for surface, key, law in laws)
 
 
 def _term(
-    context: DomainForms, where: Surface, law: BoundaryLaw, modify: Modification, scales: Scales, fixed: Entities
+    context: DomainForms,
+    where: Surface,
+    key: str,
+    law: BoundaryLaw,
+    modify: Modification,
+    scales: Scales,
+    fixed: Entities,
 ) -> LawTerm:
     directions = {
         Direction.SLIP: where.tangents,
         Direction.OPENING: -where.normals[:, None, :],
         Direction.PENETRATION: where.normals[:, None, :],
     }[law.direction]
-    solved, exact = (j.scaled(scales.displacement, scales.stress) for j in (modify(law.law), law.law))
+    solved, exact = (_scaled(j, scales, f"boundary.{where.part}.{key}") for j in (modify(law.law), law.law))
     if directions.shape[1] > 1 and np.any(solved.convex.kinks > 0):
         raise InputError(
             f'boundary.{where.part}: law = "{law.law.name}" jumps upwards at a slip > 0, which in 3D is a ring that '
@@ -249,6 +255,19 @@ def _term(
         density=density,
         residual=forms.compiled(_residual(context, where, density)),
     )
+
+
+def _scaled(law: Superpotential, scales: Scales, place: str) -> Superpotential:
+    """The law in the problem's units.
+
+    Raises:
+        InputError: its parameters are too large or too small for these.
+    """
+    try:
+        return law.scaled(scales.displacement, scales.stress)
+    except InputError as error:
+        units = f"beside displacements of {scales.displacement:.0e} m and stresses of {scales.stress:.0e} N/m²"
+        raise InputError(f"{place}: {units} it cannot be computed with: {error}") from None
 
 
 def _residual(context: DomainForms, where: Surface, density: fem.Function) -> Any:

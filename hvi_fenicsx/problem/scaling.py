@@ -6,6 +6,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from ..effects import Drive, Effect, Evaluate, Sizes
+from ..errors import InputError
+from .thresholds import DEFAULT, Thresholds
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +57,23 @@ def sizes(length: float, effects: Sequence[Placed]) -> Sizes:
     return Sizes(length, modulus, max((e.expansion_scale() for _, e in effects), default=0.0))
 
 
-def choose(sizes: Sizes, dimension: int, effects: Sequence[Placed], evaluate: Callable[[Placed], Evaluate]) -> Scales:
+def place(placed: Placed) -> str:
+    """Where the scene states an effect.
+
+    Args:
+        placed: the effect with where it acts.
+    """
+    where, effect = placed
+    return ".".join(filter(None, (effect.place.value, where, effect.key)))
+
+
+def choose(
+    sizes: Sizes,
+    dimension: int,
+    effects: Sequence[Placed],
+    evaluate: Callable[[Placed], Evaluate],
+    thresholds: Thresholds = DEFAULT,
+) -> Scales:
     """The scales of a problem. Collective where ``evaluate`` is.
 
     The stress scale is the largest load; without one, that of the largest other driving effect (prescribed
@@ -66,11 +84,28 @@ def choose(sizes: Sizes, dimension: int, effects: Sequence[Placed], evaluate: Ca
         dimension: 2 or 3.
         effects: those in force, with their places.
         evaluate: gives, for an effect with its place, the function that finds a formula's largest absolute value there.
+        thresholds: which scales can be computed with.
+
+    Raises:
+        InputError: an effect is so large, or all are so small, that their energies are no numbers.
     """
-    stress = dict.fromkeys(Drive, 0.0)
-    for placed in effects:
-        effect = placed[1]
-        size = effect.stress_scale(evaluate(placed), sizes)
-        stress[effect.drive] = max(stress[effect.drive], size)
-    chosen = next((stress[kind] for kind in Drive if stress[kind] > 0), 1.0)
-    return Scales(sizes.length, chosen, sizes.modulus, dimension)
+    found = [(placed[1].stress_scale(evaluate(placed), sizes), placed) for placed in effects]
+    driving = [pair for pair in found if pair[0] != 0.0]
+    for stress, placed in driving:
+        _check(Scales(sizes.length, stress, sizes.modulus, dimension), placed, thresholds.largest_scale, 0.0)
+    kind = next((kind for kind in Drive if any(p[1].drive is kind for _, p in driving)), None)
+    if kind is None:
+        return Scales(sizes.length, 1.0, sizes.modulus, dimension)
+    stress, placed = max((pair for pair in driving if pair[1][1].drive is kind), key=lambda pair: pair[0])
+    chosen = Scales(sizes.length, stress, sizes.modulus, dimension)
+    _check(chosen, placed, thresholds.largest_scale, 1.0 / thresholds.largest_scale)
+    return chosen
+
+
+def _check(scales: Scales, placed: Placed, most: float, least: float) -> None:
+    if not all(least <= scale <= most for scale in (scales.stress, scales.displacement)):
+        raise InputError(
+            f"{place(placed)}: makes stresses of about {scales.stress:.0e} N/m² and displacements of about "
+            f"{scales.displacement:.0e} m, which cannot be computed with; give all numbers, the modulus of "
+            f"{scales.modulus:.0e} too, in m and N/m²"
+        )

@@ -18,6 +18,8 @@ class Thresholds:
             exact; a law sees the square of this angle.
         same_direction: angle up to which two directions that the scene states are orthogonal or equal.
         outside_bounds: distance (of u0) by which a prescribed displacement may be outside of a contact bound.
+        largest_scale: of stresses (N/m²) and displacements (m); its inverse is the smallest. Energies are products of
+            both, so beyond this they are no numbers any more.
         law_scale: smallest scale of a law's traction, in units of the load's stress: a weaker law is not judged finer.
     """
 
@@ -27,6 +29,7 @@ class Thresholds:
     turned_to_prescribed: float = 1e-4
     same_direction: float = 1e-8
     outside_bounds: float = 1e-12
+    largest_scale: float = 1e100
     law_scale: float = 1e-3
 
 

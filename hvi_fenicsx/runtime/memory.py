@@ -2,16 +2,48 @@
 
 from __future__ import annotations
 
+import math
 import os
 import resource
 import sys
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from mpi4py import MPI
 
 from .mpi import total
 
-_LIMITS = ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limit_in_bytes")
+_CGROUPS = Path("/sys/fs/cgroup")
+_LIMIT_FILES = ("memory.max", "memory.limit_in_bytes")
+"""Of cgroups of version 2 and 1."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Thresholds:
+    """What an unknown takes, from the mesh to the estimate (measured: docs/benchmarks.md).
+
+    Attributes:
+        least: KB by dimension, on a mesh refined uniformly, by multigrid or GAMG; a direct solver takes more.
+        adaptive: KB by dimension, about, on a mesh refined where the error is: all coarser ones are kept, too.
+    """
+
+    least: Mapping[int, float] = field(default_factory=lambda: {2: 1.3, 3: 2.6})
+    adaptive: Mapping[int, float] = field(default_factory=lambda: {2: 3.0, 3: 6.0})
+
+
+DEFAULT = Thresholds()
+
+
+def needed(unknowns: float, dimension: int, thresholds: Thresholds = DEFAULT) -> float:
+    """What so many unknowns take at least, MB.
+
+    Args:
+        unknowns: on all ranks together.
+        dimension: 2 or 3.
+        thresholds: what one takes.
+    """
+    return unknowns * thresholds.least[dimension] / 1024
 
 
 def peak(comm: MPI.Comm) -> float:
@@ -21,15 +53,47 @@ def peak(comm: MPI.Comm) -> float:
 
 
 def limit() -> float:
-    """The memory of this machine, or what its container may use of it, MB."""
-    machine = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") / 2**20
-    texts = [Path(file).read_text(encoding="ascii").strip() for file in _LIMITS if Path(file).is_file()]
-    return min([machine, *(int(text) / 2**20 for text in texts if text.isdigit())])
+    """The memory that this process may use, MB: the machine's, or what its cgroup or ``ulimit`` leaves of it."""
+    return min(_of_machine(), _of_process())
 
 
 def room(comm: MPI.Comm) -> float:
-    """The memory of all machines that the ranks run on, MB. Collective."""
+    """The memory of all machines that the ranks run on, as far as they may use it, MB. Collective."""
     here = comm.Split_type(MPI.COMM_TYPE_SHARED)
-    found = total(comm, limit() if here.rank == 0 else 0.0)
+    machines = total(comm, _of_machine() if here.rank == 0 else 0.0)
     here.Free()
-    return found
+    return min(machines, total(comm, _of_process()))
+
+
+def _of_machine() -> float:
+    """The memory of this machine, or of the cgroup that all its ranks share, MB."""
+    machine = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") / 2**20
+    return min([machine, *cgroup_limits(Path("/proc/self/cgroup"), _CGROUPS)])
+
+
+def _of_process() -> float:
+    """What this process may take by ``ulimit``, MB; infinite: all."""
+    soft = [resource.getrlimit(kind)[0] for kind in (resource.RLIMIT_AS, resource.RLIMIT_DATA)]
+    return min([math.inf, *(bound / 2**20 for bound in soft if bound != resource.RLIM_INFINITY)])
+
+
+def cgroup_limits(table: Path, mounted: Path) -> list[float]:
+    """The limits of the cgroups that a process is in, and of those around them, MB.
+
+    Args:
+        table: which cgroups these are, as in ``/proc/self/cgroup``.
+        mounted: where cgroups are mounted.
+    """
+    lines = table.read_text(encoding="ascii").splitlines() if table.is_file() else []
+    found = []
+    for _, controllers, name in (line.split(":", 2) for line in lines):
+        if not controllers or "memory" in controllers.split(","):
+            top = mounted / "memory" if controllers else mounted
+            folders = [top, *(top.joinpath(*parts) for parts in _ways(Path(name.lstrip("/")).parts))]
+            found += [folder / file for folder in folders for file in _LIMIT_FILES]
+    texts = [file.read_text(encoding="ascii").strip() for file in found if file.is_file()]
+    return [int(text) / 2**20 for text in texts if text.isdigit()]
+
+
+def _ways(parts: tuple[str, ...]) -> list[tuple[str, ...]]:
+    return [parts[: i + 1] for i in range(len(parts))]

@@ -6,7 +6,7 @@ import os
 import re
 import stat
 import tomllib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -23,10 +23,11 @@ from .toml_lines import line_of, lines_of
 
 _LARGEST = 1_000_000
 """Bytes of a scene file at most."""
-_KEY = re.compile(r"((?:title|plugins|domain|material|body|boundary|solver)(?:\.[\w-]+)+): ")
+_KEY = re.compile(r"((?:title|plugins|domain|material|body|boundary|solver)\.[^:]+): ")
 """How a message begins that names a key of the scene."""
 _MOST_MISTAKES = 10
 """Mistakes that one message lists."""
+_TOO_LARGE = "is a whole number beyond 64 bits, which TOML does not have; write 1e20 for 100000000000000000000"
 _Place = tuple[str | int, ...]
 
 
@@ -59,7 +60,7 @@ def with_place(message: str, path: str | os.PathLike[str], overrides: Sequence[s
         source = _Source.read(path, overrides)
     except InputError:
         return message
-    return source.place(tuple(key[1].split("."))) + message[key.end(1) :]
+    return source.place(source.path(key[1])) + message[key.end(1) :]
 
 
 @dataclass(frozen=True)
@@ -86,6 +87,8 @@ class _Source:
         return cls(file, text, tables, [override(tables, assignment) for assignment in overrides])
 
     def scene(self) -> Scene:
+        if too_large := [Mistake(place, _TOO_LARGE) for place in _large_numbers(self.tables, ())]:
+            raise InputError(self._listed(too_large))
         try:
             return Scene.model_validate(self.tables, context={"folder": self.file.absolute().parent})
         except ValidationError as error:
@@ -104,6 +107,15 @@ class _Source:
         rest = len(texts) - _MOST_MISTAKES
         return "\n".join(texts[:_MOST_MISTAKES] + ([f"... and {rest} more"] if rest > 0 else []))
 
+    def path(self, key: str) -> _Place:
+        """The keys down to a place that a message names, joined by dots; names may have dots in them, too."""
+        known = {".".join(map(str, place)): place for place in (*self._lines, *self.overridden)}
+        known |= _effects_by_region(self.tables.get("body", {}))
+        begins = [text for text in known if f"{key}.".startswith(f"{text}.")]
+        nearest = max(begins, key=len, default="")
+        rest = key[len(nearest) :].strip(".")
+        return (*known.get(nearest, ()), *(rest.split(".") if rest else ()))
+
     def place(self, where: _Place) -> str:
         """A place as messages name it: file and line, or ``--set``; then the key."""
         key = ".".join(map(str, where))
@@ -111,6 +123,29 @@ class _Source:
             return f"--set {key}"
         line = line_of(self._lines, where)
         return f"{self.file}:{line}: {key}" if line else f"{self.file}: {key}"
+
+
+def _large_numbers(value: Any, place: _Place) -> Iterator[_Place]:
+    """Where whole numbers stand that TOML does not have."""
+    if isinstance(value, int) and not -(2**63) <= value < 2**63:
+        yield place
+    entries = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
+    for key, entry in entries:
+        yield from _large_numbers(entry, (*place, key))
+
+
+def _effects_by_region(body: Any) -> dict[str, _Place]:
+    """The places of what acts in the body, by region and key, as errors that the mesh shows name them."""
+    named = isinstance(body, dict) and all(isinstance(table, dict) for table in body.values())
+    whole: list[tuple[_Place, Any]] = [(("body",), body)]
+    tables = [(("body", name), table) for name, table in body.items()] if named else whole
+    found: dict[str, _Place] = {}
+    for place, table in tables:
+        regions = table.get("region") if isinstance(table, dict) else None
+        for region in regions if isinstance(regions, list) else [regions]:
+            for key in table if isinstance(table, dict) else ():
+                found[".".join(filter(None, ("body", region, key)))] = (*place, key)
+    return found
 
 
 def _text(file: Path) -> str:

@@ -3,11 +3,13 @@
 Light: it loads pydantic and nothing heavier, and knows no particular table.
 """
 
-from .fields import Count, Length, Names, Positive, vector
+from .fields import LONGEST, SHORTEST, Count, Length, Names, Positive, vector
 from .messages import refusal, shown, unknown
 from .tables import Key, Mistake, Table, choose, input_error, mistakes_of, validation_error
 
 __all__ = [
+    "LONGEST",
+    "SHORTEST",
     "Count",
     "Key",
     "Length",

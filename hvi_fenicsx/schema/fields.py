@@ -41,7 +41,9 @@ Names = Annotated[
 """One name or a list of names."""
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 """A finite number above 0."""
-Length = Annotated[float, Field(ge=1e-9, le=1e9)]
-"""A length of a body, m: beyond these limits, squares and cubes of lengths exceed what double precision resolves."""
+SHORTEST, LONGEST = 1e-9, 1e9
+"""Lengths of a body, m: beyond them, squares and cubes of lengths exceed what double precision resolves."""
+Length = Annotated[float, Field(ge=SHORTEST, le=LONGEST)]
+"""A length of a body, m."""
 Count = Annotated[int, Field(gt=0)]
 """A whole number above 0."""

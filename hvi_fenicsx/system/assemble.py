@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import numpy as np
+
+from ..errors import InputError
 from ..mesh.domain import Domain
-from ..problem.compose import Model, compose
+from ..problem import scaling
+from ..problem.compose import Model, compose, load_name
 from ..runtime.timing import Timer
 from .system import System, compile_forms
 from .thresholds import DEFAULT, Thresholds
@@ -24,4 +28,15 @@ def assemble(domain: Domain, model: Model, timer: Timer, thresholds: Thresholds 
     with timer("jit"):
         problem = compose(domain, model)
         compiled = compile_forms(problem)
-    return System(problem, compiled, timer, thresholds)
+    system = System(problem, compiled, timer, thresholds)
+    _require_finite(system)
+    return system
+
+
+def _require_finite(system: System) -> None:
+    """Refuse loads that are not finite where they are integrated, between the vertices. Collective."""
+    stated = [(where, effect) for where, effect, _ in system.problem.contributions]
+    for name, force in system.forces.items():
+        if not np.isfinite(force.norm()):
+            place = next(scaling.place(p) for p in stated if load_name(*p) == name)
+            raise InputError(f"{place}: the formula is not finite everywhere there, between the vertices of the mesh")

@@ -212,8 +212,15 @@ def test_a_forecast_holds_where_the_steps_go_on_as_they_did() -> None:
     assert cost_forecast.seconds(known, steps[7].dofs) == pytest.approx(steps[7].seconds, rel=0.1)
 
 
+def test_an_accuracy_beyond_all_numbers_is_refused_in_words() -> None:
+    reached = reach(Scene.model_validate(STRONG), Goal(1e-200))
+    assert reached.why == "1e-200 is beyond any number of unknowns"
+    assert reached.exit_code == 4
+    assert reached.more is None
+
+
 def test_what_memory_cannot_hold_is_refused_before_it_is_tried(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(memory, "limit", lambda: 400.0)
+    monkeypatch.setattr(memory, "room", lambda comm: 400.0)
     reached = reach(Scene.model_validate(STRONG), Goal(1e-5))
     assert reached.exit_code == 4
     assert reached.why is not None

@@ -380,7 +380,7 @@ def test_names_and_parameters_from_plain_data() -> None:
             "residual_traction <= peak",
         ),
         ("sawtooth", {"peak_traction": 1.0, "residual_traction": 0.0, "delta": 1.0, "drops": 2.5}, "integer"),
-        ("sawtooth", {"peak_traction": 1.0, "residual_traction": 0.0, "delta": 1.0, "drops": 0}, ">= 1"),
+        ("sawtooth", {"peak_traction": 1.0, "residual_traction": 0.0, "delta": 1.0, "drops": 0}, "from 1 to 1000"),
         ("graph", {"points": []}, "first point"),
         ("graph", {"points": [[1e-6, 2.0]]}, "first point"),
         ("graph", {"points": [[0, 0], [1, 2, 3]]}, r"points\[1\]"),

@@ -59,6 +59,33 @@ TABLE: dict[str, tuple[str, str]] = {
     "no such mesh": ("domain={shape='file', file='absent.msh'}", "does not exist"),
     "more memory than there is": ("domain.cells=[32000, 32000]", "use fewer cells"),
     "a size of no body": ("domain.size=[1.0, 1e-12]", "must be 1e-09 or more"),
+    "a displacement beyond all numbers": ("boundary.wall.displacement=[1e308, 'free']", "cannot be computed with"),
+    "a displacement as far the other way": ("boundary.wall.displacement=[-1e308, 'free']", "cannot be computed with"),
+    "a load whose energy is no number": (
+        "boundary.press.traction=[0.0, -1e160]",
+        "boundary.press.traction: makes stresses of about 1e+160 N/m²",
+    ),
+    "a law beside which nothing is a number": (
+        "boundary.floor.friction.delta=1e308",
+        "boundary.floor.friction: makes stresses of about inf",
+    ),
+    "no modulus at all": (
+        "material={elasticity='tensor', model='plane_stress', matrix=[[0,0,0],[0,0,0],[0,0,0]]}",
+        "the elasticity is zero",
+    ),
+    "a number of thousands of digits": (
+        f"domain.cells=[0x{'F' * 5000}, 4]",
+        "domain.cells.0: is a whole number beyond",
+    ),
+    "as many iterations": (f"solver.max_iterations=0x{'F' * 5000}", "solver.max_iterations: is a whole number beyond"),
+    "a law of too many pieces": (
+        "boundary.floor.friction={law='sawtooth', peak_traction=2, residual_traction=1, delta=1e-6, drops=1000000000}",
+        "drops = 1000000000 must be a whole number from 1 to 1000",
+    ),
+    "a load that is not finite between the vertices": (
+        "boundary.press.traction=[0.0, '-exp(1e7*x*(0.25-x)*(0.5-x)*(0.75-x)*(1-x)*(0.375-x))']",
+        "boundary.press.traction: the formula is not finite everywhere there, between the vertices",
+    ),
     "too many unknowns": ("domain.cells=[100000, 100000]", "fewer cells"),
 }
 
@@ -97,6 +124,38 @@ def test_what_is_found_late_has_its_line(old: str, new: str, words: str, scene: 
     scene.write_text(text.replace(old, new), encoding="utf-8")
     line = text[: text.index(old)].count("\n") + (1 if "method" in old else -1)
     assert_refused(hvi("run", scene, cwd=tmp_path), f"scene.toml:{line}: {words}", tmp_path, {"scene.toml"})
+
+
+@pytest.mark.parametrize(
+    ("body", "place", "line"),
+    [
+        ('[body]\nforce = ["sqrt(y - 0.5)", 0.0]', "body.force", 2),
+        ('[body.weight]\nforce = ["sqrt(y - 0.5)", 0.0]', "body.weight.force", 2),
+        ('[body.weight]\nregion = ["soft", "hard"]\nforce = ["sqrt(y - 0.5)", 0.0]', "body.weight.force", 3),
+        ('[body]\nregion = "hard"\nforce = ["sqrt(y - 0.5)", 0.0]', "body.force", 3),
+        ('[boundary."a.b"]\non = "top"\ntraction = ["sqrt(x - 0.5)", 0.0]', "boundary.a.b.traction", 3),
+    ],
+)
+def test_a_formula_that_fails_on_the_mesh_has_its_line(body: str, place: str, line: int, tmp_path: Path) -> None:
+    """Errors name what acts in the body by its region; the file may give it by the name of its table."""
+    file = meshes.make(tmp_path / "m.msh", meshes.HALVES)
+    table = file_scene(file, floor={"on": "bottom", "contact": {"gap": 0.0}})
+    del table["boundary"]["press"]
+    table["material"] = {"a": STEEL | {"region": ["soft", "hard"]}}
+    scene = write_scene(tmp_path / "scene.toml", table)
+    before = scene.read_text(encoding="utf-8").count("\n") + 1
+    scene.write_text(scene.read_text(encoding="utf-8") + "\n" + body, encoding="utf-8")
+    done = hvi("check", scene, cwd=tmp_path)
+    assert done.returncode == 2
+    assert done.stderr.startswith(f"hvi: {scene}:{before + line}: {place}: the formula 'sqrt(")
+
+
+def test_a_scale_that_makes_no_body_is_refused(tmp_path: Path) -> None:
+    file = meshes.make(tmp_path / "m.msh", meshes.GOOD)
+    table = file_scene(file)
+    table["domain"]["scale"] = 1e-300
+    with pytest.raises(InputError, match=r"domain\.scale: makes the body 1\.0e-300 m long; allowed is 1e-09 to 1e\+09"):
+        prepare(Scene.model_validate(table))
 
 
 def test_a_wrong_scene_is_refused_by_the_process_too(scene: Path, tmp_path: Path) -> None:

@@ -58,8 +58,9 @@ class PlaneShape(DomainShape):
 
     def build(self, comm: MPI.Comm, dimension: int) -> Domain:
         """The mesh that gmsh makes on rank 0. Collective."""
-        from .. import gmsh_shapes
+        from .. import domain, gmsh_shapes
 
+        domain.check_affordable(comm, self.unknowns(2), 2, "mesh_size", "make it larger")
         return gmsh_shapes.build(comm, self.outline(), self.mesh_size)
 
     def coarsest(self, thresholds: Thresholds = DEFAULT) -> Self:
@@ -94,8 +95,8 @@ class PlaneShape(DomainShape):
         return self.mesh_size
 
     def unknowns(self, dimension: int, thresholds: Thresholds = DEFAULT) -> float:
-        """About how many unknowns the mesh has, if it filled the box around the shape."""
-        return 2.0 * vertices(self.box_area(), self.mesh_size, self.mesh_size)
+        """About how many unknowns the mesh has, if all its cells have one size."""
+        return 2.0 * vertices(self.outline().area, self.mesh_size, self.mesh_size)
 
 
 def vertices(area: float, coarse: float, fine: float) -> float:

@@ -1,0 +1,73 @@
+"""How much memory there is, and how much a mesh will need: what cannot be held is refused before it is made."""
+
+from __future__ import annotations
+
+import resource
+from pathlib import Path
+from typing import Any
+
+import meshes
+import pytest
+from mpi4py import MPI
+
+from hvi_fenicsx import InputError
+from hvi_fenicsx.mesh.shapes import DomainShape
+from hvi_fenicsx.mesh.thresholds import Thresholds
+from hvi_fenicsx.runtime import memory
+
+
+@pytest.mark.parametrize(
+    ("table", "file", "wanted"),
+    [
+        ("0::/batch/job\n", "batch/job/memory.max", [3.0]),
+        ("0::/batch/job\n", "batch/memory.max", [3.0]),
+        ("0::/\n", "memory.max", [3.0]),
+        ("3:cpu:/job\n4:memory:/batch/job\n", "memory/batch/memory.limit_in_bytes", [3.0]),
+        ("3:cpu:/job\n", "cpu/job/memory.max", []),
+    ],
+)
+def test_the_limits_of_a_cgroup_and_of_those_around_it_hold(
+    table: str, file: str, wanted: list[float], tmp_path: Path
+) -> None:
+    (tmp_path / "table").write_text(table)
+    (tmp_path / "cgroup" / file).parent.mkdir(parents=True)
+    (tmp_path / "cgroup" / file).write_text(f"{3 * 2**20}\n")
+    (tmp_path / "cgroup" / "cgroup.procs").write_text("max\n")
+    assert memory.cgroup_limits(tmp_path / "table", tmp_path / "cgroup") == wanted
+
+
+def test_what_ulimit_allows_holds() -> None:
+    before = resource.getrlimit(resource.RLIMIT_DATA)
+    resource.setrlimit(resource.RLIMIT_DATA, (2**33, before[1]))
+    try:
+        assert memory.limit() <= 2**13
+        assert memory.room(MPI.COMM_WORLD) <= 2**13
+    finally:
+        resource.setrlimit(resource.RLIMIT_DATA, before)
+
+
+SHAPES: dict[str, tuple[dict[str, Any], int, float]] = {
+    "cells": ({"shape": "rectangle", "size": [1.0, 1.0], "cells": [30, 30]}, 2, 2 * 31**2),
+    "box": ({"shape": "box", "size": [1.0, 1.0, 1.0], "cells": [6, 6, 6]}, 3, 3 * 7**3),
+    "mesh_size": ({"shape": "l_shape", "size": [1.0, 1.0], "cut": [0.5, 0.5], "mesh_size": 0.04}, 2, 1200.0),
+    "half_disk": ({"shape": "half_disk", "radius": 1.0, "mesh_size": 0.06}, 2, 1100.0),
+    "file": ({"shape": "file", "file": "m.msh"}, 2, 2 * 98.0),
+    "refinements": ({"shape": "file", "file": "m.msh", "refinements": 3}, 2, 64 * 2 * 98.0),
+}
+"""A domain, its dimension, and about how many unknowns it has."""
+
+
+@pytest.mark.parametrize("key", SHAPES)
+def test_a_mesh_of_any_shape_that_memory_cannot_hold_is_refused(
+    key: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """At the KB per unknown that were measured (docs/benchmarks.md), less a fifth; with a half more it is made."""
+    table, dimension, unknowns = SHAPES[key]
+    meshes.make(tmp_path / "m.msh", meshes.GOOD)
+    shape = DomainShape.registry[table["shape"]].model_validate(table, context={"folder": tmp_path})
+    measured = unknowns * {2: 1.3, 3: 2.6}[dimension] / 1024
+    monkeypatch.setattr(memory, "room", lambda comm: 0.8 * measured)
+    with pytest.raises(InputError, match=r"domain\.\w+: .* unknowns need .* GB or more; there are"):
+        shape.build_hierarchy(MPI.COMM_WORLD, dimension, Thresholds())
+    monkeypatch.setattr(memory, "room", lambda comm: 1.5 * measured)
+    shape.build_hierarchy(MPI.COMM_WORLD, dimension, Thresholds())
