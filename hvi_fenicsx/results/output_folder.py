@@ -61,8 +61,10 @@ class OutputFolder:
         if not re.fullmatch(re.escape(f".{self.target.name}.hvi-") + "[0-9a-f]{8}", name):
             return
         for left in (self.target.parent / name, self.target / name):
-            if left.is_dir() and not left.is_symlink():
+            if _is_folder(left):
+                self._left = True  # until it is done, the next one must find it too
                 self._finish(left)
+                self._left = False
 
     def _finish(self, left: Path) -> None:
         if manifest.read(left) is not None:
@@ -242,7 +244,7 @@ def move_in(work: Path, target: Path) -> tuple[str, ...]:
     last = {mark: 1, manifest.NAME: 2}
     there = (n for n in sorted(new.owned, key=lambda n: (last.get(n, 0), n)) if (work / n).exists())
     kept = tuple(filter(None, [_move(work / name, target / name, name in owned) for name in there]))
-    shutil.rmtree(work)
+    shutil.rmtree(work, ignore_errors=True)
     return kept
 
 

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 from ..errors import ExitCode
+from ..report.errors import PageError
 from ..report.html import study_page
 from ..results.folder import inputs_of
 from ..results.output_folder import Existing, OutputFolder
@@ -62,10 +63,18 @@ def _fill(folder: OutputFolder, plan: Plan, options: argparse.Namespace) -> None
     study, work = evaluate(plan, store), folder.stage()
     plots.draw(study, work)
     write(study, work)
-    study_page.write(work)
+    without_page = list(_failed_page(work))
     kept = folder.move_in(inputs_of(plan.own.scene, folder.target), store.listed())
-    warnings = [f"warning: {text}" for text in kept]
+    warnings = [f"warning: {text}" for text in (*without_page, *kept)]
     print("\n".join([*_heading(study), *said(study), *warnings, f"{folder.target}: {MARK}, study.csv, pictures"]))
+
+
+def _failed_page(folder: Path) -> Iterator[str]:
+    """Write the page; why it is not there costs a line, not the study."""
+    try:
+        study_page.write(folder)
+    except PageError as error:
+        yield str(error)
 
 
 def _existing(options: argparse.Namespace) -> Existing:

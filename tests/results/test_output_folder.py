@@ -238,6 +238,39 @@ def test_what_cannot_be_moved_stays_whole_and_the_next_run_moves_it(
     assert names(tmp_path) == ["r"]
 
 
+def test_a_left_result_that_cannot_be_moved_yet_is_not_forgotten(tmp_path: Path) -> None:
+    """A file stands where the folder was; when it is away, the next run goes on."""
+    out = tmp_path / "r"
+    folder = OutputFolder(out, "result")
+    (folder.stage() / "summary.json").write_text("1")
+    out.write_text("mine")
+    with pytest.raises(InputError, match="the whole result is in"):
+        folder.move_in({})
+    folder.close()
+    for _ in range(2):
+        with pytest.raises(InputError, match="Not a directory"):
+            written(out, summary="2")
+    assert out.read_text() == "mine"
+    out.unlink()
+    with pytest.raises(InputError, match="already holds a result"):
+        written(out, "refuse", summary="3")
+    assert (out / "summary.json").read_text() == "1"
+    assert names(tmp_path) == ["r"]
+
+
+def test_a_folder_in_the_place_of_a_listed_file_is_kept(tmp_path: Path) -> None:
+    out = tmp_path / "r"
+    written(out, summary="1", a="1", b="1")
+    for name in ("a.json", "b.json"):
+        (out / name).unlink()
+        (out / name).mkdir()
+        (out / name / "thesis.txt").write_text("mine")
+    written(out, summary="2", a="2")
+    assert (out / "a.json.kept" / "thesis.txt").exists()
+    assert (out / "b.json" / "thesis.txt").exists()
+    assert (out / "a.json").read_text() == "2"
+
+
 def test_a_damaged_file_is_found_whichever_it_is(tmp_path: Path) -> None:
     out = tmp_path / "r"
     written(out, summary="1", a="1")

@@ -16,6 +16,8 @@ from runs import command, hvi, write_scene
 from scenes import model, quadratic_linear
 
 from hvi_fenicsx import read_scene
+from hvi_fenicsx.report.errors import PageError
+from hvi_fenicsx.report.html import study_page
 from hvi_fenicsx.results.output_folder import OutputFolder
 from hvi_fenicsx.runtime import processes
 from hvi_fenicsx.studies.progress import StudyProgress
@@ -59,6 +61,18 @@ def test_what_the_study_did_not_write_stays(way: str, copy: Path, monkeypatch: p
         assert done.returncode == 0, done.stderr
         assert {"study.json", "study.csv", "report.html", "time.png"} < left
     assert names(copy) == sorted(["square.toml", *(f"out/{n}" for n in names(copy / "out"))])
+
+
+def test_a_page_that_cannot_be_written_costs_a_line(copy: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refused(folder: Path) -> Path:
+        raise PageError("no page today")
+
+    monkeypatch.setattr(study_page, "write", refused)
+    done = study(copy, "--resume")
+    assert done.returncode == 0
+    assert "warning: no page today" in done.stdout
+    assert (copy / "out" / "study.json").exists()
+    assert not (copy / "out" / "report.html").exists()
 
 
 def test_folders_of_others_are_no_studies(copy: Path, tmp_path: Path) -> None:
