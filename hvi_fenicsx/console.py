@@ -50,6 +50,10 @@ def existence(prepared: Preparation) -> str:
     if s.free:
         free = motions(s.free, bodies)
         parts.append(f"undetermined, neither held nor driven: {free} (the solution that moves least is returned)")
+    if s.never_held:
+        parts.append("held at no load factor")
+    if math.isfinite(s.held_from) and not s.never_held and s.held_from > 0.0:
+        parts.append(f"held above load factor {s.held_from:.6g}")
     for name, factor in (("held up to load factor", s.lambda_held), ("peak at load factor", s.lambda_peak)):
         if math.isfinite(factor):
             parts.append(f"{name} {factor:.6g}")
@@ -73,7 +77,7 @@ def motions(found: Sequence[Mode], bodies: Sequence[RigidBody]) -> str:
 def load_factors(factors: Mapping[str, LoadFactors]) -> Iterator[str]:
     """One line on each load: between which factors of it the body is held, the others as they are."""
     for name, f in factors.items():
-        if f.held_from < f.held:
+        if not f.never_held:
             ends = [f"above {f.held_from:.6g}"] if math.isfinite(f.held_from) else []
             ends += [f"up to {f.held:.6g}"] if math.isfinite(f.held) else []
             held = f"held at factors {' and '.join(ends)}" if ends else "held at any factor"

@@ -182,7 +182,7 @@ class LoadFactor(Observable):
         """A load that can be raised until the body escapes."""
         if np.isfinite(self._factor(level)):
             return None
-        return "no load factor ends what holds the body; hvi check reports the state"
+        return "no load factor holds the body, or none ends what does; hvi check reports the state"
 
     def read(self, level: AdaptiveLevel) -> Array:
         """The factor, (1,)."""

@@ -33,17 +33,17 @@ def analyse(comm: MPI.Comm, problem: RigidProblem, thresholds: Thresholds = DEFA
         thresholds: what counts as zero, and when to give up.
     """
     basis, reduced = reduce(comm, problem, thresholds)
-    c = _paper_c(comm, problem)
     if basis.shape[1] == 0:
-        return unmovable(c)
-    return _on_root(comm, reduced, lambda found: _verdict(problem, found, c))
+        return unmovable()
+    return _on_root(comm, reduced, lambda found: _verdict(problem, found))
 
 
-def _verdict(problem: RigidProblem, reduced: ReducedProblem, c: float) -> Solvability:
+def _verdict(problem: RigidProblem, reduced: ReducedProblem) -> Solvability:
+    analysis = Analysis(problem, reduced)
     try:
-        return Analysis(problem, reduced).solvability()
+        return analysis.solvability()
     except SolverError as error:
-        return undecided(modes(reduced.frame, problem.body), c, str(error))
+        return undecided(modes(reduced.frame, problem.body), analysis.paper_c, str(error))
 
 
 def load_factors(
@@ -67,11 +67,6 @@ def load_factors(
     if basis.shape[1] == 0:
         return LoadFactors(-np.inf, np.inf, np.inf, None, None)
     return _on_root(comm, reduced, lambda found: Analysis(problem, found).load_factors(load))
-
-
-def _paper_c(comm: MPI.Comm, problem: RigidProblem) -> float:
-    square = sum(part.c4**2 * float(part.weights.sum()) for part in problem.resistances)
-    return float(np.sqrt(comm.allreduce(square)))
 
 
 def _on_root(comm: MPI.Comm, reduced: ReducedProblem | None, work: Callable[[ReducedProblem], Result]) -> Result:

@@ -18,7 +18,7 @@ import numpy as np
 
 from ..errors import SolverError
 from ..typing import Array
-from .functional import Functional, Region, SlipIntegral, ball, faces
+from .functional import Functional, Region, SlipIntegral, ball, faces, idle
 from .thresholds import DEFAULT, Thresholds
 
 
@@ -96,16 +96,17 @@ class Programme:
             f: the functional.
             y: a motion (k,).
         """
-        slip = sum(b * g.value(y) for b, g in zip(f.factors, self.integrals, strict=True) if b > 0.0)
+        slip = sum(b * g.value(y) for b, g in zip(f.factors, self.integrals, strict=True) if b)
         return float(f.linear @ y + slip)
 
-    def minimise(self, f: Functional, region: Region, give_up: float = np.inf) -> Minimum | None:
-        """Minimum of f over region and cone; None if that is empty or nothing in it is small enough.
+    def minimise(self, f: Functional, region: Region, give_up: float = np.inf, enough: float = 0.0) -> Minimum | None:
+        """Minimum of a convex f over region and cone; None if that is empty or nothing in it is small enough.
 
         Args:
             f: the functional, with its cone.
             region: where to search.
             give_up: values above this are of no interest.
+            enough: a gap between value and bound that will do.
 
         Raises:
             SolverError: the gap between value and bound does not close.
@@ -119,7 +120,8 @@ class Programme:
             if not self._violated(f.cone, found.y, active):
                 value = self.evaluate(f, found.y)
                 best = Minimum(value, found.y, found.lower) if value < best.value else best
-            if progress.done(best.value - found.lower):
+            gap = best.value - found.lower
+            if (np.isfinite(gap) and gap <= enough) or progress.done(gap):
                 return replace(best, lower=found.lower)
             self._cut_towards(found.y, best.y)
         raise SolverError(
@@ -157,7 +159,7 @@ class Programme:
         Raises:
             SolverError: the gap between value and bound does not close.
         """
-        start = self.minimise(replace(f, linear=-load, factors=np.zeros_like(f.factors)), ball(self.frame))
+        start = self.minimise(f.unresisted().minus(load), ball(self.frame))
         if start is None or -start.value <= least:
             return self._unlimited(f, load, least)
         factor, limit = self.evaluate(f, start.y) / -start.value, start.y
@@ -177,8 +179,7 @@ class Programme:
 
     def _unlimited(self, f: Functional, load: Array, least: float) -> tuple[float, Array | None]:
         """A load that only ever holds has no largest factor, unless a motion it does no work on escapes."""
-        idle = replace(ball(self.frame), equal=load[None], value=np.zeros(1))
-        found = self.minimise(f, idle)
+        found = self.minimise(f, idle(self.frame, load))
         return (np.inf, None) if found is None or found.value >= -least else (-np.inf, found.y)
 
     def _cut(self, y: Array) -> None:

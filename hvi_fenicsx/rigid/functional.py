@@ -1,14 +1,14 @@
 """The functional on the rigid motions, which limit analysis minimises, and the sets over which it does.
 
 The functional is  linear·y + Σ_p factors_p G_p(y)  with the slip integrals  G_p(y) = Σ_i |B_pi y|, y in R^k,
-k <= 6, and factors >= 0: positively homogeneous and convex.
+k <= 6: positively homogeneous, and convex if no factor is negative.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from itertools import product
+from itertools import combinations, product
 
 import numpy as np
 
@@ -60,6 +60,10 @@ class Functional:
         """
         return replace(self, linear=self.linear - factor * load)
 
+    def unresisted(self) -> Functional:
+        """Zero, on the same cone."""
+        return replace(self, linear=np.zeros_like(self.linear), factors=np.zeros_like(self.factors))
+
 
 @dataclass(frozen=True)
 class Region:
@@ -80,6 +84,30 @@ def ball(frame: Array) -> Region:
     """|y| <= 1 in the largest of the rigid coefficients z = frame @ y, frame (n, k)."""
     none = np.zeros((0, frame.shape[1]))
     return Region(np.vstack([frame, -frame]), none, np.zeros(0))
+
+
+def vertices(frame: Array, rank: float) -> Array:
+    """The corners (v, k) of the ball |y| <= 1.
+
+    Args:
+        frame: rigid coefficients of the basis motions, (n, k).
+        rank: singular values this small beside the largest count as zero.
+    """
+    k = frame.shape[1]
+    chosen = [frame[list(rows)] for rows in combinations(range(len(frame)), k)]
+    signs = np.array(list(product((1.0, -1.0), repeat=k)))
+    corners = np.vstack([np.linalg.solve(rows, signs.T).T for rows in chosen if np.linalg.cond(rows) * rank < 1.0])
+    return np.asarray(corners[np.abs(corners @ frame.T).max(axis=1) <= 1.0 + rank])
+
+
+def idle(frame: Array, load: Array) -> Region:
+    """The motions with |y| <= 1 on which a load does no work.
+
+    Args:
+        frame: rigid coefficients of the basis motions, (n, k).
+        load: its work on the basis motions, (k,).
+    """
+    return replace(ball(frame), equal=load[None], value=np.zeros(1))
 
 
 def cross(frame: Array) -> Region:

@@ -2,29 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
-from ..laws.convex_parts import Directional
 from ..typing import Array
+from .branch_and_bound import GlobalProgramme
 from .cutting_planes import Minimum, Programme
-from .functional import Functional, Region, ball, cross
+from .functional import Functional, Region, ball, cross, vertices
 from .kernel import modes, natural_basis, null_space, triangle
 from .motions import Mode, mode_of
 from .reduction import ReducedProblem, RigidProblem
-from .solvability import ExistenceState, LoadFactors, PaperConditions, Solvability
+from .solvability import ExistenceState, LoadFactors, PaperConditions, Solvability, held_up_to
 from .thresholds import Thresholds
 
 
 @dataclass(frozen=True)
 class Analysis:
     """Growth, peak and load of a scene on its rigid motions. Serial; not cached across scenes.
-
-    `growth` and `peak` are tuples of convex functionals whose pointwise minimum counts: one, unless a law is
-    not convex at infinity.
 
     Attributes:
         problem: the body and what it meets.
@@ -40,14 +36,14 @@ class Analysis:
         return self.reduced.thresholds
 
     @cached_property
-    def growth(self) -> tuple[Functional, ...]:
+    def growth(self) -> Functional:
         """∫ j^∞(y)."""
-        return self._majorants(tuple(part.growth for part in self.problem.resistances))
+        return self.reduced.functional(tuple(part.growth for part in self.problem.resistances))
 
     @cached_property
-    def peak(self) -> tuple[Functional, ...]:
+    def peak(self) -> Functional:
         """∫ ĵ(y)."""
-        return self._majorants(tuple(part.peak for part in self.problem.resistances))
+        return self.reduced.functional(tuple(part.peak for part in self.problem.resistances))
 
     @cached_property
     def work(self) -> Array:
@@ -60,10 +56,10 @@ class Analysis:
         return self.thresholds.tie * (self.reduced.load_scale or self._law_scale or 1.0)
 
     @cached_property
-    def programme(self) -> Programme:
+    def programme(self) -> GlobalProgramme:
         """The shared cuts."""
         scale = self.reduced.load_scale + self._law_scale or 1.0
-        return Programme(self.reduced.frame, self.reduced.slips, scale, self.thresholds)
+        return GlobalProgramme(Programme(self.reduced.frame, self.reduced.slips, scale, self.thresholds))
 
     @cached_property
     def free(self) -> Array:
@@ -73,23 +69,20 @@ class Analysis:
         work = self.work @ loose
         return loose if np.abs(work).max(initial=0.0) <= self.tie else loose @ null_space(work[None], self.thresholds)
 
-    @property
-    def exact(self) -> bool:
-        """One functional is the true one; with one motion the majorants are exact on both its rays."""
-        return len(self.growth) == 1 or self.reduced.frame.shape[1] == 1
-
     def solvability(self) -> Solvability:
         """The whole verdict."""
         still = np.zeros_like(self.work)
         held, critical = self._factor(self.growth, self.work, still)
         peak, last = self._factor(self.peak, self.work, still)
+        start = -self._factor(self.growth, -self.work, still)[0] if self._pushes else -np.inf
         margin = self._margin(self.growth)
         state = self._state(margin)
         free = natural_basis(self.reduced.frame @ self.free, self.problem.body.dimension, self.thresholds)
         return Solvability(
             state=state,
             margin=None if margin is None else self._flat(margin.value),
-            lambda_held=held,
+            lambda_held=held_up_to(start, held),
+            held_from=start,
             lambda_peak=peak,
             direction=self._direction(
                 state, margin, critical if self._limits(held) else None, last if self._limits(peak) else None
@@ -98,8 +91,12 @@ class Analysis:
             kernel=modes(self.reduced.frame, self.problem.body),
             free=modes(free, self.problem.body),
             paper=self._paper(),
-            exact=self.exact,
         )
+
+    @property
+    def _pushes(self) -> bool:
+        """Whether a law drives the body: then a load may be too small to hold it."""
+        return any(min(part.growth.minus, part.growth.plus) < 0.0 for part in self.problem.resistances)
 
     def _limits(self, factor: float) -> bool:
         """Whether a load factor between none and all of the load."""
@@ -113,19 +110,18 @@ class Analysis:
         start, _ = self._factor(self.growth, -moved, self.work - moved)
         return LoadFactors(-start, held, peak, mode, peak_mode)
 
-    def _factor(self, functionals: Iterable[Functional], moved: Array, rest: Array) -> tuple[float, Mode | None]:
-        """The largest λ with <rest + λ moved, y> <= f(y) on all cones, and the motion that limits it."""
-        best: tuple[float, Mode | None] = (np.inf, None)
-        for f in (f.minus(rest) for f in functionals):
-            factor, y = self.programme.ratio(f, moved, self.tie)
-            if y is not None and factor < best[0]:
-                best = (factor, self._mode(f.minus(moved, factor) if np.isfinite(factor) else f, y))
-        return best
+    def _factor(self, f: Functional, moved: Array, rest: Array) -> tuple[float, Mode | None]:
+        """The largest λ with <rest + λ moved, y> <= f(y) on the cone, and the motion that limits it."""
+        f = f.minus(rest)
+        factor, y = self.programme.ratio(f, moved, self.tie)
+        if y is None:
+            return np.inf, None
+        return factor, self._mode(f.minus(moved, factor) if np.isfinite(factor) else f, y)
 
     def _state(self, margin: Minimum | None) -> ExistenceState:
         """The state, from the margin of the growth and, if that is negative, of the peak."""
         if margin is None or margin.value > self.tie:
-            return "held" if self.exact else "metastable"
+            return "held"
         if margin.value >= -self.tie:
             return "borderline"
         peak = self._margin(self.peak)
@@ -147,28 +143,22 @@ class Analysis:
             return held or self._steepest(self.growth)
         return self._tied(margin) if state == "borderline" else None
 
-    def _margin(self, functionals: Iterable[Functional]) -> Minimum | None:
+    def _margin(self, f: Functional) -> Minimum | None:
         """Minimum of f - <g,·> over |y| = 1: if negative that over the ball, else one for each face."""
-        inner = self._lowest(functionals, ball(self.reduced.frame))
-        return inner if inner.value < -self.tie else self._sphere(functionals, self.free[:, :0])
+        inner = self._lowest(f, ball(self.reduced.frame))
+        return inner if inner.value < -self.tie else self._sphere(f, self.free[:, :0])
 
-    def _lowest(self, functionals: Iterable[Functional], region: Region) -> Minimum:
+    def _lowest(self, f: Functional, region: Region) -> Minimum:
         """Minimum over a region that contains the origin."""
-        nothing = Minimum(0.0, np.zeros_like(self.work), 0.0)
-        found = [self.programme.minimise(f.minus(self.work), region) for f in functionals]
-        return min((one or nothing for one in found), key=lambda one: one.value)
+        return self.programme.minimise(f.minus(self.work), region) or Minimum(0.0, np.zeros_like(self.work), 0.0)
 
-    def _sphere(self, functionals: Iterable[Functional], across: Array) -> Minimum | None:
+    def _sphere(self, f: Functional, across: Array) -> Minimum | None:
         """Minimum over |y| = 1 and y orthogonal to `across` (k, q); None if the cone holds no such y."""
-        found = [self.programme.sphere(f.minus(self.work), across.T) for f in functionals]
-        known = [one for one in found if one is not None]
-        return min(known, key=lambda one: one.value) if known else None
+        return self.programme.sphere(f.minus(self.work), across.T)
 
-    def _steepest(self, functionals: tuple[Functional, ...]) -> Mode:
+    def _steepest(self, f: Functional) -> Mode:
         """A direction of escape easy to name: on |y|_1 <= 1 the minimum is mostly at a pure motion."""
-        region = cross(self.reduced.frame)
-        f = min(functionals, key=lambda one: self._lowest([one], region).value)
-        return self._mode(f.minus(self.work), self._lowest([f], region).y)
+        return self._mode(f.minus(self.work), self._lowest(f, cross(self.reduced.frame)).y)
 
     def _tied(self, margin: Minimum) -> Mode:
         """The motion along which load and growth are equal; a free one only if there is no other."""
@@ -177,7 +167,7 @@ class Analysis:
             y = self.free[:, 0]
         elif strict is not None:
             y = strict.y
-        return self._mode(self.growth[0].minus(self.work), y)
+        return self._mode(self.growth.minus(self.work), y)
 
     def _mode(self, f: Functional, y: Array) -> Mode:
         """The motion y in words, in its simplest form among those with the same value of f."""
@@ -197,11 +187,18 @@ class Analysis:
 
     def _paper(self) -> PaperConditions:
         """The paper's conditions look at the load and the contact alone; the laws enter by c."""
+        margin = self._margin(replace(self.growth.unresisted(), cone=self.reduced.contact))
+        return PaperConditions(self.paper_c, None if margin is None else self._flat(margin.value), self.tie)
+
+    @property
+    def paper_c(self) -> float:
+        """(Σ c4² area)^½ γ0; γ0 is attained at a vertex of the unit ball of Y, for its square is convex."""
         c4 = np.array([part.c4 for part in self.problem.resistances])
-        lawless = Functional(np.zeros_like(self.work), np.zeros(len(c4)), self.reduced.contact)
-        margin = self._margin([lawless])
-        c = float(np.sqrt(c4**2 @ self.reduced.areas))
-        return PaperConditions(c, None if margin is None else self._flat(margin.value))
+        gram = sum(
+            (g for g, c in zip(self.reduced.traces, c4, strict=True) if c > 0.0), np.zeros((len(self.work),) * 2)
+        )
+        trace = max(float(y @ gram @ y) for y in vertices(self.reduced.frame, self.thresholds.rank))
+        return float(np.sqrt(c4**2 @ self.reduced.areas * trace))
 
     def _flat(self, margin: float) -> float:
         return 0.0 if abs(margin) <= self.tie else margin
@@ -209,23 +206,8 @@ class Analysis:
     @cached_property
     def _law_scale(self) -> float:
         """The largest resistance to a unit motion, roughly."""
-        linear = max(float(np.abs(f.linear).max(initial=0.0)) for f in self.growth + self.peak)
-        return linear + max(float(f.factors @ self.reduced.areas) for f in self.growth + self.peak)
-
-    def _majorants(self, laws: tuple[Directional, ...]) -> tuple[Functional, ...]:
-        """The functional of the laws; if not convex, convex ones above it, as -|s| is below its tangents.
-
-        The concave parts are linearised along every mode of the kernel, both ways.
-        """
-        f, k = self.reduced.functional(laws), self.reduced.frame.shape[1]
-        concave = np.minimum(f.factors, 0.0)
-        if not concave.any():
-            return (f,)
-        tangents = [
-            sum((b * g.subgradient(y) for b, g in zip(concave, self.reduced.slips, strict=True)), np.zeros(k))
-            for y in np.vstack([np.eye(k), -np.eye(k)])
-        ]
-        return tuple(replace(f, linear=f.linear + slope, factors=f.factors - concave) for slope in tangents)
+        linear = max(float(np.abs(f.linear).max(initial=0.0)) for f in (self.growth, self.peak))
+        return linear + max(float(np.abs(f.factors) @ self.reduced.areas) for f in (self.growth, self.peak))
 
     def _resisted(self) -> list[Array]:
         """Unit rows (m, k) of the slips that a law resists, on its way or at last."""

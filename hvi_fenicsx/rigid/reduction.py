@@ -127,6 +127,7 @@ class ReducedProblem:
         slips: the slip integral of each resistance.
         moments: ∫ direction·y of each resistance, (p, k).
         areas: of each resistance, (p,).
+        traces: ∫ y·y over each resistance's part as a quadratic form, (p, k, k).
         loads: by name, the work on the basis motions, (k,).
         load_scale: the largest work of the loads on any basis motion, or the sum of the absolute nodal forces.
         thresholds: what counts as zero.
@@ -137,6 +138,7 @@ class ReducedProblem:
     slips: tuple[SlipIntegral, ...]
     moments: Array
     areas: Array
+    traces: Array
     loads: Mapping[str, Array]
     load_scale: float
     thresholds: Thresholds
@@ -175,7 +177,8 @@ def reduce(
     normals = [_work(p.points, p.normals[:, None, :], problem.body, basis)[:, 0] for p in problem.contact]
     local = np.unique(unit_rows(np.vstack([np.zeros((0, basis.shape[1])), *normals]), thresholds.short_row), axis=0)
     slips = [_work(p.points, p.directions, problem.body, basis) * p.weights[:, None, None] for p in problem.resistances]
-    pieces = comm.gather((local, slips, [float(p.weights.sum()) for p in problem.resistances]), root=0)
+    traces = [_trace(p, problem.body, basis) for p in problem.resistances]
+    pieces = comm.gather((local, slips, [float(p.weights.sum()) for p in problem.resistances], traces), root=0)
     if pieces is None:
         return basis, None
     integrals = tuple(SlipIntegral(np.concatenate([piece[1][p] for piece in pieces])) for p in range(len(slips)))
@@ -187,6 +190,7 @@ def reduce(
         slips=integrals,
         moments=np.array(moments).reshape(len(integrals), basis.shape[1]),
         areas=np.sum([piece[2] for piece in pieces], axis=0) if integrals else np.zeros(0),
+        traces=np.sum([piece[3] for piece in pieces], axis=0),
         loads=works,
         load_scale=max(problem.force, sum(float(np.abs(work).max()) for work in problem.loads.values())),
         thresholds=thresholds,
@@ -202,6 +206,12 @@ def unit_rows(rows: Array, tiny: float) -> Array:
     """
     length = np.linalg.norm(rows, axis=1)
     return np.asarray(rows[length > tiny] / length[length > tiny, None])
+
+
+def _trace(part: Resistance, body: RigidBody, basis: Array) -> Array:
+    """∫ y·y over this rank's vertices of a part, as a quadratic form on the kernel's basis, (k, k)."""
+    fields = np.einsum("mnd,nk->mdk", rigid_fields(part.points, body), basis)
+    return np.asarray(np.einsum("m,mdk,mdl->kl", part.weights, fields, fields))
 
 
 def _work(points: Array, directions: Array, body: RigidBody, basis: Array) -> Array:

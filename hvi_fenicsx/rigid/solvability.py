@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 
 from .motions import Mode
+from .thresholds import DEFAULT
 
 ExistenceState = Literal["held", "metastable", "escapes", "borderline", "undecided"]
 WORST_FIRST: tuple[ExistenceState, ...] = ("escapes", "undecided", "metastable", "borderline", "held")
@@ -19,12 +20,14 @@ class PaperConditions:
     """The paper's conditions (A2s), nondimensional.
 
     Attributes:
-        c: (Σ c4² area)^½ γ0 with γ0 = 1.
+        c: (Σ c4² area)^½ γ0, γ0 being the norm of the trace from Y into L² of the parts with c4 > 0.
         margin: min of -<g,y> over y in Y∩K∞ with |y| = 1, None if there is no such y.
+        tie: differences of less than this are rounding.
     """
 
     c: float
     margin: float | None
+    tie: float = 0.0
 
     @property
     def obtuse(self) -> bool:
@@ -34,7 +37,7 @@ class PaperConditions:
     @property
     def satisfied(self) -> bool:
         """(A2s)(i) or (iii): the paper's Theorem 1 asserts a solution."""
-        return self.margin is None or (self.margin > 0.0 and self.margin > self.c)
+        return self.margin is None or (self.margin > 0.0 and self.margin > self.c + self.tie)
 
 
 @dataclass(frozen=True)
@@ -49,6 +52,7 @@ class LoadFactors:
         peak: see above.
         mode: the motion that limits the load at `held`, None where nothing does.
         peak_mode: the motion that limits the load at `peak`, likewise.
+        tie: relative difference of two factors that is rounding.
     """
 
     held_from: float
@@ -56,10 +60,18 @@ class LoadFactors:
     peak: float
     mode: Mode | None
     peak_mode: Mode | None
+    tie: float = DEFAULT.tie
+
+    @property
+    def never_held(self) -> bool:
+        """Whether no factor is held."""
+        if not np.isfinite(self.held):
+            return self.held_from >= self.held
+        return self.held - self.held_from <= self.tie * abs(self.held)
 
     def summary(self) -> dict[str, object]:
         """For JSON: null for infinite. Where no factor is held, or every factor escapes, a flag says so."""
-        some = self.held_from < self.held
+        some = not self.never_held
         return {
             "never_held": not some,
             "always_escapes": self.peak == -np.inf,
@@ -78,15 +90,14 @@ class Solvability:
     Attributes:
         state: held, metastable, escapes or borderline; undecided where the programmes broke down.
         margin: min over y in C with |y| = 1 of ∫ j^∞(y_t) - <g,y>, None (infinite) if C = {0}.
-        lambda_held: see LoadFactors.held, for the whole load; ±inf where there is no limit.
+        lambda_held: see LoadFactors.held, for the whole load; inf: nothing limits it, -inf: no factor is held.
         lambda_peak: see LoadFactors.peak.
         direction: the motion of escape (in the state borderline: the one in balance), None if held.
         critical: the motion that limits lambda_held.
         kernel: a basis of Y.
         free: a basis of the motions that nothing holds and on which the load does no work, both ways.
         paper: the paper's own conditions.
-        exact: False if a growth is not convex; margin and lambda_held are then upper bounds, and `held` is
-            not claimed (`metastable` without a direction: only solving decides).
+        held_from: see LoadFactors.held_from, where a law pushes the body; else -inf.
         trouble: in the state undecided, what broke down; margin and factors are then unknown (None, nan).
     """
 
@@ -99,15 +110,22 @@ class Solvability:
     kernel: tuple[Mode, ...]
     free: tuple[Mode, ...]
     paper: PaperConditions
-    exact: bool = True
+    held_from: float = -np.inf
     trouble: str = ""
+
+    @property
+    def never_held(self) -> bool:
+        """Whether the body is held at no factor of the whole load."""
+        return self.lambda_held == -np.inf
 
     def summary(self) -> dict[str, object]:
         """The `solvability` entry of summary.json: null for infinite or absent."""
         return {
             "state": self.state,
             "margin": self.margin,
+            "held_from": _finite(self.held_from),
             "lambda_held": _finite(self.lambda_held),
+            "never_held": self.never_held,
             "lambda_peak": _finite(self.lambda_peak),
             "direction": self.direction.name if self.direction else None,
             "kernel": [mode.name for mode in self.kernel],
@@ -116,7 +134,7 @@ class Solvability:
         }
 
 
-def unmovable(c: float) -> Solvability:
+def unmovable() -> Solvability:
     """The verdict on a body whose conditions leave no rigid motion: coercive, held under any load."""
     return Solvability(
         state="held",
@@ -127,7 +145,7 @@ def unmovable(c: float) -> Solvability:
         critical=None,
         kernel=(),
         free=(),
-        paper=PaperConditions(c, None),
+        paper=PaperConditions(0.0, None),
     )
 
 
@@ -149,9 +167,18 @@ def undecided(kernel: tuple[Mode, ...], c: float, trouble: str) -> Solvability:
         kernel=kernel,
         free=(),
         paper=PaperConditions(c, np.nan),
-        exact=False,
         trouble=trouble,
     )
+
+
+def held_up_to(held_from: float, held: float) -> float:
+    """The factor up to which a body is held, -inf if it is held at none.
+
+    Args:
+        held_from: the factor from which on it is held.
+        held: the factor up to which it is held.
+    """
+    return -np.inf if LoadFactors(held_from, held, np.inf, None, None).never_held else held
 
 
 def combine(bodies: Sequence[Solvability]) -> Solvability:
@@ -165,17 +192,17 @@ def combine(bodies: Sequence[Solvability]) -> Solvability:
     if worst.state == "undecided":
         return undecided(kernel, c, worst.trouble)
     known = [body for body in bodies if body.state != "undecided"]
-    first = min(known, key=lambda body: body.lambda_held)
+    first, held_from = min(known, key=lambda body: body.lambda_held), max(body.held_from for body in known)
     return replace(
         worst,
         margin=_combined_margin([body.margin for body in known]),
-        lambda_held=first.lambda_held,
+        lambda_held=held_up_to(held_from, first.lambda_held),
+        held_from=held_from,
         lambda_peak=min(body.lambda_peak for body in known),
         critical=first.critical,
         kernel=kernel,
         free=tuple(mode for body in known for mode in body.free),
         paper=PaperConditions(c, _combined_margin([body.paper.margin for body in known])),
-        exact=all(body.exact for body in bodies),
     )
 
 

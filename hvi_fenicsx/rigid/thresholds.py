@@ -28,6 +28,9 @@ class Thresholds:
         rest_gap: energy by which a position at rest may be above the least one, over the largest work.
         rest_rounds: linear programmes for a position at rest, at most; it is a start, so the best position will do.
         farthest: a displacement of so many times p0 L / E0 is a body that slides away.
+        max_cones: divisions of a cone of slips for one minimum, where a growth is not convex.
+        part_of_gap: how exactly the bound on such a cone is computed, relative to the gap that is left in all.
+        inside: share of an edge of such a cone, relative to the largest, from which a slip is inside of the cone.
         solver_tolerances: of HiGHS, with and without presolve, the narrowest first; where rounding leaves it without a
             verdict, the next.
     """
@@ -48,6 +51,9 @@ class Thresholds:
     rest_gap: float = 1e-10
     rest_rounds: int = 200
     farthest: float = 1e8
+    max_cones: int = 2_000
+    part_of_gap: float = 0.1
+    inside: float = 1e-3
     solver_tolerances: tuple[tuple[bool, float], ...] = ((False, 1e-10), (True, 1e-10), (False, 1e-9), (True, 1e-9))
 
     def solver_options(self) -> list[dict[str, Any]]:

@@ -76,6 +76,10 @@ def _factors(found: Mapping[str, Any]) -> Iterator[str]:
     if held == 0 and peak == 0:
         yield "Load factors: made larger or smaller as a whole, the load carries the body away."
         return
+    if found.get("never_held"):
+        yield "Load factors: laws drive the body, and made larger or smaller as a whole the load does not hold it."
+    if (start := found.get("held_from")) is not None and start > 0 and not found.get("never_held"):
+        yield f"Laws drive the body; the load holds it from {_times(start)} the given load on."
     if held is not None:
         yield f"Load factor of safety against residual strength: the body is held up to {_times(held)} the given load."
     if peak is not None:

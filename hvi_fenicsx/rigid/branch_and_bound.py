@@ -1,0 +1,202 @@
+"""Global minima of functionals whose slip integrals may have negative factors: branch and bound over cones of slips.
+
+A law whose growth falls below zero on both sides together makes a slip integral with a negative factor, which is
+concave. On a cone with as many edges as dimensions, a concave positively homogeneous function is nowhere below the
+linear one with the same values on the edges. So on each cone of slips a convex functional bounds the true one from
+below, and :class:`.Programme` minimises it. The cone with the lowest bound is divided through the motion that attains
+it, until the bound meets the lowest value attained. Slips of one dimension, as on a straight floor, need no division.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from heapq import heappop, heappush
+from itertools import count, product
+
+import numpy as np
+
+from ..errors import SolverError
+from ..typing import Array
+from .cutting_planes import Minimum, Programme
+from .functional import Functional, Region, ball, faces, idle
+
+
+@dataclass(frozen=True)
+class ConcavePart:
+    """The slip integrals of a functional that have negative factors.
+
+    Attributes:
+        functional: the functional.
+        programme: its slip integrals.
+        basis: orthonormal rows that span their slips, (q, k).
+    """
+
+    functional: Functional
+    programme: Programme
+    basis: Array
+
+    @classmethod
+    def of(cls, f: Functional, programme: Programme) -> ConcavePart:
+        """Find the slips of the negative factors.
+
+        Args:
+            f: a functional with negative factors.
+            programme: its slip integrals.
+        """
+        k = len(f.linear)
+        rows = [
+            g.rows.reshape(-1, k)
+            for b, g in zip(f.factors, programme.integrals, strict=True)
+            if b < 0.0 and g.rows.size
+        ]
+        _, sizes, right = np.linalg.svd(np.linalg.qr(np.vstack([np.zeros((k, k)), *rows]), mode="r"))
+        return cls(f, programme, right[sizes > programme.thresholds.rank * max(sizes[0], 1e-300)])
+
+    def cones(self) -> Iterator[Array]:
+        """Cones that cover all slips; the edges of each are columns (q, q)."""
+        q = len(self.basis)
+        return (np.diag(signs) for signs in product((1.0, -1.0), repeat=q))
+
+    def bound(self, edges: Array) -> Functional:
+        """The convex functional that is a lower bound on the motions with slips in a cone, and its region.
+
+        Args:
+            edges: of the cone, columns (q, q).
+        """
+        shares = np.linalg.solve(edges, self.basis)
+        values = [self._value(edge @ self.basis) for edge in edges.T]
+        f, sides = self.functional, -shares / np.linalg.norm(shares, axis=1, keepdims=True)
+        return replace(
+            f,
+            linear=f.linear + np.array(values) @ shares,
+            factors=np.maximum(f.factors, 0.0),
+            cone=np.vstack([f.cone, sides]),
+        )
+
+    def divide(self, edges: Array, y: Array, depth: int) -> Iterator[Array]:
+        """The parts of a cone: through the slip of a motion, every third time half and half.
+
+        Args:
+            edges: of the cone, columns (q, q).
+            y: the motion, (k,).
+            depth: how often the cone was divided before.
+        """
+        limit, slip = self.programme.thresholds.inside, self.basis @ y
+        shares = np.linalg.solve(edges, slip)
+        inner = np.flatnonzero(shares > limit * np.abs(shares).max(initial=0.0))
+        if depth % 3 == 2 or len(inner) < 2:
+            cosines = edges.T @ edges
+            inner = np.array(np.unravel_index(np.argmin(cosines), cosines.shape))
+            slip = edges[:, inner].sum(axis=1)
+        for j in inner:
+            part = edges.copy()
+            part[:, j] = slip / np.linalg.norm(slip)
+            yield part
+
+    def _value(self, y: Array) -> float:
+        only = replace(self.functional, linear=np.zeros_like(y), factors=np.minimum(self.functional.factors, 0.0))
+        return self.programme.evaluate(only, y)
+
+
+@dataclass(frozen=True)
+class GlobalProgramme:
+    """What :class:`.Programme` does, for factors of any sign.
+
+    Attributes:
+        convex: for functionals without negative factors.
+    """
+
+    convex: Programme
+
+    def evaluate(self, f: Functional, y: Array) -> float:
+        """The value of f at y, all vertices summed; the cone is not looked at.
+
+        Args:
+            f: the functional.
+            y: a motion (k,).
+        """
+        return self.convex.evaluate(f, y)
+
+    def minimise(self, f: Functional, region: Region, give_up: float = np.inf) -> Minimum | None:
+        """Minimum of f over region and cone; None if that is empty or nothing in it is small enough.
+
+        Args:
+            f: the functional, with its cone.
+            region: where to search.
+            give_up: values above this are of no interest.
+
+        Raises:
+            SolverError: the gap between value and bound does not close.
+        """
+        if not np.any(f.factors < 0.0):
+            return self.convex.minimise(f, region, give_up)
+        return self._search(ConcavePart.of(f, self.convex), region, give_up)
+
+    def sphere(self, f: Functional, across: Array) -> Minimum | None:
+        """Minimum of f over the cone and |y| = 1, one search for each face; None if there is no such y.
+
+        Args:
+            f: the functional, with its cone.
+            across: motions (q, k) to which y is to be orthogonal.
+
+        Raises:
+            SolverError: the gap between value and bound does not close.
+        """
+        best: Minimum | None = None
+        for face in faces(self.convex.frame, across):
+            found = self.minimise(f, face, np.inf if best is None else best.value)
+            best = found if best is None or (found is not None and found.value < best.value) else best
+        return best
+
+    def ratio(self, f: Functional, load: Array, least: float) -> tuple[float, Array | None]:
+        """The largest λ with λ load·y <= f(y) on the cone, and the motion that limits it, as :meth:`Programme.ratio`.
+
+        Args:
+            f: the functional, with its cone.
+            load: its work on the basis motions, (k,).
+            least: works of at most this size for a unit motion count as none.
+
+        Raises:
+            SolverError: the gap between value and bound does not close.
+        """
+        if not np.any(f.factors < 0.0):
+            return self.convex.ratio(f, load, least)
+        start = self.convex.minimise(f.unresisted().minus(load), ball(self.convex.frame))
+        if start is None or -start.value <= least:
+            return self._unlimited(f, load, least)
+        y, limits = start.y, self.convex.thresholds
+        factor = self.evaluate(f, y) / float(load @ y)
+        for _ in range(limits.max_rounds):
+            found = self.minimise(f.minus(load, factor), ball(self.convex.frame))
+            if found is None or found.value >= -limits.loose_gap * self.convex.scale:
+                return factor, y
+            y, work = found.y, float(load @ found.y)
+            if work <= least:
+                return -np.inf, y
+            factor = self.evaluate(f, y) / work
+        raise SolverError(f"rigid motions: no load factor after {limits.max_rounds} minima")
+
+    def _unlimited(self, f: Functional, load: Array, least: float) -> tuple[float, Array | None]:
+        """As that of :class:`.Programme`."""
+        found = self.minimise(f, idle(self.convex.frame, load))
+        return (np.inf, None) if found is None or found.value >= -least else (-np.inf, found.y)
+
+    def _search(self, part: ConcavePart, region: Region, give_up: float) -> Minimum | None:
+        limits, numbers, depth = self.convex.thresholds, count(), 0
+        best, gap = Minimum(give_up, np.empty(0), -np.inf), np.inf
+        waiting: list[tuple[float, int, Array, Array, int]] = []
+        cones = part.cones()
+        for _ in range(limits.max_cones):
+            for edges in cones:
+                found = self.convex.minimise(part.bound(edges), region, best.value, limits.part_of_gap * gap)
+                if found is not None:
+                    value = self.evaluate(part.functional, found.y)
+                    best = Minimum(value, found.y, found.lower) if value < best.value else best
+                    heappush(waiting, (found.lower, next(numbers), edges, found.y, depth))
+            gap = best.value - waiting[0][0] if waiting else 0.0
+            if gap <= limits.loose_gap * self.convex.scale:
+                return replace(best, lower=best.value - gap) if best.y.size else None
+            _, _, edges, y, depth = heappop(waiting)
+            cones, depth = part.divide(edges, y, depth), depth + 1
+        raise SolverError(f"rigid motions: {limits.max_cones} cones left a gap in a growth that is not convex")
