@@ -27,7 +27,7 @@ ENV PYTHONPATH=/opt/hvi_fenicsx \
     PRTE_MCA_mapby=:oversubscribe
 
 # Whoever the caller is (--user), home and caches are writable, so that results in /work belong to the caller.
-RUN printf '#!/bin/sh\nexec python3 -m hvi_fenicsx "$@"\n' >/usr/local/bin/hvi \
+RUN printf '#!/bin/sh\nexec python3 -P -m hvi_fenicsx "$@"\n' >/usr/local/bin/hvi \
     && chmod 755 /usr/local/bin/hvi \
     && python3 -m compileall -q /opt/hvi_fenicsx \
     && useradd --create-home --uid 1000 hvi \

@@ -8,13 +8,13 @@ import os
 import shlex
 import signal
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NoReturn
 
 from .errors import ExitCode, HviError, InputError
-from .runtime import processes
+from .runtime import processes, terminal
 
 _RANK_VARIABLES = ("OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK")
 _SIZE_VARIABLES = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE")
@@ -157,20 +157,35 @@ def _whole_number(text: str, most: int) -> int:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command; the exit code by the contract. Collective under mpirun."""
-    return int(_run_command(_with_petsc_joined(sys.argv[1:] if arguments is None else arguments)))
+    terminal.prepare()
+    processes.ensure_home()
+    try:
+        return int(_run_command(_with_petsc_joined(sys.argv[1:] if arguments is None else arguments)))
+    finally:
+        terminal.finish()
 
 
 def _run_command(words: Sequence[str]) -> int:
     try:
-        options = parser().parse_args(words)
-        options.given = shlex.join(["hvi", *words])
-        return _dispatch(options, words)
-    except HviError as error:
-        _print_error(f"hvi: {error}")
-        return error.exit_code
+        return _told(lambda: _dispatch(_parsed(words), words))
     except KeyboardInterrupt:
         _print_error("hvi: interrupted; nothing was written")
         return ExitCode.INTERRUPTED
+
+
+def _told(command: Callable[[], int]) -> int:
+    """The exit code of a command; an error of the program is told."""
+    try:
+        return command()
+    except HviError as error:
+        _print_error(f"hvi: {error}")
+        return error.exit_code
+
+
+def _parsed(words: Sequence[str]) -> argparse.Namespace:
+    options = parser().parse_args(words)
+    options.given = shlex.join(["hvi", *words])
+    return options
 
 
 def _with_petsc_joined(words: Sequence[str]) -> list[str]:
@@ -191,13 +206,19 @@ def _dispatch(options: argparse.Namespace, words: Sequence[str]) -> int:
         from .runtime import mpirun
 
         return mpirun.run(options.np, words)
-    if _is_under_mpirun():
-        processes.die_with_parent(signal.SIGKILL)
-    return _run_or_check(options)
+    if not _is_under_mpirun():
+        return _run_or_check(options)
+    from .runtime import mpirun
+
+    processes.die_with_parent(signal.SIGKILL)
+    return mpirun.hand_over(_told(lambda: _run_or_check(options)))
 
 
 def _run_or_check(options: argparse.Namespace) -> int:
     with _interrupts_held():
+        from .runtime import petsc
+
+        petsc.start()
         from . import commands
         from .runtime.mpi import ended_together
 
@@ -227,10 +248,13 @@ def _interrupts_held() -> Iterator[None]:
 
 
 def _version() -> int:
+    from .runtime import petsc
+
+    petsc.start()
     from .runtime.versions import versions
 
     if _is_first_rank():
-        print("\n".join(f"{name} {version}" for name, version in versions().items()))
+        terminal.say("\n".join(f"{name} {version}" for name, version in versions().items()))
     return ExitCode.CERTIFIED
 
 
@@ -253,7 +277,7 @@ def _become_single_process(ranks: int, words: Sequence[str]) -> NoReturn:
     """Replace this process, one of several ranks, by ``hvi WORDS --np RANKS`` in a process of its own."""
     from .runtime import mpirun
 
-    alone = [sys.executable, "-m", "hvi_fenicsx", *mpirun.without_ranks(words), f"--np={ranks}"]
+    alone = [*processes.PYTHON, "-m", "hvi_fenicsx", *mpirun.without_ranks(words), f"--np={ranks}"]
     os.execve(sys.executable, alone, processes.environment())
 
 
@@ -272,4 +296,4 @@ def _is_first_rank() -> bool:
 
 def _print_error(message: str) -> None:
     if _is_first_rank():
-        print(message, file=sys.stderr, flush=True)
+        terminal.complain(message)

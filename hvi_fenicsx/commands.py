@@ -21,7 +21,7 @@ from .report.html import render
 from .report.pictures import draw as pictures
 from .results.output_folder import Existing
 from .results.write import write_record
-from .runtime import log
+from .runtime import log, terminal
 from .runtime.mpi import on_root
 from .runtime.signals import Interrupt
 from .runtime.timing import Timer
@@ -191,7 +191,7 @@ def _finished(target: Path, scene: Scene, goal: Goal | None) -> int | None:
         return None
     if not _same_goal(goal, record["accuracy"]):
         return None
-    print(f"{target}: finished already ({record['reason']})")
+    terminal.say(f"{target}: finished already ({record['reason']})")
     return int(record["exit_code"])
 
 
@@ -211,7 +211,7 @@ def check(options: argparse.Namespace) -> int:
     prepared = prepare(scene, COMM)
     text = _report(prepared, options.loads, as_json=options.json)
     if COMM.rank == 0:
-        print(text)
+        terminal.say(text)
     return _CODES.get(prepared.solvability.state, ExitCode.CERTIFIED)
 
 

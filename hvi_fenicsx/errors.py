@@ -19,7 +19,7 @@ class ExitCode(IntEnum):
     NOT_CONVERGED = 4
     """Not converged, or metastable and no equilibrium found."""
     INTERRUPTED = 130
-    """Ctrl-C, SIGTERM or SIGUSR1; what was found is written."""
+    """Ctrl-C, SIGTERM, SIGHUP or SIGUSR1; what was found is written."""
 
 
 class HviError(Exception):

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import os
 import subprocess
-import sys
 import tempfile
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -167,8 +166,10 @@ def _run_gmsh(
     with tempfile.TemporaryDirectory() as folder:
         source, target = Path(folder, "given.npz"), Path(folder, "made.npz")
         np.savez(source, points=points, triangles=triangles, places=places, sizes=sizes)
-        command = [sys.executable, "-m", "hvi_fenicsx.mesh.gmsh_worker", os.fspath(source), os.fspath(target)]
-        subprocess.run(command, env=processes.environment(), capture_output=True, check=True, timeout=timeout)
+        command = [*processes.PYTHON, "-m", "hvi_fenicsx.mesh.gmsh_worker", os.fspath(source), os.fspath(target)]
+        subprocess.run(
+            command, env=processes.environment(), cwd=folder, capture_output=True, check=True, timeout=timeout
+        )
         with np.load(target) as made:
             return made["points"], made["cells"]
 

@@ -7,12 +7,15 @@ and keeps all records in ``run.log``.
 
 from __future__ import annotations
 
+import contextlib
 import logging
 import sys
 import time
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
+
+from . import terminal
 
 PACKAGE = __name__.partition(".")[0]
 COMMANDS, WORKFLOW = f"{PACKAGE}.commands", f"{PACKAGE}.workflow"
@@ -115,7 +118,7 @@ class _ElapsedFormatter(logging.Formatter):
         self._start = time.time()
 
     def format(self, record: logging.LogRecord) -> str:
-        return f"{record.created - self._start:9.3f} s  {record.getMessage()}"
+        return f"{record.created - self._start:9.3f} s  {terminal.printable(record.getMessage())}"
 
 
 class TerminalDisplay(logging.Handler):
@@ -136,14 +139,15 @@ class TerminalDisplay(logging.Handler):
     def emit(self, record: logging.LogRecord) -> None:
         """Show one record."""
         if not hasattr(record, "moving"):
-            print(record.getMessage(), flush=True)
+            terminal.say(record.getMessage())
         elif self._line is not None:
             self._line.renderable.update(text=f"{record.getMessage()}, {time.perf_counter() - self._start:.1f} s")
 
     def close(self) -> None:
         """Leave the terminal clean."""
         if self._line is not None:
-            self._line.stop()
+            with contextlib.suppress(OSError):  # the terminal may be closed
+                self._line.stop()
             self._line = None
         super().close()
 

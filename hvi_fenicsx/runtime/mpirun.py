@@ -3,17 +3,30 @@
 Open MPI kills the ranks 0.2 s after it gets a SIGINT or SIGTERM, too soon to write what was found; it passes SIGUSR1 on
 to them (mpirun(1), "Signal Propagation"; MPICH does too). So mpirun runs apart from the terminal, and for the first
 signal this process sends it SIGUSR1, which :mod:`.signals` catches, for a second one SIGTERM.
+
+mpirun prints a notice of its own when a rank ends with another code than 0, and no option silences it. So the ranks
+agree on the code, rank 0 writes it into a file, and all end with 0. A broken pipe would end mpirun and so the ranks:
+this process takes their lines and writes them.
 """
 
 from __future__ import annotations
 
+import contextlib
+import os
 import signal
 import subprocess
-from collections.abc import Sequence
+import tempfile
+import threading
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from pathlib import Path
 from types import FrameType
 
-from ..errors import ExitCode
-from . import processes
+from ..errors import ExitCode, InputError
+from . import processes, terminal
+
+_CODE_FILE = "HVI_EXIT_CODE_FILE"
+_LAST_LINES = 2.0
+"""Seconds for the last lines, where a rank that was killed has left the pipe open to a child of its own."""
 
 
 def run(ranks: int, words: Sequence[str]) -> int:
@@ -33,11 +46,81 @@ def run(ranks: int, words: Sequence[str]) -> int:
         signalled.append(number)
         process.send_signal(signal.SIGUSR1 if len(signalled) == 1 else signal.SIGTERM)
 
-    process = subprocess.Popen(command, start_new_session=True, preexec_fn=processes.die_with_parent)
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, pass_on)
-    code = process.wait()
+    with _code_file() as file:
+        process = _started(command, file)
+        processes.catch(processes.STOP, pass_on)
+        writers = [_writer(process.stdout, terminal.say), _writer(process.stderr, terminal.complain)]
+        code = process.wait() or int(file.read_text(encoding="ascii") or 0)
+        for writer in writers:
+            writer.join(_LAST_LINES)
     return ExitCode.INTERRUPTED if signalled and code else code
+
+
+def _started(command: Sequence[str], file: Path) -> subprocess.Popen[str]:
+    """Mpirun, in a session of its own; its ranks know the file."""
+    return subprocess.Popen(
+        command,
+        env={**os.environ, _CODE_FILE: str(file)},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        encoding="utf-8",
+        errors="backslashreplace",
+        start_new_session=True,
+        preexec_fn=processes.die_with_parent,
+    )
+
+
+def _writer(lines: Iterable[str] | None, write: Callable[[str], None]) -> threading.Thread:
+    """A thread that writes what comes from a pipe."""
+
+    def work() -> None:
+        for line in lines or ():
+            write(line.removesuffix("\n").removesuffix("\r"))
+
+    thread = threading.Thread(target=work, daemon=True)
+    thread.start()
+    return thread
+
+
+@contextlib.contextmanager
+def _code_file() -> Iterator[Path]:
+    """An empty file for the exit code of the ranks."""
+    try:
+        folder = tempfile.TemporaryDirectory(prefix="hvi-np-", ignore_cleanup_errors=True)
+    except OSError as error:
+        raise InputError(f"--np: no temporary file can be made ({error}); set TMPDIR to a folder with room") from None
+    with folder:
+        file = Path(folder.name, "code")
+        file.touch()
+        yield file
+
+
+def hand_over(code: int) -> int:
+    """Give the exit code that all ranks agree on to the process that started mpirun.
+
+    Collective, where MPI has been started.
+
+    Args:
+        code: the same on all ranks.
+
+    Returns:
+        What this rank shall end with: 0, or the code where nobody would read the file.
+    """
+    if code == 0 or _CODE_FILE not in os.environ:
+        return code
+    from mpi4py import MPI
+
+    comm = MPI.COMM_WORLD
+    written = comm.bcast(_written(os.environ[_CODE_FILE], code) if comm.rank == 0 else False)
+    return 0 if written else code
+
+
+def _written(file: str, code: int) -> bool:
+    """Write the code into a file that is there; on another machine it is not."""
+    with contextlib.suppress(OSError), open(file, "r+", encoding="ascii") as stream:
+        stream.write(str(int(code)))
+        return True
+    return False
 
 
 def without_ranks(words: Sequence[str]) -> list[str]:

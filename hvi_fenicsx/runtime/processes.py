@@ -12,10 +12,17 @@ import shutil
 import signal
 import subprocess
 import sys
+import tempfile
+from collections.abc import Callable, Iterable
 from pathlib import Path
+from types import FrameType
 
 from ..errors import InputError
 
+PYTHON = (sys.executable, "-P")
+"""Python as our children run it: the current folder is not on its path."""
+STOP = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+"""The signals by which a user, a batch system or a terminal that is closed asks a program to stop."""
 _PR_SET_PDEATHSIG = 1
 """prctl(2)."""
 _MPI = ("OMPI_", "PMIX_", "PRTE_", "PMI_", "HYDRA_", "MPI_LOCAL")
@@ -34,8 +41,28 @@ _USER_SETTINGS = (
 def environment() -> dict[str, str]:
     """Our environment for a child, with this package on its path and without what would make it an MPI rank."""
     kept = {name: value for name, value in os.environ.items() if name in _USER_SETTINGS or not name.startswith(_MPI)}
-    paths = [str(Path(__file__).parents[2]), kept.get("PYTHONPATH", "")]
-    return {**kept, "PYTHONPATH": os.pathsep.join(filter(None, paths))}
+    paths = [str(Path(__file__).parents[2]), *kept.get("PYTHONPATH", "").split(os.pathsep)]
+    return {**kept, "PYTHONPATH": os.pathsep.join(filter(None, paths))}  # an empty one would be the current folder
+
+
+def ensure_home() -> None:
+    """Set HOME where it is missing: Open MPI does not start without it."""
+    if not os.environ.get("HOME"):
+        os.environ.pop("HOME", None)
+        home = os.path.expanduser("~")  # by the table of users, which may lack this one
+        os.environ["HOME"] = home if os.path.isdir(home) else tempfile.gettempdir()
+
+
+def catch(numbers: Iterable[signal.Signals], handler: Callable[[int, FrameType | None], None]) -> None:
+    """Install a handler of signals; SIGHUP stays ignored where the caller has us ignore it, as nohup does.
+
+    Args:
+        numbers: of the signals.
+        handler: called for each.
+    """
+    for number in numbers:
+        if number != signal.SIGHUP or signal.getsignal(number) is not signal.SIG_IGN:
+            signal.signal(number, handler)
 
 
 def launcher(ranks: int) -> list[str]:
@@ -47,7 +74,7 @@ def launcher(ranks: int) -> list[str]:
     mpirun = shutil.which("mpirun")
     if mpirun is None:
         raise InputError("--np: there is no mpirun on the PATH; install Open MPI or MPICH, or leave --np out")
-    return [mpirun, "-n", str(ranks), sys.executable, "-m", "mpi4py"]
+    return [mpirun, "-n", str(ranks), *PYTHON, "-m", "mpi4py"]
 
 
 def die_with_parent(number: signal.Signals = signal.SIGTERM) -> None:

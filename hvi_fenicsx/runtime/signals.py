@@ -1,6 +1,7 @@
-"""Ctrl-C, SIGTERM and SIGUSR1 as a request to stop: the solvers end at the next iteration, the result is written.
+"""Signals as a request to stop: the solvers end at the next iteration, the result is written.
 
-SIGUSR1 is what mpirun passes on to its ranks, and what a batch system may send before a job's end.
+SIGINT is Ctrl-C, SIGHUP comes from a terminal that is closed, SIGTERM from a batch system. SIGUSR1 is what mpirun
+passes on to its ranks, and what a batch system may send before a job's end.
 """
 
 from __future__ import annotations
@@ -10,7 +11,9 @@ from types import FrameType
 
 from mpi4py import MPI
 
-SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGUSR1)
+from . import processes
+
+SIGNALS = (*processes.STOP, signal.SIGUSR1)
 
 
 class Interrupt:
@@ -25,8 +28,7 @@ class Interrupt:
 
     def watch(self) -> None:
         """Catch the signals from now on."""
-        for number in SIGNALS:
-            signal.signal(number, self._on_signal)
+        processes.catch(SIGNALS, self._on_signal)
 
     def _on_signal(self, number: int, frame: FrameType | None) -> None:
         if self._signalled:

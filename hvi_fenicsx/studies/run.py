@@ -13,6 +13,7 @@ from ..report.errors import PageError
 from ..report.html import study_page
 from ..results.folder import inputs_of
 from ..results.output_folder import Existing, OutputFolder
+from ..runtime import terminal
 from ..runtime.manifest import MARKS
 from ..runtime.versions import __version__, versions
 from ..scene import read_scene
@@ -66,7 +67,8 @@ def _fill(folder: OutputFolder, plan: Plan, options: argparse.Namespace) -> None
     without_page = list(_failed_page(work))
     kept = folder.move_in(inputs_of(plan.own.scene, folder.target), store.listed())
     warnings = [f"warning: {text}" for text in (*without_page, *kept)]
-    print("\n".join([*_heading(study), *said(study), *warnings, f"{folder.target}: {MARK}, study.csv, pictures"]))
+    place = f"{folder.target}: {MARK}, study.csv, pictures"
+    terminal.say("\n".join([*_heading(study), *said(study), *warnings, place]))
 
 
 def _failed_page(folder: Path) -> Iterator[str]:

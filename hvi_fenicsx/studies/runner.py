@@ -6,7 +6,6 @@ import contextlib
 import signal
 import statistics
 import subprocess
-import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -27,7 +26,7 @@ _OWN_FAULTS = (signal.SIGSEGV, signal.SIGBUS, signal.SIGABRT, signal.SIGFPE, sig
 
 @contextlib.contextmanager
 def watched(folder: Path) -> Iterator[None]:
-    """SIGINT and SIGTERM end the child that runs, and the study.
+    """SIGINT, SIGTERM and SIGHUP end the child that runs, and the study.
 
     Raises:
         StudyInterruptedError: a signal came.
@@ -36,12 +35,12 @@ def watched(folder: Path) -> Iterator[None]:
     def note(number: int, frame: FrameType | None) -> None:
         raise StudyInterruptedError(f"interrupted; what is finished is kept in {folder}; --resume goes on from there")
 
-    numbers = (signal.SIGINT, signal.SIGTERM)
-    before = [signal.signal(number, note) for number in numbers]
+    before = {number: signal.getsignal(number) for number in processes.STOP}
+    processes.catch(processes.STOP, note)
     try:
         yield
     finally:
-        for number, handler in zip(numbers, before, strict=True):
+        for number, handler in before.items():
             signal.signal(number, handler)
 
 
@@ -129,6 +128,7 @@ class Runner:
         child = subprocess.Popen(
             [*_python(self.store.ranks), "-m", "hvi_fenicsx.studies.point", *self._arguments(one, path)],
             env=processes.environment(),
+            cwd=path.parent,
             stdout=subprocess.DEVNULL,
             stderr=subprocess.PIPE,
             text=True,
@@ -189,7 +189,7 @@ def _killer(code: int) -> signal.Signals | None:
 
 
 def _python(ranks: int) -> list[str]:
-    return [sys.executable] if ranks == 1 else processes.launcher(ranks)
+    return [*processes.PYTHON] if ranks == 1 else processes.launcher(ranks)
 
 
 @contextlib.contextmanager

@@ -9,7 +9,6 @@ from __future__ import annotations
 import contextlib
 import os
 import subprocess
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -37,11 +36,18 @@ def draw(folder: Path, *, timeout: float = 120) -> list[Path]:
     Raises:
         PictureError: the child failed; its message says which picture and why.
     """
-    command = [sys.executable, "-m", __package__, os.fspath(folder)]
+    command = [*processes.PYTHON, "-m", __package__, os.path.abspath(folder)]
     # One thread for linear algebra: the child forks, and what it draws needs none.
     alone = {**processes.environment(), "OMP_NUM_THREADS": "1"}
+    # In the result's folder: in the current one matplotlib would read a file of settings.
     child = subprocess.Popen(
-        command, env=alone, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
+        command,
+        env=alone,
+        cwd=folder,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
     )
     with _ended(child, Path(folder)):
         try:
