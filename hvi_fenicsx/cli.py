@@ -14,11 +14,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from .errors import ExitCode, HviError, InputError
-from .runtime import processes, terminal
-
-_RANK_VARIABLES = ("OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK")
-_SIZE_VARIABLES = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE")
-"""By these, mpirun tells each process its rank, and the number of ranks."""
+from .runtime import log, processes, rank_variables, terminal
 
 
 class _Parser(argparse.ArgumentParser):
@@ -167,7 +163,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _run_command(words: Sequence[str]) -> int:
     try:
-        return _told(lambda: _dispatch(_parsed(words), words))
+        with log.Handlers(log.WarningDisplay()):
+            return _told(lambda: _dispatch(_parsed(words), words))
     except KeyboardInterrupt:
         _print_error("hvi: interrupted; nothing was written")
         return ExitCode.INTERRUPTED
@@ -183,9 +180,19 @@ def _told(command: Callable[[], int]) -> int:
 
 
 def _parsed(words: Sequence[str]) -> argparse.Namespace:
+    for word in words:
+        _check_utf8(word)
     options = parser().parse_args(words)
     options.given = shlex.join(["hvi", *words])
     return options
+
+
+def _check_utf8(word: str) -> None:
+    """Refuse what could be written into no file of the result."""
+    try:
+        word.encode("utf-8")
+    except UnicodeEncodeError:
+        raise InputError(f"{word}: is not UTF-8; rename the file or folder") from None
 
 
 def _with_petsc_joined(words: Sequence[str]) -> list[str]:
@@ -202,11 +209,11 @@ def _dispatch(options: argparse.Namespace, words: Sequence[str]) -> int:
         return _version()
     if options.command == "study":
         return _study(options, words)
-    if getattr(options, "np", None) and not _is_under_mpirun():
+    if getattr(options, "np", None) and not rank_variables.is_under_mpirun():
         from .runtime import mpirun
 
         return mpirun.run(options.np, words)
-    if not _is_under_mpirun():
+    if not rank_variables.is_under_mpirun():
         return _run_or_check(options)
     from .runtime import mpirun
 
@@ -221,8 +228,9 @@ def _run_or_check(options: argparse.Namespace) -> int:
         petsc.start()
         from . import commands
         from .runtime.mpi import ended_together
+        from .system.petsc_options import refusals_told
 
-    with ended_together(commands.COMM), _placed(options):
+    with ended_together(commands.COMM), _placed(options), refusals_told():
         return commands.run(options) if options.command == "run" else commands.check(options)
 
 
@@ -253,7 +261,7 @@ def _version() -> int:
     petsc.start()
     from .runtime.versions import versions
 
-    if _is_first_rank():
+    if rank_variables.is_first_rank():
         terminal.say("\n".join(f"{name} {version}" for name, version in versions().items()))
     return ExitCode.CERTIFIED
 
@@ -263,10 +271,10 @@ def _study(options: argparse.Namespace, words: Sequence[str]) -> int:
 
     None of them has started MPI yet, so they may end at any time.
     """
-    if _is_under_mpirun():
-        if not _is_first_rank():
+    if rank_variables.is_under_mpirun():
+        if not rank_variables.is_first_rank():
             return ExitCode.CERTIFIED
-        _become_single_process(options.np or _ranks_of_mpirun(), words)
+        _become_single_process(options.np or rank_variables.ranks(), words)
     with _interrupts_held():
         from .studies import run as study
 
@@ -281,19 +289,6 @@ def _become_single_process(ranks: int, words: Sequence[str]) -> NoReturn:
     os.execve(sys.executable, alone, processes.environment())
 
 
-def _ranks_of_mpirun() -> int:
-    return next((int(os.environ[name]) for name in _SIZE_VARIABLES if name in os.environ), 1)
-
-
-def _is_under_mpirun() -> bool:
-    return any(name in os.environ for name in _RANK_VARIABLES)
-
-
-def _is_first_rank() -> bool:
-    """Whether this is rank 0, by mpirun's variables: MPI itself need not be started for a message."""
-    return next((os.environ[name] for name in _RANK_VARIABLES if name in os.environ), "0") == "0"
-
-
 def _print_error(message: str) -> None:
-    if _is_first_rank():
+    if rank_variables.is_first_rank():
         terminal.complain(message)

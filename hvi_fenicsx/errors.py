@@ -23,9 +23,15 @@ class ExitCode(IntEnum):
 
 
 class HviError(Exception):
-    """Anything the program itself has to say about why it stopped."""
+    """Anything the program itself has to say about why it stopped.
+
+    Attributes:
+        exit_code: what a command then ends with.
+        everywhere: whether all ranks raise it alike.
+    """
 
     exit_code: int = ExitCode.ERROR
+    everywhere: bool = True
 
 
 class InputError(HviError, ValueError):

@@ -103,3 +103,31 @@ class Contribution:
     conditions: tuple[Condition, ...] = ()
     bounds: tuple[NormalBounds, ...] = ()
     laws: tuple[BoundaryLaw, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Refuse entries of a wrong kind: what is done with them would fail far from the effect that made them.
+
+        Raises:
+            TypeError: with the entry's name.
+        """
+        import ufl  # reading a scene needs none of it
+
+        forms = dict.fromkeys((*_ARGUMENTS, "across"), ufl.Form)
+        for name, kind in {**_KINDS, **forms}.items():
+            for entry in getattr(self, name):
+                if not isinstance(entry, kind):
+                    raise TypeError(f"Contribution.{name} holds a {type(entry).__name__}, not a {kind.__name__}")
+        for name, arguments in _ARGUMENTS.items():
+            for form in getattr(self, name):
+                if len(form.arguments()) != arguments:
+                    raise TypeError(f"Contribution.{name} holds a form of {len(form.arguments())} arguments")
+
+
+_KINDS: dict[str, type] = {
+    "averaged": Averaged,
+    "conditions": Condition,
+    "bounds": NormalBounds,
+    "laws": BoundaryLaw,
+}
+_ARGUMENTS = {"bilinear": 2, "linear": 1, "strains": 1}
+"""How many of test and trial function the forms have."""

@@ -121,6 +121,18 @@ class _ElapsedFormatter(logging.Formatter):
         return f"{record.created - self._start:9.3f} s  {terminal.printable(record.getMessage())}"
 
 
+class WarningDisplay(logging.Handler):
+    """Warnings on standard error, except those on a scene, which the command tells with its lines."""
+
+    def __init__(self) -> None:
+        super().__init__(logging.WARNING)
+        self.addFilter(lambda record: record.name != WORKFLOW)
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Show one record."""
+        terminal.complain(f"hvi: {record.getMessage()}")
+
+
 class TerminalDisplay(logging.Handler):
     """The lines of the command on standard output; on a terminal also the last Newton step, on a moving line.
 

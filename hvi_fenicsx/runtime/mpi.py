@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import time
 import traceback
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -11,8 +12,11 @@ from typing import Any, TypeVar
 from mpi4py import MPI
 
 from ..errors import HviError, InputError
+from . import terminal
 
 T = TypeVar("T")
+_TOGETHER = 2.0
+"""Seconds within which ranks raise the same error."""
 
 
 def agree(comm: MPI.Comm, value: T) -> list[T]:
@@ -52,17 +56,34 @@ def on_root(comm: MPI.Comm, action: Callable[[], T]) -> T:
 
 @contextmanager
 def ended_together(comm: MPI.Comm) -> Iterator[None]:
-    """End all ranks when one of them has an error that was not foreseen: the others would wait for it for ever."""
+    """End all ranks when one of them has an error that the others do not have: they would wait for it for ever.
+
+    Collective.
+    """
+    twin = comm.Dup()  # apart from what the others may wait in
     try:
         yield
-    except (HviError, KeyboardInterrupt):
-        raise  # all ranks alike
+    except KeyboardInterrupt:
+        raise
+    except HviError as error:
+        if error.everywhere or _raised_by_all(twin):
+            raise
+        terminal.complain(f"hvi: {error}")
+        comm.Abort(error.exit_code)
     except Exception:
         if comm.size > 1:
             traceback.print_exc()
             sys.stderr.flush()
             comm.Abort(1)
         raise
+
+
+def _raised_by_all(comm: MPI.Comm) -> bool:
+    """Whether all ranks come here, within a time."""
+    request, end = comm.Ibarrier(), time.monotonic() + _TOGETHER
+    while not (done := request.Test()) and time.monotonic() < end:
+        time.sleep(0.01)
+    return bool(done)
 
 
 def total(comm: MPI.Comm, value: float) -> float:

@@ -10,11 +10,15 @@ from typing import Any
 
 from pydantic_core import PydanticCustomError
 
+from ..runtime import log
 from ..schema import refusal, shown
+from . import plugin_guard
+
+_LOG = log.logger("scene")
 
 
 def load(names: Any, folder: str | os.PathLike[str]) -> tuple[str, ...]:
-    """Load Python files, each once in a process.
+    """Load Python files, each once in a process; a file is announced before its code is run.
 
     Args:
         names: one file or a list of them, relative to the folder.
@@ -53,22 +57,13 @@ def _execute(module: str, path: Path) -> None:
         raise refusal(f"{path} cannot be loaded")
     plugin = importlib.util.module_from_spec(spec)
     sys.modules[module] = plugin  # dataclasses and pydantic look their own module up
+    _LOG.warning("plugin %s: its code is run", path)
     try:
         spec.loader.exec_module(plugin)
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         del sys.modules[module]
-        raise refusal(f"{path}{_line(error, path)}: {type(error).__name__}: {error}") from None
-
-
-def _line(error: Exception, path: Path) -> str:
-    """The last line of the file that the error passed through."""
-    lines = [error.lineno] if isinstance(error, SyntaxError) else []
-    trace = error.__traceback__
-    while trace is not None:
-        if trace.tb_frame.f_code.co_filename == str(path):
-            lines.append(trace.tb_lineno)
-        trace = trace.tb_next
-    return f":{lines[-1]}" if lines else ""
+        raise refusal(f"{path}{plugin_guard.line_of(error, path)}: {type(error).__name__}: {error}") from None
+    plugin_guard.guard(plugin, path)
 
 
 def _named_wrongly(value: Any) -> PydanticCustomError:

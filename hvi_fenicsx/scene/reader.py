@@ -149,6 +149,7 @@ def _effects_by_region(body: Any) -> dict[str, _Place]:
 
 
 def _text(file: Path) -> str:
+    _check_name(file)
     raw = _bytes(file)
     if len(raw) > _LARGEST:
         raise InputError(f"{file}: has more than {_LARGEST // 1_000_000} MB; a scene file is smaller")
@@ -162,6 +163,14 @@ def _text(file: Path) -> str:
     if not text.strip():
         raise InputError(f"{file}: is empty; a scene has at least [domain] and [material]")
     return text.replace("\r\n", "\n")
+
+
+def _check_name(file: Path) -> None:
+    """Refuse a name that is no text: the result names its scene, and files beside it."""
+    try:
+        str(file.absolute()).encode("utf-8")
+    except UnicodeEncodeError:
+        raise InputError(f"{file.absolute()}: this name is not UTF-8; rename the file or folder") from None
 
 
 def _bytes(file: Path) -> bytes:

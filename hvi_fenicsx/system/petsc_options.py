@@ -11,6 +11,8 @@ from typing import Any
 
 from petsc4py import PETSc
 
+from ..errors import InputError
+
 PREFIX = "hvi_"
 
 
@@ -46,6 +48,29 @@ def configure(target: Any, defaults: Mapping[str, Any], prefix: str = PREFIX) ->
     with default_options(defaults, prefix):
         target.setOptionsPrefix(prefix)
         target.setFromOptions()
+
+
+class OptionError(InputError):
+    """PETSc cannot use an option that the user set."""
+
+    everywhere = False
+
+
+@contextmanager
+def refusals_told() -> Iterator[None]:
+    """Tell an error of PETSc with the user's options, where there are any: they are what can be mended.
+
+    Raises:
+        OptionError: in the place of PETSc's error.
+    """
+    try:
+        yield
+    except PETSc.Error as error:
+        given = [f"-{k} {v or ''}".strip() for k, v in PETSc.Options().getAll().items() if k.startswith(PREFIX)]
+        if not given:
+            raise
+        reason = str(error).splitlines()[-1].removeprefix(f"[{PETSc.COMM_WORLD.rank}] ")
+        raise OptionError(f"--petsc: PETSc stops with the options {' '.join(given)}: {reason}") from None
 
 
 def insert(text: str) -> None:
