@@ -186,7 +186,7 @@ def _finished(target: Path, scene: Scene, goal: Goal | None) -> int | None:
     """The exit code of a finished result of the same scene and goal; None where there is none. Rank 0 only."""
     record, fault = results.finished.read(target, scene)
     if fault is not None:
-        print(f"{target}: {fault}; the scene is run again")
+        terminal.say(f"{target}: {fault}; the scene is run again")
     if record is None or record["exit_code"] not in (ExitCode.CERTIFIED, ExitCode.NO_SOLUTION):
         return None
     if not _same_goal(goal, record["accuracy"]):

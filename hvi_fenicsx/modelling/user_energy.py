@@ -20,6 +20,7 @@ from ..errors import InputError
 from ..mesh import vertex_dofs
 from ..problem.spaces import displacement_space
 from ..rigid import RigidBody, rigid_fields
+from ..runtime import forms
 from ..runtime.mpi import agree
 from ..typing import Array
 
@@ -102,7 +103,7 @@ def _assembled(form: Form, space: fem.FunctionSpace) -> PETSc.Mat:
     made = form(ufl.TrialFunction(space), ufl.TestFunction(space))
     if not isinstance(made, ufl.Form) or len(made.arguments()) != 2:
         raise InputError("energy: the function must return a bilinear UFL form a(u, v), such as inner(σ(u), ε(v))*dx")
-    matrix = assemble_matrix(fem.form(made))
+    matrix = assemble_matrix(forms.compiled(made))
     matrix.assemble()
     return matrix
 
@@ -137,7 +138,7 @@ def _stretch_stiffness(matrix: PETSc.Mat, space: fem.FunctionSpace) -> float:
     """The largest energy of a unit stretch along an axis, over the volume, N/m². Collective."""
     points, d = _owned_points(space), space.mesh.geometry.dim
     volume = space.mesh.comm.allreduce(
-        fem.assemble_scalar(fem.form(fem.Constant(space.mesh, PETSc.ScalarType(1.0)) * ufl.dx))
+        fem.assemble_scalar(forms.compiled(fem.Constant(space.mesh, PETSc.ScalarType(1.0)) * ufl.dx))
     )
     energies = [_energy(matrix, points[:, i : i + 1] * np.eye(d)[i]) / volume for i in range(d)]
     if not min(energies) > 0.0:

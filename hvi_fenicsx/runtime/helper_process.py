@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import signal
 import subprocess
-import sys
 import tempfile
 import threading
 from collections.abc import Callable, Iterator, Sequence
@@ -30,7 +29,7 @@ def run(module: str, words: Sequence[str], seconds: float) -> subprocess.Complet
         TimeoutExpired: it took longer.
         Interrupted: a signal came.
     """
-    command = [sys.executable, "-m", module, *words]
+    command = [*processes.PYTHON, "-m", module, *words]
     with tempfile.TemporaryDirectory() as folder:
         child = subprocess.Popen(
             command,

@@ -17,7 +17,7 @@ import pytest
 import ufl
 from dolfinx import fem, mesh
 from mpi4py import MPI
-from runs import command, process, summary, write_scene
+from runs import ROOT, command, process, summary, write_scene
 from scenes import model, quadratic_linear
 
 from hvi_fenicsx.errors import HviError
@@ -119,6 +119,13 @@ def test_options_in_the_current_folder_are_not_read(tmp_path: Path, monkeypatch:
     (tmp_path / "ffcx_options.json").write_text("not JSON")
     monkeypatch.chdir(tmp_path)
     assert forms.options() == before
+
+
+def test_all_forms_are_compiled_in_one_place() -> None:
+    """A form that a module compiles by itself would wait for ever for a run that was killed."""
+    package = ROOT / "hvi_fenicsx"
+    direct = [file.name for file in package.rglob("*.py") if "fem.form(" in file.read_text(encoding="utf-8")]
+    assert direct == ["forms.py"]
 
 
 SLOW = """#!/bin/sh

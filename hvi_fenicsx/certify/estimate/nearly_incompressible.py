@@ -12,6 +12,7 @@ import ufl
 from dolfinx import fem, la
 
 from ...problem.problem import Problem
+from ...runtime import forms
 from ...typing import Array
 from . import defect
 from .dual_norm import DualNorm
@@ -42,10 +43,10 @@ class CondensedStiffness(BubbleStiffness):
         self.vertices = fem.Function(problem.space)
         bulk, moved = problem.bulk, self._in + self.vertices
         self.pressures = bulk.pressures(self.vertices)
-        self._dilated = [fem.form(form) for form in bulk.dilated(moved)]
+        self._dilated = [forms.compiled(form) for form in bulk.dilated(moved)]
         tests = ufl.TestFunction(problem.space), ufl.TestFunction(bubbles)
         self._at_vertices, self._action = (
-            fem.form(bulk.between(moved, v) + bulk.pressed(self.pressures, v)) for v in tests
+            forms.compiled(bulk.between(moved, v) + bulk.pressed(self.pressures, v)) for v in tests
         )
 
     def times(self, e: Array) -> Array:
