@@ -47,7 +47,7 @@ def run(ranks: int, words: Sequence[str]) -> int:
         process.send_signal(signal.SIGUSR1 if len(signalled) == 1 else signal.SIGTERM)
 
     with _code_file() as file:
-        process = _started(command, file)
+        process: subprocess.Popen[str] = _started(command, file)
         processes.catch(processes.STOP, pass_on)
         writers = [_writer(process.stdout, terminal.say), _writer(process.stderr, terminal.complain)]
         code = process.wait() or int(file.read_text(encoding="ascii") or 0)
