@@ -71,6 +71,14 @@ def _fill(folder: OutputFolder, plan: Plan, options: argparse.Namespace) -> None
     terminal.say("\n".join([*_heading(study), *said(study), *warnings, place]))
 
 
+def _failed_page(folder: Path) -> Iterator[str]:
+    """Write the page; why it is not there costs a line, not the study."""
+    try:
+        study_page.write(folder)
+    except PageError as error:
+        yield str(error)
+
+
 def _existing(options: argparse.Namespace) -> Existing:
     return "replace" if options.force else "resume" if options.resume else "refuse"
 
