@@ -26,6 +26,11 @@ class SpatialValue(ABC):
         """Whether it is a plain number."""
         return isinstance(self.source, float)
 
+    @property
+    def everywhere(self) -> bool:
+        """Whether it is known between the vertices of a mesh too."""
+        return True
+
     @abstractmethod
     def at(self, points: Array) -> Array:
         """Values at points of shape (n, 3), m; shape (n,). Not checked for finiteness."""
@@ -55,6 +60,10 @@ class _Mapped(SpatialValue):
 
     def __init__(self, value: SpatialValue, source: str, change: Callable[[Array], Array]) -> None:
         self._value, self.source, self._change = value, source, change
+
+    @property
+    def everywhere(self) -> bool:
+        return self._value.everywhere
 
     def at(self, points: Array) -> Array:
         return self._change(self._value.at(points))

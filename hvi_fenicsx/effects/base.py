@@ -80,8 +80,13 @@ class FormContext(Protocol):
     def cells(self, *regions: str | None) -> Any:
         """The measure dx/L^d of what regions share (None: the whole body); None where that is nothing."""
 
-    def facets(self, part: str) -> Any:
-        """The measure ds/L^(d-1) of a boundary part."""
+    def facets(self, part: str, *values: SpatialValue) -> Any:
+        """The measure ds/L^(d-1) of a boundary part; its quadrature sees how values vary within a facet.
+
+        Args:
+            part: its name.
+            *values: what is integrated.
+        """
 
 
 @dataclass(frozen=True, slots=True)

@@ -64,7 +64,7 @@ class Traction(_Listed):
         if where is None:
             raise InputError("a traction needs a boundary part")
         vector = ufl.as_vector([context.render(f) for f in self.values]) / context.number(context.stress)
-        return Contribution(linear=(ufl.inner(vector, context.test) * context.facets(where),))
+        return Contribution(linear=(ufl.inner(vector, context.test) * context.facets(where, *self.values),))
 
     @override
     def surface_load(self) -> SurfaceLoad:

@@ -66,6 +66,11 @@ class Expression(SpatialValue):
         self._expression, self._mesh = expression, mesh
         self.source = f"UFL expression {_shortened(str(expression))}"
 
+    @property
+    @override
+    def everywhere(self) -> bool:
+        return False
+
     @override
     def at(self, points: Array) -> Array:
         space = fem.functionspace(self._mesh, ("Lagrange", 1))

@@ -136,6 +136,7 @@ def _problem(
         implausible=implausible,
         contributions=tuple(contributions),
         held=held,
+        part_facets=context.part_facets,
     )
 
 

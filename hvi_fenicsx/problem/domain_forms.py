@@ -19,7 +19,7 @@ from ..runtime.mpi import agree
 from ..spatial_value import SpatialValue
 from ..typing import Array
 from .scaling import Placed, Scales
-from .spaces import displacement_space, scalar_space
+from .spaces import LOAD_DEGREE, displacement_space, scalar_space
 
 
 class DomainForms:
@@ -74,9 +74,16 @@ class DomainForms:
         measure = ufl.Measure("dx", domain=self.domain.mesh, subdomain_data=tags)
         return ScaledMeasure(scale, measure(shared)) if shared else None
 
-    def facets(self, part: str) -> Any:
-        """ds/L^(d-1)."""
-        return ScaledMeasure(self.number(self.length ** (1 - self.dimension)), self.boundary(part))
+    def facets(self, part: str, *values: SpatialValue) -> Any:
+        """ds/L^(d-1), with a quadrature that sees how values vary within a facet.
+
+        Args:
+            part: its name.
+            *values: what is integrated.
+        """
+        varying = any(not value.is_number for value in values)
+        rule = {"quadrature_degree": LOAD_DEGREE[self.dimension]} if varying else {}
+        return ScaledMeasure(self.number(self.length ** (1 - self.dimension)), self.boundary(part, **rule))
 
     def boundary(self, part: str, **metadata: Any) -> Any:
         """The measure ds over a part, SI.

@@ -7,6 +7,7 @@ SI; the forms contain the factors.
 from __future__ import annotations
 
 import functools
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -97,6 +98,7 @@ class Problem:
         implausible: warnings of effects about their own numbers, in sentences.
         contributions: what each effect contributed.
         held: the dofs of each condition, with its part.
+        part_facets: the local facets of each boundary part.
     """
 
     domain: Domain
@@ -114,6 +116,7 @@ class Problem:
     implausible: tuple[str, ...]
     contributions: tuple[PlacedContribution, ...]
     held: tuple[tuple[str, Entities], ...]
+    part_facets: Mapping[str, Entities]
 
     @functools.cached_property
     def fixed_here(self) -> Entities:

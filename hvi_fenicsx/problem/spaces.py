@@ -14,6 +14,8 @@ from dolfinx import mesh as dmesh
 DEGREE = 1
 CONTACT_RULE = {"quadrature_rule": "vertex", "quadrature_degree": 1}
 """Quadrature of bounds and laws on Γc (UFL metadata): the vertex rule of the paper, which lumps them at the nodes."""
+LOAD_DEGREE = {2: 20, 3: 12}
+"""Degree of the quadrature of a traction that varies, by dimension: what a mesh cannot follow must not be missed."""
 
 
 def displacement_space(mesh: dmesh.Mesh) -> fem.FunctionSpace:

@@ -139,6 +139,25 @@ def test_against_a_mesh_four_times_finer(name: str) -> None:
     assert 0.75 < row.index < 1.3
 
 
+UNSEEN: dict[str, Table] = {
+    "gap": model(4, gap="2e-6*sin(25*x)"),
+    "gap with crests between the vertices": model(4, gap="1e-6*cos(50*x)"),
+    "traction": model(4),
+    "displacement": model(4),
+}
+UNSEEN["traction"]["boundary"]["press"]["traction"] = [0.0, "-1e6*(1 + 5*cos(60*x))"]
+UNSEEN["displacement"]["boundary"] = {
+    "top": {"on": "top", "displacement": ["free", "-5e-6*(1 + sin(9*x))"]},
+    "bottom": {"on": "bottom", "displacement": [0.0, 0.0]},
+}
+
+
+@pytest.mark.parametrize("name", UNSEEN)
+def test_data_that_the_mesh_does_not_see(name: str) -> None:
+    (row,) = rows(Scene.model_validate(UNSEEN[name]), levels=1, extra=4)
+    assert 0.8 < row.index < 1.3
+
+
 # --- its parts
 
 

@@ -24,12 +24,14 @@ class ContactFacets:
         edges: the blocks of their edges' bubbles, (f, k).
         pairs: positions of each edge's ends in ``vertices``.
         areas: over L^(d-1), (f,).
+        cells: the cells, (f,).
     """
 
     vertices: Entities
     edges: Entities
     pairs: Sequence[tuple[int, int]]
     areas: Array
+    cells: Entities
 
 
 def contact_facets(problem: Problem, bubbles: fem.FunctionSpace, local: Entities) -> ContactFacets:
@@ -58,7 +60,7 @@ def contact_facets(problem: Problem, bubbles: fem.FunctionSpace, local: Entities
         numbers = [cell_edges.index((corners[a], corners[b])) for a, b in pairs]
         edges[here] = bubbles.dofmap.list[cells[here]][:, numbers]
     points = np.asarray(problem.points[vertices] / problem.scales.length)
-    return ContactFacets(vertices, edges, pairs, _areas(points))
+    return ContactFacets(vertices, edges, pairs, _areas(points), cells)
 
 
 def _areas(points: Array) -> Array:

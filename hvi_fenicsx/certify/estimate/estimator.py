@@ -18,7 +18,7 @@ from ...system.levels import Levels
 from ...system.system import System
 from ...typing import Array
 from ..certificate import Examination
-from . import defect, drop_errors, dual_norm, nearly_incompressible
+from . import data_errors, defect, drop_errors, dual_norm, nearly_incompressible
 from .contact_errors import ratio
 from .edge_bubbles import BubbleStiffness
 from .law_traces import LawTraces
@@ -75,6 +75,7 @@ def estimate(
     traces = LawTraces(problem, u, examination.states, thresholds)
     inverse = dual_norm.DualNorm(system, levels, u, thresholds)
     cells = _discretisation(traces, inverse)
+    cells += data_errors.squares(BubbleStiffness(problem, traces.bubbles), u, examination.states, thresholds)
     smoothing = inverse.solve(dual_norm.smoothing(problem, examination.states, near))[1] if _smoothed(problem) else 0.0
     _, algebraic = inverse.solve(dual_norm.algebraic(problem, examination, near))
     inverse.destroy()

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 from .. import thresholds
 
@@ -12,7 +13,7 @@ class Thresholds:
     """How accurately the estimates are computed.
 
     Attributes:
-        near: distance (of u0) from a kink or a bound that counts as being on it.
+        near: distance (of u0) from a kink or a bound that counts as being on it; variation of a gap that is rounding.
         facet_degree: of the quadrature of the laws on a facet: a drop within an edge is met to a fourteenth of its
             length.
         bubble_tolerance: of a solve for bubbles, in the energy norm: their energy is right to about its square.
@@ -20,6 +21,11 @@ class Thresholds:
         bubble_rounds: of the active set of the bounds at midpoints, at most.
         dual_tolerance: of a solve with the system's matrix, relative residual: the energy is right to about its square.
         vertex_tolerance: the same, where conjugate gradients on the bubbles solve for the vertices at each step.
+        data_degree: of the modes by which the data on a facet are sampled, by dimension.
+        half_space: compliance of a half-space under a wave of which a facet is half, over that of a bubble on an
+            isosceles right triangle, at Poisson's ratio 0.3.
+        gap_shifts: bisections of the body's motion along a normal, where a gap varies within facets.
+        gap_sweeps: sweeps over a facet's points in each of them.
         rounding: nondimensional norms up to this are rounding: a body that meets no force has no error, not 100 % of
             nothing.
         contact_rounds: times that the bubbles are solved for where the errors on Γc are estimated.
@@ -34,6 +40,10 @@ class Thresholds:
     bubble_rounds: int = 4
     dual_tolerance: float = 0.1
     vertex_tolerance: float = 1e-6
+    data_degree: Mapping[int, int] = field(default_factory=lambda: {2: 14, 3: 6})
+    half_space: float = 2.4
+    gap_shifts: int = 20
+    gap_sweeps: int = 12
     rounding: float = 1e-12
     contact_rounds: int = 2
     answer_rounds: int = 4

@@ -1,0 +1,155 @@
+"""What the mesh does not see of the data on the boundary: tractions, prescribed displacements and gaps within facets.
+
+A traction that varies within a facet moves the body within the depth of a cell, where neither P1 nor bubbles follow;
+the energy is that of the displacement that it causes (:mod:`.facet_modes`), and of higher order where the mesh resolves
+the traction. Of a prescribed displacement the bubbles take the quadratic part. A gap is known to the discrete problem
+at the vertices only. Within a facet its own variation moves the pressure to where the gap is smallest; the pressure
+that solves this contact problem of one facet is found.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from dolfinx import fem
+from mpi4py import MPI
+
+from ...problem.problem import Bounds, PrescribedComponent, Problem
+from ...runtime.mpi import total
+from ...spatial_value import SpatialValue
+from ...typing import Array, Entities
+from ..contact_state import ContactState
+from .contact_facets import PartTrace
+from .edge_bubbles import BubbleStiffness
+from .facet_modes import FacetModes, facet_modes
+from .facet_pressure import redistributed
+from .thresholds import Thresholds
+
+_ALONG = 1e-6
+"""Share of a mean normal along an axis from which it has a component there."""
+
+
+def squares(
+    stiffness: BubbleStiffness, u: fem.Function, states: Sequence[ContactState], thresholds: Thresholds
+) -> Array:
+    """η_K² of the owned cells that the data within facets add. Collective.
+
+    Args:
+        stiffness: of the bubbles.
+        u: the P1 solution, nondimensional, ghosts updated.
+        states: of the parts of Γc at u.
+        thresholds: how finely the data are sampled.
+    """
+    problem = stiffness.problem
+    found = np.zeros(problem.domain.mesh.topology.index_map(problem.scales.dimension).size_local)
+
+    def modes(facets: Entities) -> FacetModes:
+        return facet_modes(problem, stiffness, facets, thresholds)
+
+    for facets, axis, value in _tractions(problem):
+        on = modes(facets)
+        rest = on.energies(on.of(value) / problem.scales.stress, on.compliance[:, axis], lowest=1)
+        np.add.at(found, on.facets.cells, rest)
+    for part in problem.prescribed:
+        if _varies(part.value):
+            on = modes(part.facets)
+            np.add.at(found, on.facets.cells, _unprescribed(problem, on, part))
+    for obstacle in _obstacles(problem, states, modes, thresholds.near):
+        np.add.at(found, obstacle.on.facets.cells, _moved_pressure(stiffness, obstacle, thresholds))
+    return found
+
+
+def _varies(value: SpatialValue) -> bool:
+    return value.everywhere and not value.is_number
+
+
+def _tractions(problem: Problem) -> Iterator[tuple[Entities, int, SpatialValue]]:
+    """The facets, the component and the value of each traction that varies."""
+    for where, effect, _ in problem.contributions:
+        load = effect.surface_load()
+        if where is None or load is None:
+            continue
+        for axis, value in enumerate(load.components):
+            if _varies(value):
+                yield problem.part_facets[where], axis, value
+
+
+def _unprescribed(problem: Problem, on: FacetModes, part: PrescribedComponent) -> Array:
+    """Energies of what quadratic interpolation leaves of a prescribed displacement, (f,)."""
+    corners, rest = problem.points[on.facets.vertices], _within(problem, on, part.value)
+    for a, b in on.facets.pairs:
+        ends = (part.value.at(corners[:, a]) + part.value.at(corners[:, b])) / 2
+        middle = (part.value.at((corners[:, a] + corners[:, b]) / 2) - ends) / problem.scales.displacement
+        rest -= middle[:, None] * (4 * on.barycentric[:, a] * on.barycentric[:, b])
+    return on.energies_of_displacements(rest, on.compliance[:, part.component])
+
+
+@dataclass(frozen=True)
+class _Obstacle:
+    """One side's gap of a part with contact, nondimensional.
+
+    Attributes:
+        bounds: of the part.
+        push: pressure of the body against it at the vertices, (m,).
+        gap: distance from it at the vertices, (m,).
+        within: what linear interpolation leaves of the gap at the sample points, (f, q).
+        on: the facets of the part.
+    """
+
+    bounds: Bounds
+    push: Array
+    gap: Array
+    within: Array
+    on: FacetModes
+
+
+def _obstacles(
+    problem: Problem, states: Sequence[ContactState], modes: Callable[[Entities], FacetModes], rounding: float
+) -> Iterator[_Obstacle]:
+    """The sides of the parts with contact whose gap varies within facets by more than rounding. Collective."""
+    stated = [b for where, _, c in problem.contributions if where is not None for b in c.bounds]
+    for bounds, values in zip(problem.bounds, stated, strict=True):
+        state = next(s for s in states if s.surface is bounds.surface)
+        for value, sign, bound in ((values.lower, -1.0, bounds.upper), (values.upper, 1.0, -bounds.lower)):
+            if value is None or not _varies(value):
+                continue
+            on = modes(bounds.surface.facets)
+            within = -sign * _within(problem, on, value)
+            if problem.domain.mesh.comm.allreduce(float(np.max(np.abs(within), initial=0.0)), op=MPI.MAX) > rounding:
+                push, gap = sign * state.contact_pressure, bound + sign * state.normal
+                yield _Obstacle(bounds, np.maximum(push, 0.0), np.maximum(gap, 0.0), within, on)
+
+
+def _within(problem: Problem, on: FacetModes, value: SpatialValue) -> Array:
+    """What linear interpolation leaves of a displacement that is given, nondimensional, (f, q)."""
+    corners = problem.points[on.facets.vertices]
+    at_corners = value.at(corners.reshape(-1, 3)).reshape(corners.shape[:2])
+    return (on.of(value) - on.linear(at_corners)) / problem.scales.displacement
+
+
+def _moved_pressure(stiffness: BubbleStiffness, obstacle: _Obstacle, thresholds: Thresholds) -> Array:
+    """Energies of what a gap's variation within the facets changes of the contact pressure, (f,). Collective."""
+    problem, surface, on = stiffness.problem, obstacle.bounds.surface, obstacle.on
+    trace = PartTrace(problem, stiffness.space, surface, surface.normals[:, None, :], 1)
+    normals = trace.at_vertices(surface.normals).mean(axis=1)
+    compliance = np.sum(normals**2 * on.compliance, axis=1) / np.sum(normals**2, axis=1)
+    pushes, gaps = (on.linear(trace.at_vertices(v[:, None])[:, :, 0]) for v in (obstacle.push, obstacle.gap))
+    solve = functools.partial(
+        redistributed,
+        comm=problem.domain.mesh.comm,
+        on=on,
+        pushes=pushes,
+        compliance=compliance,
+        free=not _held(problem, surface.normals),
+        thresholds=thresholds,
+    )
+    return on.energies(solve(gaps=gaps + obstacle.within) - solve(gaps=gaps), compliance, lowest=0)
+
+
+def _held(problem: Problem, normals: Array) -> bool:
+    """Whether a prescribed component holds the body against a translation along a part's mean normal. Collective."""
+    mean = [abs(total(problem.domain.mesh.comm, float(along))) for along in normals.sum(axis=0)]
+    return any(mean[part.component] > _ALONG * max(mean) for part in problem.prescribed)
