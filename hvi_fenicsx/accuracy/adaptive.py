@@ -27,6 +27,7 @@ from ..solvers.nested_iteration import CoarseStart
 from ..system.levels import Level, Levels, prolongation, with_coarser_system
 from ..typing import Entities
 from ..workflow import DEFAULT, Preparation, Thresholds, finish_with_levels, prepare
+from . import first_mesh
 from .thresholds import CONTROL, ControlThresholds
 
 
@@ -85,7 +86,29 @@ class AdaptiveSolver:
         Raises:
             InputError: the scene does not fit its mesh, on all ranks alike.
         """
+        return self._begun(prepare(scene, comm, self.timer, thresholds=self.thresholds))
+
+    def begin_resolved(self, scene: Scene, comm: MPI.Comm, thresholds: ControlThresholds = CONTROL) -> AdaptiveLevel:
+        """As :meth:`begin`, on the scene's own mesh refined where the data on the boundary ask for it. Collective.
+
+        Args:
+            scene: what to solve.
+            comm: the ranks.
+            thresholds: what is fine enough, and up to which size the mesh is refined.
+
+        Raises:
+            InputError: the scene does not fit its mesh, on all ranks alike.
+        """
         prepared = prepare(scene, comm, self.timer, thresholds=self.thresholds)
+        while prepared.system.dofs < thresholds.first_unknowns:
+            cells = first_mesh.unresolved(prepared.problem, thresholds)
+            if not comm.allreduce(len(cells)):
+                break
+            domain = refinement.marked(prepared.problem.domain, cells).domain
+            prepared = prepare(scene, comm, self.timer, domain, thresholds=self.thresholds)
+        return self._begun(prepared)
+
+    def _begun(self, prepared: Preparation) -> AdaptiveLevel:
         solution, levels = finish_with_levels(prepared, self.progress, self.interrupted)
         return AdaptiveLevel(prepared=prepared, solution=solution, levels=levels, step=None)
 

@@ -88,10 +88,10 @@ class _AdaptiveRun:
         return self._result(level, why)
 
     def _first(self) -> AdaptiveLevel:
-        """The coarsest mesh, solved to a loose tolerance. Collective."""
+        """The coarsest mesh that sees the data, solved to a loose tolerance. Collective."""
         scene = adaptive.coarsest(self.scene)
         tolerance = min(self.thresholds.coarsest_tolerance, scene.solver.tolerance * 1e3)
-        return self.solver.begin(with_tolerance(scene, tolerance), self.comm)
+        return self.solver.begin_resolved(with_tolerance(scene, tolerance), self.comm, self.thresholds)
 
     def _result(self, level: AdaptiveLevel, why: str | None) -> AccuracyResult:
         return AccuracyResult(

@@ -63,6 +63,10 @@ class ControlThresholds:
         failures: times in a row without a certified solution after which no equilibrium is expected.
         most_levels: meshes at most.
         usable_memory: part of the machine's memory that may be used.
+        unresolved: root mean square deviation of a value on the boundary from its linear interpolation, as a part of
+            its range, from which the first mesh is refined.
+        rounding: the same part of the largest value that is rounding.
+        first_unknowns: unknowns from which the first mesh is not refined for that.
         close: how near to the wanted share a marking must come, as a factor.
         corrections: how often a marking is corrected for that.
     """
@@ -82,6 +86,9 @@ class ControlThresholds:
     failures: int = 4
     most_levels: int = 80
     usable_memory: float = 0.8
+    unresolved: float = 0.1
+    rounding: float = 1e-9
+    first_unknowns: int = 20_000
     close: float = 1.05
     corrections: int = 2
 

@@ -68,6 +68,29 @@ def test_what_is_asked_for_is_kept_and_not_overdone(table: dict[str, Any], reque
     assert requested / 5 < far_in_energy(finer(reached.level, 2)) < requested
 
 
+DEEP_DROP = {"law": "graph", "points": [[0, 0], [9e-6, 3e6], [9e-6, 2e5]]}
+WAVY = model(16, pull=0.0, gap="2e-6*sin(25*x)")
+
+
+@pytest.mark.parametrize(("table", "requested"), [(model(16, 6e6, 1e6, DEEP_DROP), 0.1), (WAVY, 0.3)])
+def test_a_drop_on_its_way_and_a_wavy_gap_keep_what_is_asked_for(table: dict[str, Any], requested: float) -> None:
+    """Of the gap a mesh of 4 x 4 cells sees nothing, and the drop needs several meshes to come to its place."""
+    reached = reach(Scene.model_validate(table), Goal(requested))
+    assert reached.exit_code == 0
+    assert requested / 2 < far_in_energy(finer(reached.level, 3)) < requested
+
+
+def test_the_first_mesh_sees_the_data_and_no_more() -> None:
+    def first(**changes: Any) -> int:
+        scene = adaptive.coarsest(Scene.model_validate(model(16, **changes)))
+        return AdaptiveSolver(timer=Timer()).begin_resolved(scene, COMM).dofs
+
+    plain = first()
+    assert first(gap="1e-6*x") == plain
+    assert 2 * plain < first(gap="2e-6*sin(25*x)") < 4 * plain
+    assert first(gap="1e-6 if x > 0.7 else 0") < 3 * plain
+
+
 @pytest.mark.parametrize("quantity", ["u_t", "sigma_t"])
 def test_a_quantity_on_the_floor_is_kept(quantity: str) -> None:
     reached = reach(Scene.model_validate(STRONG), Goal(5e-2, quantity))

@@ -19,9 +19,9 @@ from mpi4py import MPI
 
 from ...problem.problem import Bounds, PrescribedComponent, Problem
 from ...runtime.mpi import total
-from ...spatial_value import SpatialValue
 from ...typing import Array, Entities
 from ..contact_state import ContactState
+from . import boundary_data
 from .contact_facets import PartTrace
 from .edge_bubbles import BubbleStiffness
 from .facet_modes import FacetModes, facet_modes
@@ -49,12 +49,12 @@ def squares(
     def modes(facets: Entities) -> FacetModes:
         return facet_modes(problem, stiffness, facets, thresholds)
 
-    for facets, axis, value in _tractions(problem):
+    for facets, axis, value in boundary_data.tractions(problem):
         on = modes(facets)
         rest = on.energies(on.of(value) / problem.scales.stress, on.compliance[:, axis], lowest=1)
         np.add.at(found, on.facets.cells, rest)
     for part in problem.prescribed:
-        if _varies(part.value):
+        if boundary_data.varies(part.value):
             on = modes(part.facets)
             np.add.at(found, on.facets.cells, _unprescribed(problem, on, part))
     for obstacle in _obstacles(problem, states, modes, thresholds.near):
@@ -62,28 +62,14 @@ def squares(
     return found
 
 
-def _varies(value: SpatialValue) -> bool:
-    return value.everywhere and not value.is_number
-
-
-def _tractions(problem: Problem) -> Iterator[tuple[Entities, int, SpatialValue]]:
-    """The facets, the component and the value of each traction that varies."""
-    for where, effect, _ in problem.contributions:
-        load = effect.surface_load()
-        if where is None or load is None:
-            continue
-        for axis, value in enumerate(load.components):
-            if _varies(value):
-                yield problem.part_facets[where], axis, value
-
-
 def _unprescribed(problem: Problem, on: FacetModes, part: PrescribedComponent) -> Array:
     """Energies of what quadratic interpolation leaves of a prescribed displacement, (f,)."""
-    corners, rest = problem.points[on.facets.vertices], _within(problem, on, part.value)
+    corners, rest = on.corners, on.beyond_linear(part.value)
     for a, b in on.facets.pairs:
         ends = (part.value.at(corners[:, a]) + part.value.at(corners[:, b])) / 2
-        middle = (part.value.at((corners[:, a] + corners[:, b]) / 2) - ends) / problem.scales.displacement
+        middle = part.value.at((corners[:, a] + corners[:, b]) / 2) - ends
         rest -= middle[:, None] * (4 * on.barycentric[:, a] * on.barycentric[:, b])
+    rest /= problem.scales.displacement
     return on.energies_of_displacements(rest, on.compliance[:, part.component])
 
 
@@ -110,24 +96,16 @@ def _obstacles(
     problem: Problem, states: Sequence[ContactState], modes: Callable[[Entities], FacetModes], rounding: float
 ) -> Iterator[_Obstacle]:
     """The sides of the parts with contact whose gap varies within facets by more than rounding. Collective."""
-    stated = [b for where, _, c in problem.contributions if where is not None for b in c.bounds]
-    for bounds, values in zip(problem.bounds, stated, strict=True):
+    for bounds, lower, upper in boundary_data.gaps(problem):
         state = next(s for s in states if s.surface is bounds.surface)
-        for value, sign, bound in ((values.lower, -1.0, bounds.upper), (values.upper, 1.0, -bounds.lower)):
-            if value is None or not _varies(value):
+        for value, sign, bound in ((lower, -1.0, bounds.upper), (upper, 1.0, -bounds.lower)):
+            if value is None:
                 continue
             on = modes(bounds.surface.facets)
-            within = -sign * _within(problem, on, value)
+            within = -sign * on.beyond_linear(value) / problem.scales.displacement
             if problem.domain.mesh.comm.allreduce(float(np.max(np.abs(within), initial=0.0)), op=MPI.MAX) > rounding:
                 push, gap = sign * state.contact_pressure, bound + sign * state.normal
                 yield _Obstacle(bounds, np.maximum(push, 0.0), np.maximum(gap, 0.0), within, on)
-
-
-def _within(problem: Problem, on: FacetModes, value: SpatialValue) -> Array:
-    """What linear interpolation leaves of a displacement that is given, nondimensional, (f, q)."""
-    corners = problem.points[on.facets.vertices]
-    at_corners = value.at(corners.reshape(-1, 3)).reshape(corners.shape[:2])
-    return (on.of(value) - on.linear(at_corners)) / problem.scales.displacement
 
 
 def _moved_pressure(stiffness: BubbleStiffness, obstacle: _Obstacle, thresholds: Thresholds) -> Array:

@@ -16,42 +16,26 @@ import basix
 import numpy as np
 
 from ...problem.problem import Problem
-from ...spatial_value import SpatialValue
 from ...typing import Array, Entities
-from .contact_facets import ContactFacets, contact_facets
-from .edge_bubbles import BubbleStiffness, quadrature
+from .boundary_data import FacetSamples, sample
+from .contact_facets import ContactFacets
+from .edge_bubbles import BubbleStiffness
 from .thresholds import Thresholds
 
 
 @dataclass(frozen=True)
-class FacetModes:
+class FacetModes(FacetSamples):
     """Legendre modes (m of them) on facets (f), at q sample points.
 
     Attributes:
-        facets: whose cells this rank owns.
-        points: the sample points, m, (f, q, 3).
-        barycentric: the same in barycentric coordinates, (q, d).
-        weights: of the points; their sum is 1, (q,).
         values: of the modes at the points, orthonormal under the weights, (m, q).
         degrees: of the modes, (m,).
         compliance: nondimensional displacement by traction of the wave of one half-length, along each axis, (f, d).
     """
 
-    facets: ContactFacets
-    points: Array
-    barycentric: Array
-    weights: Array
     values: Array
     degrees: Array
     compliance: Array
-
-    def of(self, value: SpatialValue) -> Array:
-        """A value at the sample points, SI, (f, q)."""
-        return value.at(self.points.reshape(-1, 3)).reshape(self.points.shape[:2])
-
-    def linear(self, at_vertices: Array) -> Array:
-        """Values at the facets' vertices (f, d), interpolated; (f, q)."""
-        return np.asarray(at_vertices @ self.barycentric.T)
 
     def coefficients(self, sampled: Array) -> Array:
         """The coefficients of sampled values (f, q), (f, m)."""
@@ -88,17 +72,13 @@ def facet_modes(problem: Problem, stiffness: BubbleStiffness, facets: Entities, 
         facets: the local facets.
         thresholds: how many modes.
     """
-    found, d = contact_facets(problem, stiffness.space, facets), problem.scales.dimension
-    degree = thresholds.data_degree[d]
-    barycentric, weights = quadrature("interval" if d == 2 else "triangle", 2 * degree)
-    points = np.einsum("qv,fvi->fqi", barycentric, problem.points[found.vertices])
-    kind = basix.CellType.interval if d == 2 else basix.CellType.triangle
-    legendre: Any = basix.tabulate_polynomials(basix.PolynomialType.legendre, kind, degree, barycentric[:, 1:])
+    at, d = sample(problem, stiffness.space, facets, thresholds), problem.scales.dimension
+    degree, kind = thresholds.data_degree[d], basix.CellType.interval if d == 2 else basix.CellType.triangle
+    legendre: Any = basix.tabulate_polynomials(basix.PolynomialType.legendre, kind, degree, at.barycentric[:, 1:])
     values = legendre / math.sqrt(math.factorial(d - 1))
     degrees = np.concatenate([np.full(math.comb(n + d - 2, d - 2), n) for n in range(degree + 1)])
-    return FacetModes(
-        found, points, barycentric, weights, values, degrees, thresholds.half_space * _compliance(stiffness, found)
-    )
+    compliance = thresholds.half_space * _compliance(stiffness, at.facets)
+    return FacetModes(at.facets, at.corners, at.barycentric, at.weights, values, degrees, compliance)
 
 
 def _compliance(stiffness: BubbleStiffness, facets: ContactFacets) -> Array:

@@ -1,0 +1,96 @@
+"""The data on the boundary that vary in space, and samples of them within facets."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from dolfinx import fem
+
+from ...problem.problem import Bounds, Problem
+from ...spatial_value import SpatialValue
+from ...typing import Array, Entities
+from .contact_facets import ContactFacets, contact_facets
+from .edge_bubbles import quadrature
+from .thresholds import Thresholds
+
+
+def varies(value: SpatialValue | None) -> bool:
+    """Whether a value varies in space and is known between vertices."""
+    return value is not None and value.everywhere and not value.is_number
+
+
+def tractions(problem: Problem) -> Iterator[tuple[Entities, int, SpatialValue]]:
+    """The facets, the component and the value of each traction that varies."""
+    for where, effect, _ in problem.contributions:
+        load = effect.surface_load()
+        if where is None or load is None:
+            continue
+        for axis, value in enumerate(load.components):
+            if varies(value):
+                yield problem.part_facets[where], axis, value
+
+
+def gaps(problem: Problem) -> Iterator[tuple[Bounds, SpatialValue | None, SpatialValue | None]]:
+    """The bounds of each part with contact, and the values of lower and upper -u·n that vary."""
+    stated = [b for where, _, c in problem.contributions if where is not None for b in c.bounds]
+    for bounds, values in zip(problem.bounds, stated, strict=True):
+        lower, upper = (value if varies(value) else None for value in (values.lower, values.upper))
+        yield bounds, lower, upper
+
+
+def everything(problem: Problem) -> Iterator[tuple[Entities, SpatialValue]]:
+    """The facets and the value of all that varies on the boundary."""
+    for facets, _, value in tractions(problem):
+        yield facets, value
+    for part in problem.prescribed:
+        if varies(part.value):
+            yield part.facets, part.value
+    for bounds, *values in gaps(problem):
+        yield from ((bounds.surface.facets, value) for value in values if value is not None)
+
+
+@dataclass(frozen=True)
+class FacetSamples:
+    """Sample points (q of them) within facets (f).
+
+    Attributes:
+        facets: whose cells this rank owns.
+        corners: their vertices, m, (f, d, 3).
+        barycentric: the sample points in barycentric coordinates, (q, d).
+        weights: of the points; their sum is 1, (q,).
+    """
+
+    facets: ContactFacets
+    corners: Array
+    barycentric: Array
+    weights: Array
+
+    def linear(self, at_corners: Array) -> Array:
+        """Values at the corners (f, d), interpolated; (f, q)."""
+        return np.asarray(at_corners @ self.barycentric.T)
+
+    def of(self, value: SpatialValue) -> Array:
+        """A value at the sample points, SI, (f, q)."""
+        points = np.einsum("qv,fvi->fqi", self.barycentric, self.corners)
+        return value.at(points.reshape(-1, 3)).reshape(points.shape[:2])
+
+    def beyond_linear(self, value: SpatialValue) -> Array:
+        """What linear interpolation leaves of a value at the sample points, SI, (f, q)."""
+        at_corners = value.at(self.corners.reshape(-1, 3)).reshape(self.corners.shape[:2])
+        return np.asarray(self.of(value) - self.linear(at_corners))
+
+
+def sample(problem: Problem, bubbles: fem.FunctionSpace, facets: Entities, thresholds: Thresholds) -> FacetSamples:
+    """Samples of boundary facets, exact for products of the modes of the data. Collective.
+
+    Args:
+        problem: the mesh.
+        bubbles: the space of edge bubbles.
+        facets: the local facets.
+        thresholds: the degree of the modes.
+    """
+    found, d = contact_facets(problem, bubbles, facets), problem.scales.dimension
+    barycentric, weights = quadrature("interval" if d == 2 else "triangle", 2 * thresholds.data_degree[d])
+    return FacetSamples(found, problem.points[found.vertices], barycentric, weights)
