@@ -25,7 +25,7 @@ def unresolved(problem: Problem, thresholds: ControlThresholds = CONTROL) -> Ent
         problem: the data and the mesh.
         thresholds: which deviation is too much.
     """
-    bubbles, found = edge_bubbles.space(problem.domain.mesh), [np.empty(0, dtype=np.int32)]
+    bubbles, found = edge_bubbles.space(problem.domain.mesh), list[Entities]([np.empty(0, dtype=np.int32)])
     for facets, value in boundary_data.everything(problem):
         at = boundary_data.sample(problem, bubbles, facets, SAMPLING)
         squares, area = at.beyond_linear(value) ** 2 @ at.weights, at.facets.areas

@@ -51,7 +51,7 @@ def squares(
 
     for facets, axis, value in boundary_data.tractions(problem):
         on = modes(facets)
-        rest = on.energies(on.of(value) / problem.scales.stress, on.compliance[:, axis], lowest=1)
+        rest = on.energies(np.asarray(on.of(value) / problem.scales.stress), on.compliance[:, axis], lowest=1)
         np.add.at(found, on.facets.cells, rest)
     for part in problem.prescribed:
         if boundary_data.varies(part.value):
@@ -102,7 +102,7 @@ def _obstacles(
             if value is None:
                 continue
             on = modes(bounds.surface.facets)
-            within = -sign * on.beyond_linear(value) / problem.scales.displacement
+            within = np.asarray(-sign * on.beyond_linear(value) / problem.scales.displacement)
             if problem.domain.mesh.comm.allreduce(float(np.max(np.abs(within), initial=0.0)), op=MPI.MAX) > rounding:
                 push, gap = sign * state.contact_pressure, bound + sign * state.normal
                 yield _Obstacle(bounds, np.maximum(push, 0.0), np.maximum(gap, 0.0), within, on)
