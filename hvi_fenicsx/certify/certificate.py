@@ -10,10 +10,9 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 from dolfinx import fem
-from mpi4py import MPI
 
 from ..problem.problem import Bounds, Problem
-from ..runtime.mpi import agree, largest, total
+from ..runtime.mpi import largest, total
 from ..typing import Array
 from . import contact_state
 from . import second_order as stability
@@ -34,8 +33,8 @@ class Certificate:
         inclusion: largest distance of -σ_t (σ_n of a normal law) from ∂j, over the law's traction scale (not less than
             a thousandth of the load's stress), for the law that was solved.
         inclusion_true: the same for the unsmoothed law.
-        second_order: ``local minimiser``, ``not a minimiser`` (a vertex on a concave kink: moving it off lowers the
-            energy) or ``undecided`` (a law with negative curvature, unless the inertia of its Hessian was asked for).
+        second_order: ``local minimiser``, ``not a minimiser`` (on a concave kink that nothing covers: the energy falls
+            to first order) or ``undecided`` (a law softens, unless the inertia of the Hessian was asked for).
         tolerance: what was asked for.
         passed: whether all entries but ``inclusion_true`` are within the tolerance.
         rounding: None where all are; else by how much rounding alone moves the entries at this u: what is no larger
@@ -112,9 +111,8 @@ def examine(
         rounding = thresholds.rounding_safety * _rounding(problem, u, states, scale)
         passed = _within(entries, max(tolerance, rounding))
     true, error = (largest(comm, value) for value in _inclusion_true(states))
-    second_order = _second_order(comm, states)
-    if inertia and passed and second_order == stability.UNDECIDED:
-        second_order = stability.by_inertia(problem, u, states, tolerance)
+    allowed = max(tolerance, rounding or 0.0)
+    second_order = stability.status(problem, u, forces.reaction, allowed, inertia=inertia and passed)
     certificate = Certificate(
         **entries,
         inclusion_true=true,
@@ -221,15 +219,3 @@ def _inclusion_true(states: Sequence[ContactState]) -> tuple[float, float]:
         size = float(np.max(np.where(law.hidden, 0.0, law.true_distance()), initial=0.0))
         worst, absolute = max(worst, size / law.term.traction_scale), max(absolute, size)
     return worst, absolute
-
-
-def _second_order(comm: MPI.Comm, states: Sequence[ContactState]) -> str:
-    kink = curved = False
-    for law in (law for state in states for law in state.laws):
-        x, j = law.argument[~law.hidden], law.term.law
-        kink |= bool(np.any(law.on_concave_kink() & ~law.hidden))
-        curved |= bool(np.any(j.concave.second(x) > j.convex.second(x)))
-    found = agree(comm, (kink, curved))
-    if any(k for k, _ in found):
-        return stability.NO_MINIMISER
-    return stability.UNDECIDED if any(c for _, c in found) else stability.LOCAL_MINIMISER

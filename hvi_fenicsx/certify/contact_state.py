@@ -65,10 +65,6 @@ class LawState:
         """Where it is on a kink of the law's convex part, (m,)."""
         return force_attribution.on_kink(self.term.law.convex, self.argument, self.near)
 
-    def on_concave_kink(self) -> Mask:
-        """Where it is on a kink of the law's concave part, (m,)."""
-        return force_attribution.on_kink(self.term.law.concave, self.argument, self.near)
-
 
 @dataclass(frozen=True, kw_only=True)
 class ContactState:

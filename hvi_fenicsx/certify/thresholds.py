@@ -11,11 +11,13 @@ class Thresholds:
 
     Attributes:
         near: distance (of u0) from a kink or a bound that counts as being on it.
+        no_jump: jump of a traction, relative to the law's scale, that is rounding.
         largest_rounding: a certificate's entry above this is no rounding.
         rounding_safety: factor within which the sample of the rounding error is trusted.
     """
 
     near: float = 1e-10
+    no_jump: float = 1e-12
     largest_rounding: float = 1e-4
     rounding_safety: float = 4.0
 

@@ -1,0 +1,275 @@
+"""How the energy grows to first order in the directions that supports and bounds admit, and how the laws are curved.
+
+To first order it grows by E'(u; v) = r·v + Σ w j'(x; v), r being the forces without the laws, j' their one-sided
+derivatives. That is a sum over components (in local frames), except that a law of |u_t| on a kink couples those of its
+vertex by a term c |B v|. A kink that lets the energy fall in no admissible direction spoils no minimum.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..laws import Superpotential
+from ..problem.law_term import LawTerm
+from ..problem.problem import Bounds, Problem
+from ..system import local_frames
+from ..typing import Array, Entities, Integers, Mask
+from . import force_attribution
+from .thresholds import DEFAULT, Thresholds
+
+_DIRECTIONS = 256
+"""How many directions are tried where components are coupled, beside that of steepest descent."""
+
+
+@dataclass(frozen=True)
+class Growth:
+    """Growth and curvature at a displacement, by owned scalar dof in local components, (n,) each.
+
+    Attributes:
+        least: the least growth in the admissible directions of this component, or of those coupled with it.
+        opposite: the least sum of the growths in a direction and in the opposite one: negative on a concave kink.
+        slack: growth up to this size is none.
+        rounding: the opposite growths are none up to this size, since no residual is in them.
+        curvature: of the laws, the least.
+        bent: whether a bound, a support or a kink is here.
+    """
+
+    least: Array
+    opposite: Array
+    slack: Array
+    rounding: Array
+    curvature: Array
+    bent: Mask
+
+    @property
+    def falls(self) -> Mask:
+        """Where the energy falls in an admissible direction."""
+        return self.bent & ((self.least < -self.slack) | (self.opposite < -self.rounding))
+
+    @property
+    def strong(self) -> Mask:
+        """Where it rises in all of them."""
+        return self.bent & (self.least > self.slack)
+
+    @property
+    def weak(self) -> Mask:
+        """Where a bound or a kink leaves the matter to the curvature."""
+        return self.bent & ~self.strong
+
+    @property
+    def softens(self) -> Mask:
+        """Where the curvature of a law is negative and counts."""
+        return (self.curvature < 0.0) & ~self.strong
+
+
+def growth(problem: Problem, u: Array, forces: Array, tolerance: float, thresholds: Thresholds = DEFAULT) -> Growth:
+    """The growth at a displacement.
+
+    Args:
+        problem: the laws, bounds and supports.
+        u: nondimensional, a local array.
+        forces: internal forces minus loads at the owned blocks, (blocks, d).
+        tolerance: relative traction up to which a growth is none.
+        thresholds: when a vertex is on a kink or a bound.
+    """
+    local = local_frames.frames_of(problem)
+    terms, bounds = problem.terms, problem.bounds
+    if local is not None:
+        u, forces = local.local_components(u), local.local_components(forces)
+        terms, bounds = tuple(local.term(t) for t in terms), tuple(local.bounds(b) for b in bounds)
+    found = _Collector(u, forces.ravel(), forces.shape[1], tolerance, thresholds)
+    for term in terms:
+        (found.enter_vector_law if term.radial else found.enter_law)(term)
+    for one in bounds:
+        found.enter_bounds(one)
+    found.enter_supports(problem.fixed_here)
+    return found.growth()
+
+
+@dataclass(frozen=True)
+class _Coupling:
+    """The terms c |B v| of one law of |u_t| at vertices on its kinks.
+
+    Attributes:
+        blocks: the vertices, (m,).
+        factors: c, (m,).
+        rows: B, (m, q, d).
+    """
+
+    blocks: Entities
+    factors: Array
+    rows: Array
+
+
+@dataclass
+class _Collector:
+    """The sums over laws, bounds and supports, by scalar dof (n,); couplings by vertex.
+
+    Attributes:
+        u: the displacement in local components, a local array.
+        forces: r, (n,).
+        d: the dimension.
+        tolerance: relative traction up to which a growth is none.
+        thresholds: when a vertex is on a kink or a bound.
+        couplings: of the laws of |u_t|.
+    """
+
+    u: Array
+    forces: Array
+    d: int
+    tolerance: float
+    thresholds: Thresholds
+    couplings: list[_Coupling] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        n = len(self.forces)
+        self.up, self.down = self.forces.copy(), -self.forces
+        self.jump, self.slack = np.zeros(n), np.zeros(n)
+        self.curved_up, self.curved_down = np.zeros(n), np.zeros(n)
+        self.bent = np.zeros(n, dtype=bool)
+
+    def enter_law(self, term: LawTerm) -> None:
+        """Enter a law of a signed displacement.
+
+        Args:
+            term: the law, in local components.
+        """
+        (dofs, sign), w = next(force_attribution.components(term)), term.surface.weights
+        x = self._on_kink(term.law, term.argument(self.u))
+        left, right = w * term.law.left(x), w * term.law.right(x)
+        before, after = (w * c for c in self._curvatures(term.law, x))
+        ahead = sign > 0
+        np.add.at(self.up, dofs, np.where(ahead, right, -left))
+        np.add.at(self.down, dofs, np.where(ahead, -left, right))
+        np.add.at(self.jump, dofs, right - left)
+        np.add.at(self.curved_up, dofs, np.where(ahead, after, before))
+        np.add.at(self.curved_down, dofs, np.where(ahead, before, after))
+        np.add.at(self.slack, dofs, self.tolerance * w * term.traction_scale)
+        self.bent[dofs] |= np.isin(x, term.law.kinks)
+
+    def enter_vector_law(self, term: LawTerm) -> None:
+        """Enter a law of |u_t|: its force along the slip, the jump of a kink, and the stiffness across the slip.
+
+        Args:
+            term: the law, in local components.
+        """
+        w, slip = term.surface.weights, term.slip(self.u)
+        x = self._on_kink(term.law, term.argument(self.u))
+        moving = x > self.thresholds.near
+        size = np.where(moving, x, 1.0)
+        unit = np.where(moving[:, None], slip / size[:, None], 0.0)
+        left, right = np.where(moving, term.law.left(x), 0.0), term.law.right(x)
+        force = np.einsum("m,mk,mkd->md", w * (left + right) / 2, unit, term.directions)
+        across = np.where(moving, np.minimum(left, right) / size, np.inf)
+        curvature = w * np.minimum(np.minimum(*self._curvatures(term.law, x, moving)), across)
+        touched = np.any(term.directions != 0.0, axis=1)
+        dofs = term.surface.dofs
+        self.up[dofs] += force
+        self.down[dofs] -= force
+        for side in (self.curved_up, self.curved_down):
+            np.add.at(side, dofs[touched], np.repeat(curvature, self.d).reshape(touched.shape)[touched])
+        slack = self.tolerance * w * term.traction_scale
+        np.add.at(self.slack, dofs[touched], np.repeat(slack, self.d).reshape(touched.shape)[touched])
+        on = np.isin(x, term.law.kinks)
+        self._couple(term, on & moving, w * (right - left) / 2, np.einsum("mk,mkd->md", unit, term.directions)[:, None])
+        self._couple(term, on & ~moving, w * right, term.directions)
+
+    def _couple(self, term: LawTerm, on: Mask, factors: Array, rows: Array) -> None:
+        self.couplings.append(_Coupling(term.surface.blocks[on], factors[on], rows[on]))
+
+    def enter_bounds(self, bounds: Bounds) -> None:
+        """Directions beyond a reached bound are not admissible.
+
+        Args:
+            bounds: of one part, in local components.
+        """
+        dofs, sign = bounds.component()
+        lower, upper = force_attribution.on_bounds(bounds, sign * self.u.ravel()[dofs], self.thresholds.near)
+        ahead = sign > 0
+        self.up[dofs[np.where(ahead, upper, lower)]] = np.inf
+        self.down[dofs[np.where(ahead, lower, upper)]] = np.inf
+        np.add.at(self.slack, dofs, self.tolerance * bounds.surface.weights)
+        self.bent[dofs] |= lower | upper
+
+    def enter_supports(self, fixed: Entities) -> None:
+        """Prescribed components do not move.
+
+        Args:
+            fixed: their scalar dofs.
+        """
+        self.up[fixed] = self.down[fixed] = np.inf
+        self.bent[fixed] = True
+
+    def growth(self) -> Growth:
+        """What was collected."""
+        free_up, free_down = np.isfinite(self.up), np.isfinite(self.down)
+        opposite = np.where(free_up & free_down, self.jump, np.inf)
+        least = np.minimum(self.up, self.down)
+        for dofs, lowest, pair in self._coupled():
+            least[dofs], opposite[dofs], self.bent[dofs] = lowest, pair, True
+        up, down = np.where(free_up, self.curved_up, np.inf), np.where(free_down, self.curved_down, np.inf)
+        rounding = self.thresholds.no_jump / self.tolerance * self.slack
+        return Growth(least, opposite, self.slack, rounding, np.minimum(up, down), self.bent)
+
+    def _coupled(self) -> Iterator[tuple[Integers, float, float]]:
+        """For each vertex with couplings: the components that they touch, their least growth, and that of a pair."""
+        at: dict[int, list[tuple[float, Array]]] = {}
+        for one in self.couplings:
+            for i, block in enumerate(one.blocks):
+                at.setdefault(int(block), []).append((float(one.factors[i]), one.rows[i]))
+        for vertex, norms in at.items():
+            moved = np.flatnonzero(np.any(np.vstack([rows for _, rows in norms]) != 0.0, axis=0))
+            dofs = vertex * self.d + moved
+            yield dofs, *self._least(dofs, [(c, rows[:, moved]) for c, rows in norms])
+
+    def _least(self, dofs: Integers, norms: list[tuple[float, Array]]) -> tuple[float, float]:
+        """The least growth of coupled components over their admissible directions, and of opposite ones together."""
+        up, down = self.up[dofs], self.down[dofs]
+        steepest = np.where(np.isfinite(up) & np.isfinite(down), (down - up) / 2, np.where(np.isfinite(up), -up, down))
+        steepest = np.where(np.isfinite(steepest), steepest, 0.0)
+        v = _admissible(np.vstack([steepest, _sphere(len(dofs))]), np.isfinite(up), np.isfinite(down))
+        bends = np.sum([c * np.linalg.norm(v @ rows.T, axis=1) for c, rows in norms], axis=0)
+        one_way = np.where(v > 0, np.where(np.isfinite(up), up, 0.0), np.where(np.isfinite(down), down, 0.0))
+        both = np.all((v == 0.0) | (np.isfinite(up) & np.isfinite(down)), axis=1)
+        rises = np.sum(one_way * np.abs(v), axis=1) + bends
+        pairs = np.abs(v) @ self.jump[dofs] + 2 * bends
+        return float(np.min(rises, initial=np.inf)), float(np.min(pairs[both], initial=np.inf))
+
+    def _on_kink(self, law: Superpotential, x: Array) -> Array:
+        """Arguments, those near a kink put on it."""
+        if not len(law.kinks):
+            return x
+        nearest = law.kinks[np.argmin(np.abs(x[:, None] - law.kinks), axis=1)]
+        return np.where(np.abs(x - nearest) <= self.thresholds.near, nearest, x)
+
+    def _curvatures(self, law: Superpotential, x: Array, back: Mask | None = None) -> tuple[Array, Array]:
+        """J'' on the left and on the right of x; on the right alone where there is no way back."""
+        step = 2 * self.thresholds.near
+        left = x - step if back is None else np.where(back, x - step, x + step)
+        return _second(law, left), _second(law, x + step)
+
+
+def _second(law: Superpotential, x: Array) -> Array:
+    return law.convex.second(x) - law.concave.second(x)
+
+
+def _admissible(directions: Array, up: Mask, down: Mask) -> Array:
+    """Unit directions (q, k) without the components that are not admissible; those left empty are left out."""
+    v = np.where(((directions > 0) & ~up) | ((directions < 0) & ~down), 0.0, directions)
+    length = np.linalg.norm(v, axis=1)
+    return np.asarray(v[length > 0.0] / length[length > 0.0, None])
+
+
+def _sphere(k: int) -> Array:
+    """Directions spread over the sphere in k = 1, 2 or 3 dimensions, the axes among them."""
+    axes = np.vstack([np.eye(k), -np.eye(k)])
+    if k == 1:
+        return axes
+    turns = np.arange(_DIRECTIONS) * (np.pi * (3.0 - np.sqrt(5.0)))
+    height = np.zeros(_DIRECTIONS) if k == 2 else 1.0 - (2.0 * np.arange(_DIRECTIONS) + 1.0) / _DIRECTIONS
+    circle = np.sqrt(1.0 - height**2)
+    spread = np.column_stack([circle * np.cos(turns), circle * np.sin(turns), height])
+    return np.vstack([axes, spread[:, :k]])
