@@ -161,7 +161,12 @@ def solve(
 
 
 def finish(
-    prepared: Preparation, progress: Progress = newton_step, interrupted: Callable[[], bool] = never
+    prepared: Preparation,
+    progress: Progress = newton_step,
+    interrupted: Callable[[], bool] = never,
+    start: fem.Function | None = None,
+    *,
+    estimating: bool = True,
 ) -> Solution:
     """Solve a prepared scene, certify and estimate; nothing is solved where no solution exists. Collective.
 
@@ -169,15 +174,19 @@ def finish(
         prepared: the scene.
         progress: called at each Newton step; by default it is logged.
         interrupted: whether to stop (collective, asked at each Newton step).
+        start: a displacement on the same mesh to begin at, m.
+        estimating: whether to estimate the error, which takes about as long as the solve.
     """
-    return finish_with_levels(prepared, progress, interrupted)[0]
+    return finish_with_levels(prepared, progress, interrupted, start, estimating=estimating)[0]
 
 
 def finish_with_levels(
     prepared: Preparation,
     progress: Progress = newton_step,
     interrupted: Callable[[], bool] = never,
-    start: CoarseStart | None = None,
+    start: CoarseStart | fem.Function | None = None,
+    *,
+    estimating: bool = True,
 ) -> tuple[Solution, Levels]:
     """As :func:`finish`, with the coarser levels that were used, for a mesh that will be refined. Collective.
 
@@ -185,7 +194,8 @@ def finish_with_levels(
         prepared: the scene.
         progress: called at each Newton step; by default it is logged.
         interrupted: whether to stop (collective, asked at each Newton step).
-        start: a solution on a coarser mesh, where the mesh was refined from it.
+        start: a solution on a coarser mesh, where the mesh was refined from it; or a displacement on the same mesh, m.
+        estimating: whether to estimate the error.
     """
     if prepared.solvability.state == "escapes":
         return _solution(prepared, None, None, None, prepared.warnings), ()
@@ -193,7 +203,7 @@ def finish_with_levels(
     solved = _solved(prepared, control, start)
     examination, warnings = _examined(prepared, solved.result)
     errors = None
-    if examination.certificate.passed:
+    if estimating and examination.certificate.passed:
         with prepared.timer("estimate"):
             errors = estimate(prepared.system, solved.levels, solved.result.u, examination)
     return _solution(prepared, solved.result, examination, errors, prepared.warnings + warnings), solved.levels
@@ -243,18 +253,21 @@ def _log_certificate(found: certificate.Certificate) -> None:
     _LOG.info("certificate %s (%g): %s; %s", verdict, found.tolerance, parts, found.second_order)
 
 
-def _solved(prepared: Preparation, control: RunControl, start: CoarseStart | None) -> LevelSolution:
+def _solved(prepared: Preparation, control: RunControl, start: CoarseStart | fem.Function | None) -> LevelSolution:
     """What the method found; a displacement of zero where it broke down. Collective."""
-    system, options, solvability = prepared.system, prepared.options, prepared.solvability
+    model, system, options, solvability = prepared.model, prepared.system, prepared.options, prepared.solvability
     try:
-        if start is not None:
+        if isinstance(start, CoarseStart):
             found = nested_iteration.solve_from_coarser(system, start, solvability, options, control)
+        elif start is not None:
+            found = nested_iteration.solve_from_displacement(model, system, start, solvability, options, control)
         else:
-            found = nested_iteration.solve(prepared.model, system, solvability, options, control)
+            found = nested_iteration.solve(model, system, solvability, options, control)
         if system.free_motions is not None:
             free_motions.remove_free_motions(prepared.problem, solvability.free, found.result.u)
         return found
     except SolverError as error:
         u = fem.Function(prepared.problem.space, name="displacement")
         result = SolveResult(u=u, method=options.method, converged=False, reason=str(error))
-        return LevelSolution(system=system, levels=start.levels if start else (), result=result)
+        levels = start.levels if isinstance(start, CoarseStart) else ()
+        return LevelSolution(system=system, levels=levels, result=result)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from dolfinx import mesh as dmesh
@@ -32,6 +32,7 @@ class Domain:
             sides, those of mesh files among them, are taken for the geometry itself.
         one_piece: whether the mesh is known to be connected; else :mod:`.bodies` finds out.
         coarsening: makes the next coarser domain of the mesh hierarchy; None where there is none.
+        shared: what several problems on this mesh have in common, by name; None where one problem is all.
     """
 
     mesh: dmesh.Mesh
@@ -42,6 +43,7 @@ class Domain:
     curves: Mapping[str, Arc] = field(default_factory=dict)
     one_piece: bool = False
     coarsening: Coarsening | None = None
+    shared: dict[str, Any] | None = field(default=None, compare=False, repr=False)
 
     @classmethod
     def from_mesh(

@@ -163,7 +163,8 @@ def _sorted_out(
 
 
 def _remembering(domain: Domain) -> Domain:
-    """The domain, whose coarser ones are made once."""
+    """The domain for many problems, whose coarser ones are made once."""
+    domain = replace(domain, shared={})
     if domain.coarsening is None:
         return domain
     make = domain.coarsening

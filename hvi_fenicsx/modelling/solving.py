@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from dataclasses import fields, replace
 from typing import Any
 
+from dolfinx import fem
 from mpi4py import MPI
+from petsc4py import PETSc
 from pydantic import ValidationError
 
 from .. import workflow
@@ -16,6 +19,7 @@ from ..runtime.timing import Timer
 from ..scene import Scene, SolverTable
 from ..schema import mistakes_of
 from ..solvers.context import Progress
+from ..system.system import System
 from ..workflow import DEFAULT, Preparation, Thresholds
 from .model import Model
 from .solution import ModelSolution
@@ -29,6 +33,8 @@ def solve(
     progress: Progress = newton_step,
     timer: Timer | None = None,
     thresholds: Thresholds = DEFAULT,
+    start: ModelSolution | str | Sequence[Any] | None = None,
+    estimate: bool = True,
     **options: Any,
 ) -> ModelSolution:
     """Solve a model or a scene, and certify what was found. Collective.
@@ -39,12 +45,21 @@ def solve(
         progress: called at each Newton step; by default it is logged.
         timer: where time goes; by default a new one.
         thresholds: the numbers that tune the run.
-        **options: the keys of the scene's table ``[solver]``, such as ``tolerance=1e-8``.
+        start: where to begin: the solution of another model of the same body, such as that of the last load; or what
+            ``[solver]`` may have.
+        estimate: whether to estimate the error, which takes about as long as the solve.
+        **options: the other keys of the scene's table ``[solver]``, such as ``tolerance=1e-8``.
 
     Raises:
         InputError: on all ranks alike: an option is not allowed, or the model does not fit its mesh.
     """
-    found = workflow.finish(check(model, comm, timer=timer, thresholds=thresholds, **options), progress)
+    known = start if isinstance(start, ModelSolution) else None
+    if known is None and start is not None:
+        options["start"] = start
+    prepared = check(model, comm, timer=timer, thresholds=thresholds, **options)
+    first = None if known is None else _displacement(known, prepared)
+    found, levels = workflow.finish_with_levels(prepared, progress, start=first, estimating=estimate)
+    _free_garbage([prepared.system, *(level.system for level in levels)])
     return ModelSolution(**{field.name: getattr(found, field.name) for field in fields(found)})
 
 
@@ -72,8 +87,22 @@ def check(
         scene, domain = model, None
     else:
         scene, domain, comm = model.scene, _domain(model), model.body.comm
-    scene = _with_options(scene, options)
-    return workflow.prepare(scene, comm or MPI.COMM_WORLD, timer, domain, thresholds=thresholds)
+    scene, comm = _with_options(scene, options), comm or MPI.COMM_WORLD
+    return workflow.prepare(scene, comm, timer, domain, thresholds=thresholds)
+
+
+def _free_garbage(systems: Iterable[System]) -> None:
+    """Free what earlier solves have left: on several ranks that is collective, and Python alone cannot. Collective."""
+    for system in systems:
+        PETSc.garbage_cleanup(system.comm)
+        PETSc.garbage_cleanup(system.problem.space.dofmap.index_map.comm)  # dolfinx's vectors are on this one
+
+
+def _displacement(known: ModelSolution, prepared: Preparation) -> fem.Function | None:
+    """A solution's displacement, as a start; None where there is none, since no solution existed."""
+    if known.problem.domain.mesh is not prepared.problem.domain.mesh:
+        raise InputError("start: is a solution on another mesh; give one of a model with the same Body")
+    return None if known.solve_result is None else known.u
 
 
 def _with_options(scene: Scene, options: dict[str, Any]) -> Scene:

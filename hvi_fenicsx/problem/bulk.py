@@ -38,6 +38,8 @@ class Bulk:
         averaged: the volumetric parts that are averaged by vertex.
         strains: linear forms of ε(v) (thermal strain) by the name of their load; no rigid motion feels them.
         across: parts of ∫ σ_33 q dx in a plane body (:attr:`.Contribution.across`).
+        origin: what the operator is made from: two bulks of one mesh with equal origins have equal matrices.
+        shared: where problems on one mesh share their matrix; None: each makes its own.
     """
 
     space: fem.FunctionSpace
@@ -47,6 +49,8 @@ class Bulk:
     averaged: tuple[Averaged, ...]
     strains: Mapping[str, Any]
     across: tuple[Any, ...]
+    origin: tuple[Any, ...] = ()
+    shared: dict[str, Any] | None = None
 
     @functools.cached_property
     def compiled(self) -> fem.Form:
@@ -64,6 +68,13 @@ class Bulk:
 
     def matrix(self) -> PETSc.Mat:
         """The stiffness matrix, a new one without conditions; block size d. Collective."""
+        if self.shared is None:
+            return self._assembled()
+        if self.shared.get("origin") != self.origin:
+            self.shared.update(origin=self.origin, matrix=self._assembled())
+        return self.shared["matrix"].copy()
+
+    def _assembled(self) -> PETSc.Mat:
         matrix = assemble_matrix(self.compiled)
         matrix.assemble()
         return nodal_averaging.add(matrix, self._dilatations)
@@ -221,6 +232,7 @@ def make_bulk(
     scales: Scales,
     made: Sequence[tuple[str | None, Effect, Contribution]],
     strains: Mapping[str, Any],
+    shared: dict[str, Any] | None = None,
 ) -> Bulk:
     """The elastic operator that effects contribute.
 
@@ -229,7 +241,9 @@ def make_bulk(
         scales: what one unit is in SI.
         made: the effects, each with its place and what it contributes.
         strains: their linear forms of ε(v), by the name of the load.
+        shared: where problems on one mesh share their matrix; None: each makes its own.
     """
+    elastic = tuple((where, effect) for where, effect, c in made if c.bilinear or c.averaged)
     return Bulk(
         space=space,
         scales=scales,
@@ -238,4 +252,6 @@ def make_bulk(
         averaged=tuple(part for _, _, c in made for part in c.averaged),
         strains=strains,
         across=tuple(form for _, _, c in made for form in c.across),
+        origin=(scales.length, scales.modulus, *elastic),
+        shared=shared,
     )

@@ -125,7 +125,7 @@ def _problem(
         scales=scales,
         space=context.space,
         points=context.points,
-        bulk=bulk.make_bulk(context.space, scales, contributions, strains),
+        bulk=bulk.make_bulk(context.space, scales, contributions, strains, context.domain.shared),
         linear={**linear, **strains},
         conditions=conditions,
         fixed=fixed,

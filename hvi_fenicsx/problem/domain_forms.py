@@ -30,7 +30,7 @@ class DomainForms:
     ) -> None:
         self.domain, self.dimension = domain, domain.dimension
         self.length, self.stress, self.modulus = scales.length, scales.stress, scales.modulus
-        self.space = displacement_space(domain.mesh)
+        self.space = _space(domain)
         self.trial, self.test = ufl.TrialFunction(self.space), ufl.TestFunction(self.space)
         self.normal = ufl.FacetNormal(domain.mesh)
         self.materials = [placed for placed in effects if placed[1].place is Place.MATERIAL]
@@ -95,6 +95,15 @@ class DomainForms:
         tags, ids = self._facet_tags
         measure = ufl.Measure("ds", domain=self.domain.mesh, subdomain_data=tags, metadata=metadata)
         return measure(ids[part])
+
+
+def _space(domain: Domain) -> fem.FunctionSpace:
+    """The displacements, one space for all problems on a shared mesh. Collective."""
+    if domain.shared is None:
+        return displacement_space(domain.mesh)
+    if "space" not in domain.shared:
+        domain.shared["space"] = displacement_space(domain.mesh)
+    return domain.shared["space"]
 
 
 class ScaledMeasure:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+from dolfinx import fem
 from petsc4py import PETSc
 
 from ..mesh.transfer import Transfer
@@ -139,6 +140,42 @@ def solve_from_coarser(
     return LevelSolution(system=system, levels=start.levels, result=result)
 
 
+def solve_from_displacement(
+    model: Model,
+    system: System,
+    u: fem.Function,
+    solvability: Solvability,
+    options: SolverOptions,
+    control: RunControl,
+) -> LevelSolution:
+    """Solve a system from a displacement on its own mesh, such as the solution of a similar load. Collective.
+
+    Args:
+        model: what is solved, for the coarser meshes.
+        system: assembled.
+        u: the displacement, m.
+        solvability: whether a solution can exist.
+        options: method, tolerance, limits.
+        control: timer, progress and interruption.
+
+    Raises:
+        SolverError: a convex step raised the energy.
+    """
+    kind = registry.choose(options, system)
+    if not kind.takes_start:
+        return solve(model, system, solvability, options, control)
+    levels = coarser_levels(model, system, options, control)
+    first = system.unknowns(u)
+    first.scale(1.0 / system.problem.scales.displacement)
+    _make_admissible(first, system)
+    _log_level(system, kind)
+    context = SolveContext.create(system, levels, solvability, options, control)
+    result = kind(context).solve(first)
+    if result.converged or result.interrupted:
+        return LevelSolution(system=system, levels=levels, result=result)
+    return solve(model, system, solvability, options, control)
+
+
 def _log_level(system: System, kind: type[Method]) -> None:
     _LOG.info("level of %d unknowns: method %s", system.dofs, kind.label)
 
@@ -180,7 +217,12 @@ def _prolonged(start: CoarseStart, system: System) -> PETSc.Vec:
     x = system.load.duplicate()
     start.prolongation.mult(coarse.unknowns(start.result.u), x)
     x.scale(coarse.problem.scales.displacement / system.problem.scales.displacement)
+    _make_admissible(x, system)
+    return x
+
+
+def _make_admissible(x: PETSc.Vec, system: System) -> None:
+    """Move unknowns within their bounds, and to their prescribed values."""
     x.pointwiseMax(x, system.lower)
     x.pointwiseMin(x, system.upper)
     system.prescribe(x)
-    return x

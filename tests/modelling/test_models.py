@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -261,3 +263,61 @@ def test_the_ranks_of_any_communicator_tell_the_same(found: hvi.Solution) -> Non
         np.testing.assert_allclose(rank["pressure"], alone.contact["floor"].pressure, rtol=1e-8)
         for part in ("floor", "wall"):
             np.testing.assert_allclose(rank[part], alone.resultant(part), rtol=1e-8, atol=1e-2)
+
+
+def test_a_changed_material_is_not_the_kept_one(body: hvi.Body) -> None:
+    """Models of one body share its matrix where their elasticity is the same, and only there."""
+    stiff = hvi.Isotropic(youngs_modulus=4 * E, poisson_ratio=0.2)
+    model = steel_square(body=body)
+    hvi.solve(model)
+    changed = hvi.solve(model.replace(stiff))
+    assert changed.energy == pytest.approx(hvi.solve(steel_square(material=stiff)).energy, rel=1e-12)
+    held = model.replace(hvi.Displacement("wall", [1e-6, None]))
+    alone = hvi.solve(steel_square(body=own_square()).replace(hvi.Displacement("wall", [1e-6, None])))
+    assert hvi.solve(held).energy == pytest.approx(alone.energy, rel=1e-12)
+
+
+def test_a_loop_over_loads_may_begin_at_the_last_solution(body: hvi.Body) -> None:
+    """The load that has gone beyond the drop and comes back: the start decides which of two equilibria is found."""
+    pulls = [2e6, 3.5e6, 2e6]
+    found: list[hvi.Solution] = []
+    for pull in pulls:
+        model = steel_square(body=body).replace(hvi.Traction("pull", [pull, 0.0]))
+        found.append(hvi.solve(model, start=found[-1] if found else None, estimate=False))
+    assert all(one.converged and one.estimate is None for one in found)
+    assert found[2].energy == pytest.approx(found[0].energy, rel=1e-10)  # without memory the joint heals
+    with pytest.raises(hvi.InputError, match="start: is a solution on another mesh"):
+        hvi.solve(steel_square(), start=found[0])
+
+
+_LOOP = """
+import hvi_fenicsx as hvi
+from mpi4py import MPI
+from own_mesh import own_square, steel_square
+
+body = own_square(MPI.COMM_WORLD, 48)
+for number in range(45):
+    hvi.solve(steel_square(MPI.COMM_WORLD, body).replace(hvi.Traction("pull", [2e6 + number * 1e4, 0.0])))
+    if number in (14, 44):
+        pages = int(open("/proc/self/statm").read().split()[1])
+        if MPI.COMM_WORLD.rank == 0:
+            print(pages * 4096 / 2**20)
+"""
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_a_loop_over_loads_keeps_nothing(ranks: int, tmp_path: Path) -> None:
+    """A system of this size takes 3 MB; 30 that were kept would take 90."""
+    script = tmp_path / "loop.py"
+    script.write_text(_LOOP, encoding="utf-8")
+    done = process_of(ranks, script)
+    before, after = map(float, done.splitlines()[-2:])
+    assert after - before < 15.0
+
+
+def process_of(ranks: int, script: Path) -> str:
+    command = ["mpirun", "-n", str(ranks), sys.executable, "-m", "mpi4py", str(script)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=300)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
