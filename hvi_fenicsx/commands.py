@@ -16,11 +16,10 @@ from . import console, results
 from .accuracy import control, quantities
 from .accuracy.adaptive import AdaptiveSolver
 from .accuracy.goal import AccuracyResult, Goal
-from .errors import ExitCode, HviError, InputError
+from .errors import ExitCode, InputError
 from .report.html import render
-from .report.pictures import draw as pictures
 from .results.output_folder import Existing
-from .results.write import write_record
+from .results.whole import write_whole
 from .runtime import log, terminal
 from .runtime.mpi import on_root
 from .runtime.signals import Interrupt
@@ -101,7 +100,8 @@ def _run(request: RunRequest) -> int:
     with log.Handlers(*_on_first_rank(log.TerminalDisplay)):
         with log.Handlers(*run_logs):
             solution, reached = _solve(request, interrupt)
-            record = _write(request, solution, reached)
+            given = {**request.given, **(_accuracy(reached) if reached else {})}
+            record = write_whole(folder, solution, request.timer, given, draw=request.draw)
         on_root(COMM, lambda: _finish(run_logs))
         folder.commit(request.scene)
         _say([*(f"warning: {text}" for text in folder.kept), on_root(COMM, lambda: _where(request))])
@@ -152,34 +152,9 @@ def _say(lines: Iterable[str]) -> None:
         _LOG.info(line)
 
 
-def _write(request: RunRequest, solution: Solution, reached: AccuracyResult | None) -> dict[str, Any]:
-    """All files of the result but ``run.log``; the summary. Collective."""
-    work, timer = request.folder.work, request.timer
-    with timer("output"):
-        found = results.write(work, solution, request.folder.target)
-        record = {**found, **request.given, **(_accuracy(reached) if reached else {})}
-        if request.draw:
-            on_root(COMM, lambda: _from_files("pictures", pictures.draw, work, record))
-    with timer("output"):
-        record["time"] = timer.report()
-        on_root(COMM, lambda: _from_files("report", render.write, work, record))
-    record["time"] = timer.report()
-    on_root(COMM, lambda: write_record(work, record))
-    return record
-
-
 def _accuracy(reached: AccuracyResult) -> dict[str, Any]:
     """What differs in ``summary.json`` where an accuracy was asked for."""
     return {"accuracy": results.plain(reached.as_dict()), "exit_code": reached.exit_code}
-
-
-def _from_files(what: str, make: Callable[[Path], object], folder: Path, record: dict[str, Any]) -> None:
-    """Make pictures or report from the other files; one that fails costs a line in the log, not the run."""
-    write_record(folder, record)
-    try:
-        make(folder)
-    except HviError as error:
-        _LOG.info(f"{what}: {error}")
 
 
 def _finished(target: Path, scene: Scene, goal: Goal | None) -> int | None:

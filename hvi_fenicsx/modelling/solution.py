@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from html import escape
+from pathlib import Path
 
 from dolfinx import fem
 from matplotlib.figure import Figure
 
 from ..certify.certificate import Certificate, Examination
 from ..errors import InputError
-from ..results import gathering
+from ..results import ResultFolder, gathering
+from ..results.output_folder import Existing
+from ..results.whole import write_whole
 from ..solution import Solution
 from ..solvers.result import SolveResult
 from ..typing import Array
@@ -116,6 +120,28 @@ class ModelSolution(Solution):
             InputError: on all ranks alike: there is no such picture of it.
         """
         return plotting.draw(self, picture)
+
+    def write(self, folder: str | os.PathLike[str], *, force: bool = False, pictures: bool = True) -> None:
+        """Write the folder that ``hvi run`` writes. Collective.
+
+        ``scene.toml`` can be run again where the model has nothing that only Python knows.
+
+        Args:
+            folder: where to.
+            force: whether a result that is there already is replaced.
+            pictures: whether to draw.
+
+        Raises:
+            InputError: on all ranks alike: the folder holds a result or other files, or cannot be written.
+        """
+        existing: Existing = "replace" if force else "refuse"
+        target = ResultFolder(self.problem.domain.mesh.comm, Path(folder), existing)
+        try:
+            write_whole(target, self, self.timer, {"command": None, "petsc": None}, draw=pictures)
+            target.commit(self.scene)
+        except BaseException:
+            target.discard()
+            raise
 
     @property
     def _solved(self) -> SolveResult:

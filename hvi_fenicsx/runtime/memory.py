@@ -16,7 +16,7 @@ from .mpi import total
 
 _CGROUPS = Path("/sys/fs/cgroup")
 _LIMIT_FILES = ("memory.max", "memory.limit_in_bytes")
-"""Of cgroups of version 2 and 1."""
+"""Files that hold the limit of a cgroup: version 2, version 1."""
 
 
 @dataclass(frozen=True, kw_only=True)

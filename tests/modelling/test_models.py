@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import subprocess
 import sys
 from pathlib import Path
@@ -252,6 +253,19 @@ def test_it_is_short_to_read_and_can_be_seen(found: hvi.Solution) -> None:
     assert figure._repr_png_()[:4] == b"\x89PNG"  # type: ignore[attr-defined]
     with pytest.raises(hvi.InputError, match="no picture 'sketch' of this solution; there are: body"):
         found.plot("sketch")
+
+
+def test_a_solution_writes_the_folder_of_a_run(found: hvi.Solution, tmp_path: Path) -> None:
+    folder = tmp_path / "strong"
+    found.write(folder, pictures=False)
+    kept = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+    assert kept["energy"] == pytest.approx(found.energy, rel=1e-14)
+    assert {"contact.csv", "displacement.pvd", "report.html", "scene.toml"} < {f.name for f in folder.iterdir()}
+    page = (folder / "report.html").read_text(encoding="utf-8")
+    assert "made by a Python program" in page
+    with pytest.raises(hvi.InputError, match="already holds a result"):
+        found.write(folder)
+    found.write(folder, force=True, pictures=False)
 
 
 def test_the_ranks_of_any_communicator_tell_the_same(found: hvi.Solution) -> None:

@@ -70,6 +70,7 @@ def reproduce(result: Result) -> dict[str, Any]:
     text = paths.beside((result.folder / "scene.toml").read_text(encoding="utf-8"), result.scene)
     return {
         "given": paths.command(str(summary.get("command") or "")),
+        "can": summary.get("command") is not None,
         "again": shlex.join(_again(summary)),
         "scene": text,
         "download": f"data:application/toml;base64,{base64.b64encode(text.encode()).decode()}",
