@@ -68,9 +68,13 @@ class LocalFrames:
         return replace(bounds, surface=self.surface(bounds.surface))
 
     def term(self, term: LawTerm) -> LawTerm:
-        """The law with its directions in local components."""
+        """The law with its directions in local components; one along a local axis is exactly that axis.
+
+        A slip that a bound holds on a kink is then the kink itself, not the kink but for rounding.
+        """
         directions = np.einsum("mij,mkj->mki", self.at(term.surface), term.directions)
         directions = np.where(np.abs(directions) < self.rounding, 0.0, directions)
+        directions /= np.linalg.norm(directions, axis=2, keepdims=True)
         return replace(term, surface=self.surface(term.surface), directions=directions)
 
     def matrix(self, problem: Problem, like: PETSc.Mat) -> PETSc.Mat:

@@ -234,3 +234,15 @@ def test_a_free_block_has_all_rigid_motions_in_its_near_null_space() -> None:
     for vector in vectors:
         assert (system.jacobian.matrix * vector).norm() < 1e-12
         assert vector.norm() == pytest.approx(1.0)
+
+
+def test_a_slip_along_a_local_axis_is_that_component_to_the_last_digit() -> None:
+    """Bounds hold a slip on a kink of its law; a slip that is the kink but for rounding would never leave it."""
+    for slope in np.linspace(0.1, 0.9, 9):
+        table = block(2, friction={"law": "tresca", "yield_traction": 3e6})
+        table["boundary"]["floor"] |= {
+            "contact": {"obstacle": {"point": [0.0, 0.0], "normal": [slope, 1.0]}},
+            "support": {"law": "graph", "points": [[0, 0], [1e-6, 5e3], [1e-6, 3e4]]},
+        }
+        for term in prepare(Scene.model_validate(table)).system.terms:
+            assert np.array_equal(np.sort(np.abs(term.directions), axis=2), np.broadcast_to([0.0, 1.0], (3, 1, 2)))

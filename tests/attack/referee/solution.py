@@ -91,9 +91,9 @@ class Check:
 
     @cached_property
     def blur(self) -> float:
-        """What rounding alone makes of the tractions on Γc, relative to what drives their body."""
-        sizes = np.maximum(self.problem.stress, FLOOR * self.problem.stress.max())
-        found = [np.abs(self.rounding[v]).max() / self.weights[v] / sizes[self.problem.labels[v]] for v in self._at]
+        """What rounding alone makes of the tractions on Γc, relative to those of the body."""
+        size = self.traction[self.problem.labels]
+        found = [np.abs(self.rounding[v]).max() / self.weights[v] / size[v] for v in self._at]
         return float(max(found, default=0.0))
 
     def columns(self, vertex: int) -> list[Column]:
