@@ -72,10 +72,14 @@ def _growth(law: Superpotential, thresholds: Thresholds) -> Directional:
 
 
 def _majorised(part: Resistance, term: LawTerm, growth: Directional, xi: Array) -> Resistance:
-    """The resistance of H - ξ at infinity; for a law of |u_t|, ξ reduces the weights of the vertices."""
+    """The resistance of H - ξ at infinity; for a law of |u_t|, ξ reduces the weights of the vertices.
+
+    A vertex whose law falls below zero pushes the body on. It counts as no resistance: the functional stays convex, and
+    a body that slides away in spite of it does so all the more.
+    """
     if not term.radial or not np.isfinite(growth.plus) or growth.plus == 0.0:
         return replace(part, growth=growth, peak=growth)
-    return replace(part, weights=part.weights * (1.0 - xi / growth.plus), growth=growth, peak=growth)
+    return replace(part, weights=part.weights * np.maximum(1.0 - xi / growth.plus, 0.0), growth=growth, peak=growth)
 
 
 def _work(body: RigidBody, part: Resistance, term: LawTerm, xi: Array) -> Array:

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from runs import hvi, summary, write_scene
-from scenes import DELTA, P, Q, Table, block, displacement, model, points, quadratic_linear, solved
+from scenes import DELTA, STEEL, P, Q, Table, block, displacement, model, points, quadratic_linear, solved
 
 from hvi_fenicsx import Scene, rigid, solve, workflow
 from hvi_fenicsx.cli import main
@@ -230,3 +230,23 @@ def test_where_existence_cannot_be_decided_a_run_goes_on(
     assert len(found["solvability"]["kernel"]) == 3
     assert ("could not be decided" in found["reason"]) == (code == 4)
     assert "Undecided: " in (tmp_path / "r" / "report.html").read_text(encoding="utf-8")
+
+
+def test_in_space_a_law_that_has_fallen_below_zero_resists_nothing() -> None:
+    """ξ > H' everywhere: what is left of the law pushes the body on, and is no negative resistance to divide by."""
+    law = {"law": "graph", "points": [[0, 4e5], [1e-6, -2e5], [1e-6, -8e5]]}
+    table = {
+        "domain": {"shape": "box", "size": [1.0, 1.0, 1.0], "cells": [1, 1, 1]},
+        "material": STEEL | {"model": "three_dimensional"},
+        "boundary": {
+            "wall": {"on": "right", "displacement": [0.0, "free", "free"]},
+            "pull": {"on": "left", "traction": [5e5, 1e4, 0.0]},
+            "press": {"on": "top", "traction": [0.0, 0.0, -1e6]},
+            "floor": {"on": "bottom", "contact": {"gap": 0.0}, "friction": law},
+        },
+    }
+    prepared = workflow.prepare(Scene.model_validate(table))
+    term = prepared.problem.terms[0]
+    beyond = term.law.concave.left(np.full(len(term.surface.blocks), 10.0 * term.law.length_scale))
+    assert np.all(beyond > term.law.convex.right(np.array([10.0 * term.law.length_scale])))
+    assert boundedness.is_unbounded(prepared.problem, prepared.system.forces, [term.law], [beyond])
