@@ -14,6 +14,7 @@ from dolfinx import fem
 from petsc4py import PETSc
 
 from ..effects import Direction
+from ..problem.contact_normals import largest_turn
 from ..problem.law_term import LawTerm
 from ..problem.problem import Problem
 from ..rigid import kernel, rigid_fields
@@ -81,9 +82,7 @@ def _uneven_parts(problem: Problem, thresholds: PlausibilityThresholds) -> Itera
     """Contact parts that seem to be meant flat, in a mesh with few digits in its coordinates."""
     comm = problem.domain.mesh.comm
     for surface in (bounds.surface for bounds in problem.bounds):
-        mean = np.asarray(comm.allreduce(surface.weights @ surface.measured))
-        away = surface.measured - mean / (np.linalg.norm(mean) or 1.0)
-        turn = largest(comm, float(np.max(np.linalg.norm(away, axis=1), initial=0.0)))
+        turn = largest_turn(comm, surface)
         if thresholds.flat < turn < thresholds.uneven:
             yield (
                 f"{_place_of_bounds(problem, surface.part)}: the part is nearly flat, its normals turn by up to "

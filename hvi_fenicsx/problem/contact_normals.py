@@ -5,7 +5,8 @@ certificate all take it from there. Nothing is rounded to an axis, except what i
 
 Solvers want bounds on single components. So where a part shares a vertex with a prescribed component or with another
 part, the two directions must be orthogonal or equal there. A mesh with few digits in its coordinates, whose flat sides
-are slightly uneven, misses that by a small angle; the part's normal at that one vertex is then turned by this angle.
+are slightly uneven, misses that by a small angle; the normal of the uneven part at that one vertex is then turned by
+this angle. That of a flat part, which an obstacle states or a mesh has, is exact.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ import numpy as np
 from mpi4py import MPI
 
 from ..errors import InputError
-from ..runtime.mpi import agree
+from ..runtime.mpi import agree, largest
 from ..typing import Array, Entities, Integers
 from .contact_surface import Surface, tangents
 from .thresholds import DEFAULT, Thresholds
@@ -31,13 +32,13 @@ class _Row:
     Attributes:
         name: what brought it.
         direction: unit vector, (d,).
-        stated: whether the scene states it, else it follows from the mesh's coordinates.
+        exact: whether it is that of a flat part or a prescribed component.
         prescribed: whether it is a prescribed component.
     """
 
     name: str
     direction: Array
-    stated: bool
+    exact: bool
     prescribed: bool
 
 
@@ -63,8 +64,21 @@ def decide(
         InputError: on all ranks alike: two directions at a vertex are neither orthogonal nor equal.
     """
     own = {name: _own(s, stated.get(name), length, thresholds.rounding) for name, s in surfaces.items()}
-    normals = _at_shared_vertices(comm, own, stated, fixed, thresholds)
+    flat = {name for name, surface in own.items() if largest_turn(comm, surface) <= thresholds.flat}
+    normals = _at_shared_vertices(comm, own, flat, fixed, thresholds)
     return {name: replace(s, normals=normals[name], tangents=tangents(normals[name])) for name, s in own.items()}
+
+
+def largest_turn(comm: MPI.Comm, surface: Surface) -> float:
+    """The largest angle (as a chord) between the part's own normal at a vertex and the mean one. Collective.
+
+    Args:
+        comm: the ranks of the mesh.
+        surface: the part.
+    """
+    mean = np.asarray(comm.allreduce(surface.weights @ surface.measured))
+    away = surface.measured - mean / (np.linalg.norm(mean) or 1.0)
+    return largest(comm, float(np.max(np.linalg.norm(away, axis=1), initial=0.0)))
 
 
 def _own(surface: Surface, stated: Sequence[float] | None, length: float, rounding: float) -> Surface:
@@ -91,7 +105,7 @@ def _without_rounding(normals: Array, rounding: Array | float) -> Array:
 def _at_shared_vertices(
     comm: MPI.Comm,
     surfaces: Mapping[str, Surface],
-    stated: Collection[str],
+    flat: Collection[str],
     fixed: Entities,
     thresholds: Thresholds,
 ) -> dict[str, Array]:
@@ -100,8 +114,8 @@ def _at_shared_vertices(
     bad: list[str] = []
     for places, held in _shared(surfaces, fixed):
         rows = [_Row(f"u_{'xyz'[i]}", e, True, True) for i, e in held]
-        for name, i in sorted(places, key=lambda place: place[0] not in stated):
-            found = _turned(_Row(f"boundary.{name}", normals[name][i], name in stated, False), rows, thresholds)
+        for name, i in sorted(places, key=lambda place: place[0] not in flat):
+            found = _turned(_Row(f"boundary.{name}", normals[name][i], name in flat, False), rows, thresholds)
             if isinstance(found, str):
                 bad.append(f"boundary.{name}: at the vertex {tuple(map(float, surfaces[name].points[i]))} {found}")
                 break
@@ -164,7 +178,7 @@ def _turned(normal: _Row, rows: Sequence[_Row], thresholds: Thresholds) -> _Row 
 def _refusal(normal: _Row, row: _Row, limit: float) -> str:
     """Why two directions cannot stand at one vertex, and what to do."""
     angle = math.degrees(math.acos(min(abs(float(row.direction @ normal.direction)), 1.0)))
-    remedy = "" if normal.stated else ", or state the normal: contact = { obstacle = { point = ..., normal = ... } }"
+    remedy = "" if normal.exact else ", or state the normal: contact = { obstacle = { point = ..., normal = ... } }"
     return (
         f"its normal makes an angle of {angle:.6g}° with the direction of {row.name}; they must be orthogonal or "
         f"equal, here to within {math.degrees(limit):.2g}°. Move the edge of the part, prescribe all components "
@@ -174,6 +188,6 @@ def _refusal(normal: _Row, row: _Row, limit: float) -> str:
 
 def _largest_turn(normal: _Row, row: _Row, thresholds: Thresholds) -> float:
     """By which angle a normal may be turned to be orthogonal or equal to another direction."""
-    if not normal.stated:
+    if not normal.exact:
         return thresholds.uneven
     return thresholds.turned_to_prescribed if row.prescribed else thresholds.same_direction

@@ -12,11 +12,12 @@ class Thresholds:
     Attributes:
         same_displacement: difference of two prescribed displacements, relative to the largest, that is rounding.
         rounding: relative rounding of the mesh's coordinates, and of a direction that the scene states.
-        uneven: angle (rad) by which the normal of a part of the mesh may be turned at a vertex that it shares with
+        flat: angle (rad) between the normals of a part up to which the part is flat.
+        uneven: angle by which the normal of a part that is not flat may be turned at a vertex that it shares with
             another part or with a prescribed component: few digits in the coordinates explain so much.
-        turned_to_prescribed: the same for a normal that the scene states, at a prescribed component. Contact stays
-            exact; a law sees the square of this angle.
-        same_direction: angle up to which two directions that the scene states are orthogonal or equal.
+        turned_to_prescribed: the same for a flat part at a prescribed component. Contact stays exact; a law sees the
+            square of this angle.
+        same_direction: angle up to which the normals of two flat parts are orthogonal or equal.
         outside_bounds: distance (of u0) by which a prescribed displacement may be outside of a contact bound.
         largest_scale: of stresses (N/m²) and displacements (m); its inverse is the smallest. Energies are products of
             both, so beyond this they are no numbers any more.
@@ -25,6 +26,7 @@ class Thresholds:
 
     same_displacement: float = 1e-9
     rounding: float = 1e-14
+    flat: float = 1e-8
     uneven: float = 0.02
     turned_to_prescribed: float = 1e-4
     same_direction: float = 1e-8

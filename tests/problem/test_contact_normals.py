@@ -145,59 +145,63 @@ def test_in_space_too(tmp_path: Path, wall: str) -> None:
     assert solved(on_uneven(path, table, dimension=3)).exit_code == 0
 
 
-def part(name: str, normal: tuple[float, ...], block: int = 0) -> Surface:
-    """A part of one vertex."""
-    n = np.array([normal]) / np.linalg.norm(normal)
+def part(name: str, normal: tuple[float, ...], uneven: float, alone: int) -> Surface:
+    """A part of two vertices: number 0, which both parts have, and one of its own, where the normal is turned."""
+    n = np.array([normal, np.add(normal, [uneven * normal[1], -uneven * normal[0]])])
+    n /= np.linalg.norm(n, axis=1, keepdims=True)
     return Surface(
         part=name,
         facets=np.array([0], np.int32),
-        blocks=np.array([block], np.int32),
-        points=np.array([[0.5, 0.0, 0.0]]),
+        blocks=np.array([0, alone], np.int32),
+        points=np.array([[0.5, 0.0, 0.0], [0.4, 0.0, 0.0]]),
         normals=n,
         measured=n,
         tangents=tangents(n),
-        weights=np.array([0.1]),
+        weights=np.array([0.1, 0.1]),
     )
 
 
-def decided(one: tuple[float, ...], other: tuple[float, ...], *stated: str, fixed: tuple[int, ...] = ()) -> Any:
-    """The normals of the parts "one" and "other", which share vertex 0."""
-    parts = {"one": part("one", one), "other": part("other", other)}
-    directions = {name: parts[name].normals[0] for name in stated}
-    found = decide(MPI.COMM_SELF, parts, directions, np.array(fixed, np.int32), 1.0)
+def decided(
+    one: tuple[float, ...], other: tuple[float, ...], uneven: tuple[str, ...] = (), fixed: tuple[int, ...] = ()
+) -> Any:
+    """The normals of the parts "one" and "other" at the vertex that they share."""
+    normals = {"one": one, "other": other}
+    parts = {name: part(name, n, 1e-3 if name in uneven else 0.0, i) for i, (name, n) in enumerate(normals.items(), 1)}
+    found = decide(MPI.COMM_SELF, parts, {}, np.array(fixed, np.int32), 1.0)
     return tuple(found[name].normals[0] for name in parts)
 
 
 def test_rounding_of_the_coordinates_and_nothing_more_is_taken_away() -> None:
     (normal, _) = decided((1e-15, -1.0), (0.0, -1.0))
     assert normal.tolist() == [0.0, -1.0]
-    found = decide(MPI.COMM_SELF, {"one": part("one", (1e-11, -1.0))}, {}, np.empty(0, np.int32), 1.0)
+    found = decide(MPI.COMM_SELF, {"one": part("one", (1e-11, -1.0), 0.0, 1)}, {}, np.empty(0, np.int32), 1.0)
     assert found["one"].normals[0].tolist() == [1e-11, -1.0]
 
 
-def test_what_the_scene_states_stays_and_the_mesh_is_turned_to_it() -> None:
-    one, other = decided((-1.0, 3e-3), (5e-3, -1.0), "other")
+def test_what_is_flat_stays_and_what_is_uneven_is_turned_to_it() -> None:
+    one, other = decided((-1.0, 3e-3), (5e-3, -1.0), uneven=("one",))
     assert other == pytest.approx([5e-3, -1.0], rel=1e-4)
     assert float(one @ other) == pytest.approx(0.0, abs=1e-16)
     assert one == pytest.approx([-1.0, -5e-3], rel=1e-4)
 
 
 def test_two_parts_of_one_uneven_floor_have_one_normal_where_they_meet() -> None:
-    one, other = decided((3e-3, -1.0), (-4e-3, -1.0))
+    one, other = decided((3e-3, -1.0), (-4e-3, -1.0), uneven=("one", "other"))
     assert one.tolist() == other.tolist()
 
 
 @pytest.mark.parametrize(
-    ("one", "other", "stated", "fixed", "words"),
+    ("one", "other", "uneven", "fixed", "words"),
     [
-        ((3e-3, -1.0), (-1.0, 0.0), ("one", "other"), (), "boundary.one"),
-        ((0.05, -1.0), (-1.0, 0.0), (), (), "87.1"),
-        ((0.3, -1.0), (0.3, -1.0), ("one", "other"), (0,), "u_x"),
+        ((3e-3, -1.0), (-1.0, 0.0), (), (), "boundary.one"),
+        ((1e-6, -1.0), (-1.0, 0.0), (), (), "5.7e-07°"),
+        ((0.05, -1.0), (-1.0, 0.0), ("one",), (), "obstacle"),
+        ((0.3, -1.0), (0.3, -1.0), (), (0,), "u_x"),
     ],
 )
 def test_other_directions_cannot_meet(
-    one: tuple[float, ...], other: tuple[float, ...], stated: tuple[str, ...], fixed: tuple[int, ...], words: str
+    one: tuple[float, ...], other: tuple[float, ...], uneven: tuple[str, ...], fixed: tuple[int, ...], words: str
 ) -> None:
     with pytest.raises(InputError, match="must be orthogonal or equal") as caught:
-        decided(one, other, *stated, fixed=fixed)
+        decided(one, other, uneven, fixed)
     assert words in str(caught.value)
