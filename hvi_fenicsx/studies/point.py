@@ -32,6 +32,7 @@ from ..solution import Solution
 from ..workflow import finish, prepare
 from . import cost
 from .errors import NotStoredError
+from .runner import COMPLAINT
 from .solution_fields import width
 from .stiffness import stiffness
 from .store import write_json
@@ -53,7 +54,7 @@ def main() -> int:
             _point(options)
     except HviError as error:
         if COMM.rank == 0:
-            print(error, file=sys.stderr)
+            print(f"{COMPLAINT}{error}", file=sys.stderr)
         return error.exit_code
     return 0
 

@@ -24,6 +24,10 @@ _OWN_FAULTS = (signal.SIGSEGV, signal.SIGBUS, signal.SIGABRT, signal.SIGFPE, sig
 """Signals that a process raises itself when it crashes."""
 
 
+COMPLAINT = "point: "
+"""How the message of a point begins."""
+
+
 @contextlib.contextmanager
 def watched(folder: Path) -> Iterator[None]:
     """SIGINT, SIGTERM and SIGHUP end the child that runs, and the study.
@@ -158,7 +162,7 @@ class Runner:
         Raises:
             InputError: its files could not be written: nor can those of the others.
         """
-        reason = (errors.strip().splitlines() or [f"ended with code {code}"])[-1]
+        reason = _reason(errors, code)
         if code == NotStoredError.exit_code:
             raise InputError(
                 f"--out {self.store.folder}: {reason}; finished points are kept, --resume goes on from there"
@@ -186,6 +190,13 @@ def _killer(code: int) -> signal.Signals | None:
     number = -code if code < 0 else code - 128
     found = next((known for known in signal.Signals if known == number), None)
     return None if found in _OWN_FAULTS else found
+
+
+def _reason(errors: str, code: int) -> str:
+    """The point's own words; behind them mpirun may have written, and without them Python."""
+    lines = errors.strip().splitlines() or [f"ended with code {code}"]
+    own = [line.removeprefix(COMPLAINT) for line in lines if line.startswith(COMPLAINT)]
+    return (own or lines)[-1]
 
 
 def _python(ranks: int) -> list[str]:

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TextIO
 
 import pytest
-from runs import ROOT, command, summary, write_scene
+from runs import ROOT, command, process, summary, write_scene
 from scenes import block, model, quadratic_linear
 
 from hvi_fenicsx.runtime import processes, terminal
@@ -85,6 +85,14 @@ def test_ranks_end_with_the_exit_code_and_no_notice_of_mpirun(code: int, tmp_pat
     done = subprocess.run([*words, *wrong], capture_output=True, text=True, check=False, timeout=120)
     assert done.returncode == code, done.stdout
     assert len(done.stderr.splitlines()) == (1 if code == 2 else 0), done.stderr
+
+
+@pytest.mark.long
+def test_a_point_of_a_study_that_fails_on_ranks_is_told_with_its_reason(tmp_path: Path) -> None:
+    scene = write_scene(tmp_path / "square.toml", model(2, gap="sqrt(x - 2)"))
+    done = process("study", scene, "--axis", "mesh=2", "--np", 2, "--out", tmp_path / "s")
+    assert done.returncode == 2
+    assert "not finite everywhere" in done.stderr
 
 
 @pytest.mark.long
