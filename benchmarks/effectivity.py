@@ -160,17 +160,37 @@ def l_shape() -> dict[str, Any]:
     }
 
 
-def rubber() -> dict[str, Any]:
+def rubber(poisson_ratio: float = 0.499) -> dict[str, Any]:
     """A nearly incompressible block on a floor, clamped at its left."""
     return {
         "domain": {"shape": "rectangle", "size": [1.0, 1.0], "cells": [8, 8]},
-        "material": {"model": "plane_strain", "youngs_modulus": 1.0e9, "poisson_ratio": 0.499},
+        "material": {"model": "plane_strain", "youngs_modulus": 1.0e9, "poisson_ratio": poisson_ratio},
         "boundary": {
             "wall": {"on": "left", "displacement": [0.0, 0.0]},
             "press": {"on": "top", "traction": [0.0, "-1e6*(1 + 4*x*(1 - x))"]},
             "floor": {"on": "bottom", "contact": {"gap": 0.0}},
         },
     }
+
+
+def square(
+    cells: int, pull: float = 0.0, press: str = "-1e6", gap: str = "0", friction: dict[str, Any] | None = None
+) -> dict[str, Any]:
+    """A square with a wall at its left, on a floor, with one of the data that coarse meshes do not see."""
+    floor = {"on": "bottom", "contact": {"gap": gap}} | ({"friction": friction} if friction else {})
+    return {
+        "domain": {"shape": "rectangle", "size": [1.0, 1.0], "cells": [cells, cells]},
+        "material": dict(STEEL),
+        "boundary": {
+            "wall": {"on": "left", "displacement": [0.0, "free"]},
+            "pull": {"on": "right", "traction": [pull, 0.0]},
+            "press": {"on": "top", "traction": [0.0, press]},
+            "floor": floor,
+        },
+    }
+
+
+DEEP_DROP = {"law": "graph", "points": [[0, 0], [9e-6, 3e6], [9e-6, 2e5]]}
 
 
 def _demo(name: str, *overrides: str) -> Scene:
@@ -192,6 +212,10 @@ def scenes() -> dict[str, Scene]:
         "thermal_bar": _demo("thermal_bar"),
         "L-shape": Scene.model_validate(l_shape()),
         "rubber, ν = 0.499": Scene.model_validate(rubber()),
+        "rubber, ν = 0.4999": Scene.model_validate(rubber(0.4999)),
+        "deep drop": Scene.model_validate(square(16, pull=6e6, friction=DEEP_DROP)),
+        "gap 2e-6 sin(25 x)": Scene.model_validate(square(4, gap="2e-6*sin(25*x)")),
+        "traction 1 + 2 sin(40 x)": Scene.model_validate(square(4, press="-1e6*(1 + 2*sin(40*x))")),
         "block_3d": _demo("block_3d", "domain.cells=[4, 4, 4]"),
         "anchor_3d": _demo("anchor_3d", "domain.cells=[4, 4, 2]"),
     }
