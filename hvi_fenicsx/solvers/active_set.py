@@ -135,6 +135,7 @@ class ActiveSetSolver:
         line_search: str = "bt",
         max_iterations: int = 60,
         steady: bool = False,
+        foundation: float = 0.0,
     ) -> Outcome:
         """Minimise the energy of the models between the bounds. Collective.
 
@@ -147,9 +148,10 @@ class ActiveSetSolver:
             line_search: PETSc's name; ``bt`` uses the energy.
             max_iterations: Newton steps at most.
             steady: whether x's active set is expected to be the final one; the first linear solve is then exact.
+            foundation: as in :meth:`.System.tangents`; the residual has none, so the solution is the same.
         """
         with self.timer("solve"):
-            run = _SnesRun(self, models, tolerance, lower, upper, steady=steady)
+            run = _SnesRun(self, models, tolerance, lower, upper, steady=steady, foundation=foundation)
             snes = run.create(line_search, max_iterations)
             try:
                 snes.solve(None, x)
@@ -189,9 +191,10 @@ class _SnesRun:
         upper: PETSc.Vec,
         *,
         steady: bool,
+        foundation: float,
     ) -> None:
         self.owner, self.models, self.tolerance = owner, models, tolerance
-        self.thresholds, self.steady = owner.thresholds.active_set, steady
+        self.thresholds, self.steady, self.foundation = owner.thresholds.active_set, steady, foundation
         self.lower, self.upper = lower, upper
         self.last, self.linear, self.iterations, self.reason = float("inf"), 0, 0, 0
         self.sizes: Sizes = (float("inf"), float("inf"))
@@ -233,7 +236,7 @@ class _SnesRun:
         self.iterations, self.reason = snes.getIterationNumber(), snes.getConvergedReason()
         self.linear = snes.getLinearSolveIterations()
         if self.reason == PETSc.SNES.ConvergedReason.DIVERGED_LINEAR_SOLVE:
-            self.owner.held.report(snes.getKSP().getIterationNumber())
+            self.owner.held.report(snes.getKSP().getIterationNumber(), failed=True)
         snes.destroy()
 
     def outcome(self) -> Outcome:
@@ -246,7 +249,7 @@ class _SnesRun:
 
     def _jacobian(self, snes: PETSc.SNES, x: PETSc.Vec, j: PETSc.Mat, p: PETSc.Mat) -> None:
         system = self.owner.system
-        system.jacobian.set_rates(system.tangents(x, self.models))
+        system.jacobian.set_rates(system.tangents(x, self.models, self.foundation))
 
     def _converged(self, snes: PETSc.SNES, iteration: int, norms: Any) -> int:
         x, (f, _) = snes.getSolution(), snes.getFunction()[:2]

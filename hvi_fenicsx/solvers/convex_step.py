@@ -188,6 +188,7 @@ class ConvexStep:
                 max_iterations=min(most, self._options.max_iterations),
                 lowers_energy=secant,
                 steady=steady,
+                foundation=self._thresholds.foundation if secant else 0.0,
             )
             if not self._check_bounded:
                 self._check_bounded = True

@@ -26,6 +26,7 @@ class Attempt:
             this one ended, else where this one began.
         start: where to begin instead; None for where it would.
         steady: as in :meth:`.ActiveSetSolver.solve`.
+        foundation: likewise.
     """
 
     models: Sequence[LawModel]
@@ -34,6 +35,7 @@ class Attempt:
     lowers_energy: bool
     start: PETSc.Vec | None = None
     steady: bool = False
+    foundation: float = 0.0
 
 
 def first_success(
@@ -91,4 +93,5 @@ def _solve(
         line_search=attempt.line_search,
         max_iterations=attempt.max_iterations,
         steady=attempt.steady,
+        foundation=attempt.foundation,
     )

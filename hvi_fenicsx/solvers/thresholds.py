@@ -60,6 +60,8 @@ class BranchThresholds:
     Attributes:
         attempts: ways to solve a convex step, until one converges: whether with secant stiffness, PETSc's line search,
             Newton steps at most.
+        foundation: stiffness per area, in units of E0/L, that attempts with secant stiffness add to the laws': where
+            these have none, as in a dead zone, the matrix would be singular.
         loose_tolerance: of convex steps while the pieces of the laws still change.
         convex_steps: convex steps at most.
         cell_changes: times that vertices may change their cell between convex kinks in one convex step.
@@ -79,6 +81,7 @@ class BranchThresholds:
     """
 
     attempts: Sequence[tuple[bool, str, int]] = BRANCH_ATTEMPTS
+    foundation: float = 1e-6
     loose_tolerance: float = 1e-4
     convex_steps: int = 200
     cell_changes: int = 200

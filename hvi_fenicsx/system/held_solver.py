@@ -161,12 +161,17 @@ class HeldPreconditioner:
         most = 0 if self.settings.kind == "mg" else max(2, thresholds.changed_held * len(held))
         return changed <= most and drift <= thresholds.drift
 
-    def report(self, iterations: int) -> None:
-        """Report the iterations of a solve (the same on all ranks): where they grow, the preconditioner is outdated."""
+    def report(self, iterations: int, *, failed: bool = False) -> None:
+        """Report how a solve went: where iterations grow or it fails, the preconditioner is outdated.
+
+        Args:
+            iterations: of the solve, the same on all ranks.
+            failed: whether it broke down.
+        """
         thresholds = self.settings.thresholds
         self._first_iterations = self._first_iterations or iterations
-        self._outdated = iterations > thresholds.slower * self._first_iterations + 5
-        if iterations > thresholds.slow and _small(self.system, thresholds):
+        self._outdated = failed or iterations > thresholds.slower * self._first_iterations + 5
+        if (failed or iterations > thresholds.slow) and _small(self.system, thresholds):
             self.settings, self._outdated = LinearSettings("lu", thresholds), True
 
     def _build(self, held: Entities) -> None:

@@ -220,17 +220,19 @@ class System:
             assemble_vector(out, term.residual)
         out.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
 
-    def tangents(self, x: PETSc.Vec, models: Sequence[LawModel]) -> list[Array]:
+    def tangents(self, x: PETSc.Vec, models: Sequence[LawModel], foundation: float = 0.0) -> list[Array]:
         """The tangent stiffness K of the laws, (m, d, d) by term.
 
         Args:
             x: the unknowns u.
             models: what takes the place of the laws, by term.
+            foundation: stiffness added in all directions that are not prescribed: laws without any hold no motion.
         """
         u = x.array_r
         arguments = [term.argument(u) for term in self.terms]
         return [
             term.rate(u, model.derivative(a), model.second(a))
+            + foundation * term.free[:, :, None] * np.eye(term.free.shape[1])
             for term, model, a in zip(self.terms, models, arguments, strict=True)
         ]
 

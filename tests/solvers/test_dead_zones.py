@@ -8,7 +8,7 @@ from typing import Any
 import meshes
 import pytest
 from enumeration import Floor, polyline
-from scenes import STEEL, Table, block, displacement, energy, far, points, solved
+from scenes import NESTED, STEEL, Table, block, displacement, energy, far, points, solved
 
 PRESS = {"on": "top", "traction": [0.0, -1e6]}
 PUSH = {"on": "left", "traction": [3e5, 0.0]}
@@ -164,3 +164,16 @@ def test_the_solution_is_the_only_stationary_point_there_is(law: list[tuple[floa
     order = points(found)[:, [0, 1]]
     rows = (2 * order[:, 1] * 3 + 2 * order[:, 0]).round().astype(int)
     assert far(displacement(found), wanted[0].u[rows]) < 1e-7
+
+
+@pytest.mark.parametrize("push", [0.0, 2e5], ids=["free play", "lifting"])
+def test_multigrid_passes_over_motions_that_nothing_holds_for_a_while(push: float) -> None:
+    """The tangent is singular in free play, and where the active set leaves a vertex or two."""
+    table = SCENES["foundation that tilts"]
+    if push:
+        press = {"on": "top", "traction": [0.0, "-1e6*(1 - 1.8*x)"]}
+        table = square(left={"on": "left", "traction": [push, 0.0]}, top=press, floor=floor(DEAD))
+    found = solved(table | {"domain": table["domain"] | {"cells": [32, 32]}}, NESTED)
+    assert found.exit_code == 0, found.reason
+    assert found.solve_result is not None
+    assert found.solve_result.counts.newton < 20
