@@ -242,7 +242,8 @@ def _placed(options: argparse.Namespace) -> Iterator[None]:
     try:
         yield
     except InputError as error:
-        raise InputError(with_place(str(error), options.scene, options.overrides)) from error
+        error.args = (with_place(str(error), options.scene, options.overrides),)  # it stays what it is, on which ranks
+        raise
 
 
 @contextmanager
