@@ -11,6 +11,8 @@ from ..runtime.manifest import MARKS
 from ..scene import Scene, dump_scene
 from .folder import inputs_of
 
+_READ = ("scene.toml", MARKS["result"])
+
 
 class Finished(NamedTuple):
     """A folder that should hold a result of a scene.
@@ -35,6 +37,8 @@ def read(target: Path, scene: Scene) -> Finished:
     if found is None or found.kind != "result":
         return Finished()
     damaged = found.damaged(target)
+    if damaged is None:
+        damaged = next((name for name in _READ if not found.files.get(name)), None)  # listed without what was in it
     if damaged is not None:
         return Finished(fault=f"{damaged} is not as it was written")
     if (target / "scene.toml").read_text(encoding="utf-8") != dump_scene(scene, target):

@@ -51,10 +51,10 @@ def run(module: str, words: Sequence[str], seconds: float) -> subprocess.Complet
 
 @contextmanager
 def _ended_by_signals(child: subprocess.Popen[bytes]) -> Iterator[list[int]]:
-    """Have our own handlers of signals end the child too; the signals that came."""
+    """Have signals that are handled, or would end us, end the child; the signals that came."""
     came: list[int] = []
     handlers = {number: signal.getsignal(number) for number in SIGNALS}
-    ours = {number: handler for number, handler in handlers.items() if callable(handler)}
+    ours = {number: handler for number, handler in handlers.items() if callable(handler) or handler == signal.SIG_DFL}
     if threading.current_thread() is not threading.main_thread():
         ours = {}  # Python takes handlers from its main thread only
     for number, handler in ours.items():
@@ -66,10 +66,11 @@ def _ended_by_signals(child: subprocess.Popen[bytes]) -> Iterator[list[int]]:
             signal.signal(number, handler)
 
 
-def _ending(child: subprocess.Popen[bytes], handler: Callable[..., Any], came: list[int]) -> Callable[..., Any]:
+def _ending(child: subprocess.Popen[bytes], handler: Any, came: list[int]) -> Callable[..., Any]:
     def end(number: int, frame: FrameType | None) -> None:
         came.append(number)
         os.kill(child.pid, signal.SIGKILL)
-        handler(number, frame)
+        if callable(handler):
+            handler(number, frame)
 
     return end

@@ -52,6 +52,18 @@ def line_of(error: BaseException, path: Path) -> str:
     return f":{lines[-1]}" if lines else ""
 
 
+def words_of(error: BaseException) -> str:
+    """The kind of an error and what it says, if it can: a plugin's own kind may fail at that too.
+
+    Args:
+        error: of any kind.
+    """
+    try:
+        return f"{type(error).__name__}: {error}"
+    except Exception:
+        return type(error).__name__
+
+
 def _guarded_attribute(cls: type, name: str, attribute: Any, path: Path) -> Any:
     """The method or property with its guard; None for what is neither."""
     expected = _expected(cls, name)
@@ -84,11 +96,11 @@ def _guarded(function: Function, expected: Any, path: Path) -> Function:
     def call(*args: Any, **kwargs: Any) -> Any:
         try:
             result = function(*args, **kwargs)
-        except HviError:
+        except (HviError, KeyboardInterrupt):
             raise
-        except (Exception, SystemExit) as error:
+        except BaseException as error:
             place = f"{path}{line_of(error, path)}: {function.__qualname__}"
-            raise PluginError(f"{place} raises {type(error).__name__}: {error}") from error
+            raise PluginError(f"{place} raises {words_of(error)}") from error
         if not _fits(expected, result, args):
             place = f"{path}:{function.__code__.co_firstlineno}: {function.__qualname__}"
             raise PluginError(f"{place} returns {_shown(result)}; it must return {_named(expected)}")

@@ -60,9 +60,11 @@ def _execute(module: str, path: Path) -> None:
     _LOG.warning("plugin %s: its code is run", path)
     try:
         spec.loader.exec_module(plugin)
-    except (Exception, SystemExit) as error:
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:
         del sys.modules[module]
-        raise refusal(f"{path}{plugin_guard.line_of(error, path)}: {type(error).__name__}: {error}") from None
+        raise refusal(f"{path}{plugin_guard.line_of(error, path)}: {plugin_guard.words_of(error)}") from None
     plugin_guard.guard(plugin, path)
 
 

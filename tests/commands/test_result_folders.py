@@ -93,6 +93,17 @@ def test_a_damaged_result_is_not_finished(name: str, text: str | None, copy: Pat
     assert "finished already" in run(copy / "square.toml", copy / "r", "--resume").stdout
 
 
+@pytest.mark.parametrize("name", ["summary.json", "scene.toml"])
+def test_a_file_that_the_manifest_lists_without_its_hash_is_not_trusted(name: str, copy: Path) -> None:
+    record = json.loads((copy / "r" / "manifest.json").read_text())
+    record["files"][name] = None
+    (copy / "r" / "manifest.json").write_text(json.dumps(record))
+    (copy / "r" / name).write_bytes(b"\xff")
+    done = run(copy / "square.toml", copy / "r", "--resume")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert f"{name} is not as it was written; the scene is run again" in done.stdout
+
+
 def test_a_page_that_is_made_again_leaves_the_result_whole(copy: Path) -> None:
     (copy / "r" / "report.html").unlink()
     render.write(copy / "r")

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import os
 import signal
+import tempfile
 import threading
+import time
 from pathlib import Path
 
 import meshes
@@ -131,16 +133,29 @@ def test_a_script_that_ends_gmsh_or_never_ends_is_refused(command: str, tmp_path
     assert str(tmp_path / "m.geo") in str(refused.value)
 
 
-def test_a_signal_ends_the_meshing(tmp_path: Path) -> None:
-    script = written(tmp_path / "m.geo", LOOP)
+def signalled_while_meshing(temporary: Path) -> None:
+    """A signal to this process a second after gmsh's own was given its folder."""
+    while not list(temporary.iterdir()):
+        time.sleep(0.01)
+    time.sleep(1.0)
+    os.kill(os.getpid(), signal.SIGUSR1)
+
+
+@pytest.mark.parametrize("watched", [True, False])
+def test_a_signal_ends_the_meshing(watched: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whether the run catches signals already or they would end it: no temporary folder stays."""
+    script, temporary = written(tmp_path / "m.geo", LOOP), tmp_path / "t"
+    temporary.mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(temporary))
     handler = signal.getsignal(signal.SIGUSR1)
-    signal.signal(signal.SIGUSR1, Interrupt(MPI.COMM_WORLD)._on_signal)
+    signal.signal(signal.SIGUSR1, Interrupt(MPI.COMM_WORLD)._on_signal if watched else signal.SIG_DFL)
     try:
-        threading.Timer(0.5, os.kill, (os.getpid(), signal.SIGUSR1)).start()
+        threading.Thread(target=signalled_while_meshing, args=(temporary,)).start()
         with pytest.raises(Interrupted):
             read(script)
     finally:
         signal.signal(signal.SIGUSR1, handler)
+    assert list(temporary.iterdir()) == []
 
 
 @pytest.mark.parametrize("version", [2.2, 4.1])

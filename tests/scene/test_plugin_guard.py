@@ -61,11 +61,22 @@ def test_a_plugin_that_ends_the_program_is_refused(tmp_path: Path) -> None:
         read_scene(tmp_path / "scene.toml")
 
 
+@pytest.mark.parametrize("error", ["GeneratorExit", "Odd"])
+def test_an_error_of_any_kind_on_import_is_told(error: str, tmp_path: Path) -> None:
+    """One that cannot be printed too."""
+    odd = "class Odd(Exception):\n    def __str__(self): raise ValueError\n"
+    (tmp_path / f"of_{error}.py").write_text(f"{odd}raise {error}\n", encoding="utf-8")
+    (tmp_path / "scene.toml").write_text(f'plugins = "of_{error}.py"', encoding="utf-8")
+    with pytest.raises(InputError, match=rf"of_{error}\.py:3: {error}"):
+        read_scene(tmp_path / "scene.toml")
+
+
 @pytest.mark.parametrize(
     ("wrong", "told"),
     [
         ({"traction": "return 1 / 0"}, r":12: Mine\.traction raises ZeroDivisionError"),
         ({"traction": "raise SystemExit(1)"}, r":12: Mine\.traction raises SystemExit"),
+        ({"traction": "raise BaseException('no')"}, r":12: Mine\.traction raises BaseException: no"),
         ({"traction": "return None"}, r":11: Mine\.traction returns None; it must return numbers"),
         ({"traction": "return x[:1]"}, r":11: Mine\.traction returns an array of shape \(1,\)"),
         ({"traction": "return 'stiff'"}, r":11: Mine\.traction returns str 'stiff'"),
