@@ -1,7 +1,21 @@
 """Semicoercive hemivariational inequalities of nonmonotone contact, on FEniCSx.
 
-From Python: ``from hvi_fenicsx import Scene, read_scene, solve``. Names are loaded when they are first used, so that
-importing the package costs nothing.
+From Python (docs/python.md)::
+
+    import hvi_fenicsx as hvi
+
+    model = hvi.Model(
+        hvi.Body.rectangle([1.0, 1.0], [16, 16]),
+        [
+            hvi.Isotropic(youngs_modulus=2.15e11, poisson_ratio=0.29),
+            hvi.Displacement("left", [0.0, None]),
+            hvi.Traction("top", [0.0, -1e6]),
+            hvi.Contact("bottom"),
+        ],
+    )
+    solution = hvi.solve(model)
+
+Names are loaded when they are first used, so that importing the package costs nothing.
 """
 
 from __future__ import annotations
@@ -95,6 +109,10 @@ if TYPE_CHECKING:
     from .runtime.versions import __version__
     from .scene import Scene, dump_scene, read_scene
     from .workflow import prepare
+
+
+def __dir__() -> list[str]:
+    return __all__
 
 
 def __getattr__(name: str) -> Any:

@@ -20,7 +20,7 @@ from .contact_state import ContactState, Forces
 from .thresholds import DEFAULT, Thresholds
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class Certificate:
     """How far u is from a solution.
 
@@ -55,6 +55,15 @@ class Certificate:
     def as_dict(self) -> dict[str, float | str | bool | None]:
         """For ``summary.json``."""
         return asdict(self)
+
+    def __str__(self) -> str:
+        return (
+            f"equilibrium {self.equilibrium:.1e}, penetration {self.penetration:.1e}, tension {self.tension:.1e}, "
+            f"complementarity {self.complementarity:.1e}, inclusion {self.inclusion:.1e}; {self.second_order}"
+        )
+
+    def __repr__(self) -> str:
+        return f"Certificate({'passed' if self.passed else 'not passed'} at {self.tolerance:g}: {self})"
 
 
 @dataclass(frozen=True)

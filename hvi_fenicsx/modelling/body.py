@@ -9,6 +9,7 @@ from dataclasses import replace
 from functools import cached_property
 from typing import Any, Self
 
+import numpy as np
 from dolfinx import mesh as dmesh
 from mpi4py import MPI
 from pydantic import ValidationError
@@ -19,7 +20,7 @@ from ..mesh.domain import Domain
 from ..mesh.shapes import Box, DomainShape, GivenMesh, MeshFile, Rectangle
 from ..mesh.thresholds import DEFAULT
 from ..mesh.transfer import Transfer
-from ..schema import input_error
+from ..schema import located_error
 
 
 class Body:
@@ -47,6 +48,8 @@ class Body:
         names: Mapping[str, int] | None = None,
         regions: Mapping[str, int] | None = None,
     ) -> None:
+        if not isinstance(mesh, dmesh.Mesh):
+            raise InputError(f"body: {mesh!r} is no dolfinx mesh; a file is read by hvi.Body.file(path)")
         sides, within = _sorted_out(mesh, facets, cells, dict(names or {}), regions)
         domain = given.domain_of(mesh, facets, cells, sides, within)
         self._set(GivenMesh(shape="given mesh", given=domain), mesh.comm)
@@ -78,7 +81,7 @@ class Body:
         Raises:
             InputError: a number is not allowed.
         """
-        return cls.from_shape(_shape(Rectangle, size=_floats(size), cells=tuple(cells)), comm)
+        return cls.from_shape(_shape(Rectangle, size=_plain(size), cells=_plain(cells)), comm)
 
     @classmethod
     def box(cls, size: Sequence[float], cells: Sequence[int], comm: MPI.Comm = MPI.COMM_WORLD) -> Self:
@@ -92,7 +95,7 @@ class Body:
         Raises:
             InputError: a number is not allowed.
         """
-        return cls.from_shape(_shape(Box, size=_floats(size), cells=tuple(cells)), comm)
+        return cls.from_shape(_shape(Box, size=_plain(size), cells=_plain(cells)), comm)
 
     @classmethod
     def file(
@@ -177,12 +180,13 @@ def _remembering(domain: Domain) -> Domain:
     return replace(domain, coarsening=coarser)
 
 
-def _floats(values: Sequence[float]) -> tuple[float, ...]:
-    return tuple(float(value) for value in values)
+def _plain(values: Sequence[float]) -> Any:
+    """Numbers of any kind, such as NumPy's, as Python's."""
+    return np.asarray(values).tolist()
 
 
 def _shape(kind: type[DomainShape], **keys: Any) -> DomainShape:
     try:
         return kind(**keys)
     except ValidationError as error:
-        raise InputError(f"body: {input_error(error, kind)}") from None
+        raise located_error(error, kind) from None

@@ -8,6 +8,7 @@ from typing import Self
 
 import numpy as np
 
+from ..problem import contact_surface
 from ..report.solution_arrays import PartArrays
 from ..typing import Array, Integers, Mask
 
@@ -21,9 +22,10 @@ class ContactArrays:
         s: in 2D the arc length, m, (m,); None in 3D.
         weight: the area of each vertex, m (2D) or m², (m,).
         normal: outward unit normals, (m, d).
+        tangents: unit tangents, (m, d-1, d).
         displacement: u·n, m, (m,).
         gap: the distance to the obstacle, m, (m,); NaN where there is no contact.
-        slip: u_t, m: (m,) in 2D, (m, 2) in 3D, along the tangents of ``contact.csv``.
+        slip: u_t, m: (m,) in 2D, (m, 2) in 3D, along the tangents.
         pressure: -σ_n, positive where the part is pressed, N/m², (m,).
         friction: -σ_t, N/m², as ``slip``.
         active: whether the vertex is in contact, (m,).
@@ -35,6 +37,7 @@ class ContactArrays:
     s: Array | None
     weight: Array
     normal: Array
+    tangents: Array
     displacement: Array
     gap: Array
     slip: Array
@@ -53,6 +56,7 @@ class ContactArrays:
             s=columns.get("s"),
             weight=part.weights,
             normal=part.normals,
+            tangents=contact_surface.tangents(part.normals),
             displacement=columns["u_n"],
             gap=columns.get("gap", np.full(len(part.weights), np.nan)),
             slip=_tangential(columns, "u_t"),

@@ -10,7 +10,7 @@ from pydantic import ValidationError
 from ..effects import Effect, Place
 from ..errors import InputError
 from ..scene import BodyTable, BoundaryTable, MaterialTable, Scene
-from ..schema import mistakes_of, unknown
+from ..schema import located_error, unknown
 from .body import Body
 from .placed_effects import PlacedEffect
 
@@ -38,6 +38,7 @@ class Model:
     """
 
     def __init__(self, body: Body, effects: Sequence[PlacedEffect], title: str = "") -> None:
+        _check_kinds(body, effects)
         self.body, self.effects, self.title = body, tuple(effects), title
         for one in self.effects:
             _check_place(body, one)
@@ -64,6 +65,16 @@ class Model:
     def __repr__(self) -> str:
         names = ", ".join(f"{type(one).__name__} on {one.where or 'the body'}" for one in self.effects)
         return f"Model({self.body!r}: {names})"
+
+
+def _check_kinds(body: Any, effects: Any) -> None:
+    if not isinstance(body, Body):
+        raise InputError(f"model: {body!r} is no body; make one of a mesh: hvi.Body(mesh, facets=..., names=...)")
+    if isinstance(effects, PlacedEffect):
+        raise InputError("model: effects are a list; write [...] around them")
+    for one in effects:
+        if not isinstance(one, PlacedEffect):
+            raise InputError(f'model: {one!r} is no effect with a place, such as hvi.Friction("floor", law)')
 
 
 def _check_place(body: Body, placed: PlacedEffect) -> None:
@@ -100,8 +111,7 @@ def _scene(body: Body, effects: Iterable[tuple[str | None, Effect]], title: str)
             boundary=dict(_boundary(tables[Place.BOUNDARY])),
         )
     except ValidationError as error:
-        mistakes = mistakes_of(error, Scene)
-        raise InputError("\n".join(f"{'.'.join(map(str, m.where))}: {m.text}" for m in mistakes)) from None
+        raise located_error(error, Scene) from None
 
 
 def _add(tables: list[tuple[str | None, dict[str, Any]]], where: str | None, effect: Effect) -> None:

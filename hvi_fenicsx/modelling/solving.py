@@ -11,19 +11,27 @@ from mpi4py import MPI
 from petsc4py import PETSc
 from pydantic import ValidationError
 
-from .. import workflow
+from .. import console, workflow
 from ..errors import InputError
 from ..mesh.domain import Domain
 from ..runtime.log import newton_step
 from ..runtime.timing import Timer
 from ..scene import Scene, SolverTable
-from ..schema import mistakes_of
+from ..schema import located_error
+from ..solution import Solution
 from ..solvers.context import Progress
 from ..system.system import System
 from ..workflow import DEFAULT, Preparation, Thresholds
 from .model import Model
 from .solution import ModelSolution
 from .user_energy import UserEnergy
+
+
+class ModelPreparation(Preparation):
+    """A model before the solve, told in a few lines."""
+
+    def __repr__(self) -> str:
+        return "\n".join(console.heading(self, self.system.comm.size))
 
 
 def solve(
@@ -60,7 +68,7 @@ def solve(
     first = None if known is None else _displacement(known, prepared)
     found, levels = workflow.finish_with_levels(prepared, progress, start=first, estimating=estimate)
     _free_garbage([prepared.system, *(level.system for level in levels)])
-    return ModelSolution(**{field.name: getattr(found, field.name) for field in fields(found)})
+    return ModelSolution(**_fields(found))
 
 
 def check(
@@ -70,7 +78,7 @@ def check(
     timer: Timer | None = None,
     thresholds: Thresholds = DEFAULT,
     **options: Any,
-) -> Preparation:
+) -> ModelPreparation:
     """Assemble a model or a scene and say whether a solution can exist; solves nothing. Collective.
 
     Args:
@@ -85,10 +93,17 @@ def check(
     """
     if isinstance(model, Scene):
         scene, domain = model, None
+    elif not isinstance(model, Model):
+        raise InputError(f"{model!r} is no model and no scene; a file is read by hvi.read_scene(path)")
     else:
         scene, domain, comm = model.scene, _domain(model), model.body.comm
     scene, comm = _with_options(scene, options), comm or MPI.COMM_WORLD
-    return workflow.prepare(scene, comm, timer, domain, thresholds=thresholds)
+    prepared = workflow.prepare(scene, comm, timer, domain, thresholds=thresholds)
+    return ModelPreparation(**_fields(prepared))
+
+
+def _fields(made: Preparation | Solution) -> dict[str, Any]:
+    return {field.name: getattr(made, field.name) for field in fields(made)}
 
 
 def _free_garbage(systems: Iterable[System]) -> None:
@@ -109,8 +124,7 @@ def _with_options(scene: Scene, options: dict[str, Any]) -> Scene:
     try:
         return scene.with_solver(**options) if options else scene
     except ValidationError as error:
-        mistakes = mistakes_of(error, SolverTable)
-        raise InputError("; ".join(f"{'.'.join(map(str, m.where))}: {m.text}" for m in mistakes)) from None
+        raise located_error(error, SolverTable) from None
 
 
 def _domain(model: Model) -> Domain:

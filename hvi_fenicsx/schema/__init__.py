@@ -5,7 +5,7 @@ Light: it loads pydantic and nothing heavier, and knows no particular table.
 
 from .fields import LONGEST, SHORTEST, Count, Length, Names, Positive, vector
 from .messages import refusal, shown, unknown
-from .tables import Key, Mistake, Table, choose, input_error, mistakes_of, validation_error
+from .tables import Key, Mistake, Table, choose, input_error, located_error, mistakes_of, validation_error
 
 __all__ = [
     "LONGEST",
@@ -19,6 +19,7 @@ __all__ = [
     "Table",
     "choose",
     "input_error",
+    "located_error",
     "mistakes_of",
     "refusal",
     "shown",

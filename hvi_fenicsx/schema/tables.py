@@ -61,6 +61,16 @@ def input_error(error: ValidationError, model: type[BaseModel] | None = None) ->
     return InputError("; ".join(m.text for m in mistakes_of(error, model)))
 
 
+def located_error(error: ValidationError, model: type[BaseModel] | None = None) -> InputError:
+    """What pydantic found, a line each, with the key before it.
+
+    Args:
+        error: pydantic's error.
+        model: the table that was read, for its allowed keys.
+    """
+    return InputError("\n".join(": ".join([".".join(map(str, m.where)), m.text]) for m in mistakes_of(error, model)))
+
+
 class Table(BaseModel):
     """A table of the scene file: frozen, no unknown keys, no silent conversions."""
 

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import json
+import pickle
+import pydoc
 import subprocess
 import sys
+import typing
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +16,7 @@ import pytest
 import ufl
 from dolfinx import fem, mesh
 from mpi4py import MPI
-from own_mesh import STEEL, TAGS, own_square, steel_square, tagged_square
+from own_mesh import LAW, STEEL, TAGS, own_square, steel_square, tagged_square
 from runs import on_ranks
 from scenes import model as scene_table
 from scenes import quadratic_linear
@@ -227,7 +230,13 @@ def test_wrong_words_are_refused_as_in_a_scene_file(body: hvi.Body) -> None:
         (lambda: hvi.Model(body, [hvi.Traction("pull", [0.0, 0.0])]), "material: is empty"),
         (lambda: hvi.Model(body, [hvi.Isotropic(youngs_modulus=-1, poisson_ratio=0.3)]), "youngs_modulus|greater"),
         (lambda: hvi.solve(steel_square(body=body), tolerence=1), 'unknown key "tolerence"; did you mean "tolerance"'),
-        (lambda: hvi.Body.rectangle([1.0, -1.0], [2, 2]), "body: "),
+        (lambda: hvi.Body.rectangle([1.0, -1.0], [2, 2]), r"size\.1: must be 1e-09 or more"),
+        (lambda: hvi.Body.rectangle([1.0, 1.0], 8), r"cells: must be a list of 2 .*is 8"),  # type: ignore[arg-type]
+        (lambda: hvi.Body("part.msh"), r"is no dolfinx mesh; a file is read by hvi.Body.file"),  # type: ignore[arg-type]
+        (lambda: hvi.Model(body.mesh, [STEEL]), r"is no body; make one of a mesh"),  # type: ignore[arg-type]
+        (lambda: hvi.Model(body, STEEL), "effects are a list"),  # type: ignore[arg-type]
+        (lambda: hvi.Model(body, [STEEL, LAW]), "QuadraticLinear.* is no effect with a place"),  # type: ignore[list-item]
+        (lambda: hvi.solve("part.toml"), "'part.toml' is no model and no scene"),  # type: ignore[arg-type]
     ]
     for make, reason in wrong:
         with pytest.raises(hvi.InputError, match=reason):
@@ -247,12 +256,36 @@ def test_a_body_that_escapes_has_no_displacement_and_says_so(body: hvi.Body) -> 
 
 def test_it_is_short_to_read_and_can_be_seen(found: hvi.Solution) -> None:
     assert len(repr(found)) < 1000
+    assert repr(found.certificate).startswith("Certificate(passed at 1e-08: equilibrium ")
+    assert repr(found.estimate).startswith("Estimate(relative=0.")
+    prepared = repr(hvi.check(steel_square())).splitlines()
+    assert prepared[0] == "untitled: 162 unknowns on 1 rank"
+    assert prepared[1].startswith("existence: held")
     assert found._repr_html_().startswith("<table><tr><th>result</th><td>certified</td></tr>")
     figure = found.plot("stress")
     assert figure is not None
     assert figure._repr_png_()[:4] == b"\x89PNG"  # type: ignore[attr-defined]
     with pytest.raises(hvi.InputError, match="no picture 'sketch' of this solution; there are: body"):
         found.plot("sketch")
+
+
+def test_what_python_offers_for_help(found: hvi.Solution) -> None:
+    page = pydoc.render_doc(hvi, renderer=pydoc.plaintext)
+    for name in ("class Body", "class Energy", "solution = hvi.solve(model)"):
+        assert name in page
+    for offered in (hvi.solve, hvi.check, hvi.Body.file, hvi.Model.replace, hvi.Solution.plot, hvi.Solution):
+        assert typing.get_type_hints(offered)
+    numbers = pickle.loads(pickle.dumps((found.energy, found.certificate, found.estimate, dict(found.contact))))
+    assert numbers[1] == found.certificate
+
+
+def test_the_slip_of_a_part_turns_with_its_tangents() -> None:
+    """A block moved sideways slips as it is moved, whatever the tangents are."""
+    box = hvi.Body.box([1.0, 1.0, 1.0], [1, 1, 1], MPI.COMM_SELF)
+    whole = [hvi.Isotropic(youngs_modulus=E, poisson_ratio=NU), hvi.Displacement("top", [1e-5, 2e-5, 0.0])]
+    floor = hvi.solve(hvi.Model(box, [*whole, hvi.Contact("bottom")])).contact["bottom"]
+    slip = np.einsum("mk,mkd->md", floor.slip, floor.tangents)
+    np.testing.assert_allclose(slip, np.tile([1e-5, 2e-5, 0.0], (4, 1)), atol=1e-18)
 
 
 def test_a_solution_writes_the_folder_of_a_run(found: hvi.Solution, tmp_path: Path) -> None:

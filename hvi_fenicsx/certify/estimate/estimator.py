@@ -25,7 +25,7 @@ from .law_traces import LawTraces
 from .thresholds import DEFAULT, Thresholds
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Estimate:
     """Estimated errors in the energy norm, nondimensional (energies in units of :attr:`.Scales.energy`).
 
@@ -57,6 +57,9 @@ class Estimate:
         """The numbers by name, nondimensional."""
         names = ("relative", "total", "discretisation", "smoothing", "algebraic", "energy_norm")
         return {name: float(getattr(self, name)) for name in names}
+
+    def __repr__(self) -> str:
+        return f"Estimate({', '.join(f'{name}={value:.3g}' for name, value in self.as_dict().items())})"
 
 
 def estimate(
