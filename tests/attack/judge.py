@@ -13,12 +13,16 @@ from referee.coordinates import Floor
 from referee.equilibria import find
 from referee.meshes import Array, Mesh, block, boundary
 from referee.minimality import examine, sampled_descent
-from referee.solution import Check
+from referee.solution import EPS, Check
 
 AGREES, CONTRADICTS, UNDECIDED = "agrees", "contradicts", "undecided"
 Table = dict[str, Any]
-SMALLEST_FACTOR = 1e-6
-"""A load factor below this is a rounded zero: the programmes have a tie of their own."""
+SMALLEST_FACTOR = 1e-3
+"""A load factor below this is not compared: beside the rest of the load its work is within our tie."""
+
+WEDGE = 1e4
+"""Where contact must carry so many times the load, displacements are its square times those of the load: no number of
+double precision tells whether a solution was missed."""
 
 
 @dataclass(frozen=True)
@@ -120,7 +124,7 @@ def _existence(problem: Problem, truth: programmes.Verdict, answer: Answer) -> l
     found = []
     tie = "" if answer.margin is None else f", margin {answer.margin:.1e}"
     allowed = {"unclear": ("held", "borderline", "metastable", "escapes", "undecided")}
-    tied = answer.state == "borderline" and min(abs(truth.growth), abs(truth.peak)) < truth.equal
+    tied = answer.state == "borderline" and np.nanmin(np.abs([truth.growth, truth.peak])) < truth.equal
     if answer.state not in allowed.get(truth.state, (truth.state,)) and not tied:
         found.append(f"state {answer.state}{tie}, in truth {truth.state} ({truth.growth:.2e}, {truth.peak:.2e})")
     sure = truth.state in ("held", "metastable") and abs(truth.growth) > programmes.TIE
@@ -194,6 +198,12 @@ def _unsolved(
         return [], f"? rounding moves the tractions by {check.blur:.0e}"
     if check and not check.wrongs():
         return [f"{truth.state}, exit 4, but its own point is a solution ({answer.text[:100]}{_failed(answer)})"], ""
+    far = _far(problem)
+    if far > 1e-6:
+        return [], f"? over the distance to its supports rounding moves the tractions by {far:.0e}"
+    wedge = max(programmes.Body(problem, label).amplification() for label in range(problem.bodies))
+    if wedge > WEDGE:
+        return [], f"? contact must carry {wedge:.0e} times the load"
     if truth.state == "held":
         why = "C = {0}" if np.isinf(truth.growth) else f"margin {truth.growth:.2e}"
         return [f"held ({why}), so a solution exists, and none was found: {answer.text[:100]}{_failed(answer)}"], ""
@@ -201,6 +211,18 @@ def _unsolved(
     if seen is not None:
         return [f"{truth.state}, exit 4, and there is a solution: {seen} ({answer.text[:100]}{_failed(answer)})"], ""
     return [], "? no solution found by either"
+
+
+def _far(problem: Problem) -> float:
+    """What the rounding of a displacement as large as the gaps makes of the tractions of some body."""
+    worst = 0.0
+    for b in problem.bounds:
+        label = problem.labels[b.vertex]
+        gaps = [abs(end) for end in (b.lower, b.upper) if np.isfinite(end)]
+        if gaps and problem.stress[label] > 0:
+            lost = EPS * problem.modulus * max(gaps) / problem.mesh.size
+            worst = max(worst, 50.0 * lost / problem.stress[label])
+    return float(worst)
 
 
 def _failed(answer: Answer) -> str:

@@ -64,7 +64,8 @@ def _least(matrix: Array, where: list[int]) -> float:
 def _side(check: Check, c: Coordinate, sign: float) -> tuple[float, float]:
     """The derivative of the energy to one side, in units of what rounding may be, and the law's curvature there."""
     near, x = check.near(c.vertex), float(c.direction @ check.u[c.vertex])
-    if (sign > 0 and x >= c.upper - near) or (sign < 0 and x <= c.lower + near):
+    touching = check.touching(c.vertex)
+    if (sign > 0 and x >= c.upper - touching) or (sign < 0 and x <= c.lower + touching):
         return np.inf, 0.0
     slope = -sign * float(c.direction @ check.missing[c.vertex])
     curvature = 0.0

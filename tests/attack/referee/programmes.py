@@ -205,6 +205,24 @@ class Body:
         y = y[np.all(y @ self.cone.T <= 0, axis=1)] if len(self.cone) else y
         return min((float(-self.work @ v / self.size + sum(r.value(v) for r in rows)) for v in y), default=np.inf)
 
+    def amplification(self) -> float:
+        """The least possible sum of contact forces over that of the loads: a wedge of slope s needs 1/s."""
+        one_way = [b for b in self.problem.bounds if b.vertex in self.mine]
+        if not one_way or self.basis is None or not self.basis.shape[1] or not self.loads:
+            return 0.0
+        columns = [b.normal @ self.fields(b.vertex) @ self.basis for b in one_way]
+        limits = [(0.0 if np.isinf(b.lower) else None, None) for b in one_way]
+        cost = [float(np.isinf(b.lower)) for b in one_way]
+        for p in self._laws:
+            minus, plus = (p.law.exact or p.law).peak()
+            for row in p.directions:
+                columns.append(row @ self.fields(p.vertex) @ self.basis)
+                ends = p.weight * np.array([-minus, plus]) / self.loads
+                limits.append((ends[0] if np.isfinite(ends[0]) else None, ends[1] if np.isfinite(ends[1]) else None))
+                cost.append(0.0)
+        found = linprog(cost, A_eq=np.array(columns).T, b_eq=self.work / self.loads, bounds=limits)
+        return float(found.fun) if found.x is not None else 0.0
+
     def verdict(self) -> Verdict:
         """The state of this body."""
         if self.basis is None:

@@ -85,22 +85,20 @@ class Check:
         """What tractions of each body are judged by: what drives it, or the largest that acts on its Γc."""
         found = self.problem.stress.copy()
         for v in self._at:
-            carried = float(np.abs(self.missing[v][self.free[v]]).max(initial=0.0)) / self.weights[v]
-            found[self.problem.labels[v]] = max(found[self.problem.labels[v]], carried)
+            carried = float(np.abs(self.missing[v][self.free[v]]).max(initial=0.0))
+            lost = float(self.rounding[v].max()) / WRONG  # a rigid motion carries nothing but rounding
+            found[self.problem.labels[v]] = max(found[self.problem.labels[v]], max(carried, lost) / self.weights[v])
         return _floored(found)
 
     @cached_property
     def blur(self) -> float:
-        """What rounding alone makes of the tractions on Γc, relative to those of the body."""
-        size = self.traction[self.problem.labels]
-        found = [np.abs(self.rounding[v]).max() / self.weights[v] / size[v] for v in self._at]
-        return float(max(found, default=0.0))
+        """What rounding alone makes of the tractions on Γc, by what they are judged by."""
+        return max((self._share(v, self.rounding[v] / self.weights[v]) for v in self._at), default=0.0)
 
     def columns(self, vertex: int) -> list[Column]:
         """What may act at a vertex, forces that the rest of the problem has to balance."""
         bounds, laws = self._at[vertex]
-        near = self.near(vertex)
-        touching = near + 1e-7 * float(self.displacement[self.problem.labels[vertex]])
+        near, touching = self.near(vertex), self.touching(vertex)
         found = []
         for b in bounds:
             un = float(b.normal @ self.u[vertex])
@@ -124,6 +122,10 @@ class Check:
         body = self.problem.labels[vertex]
         u0 = self.traction[body] * self.problem.mesh.size / self.problem.modulus
         return float(1e-9 * u0 + 4 * EPS * self.displacement[body] + 1e-9 * self.displacement[body])
+
+    def touching(self, vertex: int) -> float:
+        """A distance to a bound that counts as none."""
+        return self.near(vertex) + 1e-7 * float(self.displacement[self.problem.labels[vertex]])
 
     def wrongs(self) -> list[str]:
         """One line for each thing that is wrong; empty for a solution."""
