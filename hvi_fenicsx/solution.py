@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
+from .certify import placed_forces
 from .certify.certificate import Examination
 from .certify.estimate.estimator import Estimate
+from .certify.placed_forces import PlacedForces
 from .errors import ExitCode
 from .problem.problem import Problem
 from .rigid import Solvability
@@ -69,3 +72,15 @@ class Solution:
             return f"metastable, and no equilibrium found ({self.solve_result.reason})"
         unknown = "; whether a solution exists could not be decided" if self.solvability.state == "undecided" else ""
         return f"not certified ({self.solve_result.reason}){unknown}"
+
+    @cached_property
+    def forces(self) -> PlacedForces | None:
+        """What acts on the body, place by place, nondimensional; None where nothing was solved.
+
+        Collective when first used.
+        """
+        if self.solve_result is None or self.examination is None:
+            return None
+        found = self.examination
+        reactions = placed_forces.reactions(self.problem, self.solve_result.u, found.forces, found.states)
+        return PlacedForces(placed_forces.loads(self.problem), reactions)

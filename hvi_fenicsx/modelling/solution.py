@@ -20,7 +20,7 @@ from ..results.whole import write_whole
 from ..solution import Solution
 from ..solvers.result import SolveResult
 from ..typing import Array
-from . import plotting, resultants
+from . import plotting
 from .contact_arrays import ContactArrays
 
 
@@ -93,7 +93,9 @@ class ModelSolution(Solution):
         Raises:
             InputError: on all ranks alike: nothing was solved, since no solution exists.
         """
-        found = resultants.by_part(self.problem, self._solved.u, self._examined.states)
+        if self.forces is None:
+            raise InputError(self._nothing)
+        found = self.forces.resultants(self.problem.domain.mesh.comm)
         return {name: force * self.problem.scales.force for name, force in found.items()}
 
     def resultant(self, part: str) -> Array:

@@ -1,51 +1,95 @@
-"""``boundary.csv``: the vertices of every boundary table of the scene."""
+"""``boundary.csv``: the vertices of every boundary table of the scene, with displacement, load and reaction, SI."""
 
 from __future__ import annotations
 
 import csv
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
+import dolfinx
 import numpy as np
-from dolfinx import fem
+from dolfinx import fem, la
 
+from ..certify import placed_forces
+from ..certify.placed_forces import NodalForces
+from ..mesh.vertex_dofs import dof_of_node
 from ..problem.problem import Problem
-from ..typing import Array
+from ..solution import Solution
+from ..typing import Array, Entities
 
-COLUMNS = ("part", "x", "y", "z")
+QUANTITIES = ("", "u_", "traction_", "reaction_")
+"""The vertex, its displacement, the part's load there, what the part's support, contact and laws put on the body."""
+COLUMNS = ("part", *(quantity + axis for quantity in QUANTITIES for axis in "xyz"))
 
 
-def rows(problem: Problem, parts: Mapping[str, Sequence[str]]) -> list[tuple[str, Array]]:
-    """The vertices of each part, m, (m, 3), on rank 0; elsewhere empty. Collective.
+def rows(solution: Solution) -> dict[str, Array]:
+    """The columns after the first, by part, (m, 12) on rank 0; NaN where a cell is empty. Collective.
 
     Args:
-        problem: what was solved.
-        parts: the sides, or physical groups, that each part stands on.
+        solution: what was found.
     """
-    return [(name, _vertices(problem, on)) for name, on in parts.items()]
+    problem = solution.problem
+    loads = placed_forces.loads(problem) if solution.forces is None else solution.forces.loads
+    return {name: _gathered(problem, _columns(solution, loads, name)) for name in solution.scene.parts}
 
 
-def _vertices(problem: Problem, on: Sequence[str]) -> Array:
-    space = problem.space
-    facets = problem.domain.facets(on)
-    dofs = fem.locate_dofs_topological(space, problem.domain.dimension - 1, facets)
-    owned = np.unique(dofs[dofs < space.dofmap.index_map.size_local])
-    gathered = problem.domain.mesh.comm.gather(problem.points[owned], root=0)
-    found = np.concatenate(gathered) if gathered else np.empty((0, 3))
-    return found[np.lexsort(found.T[::-1])]
+def _columns(solution: Solution, loads: Mapping[str, NodalForces], part: str) -> Array:
+    """The columns at the vertices of a part that this rank owns, in the order of the table, (m, 12). Collective."""
+    problem, forces = solution.problem, solution.forces
+    facets = problem.part_facets[part]
+    blocks = _vertices(problem, facets)
+    d, scales = problem.scales.dimension, problem.scales
+    found = np.full((len(blocks), len(QUANTITIES), 3), np.nan)
+    found[:, 0, :d] = problem.points[blocks, :d]
+    if part in loads:
+        found[:, 2, :d] = loads[part].at(blocks) * scales.force / _areas(problem, facets)[blocks, None]
+    if solution.solve_result is not None and forces is not None:
+        found[:, 1, :d] = solution.solve_result.u.x.array.reshape(-1, d)[blocks] * scales.displacement
+        reaction = forces.reactions.get(part)
+        found[:, 3, :d] = 0.0 if reaction is None else reaction.at(blocks) * scales.force
+    return found.reshape(len(blocks), len(COLUMNS) - 1)
 
 
-def write_csv(path: Path, table: Sequence[tuple[str, Array]], dimension: int) -> None:
-    """Write the table; z is empty in the plane. Rank 0 only.
+def _vertices(problem: Problem, facets: Entities) -> Entities:
+    """The vertices of facets that this rank owns, ascending."""
+    dofs = fem.locate_dofs_topological(problem.space, problem.domain.dimension - 1, facets)
+    return np.unique(dofs[dofs < problem.space.dofmap.index_map.size_local])
+
+
+def _areas(problem: Problem, facets: Entities) -> Array:
+    """The lumped length (m) or area (m²) of facets at each vertex that this rank owns, (n,). Collective."""
+    mesh, d = problem.domain.mesh, problem.scales.dimension
+    own = facets[facets < mesh.topology.index_map(d - 1).size_local]
+    found = la.vector(problem.space.dofmap.index_map)
+    if len(own):  # dolfinx divides by their number
+        nodes = dolfinx.mesh.entities_to_geometry(mesh, d - 1, own)
+        corners = mesh.geometry.x[nodes]
+        edges = corners[:, 1:] - corners[:, :1]
+        sizes = np.linalg.norm(edges[:, 0] if d == 2 else np.cross(edges[:, 0], edges[:, 1]) / 2, axis=1)
+        np.add.at(found.array, dof_of_node(problem.space)[nodes], (sizes / d)[:, None])
+    found.scatter_reverse(la.InsertMode.add)
+    return np.asarray(found.array[: problem.space.dofmap.index_map.size_local], dtype=np.float64)
+
+
+def _gathered(problem: Problem, columns: Array) -> Array:
+    """The rows of all ranks, sorted by their points, on rank 0; elsewhere its own. Collective."""
+    gathered = problem.domain.mesh.comm.gather(columns, root=0)
+    found = columns if gathered is None else np.concatenate(gathered)
+    return np.asarray(found[np.lexsort(found[:, 2::-1].T)])
+
+
+def write_csv(path: Path, table: Mapping[str, Array]) -> None:
+    """Write the table. Rank 0 only.
 
     Args:
         path: the file.
-        table: the vertices of each part, m, (m, 3).
-        dimension: of the body, 2 or 3.
+        table: the columns after the first, by part, (m, 12); NaN leaves a cell empty.
     """
     with path.open("w", newline="", encoding="utf-8") as stream:
         writer = csv.writer(stream, lineterminator="\n")
         writer.writerow(COLUMNS)
-        for part, points in table:
-            cells = [[repr(float(c)) for c in point[:dimension]] for point in points]
-            writer.writerows([part, *cell, *[""] * (3 - dimension)] for cell in cells)
+        for part, values in table.items():
+            cells: Any = values.tolist()
+            writer.writerows([part, *("" if math.isnan(v) else repr(v) for v in row)] for row in cells)

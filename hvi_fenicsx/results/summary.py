@@ -33,6 +33,7 @@ def summary(solution: Solution) -> dict[str, Any]:
             "iterations": _iterations(solution),
             "energy": examination.energy * problem.scales.energy if examination else None,
             "contact": _contact(solution),
+            "resultants": _resultants(solution),
             "solvability": solution.solvability.summary(),
             "certificate": examination.certificate.as_dict() if examination else None,
             "estimate": _estimate(solution),
@@ -85,6 +86,14 @@ def _contact(solution: Solution) -> dict[str, Any] | None:
         * scales.displacement,
         "resultant": [float(f) * scales.force for f in resultant],
     }
+
+
+def _resultants(solution: Solution) -> dict[str, list[float]] | None:
+    """The forces on the body by place, N/m or N; null where nothing was solved. Collective."""
+    if solution.forces is None:
+        return None
+    found = solution.forces.resultants(solution.problem.domain.mesh.comm)
+    return {name: [float(f) * solution.problem.scales.force for f in force] for name, force in found.items()}
 
 
 def _scales(problem: Problem) -> dict[str, float]:

@@ -41,8 +41,8 @@ def write(folder: Path, solution: Solution, target: Path) -> dict[str, Any]:
         vtk_fields.write_escape(folder / "displacement.pvd", problem, solution.solvability.direction)
     if states:
         vtk_fields.write_contact(folder / "contact.pvd", problem, states)
-    points = boundary_table.rows(problem, solution.scene.parts)
-    on_root(comm, lambda: boundary_table.write_csv(folder / "boundary.csv", points, problem.scales.dimension))
+    rows = boundary_table.rows(solution)
+    on_root(comm, lambda: boundary_table.write_csv(folder / "boundary.csv", rows))
     arrays = gathering.solution_arrays(solution, stress)
     on_root(comm, lambda: _write_arrays(folder, arrays))
     on_root(comm, lambda: _text(folder / "scene.toml", dump_scene(solution.scene, target)))

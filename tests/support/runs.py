@@ -101,8 +101,12 @@ def summary(folder: Path) -> dict[str, Any]:
 
 
 def contact(folder: Path) -> npt.NDArray[Any]:
-    """``contact.csv`` by NumPy, columns by name; empty cells are NaN."""
-    file = folder / "contact.csv"
+    """``contact.csv`` by NumPy."""
+    return table(folder / "contact.csv")
+
+
+def table(file: Path) -> npt.NDArray[Any]:
+    """A table of a part's vertices by NumPy, columns by name; empty cells are NaN."""
     names = file.read_text(encoding="utf-8").splitlines()[0].split(",")
     kinds = [(name, "U40" if name == "part" else "f8") for name in names]
     return np.genfromtxt(file, delimiter=",", dtype=kinds, skip_header=1, encoding="utf-8")

@@ -12,7 +12,7 @@ import meshes
 import numpy as np
 import numpy.typing as npt
 import pytest
-from runs import ROOT, contact, run_all, summary
+from runs import ROOT, contact, run_all, summary, table
 from scenes import Table, block, model, quadratic_linear
 
 from hvi_fenicsx import read_scene
@@ -100,6 +100,17 @@ def test_several_ranks_write_the_stress_of_one(ranks: int, results: Path) -> Non
     one, other = (stresses(results / f"strong_law-{n}") for n in (1, ranks))
     assert np.ptp(one) > 0.1 * one.max()
     np.testing.assert_allclose(other, one, rtol=1e-6)
+
+
+@pytest.mark.parametrize("ranks", RANKS[1:])
+@pytest.mark.parametrize("name", ["lift-off", "of-a-mesh-file", "fewer-cells-than-ranks"])
+def test_several_ranks_write_the_forces_of_one(name: str, ranks: int, results: Path) -> None:
+    one, other = results / f"{name}-1", results / f"{name}-{ranks}"
+    assert_same_table(table(one / "boundary.csv"), table(other / "boundary.csv"))
+    forces, largest = summary(one)["resultants"], 6e6
+    assert list(forces) == list(summary(other)["resultants"])
+    for place, force in summary(other)["resultants"].items():
+        assert force == pytest.approx(forces[place], abs=1e-9 * largest), place
 
 
 def stresses(folder: Path) -> npt.NDArray[np.float64]:

@@ -32,6 +32,7 @@ def content(result: Result) -> dict[str, Any]:
         "body": list(scene_text.body(result)),
         "parts": list(scene_text.parts(result)),
         "contact": [numbers.contact(part) for part in result.parts],
+        "forces": numbers.forces(result),
         "certificate": certificate(result),
         "estimate": estimate(result.summary.get("estimate")),
         "time": list(numbers.time(result.summary.get("time") or {})),

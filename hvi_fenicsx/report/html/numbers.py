@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..reader import ContactPart, Result
-from ..units import quantity, thousands
+from ..units import quantity, thousands, unit_for
 
 _PHASES = {
     "jit": "compiling forms (cached for the next run)",
@@ -64,6 +64,18 @@ def contact(part: ContactPart) -> dict[str, Any]:
         rows.append(("largest tension", _largest(part["sigma_n"], "Pa")))
         rows.append(("pieces of the normal law in use", _pieces(part["branch_n"])))
     return {"name": part.name, "rows": rows}
+
+
+def forces(result: Result) -> dict[str, Any] | None:
+    """The forces on the body by place and in all, by component; None where the summary has none."""
+    found: Mapping[str, list[float]] = result.summary.get("resultants") or {}
+    if not found:
+        return None
+    places = {**found, "in all": [sum(component) for component in zip(*found.values(), strict=True)]}
+    dimension = len(places["in all"])
+    unit = unit_for(max(abs(v) for force in places.values() for v in force), "N" if dimension == 3 else "N/m")
+    rows = [{"name": name, "values": [unit.text(v) for v in force]} for name, force in places.items()]
+    return {"axes": "xyz"[:dimension], "rows": rows}
 
 
 def _largest(values: Any, unit: str) -> str:

@@ -1,0 +1,141 @@
+"""The forces on the body, place by place: loads, and what supports, contact, laws and springs give. Nondimensional."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import ufl
+from dolfinx import fem
+from mpi4py import MPI
+
+from ..effects import Direction, Place
+from ..problem.problem import Problem
+from ..problem.vectors import nodal
+from ..typing import Array, Entities
+from .contact_state import ContactState, Forces
+
+
+@dataclass(frozen=True)
+class NodalForces:
+    """Forces at some of the vertices that this rank owns (m of them).
+
+    Attributes:
+        blocks: local indices of the vertices, ascending, (m,).
+        values: the forces, (m, d).
+    """
+
+    blocks: Entities
+    values: Array
+
+    @classmethod
+    def of(cls, values: Array) -> NodalForces:
+        """Those that are not zero, of forces at all vertices that this rank owns, (n, d)."""
+        blocks = np.flatnonzero(values.any(axis=1)).astype(np.int32)
+        return cls(blocks, values[blocks])
+
+    def at(self, blocks: Entities) -> Array:
+        """The forces at k vertices, zero where there is none, (k, d).
+
+        Args:
+            blocks: their local indices, each once, (k,).
+        """
+        found = np.zeros((len(blocks), self.values.shape[1]))
+        _, there, here = np.intersect1d(blocks, self.blocks, assume_unique=True, return_indices=True)
+        found[there] = self.values[here]
+        return found
+
+    def __add__(self, other: NodalForces) -> NodalForces:
+        blocks = np.union1d(self.blocks, other.blocks).astype(np.int32)
+        return NodalForces(blocks, self.at(blocks) + other.at(blocks))
+
+
+@dataclass(frozen=True)
+class PlacedForces:
+    """All that acts on the body, by the name of the place; all together are in balance.
+
+    Given strains (heat) are not among them: no force belongs to them.
+
+    Attributes:
+        loads: the loads.
+        reactions: what supports, contact, laws and springs put on the body. Where two parts prescribe the same
+            component of a vertex, its reaction counts for the first of them.
+    """
+
+    loads: Mapping[str, NodalForces]
+    reactions: Mapping[str, NodalForces]
+
+    def resultants(self, comm: MPI.Comm) -> dict[str, Array]:
+        """The resultant of all that acts at each place, (d,) each. Collective.
+
+        Args:
+            comm: of the mesh.
+        """
+        found: dict[str, Array] = {}
+        for name, forces in [*self.loads.items(), *self.reactions.items()]:
+            found[name] = found.get(name, 0.0) + forces.values.sum(axis=0)
+        return {name: np.asarray(comm.allreduce(force)) for name, force in found.items()}
+
+
+def loads(problem: Problem) -> dict[str, NodalForces]:
+    """The loads by the name of their place. Collective.
+
+    Args:
+        problem: what is solved.
+    """
+    found: dict[str, NodalForces] = {}
+    for name, form in problem.linear.items():
+        if name not in problem.bulk.strains:
+            _add(found, name.rpartition(".")[0], NodalForces.of(nodal(form)))
+    return found
+
+
+def reactions(
+    problem: Problem, u: fem.Function, forces: Forces, states: tuple[ContactState, ...]
+) -> dict[str, NodalForces]:
+    """What supports, contact, laws and springs put on the body, by the name of the place. Collective.
+
+    Args:
+        problem: what was solved.
+        u: its solution, ghosts updated.
+        forces: at u.
+        states: of the parts of Γc at u.
+    """
+    found = _springs(problem, u)
+    left = forces.reaction.copy()
+    for state in states:
+        own = _traction(state) * state.surface.weights[:, None]
+        np.subtract.at(left, state.surface.blocks, own)
+        _add(found, state.surface.part, NodalForces(state.surface.blocks, own))
+    for part, dofs in problem.held:
+        own_dofs = dofs[dofs < left.size]
+        support = np.zeros_like(left)
+        support.ravel()[own_dofs] = left.ravel()[own_dofs]
+        left.ravel()[own_dofs] = 0.0
+        _add(found, part, NodalForces.of(support))
+    return found
+
+
+def _springs(problem: Problem, u: fem.Function) -> dict[str, NodalForces]:
+    """The forces of effects that add stiffness without being a material. Collective."""
+    found: dict[str, NodalForces] = {}
+    for where, effect, contribution in problem.contributions:
+        if effect.place is not Place.MATERIAL:
+            for form in contribution.bilinear:
+                _add(found, where or "body", NodalForces.of(-nodal(ufl.action(form, u))))
+    return found
+
+
+def _add(found: dict[str, NodalForces], name: str, forces: NodalForces) -> None:
+    found[name] = found[name] + forces if name in found else forces
+
+
+def _traction(state: ContactState) -> Array:
+    """The traction that contact and laws put on the body, (m, d)."""
+    traction = np.zeros_like(state.surface.normals)
+    if state.bounds is not None or any(law.term.direction is not Direction.SLIP for law in state.laws):
+        traction += state.pressure[:, None] * state.surface.normals
+    if any(law.term.direction is Direction.SLIP for law in state.laws):
+        traction -= np.einsum("mk,mkd->md", state.friction, state.surface.tangents)
+    return traction
