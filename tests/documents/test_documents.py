@@ -72,6 +72,14 @@ def test_every_block_does_what_it_says(name: str, place: Path) -> None:
             python.append(block.text)
 
 
+@pytest.mark.long
+def test_the_python_page_is_one_program_for_two_ranks(place: Path) -> None:
+    program = [block.text for block in blocks(ROOT / "docs/python.md") if block.language == "python"]
+    (place / "page.py").write_text("\n".join(program), encoding="utf-8")
+    done = run(["mpirun", "-n", "2", sys.executable, "-m", "mpi4py", "page.py"], place)
+    assert done.returncode == 0, done.stderr
+
+
 @pytest.mark.parametrize("name", names(DOCUMENTS))
 def test_every_block_is_well_formed(name: str) -> None:
     for block in blocks(ROOT / name):
