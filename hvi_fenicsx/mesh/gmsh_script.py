@@ -59,7 +59,10 @@ def _check(path: Path, seen: set[Path]) -> None:
         if fault := _fault(word, words[i + 1 : i + _LONGEST]):
             raise InputError(f"mesh file {path}:{_line(text, start)}: {word} {fault}")
         if word in _READS and _is_text(words[i + 1 : i + 2]):
-            _check_named(path.parent / words[i + 1][1:-1], word, seen)
+            named = path.parent / words[i + 1][1:-1]
+            if named.exists() and not named.is_file():  # a device may have no end
+                raise InputError(f"mesh file {path}:{_line(text, start)}: {word} wants a file, and {named} is none")
+            _check_named(named, word, seen)
     _check(path.with_name(path.name + ".opt"), seen)
 
 

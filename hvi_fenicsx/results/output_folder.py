@@ -213,9 +213,12 @@ def resolved(target: Path) -> Path:
         InputError: the links go round in a circle.
     """
     try:
-        return target.resolve()
+        found = target.resolve()
     except (OSError, RuntimeError) as error:
         raise InputError(f"--out {target}: {error}; choose another folder") from None
+    if found.is_symlink():  # Python 3.13 and later hand a circle back
+        raise InputError(f"--out {target}: its symbolic links go round in a circle; choose another folder")
+    return found
 
 
 def move_in(work: Path, target: Path) -> tuple[str, ...]:

@@ -57,6 +57,7 @@ COMMANDS = {
     'Include "other";': "SystemCall runs a program",
     'Merge "other";': "SystemCall runs a program",
     'Merge "HARM.gz";': "would start a program",
+    'Merge "/dev/zero";': "Merge wants a file, and /dev/zero is none",
     'If (0) SystemCall "touch HARM"; EndIf': "SystemCall runs a program",
 }
 

@@ -100,7 +100,8 @@ def test_a_link_stands_for_what_it_points_to(tmp_path: Path) -> None:
     assert (tmp_path / "disk" / "r" / "summary.json").read_text() == "2"
     (tmp_path / "loop").symlink_to(tmp_path / "loop")
     with pytest.raises(InputError, match="--out"):
-        written(tmp_path / "loop", summary="1")
+        OutputFolder(tmp_path / "loop", "result")
+    assert sorted(f.name for f in tmp_path.iterdir()) == ["disk", "loop", "out"]
 
 
 def test_the_folder_itself_stays_so_that_a_shell_in_it_does_too(tmp_path: Path) -> None:

@@ -1,0 +1,65 @@
+"""One hostile input: what is started where, and the scenes that all kinds begin with."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import tomli_w
+from scenes import Table, model, quadratic_linear
+
+SCENE, OUT = "scene.toml", "out"
+RUN = ("run", SCENE, "--out", OUT, "--no-pictures")
+CHECK = ("check", SCENE)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Case:
+    """What is started in a folder of its own.
+
+    Attributes:
+        what: in words.
+        words: arguments of the program.
+        alone: whether it needs a process of its own.
+        environment: variables that are changed, by name; None removes one.
+        shell: how the shell starts the program, ``"$@"``.
+        end_after: seconds after which the process is told to end.
+        out: the folder for the output, relative to that of the case.
+        ours: beginnings of the names of files that the program wrote and may remove.
+    """
+
+    what: str
+    words: Sequence[str] = RUN
+    alone: bool = False
+    environment: Mapping[str, str | None] = field(default_factory=dict)
+    shell: str = '"$@"'
+    end_after: float | None = None
+    out: str = OUT
+    ours: tuple[str, ...] = ()
+
+
+Kind = Callable[[random.Random, Path], Case]
+"""Writes a case into an empty folder."""
+
+
+def table() -> Table:
+    """A small sound scene."""
+    return model(2, friction=quadratic_linear(1e3))
+
+
+def write(folder: Path, content: Table | str | None = None, name: str = SCENE) -> None:
+    """Write a scene file; the sound one if nothing else is given."""
+    found = table() if content is None else content
+    text = found if isinstance(found, str) else tomli_w.dumps(found)
+    (folder / name).write_bytes(text.encode("utf-8", "surrogateescape"))
+
+
+def odd_name(chance: random.Random) -> str:
+    """A name that file systems allow and programs dislike."""
+    shells = [" ", "a b", "it's", 'a"b', "a;touch HARM", "$(touch HARM)", "`touch HARM`", "-x", "--help", "~", "*", "?"]
+    controls = ["a\nb", "a\tb", "a\rb", "a\x1b[31mb", "a\x7fb", "\u202egnp", "\udce9", "é", "e\u0301", "𝟙"]
+    formats = ["%s%n", "{0}", "a\\b", "[red]a[bold]", "<b>&amp;", "#a", "a,b", "a=b", "a:b"]
+    dots = ["a.", "a..b", ".hidden", "a.tar.toml", "CON", "x" * 200]
+    return chance.choice([*shells, *controls, *formats, *dots])

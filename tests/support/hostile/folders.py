@@ -1,0 +1,164 @@
+"""Folders of results and studies that were damaged, or filled by others, before ``--resume`` and ``--force``."""
+
+from __future__ import annotations
+
+import atexit
+import json
+import random
+import shutil
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from tempfile import mkdtemp
+
+from hvi_fenicsx.cli import main
+
+from .case import OUT, RUN, SCENE, Case, write
+
+STUDY = ("study", SCENE, "--axis", "epsilon=1", "--repeat", "1", "--limit", "60")
+_JSON = [b"", b"[]", b"null", b"{}", b"\xff", b"nan", b"[" * 9999, b'{"files": 3}', b"9" * 5000, b'{"converged": true}']
+
+
+@cache
+def finished(kind: str) -> Path:
+    """A finished result or study, made once in this process."""
+    folder = Path(mkdtemp(prefix="hvi-finished-"))
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    write(folder)
+    words = RUN if kind == "result" else STUDY
+    scene = str(folder / SCENE)
+    assert main([scene if w == SCENE else str(folder / OUT) if w == OUT else w for w in [*words, "--out", OUT]]) == 0
+    return folder
+
+
+def _manifest(out: Path, change: Callable[[dict[str, object]], object]) -> None:
+    found = json.loads((out / "manifest.json").read_text())
+    change(found)
+    (out / "manifest.json").write_text(json.dumps(found))
+
+
+def _listing(names: list[str]) -> Callable[[random.Random, Path], None]:
+    def damage(chance: random.Random, out: Path) -> None:
+        _manifest(out, lambda m: m["files"].update({chance.choice(names): None}))  # type: ignore[attr-defined]
+
+    return damage
+
+
+def no_manifest(chance: random.Random, out: Path) -> None:
+    (out / "manifest.json").unlink()
+
+
+def odd_manifest(chance: random.Random, out: Path) -> None:
+    (out / "manifest.json").write_bytes(chance.choice(_JSON))
+
+
+def odd_entries(chance: random.Random, out: Path) -> None:
+    """Other types where the manifest has names and hashes."""
+    values: list[object] = [3, None, [], "x", {"a": 3}, {"": None}, {"a\0": None}, {"../scene.toml": "x"}, [["a", "b"]]]
+    key = chance.choice(["files", "inputs", "kind", "format", "program"])
+    _manifest(out, lambda m: m.update({key: chance.choice(values)}))
+
+
+def wrong_hashes(chance: random.Random, out: Path) -> None:
+    digest = chance.choice(["0" * 64, "", "x", 3, [], True])
+    _manifest(out, lambda m: m.update(files=dict.fromkeys(m["files"], digest)))  # type: ignore[call-overload]
+
+
+def odd_json(chance: random.Random, out: Path) -> None:
+    """The file that marks the end, and with a manifest that knows it: as another program would leave it."""
+    file = next(out / name for name in ("summary.json", "study.json") if (out / name).exists())
+    file.write_bytes(chance.choice(_JSON))
+    _manifest(out, lambda m: m["files"].update({file.name: None}))  # type: ignore[attr-defined]
+
+
+def mine_instead(chance: random.Random, out: Path) -> None:
+    """A file of the program's is a link to, or a folder with, files of the user's."""
+    files = [f for f in sorted(out.iterdir()) if f.is_file()]
+    file = chance.choice(files)
+    file.unlink()
+    if chance.random() < 0.5:
+        file.symlink_to(chance.choice(["../mine.txt", "absent", ".", file.name]))
+    else:
+        file.mkdir()
+        (file / "thesis.txt").write_text("precious")
+
+
+def mine_beside(chance: random.Random, out: Path) -> None:
+    """Files of the user's, with names that the program might take for its own."""
+    for name in chance.sample(
+        [".notes", "a.png", "points.txt", "summary.json.bak", ".summary.json.part", "x.kept", "\x1b.txt"], 3
+    ):
+        (out / name).write_text("precious")
+    (out / "points2").mkdir()
+    (out / "points2" / "summary.json").write_text("{}")
+    (out.parent / f"{out.name}.old").mkdir()
+    (out.parent / f"{out.name}.partial").write_text("precious")
+    (out.parent / f".{out.name}.hvi-0123abcd").mkdir()
+    (out.parent / f".{out.name}.hvi-0123abcd" / "thesis.txt").write_text("precious")
+
+
+def odd_lock(chance: random.Random, out: Path) -> None:
+    """The lock's file holds something else, is no file, or names a folder that is not the program's."""
+    lock = out.parent / f".{out.name}.hvi-lock"
+    named = [{"program": "hvi_fenicsx", "folder": name} for name in ("mine", "..", "/", 3, ".out.hvi-0123abcd", None)]
+    kind = chance.randrange(4)
+    if kind == 0:
+        lock.write_bytes(chance.choice([*_JSON, *(json.dumps(n).encode() for n in named)]))
+    elif kind == 1:
+        lock.mkdir()
+    elif kind == 2:
+        lock.symlink_to(chance.choice(["mine.txt", "absent"]))
+    else:
+        lock.write_text(json.dumps(chance.choice(named)))
+
+
+def emptied(chance: random.Random, out: Path) -> None:
+    for file in chance.sample([f for f in sorted(out.rglob("*")) if f.is_file()], 3):
+        file.write_bytes(b"" if chance.random() < 0.5 else file.read_bytes()[: file.stat().st_size // 2])
+
+
+def moved_around(chance: random.Random, out: Path) -> None:
+    """The folder is reached by a link, or is a link to itself elsewhere."""
+    out.rename(out.parent / "elsewhere")
+    out.symlink_to("elsewhere")
+
+
+_DAMAGES = [
+    no_manifest,
+    odd_manifest,
+    odd_entries,
+    wrong_hashes,
+    odd_json,
+    mine_instead,
+    mine_beside,
+    odd_lock,
+    emptied,
+]
+_DAMAGES += [
+    moved_around,
+    _listing(["../mine.txt", "/etc/hostname", "..", "", ".", "notes", "notes/thesis.txt", "a/../../mine.txt"]),
+]
+
+
+def damaged_folder(chance: random.Random, folder: Path) -> Case:
+    """A finished result or study, damaged, and one of the ways to go on."""
+    kind = chance.choice(["result", "result", "result", "study"])
+    shutil.copytree(finished(kind), folder, dirs_exist_ok=True)
+    out = folder / OUT
+    (folder / "mine.txt").write_text("precious")
+    (out / "notes").mkdir()
+    (out / "notes" / "thesis.txt").write_text("precious")
+    done = chance.sample(_DAMAGES, chance.choice([1, 1, 2]))
+    names = []
+    for damage in done:
+        try:
+            damage(chance, out)
+        except (OSError, ValueError, KeyError, TypeError, AttributeError, StopIteration):
+            continue  # an earlier damage took away what this one works on
+        names.append(damage.__name__)
+    way = chance.choice([["--force"], ["--resume"], ["--force", "--resume"], []])
+    words = [*(RUN if kind == "result" else (*STUDY, "--out", OUT)), *way]
+    return Case(what=f"{kind}: {', '.join(names)} {way}", words=words)
+
+
+KINDS = [damaged_folder, damaged_folder, damaged_folder]
