@@ -12,48 +12,64 @@ from dolfinx.io import VTKFile
 
 from .. import compat
 from ..certify.contact_state import ContactState
-from ..certify.estimate.estimator import Estimate
 from ..errors import InputError
 from ..mesh.vertex_dofs import dof_of_node
 from ..problem.problem import Problem
 from ..problem.spaces import scalar_space
-from ..report.solution_arrays import Singles
+from ..problem.stress import von_mises
 from ..rigid import Mode
 from ..runtime.mpi import agree
+from ..solution import Solution
 from ..typing import Array
 
 
-def write_body(path: Path, problem: Problem, u: fem.Function, von_mises: Singles, estimate: Estimate | None) -> None:
-    """Write the displacement, m; by cell the von Mises stress and the estimated error. Collective.
+def write_body(path: Path, solution: Solution, stress: Array) -> None:
+    """Write displacement and reaction by vertex; by cell stress, von Mises stress, estimated error.
+
+    Collective.
 
     Args:
         path: the file.
-        problem: what was solved.
-        u: the displacement, nondimensional.
-        von_mises: the von Mises stress of the cells that this rank owns, N/m², (c,).
-        estimate: of the error, written cell by cell over the energy norm of u; None leaves it out.
+        solution: what was found.
+        stress: of the cells that this rank owns, N/m², (c, 3, 3).
 
     Raises:
         InputError: it cannot be written, on all ranks alike.
     """
-    field = fem.Function(problem.space, name="displacement")
-    field.x.array[:] = u.x.array * problem.scales.displacement
-    by_cell = {"von_mises": von_mises}
-    if estimate is not None:
-        by_cell["error"] = (estimate.cells / (estimate.energy_norm or 1.0)).astype(np.float32)
-    space = fem.functionspace(problem.domain.mesh, ("Discontinuous Lagrange", 0))
-    _write(path, problem.domain.mesh, [field, *(_constant(space, name, values) for name, values in by_cell.items())])
+    problem, solved, forces = solution.problem, solution.solve_result, solution.forces
+    assert solved is not None
+    assert forces is not None
+    u = fem.Function(problem.space, name="displacement")
+    u.x.array[:] = solved.u.x.array * problem.scales.displacement
+    reaction = fem.Function(problem.space, name="reaction")
+    by_vertex = reaction.x.array.reshape(-1, problem.scales.dimension)
+    for part in forces.reactions.values():
+        by_vertex[part.blocks] += part.values * problem.scales.force
+    reaction.x.scatter_forward()
+    by_cell = {"von_mises": von_mises(stress), "stress": stress}
+    if (estimate := solution.estimate) is not None:
+        by_cell["error"] = np.asarray(estimate.cells / (estimate.energy_norm or 1.0), dtype=np.float64)
+    constant = [_constant(problem.domain.mesh, name, values) for name, values in by_cell.items()]
+    _write(path, problem.domain.mesh, [u, reaction, *constant])
 
 
-def _constant(space: fem.FunctionSpace, name: str, values: Singles) -> fem.Function:
-    """A field that is constant in each cell, of values at the owned cells. Collective.
+def _constant(mesh: dmesh.Mesh, name: str, values: Array) -> fem.Function:
+    """A field that is constant in each cell, of values at the owned cells, (c, ...). Collective.
 
-    More than the seven digits of single precision say nothing, and their text takes twice as long to write.
+    More than seven digits of them say nothing, and their text takes twice as long to write.
     """
-    field = fem.Function(space, name=name)
-    field.x.array[: len(values)] = values
+    field = fem.Function(fem.functionspace(mesh, ("Discontinuous Lagrange", 0, values.shape[1:])), name=name)
+    field.x.array[: values.size] = _rounded(values, 7).ravel()
     field.x.scatter_forward()
     return field
+
+
+def _rounded(values: Array, digits: int) -> Array:
+    """Values with so many digits beside the largest entry of their row, (c, ...), so that rounding is no value."""
+    largest = np.abs(values.reshape(len(values), -1)).max(axis=1, initial=0.0)
+    size = np.where(largest > 0.0, largest, 1.0).reshape(-1, *[1] * (values.ndim - 1))
+    unit = 10.0 ** (digits - 1 - np.floor(np.log10(size)))
+    return np.asarray(np.round(values * unit) / unit)
 
 
 def write_escape(path: Path, problem: Problem, mode: Mode) -> None:

@@ -35,8 +35,9 @@ def write(folder: Path, solution: Solution, target: Path) -> dict[str, Any]:
     states = () if examination is None else examination.states
     stress = None
     if solved is not None:
-        stress = von_mises(problem.bulk.stress(solved.u)).astype(np.float32)
-        vtk_fields.write_body(folder / "displacement.pvd", problem, solved.u, stress, solution.estimate)
+        sigma = problem.bulk.stress(solved.u)
+        stress = von_mises(sigma).astype(np.float32)
+        vtk_fields.write_body(folder / "displacement.pvd", solution, sigma)
     elif solution.solvability.direction is not None:
         vtk_fields.write_escape(folder / "displacement.pvd", problem, solution.solvability.direction)
     if states:

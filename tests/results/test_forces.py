@@ -125,3 +125,14 @@ def test_a_spring_pulls_back_where_it_stands() -> None:
     assert list(found) == ["press"]
     around = 4.0
     np.testing.assert_allclose(found["press"].values.sum(axis=0), -stiffness * around * np.array([2.0, -1.0]))
+
+
+def test_paraview_is_given_the_whole_stress_and_the_reactions_as_vectors(uniform: Path) -> None:
+    pyvista = pytest.importorskip("pyvista")
+    body = pyvista.get_reader(uniform / "displacement.pvd").read()[0]
+    assert body.point_data["displacement"].shape == body.point_data["reaction"].shape == (body.n_points, 3)
+    stress = body.cell_data["stress"].reshape(-1, 3, 3)
+    np.testing.assert_allclose(stress, [np.diag([P, -Q, 0.0])] * body.n_cells, atol=1e-6 * P)
+    x, reaction = body.points, body.point_data["reaction"]
+    np.testing.assert_allclose(reaction.sum(axis=0), [-P, Q, 0.0], atol=1e-9 * P)
+    assert not reaction[(x[:, 0] > 0) & (x[:, 1] > 0)].any()
