@@ -66,8 +66,8 @@ def _constant(mesh: dmesh.Mesh, name: str, values: Array) -> fem.Function:
 
 def _rounded(values: Array, digits: int) -> Array:
     """Values with so many digits beside the largest entry of their row, (c, ...), so that rounding is no value."""
-    largest = np.abs(values.reshape(len(values), -1)).max(axis=1, initial=0.0)
-    size = np.where(largest > 0.0, largest, 1.0).reshape(-1, *[1] * (values.ndim - 1))
+    largest = np.abs(values).max(axis=tuple(range(1, values.ndim)), initial=0.0, keepdims=True)
+    size = np.where(largest > 0.0, largest, 1.0)
     unit = 10.0 ** (digits - 1 - np.floor(np.log10(size)))
     return np.asarray(np.round(values * unit) / unit)
 
