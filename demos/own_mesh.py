@@ -84,12 +84,12 @@ def model(size: float = 0.005) -> hvi.Model:
 
 def main(folder: Path) -> hvi.Solution:
     solution = hvi.solve(model())
+    floor = solution.contact["floor"]  # this and pictures are made by all ranks together
     pictures = {"plate": solution.plot("stress"), "floor": solution.plot("contact")}
     if MPI.COMM_WORLD.rank == 0:  # the others have None
         folder.mkdir(parents=True, exist_ok=True)
         for name, figure in pictures.items():
             figure.savefig(folder / f"{name}.png", dpi=100)
-        floor = solution.contact["floor"]
         print(solution)
         print(f"largest pressure {floor.pressure.max():.4g} N/m² at x = {floor.x[floor.pressure.argmax(), 0]:.3g} m")
         print(f"broken from x = {floor.x[floor.branch == 1, 0].min():.3g} m on")
