@@ -117,6 +117,11 @@ def outcome(solution: Solution) -> Iterator[str]:
         return
     c, counts = solution.examination.certificate, solution.solve_result.counts
     yield f"certificate ({c.tolerance:g}): {c}"
+    if c.rounding is not None and c.rounding > c.tolerance:
+        yield (
+            f"tolerance {c.tolerance:g} is below the rounding errors at this displacement: {c.rounding:.1e} was asked "
+            f"for instead (of the net force {c.tolerance:g})"
+        )
     if solution.scene.solver.smoothing is not None:
         away = solution.examination.smoothing_error * solution.problem.scales.stress
         yield f"smoothing: -σ_t is up to {away:.3g} N/m² from what the unsmoothed law gives there"

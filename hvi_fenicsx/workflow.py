@@ -247,7 +247,7 @@ def _log_warnings(warnings: Iterable[str]) -> None:
 
 
 def _log_certificate(found: certificate.Certificate) -> None:
-    names = ("equilibrium", "penetration", "tension", "complementarity", "inclusion")
+    names = ("equilibrium", "net_force", "penetration", "tension", "complementarity", "inclusion")
     parts = ", ".join(f"{name} {getattr(found, name):.1e}" for name in names)
     verdict = "passed" if found.passed else "not passed"
     _LOG.info("certificate %s (%g): %s; %s", verdict, found.tolerance, parts, found.second_order)

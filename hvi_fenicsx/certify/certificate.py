@@ -1,20 +1,22 @@
 """Is it a solution of the inequality? Decided from (u, problem) alone, whatever the solver says.
 
-Each entry is relative to a scale that is stated with it; ``passed`` means that all of them are within the tolerance.
+Each entry is relative to a scale that is stated with it, of the body where it is found (:mod:`.references`), and is the
+largest of all bodies; ``passed`` means that all of them are within the tolerance.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 
 import numpy as np
 from dolfinx import fem
 
-from ..problem.problem import Bounds, Problem
+from ..problem import references
+from ..problem.problem import Problem
 from ..runtime.mpi import largest, total
 from ..typing import Array
-from . import contact_state
+from . import balance, contact_state, deviations
 from . import second_order as stability
 from .contact_state import ContactState, Forces
 from .thresholds import DEFAULT, Thresholds
@@ -25,8 +27,10 @@ class Certificate:
     """How far u is from a solution.
 
     Attributes:
-        equilibrium: residual force that nothing carries, over the load's or the supports' (over one unit where there is
-            no force at all), Euclidean norms.
+        equilibrium: residual force that nothing carries, over the loads (where something else moves the body, over
+            what supports, contact and laws take up, if more), Euclidean norms.
+        net_force: largest net force or moment along a rigid motion that nothing carries, over the loads' or what
+            contact and laws carry or could carry along it.
         penetration: largest violation of a bound, over the largest displacement.
         tension: largest contact traction of the wrong sign, over the load's stress.
         complementarity: largest min(gap over the largest displacement, contact traction over the load's stress).
@@ -38,10 +42,11 @@ class Certificate:
         tolerance: what was asked for.
         passed: whether all entries but ``inclusion_true`` are within the tolerance.
         rounding: None where all are; else by how much rounding alone moves the entries at this u: what is no larger
-            passes, since no displacement in double precision can do better.
+            passes, since no displacement in double precision can do better; ``net_force`` has no such excuse.
     """
 
     equilibrium: float
+    net_force: float
     penetration: float
     tension: float
     complementarity: float
@@ -105,25 +110,20 @@ def examine(
     """
     comm = problem.domain.mesh.comm
     forces = contact_state.forces(problem, u)
-    states = contact_state.states(problem, u, forces.reaction, thresholds)
-    size = largest(comm, float(np.max(np.abs(u.x.array), initial=0.0))) or 1.0
-    scale = _force_scale(problem, u, forces, thresholds.rounding_safety)
-    entries = {
-        "equilibrium": _unbalanced(problem, forces, states) / scale,
-        "penetration": largest(comm, _worst(states, _penetration)) / size,
-        "tension": largest(comm, _worst(states, _tension)),
-        "complementarity": largest(comm, _worst(states, lambda b, s: _complementarity(b, s, size))),
-        "inclusion": largest(comm, max((_inclusion(s) for s in states), default=0.0)),
-    }
+    known = references.of(problem, forces.load)
+    states = contact_state.states(known, u, forces.reaction, thresholds)
+    net = {"net_force": balance.net_forces(known, forces, states, u, tolerance, thresholds)}
+    entries = deviations.measured(known, u, forces, states)
     passed, rounding = _within(entries, tolerance), None
     if not passed and _within(entries, thresholds.largest_rounding):
-        rounding = thresholds.rounding_safety * _rounding(problem, u, states, scale)
-        passed = _within(entries, max(tolerance, rounding))
+        floors = thresholds.rounding_safety * deviations.rounding(known, u, forces, states)
+        passed, rounding = _within(entries, np.maximum(tolerance, floors)), float(np.max(floors))
+    passed = passed and _within(net, tolerance)
     true, error = (largest(comm, value) for value in _inclusion_true(states))
     allowed = max(tolerance, rounding or 0.0)
-    second_order = stability.status(problem, u, forces.reaction, allowed, inertia=inertia and passed)
+    second_order = stability.status(known, u, forces.reaction, allowed, inertia=inertia and passed)
     certificate = Certificate(
-        **entries,
+        **{name: float(np.max(values)) for name, values in (entries | net).items()},
         inclusion_true=true,
         second_order=second_order,
         tolerance=tolerance,
@@ -133,49 +133,8 @@ def examine(
     return Examination(certificate, _energy(problem, u, forces, states), forces, states, error)
 
 
-def _within(entries: Mapping[str, float], limit: float) -> bool:
-    return all(np.isfinite(v) and v <= limit for v in entries.values())
-
-
-def _force_scale(problem: Problem, u: fem.Function, forces: Forces, safety: float) -> float:
-    """Norm of the loads, or of the supports' reactions where these are larger; 1 where all forces are rounding.
-
-    Collective.
-    """
-    load, reaction = (_norm(problem, v) for v in (forces.load, forces.reaction))
-    if load > 0.0 or reaction > safety * _norm(problem, _noise(problem, u)):
-        return max(load, reaction)
-    return 1.0
-
-
-def _norm(problem: Problem, values: Array) -> float:
-    return float(np.sqrt(total(problem.domain.mesh.comm, float(np.sum(values**2)))))
-
-
-def _noise(problem: Problem, u: fem.Function) -> Array:
-    """Forces of u's last digits, shuffled: a sample of what rounding makes of its forces, (blocks, d). Collective."""
-    comm = problem.domain.mesh.comm
-    shuffled = fem.Function(problem.space)
-    signs = np.random.default_rng(comm.rank).choice([-1.0, 1.0], len(u.x.array))
-    shuffled.x.array[:] = u.x.array * signs * np.finfo(float).eps
-    shuffled.x.scatter_forward()
-    forces = contact_state.forces(problem, shuffled)
-    return forces.reaction + forces.load
-
-
-def _rounding(problem: Problem, u: fem.Function, states: Sequence[ContactState], scale: float) -> float:
-    """By how much the entries change when the last digits of u are shuffled. Collective."""
-    force = _noise(problem, u)
-    tractions = [
-        float(np.max(np.abs(force[s.surface.blocks]) / s.surface.weights[:, None] / _finest(s), initial=0.0))
-        for s in states
-    ]
-    worst = largest(problem.domain.mesh.comm, max(tractions, default=0.0))
-    return max(_norm(problem, force) / scale, worst)
-
-
-def _finest(state: ContactState) -> float:
-    return min((law.term.traction_scale for law in state.laws), default=1.0)
+def _within(entries: Mapping[str, Array], limit: float | Array) -> bool:
+    return all(bool(np.all(np.isfinite(v) & (v <= limit))) for v in entries.values())
 
 
 def _energy(problem: Problem, u: fem.Function, forces: Forces, states: Sequence[ContactState]) -> float:
@@ -190,41 +149,11 @@ def _energy(problem: Problem, u: fem.Function, forces: Forces, states: Sequence[
     return total(problem.domain.mesh.comm, elastic + laws)
 
 
-def _unbalanced(problem: Problem, forces: Forces, states: Sequence[ContactState]) -> float:
-    """Norm of the residual force that nothing carries. Collective."""
-    return _norm(problem, contact_state.balanced(problem, forces.reaction, states))
-
-
-def _worst(states: Sequence[ContactState], measure: Callable[[Bounds, ContactState], Array]) -> float:
-    values = [measure(s.bounds, s) for s in states if s.bounds is not None]
-    return max((float(np.max(v, initial=0.0)) for v in values), default=0.0)
-
-
-def _penetration(bounds: Bounds, state: ContactState) -> Array:
-    return bounds.beyond(state.normal)
-
-
-def _tension(bounds: Bounds, state: ContactState) -> Array:
-    """Pulling at the upper bound of u·n, pushing at the lower one."""
-    pressure, lower, upper = state.contact_pressure, state.on_lower, state.on_upper
-    wrong = np.where(upper & lower, 0.0, np.where(upper, pressure, np.where(lower, -pressure, 0.0)))
-    return np.maximum(wrong, 0.0)
-
-
-def _complementarity(bounds: Bounds, state: ContactState, size: float) -> Array:
-    gap = np.maximum(-bounds.beyond(state.normal), 0.0)
-    return np.minimum(np.abs(state.contact_pressure), gap / size)
-
-
-def _inclusion(state: ContactState) -> float:
-    pairs = [law.distance / law.term.traction_scale for law in state.laws]
-    return max((float(np.max(p, initial=0.0)) for p in pairs), default=0.0)
-
-
 def _inclusion_true(states: Sequence[ContactState]) -> tuple[float, float]:
     """Largest distance from the unsmoothed laws, relative to the law's scale, and in units of p0."""
     worst = absolute = 0.0
     for law in (law for state in states for law in state.laws):
-        size = float(np.max(np.where(law.hidden, 0.0, law.true_distance()), initial=0.0))
-        worst, absolute = max(worst, size / law.term.traction_scale), max(absolute, size)
+        sizes = np.where(law.hidden, 0.0, law.true_distance())
+        worst = max(worst, float(np.max(sizes / law.scale, initial=0.0)))
+        absolute = max(absolute, float(np.max(sizes, initial=0.0)))
     return worst, absolute

@@ -16,6 +16,7 @@ from ..effects import Direction
 from ..problem.contact_surface import Surface
 from ..problem.law_term import LawTerm
 from ..problem.problem import Bounds, Problem
+from ..problem.references import References
 from ..problem.vectors import nodal
 from ..typing import Array, Integers, Mask
 from . import force_attribution
@@ -31,10 +32,12 @@ class Forces:
         reaction: internal forces minus loads, the reaction of whatever holds the body: zero off supports, contact and
             laws.
         load: the loads.
+        pushing: those that do work on rigid motions: without given strains.
     """
 
     reaction: Array
     load: Array
+    pushing: Array
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,16 +49,20 @@ class LawState:
         argument: what it acts on, (m,).
         traction: the traction it gives, (m,).
         distance: how far that is from Clarke's subdifferential, (m,).
+        allowed: the nearest traction along its directions that the law allows, (m, k).
+        scale: what its traction is judged by, (m,).
         hidden: where a support hides what the law gives, (m,).
-        near: distance from a kink that counts as being on it.
+        near: distance from a kink that counts as being on it, (m,).
     """
 
     term: LawTerm
     argument: Array
     traction: Array
     distance: Array
+    allowed: Array
+    scale: Array
     hidden: Mask
-    near: float
+    near: Array
 
     def true_distance(self) -> Array:
         """How far the traction is from the unsmoothed law's subdifferential, (m,)."""
@@ -117,32 +124,39 @@ def forces(problem: Problem, u: fem.Function) -> Forces:
         u: nondimensional, ghosts updated.
     """
     internal = problem.bulk.force(u)
-    load = sum((nodal(form) for form in problem.linear.values()), np.zeros_like(internal))
-    return Forces(internal - load, load)
+    pushing, strains = np.zeros_like(internal), np.zeros_like(internal)
+    for name, form in problem.linear.items():
+        (strains if name in problem.bulk.strains else pushing)[:] += nodal(form)
+    load = pushing + strains
+    return Forces(internal - load, load, pushing)
 
 
 def states(
-    problem: Problem, u: fem.Function, reaction: Array, thresholds: Thresholds = DEFAULT
+    references: References, u: fem.Function, reaction: Array, thresholds: Thresholds = DEFAULT
 ) -> tuple[ContactState, ...]:
     """The state of each part with bounds or laws, in the problem's order. Collective.
 
     Args:
-        problem: what is solved.
+        references: of the problem that is solved.
         u: nondimensional, ghosts updated.
         reaction: internal forces minus loads at u, (blocks, d).
         thresholds: when a vertex is on a kink or a bound.
     """
-    values = u.x.array
-    attribution = force_attribution.attribute(problem, values, reaction, thresholds.near)
-    laws = [_law(attribution, *pair, values) for pair in zip(problem.terms, attribution.terms, strict=True)]
+    values, problem = u.x.array, references.problem
+    near = thresholds.near * references.at(np.arange(len(reaction)))
+    attribution = force_attribution.attribute(problem, values, reaction, near)
+    laws = [
+        _law(attribution, term, local, values, references.traction_scale(term))
+        for term, local in zip(problem.terms, attribution.terms, strict=True)
+    ]
     pairs = zip(problem.bounds, attribution.bounds, strict=True)
     contact = {bounds.surface.part: _contact(attribution, local) for bounds, local in pairs}
-    return tuple(_state(problem, surface, values, reaction, laws, contact, thresholds) for surface in problem.surfaces)
+    return tuple(_state(problem, surface, values, reaction, laws, contact, near) for surface in problem.surfaces)
 
 
-def _law(attribution: ForceAttribution, term: LawTerm, local: LawTerm, u: Array) -> LawState:
-    argument = term.argument(u)
-    low, high = term.law.interval(argument, attribution.near)
+def _law(attribution: ForceAttribution, term: LawTerm, local: LawTerm, u: Array, scale: Array) -> LawState:
+    argument, near = term.argument(u), attribution.near[term.surface.blocks]
+    low, high = term.law.interval(argument, near)
     parts, hidden = [], np.zeros(len(argument), dtype=bool)
     for dofs, sign in force_attribution.components(local):
         share = np.where(sign > 0, attribution.share[dofs], 1.0 - attribution.share[dofs])
@@ -150,28 +164,39 @@ def _law(attribution: ForceAttribution, term: LawTerm, local: LawTerm, u: Array)
         hidden |= attribution.held[dofs]
     if len(parts) == 1:
         traction, distance = parts[0], _away(parts[0], low, high)
+        allowed = np.clip(parts[0], low, high)[:, None]
     else:
-        traction, distance = _radial(attribution, term, local, argument, u)
+        traction, distance, allowed = _radial(attribution, term, local, argument, u)
     return LawState(
-        term=term, argument=argument, traction=traction, distance=distance, hidden=hidden, near=attribution.near
+        term=term,
+        argument=argument,
+        traction=traction,
+        distance=distance,
+        allowed=allowed,
+        scale=scale,
+        hidden=hidden,
+        near=near,
     )
 
 
 def _radial(
     attribution: ForceAttribution, term: LawTerm, local: LawTerm, argument: Array, u: Array
-) -> tuple[Array, Array]:
+) -> tuple[Array, Array, Array]:
     """A law of |u_t|: the traction is a vector along the slip, at zero slip any within the kink's disc."""
     dofs = [d for d, _ in force_attribution.components(local)]
     signs = np.stack([s for _, s in force_attribution.components(local)], axis=1)
     carried_elsewhere = np.stack([attribution.held[d] | attribution.contact[d] for d in dofs], axis=1)
     needed = np.stack([attribution.needed[d] for d in dofs], axis=1) * signs / term.surface.weights[:, None]
-    slip, moving = term.slip(u), argument > attribution.near
+    near = attribution.near[term.surface.blocks]
+    slip, moving = term.slip(u), argument > near
     unit = np.divide(slip, argument[:, None], out=np.zeros_like(slip), where=moving[:, None])
-    low, high = term.law.interval(argument, attribution.near)
+    low, high = term.law.interval(argument, near)
     needed = np.where(carried_elsewhere, unit * ((low + high) / 2)[:, None], needed)
     along = np.where(moving, np.sum(needed * unit, axis=1), np.linalg.norm(needed, axis=1))
     across = np.where(moving, np.linalg.norm(needed - along[:, None] * unit, axis=1), 0.0)
-    return along, np.hypot(_away(along, low, high), across)
+    at_rest = np.divide(needed, along[:, None], out=np.zeros_like(needed), where=along[:, None] > 0)
+    allowed = np.clip(along, low, high)[:, None] * np.where(moving[:, None], unit, at_rest)
+    return along, np.hypot(_away(along, low, high), across), allowed
 
 
 def _away(traction: Array, low: Array, high: Array) -> Array:
@@ -192,7 +217,7 @@ def _state(
     reaction: Array,
     laws: Sequence[LawState],
     contact: Mapping[str, Array],
-    thresholds: Thresholds,
+    near: Array,
 ) -> ContactState:
     bounds = next((b for b in problem.bounds if b.surface is surface), None)
     here = tuple(law for law in laws if law.term.surface is surface)
@@ -201,7 +226,7 @@ def _state(
     slip = np.einsum("mkd,md->mk", surface.tangents, surface.values(u))
     traction = reaction[surface.blocks] / surface.weights[:, None]
     nowhere = np.zeros(len(normal), dtype=bool)
-    on = (nowhere, nowhere) if bounds is None else force_attribution.on_bounds(bounds, normal, thresholds.near)
+    on = (nowhere, nowhere) if bounds is None else force_attribution.on_bounds(bounds, normal, near[surface.blocks])
     return ContactState(
         surface=surface,
         bounds=bounds,
@@ -244,26 +269,5 @@ def _along(slip: Array, law: LawState) -> Array:
     """The law's traction as a vector: along a signed slip, or in the direction of a slip vector."""
     if slip.shape[1] == 1:
         return law.traction[:, None]
-    moving = law.argument[:, None] > law.near
+    moving = law.argument[:, None] > law.near[:, None]
     return law.traction[:, None] * np.divide(slip, law.argument[:, None], out=np.zeros_like(slip), where=moving)
-
-
-def balanced(problem: Problem, reaction: Array, parts: Sequence[ContactState]) -> Array:
-    """The reaction without what supports, contact and laws may carry: zero in equilibrium; (blocks, d).
-
-    Args:
-        problem: the supports.
-        reaction: internal forces minus loads, (blocks, d).
-        parts: contact and laws.
-    """
-    rest = reaction.copy()
-    rest.reshape(-1)[problem.fixed_here] = 0.0
-    for state in parts:
-        carried = [law.term.directions for law in state.laws]
-        if state.bounds is not None:
-            carried.append(state.surface.normals[:, None, :])
-        for directions in carried:
-            here = rest[state.surface.blocks]
-            along = np.einsum("mkd,md->mk", directions, here)
-            rest[state.surface.blocks] = here - np.einsum("mk,mkd->md", along, directions)
-    return rest

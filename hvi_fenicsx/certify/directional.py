@@ -14,7 +14,8 @@ import numpy as np
 
 from ..laws import Superpotential
 from ..problem.law_term import LawTerm
-from ..problem.problem import Bounds, Problem
+from ..problem.problem import Bounds
+from ..problem.references import References
 from ..system import local_frames
 from ..typing import Array, Entities, Integers, Mask
 from . import force_attribution
@@ -65,22 +66,25 @@ class Growth:
         return (self.curvature < 0.0) & ~self.strong
 
 
-def growth(problem: Problem, u: Array, forces: Array, tolerance: float, thresholds: Thresholds = DEFAULT) -> Growth:
+def growth(
+    references: References, u: Array, forces: Array, tolerance: float, thresholds: Thresholds = DEFAULT
+) -> Growth:
     """The growth at a displacement.
 
     Args:
-        problem: the laws, bounds and supports.
+        references: of the problem, whose laws, bounds and supports count.
         u: nondimensional, a local array.
         forces: internal forces minus loads at the owned blocks, (blocks, d).
         tolerance: relative traction up to which a growth is none.
         thresholds: when a vertex is on a kink or a bound.
     """
+    problem = references.problem
     local = local_frames.frames_of(problem)
     terms, bounds = problem.terms, problem.bounds
     if local is not None:
         u, forces = local.local_components(u), local.local_components(forces)
         terms, bounds = tuple(local.term(t) for t in terms), tuple(local.bounds(b) for b in bounds)
-    found = _Collector(u, forces.ravel(), forces.shape[1], tolerance, thresholds)
+    found = _Collector(references, u, forces.ravel(), forces.shape[1], tolerance, thresholds)
     for term in terms:
         (found.enter_vector_law if term.radial else found.enter_law)(term)
     for one in bounds:
@@ -109,6 +113,7 @@ class _Collector:
     """The sums over laws, bounds and supports, by scalar dof (n,); couplings by vertex.
 
     Attributes:
+        references: what tractions are relative to.
         u: the displacement in local components, a local array.
         forces: r, (n,).
         d: the dimension.
@@ -117,6 +122,7 @@ class _Collector:
         couplings: of the laws of |u_t|.
     """
 
+    references: References
     u: Array
     forces: Array
     d: int
@@ -147,7 +153,7 @@ class _Collector:
         np.add.at(self.jump, dofs, right - left)
         np.add.at(self.curved_up, dofs, np.where(ahead, after, before))
         np.add.at(self.curved_down, dofs, np.where(ahead, before, after))
-        np.add.at(self.slack, dofs, self.tolerance * w * term.traction_scale)
+        np.add.at(self.slack, dofs, self.tolerance * w * self.references.traction_scale(term))
         self.bent[dofs] |= np.isin(x, term.law.kinks)
 
     def enter_vector_law(self, term: LawTerm) -> None:
@@ -171,7 +177,7 @@ class _Collector:
         self.down[dofs] -= force
         for side in (self.curved_up, self.curved_down):
             np.add.at(side, dofs[touched], np.repeat(curvature, self.d).reshape(touched.shape)[touched])
-        slack = self.tolerance * w * term.traction_scale
+        slack = self.tolerance * w * self.references.traction_scale(term)
         np.add.at(self.slack, dofs[touched], np.repeat(slack, self.d).reshape(touched.shape)[touched])
         on = np.isin(x, term.law.kinks)
         self._couple(term, on & moving, w * (right - left) / 2, np.einsum("mk,mkd->md", unit, term.directions)[:, None])
@@ -191,7 +197,7 @@ class _Collector:
         ahead = sign > 0
         self.up[dofs[np.where(ahead, upper, lower)]] = np.inf
         self.down[dofs[np.where(ahead, lower, upper)]] = np.inf
-        np.add.at(self.slack, dofs, self.tolerance * bounds.surface.weights)
+        np.add.at(self.slack, dofs, self.tolerance * self.references.at(bounds.surface.blocks) * bounds.surface.weights)
         self.bent[dofs] |= lower | upper
 
     def enter_supports(self, fixed: Entities) -> None:

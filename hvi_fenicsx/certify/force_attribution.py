@@ -27,7 +27,7 @@ class ForceAttribution:
     Attributes:
         terms: the problem's laws in local components.
         bounds: its bounds in local components.
-        near: distance (of u0) from a kink or a bound that counts as being on it.
+        near: distance (of u0) from a kink or a bound that counts as being on it, at each owned vertex, (blocks,).
         needed: minus the residual, what the carriers give.
         low: lower end of the range of the laws' sum.
         high: its upper end.
@@ -39,7 +39,7 @@ class ForceAttribution:
 
     terms: tuple[LawTerm, ...]
     bounds: tuple[Bounds, ...]
-    near: float
+    near: Array
     needed: Array
     low: Array
     high: Array
@@ -78,7 +78,7 @@ class ForceAttribution:
             term: the law at its vertices.
             u: the displacement, nondimensional, a local array.
         """
-        low, high = term.law.interval(term.argument(u), self.near)
+        low, high = term.law.interval(term.argument(u), self.near[term.surface.blocks])
         for dofs, sign in components(term):
             ends = np.stack([sign * low, sign * high]) * term.surface.weights
             np.add.at(self.low, dofs, ends.min(axis=0))
@@ -93,19 +93,19 @@ class ForceAttribution:
             u: the displacement, nondimensional, a local array.
         """
         dofs, sign = bounds.component()
-        reached = touches(bounds, sign * u.ravel()[dofs], self.near)
+        reached = touches(bounds, sign * u.ravel()[dofs], self.near[bounds.surface.blocks])
         self.contact[dofs] |= reached
         np.add.at(self.contact_weight, dofs, np.where(reached, bounds.surface.weights, 0.0))
 
 
-def attribute(problem: Problem, u: Array, residual: Array, near: float) -> ForceAttribution:
+def attribute(problem: Problem, u: Array, residual: Array, near: Array) -> ForceAttribution:
     """Attribute the residual force of a displacement to its carriers.
 
     Args:
         problem: the laws, bounds and supports.
         u: nondimensional, a local array.
         residual: internal forces minus loads at the owned blocks, (blocks, d).
-        near: distance (of u0) from a kink or a bound that counts as being on it.
+        near: distance (of u0) from a kink or a bound that counts as being on it, at the owned blocks, (blocks,).
     """
     local = local_frames.frames_of(problem)
     if local is not None:
@@ -130,38 +130,38 @@ def attribute(problem: Problem, u: Array, residual: Array, near: float) -> Force
     return found
 
 
-def on_bounds(bounds: Bounds, normal: Array, near: float) -> tuple[Mask, Mask]:
+def on_bounds(bounds: Bounds, normal: Array, near: float | Array) -> tuple[Mask, Mask]:
     """Whether a normal displacement is on the lower and on the upper bound, (m,) each.
 
     Args:
         bounds: of u·n.
         normal: u·n, (m,).
-        near: distance that counts as being on a bound.
+        near: distance that counts as being on a bound, one for all or (m,).
     """
     return normal <= bounds.lower + near, normal >= bounds.upper - near
 
 
-def touches(bounds: Bounds, normal: Array, near: float) -> Mask:
+def touches(bounds: Bounds, normal: Array, near: float | Array) -> Mask:
     """Whether a normal displacement is on a bound, (m,).
 
     Args:
         bounds: of u·n.
         normal: u·n, (m,).
-        near: distance that counts as being on a bound.
+        near: distance that counts as being on a bound, one for all or (m,).
     """
     lower, upper = on_bounds(bounds, normal, near)
     return lower | upper
 
 
-def on_kink(part: ConvexPart, argument: Array, near: float) -> Mask:
+def on_kink(part: ConvexPart, argument: Array, near: float | Array) -> Mask:
     """Whether a law's argument is on a kink, (m,).
 
     Args:
         part: the law's H or G.
         argument: what it acts on, (m,).
-        near: distance that counts as being on a kink.
+        near: distance that counts as being on a kink, one for all or (m,).
     """
-    return np.asarray(np.any(np.abs(argument[:, None] - part.kinks) <= near, axis=1))
+    return np.asarray(np.any(np.abs(argument[:, None] - part.kinks) <= np.reshape(near, (-1, 1)), axis=1))
 
 
 def components(term: LawTerm) -> Iterator[tuple[Integers, Array]]:

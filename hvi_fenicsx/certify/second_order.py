@@ -16,6 +16,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from ..problem.problem import Problem
+from ..problem.references import References
 from ..runtime.timing import Timer
 from ..solvers.law_models import Cells, ExactLaw
 from ..system.system import System, compile_forms
@@ -27,18 +28,19 @@ _NEGATIVE_PIVOTS = 12
 """MUMPS's INFOG entry."""
 
 
-def status(problem: Problem, u: fem.Function, forces: Array, tolerance: float, *, inertia: bool) -> str:
+def status(references: References, u: fem.Function, forces: Array, tolerance: float, *, inertia: bool) -> str:
     """Whether a certified u is a local minimiser. Collective.
 
     Args:
-        problem: with the laws that were solved.
+        references: of the problem, with the laws that were solved.
         u: nondimensional, ghosts updated.
         forces: internal forces minus loads at the owned blocks, (blocks, d).
         tolerance: relative traction up to which a growth of the energy is none.
         inertia: whether to factorise the Hessian where the laws leave it open.
     """
+    problem = references.problem
     comm = problem.domain.mesh.comm
-    found = growth(problem, u.x.array, forces, tolerance)
+    found = growth(references, u.x.array, forces, tolerance)
     if comm.allreduce(bool(np.any(found.falls)), op=MPI.LOR):
         return NO_MINIMISER
     if not comm.allreduce(bool(np.any(found.softens)), op=MPI.LOR):

@@ -14,12 +14,16 @@ class Thresholds:
         no_jump: jump of a traction, relative to the law's scale, that is rounding.
         largest_rounding: a certificate's entry above this is no rounding.
         rounding_safety: factor within which the sample of the rounding error is trusted.
+        along: part of a rigid motion along a direction, per radian or unit length, that is rounding.
+        summation: rounding error of a sum of nodal forces, relative to the sum of their sizes.
     """
 
     near: float = 1e-10
     no_jump: float = 1e-12
     largest_rounding: float = 1e-4
     rounding_safety: float = 4.0
+    along: float = 1e-9
+    summation: float = 1e-14
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -29,7 +29,7 @@ class Place(Enum):
 
 
 class Drive(Enum):
-    """How an effect drives the body; the scales come from the first kind that is there."""
+    """How an effect drives the body; the scales come from what drives it, else from what resists."""
 
     LOAD = "load"
     KINEMATIC = "prescribed displacement or strain"

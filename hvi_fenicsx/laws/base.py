@@ -101,13 +101,14 @@ class Superpotential(ABC):
         """Positions (k,), ascending, of all kinks of j."""
         return np.union1d(self.convex.kinks, self.concave.kinks)
 
-    def interval(self, x: Array, atol: float = 0.0) -> tuple[Array, Array]:
+    def interval(self, x: Array, atol: float | Array = 0.0) -> tuple[Array, Array]:
         """Clarke's subdifferential [lo, hi] of j, N/m², each (m,).
 
         Args:
             x: displacements (m,), m.
-            atol: a length, m: the hull is taken with the intervals of every kink within it, so that a displacement
-                which means a kink but misses it by rounding is given the kink's whole interval.
+            atol: a length, or one for each displacement, m: the hull is taken with the intervals of every kink within
+                it, so that a displacement which means a kink but misses it by rounding is given the kink's whole
+                interval.
         """
         lo, hi = self._clarke(x)
         for kink in self._kinks_within(x, atol):
@@ -117,7 +118,7 @@ class Superpotential(ABC):
             hi = np.where(near, np.maximum(hi, high[0]), hi)
         return lo, hi
 
-    def distance(self, x: Array, traction: Array, atol: float = 0.0) -> Array:
+    def distance(self, x: Array, traction: Array, atol: float | Array = 0.0) -> Array:
         """Distance (m,) of a traction from ∂j(x), N/m²; zero if the law allows it.
 
         Args:
@@ -132,12 +133,12 @@ class Superpotential(ABC):
         """Index (m,) of the law's piece that x lies on, counted from 0 by |x|; this default knows one."""
         return np.zeros(np.shape(x), dtype=np.int64)
 
-    def branch(self, x: Array, atol: float = 0.0) -> Integers:
+    def branch(self, x: Array, atol: float | Array = 0.0) -> Integers:
         """Index (m,) of the active piece, counted from 0 by |x|; -1 on a kink.
 
         Args:
             x: displacements (m,), m.
-            atol: the distance from a kink, m, that counts as being on it.
+            atol: the distance from a kink, or one for each displacement, m, that counts as being on it.
         """
         result = self.piece(x)
         for kink in self._kinks_within(x, atol):
@@ -179,10 +180,10 @@ class Superpotential(ABC):
         left, right = self.left(x), self.right(x)
         return np.minimum(left, right), np.maximum(left, right)
 
-    def _kinks_within(self, x: Array, atol: float) -> Array:
+    def _kinks_within(self, x: Array, atol: float | Array) -> Array:
         if np.size(x) == 0:
             return np.empty(0)
-        return self.kinks[(self.kinks >= np.min(x) - atol) & (self.kinks <= np.max(x) + atol)]
+        return self.kinks[(self.kinks >= np.min(x - atol)) & (self.kinks <= np.max(x + atol))]
 
 
 def _refuse_hidden_properties(cls: type[Superpotential]) -> None:

@@ -35,6 +35,7 @@ class Bulk:
         scales: what one unit is in SI.
         form: a(u, v) in UFL, but for the volumetric part that is averaged by vertex.
         material: the part of ``form`` that depends on ε(u) and ε(v) only: a material's, not an elastic support's.
+        foundation: the other part of it; None where there is none.
         averaged: the volumetric parts that are averaged by vertex.
         strains: linear forms of ε(v) (thermal strain) by the name of their load; no rigid motion feels them.
         across: parts of ∫ σ_33 q dx in a plane body (:attr:`.Contribution.across`).
@@ -46,6 +47,7 @@ class Bulk:
     scales: Scales
     form: Any
     material: Any
+    foundation: Any
     averaged: tuple[Averaged, ...]
     strains: Mapping[str, Any]
     across: tuple[Any, ...]
@@ -95,6 +97,12 @@ class Bulk:
         for part in self._dilatations:
             internal += part.force(u).reshape(internal.shape)
         return internal
+
+    def foundation_force(self, u: fem.Function) -> Array:
+        """The part of :meth:`force` that no strain makes: of elastic supports of the body, (n, d). Collective."""
+        if self.foundation is None:
+            return np.zeros((self.space.dofmap.index_map.size_local, self.scales.dimension))
+        return nodal(ufl.action(self.foundation, u))
 
     def force_in(self, space: fem.FunctionSpace, u: fem.Function) -> Array:
         """a(u, v) of the test functions v of any vector space, without what is averaged by vertex. Collective.
@@ -244,11 +252,13 @@ def make_bulk(
         shared: where problems on one mesh share their matrix; None: each makes its own.
     """
     elastic = tuple((where, effect) for where, effect, c in made if c.bilinear or c.averaged)
+    foundations = [form for _, effect, c in made if effect.place is not Place.MATERIAL for form in c.bilinear]
     return Bulk(
         space=space,
         scales=scales,
         form=sum(form for _, _, c in made for form in c.bilinear),
         material=sum(form for _, effect, c in made if effect.place is Place.MATERIAL for form in c.bilinear),
+        foundation=sum(foundations) if foundations else None,
         averaged=tuple(part for _, _, c in made for part in c.averaged),
         strains=strains,
         across=tuple(form for _, _, c in made for form in c.across),

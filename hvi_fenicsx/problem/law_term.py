@@ -16,7 +16,6 @@ from ..effects import Direction
 from ..laws import Superpotential
 from ..typing import Array
 from .contact_surface import Surface
-from .thresholds import DEFAULT, Thresholds
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,7 +31,6 @@ class LawTerm:
         free: 1 where a component is not prescribed, (m, d).
         density: the P1 field τ.
         residual: the compiled form ∫ τ·v ds.
-        thresholds: what its traction is judged by at least.
     """
 
     surface: Surface
@@ -43,17 +41,11 @@ class LawTerm:
     free: Array
     density: fem.Function
     residual: Any
-    thresholds: Thresholds = DEFAULT
 
     @property
     def radial(self) -> bool:
         """Whether the law acts on the length of a slip vector (|u_t| in 3D)."""
         return self.directions.shape[1] > 1
-
-    @property
-    def traction_scale(self) -> float:
-        """What the law's traction is judged by: its own scale, but nothing finer than a share of the load's stress."""
-        return max(self.exact.traction_scale, self.thresholds.law_scale)
 
     def slip(self, u: Array) -> Array:
         """The displacement along the directions, of a local array u; shape (m, k)."""

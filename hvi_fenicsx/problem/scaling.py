@@ -76,8 +76,9 @@ def choose(
 ) -> Scales:
     """The scales of a problem. Collective where ``evaluate`` is.
 
-    The stress scale is the largest load; without one, that of the largest other driving effect (prescribed
-    displacement, thermal strain); without that either, the largest law's: the solution is then zero and any will do.
+    The stress scale is that of the largest driving effect: a load, or the strain of a prescribed displacement or of
+    heat, beside which a small load would make the unit of displacement far too small. Without any it is the largest
+    law's.
 
     Args:
         sizes: of the body and its materials.
@@ -93,10 +94,10 @@ def choose(
     driving = [pair for pair in found if pair[0] != 0.0]
     for stress, placed in driving:
         _check(Scales(sizes.length, stress, sizes.modulus, dimension), placed, thresholds.largest_scale, 0.0)
-    kind = next((kind for kind in Drive if any(p[1].drive is kind for _, p in driving)), None)
-    if kind is None:
+    if not driving:
         return Scales(sizes.length, 1.0, sizes.modulus, dimension)
-    stress, placed = max((pair for pair in driving if pair[1][1].drive is kind), key=lambda pair: pair[0])
+    active = [pair for pair in driving if pair[1][1].drive is not Drive.RESISTANCE]
+    stress, placed = max(active or driving, key=lambda pair: pair[0])
     chosen = Scales(sizes.length, stress, sizes.modulus, dimension)
     _check(chosen, placed, thresholds.largest_scale, 1.0 / thresholds.largest_scale)
     return chosen

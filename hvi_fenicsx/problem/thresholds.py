@@ -22,6 +22,7 @@ class Thresholds:
         largest_scale: of stresses (N/m²) and displacements (m); its inverse is the smallest. Energies are products of
             both, so beyond this they are no numbers any more.
         law_scale: smallest scale of a law's traction, in units of the load's stress: a weaker law is not judged finer.
+        least_force: forces that are a smaller part of stiffness times displacement are not judged finer.
     """
 
     same_displacement: float = 1e-9
@@ -33,6 +34,7 @@ class Thresholds:
     outside_bounds: float = 1e-12
     largest_scale: float = 1e100
     law_scale: float = 1e-3
+    least_force: float = 1e-5
 
 
 DEFAULT = Thresholds()

@@ -21,7 +21,7 @@ from ..system.levels import Levels
 from ..system.petsc_options import configure
 from ..system.system import LawModel, System
 from ..typing import Entities
-from .convergence import ConvergenceTest, Outcome, Sizes
+from .convergence import NOT_MEASURED, ConvergenceTest, Outcome
 from .snes_views import ReducedPreconditioner, unextracted
 from .thresholds import DEFAULT, Thresholds
 
@@ -90,8 +90,8 @@ class ActiveSetSolver:
     def measure(self, x: PETSc.Vec, residual: PETSc.Vec, lower: PETSc.Vec, upper: PETSc.Vec) -> float:
         """The residual of the inequality over its scale: at most ``tolerance`` when solved. Collective.
 
-        It is the larger of its norm relative to the load's, and of the largest nodal traction error on Γc relative to
-        what is allowed there.
+        It is the largest of its norm relative to the forces of the body, of the largest nodal traction error on Γc
+        relative to what is allowed there, and of the net forces along rigid motions; of all bodies the largest.
 
         Args:
             x: the displacement.
@@ -99,7 +99,7 @@ class ActiveSetSolver:
             lower: lower bounds.
             upper: upper bounds.
         """
-        return max(self.convergence.sizes(x, residual, lower, upper))
+        return self.convergence.sizes(x, residual, lower, upper).worst
 
     def newton_step(self, x: PETSc.Vec, held: Entities, models: Sequence[LawModel], rtol: float) -> Outcome:
         """One Newton step that leaves some unknowns as they are. Collective.
@@ -174,8 +174,8 @@ class ActiveSetSolver:
             tolerance: of :meth:`measure`.
         """
         self.system.residual(x, self._residual, models)
-        sizes = self.convergence.sizes_of(self._residual.array_r)
-        found = replace(step, converged=max(sizes) <= tolerance, measure=max(sizes))
+        sizes = self.convergence.sizes_without_bounds(x, self._residual)
+        found = replace(step, converged=sizes.worst <= tolerance, measure=sizes.worst)
         return found if found.converged else self.convergence.accept_rounding(found, sizes, x)
 
 
@@ -197,7 +197,7 @@ class _SnesRun:
         self.thresholds, self.steady, self.foundation = owner.thresholds.active_set, steady, foundation
         self.lower, self.upper = lower, upper
         self.last, self.linear, self.iterations, self.reason = float("inf"), 0, 0, 0
-        self.sizes: Sizes = (float("inf"), float("inf"))
+        self.sizes = NOT_MEASURED
         self._stalled = self._slow = 0
         self.stopped = False
 
@@ -214,7 +214,8 @@ class _SnesRun:
         snes.setTolerances(max_it=max_iterations)
         snes.getKSP().setTolerances(rtol=self.thresholds.finest_accuracy, atol=0.0, max_it=linear.krylov_iterations)
         snes.getKSP().setPC(self._preconditioner(snes))
-        defaults = {"snes_linesearch_type": line_search, "snes_vi_zero_tolerance": self.thresholds.on_bound}
+        near = self.thresholds.on_bound * float(np.min(system.references.scale))
+        defaults = {"snes_linesearch_type": line_search, "snes_vi_zero_tolerance": near}
         configure(snes, {**defaults, **self.owner.settings.ksp})
         return snes
 
@@ -256,7 +257,7 @@ class _SnesRun:
         if iteration:
             self.owner.held.report(snes.getKSP().getIterationNumber())
         self.sizes = self.owner.convergence.sizes(x, f, self.lower, self.upper)
-        previous, self.last = self.last, max(self.sizes)
+        previous, self.last = self.last, self.sizes.worst
         if self.owner.progress:
             self.owner.progress(iteration, self.last, self.owner.in_contact(x))
         self.stopped = self.owner.interrupted()

@@ -108,17 +108,17 @@ class BranchIteration(Method):
 
     def _off_kinks(self, x: PETSc.Vec) -> PETSc.Vec | None:
         """A point of lower energy, where x is on a kink of G, which hides a descent: both sides are tried."""
-        near = self.thresholds.kink_distance
+        near = [self.thresholds.kink_distance * self.system.references.at(t.surface.blocks) for t in self.system.terms]
         on = [
-            law.concave.left(a - near) < law.concave.right(a + near) - self.thresholds.kink_jump * law.traction_scale
-            for law, a in zip(self._laws, self._convex.arguments(x), strict=True)
+            law.concave.left(a - d) < law.concave.right(a + d) - self.thresholds.kink_jump * law.traction_scale
+            for law, a, d in zip(self._laws, self._convex.arguments(x), near, strict=True)
         ]
         if not self._convex.anywhere(on):
             return None
         energy = self._convex.energy(x)
-        for side in (-near, near):
-            trial = x.copy()
-            outcome = self._descend(trial, self._convex.cells(trial), self._convex.subgradients(trial, side))
+        for side in (-1.0, 1.0):
+            trial, shifts = x.copy(), [side * d for d in near]
+            outcome = self._descend(trial, self._convex.cells(trial), self._convex.subgradients(trial, shifts))
             if outcome.converged and self._convex.energy(trial) < energy - self._convex.energy_rounding(energy, x):
                 return trial
         return None

@@ -136,7 +136,7 @@ class Condensation(Method):
     def _record(self, mixed: _Complementarity, x: Array, points: list[Array]) -> None:
         """Keep and report an accepted point."""
         points.append(x.copy())
-        size = float(np.linalg.norm(mixed.function(x))) / self.system.scale
+        size = float(np.linalg.norm(mixed.function(x))) / (self.system.load.norm() or 1.0)
         self.context.progress(self.name, self.context.epsilon, len(points) - 1, size, mixed.in_contact(x))
         self.stopped = self.solver.interrupted()
         if self.stopped:

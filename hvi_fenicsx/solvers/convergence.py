@@ -5,15 +5,37 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from mpi4py import MPI
 from petsc4py import PETSc
 
 from ..system.system import System
-from ..typing import Array
+from ..typing import Array, Mask
+from .net_force_test import NetForceTest
 from .thresholds import ActiveSetThresholds
 
-Sizes = tuple[float, float]
-"""Size of a residual: its norm relative to the load's; its largest nodal traction relative to what is allowed on Γc."""
+
+@dataclass(frozen=True, slots=True)
+class Sizes:
+    """Size of a residual of the inequality, relative, by body.
+
+    Attributes:
+        norm: its Euclidean norm, over the forces there (:class:`.References`).
+        traction: the largest nodal traction on Γc, over what is allowed there.
+        net: the largest net force along a rigid motion (:mod:`.net_forces`).
+        noise: what ``net`` grows by with a unit of noise in all unknowns.
+    """
+
+    norm: Array
+    traction: Array
+    net: Array
+    noise: Array
+
+    @property
+    def worst(self) -> float:
+        """The largest one."""
+        return float(np.max([self.norm, self.traction, self.net]))
+
+
+NOT_MEASURED = Sizes(*(np.full(1, np.inf) for _ in range(4)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +71,11 @@ class ConvergenceTest:
 
     def __init__(self, system: System, thresholds: ActiveSetThresholds) -> None:
         self._system, self._thresholds = system, thresholds
-        self._limits = system.residual_limits(1.0)[system.jacobian.rows.dofs]
+        rows = system.jacobian.rows.dofs
+        self._limits = traction_limits(system)[rows]
+        self._blocks = rows // system.problem.scales.dimension
+        self._near = thresholds.on_bound * system.references.at(self._blocks)
+        self._net = NetForceTest(system, thresholds)
 
     def sizes(self, x: PETSc.Vec, residual: PETSc.Vec, lower: PETSc.Vec, upper: PETSc.Vec) -> Sizes:
         """Size of the residual of the inequality. Collective.
@@ -61,16 +87,44 @@ class ConvergenceTest:
             upper: upper bounds.
         """
         at, r = self._system.jacobian.rows.dofs, residual.array_r.copy()
-        near = self._thresholds.on_bound
-        r[at] = projected(x.array_r[at], r[at], (lower.array_r[at], upper.array_r[at]), near)
-        return self.sizes_of(r)
+        on_lower, on_upper = np.zeros((2, len(r)), dtype=bool)
+        on_lower[at] = x.array_r[at] <= lower.array_r[at] + self._near
+        on_upper[at] = x.array_r[at] >= upper.array_r[at] - self._near
+        r = projected(r, on_lower, on_upper)
+        return Sizes(*self._forces(r, x), *self._net.sizes(x, residual.array_r, r, (on_lower, on_upper)))
 
-    def sizes_of(self, residual: Array) -> Sizes:
-        """Size of a residual that has no reactions of bounds in it, (n,) on this rank. Collective."""
-        system = self._system
-        nodal = float(np.max(np.abs(residual[system.jacobian.rows.dofs]) / self._limits, initial=0.0))
-        norm = float(np.sqrt(system.comm.allreduce(float(residual @ residual)))) / system.scale
-        return norm, float(system.comm.allreduce(nodal, op=MPI.MAX))
+    def sizes_without_bounds(self, x: PETSc.Vec, residual: PETSc.Vec) -> Sizes:
+        """Size of the residual of an equation. Collective.
+
+        Args:
+            x: the displacement.
+            residual: of the equation at x.
+        """
+        r, nowhere = residual.array_r, np.zeros(residual.local_size, dtype=bool)
+        return Sizes(*self._forces(r, x), *self._net.sizes(x, r, r, (nowhere, nowhere)))
+
+    def _forces(self, residual: Array, x: PETSc.Vec) -> tuple[Array, Array]:
+        """Norm and largest traction of a residual (n,) at x, by body. Collective."""
+        system, references = self._system, self._system.references
+        nodal = np.abs(residual[system.jacobian.rows.dofs]) / self._limits
+        forces = references.forces(x.array_r, system.holding_forces(x))
+        return references.norms(residual) / forces, references.largest(self._blocks, nodal)
+
+    def rounding(self, x: PETSc.Vec, sizes: Sizes) -> Sizes:
+        """What rounding makes of the residual at x. Collective.
+
+        Args:
+            x: the displacement.
+            sizes: of its residual.
+        """
+        system, safety = self._system, self._thresholds.rounding_safety
+        sample = system.load.duplicate()
+        system.rounding_sample(x, sample)
+        norm, traction = (safety * size for size in self._forces(sample.array_r, x))
+        unknowns = system.references.vertices * system.problem.scales.dimension
+        noise = safety * system.references.norms(sample.array_r) / np.sqrt(unknowns)
+        sample.destroy()
+        return Sizes(norm, traction, noise * sizes.noise, sizes.noise)
 
     def in_contact(self, x: PETSc.Vec) -> int:
         """Vertices on a bound of the problem. Collective."""
@@ -82,8 +136,8 @@ class ConvergenceTest:
     def accept_rounding(self, found: Outcome, sizes: Sizes, x: PETSc.Vec) -> Outcome:
         """Accept a residual at the rounding floor as converged. Collective.
 
-        The norm and the nodal tractions have a floor each: rounding of the forces inside of the body does not excuse a
-        wrong traction on Γc.
+        The norm, the nodal tractions and the net forces of each body have a floor each: rounding of the forces inside
+        of a body does not excuse a wrong traction on Γc, nor another body.
 
         Args:
             found: how the solve ended.
@@ -93,24 +147,34 @@ class ConvergenceTest:
         thresholds = self._thresholds
         if not np.isfinite(found.measure) or not np.isfinite(x.norm()) or found.measure > thresholds.largest_rounding:
             return found
-        sample = self._system.load.duplicate()
-        self._system.rounding_sample(x, sample)
-        floors = [thresholds.rounding_safety * size for size in self.sizes_of(sample.array_r)]
-        sample.destroy()
-        if any(size > floor for size, floor in zip(sizes, floors, strict=True)):
+        floors = self.rounding(x, sizes)
+        pairs = [(sizes.norm, floors.norm), (sizes.traction, floors.traction), (sizes.net, floors.net)]
+        if any(np.any(size > floor) for size, floor in pairs):
             return found
-        return replace(found, converged=True, rounding=max(floors), reason="as small as rounding allows")
+        return replace(found, converged=True, rounding=floors.worst, reason="as small as rounding allows")
 
 
-def projected(x: Array, residual: Array, bounds: tuple[Array, Array], near: float) -> Array:
+def projected(residual: Array, on_lower: Mask, on_upper: Mask) -> Array:
     """The residual without the reactions that the bounds can bear: zero exactly where the inequality holds, (n,).
 
     Args:
-        x: displacements, (n,).
         residual: of the equations, (n,).
-        bounds: lower and upper bounds, (n,) each.
-        near: distance that counts as being on a bound.
+        on_lower: which unknowns are on their lower bound, (n,).
+        on_upper: which are on their upper bound, (n,).
     """
-    at_lower, at_upper = x <= bounds[0] + near, x >= bounds[1] - near
-    r = np.where(at_lower, np.minimum(residual, 0.0), residual)
-    return np.where(at_upper, np.maximum(r, 0.0), r)
+    r = np.where(on_lower, np.minimum(residual, 0.0), residual)
+    return np.where(on_upper, np.maximum(r, 0.0), r)
+
+
+def traction_limits(system: System) -> Array:
+    """The residual that is a traction on Γc of the size that tractions are relative to, by unknown; else infinite."""
+    references, limits = system.references, np.full(system.load.local_size, np.inf)
+    for bounds in system.bounds:
+        dofs, _ = bounds.component()
+        limits[dofs] = np.minimum(limits[dofs], references.at(bounds.surface.blocks) * bounds.surface.weights)
+    for term in system.terms:
+        dofs = term.surface.dofs
+        touched = np.any(term.directions != 0, axis=1)
+        limit = references.traction_scale(term) * term.surface.weights
+        limits[dofs[touched]] = np.minimum(limits[dofs], limit[:, None])[touched]
+    return limits

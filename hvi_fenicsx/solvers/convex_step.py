@@ -55,14 +55,16 @@ class ConvexStep:
         terms = zip(self._system.terms, self._laws, self.arguments(x), strict=True)
         return [Cells.around(law.convex, a, radial=t.radial, thresholds=self._thresholds) for t, law, a in terms]
 
-    def subgradients(self, x: PETSc.Vec, shift: float = 0.0) -> list[Array]:
+    def subgradients(self, x: PETSc.Vec, shifts: Sequence[Array] | None = None) -> list[Array]:
         """ξ ∈ ∂G at x, by term, (m,) each.
 
         Args:
             x: the displacement.
-            shift: of the arguments, to one side of a kink.
+            shifts: of the arguments, to one side of a kink, by term, (m,) each; None: none.
         """
-        return [law.concave.left(a + shift) for law, a in zip(self._laws, self.arguments(x), strict=True)]
+        arguments = self.arguments(x)
+        moved = arguments if shifts is None else [a + s for a, s in zip(arguments, shifts, strict=True)]
+        return [law.concave.left(a) for law, a in zip(self._laws, moved, strict=True)]
 
     def majorants(self, cells: Sequence[Cells], xi: Sequence[Array]) -> list[Majorant]:
         """H - ξ, by term.

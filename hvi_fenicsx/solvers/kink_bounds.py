@@ -60,17 +60,17 @@ def overloaded(
     moves = []
     for term, model in zip(system.terms, models, strict=True):
         find = _radial_moves if term.radial else _signed_moves
-        moves.append(find(term, model, term.argument(x.array_r), residual, slack))
+        excess = slack * system.references.traction_scale(term) * term.surface.weights
+        moves.append(find(term, model, term.argument(x.array_r), residual, excess))
     return moves
 
 
 def _signed_moves(
-    term: LawTerm, model: Majorant | ExactLaw, argument: Array, residual: PETSc.Vec, slack: float
+    term: LawTerm, model: Majorant | ExactLaw, argument: Array, residual: PETSc.Vec, excess: Array
 ) -> Integers:
     """The moves for a law of a signed slip."""
     c, part, weight = model.cells, model.law.convex, term.surface.weights
     force = np.einsum("md,md->m", term.directions[:, 0, :], term.surface.values(residual.array_r))
-    excess = slack * term.traction_scale * weight
     _, _, free = _slip_dofs(term)
     down = free & (argument <= c.lower) & (force - weight * _jump(part, c.lower) > excess)
     up = free & (argument >= c.upper) & (force + weight * _jump(part, c.upper) < -excess)
@@ -86,7 +86,7 @@ def _hold_stuck(term: LawTerm, cells: Cells, lower: PETSc.Vec, upper: PETSc.Vec)
 
 
 def _radial_moves(
-    term: LawTerm, model: Majorant | ExactLaw, argument: Array, residual: PETSc.Vec, slack: float
+    term: LawTerm, model: Majorant | ExactLaw, argument: Array, residual: PETSc.Vec, excess: Array
 ) -> Integers:
     """The moves for a law of |u_t|: a stuck vertex slips if the force leaves the kink's disc, a slow one sticks."""
     cells = model.cells
@@ -95,7 +95,6 @@ def _radial_moves(
     force = np.einsum("mkd,md->mk", term.directions, term.surface.values(residual.array_r) * term.free)
     weight = term.surface.weights
     disc = weight * model.law.convex.right(np.zeros_like(argument))
-    excess = slack * term.traction_scale * weight
     go = (cells.index == 0) & (np.linalg.norm(force, axis=1) > disc + excess)
     stick = (cells.index == 1) & (argument <= cells.ramp)
     return go.astype(np.int64) - stick.astype(np.int64)

@@ -48,7 +48,7 @@ class LinearSolve(Method):
         x, models, counts = self.system.undisplaced(), smooth_models(self.system), Counts()
         outcome = Outcome(False, 0, 0, float("inf"), "not started")
         for _ in range(self.options.thresholds.linear_solves):
-            outcome = self._step(x, models)
+            outcome = self._step(x, models, outcome.measure)
             counts.linear += outcome.linear
             if outcome.converged:
                 break
@@ -58,9 +58,9 @@ class LinearSolve(Method):
             u=self.system.displacement(x), method=self.name, converged=outcome.converged, reason=reason, counts=counts
         )
 
-    def _step(self, x: PETSc.Vec, models: Sequence[ExactLaw]) -> Outcome:
-        """One solve of the residual equation, and the residual that is left. Collective."""
-        rtol = self.options.thresholds.linear_margin * self.options.tolerance
+    def _step(self, x: PETSc.Vec, models: Sequence[ExactLaw], left: float) -> Outcome:
+        """One solve of the residual equation, of which ``left`` is known, and the residual left then. Collective."""
+        rtol = self.options.thresholds.linear_margin * self.options.tolerance / min(left, 1.0)
         step = self.solver.newton_step(x, np.empty(0, np.int32), models, rtol)
         return self.solver.check_step(step, x, models, self.options.tolerance)
 

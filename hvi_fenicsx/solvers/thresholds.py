@@ -32,6 +32,8 @@ class ActiveSetThresholds:
         rounding_below: residual below which twice as many steps without halving it mean that rounding allows no more.
         largest_rounding: a residual larger than this is no rounding.
         rounding_safety: the sample of the rounding error is trusted within this factor.
+        along: part of a rigid motion along a direction, per radian or unit length, that is rounding.
+        nothing_acts: net forces along a rigid motion that are this small beside the sum of all forces are none.
         moving_accuracy: relative tolerance of a step's linear solve while the active set changes.
         forcing: relative tolerance of a linear solve, as a part of the reduction that is still needed.
         finest_accuracy: the least relative tolerance of a linear solve.
@@ -46,6 +48,8 @@ class ActiveSetThresholds:
     rounding_below: float = 1e-7
     largest_rounding: float = 1e-4
     rounding_safety: float = 4.0
+    along: float = 1e-9
+    nothing_acts: float = 1e-12
     moving_accuracy: float = 1e-2
     forcing: float = 0.5
     finest_accuracy: float = 1e-4

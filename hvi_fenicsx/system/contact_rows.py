@@ -75,6 +75,11 @@ class ContactRows:
         matrix.setValuesBlockedRCV(self._blocks, self._blocks, values)
         matrix.assemble()
 
+    def elastic(self, x: PETSc.Vec) -> Array:
+        """These rows of A x, (m d,). Collective."""
+        self.bulk.mult(x, self._product)
+        return np.array(self._product.array_r)
+
     def overwrite(self, x: PETSc.Vec, out: PETSc.Vec) -> None:
         """Replace these rows of a product with J by those of the product with A. Collective.
 
@@ -84,5 +89,4 @@ class ContactRows:
             x: the vector.
             out: the product with J, changed in place.
         """
-        self.bulk.mult(x, self._product)
-        out.array[self.dofs] = self._product.array_r
+        out.array[self.dofs] = self.elastic(x)

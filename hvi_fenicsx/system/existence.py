@@ -98,7 +98,7 @@ def motions(problem: Problem, *, contact_closed: bool, without: Sequence[Mode] =
     found: list[Mode] = []
     for body in problem.bodies:
         held = [_normals(problem, body, b.surface) for b in problem.bounds] if contact_closed else []
-        basis = kernel(problem.domain.mesh.comm, body, (_prescribed(problem, body), *held))
+        basis = kernel(problem.domain.mesh.comm, body, (prescribed_directions(problem, body), *held))
         left_out = np.array([mode.coefficients for mode in without if mode.body == body.index])
         if len(left_out):
             basis = basis @ null_space(left_out @ basis)
@@ -130,7 +130,7 @@ def rigid_problem(problem: Problem, forces: Mapping[str, PETSc.Vec], body: Rigid
     return RigidProblem(
         body=body,
         loads=works,
-        fixed=(_prescribed(problem, body), *held),
+        fixed=(prescribed_directions(problem, body), *held),
         contact=tuple(ContactCone(cone.points, cone.directions) for cone in cones),
         resistances=tuple(_resistance(problem, body, term) for term in problem.terms if acts_on(problem, body, term)),
         force=force,
@@ -158,8 +158,13 @@ def _normals(problem: Problem, body: RigidBody, surface: Surface) -> FixedDirect
     return FixedDirections(np.asarray(surface.points[mine] / problem.scales.length), surface.normals[mine])
 
 
-def _prescribed(problem: Problem, body: RigidBody) -> FixedDirections:
-    """The prescribed components at the body's vertices."""
+def prescribed_directions(problem: Problem, body: RigidBody) -> FixedDirections:
+    """The prescribed components at the body's vertices.
+
+    Args:
+        problem: the problem.
+        body: the body.
+    """
     d, dofs = problem.scales.dimension, problem.fixed_here
     dofs = dofs[inside(problem, body, dofs // d)]
     points = problem.points[dofs // d]

@@ -6,7 +6,7 @@ The bulk matrix A is assembled once. Laws and active sets touch only the diagona
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Protocol
@@ -17,6 +17,7 @@ from dolfinx.fem.petsc import assemble_vector, set_bc
 from mpi4py import MPI
 from petsc4py import PETSc
 
+from ..problem import references
 from ..problem.law_term import LawTerm
 from ..problem.problem import Bounds, Problem
 from ..problem.vectors import assembled, new_vector, turn
@@ -24,8 +25,9 @@ from ..rigid import Mode
 from ..runtime import forms
 from ..runtime.timing import Timer
 from ..typing import Array, Entities
-from . import free_motions, local_frames, near_null_space
+from . import existence, free_motions, local_frames, near_null_space
 from .free_motions import FreeMotions
+from .holding_forces import HoldingForces
 from .jacobian import Jacobian
 from .thresholds import DEFAULT, Thresholds
 
@@ -81,8 +83,9 @@ class System:
         load: b, lifted; the Dirichlet rows contain the prescribed values.
         lower: lower bounds of u; infinite on Dirichlet rows.
         upper: upper bounds, likewise.
-        scale: norm of the load, to which residuals are relative.
+        references: what residuals are relative to, by body.
         forces: the assembled load vectors by name, unlifted (for the virtual work of rigid motions).
+        pushing: the sum of those that do work on rigid motions, Cartesian, (vertices, d).
         free_motions: the rigid motions that nothing holds and no load moves; None where there are none.
     """
 
@@ -97,11 +100,11 @@ class System:
             stiffness, self.load = self._constrained()
             stiffness, self.rotation, self.terms, self.bounds = self._in_local_components(stiffness)
             self.jacobian = Jacobian(stiffness, self.terms, self.bounds, thresholds)
+            self.references = references.of(problem, self._sum_of(self.forces))
+            self.pushing = self._sum_of(existence.loads_of_rigid_motions(problem, self.forces))
+            self._lift = self._lifted_by()
         self._work = self.load.duplicate()
         self.lower, self.upper = self._box()
-        free = self.load.copy()
-        free.array[problem.fixed_here] = 0.0
-        self.scale = float(free.norm()) or 1.0
 
     @property
     def comm(self) -> MPI.Comm:
@@ -173,12 +176,34 @@ class System:
         self.prescribe(x)
         return x
 
+    def _sum_of(self, forces: Mapping[str, PETSc.Vec]) -> Array:
+        """The sum of some load vectors, (vertices, d)."""
+        d = self.problem.scales.dimension
+        total = sum((force.array_r for force in forces.values()), np.zeros(self.load.local_size))
+        return np.array(total).reshape(-1, d)
+
+    def _unlifted(self) -> PETSc.Vec:
+        """The sum of the loads, in Cartesian components. Collective."""
+        load = new_vector(self.problem.space)
+        for force in self.forces.values():
+            load.axpy(1.0, force)
+        return load
+
+    def _lifted_by(self) -> Array:
+        """What the prescribed values took off the load at the vertices of Γc. Collective."""
+        load, at = self._unlifted(), self.jacobian.rows.dofs
+        turn(load, self.rotation)
+        return np.asarray(load.array_r[at] - self.load.array_r[at])
+
+    def holding_forces(self, x: PETSc.Vec) -> Array:
+        """The elastic forces that supports, contact and laws take up; zero elsewhere, (n,). Collective."""
+        return self._holding.at(x, self.rotation, self.jacobian.rows, self._lift)
+
     def _constrained(self) -> tuple[PETSc.Mat, PETSc.Vec]:
         """Stiffness and load with the prescribed values: rows and columns of the identity, the load lifted."""
         matrix = self.problem.bulk.matrix()
-        load, prescribed = new_vector(self.problem.space), new_vector(self.problem.space)
-        for force in self.forces.values():
-            load.axpy(1.0, force)
+        load, prescribed = self._unlifted(), new_vector(self.problem.space)
+        self._holding = HoldingForces(self.problem, matrix)
         set_bc(prescribed, list(self.problem.conditions))
         rows = (self.problem.fixed_here + load.owner_range[0]).astype(PETSc.IntType)
         matrix.zeroRowsColumns(rows, 1.0, prescribed, load)
@@ -272,16 +297,3 @@ class System:
         shuffled.array[:] = x.array_r * signs * np.finfo(float).eps
         self.jacobian.elastic_product(shuffled, out)
         shuffled.destroy()
-
-    def residual_limits(self, tolerance: float) -> Array:
-        """The residual up to which a traction on Γc is right within a relative tolerance, by unknown; else infinite."""
-        limits = np.full(self.load.local_size, np.inf)
-        for bounds in self.bounds:
-            dofs, _ = bounds.component()
-            limits[dofs] = np.minimum(limits[dofs], tolerance * bounds.surface.weights)
-        for term in self.terms:
-            dofs = term.surface.dofs
-            touched = np.any(term.directions != 0, axis=1)
-            limit = tolerance * term.traction_scale * term.surface.weights
-            limits[dofs[touched]] = np.minimum(limits[dofs], limit[:, None])[touched]
-        return limits

@@ -19,7 +19,7 @@ from hvi_fenicsx.certify.certificate import Certificate, examine
 Array = npt.NDArray[np.float64]
 STRONG = quadratic_linear(3e6)
 CELLS = 6
-ENTRIES = ("equilibrium", "penetration", "tension", "complementarity", "inclusion")
+ENTRIES = ("equilibrium", "net_force", "penetration", "tension", "complementarity", "inclusion")
 
 
 @pytest.fixture(scope="module")

@@ -40,7 +40,7 @@ SUMMARY = {
     "contact": ["vertices", "active", "max_gap", "max_penetration", "resultant"],
     "solvability": ["state", "margin", "lambda_held", "lambda_peak", "direction", "kernel", "paper"],
     "certificate": [
-        *("equilibrium", "penetration", "tension", "complementarity", "inclusion"),
+        *("equilibrium", "net_force", "penetration", "tension", "complementarity", "inclusion"),
         *("inclusion_true", "second_order", "tolerance", "passed"),
     ],
     "estimate": (dict, type(None)),

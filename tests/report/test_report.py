@@ -147,7 +147,7 @@ def test_an_estimate_and_ranks_are_told(held: Path, tmp_path: Path) -> None:
 def test_numbers_that_rounding_spoils_pass_by_rounding(held: Path, tmp_path: Path) -> None:
     spoiled = {**summary(held)["certificate"], "inclusion": 3e-8, "rounding": 5e-8}
     text = Page(changed(held, tmp_path / "new", certificate=spoiled)).text
-    assert "Rounding alone moves these numbers by 5·10⁻⁸" in text
+    assert "Each number must be at most 5·10⁻⁸" in text
     assert "failed" not in text
     spoiled["inclusion"] = 6e-8
     assert "✗ failed" in Page(changed(held, tmp_path / "newer", certificate=spoiled)).text

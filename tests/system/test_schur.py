@@ -11,7 +11,7 @@ from scenes import DELTA, displacement, model, quadratic_linear, solved
 from hvi_fenicsx import Scene, prepare
 from hvi_fenicsx.runtime.timing import Timer
 from hvi_fenicsx.solvers.active_set import ActiveSetSolver
-from hvi_fenicsx.solvers.convergence import Outcome
+from hvi_fenicsx.solvers.convergence import Outcome, Sizes
 from hvi_fenicsx.solvers.thresholds import Thresholds as SolverThresholds
 from hvi_fenicsx.system import schur
 from hvi_fenicsx.system.held_solver import HeldPreconditioner, LinearSettings
@@ -64,13 +64,12 @@ def test_rounding_of_the_bodys_forces_is_no_excuse_for_a_wrong_traction() -> Non
     """A residual under the larger floor, but over the floor of its own, has not converged."""
     system = assembled()
     solver = ActiveSetSolver(system, (), DIRECT, Timer())
-    x, noise = system.load.duplicate(), system.load.duplicate()
+    x = system.load.duplicate()
     x.array[:] = np.random.default_rng(2).standard_normal(x.local_size)
-    system.rounding_sample(x, noise)
-    norm, nodal = solver.convergence.sizes_of(noise.array_r)
-    between = 4.0 * float(np.sqrt(norm * nodal))
-    wrong = (between, 0.0) if norm < nodal else (0.0, between)
-    right = wrong[::-1]
-    outcome = Outcome(False, 1, 1, between, "stalled")
+    floor = solver.convergence.rounding(x, Sizes(*np.zeros((4, 1))))
+    between, none = np.sqrt(floor.norm * floor.traction), np.zeros(1)
+    of_norm, of_traction = (Sizes(*sizes, none, none) for sizes in ((between, none), (none, between)))
+    wrong, right = (of_norm, of_traction) if floor.norm < floor.traction else (of_traction, of_norm)
+    outcome = Outcome(False, 1, 1, float(between[0]), "stalled")
     assert not solver.convergence.accept_rounding(outcome, wrong, x).converged
     assert solver.convergence.accept_rounding(outcome, right, x).converged

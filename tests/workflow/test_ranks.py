@@ -74,7 +74,7 @@ def test_each_of_them_is_certified(name: str, ranks: int, results: Path) -> None
     certificate, weak = record["certificate"], name in ("paper", "exact")
     assert record["exit_code"] == 0
     assert (certificate["rounding"] or 0.0) < (1e-10 if weak else 1e-11)
-    for entry in ("equilibrium", "penetration", "tension", "complementarity", "inclusion"):
+    for entry in ("equilibrium", "net_force", "penetration", "tension", "complementarity", "inclusion"):
         assert certificate[entry] <= max(1e-12, certificate["rounding"] or 0.0), entry
 
 

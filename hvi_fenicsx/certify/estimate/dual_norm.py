@@ -20,7 +20,7 @@ from ...system.held_solver import HeldPreconditioner, LinearSettings
 from ...system.levels import Levels
 from ...system.system import System
 from ...typing import Array, Entities, Integers
-from .. import contact_state
+from .. import balance
 from ..certificate import Examination
 from ..contact_state import ContactState
 from ..force_attribution import components, on_kink, touches
@@ -116,7 +116,7 @@ def algebraic(problem: Problem, examination: Examination, near: float) -> Array:
         examination: of its solution.
         near: distance from a kink that counts as being on it.
     """
-    rest = contact_state.balanced(problem, examination.forces.reaction, examination.states)
+    rest = balance.unbalanced(problem, examination.forces.reaction, examination.states)
     rest = rest - _law_forces(problem, examination.states, near, exact=False)  # a law's force is minus its residual
     for state in examination.states:
         if state.bounds is not None:

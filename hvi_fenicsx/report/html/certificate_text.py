@@ -10,12 +10,16 @@ from .scene_text import number
 
 _ENTRIES = {
     "equilibrium": "Forces balance: the largest force that nothing carries, as a share of the load",
+    "net_force": "Each body balances as a whole: the largest net force or moment that nothing carries, as a share of "
+    "those that act",
     "penetration": "Nothing passes through an obstacle: the deepest intrusion, as a share of the largest displacement",
     "tension": "Contact only pushes: the largest pull in contact, as a share of the load's stress",
     "complementarity": "Contact presses only where it is closed: the largest overlap of an open gap with a pressure",
     "inclusion": "The law is obeyed: the largest distance of a traction from what its law allows there",
 }
 """All that must be within the tolerance."""
+_UNEXCUSED = "net_force"
+"""The entry that must be so even where rounding relaxes the tolerance of the others."""
 _SECOND_ORDER = {
     "local minimiser": "The solution is a local minimiser of the energy: a stable equilibrium.",
     "not a minimiser": "The solution is an equilibrium, but not a minimiser of the energy: it is unstable.",
@@ -28,13 +32,25 @@ def certificate(result: Result) -> dict[str, Any] | None:
     found = result.summary.get("certificate")
     if not found:
         return None
-    limit = max(float(found["tolerance"]), float(found.get("rounding") or 0.0))
+    tolerance = float(found["tolerance"])
+    limit = max(tolerance, float(found.get("rounding") or 0.0))
+    limits = dict.fromkeys(_ENTRIES, limit) | {_UNEXCUSED: tolerance}
     return {
         "passed": bool(found["passed"]),
-        "tolerance": number(found["tolerance"]),
-        "rows": [_row(name, words, found[name], limit) for name, words in _ENTRIES.items()],
+        "demand": _demand(tolerance, limit),
+        "rows": [_row(name, words, found[name], limits[name]) for name, words in _ENTRIES.items()],
         "remarks": list(_remarks(result, found)),
     }
+
+
+def _demand(tolerance: float, limit: float) -> str:
+    """What the numbers must be, in a sentence: the tolerance, or what rounding makes of it."""
+    if limit <= tolerance:
+        return f"Each number must be at most {number(tolerance)}."
+    return (
+        f"Each number must be at most {_two_digits(limit)}: the tolerance {number(tolerance)} is below the rounding "
+        f"errors at this displacement. The net force must be at most {number(tolerance)} beyond its rounding error."
+    )
 
 
 def _row(name: str, words: str, value: float | None, limit: float) -> dict[str, Any]:
@@ -49,9 +65,6 @@ def _two_digits(value: float | None) -> str:
 def _remarks(result: Result, found: Mapping[str, Any]) -> Iterator[str]:
     if found["passed"]:
         yield _SECOND_ORDER.get(str(found["second_order"]), str(found["second_order"]))
-    if found.get("rounding"):
-        rounding = _two_digits(found["rounding"])
-        yield f"Rounding alone moves these numbers by {rounding}, above the tolerance; what is no larger passes."
     if result.summary.get("smoothing") and result.summary["epsilon"] is not None:  # null: there is no law
         yield _smoothed(result.summary, found)
 

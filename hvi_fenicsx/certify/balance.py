@@ -1,0 +1,165 @@
+"""Do the forces balance? At every vertex, and along every rigid motion of a body that its supports leave.
+
+Rounding of the stresses excuses no net force: only what rounding makes of the sum of the forces does.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+from dolfinx import fem
+
+from ..problem.problem import Problem
+from ..problem.references import References
+from ..rigid import rigid_fields
+from ..system import net_forces as rigid_balance
+from ..system.net_forces import ActingForces, Holder, spread
+from ..typing import Array
+from .contact_state import ContactState, Forces
+from .thresholds import DEFAULT, Thresholds
+
+
+def unbalanced(problem: Problem, reaction: Array, parts: Sequence[ContactState]) -> Array:
+    """The reaction without what supports, contact and laws may carry: zero in equilibrium; (blocks, d).
+
+    Args:
+        problem: the supports.
+        reaction: internal forces minus loads, (blocks, d).
+        parts: contact and laws.
+    """
+    rest = reaction.copy()
+    rest.reshape(-1)[problem.fixed_here] = 0.0
+    for state in parts:
+        carried = [law.term.directions for law in state.laws]
+        if state.bounds is not None:
+            carried.append(state.surface.normals[:, None, :])
+        for directions in carried:
+            here = rest[state.surface.blocks]
+            along = np.einsum("mkd,md->mk", directions, here)
+            rest[state.surface.blocks] = here - np.einsum("mk,mkd->md", along, directions)
+    return rest
+
+
+def rounding_sample(problem: Problem, u: Array) -> Array:
+    """Forces of a displacement's last digits, shuffled: what rounding makes of its forces, (blocks, d). Collective.
+
+    Args:
+        problem: what was solved.
+        u: nondimensional, a local array.
+    """
+    shuffled = fem.Function(problem.space)
+    signs = np.random.default_rng(problem.domain.mesh.comm.rank).choice([-1.0, 1.0], len(u))
+    shuffled.x.array[:] = u * signs * np.finfo(float).eps
+    shuffled.x.scatter_forward()
+    return problem.bulk.force(shuffled)
+
+
+def net_forces(
+    references: References,
+    forces: Forces,
+    states: Sequence[ContactState],
+    u: fem.Function,
+    tolerance: float,
+    thresholds: Thresholds = DEFAULT,
+) -> Array:
+    """The largest net force or moment along a rigid motion that nothing carries, by body. Collective.
+
+    It is relative to the loads' net force along the same motion, or to what contact and laws carry or could carry
+    there. Where it is above the tolerance, what rounding makes of the sum of these forces is taken off.
+
+    Args:
+        references: of the problem that was solved.
+        forces: at u.
+        states: of the parts of Γc at u.
+        u: nondimensional, ghosts updated.
+        tolerance: relative.
+        thresholds: what rounding is.
+    """
+    problem, acting = references.problem, _acting(references, forces, states, u, thresholds)
+    closed = [(state.surface, state.contact) for state in states]
+    fields = [rigid_balance.motions(problem, body, closed) for body in problem.bodies]
+    found = _beyond_rounding(references, fields, acting)
+    if np.all(found <= tolerance):
+        return found
+    return _beyond_rounding(references, fields, _with_noise(references, acting, u, thresholds))
+
+
+def _beyond_rounding(references: References, fields: Sequence[Array], acting: ActingForces) -> Array:
+    pairs = zip(references.problem.bodies, fields, strict=True)
+    return np.array([rigid_balance.along(references, body, y, acting).beyond_rounding for body, y in pairs])
+
+
+def _acting(
+    references: References,
+    forces: Forces,
+    states: Sequence[ContactState],
+    u: fem.Function,
+    thresholds: Thresholds,
+) -> ActingForces:
+    problem = references.problem
+    holders = [holder for state in states for holder in _holders(problem, state)]
+    foundation = -problem.bulk.foundation_force(u)
+    return ActingForces(
+        left=np.sum([forces.pushing, foundation, *(holder.forces for holder in holders)], axis=0),
+        loads=forces.pushing,
+        carried=[foundation],
+        holders=holders,
+        capable=rigid_balance.capable(problem),
+        noise=np.zeros(references.count),
+        summation=thresholds.summation,
+        tiny=thresholds.along,
+    )
+
+
+def _with_noise(references: References, acting: ActingForces, u: fem.Function, thresholds: Thresholds) -> ActingForces:
+    """With the rounding errors of the stresses. Collective."""
+    problem = references.problem
+    noise = references.norms(rounding_sample(problem, _without_rigid_part(problem, u.x.array)))
+    unknowns = references.vertices * problem.scales.dimension
+    return replace(acting, noise=thresholds.rounding_safety * noise / np.sqrt(unknowns))
+
+
+def _holders(problem: Problem, state: ContactState) -> Iterator[Holder]:
+    """What contact and laws of a part give, as far as they may, and what else they might give."""
+    surface, weights = state.surface, state.surface.weights
+
+    def holder(direction: Array, *tractions: Array) -> Holder:
+        forces = (spread(problem, surface, (weights * t)[:, None])[:, 0] for t in tractions)
+        return Holder(spread(problem, surface, direction), *forces)
+
+    if state.bounds is not None:
+        yield holder(surface.normals, allowed_pressure(state), *_pressures(state))
+    for law in state.laws:
+        low, high = law.term.law.interval(law.argument, law.near)
+        for k in range(law.allowed.shape[1]):
+            least, most = -high, -low
+            if law.term.radial:
+                stuck, given = law.argument <= law.near, -law.allowed[:, k]
+                least, most = np.where(stuck, -high, given), np.where(stuck, high, given)
+            yield holder(law.term.directions[:, k], -law.allowed[:, k], least, most)
+
+
+def _pressures(state: ContactState) -> tuple[Array, Array]:
+    """The least and the largest σ_n that contact may carry, (m,): no pull at the upper bound, no push at the lower."""
+    return np.where(state.on_upper, -np.inf, 0.0), np.where(state.on_lower, np.inf, 0.0)
+
+
+def allowed_pressure(state: ContactState) -> Array:
+    """The part of σ_n on its bounds that contact may carry, (m,)."""
+    return np.clip(state.contact_pressure, *_pressures(state))
+
+
+def _without_rigid_part(problem: Problem, u: Array) -> Array:
+    """A displacement (a local array) without the rigid motion of each body that is nearest to it. Collective."""
+    d, comm = problem.scales.dimension, problem.domain.mesh.comm
+    here = problem.space.dofmap.index_map.size_local
+    points, values = np.asarray(problem.points / problem.scales.length), u.reshape(-1, d).copy()
+    for body in problem.bodies:
+        mine = problem.bodies.labels == body.index
+        fields, owned = rigid_fields(points[mine], body), np.flatnonzero(mine) < here
+        gram = comm.allreduce(np.einsum("vnd,vmd->nm", fields[owned], fields[owned]))
+        parts = comm.allreduce(np.einsum("vnd,vd->n", fields[owned], values[mine][owned]))
+        values[mine] -= np.einsum("n,vnd->vd", np.linalg.solve(gram, parts), fields)
+    return values.ravel()

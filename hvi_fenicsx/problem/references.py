@@ -1,0 +1,168 @@
+"""What residual forces, tractions and distances are relative to, body by body: one answer for solvers and certificate.
+
+Bodies share no force, so none may hide behind another's stress. Forces are relative to the loads of a body. Where it is
+moved too (by prescribed values, bounds, laws that push), they are relative to what its supports, contact and laws take
+up, if that is more. What prescribed values make of the equations next to them depends on the mesh and says nothing
+about the body's forces.
+"""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+from dolfinx import fem
+from mpi4py import MPI
+
+from ..typing import Array, Mask
+from .law_term import LawTerm
+from .problem import Problem
+from .thresholds import DEFAULT, Thresholds
+
+
+@dataclass(frozen=True)
+class References:
+    """The references of one problem; all arrays by body have the length B.
+
+    Attributes:
+        problem: the problem.
+        load: Euclidean norm of the nodal loads that no support takes up at once, by body.
+        scale: stress in units of p0, and displacement in units of u0, that drives the body, at most 1, by body.
+        moved: whether something else than loads drives the body, by body.
+        holding: which scalar dofs of this rank's vertices supports, contact and laws act on, (n,).
+        thresholds: what is the least force that forces are relative to.
+    """
+
+    problem: Problem
+    load: Array
+    scale: Array
+    moved: Mask
+    holding: Mask
+    thresholds: Thresholds = DEFAULT
+
+    def norms(self, values: Array) -> Array:
+        """Euclidean norms of values at this rank's vertices, any shape of (vertices, d), by body. Collective."""
+        squares = np.sum(values.reshape(-1, self.problem.scales.dimension) ** 2, axis=1)
+        return np.sqrt(_total(self.problem, _sums(self.problem, squares)))
+
+    def largest(self, blocks: npt.NDArray[np.integer], values: Array) -> Array:
+        """The largest of values (m,) at vertices, at least 0, by body. Collective.
+
+        Args:
+            blocks: the vertices, local, (m,).
+            values: what is compared; what is no number counts as infinite.
+        """
+        found = np.zeros(self.count)
+        np.maximum.at(found, self.problem.bodies.labels[blocks], np.where(np.isnan(values), np.inf, values))
+        self.problem.domain.mesh.comm.Allreduce(MPI.IN_PLACE, found, op=MPI.MAX)
+        return found
+
+    @property
+    def count(self) -> int:
+        """B."""
+        return len(self.problem.bodies.bodies)
+
+    def at(self, blocks: npt.NDArray[np.integer]) -> Array:
+        """``scale`` at local vertices (m,), (m,)."""
+        return np.asarray(self.scale[self.problem.bodies.labels[blocks]])
+
+    def displacements(self, u: Array) -> Array:
+        """The largest component of a displacement, by body; where there is none, its scale. Collective.
+
+        Args:
+            u: at this rank's vertices, in units of u0, any shape of (vertices, d).
+        """
+        sizes = np.max(np.abs(u.reshape(-1, self.problem.scales.dimension)), axis=1)
+        found = self.largest(np.arange(len(sizes)), sizes)
+        return np.where(found > 0.0, found, self.scale)
+
+    def forces(self, u: Array, internal: Array) -> Array:
+        """What residual forces at u are relative to, as Euclidean norms of nodal forces, by body. Collective.
+
+        Where loads and reactions are less than a small part of stiffness times displacement (a body that moves as a
+        whole), that part.
+
+        Args:
+            u: at this rank's vertices, in units of u0, (vertices, d).
+            internal: the elastic forces there, likewise; only those at supports, contact and laws are looked at.
+        """
+        held = np.where(self.moved, self.norms(np.where(self.holding, internal.ravel(), 0.0)), 0.0)
+        least = self.thresholds.least_force * self.displacements(u) * self.surface
+        return np.maximum(np.maximum(self.load, held), least)
+
+    @functools.cached_property
+    def surface(self) -> Array:
+        """Norm of the nodal forces of a unit traction on a block of unit size with as many vertices, by body."""
+        d = self.problem.scales.dimension
+        return np.asarray(self.vertices ** (-(d - 1) / (2 * d)))
+
+    @functools.cached_property
+    def vertices(self) -> Array:
+        """Number of vertices, by body. Collective when first used."""
+        owned = self.problem.space.dofmap.index_map.size_local
+        return _total(self.problem, _sums(self.problem, np.ones(owned)))
+
+    def traction_scale(self, term: LawTerm) -> Array:
+        """What a law's traction is judged by at its vertices: its own, but at least a share of the body's, (m,)."""
+        return np.maximum(term.exact.traction_scale, self.thresholds.law_scale * self.at(term.surface.blocks))
+
+
+def of(problem: Problem, load: Array, thresholds: Thresholds = DEFAULT) -> References:
+    """The references of a problem. Collective.
+
+    Args:
+        problem: the problem.
+        load: the nodal loads at this rank's vertices, not lifted, (vertices, d).
+        thresholds: what is the least force that forces are relative to.
+    """
+    n, d = load.shape
+    holding = np.zeros(n * d, dtype=bool)
+    for surface in problem.surfaces:
+        holding[surface.dofs] = True
+    holding[problem.fixed_here] = True
+    free = load.copy()
+    free.reshape(-1)[problem.fixed_here] = 0.0
+    everywhere = np.ones(len(problem.bodies.bodies))
+    found = References(problem, everywhere, everywhere, everywhere > 0, holding, thresholds)
+    loaded, moved = _total(problem, _sums(problem, np.linalg.norm(load, axis=1))), _moved(problem)
+    drive = np.maximum(loaded, moved)
+    scale = np.where(drive > 0.0, drive / (np.max(drive) or 1.0), 1.0)
+    return replace(found, load=found.norms(free), scale=scale, moved=moved > 0.0)
+
+
+def _moved(problem: Problem) -> Array:
+    """The sum of what laws push at rest, or the largest displacement that is demanded, by body. Collective."""
+    force, demanded = np.zeros((2, len(problem.bodies.bodies)))
+    for term in problem.terms:
+        rest = np.zeros(len(term.surface.blocks))
+        push = term.surface.weights * _outside(rest, *term.law.interval(rest))
+        np.add.at(force, problem.bodies.labels[term.surface.blocks], push)
+    for bounds in problem.bounds:
+        away = _outside(np.zeros_like(bounds.lower), bounds.lower, bounds.upper)
+        np.maximum.at(demanded, problem.bodies.labels[bounds.surface.blocks], away)
+    prescribed = fem.Function(problem.space)
+    for condition in problem.conditions:
+        condition.set(prescribed.x.array)
+    sizes = np.max(np.abs(prescribed.x.array.reshape(-1, problem.scales.dimension)), axis=1)
+    np.maximum.at(demanded, problem.bodies.labels, sizes)
+    problem.domain.mesh.comm.Allreduce(MPI.IN_PLACE, demanded, op=MPI.MAX)
+    return np.maximum(_total(problem, force), demanded)
+
+
+def _outside(x: Array, lower: Array, upper: Array) -> Array:
+    return np.maximum(np.maximum(lower - x, x - upper), 0.0)
+
+
+def _sums(problem: Problem, values: Array) -> Array:
+    """Sums of values at this rank's vertices by body, without those of other ranks."""
+    labels = problem.bodies.labels[: len(values)]
+    return np.bincount(labels, weights=values, minlength=len(problem.bodies.bodies)).astype(np.float64)
+
+
+def _total(problem: Problem, values: Array) -> Array:
+    """Values by body, summed over the ranks. Collective."""
+    found = values.copy()
+    problem.domain.mesh.comm.Allreduce(MPI.IN_PLACE, found)
+    return found
