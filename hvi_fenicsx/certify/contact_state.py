@@ -19,7 +19,7 @@ from ..problem.problem import Bounds, Problem
 from ..problem.references import References
 from ..problem.vectors import nodal
 from ..typing import Array, Integers, Mask
-from . import force_attribution
+from . import force_attribution, shared_forces
 from .force_attribution import ForceAttribution
 from .thresholds import DEFAULT, Thresholds
 
@@ -146,27 +146,29 @@ def states(
     near = thresholds.near * references.at(np.arange(len(reaction)))
     attribution = force_attribution.attribute(problem, values, reaction, near)
     laws = [
-        _law(attribution, term, local, values, references.traction_scale(term))
-        for term, local in zip(problem.terms, attribution.terms, strict=True)
+        _law(attribution, number, term, values, references.traction_scale(term))
+        for number, term in enumerate(problem.terms)
     ]
-    pairs = zip(problem.bounds, attribution.bounds, strict=True)
-    contact = {bounds.surface.part: _contact(attribution, local) for bounds, local in pairs}
+    contact = {bounds.surface.part: _contact(attribution, number) for number, bounds in enumerate(problem.bounds)}
     return tuple(_state(problem, surface, values, reaction, laws, contact, near) for surface in problem.surfaces)
 
 
-def _law(attribution: ForceAttribution, term: LawTerm, local: LawTerm, u: Array, scale: Array) -> LawState:
+def _law(attribution: ForceAttribution, number: int, term: LawTerm, u: Array, scale: Array) -> LawState:
+    local = attribution.terms[number]
     argument, near = term.argument(u), attribution.near[term.surface.blocks]
     low, high = term.law.interval(argument, near)
     parts, hidden = [], np.zeros(len(argument), dtype=bool)
-    for dofs, sign in force_attribution.components(local):
+    for dofs, sign in shared_forces.components(local):
         share = np.where(sign > 0, attribution.share[dofs], 1.0 - attribution.share[dofs])
         parts.append(low + share * (high - low) + sign * attribution.excess[dofs])
         hidden |= attribution.held[dofs]
     if len(parts) == 1:
+        at, forces = attribution.shared.of_law(number, local)
+        parts[0][at] = np.sum(forces * local.directions[at, 0], axis=1) / term.surface.weights[at]
         traction, distance = parts[0], _away(parts[0], low, high)
         allowed = np.clip(parts[0], low, high)[:, None]
     else:
-        traction, distance, allowed = _radial(attribution, term, local, argument, u)
+        traction, distance, allowed = _radial(attribution, number, term, argument, u)
     return LawState(
         term=term,
         argument=argument,
@@ -180,11 +182,12 @@ def _law(attribution: ForceAttribution, term: LawTerm, local: LawTerm, u: Array,
 
 
 def _radial(
-    attribution: ForceAttribution, term: LawTerm, local: LawTerm, argument: Array, u: Array
+    attribution: ForceAttribution, number: int, term: LawTerm, argument: Array, u: Array
 ) -> tuple[Array, Array, Array]:
     """A law of |u_t|: the traction is a vector along the slip, at zero slip any within the kink's disc."""
-    dofs = [d for d, _ in force_attribution.components(local)]
-    signs = np.stack([s for _, s in force_attribution.components(local)], axis=1)
+    local = attribution.terms[number]
+    dofs = [d for d, _ in shared_forces.components(local)]
+    signs = np.stack([s for _, s in shared_forces.components(local)], axis=1)
     carried_elsewhere = np.stack([attribution.held[d] | attribution.contact[d] for d in dofs], axis=1)
     needed = np.stack([attribution.needed[d] for d in dofs], axis=1) * signs / term.surface.weights[:, None]
     near = attribution.near[term.surface.blocks]
@@ -192,6 +195,8 @@ def _radial(
     unit = np.divide(slip, argument[:, None], out=np.zeros_like(slip), where=moving[:, None])
     low, high = term.law.interval(argument, near)
     needed = np.where(carried_elsewhere, unit * ((low + high) / 2)[:, None], needed)
+    at, forces = attribution.shared.of_law(number, local)
+    needed[at] = np.einsum("mkd,md->mk", local.directions[at], forces) / term.surface.weights[at, None]
     along = np.where(moving, np.sum(needed * unit, axis=1), np.linalg.norm(needed, axis=1))
     across = np.where(moving, np.linalg.norm(needed - along[:, None] * unit, axis=1), 0.0)
     at_rest = np.divide(needed, along[:, None], out=np.zeros_like(needed), where=along[:, None] > 0)
@@ -203,11 +208,15 @@ def _away(traction: Array, low: Array, high: Array) -> Array:
     return np.maximum(np.maximum(low - traction, traction - high), 0.0)
 
 
-def _contact(attribution: ForceAttribution, bounds: Bounds) -> Array:
+def _contact(attribution: ForceAttribution, number: int) -> Array:
     """σ_n that contact carries, (m,); off the bounds what is left there, which should be nothing."""
+    bounds = attribution.bounds[number]
     dofs, sign = bounds.component()
     weight = np.where(attribution.contact[dofs], attribution.contact_weight[dofs], bounds.surface.weights)
-    return sign * attribution.contact_force[dofs] / weight
+    carried = sign * attribution.contact_force[dofs] / weight
+    at, forces = attribution.shared.of_bounds(number, bounds)
+    carried[at] = -np.sum(forces * bounds.surface.normals[at], axis=1) / bounds.surface.weights[at]
+    return np.asarray(carried)
 
 
 def _state(

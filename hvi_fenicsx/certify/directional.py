@@ -18,7 +18,7 @@ from ..problem.problem import Bounds
 from ..problem.references import References
 from ..system import local_frames
 from ..typing import Array, Entities, Integers, Mask
-from . import force_attribution
+from . import force_attribution, shared_forces
 from .thresholds import DEFAULT, Thresholds
 
 _DIRECTIONS = 256
@@ -143,7 +143,7 @@ class _Collector:
         Args:
             term: the law, in local components.
         """
-        (dofs, sign), w = next(force_attribution.components(term)), term.surface.weights
+        (dofs, sign), w = next(shared_forces.components(term)), term.surface.weights
         x = self._on_kink(term.law, term.argument(self.u))
         left, right = w * term.law.left(x), w * term.law.right(x)
         before, after = (w * c for c in self._curvatures(term.law, x))
@@ -234,7 +234,9 @@ class _Collector:
     def _least(self, dofs: Integers, norms: list[tuple[float, Array]]) -> tuple[float, float]:
         """The least growth of coupled components over their admissible directions, and of opposite ones together."""
         up, down = self.up[dofs], self.down[dofs]
-        steepest = np.where(np.isfinite(up) & np.isfinite(down), (down - up) / 2, np.where(np.isfinite(up), -up, down))
+        with np.errstate(invalid="ignore"):  # both infinite: the next line
+            middle = (down - up) / 2
+        steepest = np.where(np.isfinite(up) & np.isfinite(down), middle, np.where(np.isfinite(up), -up, down))
         steepest = np.where(np.isfinite(steepest), steepest, 0.0)
         v = _admissible(np.vstack([steepest, _sphere(len(dofs))]), np.isfinite(up), np.isfinite(down))
         bends = np.sum([c * np.linalg.norm(v @ rows.T, axis=1) for c, rows in norms], axis=0)

@@ -7,17 +7,17 @@ of their Clarke intervals; a bound that is reached, or a support, carries the re
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..laws import ConvexPart
-from ..problem.contact_surface import component_dofs
 from ..problem.law_term import LawTerm
 from ..problem.problem import Bounds, Problem
 from ..system import local_frames
-from ..typing import Array, Integers, Mask
+from ..typing import Array, Mask
+from . import shared_forces
+from .shared_forces import SharedForces
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,6 +35,7 @@ class ForceAttribution:
         contact: whether a bound is reached.
         held: whether it is prescribed.
         contact_weight: area of the parts whose bound is reached.
+        shared: the forces at vertices where a law of |u_t| shares a component with others: they replace all above.
     """
 
     terms: tuple[LawTerm, ...]
@@ -47,6 +48,7 @@ class ForceAttribution:
     contact: Mask
     held: Mask
     contact_weight: Array
+    shared: SharedForces
 
     @property
     def by_laws(self) -> Array:
@@ -79,7 +81,7 @@ class ForceAttribution:
             u: the displacement, nondimensional, a local array.
         """
         low, high = term.law.interval(term.argument(u), self.near[term.surface.blocks])
-        for dofs, sign in components(term):
+        for dofs, sign in shared_forces.components(term):
             ends = np.stack([sign * low, sign * high]) * term.surface.weights
             np.add.at(self.low, dofs, ends.min(axis=0))
             np.add.at(self.high, dofs, ends.max(axis=0))
@@ -92,8 +94,9 @@ class ForceAttribution:
             bounds: of one part.
             u: the displacement, nondimensional, a local array.
         """
-        dofs, sign = bounds.component()
-        reached = touches(bounds, sign * u.ravel()[dofs], self.near[bounds.surface.blocks])
+        dofs, _ = bounds.component()
+        lower, upper = _reached(bounds, u, self.near)
+        reached = lower | upper
         self.contact[dofs] |= reached
         np.add.at(self.contact_weight, dofs, np.where(reached, bounds.surface.weights, 0.0))
 
@@ -111,23 +114,34 @@ def attribute(problem: Problem, u: Array, residual: Array, near: Array) -> Force
     if local is not None:
         u, residual = local.local_components(u), local.local_components(residual)
     n = residual.size
+    terms = problem.terms if local is None else tuple(local.term(t) for t in problem.terms)
+    bounds = problem.bounds if local is None else tuple(local.bounds(b) for b in problem.bounds)
+    needed, held = -residual.ravel(), np.isin(np.arange(n), problem.fixed)
+    reached = [(b, *_reached(b, u, near)) for b in bounds]
     found = ForceAttribution(
-        terms=problem.terms if local is None else tuple(local.term(t) for t in problem.terms),
-        bounds=problem.bounds if local is None else tuple(local.bounds(b) for b in problem.bounds),
+        terms=terms,
+        bounds=bounds,
         near=near,
-        needed=-residual.ravel(),
+        needed=needed,
         low=np.zeros(n),
         high=np.zeros(n),
         weight=np.zeros(n),
         contact=np.zeros(n, dtype=bool),
-        held=np.isin(np.arange(n), problem.fixed),
+        held=held,
         contact_weight=np.zeros(n),
+        shared=shared_forces.settle(terms, reached, u, needed, held, near),
     )
     for term in found.terms:
         found.enter_law(term, u)
-    for bounds in found.bounds:
-        found.enter_bounds(bounds, u)
+    for one in found.bounds:
+        found.enter_bounds(one, u)
     return found
+
+
+def _reached(bounds: Bounds, u: Array, near: Array) -> tuple[Mask, Mask]:
+    """Where the lower and where the upper bound is reached, (m,) each."""
+    dofs, sign = bounds.component()
+    return on_bounds(bounds, sign * u.ravel()[dofs], near[bounds.surface.blocks])
 
 
 def on_bounds(bounds: Bounds, normal: Array, near: float | Array) -> tuple[Mask, Mask]:
@@ -162,9 +176,3 @@ def on_kink(part: ConvexPart, argument: Array, near: float | Array) -> Mask:
         near: distance that counts as being on a kink, one for all or (m,).
     """
     return np.asarray(np.any(np.abs(argument[:, None] - part.kinks) <= np.reshape(near, (-1, 1)), axis=1))
-
-
-def components(term: LawTerm) -> Iterator[tuple[Integers, Array]]:
-    """For each of a law's directions the scalar dof at every vertex and the direction's sign."""
-    for i in range(term.directions.shape[1]):
-        yield component_dofs(term.surface.blocks, term.directions[:, i])

@@ -16,6 +16,8 @@ class Thresholds:
         rounding_safety: factor within which the sample of the rounding error is trusted.
         along: part of a rigid motion along a direction, per radian or unit length, that is rounding.
         summation: rounding error of a sum of nodal forces, relative to the sum of their sizes.
+        settled: change of shared forces, relative to the largest, at which they are settled.
+        sweeps: over their carriers, at most.
     """
 
     near: float = 1e-10
@@ -24,6 +26,8 @@ class Thresholds:
     rounding_safety: float = 4.0
     along: float = 1e-9
     summation: float = 1e-14
+    settled: float = 1e-15
+    sweeps: int = 1000
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from dolfinx import fem
-from scenes import P, Q, Table, displacement, far, model, quadratic_linear, solved
+from scenes import STEEL, P, Q, Table, displacement, far, model, quadratic_linear, solved
 
 from hvi_fenicsx import Scene, Solution, prepare, solve
 from hvi_fenicsx.certify.certificate import Certificate, examine
@@ -149,3 +149,33 @@ def test_a_corner_of_two_contact_parts_is_certified() -> None:
     supported, touching = bearing({"displacement": [0.0, "free"]}), bearing({"contact": {"gap": 0.0}})
     assert supported.exit_code == touching.exit_code == 0
     assert far(displacement(touching), displacement(supported)) < 1e-9
+
+
+def _floor_and_back(friction: float) -> Table:
+    """A block held at its right side; floor and back wall, which meet at an edge, resist by friction."""
+    law = {"law": "tresca", "yield_traction": friction}
+    return {
+        "domain": {"shape": "box", "size": [1.0, 0.5, 0.5], "cells": [1, 1, 1]},
+        "material": STEEL | {"model": "three_dimensional"},
+        "boundary": {
+            "held": {"on": "right", "displacement": [0.0, 0.0, 0.0]},
+            "floor": {"on": "bottom", "contact": {"gap": 0.0}, "friction": law},
+            "wall": {"on": "back", "friction": law | {"yield_traction": 10 * friction}},
+        },
+        "body": {"force": [-3e4, 0.0, -3e5]},
+    }
+
+
+@pytest.mark.parametrize("friction", [2e2, 2e3, 2e4])
+def test_two_frictions_share_the_force_at_their_edge(friction: float) -> None:
+    """Each may carry a part of the force along the edge; their sum, not each, must be what is needed."""
+    assert solved(_floor_and_back(friction)).converged
+
+
+def test_an_edge_whose_force_exceeds_both_frictions_is_not_certified() -> None:
+    """The solution with a hundredth of the displacement taken off: more is needed than both laws can give."""
+    found = solve(Scene.model_validate(_floor_and_back(2e3)))
+    assert found.solve_result is not None
+    u = found.solve_result.u
+    u.x.array[:] *= 0.99
+    assert examine(found.problem, u, 1e-8).certificate.inclusion > 1e-3

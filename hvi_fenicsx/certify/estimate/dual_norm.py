@@ -23,7 +23,8 @@ from ...typing import Array, Entities, Integers
 from .. import balance
 from ..certificate import Examination
 from ..contact_state import ContactState
-from ..force_attribution import components, on_kink, touches
+from ..force_attribution import on_kink, touches
+from ..shared_forces import components
 from .law_traces import nearest, tractions
 from .thresholds import DEFAULT, Thresholds
 
