@@ -63,8 +63,9 @@ class Certificate:
 
     def __str__(self) -> str:
         return (
-            f"equilibrium {self.equilibrium:.1e}, penetration {self.penetration:.1e}, tension {self.tension:.1e}, "
-            f"complementarity {self.complementarity:.1e}, inclusion {self.inclusion:.1e}; {self.second_order}"
+            f"equilibrium {self.equilibrium:.1e}, net force {self.net_force:.1e}, penetration {self.penetration:.1e}, "
+            f"tension {self.tension:.1e}, complementarity {self.complementarity:.1e}, inclusion {self.inclusion:.1e}; "
+            f"{self.second_order}"
         )
 
     def __repr__(self) -> str:
