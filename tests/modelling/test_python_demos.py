@@ -33,7 +33,7 @@ def test_the_plate_of_an_own_mesh_breaks_at_its_right_end(tmp_path: Path) -> Non
 
 def test_the_force_of_the_load_loop_ends_at_the_weakened_friction(tmp_path: Path) -> None:
     force = demo("load_loop")["main"](tmp_path)
-    assert force.argmax() == np.flatnonzero(np.diff(force) > 0).max() + 1  # rises to one peak
+    assert force.argmax() == np.flatnonzero(np.diff(force) > 1.0).max() + 1  # N/m: rises to one peak
     assert 5e5 < force.max() < 1e6  # the floor breaks one part after the other
     assert (tmp_path / "force.png").exists()
 
