@@ -131,7 +131,10 @@ class GlobalProgramme:
         """
         if not np.any(f.factors < 0.0):
             return self.convex.minimise(f, region, give_up)
-        return self._search(ConcavePart.of(f, self.convex), region, give_up)
+        part = ConcavePart.of(f, self.convex)
+        if not len(part.basis):  # no motion slips where the growth is negative
+            return self.convex.minimise(replace(f, factors=np.maximum(f.factors, 0.0)), region, give_up)
+        return self._search(part, region, give_up)
 
     def sphere(self, f: Functional, across: Array) -> Minimum | None:
         """Minimum of f over the cone and |y| = 1, one search for each face; None if there is no such y.
