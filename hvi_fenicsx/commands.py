@@ -101,7 +101,7 @@ def _run(request: RunRequest) -> int:
         with log.Handlers(*run_logs):
             solution, reached = _solve(request, interrupt)
             given = {**request.given, **(_accuracy(reached) if reached else {})}
-            record = write_whole(folder, solution, request.timer, given, draw=request.draw)
+            record = write_whole(folder, solution, request.timer, given, _LOG.info, draw=request.draw)
         on_root(COMM, lambda: _finish(run_logs))
         folder.commit(request.scene)
         _say([*(f"warning: {text}" for text in folder.kept), on_root(COMM, lambda: _where(request))])

@@ -80,15 +80,18 @@ def net_forces(
     problem, acting = references.problem, _acting(references, forces, states, u, thresholds)
     closed = [(state.surface, state.contact) for state in states]
     fields = [rigid_balance.motions(problem, body, closed) for body in problem.bodies]
-    found = _beyond_rounding(references, fields, acting)
+    found = _beyond_rounding(references, fields, acting, thresholds)
     if np.all(found <= tolerance):
         return found
-    return _beyond_rounding(references, fields, _with_noise(references, acting, u, thresholds))
+    return _beyond_rounding(references, fields, _with_noise(references, acting, u, thresholds), thresholds)
 
 
-def _beyond_rounding(references: References, fields: Sequence[Array], acting: ActingForces) -> Array:
+def _beyond_rounding(
+    references: References, fields: Sequence[Array], acting: ActingForces, thresholds: Thresholds
+) -> Array:
     pairs = zip(references.problem.bodies, fields, strict=True)
-    return np.array([rigid_balance.along(references, body, y, acting).beyond_rounding for body, y in pairs])
+    nets = (rigid_balance.along(references, body, y, acting) for body, y in pairs)
+    return np.array([net.beyond_rounding(thresholds.nothing_acts) for net in nets])
 
 
 def _acting(

@@ -15,6 +15,7 @@ class Thresholds:
         largest_rounding: a certificate's entry above this is no rounding.
         rounding_safety: factor within which the sample of the rounding error is trusted.
         along: part of a rigid motion along a direction, per radian or unit length, that is rounding.
+        nothing_acts: net forces along a rigid motion that are this small beside the sum of all forces are none.
         summation: rounding error of a sum of nodal forces, relative to the sum of their sizes.
         settled: change of shared forces, relative to the largest, at which they are settled.
         sweeps: over their carriers, at most.
@@ -25,6 +26,7 @@ class Thresholds:
     largest_rounding: float = 1e-4
     rounding_safety: float = 4.0
     along: float = 1e-9
+    nothing_acts: float = 1e-10
     summation: float = 1e-14
     settled: float = 1e-15
     sweeps: int = 1000

@@ -17,11 +17,14 @@ from ..errors import InputError
 from ..results import ResultFolder, gathering
 from ..results.output_folder import Existing
 from ..results.whole import write_whole
+from ..runtime import log
 from ..solution import Solution
 from ..solvers.result import SolveResult
 from ..typing import Array
 from . import plotting
 from .contact_arrays import ContactArrays
+
+_LOG = log.logger("modelling")
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -139,7 +142,7 @@ class ModelSolution(Solution):
         existing: Existing = "replace" if force else "refuse"
         target = ResultFolder(self.problem.domain.mesh.comm, Path(folder), existing)
         try:
-            write_whole(target, self, self.timer, {"command": None, "petsc": None}, draw=pictures)
+            write_whole(target, self, self.timer, {"command": None, "petsc": None}, _LOG.warning, draw=pictures)
             target.commit(self.scene)
         except BaseException:
             target.discard()

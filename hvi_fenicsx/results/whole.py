@@ -9,28 +9,32 @@ from typing import Any
 from ..errors import HviError
 from ..report.html import render
 from ..report.pictures import draw as pictures
-from ..runtime import log
 from ..runtime.mpi import on_root
 from ..runtime.timing import Timer
 from ..solution import Solution
 from .folder import ResultFolder
 from .write import write, write_record
 
-_LOG = log.logger("results")
-
 
 def write_whole(
-    folder: ResultFolder, solution: Solution, timer: Timer, given: Mapping[str, Any], *, draw: bool
+    folder: ResultFolder,
+    solution: Solution,
+    timer: Timer,
+    given: Mapping[str, Any],
+    tell: Callable[[str], None],
+    *,
+    draw: bool,
 ) -> dict[str, Any]:
     """Write all files of a result but ``run.log``. Collective.
 
-    Pictures and report are made from the other files; one that fails costs a line in the log, not the run.
+    Pictures and report are made from the other files; one that fails costs a line, not the run.
 
     Args:
         folder: being written.
         solution: what was found.
         timer: where time goes.
         given: further entries of the summary.
+        tell: is given that line, on rank 0.
         draw: whether to make pictures.
 
     Returns:
@@ -40,18 +44,20 @@ def write_whole(
     with timer("output"):
         record = {**write(work, solution, folder.target), **given}
         if draw:
-            on_root(comm, lambda: _from_files("pictures", pictures.draw, work, record))
+            on_root(comm, lambda: _from_files("pictures", pictures.draw, work, record, tell))
     with timer("output"):
         record["time"] = timer.report()
-        on_root(comm, lambda: _from_files("report", render.write, work, record))
+        on_root(comm, lambda: _from_files("report", render.write, work, record, tell))
     record["time"] = timer.report()
     on_root(comm, lambda: write_record(work, record))
     return record
 
 
-def _from_files(what: str, make: Callable[[Path], object], folder: Path, record: dict[str, Any]) -> None:
+def _from_files(
+    what: str, make: Callable[[Path], object], folder: Path, record: dict[str, Any], tell: Callable[[str], None]
+) -> None:
     write_record(folder, record)
     try:
         make(folder)
     except HviError as error:
-        _LOG.info(f"{what}: {error}")
+        tell(f"{what}: {error}")

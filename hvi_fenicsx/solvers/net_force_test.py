@@ -67,7 +67,7 @@ class NetForceTest:
 
     def _relative(self, net: NetForces) -> tuple[float, float]:
         """The largest net force and its rounding, along motions in which anything acts at all."""
-        acts = net.scale > self._thresholds.nothing_acts * net.sizes
+        acts = net.acts(self._thresholds.nothing_acts)
         scale = np.where(acts, net.scale, np.inf)
         return float(np.max(net.left / scale, initial=0.0)), float(np.max(net.rounding / scale, initial=0.0))
 

@@ -49,7 +49,7 @@ class ActiveSetThresholds:
     largest_rounding: float = 1e-4
     rounding_safety: float = 4.0
     along: float = 1e-9
-    nothing_acts: float = 1e-12
+    nothing_acts: float = 1e-10
     moving_accuracy: float = 1e-2
     forcing: float = 0.5
     finest_accuracy: float = 1e-4

@@ -97,10 +97,21 @@ class NetForces:
     scale: Array
     sizes: Array
 
-    @property
-    def beyond_rounding(self) -> float:
-        """The largest relative one, without rounding; infinite where there is nothing that it could be relative to."""
-        left = np.maximum(self.left - self.rounding, 0.0)
+    def acts(self, smallest: float) -> Mask:
+        """Along which motions anything acts at all, (j,): a body in neutral balance has none but digits of its mesh.
+
+        Args:
+            smallest: of what acts, beside the sum of the sizes of all forces.
+        """
+        return np.asarray(self.scale > smallest * self.sizes)
+
+    def beyond_rounding(self, smallest: float) -> float:
+        """The largest relative one, without rounding; infinite where there is nothing that it could be relative to.
+
+        Args:
+            smallest: what acts less than this, beside the sum of the sizes of all forces, does not act.
+        """
+        left = np.maximum(self.left - self.rounding, 0.0) * (self.acts(smallest) | (self.left > smallest * self.sizes))
         found = np.divide(left, self.scale, out=np.where(left > 0, np.inf, 0.0), where=self.scale > 0)
         return float(np.max(found, initial=0.0))
 
