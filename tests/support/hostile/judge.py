@@ -92,7 +92,8 @@ def _of_files(case: Case, found: Outcome, folder: Path) -> list[str]:
         if mine and found.after.get(name) != kind and not _is_kept(name, kind, found.after):
             wrong.append(f"{'changed' if name in found.after else 'lost'} {name!r}")
     new = [n for n in found.after if n not in found.before and not any(p.startswith(case.ours) for p in Path(n).parts)]
-    if case.words[:1] == ["study"] or (found.code not in (2, 130) and found.code >= 0):
+    written = f"{out}/summary.json" in found.after  # also by a run that was interrupted while it solved
+    if case.words[:1] == ["study"] or (found.code not in (2, 130) and found.code >= 0) or (found.code != 2 and written):
         within = [n for n in new if out == "." or n == out or n.startswith((f"{out}/", f"{out.split('/')[0]}/"))]
         new = [n for n in new if n not in within and not out.startswith(f"{n}/")]
         wrong += _of_result(case, found, folder)
