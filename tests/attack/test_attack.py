@@ -1,10 +1,9 @@
-"""The attack itself: random scenes, with a new seed each day, and nothing that contradicts (docs/attack.md)."""
+"""The attack itself: random scenes, and nothing that contradicts (docs/attack.md). HVI_ATTACK_SEED gives others."""
 
 from __future__ import annotations
 
 import os
 import sys
-import time
 from pathlib import Path
 
 import pytest
@@ -17,7 +16,7 @@ from judge import CONTRADICTS
 
 @pytest.mark.long
 def test_nothing_contradicts_the_program(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    seed = int(os.environ.get("HVI_ATTACK_SEED", time.time() // 86400))
+    seed = int(os.environ.get("HVI_ATTACK_SEED", "20779"))
     counts = series(seed, range(100), tmp_path)
     found = capsys.readouterr().out
     with capsys.disabled():
