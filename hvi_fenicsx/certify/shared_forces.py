@@ -98,22 +98,22 @@ def settle(
         near: distance from a kink that counts as being on it, by owned vertex, (blocks,).
         thresholds: when forces are settled.
     """
-    blocks = _shared(terms, bounds, len(needed), len(near))
-    if not len(blocks):
+    if not any(term.radial for term in terms):
         return SharedForces({}, {})
-    d = len(needed) // len(near)
+    d = terms[0].directions.shape[2]
+    blocks = _shared(terms, bounds, len(needed), d)
     free = ~held.reshape(-1, d)[blocks]
     row = np.full(len(near), -1)
     row[blocks] = np.arange(len(blocks))
-    laws = {i: _of_law(term, row, free, u, near) for i, term in enumerate(terms)}
-    contact = {i: _of_bounds(*one, row, free) for i, one in enumerate(bounds)}
+    carriers = [_of_law(term, row, free, u, near) for term in terms]
+    carriers += [_of_bounds(*one, row, free) for one in bounds]
     wanted = np.where(free, needed.reshape(-1, d)[blocks], 0.0)
-    forces, left = _nearest_sum([*laws.values(), *contact.values()], wanted, thresholds)
-    found = [(c.own, f + left[c.rows]) for c, f in zip([*laws.values(), *contact.values()], forces, strict=True)]
-    return SharedForces(dict(zip(laws, found, strict=False)), dict(zip(contact, found[len(laws) :], strict=True)))
+    forces, left = _nearest_sum(carriers, wanted, thresholds)
+    found = [(c.own, f + left[c.rows]) for c, f in zip(carriers, forces, strict=True)]
+    return SharedForces(dict(enumerate(found[: len(terms)])), dict(enumerate(found[len(terms) :])))
 
 
-def _shared(terms: Sequence[LawTerm], bounds: Sequence[tuple[Bounds, Mask, Mask]], dofs: int, blocks: int) -> Integers:
+def _shared(terms: Sequence[LawTerm], bounds: Sequence[tuple[Bounds, Mask, Mask]], dofs: int, d: int) -> Integers:
     """The vertices at which a component of a law of |u_t| has another carrier too."""
     carriers = np.zeros(dofs, dtype=np.int64)
     for term in terms:
@@ -121,8 +121,8 @@ def _shared(terms: Sequence[LawTerm], bounds: Sequence[tuple[Bounds, Mask, Mask]
             np.add.at(carriers, own, 1)
     for one, lower, upper in bounds:
         np.add.at(carriers, one.component()[0], (lower | upper).astype(np.int64))
-    found = [own[carriers[own] > 1] // (dofs // blocks) for term in terms if term.radial for own, _ in components(term)]
-    return np.unique(np.concatenate(found)) if found else np.empty(0, dtype=np.int64)
+    found = [own[carriers[own] > 1] // d for term in terms if term.radial for own, _ in components(term)]
+    return np.unique(np.concatenate(found))
 
 
 def _of_law(term: LawTerm, row: Integers, free: Mask, u: Array, near: Array) -> Carrier:
