@@ -2,18 +2,15 @@
 
 from .body import Body
 from .contact_arrays import ContactArrays
+from .materials import Anisotropic, Energy, Isotropic, Orthotropic
 from .model import Model
 from .placed_effects import (
     Adhesion,
-    Anisotropic,
     BodyForce,
     Contact,
     Displacement,
-    Energy,
     Friction,
-    Isotropic,
     On,
-    Orthotropic,
     PlacedEffect,
     Support,
     Temperature,

@@ -3,28 +3,25 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any
 
 from dolfinx import mesh as dmesh
 from pydantic import ValidationError
 
 from .. import effects
 from ..effects import Effect
-from ..effects.anisotropic import OrthotropicElasticity, TensorElasticity
 from ..errors import InputError
 from ..laws import Superpotential
 from ..mesh.domain import Domain
 from ..schema import input_error
 from . import values
-from .user_energy import UserEnergy
 
 Value = Any
 """A number, a formula in x, y, z, a Python function of x (3, n), a scalar UFL expression or fem.Function; SI."""
 Vector = Any
 """A list of values, one for each component; or a Python function with values (d, n), a UFL vector, a fem.Function."""
-Plane = Literal["plane_stress", "plane_strain", "three_dimensional"]
 
 
 class PlacedEffect(ABC):
@@ -37,7 +34,11 @@ class PlacedEffect(ABC):
 
     @abstractmethod
     def places(self, domain: Domain) -> Collection[str]:
-        """The names that its place may have on a body."""
+        """The names that its place may have on a body.
+
+        Args:
+            domain: of the body.
+        """
 
     @abstractmethod
     def effect(self, mesh: dmesh.Mesh) -> Effect:
@@ -51,7 +52,7 @@ class PlacedEffect(ABC):
         """
 
 
-class _OnSide(PlacedEffect):
+class OnSide(PlacedEffect):
     """An effect on a side.
 
     Attributes:
@@ -62,13 +63,19 @@ class _OnSide(PlacedEffect):
 
     @property
     def where(self) -> str:
+        """The side."""
         return self.side
 
     def places(self, domain: Domain) -> Collection[str]:
+        """The sides.
+
+        Args:
+            domain: of the body.
+        """
         return domain.sides
 
 
-class _InRegion(PlacedEffect):
+class InRegion(PlacedEffect):
     """An effect in a region.
 
     Attributes:
@@ -79,14 +86,20 @@ class _InRegion(PlacedEffect):
 
     @property
     def where(self) -> str | None:
+        """The region; None: the whole body."""
         return self.region
 
     def places(self, domain: Domain) -> Collection[str]:
+        """The regions.
+
+        Args:
+            domain: of the body.
+        """
         return domain.regions
 
 
 @dataclass(frozen=True)
-class On(_OnSide):
+class On(OnSide):
     """Any effect on a side, such as one of your own class.
 
     Attributes:
@@ -103,7 +116,7 @@ class On(_OnSide):
 
 
 @dataclass(frozen=True)
-class Displacement(_OnSide):
+class Displacement(OnSide):
     """A prescribed displacement.
 
     Attributes:
@@ -117,11 +130,11 @@ class Displacement(_OnSide):
     def effect(self, mesh: dmesh.Mesh) -> Effect:
         """The conditions."""
         given = ["free" if value is None else value for value in values.components(self.values, mesh)]
-        return _checked(effects.loads.PrescribedDisplacement, values=tuple(given))
+        return checked(effects.loads.PrescribedDisplacement, values=tuple(given))
 
 
 @dataclass(frozen=True)
-class Traction(_OnSide):
+class Traction(OnSide):
     """A surface traction.
 
     Attributes:
@@ -134,11 +147,11 @@ class Traction(_OnSide):
 
     def effect(self, mesh: dmesh.Mesh) -> Effect:
         """The load."""
-        return _checked(effects.loads.Traction, values=tuple(values.components(self.values, mesh)))
+        return checked(effects.loads.Traction, values=tuple(values.components(self.values, mesh)))
 
 
 @dataclass(frozen=True)
-class Contact(_OnSide):
+class Contact(OnSide):
     """Contact: unilateral with a gap, bilateral, or with a flat obstacle.
 
     Attributes:
@@ -162,11 +175,11 @@ class Contact(_OnSide):
         if self.obstacle is not None:
             point, normal = (tuple(map(float, vector)) for vector in self.obstacle)
             keys["obstacle"] = {"point": point, "normal": normal}
-        return _checked(effects.contact.Contact, **(keys or {"gap": 0.0}))
+        return checked(effects.contact.Contact, **(keys or {"gap": 0.0}))
 
 
 @dataclass(frozen=True)
-class _Law(_OnSide):
+class _Law(OnSide):
     """A law on a side.
 
     Attributes:
@@ -183,7 +196,7 @@ class Friction(_Law):
 
     def effect(self, mesh: dmesh.Mesh) -> Effect:
         """The law."""
-        return _checked(effects.friction.Friction, law=self.law)
+        return checked(effects.friction.Friction, law=self.law)
 
 
 class Adhesion(_Law):
@@ -191,7 +204,7 @@ class Adhesion(_Law):
 
     def effect(self, mesh: dmesh.Mesh) -> Effect:
         """The law."""
-        return _checked(effects.normal_laws.Adhesion, law=self.law)
+        return checked(effects.normal_laws.Adhesion, law=self.law)
 
 
 class Support(_Law):
@@ -199,11 +212,11 @@ class Support(_Law):
 
     def effect(self, mesh: dmesh.Mesh) -> Effect:
         """The law."""
-        return _checked(effects.normal_laws.Support, law=self.law)
+        return checked(effects.normal_laws.Support, law=self.law)
 
 
 @dataclass(frozen=True)
-class BodyForce(_InRegion):
+class BodyForce(InRegion):
     """A force per volume.
 
     Attributes:
@@ -216,11 +229,11 @@ class BodyForce(_InRegion):
 
     def effect(self, mesh: dmesh.Mesh) -> Effect:
         """The load."""
-        return _checked(effects.loads.BodyForce, values=tuple(values.components(self.values, mesh)))
+        return checked(effects.loads.BodyForce, values=tuple(values.components(self.values, mesh)))
 
 
 @dataclass(frozen=True)
-class Temperature(_InRegion):
+class Temperature(InRegion):
     """The temperature above that of the stress-free state.
 
     Attributes:
@@ -233,102 +246,19 @@ class Temperature(_InRegion):
 
     def effect(self, mesh: dmesh.Mesh) -> Effect:
         """The thermal strain."""
-        return _checked(effects.thermal.Temperature, value=values.spatial_value(self.value, mesh))
+        return checked(effects.thermal.Temperature, value=values.spatial_value(self.value, mesh))
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Elastic(_InRegion):
-    """An elastic material.
+def checked(kind: type[Effect], **keys: Any) -> Effect:
+    """An effect of these keys.
 
-    Attributes:
-        model: by default plane_stress in 2D and three_dimensional in 3D.
-        thermal_expansion: 1/K.
-        region: where; None: in the whole body.
+    Args:
+        kind: its class.
+        **keys: as a scene has them.
+
+    Raises:
+        InputError: one of them is not allowed.
     """
-
-    model: Plane | None = None
-    thermal_expansion: float = 0.0
-    region: str | None = None
-
-    def _material(self, kind: type[Effect], mesh: dmesh.Mesh, **keys: Any) -> Effect:
-        usual = "plane_stress" if mesh.geometry.dim == 2 else "three_dimensional"
-        common = {"model": self.model or usual, "thermal_expansion": float(self.thermal_expansion)}
-        return _checked(kind, **common, **keys)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Isotropic(_Elastic):
-    """Isotropic linear elasticity (see also :class:`_Elastic`).
-
-    Attributes:
-        youngs_modulus: N/m².
-        poisson_ratio: between -1 and 0.5.
-    """
-
-    youngs_modulus: float
-    poisson_ratio: float
-
-    def effect(self, mesh: dmesh.Mesh) -> Effect:
-        """The material."""
-        keys = {"youngs_modulus": float(self.youngs_modulus), "poisson_ratio": float(self.poisson_ratio)}
-        return self._material(effects.elasticity.IsotropicElasticity, mesh, **keys)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Orthotropic(_Elastic):
-    """Orthotropic linear elasticity with the axes x, y, z (see also :class:`_Elastic`).
-
-    Attributes:
-        youngs_moduli: along x, y, z, N/m²; plane stress has two.
-        poisson_ratios: ν12, ν13, ν23; plane stress has the first only.
-        shear_moduli: G12, G13, G23, N/m²; plane models have the first only.
-    """
-
-    youngs_moduli: Sequence[float]
-    poisson_ratios: Sequence[float]
-    shear_moduli: Sequence[float]
-
-    def effect(self, mesh: dmesh.Mesh) -> Effect:
-        """The material."""
-        names = ("youngs_moduli", "poisson_ratios", "shear_moduli")
-        keys = {name: [float(value) for value in getattr(self, name)] for name in names}
-        return self._material(OrthotropicElasticity, mesh, **keys)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Anisotropic(_Elastic):
-    """Linear elasticity with any tensor (see also :class:`_Elastic`).
-
-    Attributes:
-        matrix: C in Voigt notation, N/m²: 3 rows in 2D (11, 22, 12), 6 rows in 3D (11, 22, 33, 23, 13, 12).
-    """
-
-    matrix: Sequence[Sequence[float]]
-
-    def effect(self, mesh: dmesh.Mesh) -> Effect:
-        """The material."""
-        return self._material(TensorElasticity, mesh, matrix=[[float(c) for c in row] for row in self.matrix])
-
-
-@dataclass(frozen=True)
-class Energy(_InRegion):
-    """An elasticity of the user's own: twice its energy is form(u, u).
-
-    Attributes:
-        form: makes the symmetric bilinear UFL form, in SI (J/m in 2D, J in 3D), of a trial function u and a test
-            function v in m. It must depend on their strains only.
-        region: where, if other materials are elsewhere; the form itself must then integrate over that region.
-    """
-
-    form: Callable[[Any, Any], Any]
-    region: str | None = None
-
-    def effect(self, mesh: dmesh.Mesh) -> Effect:
-        """The material, after a look at what it does to stretches and rigid motions. Collective."""
-        return UserEnergy.examined(self.form, mesh)
-
-
-def _checked(kind: type[Effect], **keys: Any) -> Effect:
     try:
         return kind(**keys)
     except ValidationError as error:

@@ -18,7 +18,7 @@ import numpy as np
 
 from ..errors import SolverError
 from ..typing import Array
-from .cutting_planes import Minimum, Programme
+from .cutting_planes import Minimum, Programme, without_limit
 from .functional import Functional, Region, ball, faces, idle
 
 
@@ -167,7 +167,7 @@ class GlobalProgramme:
             return self.convex.ratio(f, load, least)
         start = self.convex.minimise(f.unresisted().minus(load), ball(self.convex.frame))
         if start is None or -start.value <= least:
-            return self._unlimited(f, load, least)
+            return without_limit(self.minimise(f, idle(self.convex.frame, load)), least)
         y, limits = start.y, self.convex.thresholds
         factor = self.evaluate(f, y) / float(load @ y)
         for _ in range(limits.max_rounds):
@@ -179,11 +179,6 @@ class GlobalProgramme:
                 return -np.inf, y
             factor = self.evaluate(f, y) / work
         raise SolverError(f"rigid motions: no load factor after {limits.max_rounds} minima")
-
-    def _unlimited(self, f: Functional, load: Array, least: float) -> tuple[float, Array | None]:
-        """As that of :class:`.Programme`."""
-        found = self.minimise(f, idle(self.convex.frame, load))
-        return (np.inf, None) if found is None or found.value >= -least else (-np.inf, found.y)
 
     def _search(self, part: ConcavePart, region: Region, give_up: float) -> Minimum | None:
         limits, numbers, depth = self.convex.thresholds, count(), 0

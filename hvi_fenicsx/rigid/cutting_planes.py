@@ -18,7 +18,7 @@ import numpy as np
 
 from ..errors import SolverError
 from ..typing import Array
-from .functional import Functional, Region, SlipIntegral, ball, faces, idle
+from .functional import Functional, Region, SlipIntegral, ball, idle
 from .thresholds import DEFAULT, Thresholds
 
 
@@ -35,6 +35,16 @@ class Minimum:
     value: float
     y: Array
     lower: float
+
+
+def without_limit(idling: Minimum | None, least: float) -> tuple[float, Array | None]:
+    """The largest factor of a load that only ever holds: none, unless a motion it does no work on escapes.
+
+    Args:
+        idling: the least of a functional among the motions that the load does no work on; None: there are none.
+        least: values of at most this size for a unit motion count as none.
+    """
+    return (np.inf, None) if idling is None or idling.value >= -least else (-np.inf, idling.y)
 
 
 @dataclass
@@ -128,22 +138,6 @@ class Programme:
             f"rigid motions: {self.thresholds.max_rounds} cutting planes left a gap of {progress.best:.1e}"
         )
 
-    def sphere(self, f: Functional, across: Array) -> Minimum | None:
-        """Minimum of f over the cone and |y| = 1, one programme for each face; None if there is no such y.
-
-        Args:
-            f: the functional, with its cone.
-            across: motions (q, k) to which y is to be orthogonal.
-
-        Raises:
-            SolverError: the gap between value and bound does not close.
-        """
-        best: Minimum | None = None
-        for face in faces(self.frame, across):
-            found = self.minimise(f, face, np.inf if best is None else best.value)
-            best = found if best is None or (found is not None and found.value < best.value) else best
-        return best
-
     def ratio(self, f: Functional, load: Array, least: float) -> tuple[float, Array | None]:
         """The largest λ with λ load·y <= f(y) on the cone, and the motion that limits it (None if none does).
 
@@ -161,7 +155,7 @@ class Programme:
         """
         start = self.minimise(f.unresisted().minus(load), ball(self.frame))
         if start is None or -start.value <= least:
-            return self._unlimited(f, load, least)
+            return without_limit(self.minimise(f, idle(self.frame, load)), least)
         factor, limit = self.evaluate(f, start.y) / -start.value, start.y
         active, progress = _seeds(f.cone), GapHistory(self.scale, self.thresholds)
         for _ in range(self.thresholds.max_rounds):
@@ -176,11 +170,6 @@ class Programme:
                     factor, limit = value / work, found.y
             self._cut_towards(found.y, limit)
         raise SolverError(f"rigid motions: no load factor after {self.thresholds.max_rounds} cutting planes")
-
-    def _unlimited(self, f: Functional, load: Array, least: float) -> tuple[float, Array | None]:
-        """A load that only ever holds has no largest factor, unless a motion it does no work on escapes."""
-        found = self.minimise(f, idle(self.frame, load))
-        return (np.inf, None) if found is None or found.value >= -least else (-np.inf, found.y)
 
     def _cut(self, y: Array) -> None:
         for integral, cuts in zip(self.integrals, self.cuts, strict=True):
