@@ -125,6 +125,21 @@ def test_a_concave_kink_is_no_minimum_and_a_bound_makes_it_one() -> None:
     assert examine(check, Floor(problem)).minimiser is True
 
 
+def test_at_a_corner_the_uneven_part_is_turned_whatever_the_order() -> None:
+    mesh = block([1.0, 1.0], [2, 2])
+    points = mesh.points + [0.0, 1e-3] * ((mesh.points[:, 1:] == 0.0) & (mesh.points[:, :1] == 0.5))
+    uneven, corner = replace(mesh, points=points), 0
+    table = scene()
+    parts = [("floor", {"on": "bottom", "contact": {"gap": 0.0}}), ("side", {"on": "left", "contact": {"gap": 0.0}})]
+    for order in (parts, parts[::-1]):
+        table["boundary"] = dict(order)
+        normals = [b.normal for b in assemble(table, uneven).bounds if b.vertex == corner]
+        assert sorted(map(list, normals)) == [[-1.0, 0.0], [0.0, -1.0]]
+    table["boundary"] = dict(parts[:1]) | {"wall": {"on": "left", "displacement": [0.0, "free"]}}
+    (bound,) = [b for b in assemble(table, uneven).bounds if b.vertex == corner]
+    assert bound.normal == pytest.approx(np.array([2e-3, -1.0]) / np.hypot(2e-3, 1.0))
+
+
 def test_the_search_finds_what_exists_and_nothing_else() -> None:
     rng = np.random.default_rng(0)
     mesh = block([1.0, 1.0], [2, 2])

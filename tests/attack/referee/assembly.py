@@ -15,6 +15,8 @@ from referee.laws import Law, law_of
 from referee.meshes import Array, Integers, Mesh
 
 Table = dict[str, Any]
+FLAT = 1e-8
+"""Angle between the normals of a flat part, at most."""
 
 
 def formula(source: float | str, points: Array) -> Array:
@@ -167,6 +169,12 @@ class _Surface:
         found: Table | None = self.table.get("contact", {}).get("obstacle")
         return found
 
+    @property
+    def flat(self) -> bool:
+        """Whether all its normals are one: its mesh is flat, or an obstacle states it."""
+        mean = self.weights @ self.normals
+        return bool(np.linalg.norm(self.normals - mean / np.linalg.norm(mean), axis=1).max() <= FLAT)
+
 
 def _surface(mesh: Mesh, facets: Integers, table: Table) -> _Surface:
     vectors, vertices = facet_vectors(mesh, facets), np.unique(facets)
@@ -183,9 +191,9 @@ def _surface(mesh: Mesh, facets: Integers, table: Table) -> _Surface:
 
 
 def _turn(surfaces: list[_Surface], fixed: Integers, d: int) -> None:
-    """Where directions meet at a vertex the later one is made orthogonal or equal (docs/methods.md)."""
+    """Where directions meet at a vertex, uneven parts are turned towards what flat ones have (docs/methods.md)."""
     places: dict[int, list[tuple[_Surface, int]]] = {}
-    for s in sorted(surfaces, key=lambda s: s.obstacle is None):
+    for s in sorted(surfaces, key=lambda s: not s.flat):
         for i, v in enumerate(s.vertices):
             places.setdefault(int(v), []).append((s, i))
     for v, found in places.items():
