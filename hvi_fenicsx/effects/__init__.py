@@ -2,7 +2,7 @@
 
 from ..class_registry import load_modules
 from . import anisotropic, contact, elasticity, friction, loads, normal_laws, thermal
-from .base import Drive, Effect, Evaluate, FormContext, Place, Sizes, SurfaceLoad
+from .base import Drive, Effect, Evaluate, FormContext, Place, Sizes, SurfaceLoad, load_name
 from .contribution import Averaged, BoundaryLaw, Condition, Contribution, Direction, NormalBounds
 from .formula_field import FormulaField
 from .role import Role, role_of
@@ -27,6 +27,7 @@ __all__ = [
     "contact",
     "elasticity",
     "friction",
+    "load_name",
     "loads",
     "normal_laws",
     "role_of",

@@ -221,3 +221,13 @@ class Effect(BaseModel):
         """What it is, in a sentence or two: the first paragraph of its docstring."""
         text = inspect.cleandoc(cls.__doc__ or "")
         return text.split("\n\n")[0].replace("\n", " ").replace("`", "")
+
+
+def load_name(where: str | None, effect: Effect) -> str:
+    """The name of what drives the body at one place: a load, a prescribed displacement, a given strain.
+
+    Args:
+        where: a boundary part, a region, or None for the whole body.
+        effect: what drives it.
+    """
+    return f"{where or 'body'}.{effect.key}"

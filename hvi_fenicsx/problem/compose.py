@@ -14,7 +14,7 @@ import dolfinx
 import numpy as np
 from dolfinx import fem
 
-from ..effects import Effect, Evaluate, Place
+from ..effects import Evaluate, Place, load_name
 from ..errors import InputError
 from ..mesh.domain import Domain
 from ..runtime.mpi import agree
@@ -149,16 +149,6 @@ def _conditions(
     held = tuple((where, bc.dof_indices()[0]) for (where, _), bc in zip(wanted, conditions, strict=True))
     fixed = np.unique(np.concatenate([np.empty(0, np.int32), *(dofs for _, dofs in held)])).astype(np.int32)
     return conditions, held, fixed
-
-
-def load_name(where: str | None, effect: Effect) -> str:
-    """The name of a load among all.
-
-    Args:
-        where: a boundary part, a region, or None for the whole body.
-        effect: what loads it.
-    """
-    return f"{where or 'body'}.{effect.key}"
 
 
 def _by_name(contributions: Sequence[PlacedContribution], kind: str) -> dict[str, Any]:

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..effects import load_name
 from ..errors import InputError
 from ..mesh.domain import Domain
 from ..problem import scaling
-from ..problem.compose import Model, compose, load_name
+from ..problem.compose import Model, compose
 from ..runtime.timing import Timer
 from .system import System, compile_forms
 from .thresholds import DEFAULT, Thresholds

@@ -41,3 +41,14 @@ class HoldingForces:
         self._rows.mult(x if rotation is None else rotation * x, self._product)
         found[self._fixed] = self._product.array_r
         return found
+
+    def spread(self, values: Array) -> PETSc.Vec:
+        """The elastic forces that displacements of the prescribed unknowns alone make, Cartesian. Collective.
+
+        Args:
+            values: of those that this rank owns.
+        """
+        self._product.array[:] = values
+        forces = self._rows.createVecRight()
+        self._rows.multTranspose(self._product, forces)
+        return forces

@@ -84,6 +84,7 @@ class System:
         lower: lower bounds of u; infinite on Dirichlet rows.
         upper: upper bounds, likewise.
         references: what residuals are relative to, by body.
+        holding: the elastic forces at prescribed unknowns.
         forces: the assembled load vectors by name, unlifted (for the virtual work of rigid motions).
         pushing: the sum of those that do work on rigid motions, Cartesian, (vertices, d).
         free_motions: the rigid motions that nothing holds and no load moves; None where there are none.
@@ -197,13 +198,13 @@ class System:
 
     def holding_forces(self, x: PETSc.Vec) -> Array:
         """The elastic forces that supports, contact and laws take up; zero elsewhere, (n,). Collective."""
-        return self._holding.at(x, self.rotation, self.jacobian.rows, self._lift)
+        return self.holding.at(x, self.rotation, self.jacobian.rows, self._lift)
 
     def _constrained(self) -> tuple[PETSc.Mat, PETSc.Vec]:
         """Stiffness and load with the prescribed values: rows and columns of the identity, the load lifted."""
         matrix = self.problem.bulk.matrix()
         load, prescribed = self._unlifted(), new_vector(self.problem.space)
-        self._holding = HoldingForces(self.problem, matrix)
+        self.holding = HoldingForces(self.problem, matrix)
         set_bc(prescribed, list(self.problem.conditions))
         rows = (self.problem.fixed_here + load.owner_range[0]).astype(PETSc.IntType)
         matrix.zeroRowsColumns(rows, 1.0, prescribed, load)
