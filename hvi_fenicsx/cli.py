@@ -3,152 +3,18 @@
 from __future__ import annotations
 
 import argparse
-import math
+import importlib
 import os
 import shlex
 import signal
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from pathlib import Path
-from typing import Any, NoReturn
+from typing import NoReturn
 
+from .arguments import parser
 from .errors import ExitCode, HviError, InputError
 from .runtime import log, processes, rank_variables, terminal
-
-
-class _Parser(argparse.ArgumentParser):
-    """Errors of the command line are input errors like any other: one message, exit code 2."""
-
-    def error(self, message: str) -> NoReturn:
-        raise InputError(f"{message}; see `{self.prog} --help`")
-
-
-class _RunHelp(argparse.HelpFormatter):
-    """Lists the quantities, which are looked up when the help is printed: other commands need not wait for them."""
-
-    def _get_help_string(self, action: argparse.Action) -> str | None:
-        if action.dest != "quantity":
-            return super()._get_help_string(action)
-        from .accuracy import quantities
-
-        return f"{action.help}; one of {', '.join(quantities.names())}, or a plugin's own"
-
-
-def parser() -> argparse.ArgumentParser:
-    """The whole command line."""
-    main_parser = _Parser(
-        prog="hvi",
-        description="Semicoercive hemivariational inequalities: elastic bodies held by contact and nonmonotone laws.",
-        epilog="Exit codes: 0 certified, 2 bad input, 3 no solution exists, 4 not converged, 130 interrupted.",
-    )
-    commands = main_parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
-    _add_run_options(_add(commands, "run", "solve a scene; results go to results/SCENE or --out", _RunHelp))
-    _add_check_options(_add(commands, "check", "validate a scene and say whether a solution exists; solves nothing"))
-    _add_study_options(_add(commands, "study", "measure what accuracy costs in time, along several axes"))
-    _add(commands, "version", "versions of everything")
-    return main_parser
-
-
-def _add(
-    commands: Any, name: str, text: str, formatter: type[argparse.HelpFormatter] = argparse.HelpFormatter
-) -> argparse.ArgumentParser:
-    return commands.add_parser(name, help=text, description=text, formatter_class=formatter)
-
-
-def _add_scene_options(command: argparse.ArgumentParser) -> None:
-    command.add_argument("scene", type=Path, metavar="SCENE.toml", help="the scene file")
-    command.add_argument(
-        "--set",
-        action="append",
-        default=[],
-        dest="overrides",
-        metavar="KEY=VALUE",
-        help="override a value of the scene, like domain.cells=[64,64]",
-    )
-
-
-def _add_run_options(run: argparse.ArgumentParser) -> None:
-    _add_scene_options(run)
-    run.add_argument("--out", type=Path, metavar="DIR", help="the folder for the result")
-    run.add_argument("--force", action="store_true", help="replace a result that is there")
-    run.add_argument("--resume", action="store_true", help="keep a finished result of the same scene, else run it")
-    run.add_argument(
-        "--accuracy",
-        type=_relative_error,
-        metavar="REL",
-        help="choose mesh, ε and tolerances so that the relative error is below REL, like 1e-2",
-    )
-    run.add_argument("--quantity", metavar="NAME", help="the quantity whose error --accuracy bounds, by default energy")
-    run.add_argument(
-        "--time-budget", type=_seconds, metavar="S", help="find the most accurate solution within S seconds"
-    )
-    run.add_argument("--np", type=_ranks, metavar="N", help="run on N MPI ranks")
-    run.add_argument("--petsc", default="", metavar="OPTIONS", help='PETSc options, like "-hvi_ksp_monitor"')
-    run.add_argument("--no-pictures", action="store_true", help="write no pictures")
-
-
-def _add_check_options(check: argparse.ArgumentParser) -> None:
-    _add_scene_options(check)
-    check.add_argument(
-        "--load",
-        action="append",
-        default=[],
-        dest="loads",
-        metavar="NAME",
-        help="also print the factors of this load, the others constant: its part or region, or PART.traction",
-    )
-    check.add_argument("--json", action="store_true", help="print the report as JSON")
-
-
-def _add_study_options(study: argparse.ArgumentParser) -> None:
-    _add_scene_options(study)
-    study.add_argument(
-        "--axis",
-        action="append",
-        default=[],
-        metavar="NAME=VALUE,...",
-        help="solve the scene for each VALUE of mesh, epsilon, epsilon_absolute, smoothing, method, tolerance, "
-        "linear_solver or accuracy; several axes: all combinations; none: the program plans the study",
-    )
-    study.add_argument("--out", type=Path, metavar="DIR", help="the folder for the study; else results/SCENE-study")
-    study.add_argument("--force", action="store_true", help="replace a study that is there")
-    study.add_argument("--resume", action="store_true", help="keep the points that are finished")
-    study.add_argument("--repeat", type=_repetitions, metavar="N", help="solve a point at most N times for its time")
-    study.add_argument("--limit", type=_seconds, metavar="SECONDS", help="give a point up after so many seconds")
-    study.add_argument("--np", type=_ranks, metavar="N", help="run each point on N MPI ranks")
-
-
-def _relative_error(text: str) -> float:
-    return _number(text, 1.0, "a relative error between 0 and 1, like 1e-2")
-
-
-def _seconds(text: str) -> float:
-    return _number(text, math.inf, "a number of seconds above 0")
-
-
-def _number(text: str, below: float, allowed: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not 0 < value < below:
-        raise argparse.ArgumentTypeError(f"must be {allowed} (is {text!r})")
-    return value
-
-
-def _repetitions(text: str) -> int:
-    return _whole_number(text, 1000)
-
-
-def _ranks(text: str) -> int:
-    return _whole_number(text, 4096)
-
-
-def _whole_number(text: str, most: int) -> int:
-    if not text.isdigit() or not 1 <= int(text) <= most:
-        raise argparse.ArgumentTypeError(f"must be a whole number from 1 to {most} (is {text!r})")
-    return int(text)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -214,24 +80,26 @@ def _dispatch(options: argparse.Namespace, words: Sequence[str]) -> int:
 
         return mpirun.run(options.np, words)
     if not rank_variables.is_under_mpirun():
-        return _run_or_check(options)
+        return _run_on_ranks(options)
     from .runtime import mpirun
 
     processes.die_with_parent(signal.SIGKILL)
-    return mpirun.hand_over(_told(lambda: _run_or_check(options)))
+    return mpirun.hand_over(_told(lambda: _run_on_ranks(options)))
 
 
-def _run_or_check(options: argparse.Namespace) -> int:
+def _run_on_ranks(options: argparse.Namespace) -> int:
     with _interrupts_held():
         from .runtime import petsc
 
         petsc.start()
-        from . import commands
+        from mpi4py import MPI
+
         from .runtime.mpi import ended_together
         from .system.petsc_options import refusals_told
 
-    with ended_together(commands.COMM), _placed(options), refusals_told():
-        return commands.run(options) if options.command == "run" else commands.check(options)
+        command = importlib.import_module(f".commands.{options.command}", __package__)
+    with ended_together(MPI.COMM_WORLD), _placed(options), refusals_told():
+        return int(command.execute(options))
 
 
 @contextmanager

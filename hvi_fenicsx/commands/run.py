@@ -1,39 +1,30 @@
-"""What the commands do: scene to result folder (``run``), scene to report (``check``). Collective under mpirun."""
+"""``hvi run``: a scene solved into a result folder."""
 
 from __future__ import annotations
 
 import argparse
-import json
-import logging
-from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
-from mpi4py import MPI
-
-from . import console, results
-from .accuracy import control, quantities
-from .accuracy.adaptive import AdaptiveSolver
-from .accuracy.goal import AccuracyResult, Goal
-from .errors import ExitCode, InputError
-from .report.html import render
-from .results.output_folder import Existing
-from .results.whole import write_whole
-from .runtime import log, terminal
-from .runtime.mpi import on_root
-from .runtime.signals import Interrupt
-from .runtime.timing import Timer
-from .scene import Scene, read_scene
-from .solution import Solution
-from .system import petsc_options
-from .workflow import Preparation, finish, prepare
-
-COMM = MPI.COMM_WORLD
-H = TypeVar("H", bound=logging.Handler)
-_LOG = log.logger("commands")
-_CODES = {"escapes": ExitCode.NO_SOLUTION, "undecided": ExitCode.NOT_CONVERGED}
-"""What ``hvi check`` ends with, by the state."""
+from .. import console, results
+from ..accuracy import control, quantities
+from ..accuracy.adaptive import AdaptiveSolver
+from ..accuracy.goal import AccuracyResult, Goal
+from ..errors import ExitCode, InputError
+from ..report.html import render
+from ..results.output_folder import Existing
+from ..results.whole import write_whole
+from ..runtime import log, terminal
+from ..runtime.mpi import on_root
+from ..runtime.signals import Interrupt
+from ..runtime.timing import Timer
+from ..scene import Scene, read_scene
+from ..solution import Solution
+from ..system import petsc_options
+from ..workflow import finish, prepare
+from . import telling
+from .telling import COMM
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,7 +48,7 @@ class RunRequest:
     draw: bool
 
 
-def run(options: argparse.Namespace) -> int:
+def execute(options: argparse.Namespace) -> int:
     """Solve a scene into a folder; the exit code by the contract. Collective.
 
     Raises:
@@ -96,15 +87,15 @@ def _run(request: RunRequest) -> int:
     """Solve, write and tell; the exit code. Collective."""
     interrupt = Interrupt(COMM)
     interrupt.watch()
-    folder, run_logs = request.folder, _on_first_rank(lambda: log.RunLog(request.folder.work / "run.log"))
-    with log.Handlers(*_on_first_rank(log.TerminalDisplay)):
+    folder, run_logs = request.folder, telling.on_first_rank(lambda: log.RunLog(request.folder.work / "run.log"))
+    with log.Handlers(*telling.on_first_rank(log.TerminalDisplay)):
         with log.Handlers(*run_logs):
             solution, reached = _solve(request, interrupt)
             given = {**request.given, **(_accuracy(reached) if reached else {})}
-            record = write_whole(folder, solution, request.timer, given, _LOG.info, draw=request.draw)
-        on_root(COMM, lambda: _finish(run_logs))
+            record = write_whole(folder, solution, request.timer, given, telling.LOG.info, draw=request.draw)
+        on_root(COMM, lambda: telling.finish(run_logs))
         folder.commit(request.scene)
-        _say([*(f"warning: {text}" for text in folder.kept), on_root(COMM, lambda: _where(request))])
+        telling.say([*(f"warning: {text}" for text in folder.kept), on_root(COMM, lambda: _where(request))])
     return int(record["exit_code"])
 
 
@@ -114,24 +105,12 @@ def _where(request: RunRequest) -> str:
     return f"{request.folder.target}: {request.timer.total:.1f} s in all{first}"
 
 
-def _on_first_rank(make: Callable[[], H]) -> list[H]:
-    """The handler that rank 0 makes, none on the others. Collective."""
-    made: list[H] = []
-    on_root(COMM, lambda: made.append(make()))
-    return made
-
-
-def _finish(run_logs: Iterable[log.RunLog]) -> None:
-    for run_log in run_logs:
-        run_log.finish()
-
-
 def _solve(request: RunRequest, interrupt: Interrupt) -> tuple[Solution, AccuracyResult | None]:
     """The solution; with it, where an accuracy was asked for, how it was reached. Collective."""
     if request.goal is not None:
         solver = AdaptiveSolver(timer=request.timer, interrupted=interrupt.requested)
-        reached = control.solve_to_goal(request.scene, COMM, request.goal, solver, _LOG.info)
-        _say(
+        reached = control.solve_to_goal(request.scene, COMM, request.goal, solver, telling.LOG.info)
+        telling.say(
             [
                 *console.outcome(reached.solution),
                 *console.warnings(reached.solution.warnings),
@@ -140,16 +119,11 @@ def _solve(request: RunRequest, interrupt: Interrupt) -> tuple[Solution, Accurac
         )
         return reached.solution, reached
     prepared = prepare(request.scene, COMM, request.timer)
-    _say(console.heading(prepared, COMM.size))
+    telling.say(console.heading(prepared, COMM.size))
     solution = finish(prepared, interrupted=interrupt.requested)
     new = (warning for warning in solution.warnings if warning not in prepared.warnings)
-    _say([*console.outcome(solution), *console.warnings(new)])
+    telling.say([*console.outcome(solution), *console.warnings(new)])
     return solution, None
-
-
-def _say(lines: Iterable[str]) -> None:
-    for line in lines:
-        _LOG.info(line)
 
 
 def _accuracy(reached: AccuracyResult) -> dict[str, Any]:
@@ -174,26 +148,3 @@ def _same_goal(goal: Goal | None, recorded: dict[str, Any] | None) -> bool:
     if goal is None or recorded is None:
         return goal is None and recorded is None
     return goal.as_dict().items() <= recorded.items()
-
-
-def check(options: argparse.Namespace) -> int:
-    """Validate a scene and print its effects, rigid motions and existence; the exit code by the contract. Collective.
-
-    Raises:
-        InputError: on all ranks alike.
-    """
-    scene = on_root(COMM, lambda: read_scene(options.scene, options.overrides))
-    prepared = prepare(scene, COMM)
-    text = _report(prepared, options.loads, as_json=options.json)
-    if COMM.rank == 0:
-        terminal.say(text)
-    return _CODES.get(prepared.solvability.state, ExitCode.CERTIFIED)
-
-
-def _report(prepared: Preparation, loads: Sequence[str], *, as_json: bool) -> str:
-    """What ``check`` prints. Collective."""
-    factors = {name: prepared.load_factors(name) for name in loads}
-    if as_json:
-        return json.dumps(console.as_data(prepared, factors), indent=2, ensure_ascii=False)
-    lines = [*console.heading(prepared, COMM.size), *console.load_factors(factors), *console.effects(prepared)]
-    return "\n".join(lines)
