@@ -17,8 +17,9 @@ from petsc4py import PETSc
 from scipy.optimize import least_squares
 from scipy.sparse import csr_matrix
 
-from ..errors import InputError, SolverError
+from ..errors import InputError
 from ..laws import Superpotential
+from ..system.interior import Interior
 from ..system.system import LawModel, System
 from ..typing import Array, Integers
 from .context import SolveContext
@@ -160,7 +161,6 @@ class _Schur:
 
     Attributes:
         kept: the dofs of Γc's vertices that are not prescribed, ascending, (n,).
-        rest: all other dofs.
         G: forces on Γc by the rest of the body, for unit contact displacements, (n, n).
         g: forces on Γc by the loads on the rest of the body, (n,).
         lower: lower bounds, (n,).
@@ -170,38 +170,11 @@ class _Schur:
     def __init__(self, system: System) -> None:
         self.system = system
         system.jacobian.set_rates([np.zeros_like(k) for k in system.jacobian.rates])
-        self.kept, self.rest = _partition(system)
-        self._factor = self._factorised()
-        self._coupling = _sparse(system.jacobian.matrix)[self.rest][:, self.kept].tocsc()
-        self.G = np.empty((self.kept.size, self.kept.size))
-        at_once = system.thresholds.dense_columns
-        for start in range(0, self.kept.size, at_once):
-            block = slice(start, start + at_once)
-            self.G[:, block] = self._coupling.T @ self._solve(self._coupling[:, block].toarray())
-        self.g = self._coupling.T @ self._solve(system.load.array_r[self.rest])
+        self.kept = _kept(system)
+        self._interior = Interior(system, self.kept)
+        self.G = self._interior.response()
+        self.g = self._interior.pulled(self._interior.solve(system.load.array_r[:, None]))[:, 0]
         self.lower, self.upper = system.lower.array_r[self.kept], system.upper.array_r[self.kept]
-
-    def _factorised(self) -> PETSc.PC:
-        rows = PETSc.IS().createGeneral(self.rest.astype(PETSc.IntType), comm=self.system.comm)
-        pc = PETSc.PC().create(self.system.comm)
-        pc.setOperators(self.system.jacobian.matrix.createSubMatrix(rows, rows))
-        pc.setType(PETSc.PC.Type.LU)
-        pc.setFactorSolverType(PETSc.Mat.SolverType.MUMPS)
-        pc.setUp()
-        if pc.getFailedReason():
-            raise SolverError("the stiffness without its contact displacements is singular: MUMPS met a zero pivot")
-        return pc
-
-    def _solve(self, right: Array) -> Array:
-        """The solutions for right-hand sides (n,) or (n, k)."""
-        if not right.size:  # every unknown is on Γc
-            return right
-        columns = np.asfortranarray(right.reshape(len(right), -1))
-        b = PETSc.Mat().createDense(columns.shape, array=columns, comm=self.system.comm)
-        x = PETSc.Mat().createDense(columns.shape, comm=self.system.comm)
-        x.assemble()
-        self._factor.getFactorMatrix().matSolve(b, x)
-        return np.array(x.getDenseArray()).reshape(right.shape)
 
     def spread(self, values: Array) -> PETSc.Vec:
         """A displacement of the whole body with these values on Γc, and zero elsewhere."""
@@ -211,8 +184,8 @@ class _Schur:
 
     def expand(self, values: Array) -> PETSc.Vec:
         """The displacement of the whole body in equilibrium with these contact displacements."""
-        x = self.spread(values)
-        x.array[self.rest] = self._solve(self.system.load.array_r[self.rest] - self._coupling @ values)
+        x = self.system.undisplaced()
+        x.array[:] = self._interior.expand(values, self.system.load.array_r)
         return x
 
 
@@ -220,13 +193,9 @@ def _sparse(matrix: PETSc.Mat) -> Any:
     return csr_matrix(matrix.getValuesCSR()[::-1], shape=matrix.getSize())
 
 
-def _partition(system: System) -> tuple[Integers, Integers]:
-    """The free dofs of Γc's vertices, and all others; prescribed ones have rows of the identity."""
-    d = system.problem.scales.dimension
-    blocks = [s.blocks for s in system.problem.surfaces]
-    vertices = np.unique(np.concatenate([np.empty(0, np.int32), *blocks])).astype(np.int64)
-    kept = np.setdiff1d((vertices[:, None] * d + np.arange(d)).ravel(), system.problem.fixed)
-    return kept, np.setdiff1d(np.arange(system.dofs), kept)
+def _kept(system: System) -> Integers:
+    """The free dofs of Γc's vertices; prescribed ones have rows of the identity."""
+    return np.setdiff1d(system.jacobian.rows.dofs, system.problem.fixed)
 
 
 class _Complementarity:

@@ -9,7 +9,7 @@ which they are held by their diagonals (:meth:`.Jacobian.hold`).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Literal, Protocol
 
@@ -22,7 +22,7 @@ from ..typing import Array, Entities
 from . import multigrid, schur
 from .levels import Levels
 from .matrix_copy import MatrixCopy
-from .petsc_options import PREFIX, configure
+from .petsc_options import CHOLESKY, PREFIX, configure
 from .system import System
 from .thresholds import DEFAULT, Thresholds
 
@@ -44,7 +44,6 @@ _MG: dict[str, object] = {
     "mg_coarse_ksp_type": "preonly",
     "mg_coarse_pc_type": "redundant",
 }
-_LU: dict[str, object] = {"pc_type": "cholesky", "pc_factor_mat_solver_type": "mumps"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,9 +89,9 @@ class LinearSettings:
         return {"ksp_type": "preonly"} if self.kind == "lu" else {"ksp_type": "cg", "ksp_norm_type": "unpreconditioned"}
 
     @property
-    def pc(self) -> dict[str, object]:
+    def pc(self) -> Mapping[str, object]:
         """Default options of the preconditioner."""
-        return {"lu": _LU, "gamg": _GAMG, "mg": _MG}[self.kind]
+        return {"lu": CHOLESKY, "gamg": _GAMG, "mg": _MG}[self.kind]
 
 
 def _small(system: System, thresholds: Thresholds) -> bool:

@@ -38,8 +38,29 @@ class HoldingForces:
         """
         found = np.zeros(x.local_size)
         found[rows.dofs] = rows.elastic(x) + lift
+        found[self._fixed] = self.at_prescribed(x, rotation)
+        return found
+
+    def at_prescribed(self, x: PETSc.Vec, rotation: PETSc.Mat | None) -> Array:
+        """The elastic forces at the prescribed unknowns of this rank. Collective.
+
+        Args:
+            x: the unknowns.
+            rotation: Q with u = Q x; None where both are the same.
+        """
         self._rows.mult(x if rotation is None else rotation * x, self._product)
-        found[self._fixed] = self._product.array_r
+        return np.array(self._product.array_r)
+
+    def pull(self, prescribed: PETSc.Vec) -> PETSc.Vec:
+        """The elastic forces of prescribed displacements on a body that is undisplaced elsewhere. Collective.
+
+        Args:
+            prescribed: Cartesian, zero where nothing is prescribed.
+        """
+        values, found = self._product.duplicate(), prescribed.duplicate()
+        values.array[:] = prescribed.array_r[self._fixed]
+        self._rows.multTranspose(values, found)
+        values.destroy()
         return found
 
     def spread(self, values: Array) -> PETSc.Vec:

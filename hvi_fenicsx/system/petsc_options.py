@@ -14,6 +14,8 @@ from petsc4py import PETSc
 from ..errors import InputError
 
 PREFIX = "hvi_"
+CHOLESKY: Mapping[str, object] = {"pc_type": "cholesky", "pc_factor_mat_solver_type": "mumps"}
+"""Options of a direct solver."""
 
 
 @contextmanager

@@ -12,10 +12,10 @@ from collections.abc import Mapping
 import numpy as np
 from petsc4py import PETSc
 from scipy.linalg import LinAlgWarning, block_diag, lu_factor, lu_solve
-from scipy.sparse import csr_matrix
 
 from ..typing import Array, Entities, Mask
-from .petsc_options import PREFIX, default_options
+from .interior import Interior
+from .petsc_options import PREFIX
 from .system import System
 
 
@@ -48,13 +48,8 @@ class SchurDirect:
 
     def __init__(self, system: System, options: Mapping[str, object]) -> None:
         self._system, self._dofs = system, system.jacobian.rows.dofs
-        bulk = system.jacobian.rows.bulk
-        rows = csr_matrix(bulk.getValuesCSR()[::-1], shape=bulk.getSize())
-        self._coupling = rows.copy()
-        self._coupling.data[np.isin(rows.indices, self._dofs)] = 0.0
-        self._coupling.eliminate_zeros()
-        self._factor = self._factorised_interior(options)
-        self._stiffness = rows[:, self._dofs].toarray() - self._interior_response()
+        self._interior = Interior(system, self._dofs, options, PREFIX)
+        self._stiffness = self._interior.stiffness()
         self._lu: tuple[Array, Entities] | None = None
         self._free: Mask = np.ones(len(self._dofs), dtype=bool)
         self._work = system.load.duplicate()
@@ -62,35 +57,6 @@ class SchurDirect:
         self.pc.setType(PETSc.PC.Type.PYTHON)
         self.pc.setPythonContext(self)
         self.pc.setOperators(self.matrix)
-
-    def _factorised_interior(self, options: Mapping[str, object]) -> PETSc.PC:
-        """The factorised body with Γc held."""
-        matrix = self._system.jacobian.matrix.copy()
-        matrix.zeroRowsColumns(self._dofs.astype(PETSc.IntType), diag=1.0)
-        matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
-        pc = PETSc.PC().create(self._system.comm)
-        pc.setOptionsPrefix(PREFIX)
-        pc.setOperators(matrix)
-        with default_options(options):
-            pc.setFromOptions()
-            pc.setUp()
-        return pc
-
-    def _interior_response(self) -> Array:
-        """Forces on Γc by the body inside, for unit displacements of Γc, (n, n)."""
-        columns, at_once = self._coupling.T.tocsc(), self._system.thresholds.dense_columns
-        response = np.empty((len(self._dofs),) * 2)
-        for start in range(0, len(self._dofs), at_once):
-            block = slice(start, start + at_once)
-            right = np.asfortranarray(columns[:, block].toarray())
-            b = PETSc.Mat().createDense(right.shape, array=right, comm=self._system.comm)
-            x = PETSc.Mat().createDense(right.shape, comm=self._system.comm)
-            x.assemble()
-            self._factor.getFactorMatrix().matSolve(b, x)
-            response[:, block] = self._coupling @ x.getDenseArray()
-            b.destroy()
-            x.destroy()
-        return response
 
     def prepare(self, held: Entities) -> None:
         """Take the present tangent, and hold these dofs; all that are not prescribed must be on Γc."""
@@ -110,17 +76,18 @@ class SchurDirect:
             x: the right-hand side.
             y: where the solution is written.
         """
-        inner = self._work
+        inner, coupling = self._work, self._interior.coupling
         x.copy(inner)
         inner.array[self._dofs] = 0.0
-        self._factor.apply(inner, y)
-        value = x.array_r[self._dofs] - np.where(self._free, self._coupling @ y.array_r, 0.0)
+        self._interior.pc.apply(inner, y)
+        value = x.array_r[self._dofs] - np.where(self._free, coupling.T @ y.array_r, 0.0)
         value = lu_solve(self._lu, value, check_finite=False)
-        inner.array[:] -= self._coupling.T @ np.where(self._free, value, 0.0)
-        self._factor.apply(inner, y)
+        inner.array[:] -= coupling @ np.where(self._free, value, 0.0)
+        self._interior.pc.apply(inner, y)
         y.array[self._dofs] = value
 
     def free(self) -> None:
         """Free the PETSc objects (not named ``destroy``: petsc4py calls that with every PC of the context)."""
-        for thing in (self.pc, self._factor, self._work):
+        for thing in (self.pc, self._work):
             thing.destroy()
+        self._interior.free()

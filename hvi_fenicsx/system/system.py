@@ -88,6 +88,7 @@ class System:
         forces: the assembled load vectors by name, unlifted (for the virtual work of rigid motions).
         pushing: the sum of those that do work on rigid motions, Cartesian, (vertices, d).
         free_motions: the rigid motions that nothing holds and no load moves; None where there are none.
+        holding: the rows of the elastic operator at prescribed unknowns.
     """
 
     def __init__(

@@ -1,0 +1,207 @@
+"""A system condensed to the unknowns of Γc that carry a bound or a law, as a dense problem of arrays.
+
+All unknowns of Γc's vertices are kept first (:mod:`.interior`): with them a body is held. Those that carry nothing are
+then eliminated as well, as far as the others hold the body: where a rigid motion leaves all bounds and laws as they
+are, one unknown for each such motion stays.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass
+
+import numpy as np
+from petsc4py import PETSc
+from scipy.linalg import cho_factor, cho_solve
+from scipy.linalg.lapack import dpstrf
+
+from ..runtime.mpi import agree
+from ..typing import Array, Integers
+from . import condensed_laws, loading
+from .condensed_problem import CondensedProblem
+from .interior import Interior
+from .system import System
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Carriers:
+    """The vertices' unknowns, the same on all ranks.
+
+    Attributes:
+        lower: bounds, (n,).
+        upper: bounds, (n,).
+        points: vertices, m, (n, 3).
+        parts: the part whose contact bounds the unknown, (n,).
+        carrying: numbers of those that carry a bound or a law.
+    """
+
+    lower: Array
+    upper: Array
+    points: Array
+    parts: tuple[str, ...]
+    carrying: Integers
+
+
+class Condensation:
+    """A condensed system, which expands condensed unknowns to the whole body. Creation is collective.
+
+    Args:
+        system: the system, nothing held and without tangents of laws.
+        scaled: names (``part.effect``) of the loads and prescribed displacements that the factor scales; None: all.
+
+    Attributes:
+        problem: the arrays.
+
+    Raises:
+        InputError: on all ranks alike: a name in ``scaled`` is none; a law on |u_t| cannot be condensed.
+        SolverError: a body without contact is not held.
+    """
+
+    def __init__(self, system: System, scaled: Collection[str] | None = None) -> None:
+        self._system, self._loading = system, loading.make(system, scaled)
+        kept = np.setdiff1d(system.jacobian.rows.dofs, np.union1d(system.problem.fixed, system.pins))
+        self._interior = Interior(system, kept)
+        laws = condensed_laws.make(system, self._interior, self._loading.prescribed)
+        carriers = _carriers(system, self._interior, laws)
+        whole = self._interior.stiffness()
+        self._split(whole, carriers.carrying)
+        self.problem = self._condensed(whole, carriers, laws)
+
+    def _split(self, whole: Array, carrying: Integers) -> None:
+        """Which of Γc's unknowns are eliminated, and their factorised stiffness."""
+        rest = np.setdiff1d(np.arange(len(whole)), carrying)
+        gone = rest[_regular(whole[np.ix_(rest, rest)], len(whole) * self._system.thresholds.rounding)]
+        self._gone, self._stay = np.sort(gone), np.setdiff1d(np.arange(len(whole)), gone)
+        self._factor = cho_factor(whole[np.ix_(self._gone, self._gone)]) if self._gone.size else None
+        self._coupling = whole[np.ix_(self._gone, self._stay)]
+
+    def _eliminated(self, right: Array) -> Array:
+        """The inverse stiffness of the eliminated unknowns times columns."""
+        return right if self._factor is None else np.asarray(cho_solve(self._factor, right))
+
+    def _condensed(self, whole: Array, carriers: _Carriers, laws: condensed_laws.CondensedLaws) -> CondensedProblem:
+        """The problem on the unknowns that stay. Collective."""
+        stay, at = self._stay, self._coupling
+        stiffness = whole[np.ix_(stay, stay)] - at.T @ self._eliminated(at)
+        force, applied, constant, applied_constant = self._loads()
+        laws = laws.renumbered(stay, len(whole))
+        return CondensedProblem(
+            stiffness=0.5 * (stiffness + stiffness.T),
+            force=force[:, 0],
+            force_rate=force[:, 1],
+            lower=carriers.lower[stay],
+            upper=carriers.upper[stay],
+            bonds=laws.bonds,
+            prescribed_bonds=laws.prescribed,
+            constant=constant,
+            applied=applied.T,
+            applied_constant=applied_constant,
+            points=carriers.points[stay],
+            parts=tuple(carriers.parts[i] for i in stay),
+        )
+
+    def _loads(self) -> tuple[Array, Array, Array, Array]:
+        """Condensed forces and applied loads (n, 2), and the constants of the energy and of <g, u>. Collective."""
+        interior, load, total = self._interior, self._loading, self._system.comm.allreduce
+        fixed = self._system.problem.fixed_here
+        inner = interior.solve(load.lifted)
+        inside = inner.copy()
+        inside[fixed] = 0.0
+        lifted, applied = load.lifted.copy(), load.applied.copy()
+        lifted[fixed] = applied[fixed] = 0.0
+        self._force = interior.gathered(lifted) - interior.pulled(inside)
+        outer = interior.gathered(applied) - interior.pulled(interior.solve(applied))
+        held = 0.5 * load.prescribed.T @ load.pulled - load.prescribed.T @ load.applied
+        constant = total(held - 0.5 * lifted.T @ inside)
+        product = total(load.applied.T @ inner)
+        gone, stay = self._gone, self._stay
+        moved = self._eliminated(self._force[gone])
+        constant = constant - 0.5 * self._force[gone].T @ moved
+        product = product + outer[gone].T @ moved
+        force = self._force[stay] - self._coupling.T @ moved
+        outer = outer[stay] - self._coupling.T @ self._eliminated(outer[gone])
+        return force, outer, _quadratic(constant), _quadratic(product)
+
+    def values(self, x: Array, factor: float = 1.0) -> Array:
+        """The displacements of all unknowns of Γc that the body keeps, (n of the interior,).
+
+        Args:
+            x: the condensed unknowns, (n,).
+            factor: λ.
+        """
+        found = np.empty(self._interior.size)
+        found[self._stay] = x
+        load = self._force[self._gone] @ np.array([1.0, factor])
+        found[self._gone] = self._eliminated(load - self._coupling @ x)
+        return found
+
+    def expand(self, x: Array, factor: float = 1.0) -> PETSc.Vec:
+        """The unknowns of the whole body in equilibrium with condensed ones. Collective.
+
+        Args:
+            x: the condensed unknowns, (n,).
+            factor: λ.
+        """
+        found = self._system.load.duplicate()
+        right = self._loading.lifted @ np.array([1.0, factor])
+        found.array[:] = self._interior.expand(self.values(x, factor), right)
+        return found
+
+    def load(self, factor: float = 1.0) -> PETSc.Vec:
+        """The system's load at a factor, prescribed values in their rows, as :attr:`.System.load`. Collective.
+
+        Args:
+            factor: λ.
+        """
+        found = self._system.load.duplicate()
+        found.array[:] = self._loading.lifted @ np.array([1.0, factor])
+        return found
+
+    def reactions(self, u: PETSc.Vec, factor: float = 1.0) -> Array:
+        """Forces A u - g at this rank's unknowns: where a support, contact or a law holds the body. Collective.
+
+        Args:
+            u: the unknowns of the whole body, as :meth:`expand` finds them.
+            factor: λ.
+        """
+        weights, fixed, out = np.array([1.0, factor]), self._system.problem.fixed_here, u.duplicate()
+        self._system.jacobian.elastic_product(u, out)
+        found = np.asarray(out.array_r - self._loading.lifted @ weights)
+        applied = self._loading.applied @ weights
+        found[fixed] = self._system.holding.at_prescribed(u, self._system.rotation) - applied[fixed]
+        return found
+
+    def free(self) -> None:
+        """Free the PETSc objects."""
+        self._interior.free()
+
+
+def _regular(matrix: Array, tolerance: float) -> Integers:
+    """Numbers of the unknowns in a greatest regular part of a semidefinite matrix (pivoted Cholesky)."""
+    if not matrix.size:
+        return np.empty(0, np.int64)
+    _, pivots, rank, _ = dpstrf(matrix, tol=tolerance * float(np.max(np.diag(matrix))), lower=1)
+    return np.asarray(pivots[:rank] - 1, dtype=np.int64)
+
+
+def _quadratic(products: Array) -> Array:
+    """c0, c1, c2 of the bilinear form at (1, λ)."""
+    return np.array([products[0, 0], products[0, 1] + products[1, 0], products[1, 1]])
+
+
+def _carriers(system: System, interior: Interior, laws: condensed_laws.CondensedLaws) -> _Carriers:
+    """What the kept unknowns carry. Collective."""
+    lower, upper = (interior.gathered(v.array_r) for v in (system.lower, system.upper))
+    bounded = np.isfinite(lower) | np.isfinite(upper)
+    with_law = [b.unknowns.ravel() for b in laws.bonds]
+    d = system.problem.scales.dimension
+    named = np.full(system.load.local_size, "", dtype=object)
+    for bounds in system.bounds:
+        named[bounds.component()[0]] = bounds.surface.part
+    return _Carriers(
+        lower=lower,
+        upper=upper,
+        points=np.concatenate(agree(system.comm, system.problem.points[interior.kept // d])),
+        parts=tuple(str(p) if b else "" for p, b in zip(interior.gathered(named), bounded, strict=True)),
+        carrying=np.unique(np.concatenate([np.flatnonzero(bounded), *with_law])).astype(np.int64),
+    )

@@ -1,0 +1,110 @@
+"""The laws of a system on the kept unknowns of its interior, of all ranks, by law and number of components."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..errors import InputError
+from ..problem.law_term import LawTerm
+from ..runtime.mpi import agree
+from ..typing import Array, Integers
+from .condensed_problem import Bonds, PrescribedBonds
+from .interior import Interior
+from .system import System
+
+
+@dataclass(frozen=True, kw_only=True)
+class CondensedLaws:
+    """The laws on some unknowns.
+
+    Attributes:
+        bonds: where displacements are free.
+        prescribed: where they are prescribed.
+    """
+
+    bonds: tuple[Bonds, ...]
+    prescribed: tuple[PrescribedBonds, ...]
+
+    def renumbered(self, stay: Integers, size: int) -> CondensedLaws:
+        """The laws on fewer unknowns.
+
+        Args:
+            stay: numbers of the unknowns that stay.
+            size: number of all.
+        """
+        number = np.full(size, -1)
+        number[stay] = np.arange(len(stay))
+        return replace(self, bonds=tuple(replace(b, unknowns=number[b.unknowns]) for b in self.bonds))
+
+
+def make(system: System, interior: Interior, prescribed: Array) -> CondensedLaws:
+    """The laws of a system. Collective.
+
+    Args:
+        system: the system.
+        interior: which unknowns are kept.
+        prescribed: prescribed displacements, constant and scaled, (local unknowns, 2).
+
+    Raises:
+        InputError: on all ranks alike: a law on |u_t| where one component has a prescribed value that is not zero.
+    """
+    number = np.full(system.load.local_size, -1)
+    number[interior.kept] = interior.first + np.arange(len(interior.kept))
+    found = [_Term(system, term, number, prescribed) for term in system.terms]
+    bonds = [b for term in found for k in (1, 2) for b in term.bonds(k)]
+    held = [b for term in found for b in term.prescribed_bonds()]
+    return CondensedLaws(bonds=tuple(bonds), prescribed=tuple(held))
+
+
+class _Term:
+    """One law, its directions along the axes of the vertices' unknowns. Creation is collective."""
+
+    def __init__(self, system: System, term: LawTerm, number: Integers, prescribed: Array) -> None:
+        self._comm, self._term = system.comm, term
+        dofs, along = term.surface.dofs, np.any(term.directions != 0.0, axis=1)
+        self._unknowns, values = number[dofs], prescribed[dofs]
+        self._free = along & (self._unknowns >= 0)
+        constant = np.einsum("mkd,mdc->mkc", term.directions, values)
+        self._components = np.count_nonzero(self._free, axis=1)
+        self._arguments = constant[:, 0].T
+        moved = np.any(constant != 0.0, axis=(1, 2)) & ((self._components > 0) | term.radial)
+        if any(agree(system.comm, bool(np.any(moved)))):
+            raise InputError(
+                f"boundary.{term.surface.part}: a law acts on |u_t| where one component of u_t is prescribed and not "
+                "zero; such a scene has no condensed form"
+            )
+
+    def bonds(self, components: int) -> Sequence[Bonds]:
+        """The vertices where so many components are free, of all ranks. Collective."""
+        term, here = self._term, self._components == components
+        free = self._free[here]
+        unknowns = self._unknowns[here][free].reshape(-1, components)
+        columns = np.swapaxes(term.directions[here], 1, 2)[free].reshape(-1, components, term.directions.shape[1])
+        signs = columns[:, :, 0] if term.directions.shape[1] == 1 else np.linalg.norm(columns, axis=2)
+        surface = term.surface
+        parts = (unknowns, signs, surface.weights[here], surface.points[here])
+        unknowns, signs, weights, points = (np.concatenate(agree(self._comm, p)) for p in parts)
+        if not len(weights):
+            return []
+        found = Bonds(
+            law=term.law,
+            unknowns=unknowns,
+            signs=signs,
+            weights=weights,
+            part=surface.part,
+            direction=term.direction,
+            points=points,
+        )
+        return [found]
+
+    def prescribed_bonds(self) -> Sequence[PrescribedBonds]:
+        """The vertices where no component is free, and the argument is not always zero, of all ranks. Collective."""
+        here = (self._components == 0) & np.any(self._arguments != 0.0, axis=0)
+        weights = np.concatenate(agree(self._comm, self._term.surface.weights[here]))
+        arguments = np.concatenate(agree(self._comm, self._arguments[:, here]), axis=1)
+        if not len(weights):
+            return []
+        return [PrescribedBonds(law=self._term.law, weights=weights, arguments=arguments)]

@@ -1,0 +1,157 @@
+"""The body with unknowns of Γc held, factorised once: what condenses it to these unknowns, and expands it again.
+
+With A = [[A_kk, A_ki], [A_ik, A_ii]], k the kept unknowns, the Schur complement is S = A_kk - A_ki A_ii⁻¹ A_ik and the
+condensed load f = b_k - A_ki A_ii⁻¹ b_i. Its arrays are the same on all ranks.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from mpi4py import MPI
+from petsc4py import PETSc
+from scipy.sparse import csr_matrix
+
+from ..errors import SolverError
+from ..runtime.mpi import agree
+from ..typing import Array, Integers
+from .petsc_options import CHOLESKY, PREFIX, default_options
+from .system import System
+
+
+class Interior:
+    """A_ii, factorised. Creation is collective.
+
+    Args:
+        system: the system; where motions are free, their pins are held too.
+        kept: unknowns of Γc (local, owned, sorted) that are kept.
+        options: defaults of the factorisation's options.
+        prefix: of the options by which the user changes them.
+
+    Attributes:
+        kept: the unknowns of this rank that are kept.
+        pc: the factorised A_ii; rows and columns of kept and pinned unknowns are those of the identity.
+        coupling: this rank's rows of A_ik, zero in the kept rows, (local unknowns, n).
+
+    Raises:
+        SolverError: A_ii is singular.
+    """
+
+    def __init__(
+        self,
+        system: System,
+        kept: Integers,
+        options: Mapping[str, object] = CHOLESKY,
+        prefix: str = f"{PREFIX}condensed_",
+    ) -> None:
+        self._system, self._comm, self.kept = system, system.comm, kept
+        self._held = np.union1d(kept, system.pins)
+        start = system.load.owner_range[0]
+        self._everywhere = np.concatenate(agree(self._comm, kept + start)).astype(np.int64)
+        self.coupling = self._coupled()
+        self.pc = self._factorised(options, prefix)
+        if self.pc.getFailedReason():
+            raise SolverError("the stiffness without the displacements of Γc is singular: a body is not held")
+
+    @property
+    def size(self) -> int:
+        """Number n of kept unknowns, over all ranks."""
+        return len(self._everywhere)
+
+    @property
+    def first(self) -> int:
+        """The number among all kept unknowns of this rank's first one."""
+        return sum(agree(self._comm, len(self.kept))[: self._comm.rank])
+
+    def _columns(self, matrix: PETSc.Mat) -> csr_matrix:
+        """The columns of kept unknowns in a matrix, this rank's rows, (rows, n)."""
+        rows, total = matrix.getLocalSize()[0], matrix.getSize()[1]
+        return csr_matrix(matrix.getValuesCSR()[::-1], shape=(rows, total))[:, self._everywhere]
+
+    def _coupled(self) -> csr_matrix:
+        inner = np.ones(self._system.load.local_size)
+        inner[self._held] = 0.0
+        return csr_matrix(self._columns(self._system.jacobian.matrix).multiply(inner[:, None]))
+
+    def _factorised(self, options: Mapping[str, object], prefix: str) -> PETSc.PC:
+        matrix = self._system.jacobian.matrix.copy()
+        start = self._system.load.owner_range[0]
+        matrix.zeroRowsColumns((self._held + start).astype(PETSc.IntType), diag=1.0)
+        matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+        pc = PETSc.PC().create(self._comm)
+        pc.setOptionsPrefix(prefix)
+        pc.setOperators(matrix)
+        with default_options(options, prefix):
+            pc.setFromOptions()
+            pc.setUp()
+        return pc
+
+    def solve(self, right: Array) -> Array:
+        """A_ii⁻¹ times columns, zero at kept unknowns. Collective.
+
+        Args:
+            right: right-hand sides, this rank's rows, (local unknowns, k).
+        """
+        columns = np.array(right, order="F")
+        columns[self._held] = 0.0
+        sizes = ((len(columns), PETSc.DECIDE), (PETSc.DECIDE, columns.shape[1]))
+        b = PETSc.Mat().createDense(sizes, array=columns, comm=self._comm)
+        x = PETSc.Mat().createDense(sizes, comm=self._comm)
+        for matrix in (b, x):
+            matrix.assemble()
+        self.pc.getFactorMatrix().matSolve(b, x)
+        found = np.array(x.getDenseArray())
+        b.destroy()
+        x.destroy()
+        return found
+
+    def response(self) -> Array:
+        """A_ki A_ii⁻¹ A_ik: forces on Γc by the body inside, for unit displacements of Γc, (n, n). Collective."""
+        columns, at_once = self.coupling.tocsc(), self._system.thresholds.dense_columns
+        found = np.zeros((self.size, self.size))
+        for start in range(0, self.size, at_once):
+            block = slice(start, start + at_once)
+            found[:, block] = self.coupling.T @ self.solve(columns[:, block].toarray())
+        self._comm.Allreduce(MPI.IN_PLACE, found)
+        return found
+
+    def stiffness(self) -> Array:
+        """The Schur complement S, (n, n). Collective."""
+        rows, bulk = self._system.jacobian.rows, self._columns(self._system.jacobian.rows.bulk)
+        found = np.zeros((self.size, self.size))
+        found[self.first : self.first + len(self.kept)] = bulk[np.searchsorted(rows.dofs, self.kept)].toarray()
+        self._comm.Allreduce(MPI.IN_PLACE, found)
+        found -= self.response()
+        return np.asarray(0.5 * (found + found.T))
+
+    def gathered(self, values: Array) -> Array:
+        """The values at all kept unknowns of this rank's values at its unknowns. Collective.
+
+        Args:
+            values: (local unknowns, ...).
+        """
+        return np.concatenate(agree(self._comm, values[self.kept]))
+
+    def pulled(self, inner: Array) -> Array:
+        """A_ki times displacements of the body inside, (n, k). Collective.
+
+        Args:
+            inner: (local unknowns, k), zero at kept unknowns.
+        """
+        return np.asarray(self._comm.allreduce(self.coupling.T @ inner))
+
+    def expand(self, values: Array, right: Array) -> Array:
+        """The displacement in equilibrium with given ones of Γc, this rank's unknowns, (local unknowns,). Collective.
+
+        Args:
+            values: of all kept unknowns, (n,).
+            right: the load, this rank's, (local unknowns,).
+        """
+        found = self.solve((right - self.coupling @ values)[:, None])[:, 0]
+        found[self.kept] = values[self.first : self.first + len(self.kept)]
+        return found
+
+    def free(self) -> None:
+        """Free the PETSc objects."""
+        self.pc.destroy()

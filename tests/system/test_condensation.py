@@ -1,0 +1,216 @@
+"""The condensed problem has the energy, the forces and the equilibria of the whole system."""
+
+from __future__ import annotations
+
+import copy
+import functools
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from mpi4py import MPI
+from runs import RANKS, on_ranks
+from scenes import DELTA, NU, E, Table, block, model, quadratic_linear
+
+from hvi_fenicsx import Scene, prepare
+from hvi_fenicsx.errors import InputError
+from hvi_fenicsx.system.condensation import Condensation
+from hvi_fenicsx.system.system import System
+
+Array = npt.NDArray[np.float64]
+STRONG = quadratic_linear(3e6, DELTA)
+SPACE = {"model": "three_dimensional", "youngs_modulus": E, "poisson_ratio": NU}
+
+
+def pulled(cells: int = 4) -> Table:
+    """By displacements: one at a vertex that carries a law, and a wall that is scaled with it."""
+    table = model(cells, friction=STRONG, press=2e6)
+    table["boundary"]["pull"] = {"on": "right", "displacement": [5e-6, "free"]}
+    table["boundary"]["wall"]["displacement"] = [-1e-6, "free"]
+    return table
+
+
+def corner() -> Table:
+    """Contact on two sides that meet, adhesion on both, friction on one."""
+    table = block(4, friction=STRONG)
+    glue = {"law": "graph", "points": [[0, 0], [1e-6, 1e6], [3e-6, 0]], "one_sided": True}
+    table["boundary"]["floor"]["adhesion"] = glue
+    table["boundary"]["side"] = {"on": "left", "contact": {"gap": 1e-7}, "adhesion": glue}
+    return table
+
+
+def frictionless() -> Table:
+    """Contact alone, and no load along the floor: the body slides freely."""
+    return block(4, push=0.0)
+
+
+def in_space() -> Table:
+    """The model problem in space: |u_t| has two components, one where the wall holds the other."""
+    table = model(2, friction=STRONG)
+    table |= {"domain": {"shape": "box", "size": [1.0, 0.5, 1.0], "cells": [2, 1, 2]}, "material": dict(SPACE)}
+    table["boundary"]["wall"]["displacement"] = [0.0, "free", "free"]
+    table["boundary"]["pull"]["traction"] = [3e6, 1e5, 0.0]
+    table["boundary"]["press"]["traction"] = [0.0, 0.0, -1e6]
+    return table
+
+
+def slanted() -> Table:
+    """The floor is an obstacle that slants, so unknowns have local components."""
+    table = model(4, friction=STRONG)
+    del table["boundary"]["wall"]
+    table["boundary"]["floor"]["contact"] = {"obstacle": {"point": [0.0, 0.0], "normal": [-0.2, 1.0]}}
+    return table
+
+
+SCENES = {f.__name__: f for f in (pulled, corner, frictionless, in_space, slanted)} | {
+    "wall": functools.partial(model, 4, 6e6, friction=STRONG),
+    "block": functools.partial(block, 4, 3e5, friction=STRONG),
+}
+
+
+@functools.cache
+def condensed(name: str) -> tuple[System, Condensation]:
+    system = prepare(Scene.model_validate(SCENES[name]()), MPI.COMM_SELF).system
+    return system, Condensation(system)
+
+
+def samples(condensation: Condensation) -> list[Array]:
+    generator = np.random.default_rng(3)
+    return [3.0 * generator.standard_normal(condensation.problem.size) for _ in range(2)]
+
+
+def tractions(condensation: Condensation, x: Array) -> Array:
+    """The laws' forces."""
+    found = np.zeros_like(x)
+    for bonds in condensation.problem.bonds:
+        argument = bonds.argument(x)
+        size = bonds.weights * bonds.law.right(argument)
+        vectors = bonds.signs * x[bonds.unknowns]
+        unit = bonds.signs if vectors.shape[1] == 1 else bonds.signs * vectors / argument[:, None]
+        np.add.at(found, bonds.unknowns, size[:, None] * unit)
+    return found
+
+
+class Right:
+    """A law's right derivative, which is defined everywhere."""
+
+    def __init__(self, law: Any) -> None:
+        self.value, self.derivative = law.value, law.right
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_energies_differ_by_what_those_of_the_whole_body_differ_by(name: str) -> None:
+    system, condensation = condensed(name)
+    whole, reduced = [], []
+    for x in samples(condensation):
+        whole.append(system.energy(condensation.expand(x), [Right(t.law) for t in system.terms]))
+        reduced.append(condensation.problem.energy(x))
+    assert reduced[1] - reduced[0] == pytest.approx(whole[1] - whole[0], rel=1e-9)
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_forces_are_those_of_the_whole_body(name: str) -> None:
+    """Zero at all unknowns that were condensed away; bounds and laws alone hold the others."""
+    system, condensation = condensed(name)
+    problem, residual = condensation.problem, system.load.duplicate()
+    for x in samples(condensation):
+        u = condensation.expand(x)
+        system.residual(u, residual, [Right(t.law) for t in system.terms])
+        whole = np.array(residual.array_r)
+        reduced = problem.stiffness @ x - problem.load(1.0) + tractions(condensation, x)
+        size = np.max(np.abs(reduced))
+        assert np.max(np.abs(np.sort(whole[np.abs(whole) > 1e-9 * size]) - np.sort(reduced[reduced != 0.0]))) < (
+            1e-9 * size
+        )
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_only_what_carries_a_bound_or_a_law_is_kept(name: str) -> None:
+    _, condensation = condensed(name)
+    problem = condensation.problem
+    carrying = np.isfinite(problem.lower) | np.isfinite(problem.upper)
+    for bonds in problem.bonds:
+        carrying[bonds.unknowns] = True
+    assert np.all(carrying)
+    assert np.array_equal([bool(p) for p in problem.parts], np.isfinite(problem.lower) | np.isfinite(problem.upper))
+
+
+def test_a_body_that_could_leave_keeps_one_unknown_for_each_such_motion() -> None:
+    """Contact alone, and a load along the floor: the slide is no free motion, and nothing but a tangent feels it."""
+    system = prepare(Scene.model_validate(block(4, push=1e5)), MPI.COMM_SELF).system
+    problem = Condensation(system).problem
+    assert problem.size == np.count_nonzero(np.isfinite(problem.lower) | np.isfinite(problem.upper)) + 1
+    values, vectors = np.linalg.eigh(problem.stiffness)
+    escape = vectors[:, 0]
+    assert abs(values[0]) < 1e-12 * values[-1]
+    assert abs(problem.load(1.0) @ escape) > 0.01 * np.max(np.abs(escape)) * 1e5 / 1e6
+
+
+@pytest.mark.parametrize("name", ["pulled", "wall"])
+def test_the_factor_scales_loads_and_prescribed_displacements(name: str) -> None:
+    """Condensed at a factor as the scene with scaled numbers, in the same units."""
+    factor, (system, condensation) = 0.4, condensed(name)
+    table = copy.deepcopy(SCENES[name]())
+    for part in table["boundary"].values():
+        for key in {"traction", "displacement"} & part.keys():
+            part[key] = [v if v == "free" else factor * v for v in part[key]]
+    other = prepare(Scene.model_validate(table), MPI.COMM_SELF).system
+    reference = Condensation(other)
+    scales = [s.problem.scales for s in (system, other)]
+    unit, force = (getattr(scales[0], k) / getattr(scales[1], k) for k in ("displacement", "stress"))
+    for x in samples(condensation):
+        u, same = condensation.expand(x, factor), reference.expand(x * unit)
+        assert np.max(np.abs(u.array_r * unit - same.array_r)) < 1e-9 * np.max(np.abs(same.array_r))
+        energies = condensation.problem.energy(x, factor), reference.problem.energy(x * unit)
+        assert energies[0] * unit * force == pytest.approx(energies[1], rel=1e-9)
+        products = condensation.problem.potential(x, factor), reference.problem.potential(x * unit, 1.0)
+        assert products[0] * unit * force == pytest.approx(products[1], rel=1e-9)
+
+
+def test_energy_and_work_agree_along_a_path_of_displacements() -> None:
+    """dE/dλ at fixed x = -<g', u> + the reactions' power: with it follows the work of what is prescribed."""
+    system, condensation = condensed("pulled")
+    problem, (x, _) = condensation.problem, samples(condensation)
+    step, factor = 1e-3, 0.7
+    rate = (problem.energy(x, factor + step) - problem.energy(x, factor - step)) / (2 * step)
+    u = condensation.expand(x, factor)
+    reactions = condensation.reactions(u, factor)
+    fixed = system.problem.fixed_here
+    power = reactions[fixed] @ condensation.load(1.0).array_r[fixed]
+    for bonds in problem.prescribed_bonds:
+        power += (bonds.weights * bonds.law.right(bonds.arguments[0] + factor * bonds.arguments[1])) @ bonds.arguments[
+            1
+        ]
+    applied = (problem.potential(x, factor + step) - problem.potential(x, factor - step)) / (2 * step)
+    following = sum(
+        float(system.forces[n].array_r @ (condensation.expand(x, factor + step).array_r - v.array_r)) / (2 * step)
+        for n in system.forces
+        for v in [condensation.expand(x, factor - step)]
+    )
+    loads = sum(float(v.array_r @ u.array_r) for v in system.forces.values())
+    assert applied == pytest.approx(loads + factor * following, rel=1e-6)
+    assert rate == pytest.approx(power - loads, rel=1e-6)
+
+
+def test_constant_loads_are_apart_from_scaled_ones() -> None:
+    system, whole = condensed("wall")
+    part = Condensation(system, ["pull.traction"]).problem
+    assert np.allclose(part.load(1.0), whole.problem.load(1.0), rtol=0, atol=1e-12)
+    assert np.max(np.abs(whole.problem.force)) == 0.0
+    assert np.max(np.abs(part.force)) > 1e-3
+
+
+def test_a_name_that_is_no_load_is_refused() -> None:
+    system, _ = condensed("wall")
+    with pytest.raises(InputError, match=r"pull\.force.*pull\.traction"):
+        Condensation(system, ["pull.force"])
+
+
+@pytest.mark.parametrize("ranks", RANKS[1:])
+def test_all_ranks_hold_the_problem_of_one(ranks: int) -> None:
+    """Its energies and forces, for displacements given by place."""
+    alone, together = (on_ranks(n, "tests/system/condensed_ranks.py") for n in (1, ranks))
+    assert together["equal"]
+    for key in ("energies", "force", "whole"):
+        assert together[key] == pytest.approx(alone[key], rel=1e-9)
