@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from dolfinx.fem.petsc import set_bc
 
+from ..effects.base import load_name
 from ..errors import InputError
-from ..problem.compose import load_name
 from ..problem.vectors import new_vector, turn
 from ..runtime.mpi import agree
 from ..typing import Array
