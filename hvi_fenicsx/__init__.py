@@ -36,6 +36,7 @@ _HOME = {
     "InputError": "errors",
     "Isotropic": "modelling",
     "Model": "modelling",
+    "NewtonStep": "runtime.newton_step",
     "On": "modelling",
     "Orthotropic": "modelling",
     "Scene": "scene",
@@ -63,6 +64,7 @@ __all__ = [
     "InputError",
     "Isotropic",
     "Model",
+    "NewtonStep",
     "On",
     "Orthotropic",
     "Scene",
@@ -106,6 +108,7 @@ if TYPE_CHECKING:
         solve,
     )
     from .runtime.log import set_log_level
+    from .runtime.newton_step import NewtonStep
     from .runtime.versions import __version__
     from .scene import Scene, dump_scene, read_scene
     from .workflow import prepare

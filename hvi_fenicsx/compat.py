@@ -22,6 +22,12 @@ def geometry_dofmap(mesh: _mesh.Mesh) -> Entities:
     return geometry.dofmaps[0] if hasattr(geometry, "dofmaps") else geometry.dofmap
 
 
+def geometry_degree(mesh: _mesh.Mesh) -> int:
+    """Degree of the cells' shape: 1 where they are straight."""
+    geometry = mesh.geometry
+    return int((geometry.cmaps[0] if hasattr(geometry, "cmaps") else geometry.cmap).degree)
+
+
 def local_entities(
     mesh: _mesh.Mesh, dimension: int, nodes: npt.NDArray[np.int64], tags: Entities
 ) -> tuple[Entities, Entities]:

@@ -70,10 +70,8 @@ def _check_mesh(mesh: dmesh.Mesh) -> None:
             f"body: the mesh has cells of dimension {mesh.topology.dim} in {d} coordinates; give as many coordinates "
             f"as dimensions, such as gdim={mesh.topology.dim} where the mesh is read"
         )
-    if mesh.geometry.cmap.degree != 1:
-        raise InputError(
-            f"body: the cells are curved (degree {mesh.geometry.cmap.degree}); give straight ones, degree 1"
-        )
+    if (degree := compat.geometry_degree(mesh)) != 1:
+        raise InputError(f"body: the cells are curved (degree {degree}); give straight ones, degree 1")
     _check_folds(mesh)
 
 

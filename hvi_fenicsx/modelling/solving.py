@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import fields, replace
 from typing import Any
 
@@ -20,6 +20,7 @@ from ..scene import Scene, SolverTable
 from ..schema import located_error
 from ..solution import Solution
 from ..solvers.context import Progress
+from ..system import petsc_options
 from ..system.system import System
 from ..workflow import DEFAULT, Preparation, Thresholds
 from .model import Model
@@ -43,6 +44,8 @@ def solve(
     thresholds: Thresholds = DEFAULT,
     start: ModelSolution | str | Sequence[Any] | None = None,
     estimate: bool = True,
+    petsc: Mapping[str, Any] | None = None,
+    petsc_prefix: str = "hvi_",
     **options: Any,
 ) -> ModelSolution:
     """Solve a model or a scene, and certify what was found. Collective.
@@ -56,17 +59,24 @@ def solve(
         start: where to begin: the solution of another model of the same body, such as that of the last load; or what
             ``[solver]`` may have.
         estimate: whether to estimate the error, which takes about as long as the solve.
+        petsc: options for PETSc's solvers by name, without dash and prefix, such as ``{"ksp_max_it": 500}``; None for
+            an option without value. They hold for this solve.
+        petsc_prefix: of these options, and of those that your program or command line has given PETSc already.
         **options: the other keys of the scene's table ``[solver]``, such as ``tolerance=1e-8``.
 
     Raises:
-        InputError: on all ranks alike: an option is not allowed, or the model does not fit its mesh.
+        InputError: on all ranks alike: an option is not allowed, no solver reads an option for PETSc, or the model does
+            not fit its mesh.
     """
     known = start if isinstance(start, ModelSolution) else None
     if known is None and start is not None:
         options["start"] = start
     prepared = check(model, comm, timer=timer, thresholds=thresholds, **options)
     first = None if known is None else _displacement(known, prepared)
-    found, levels = workflow.finish_with_levels(prepared, progress, start=first, estimating=estimate)
+    with petsc_options.chosen(petsc or {}, petsc_prefix):
+        found, levels = workflow.finish_with_levels(prepared, progress, start=first, estimating=estimate)
+        if found.solve_result is not None:
+            petsc_options.check_read(petsc or {}, prepared.system.comm)
     _free_garbage([prepared.system, *(level.system for level in levels)])
     return ModelSolution(**_fields(found))
 

@@ -140,13 +140,13 @@ def _component(function: Callable[[Array], Any], number: int) -> Callable[[Array
     return component
 
 
-def _expression(given: Any, mesh: dmesh.Mesh) -> Expression:
+def _expression(given: Any, mesh: dmesh.Mesh) -> SpatialValue:
     if given.ufl_shape != ():
         raise InputError(f"a scalar is wanted; the UFL expression has the shape {given.ufl_shape}")
     domains = [domain.ufl_cargo() for domain in ufl.domain.extract_domains(given)]
     if any(domain is not mesh._cpp_object for domain in domains):
         raise InputError("a UFL expression or fem.Function is of another mesh than the body; make it on body.mesh")
-    return Expression(given, mesh)
+    return Expression(given, mesh) if domains else Formula(float(given(())))  # a number needs no mesh
 
 
 def _shortened(text: str) -> str:

@@ -16,6 +16,7 @@ from types import TracebackType
 from typing import Any, Self
 
 from . import terminal
+from .newton_step import NewtonStep
 
 PACKAGE = __name__.partition(".")[0]
 COMMANDS, WORKFLOW = f"{PACKAGE}.commands", f"{PACKAGE}.workflow"
@@ -55,19 +56,13 @@ def _on_first_rank(record: logging.LogRecord) -> bool:
 _SOLVERS = logger("solvers")
 
 
-def newton_step(method: str, epsilon: float | None, iteration: int, residual: float, contact: int) -> None:
+def newton_step(step: NewtonStep) -> None:
     """Record a Newton step.
 
     Args:
-        method: its name.
-        epsilon: relative width of the smoothing; None for exact laws.
-        iteration: counted from the start of the solve.
-        residual: of the inequality, relative.
-        contact: vertices in contact, of all ranks.
+        step: the step.
     """
-    width = "" if epsilon is None else f", ε {epsilon:.3g}"
-    text = "%s%s, iteration %d, residual %.2e, %d vertices in contact"
-    _SOLVERS.debug(text, method, width, iteration, residual, contact, extra={"moving": True})
+    _SOLVERS.debug("%s", step, extra={"moving": True})
 
 
 class RunLog(logging.FileHandler):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, Self
+from typing import Annotated, Any, NamedTuple, Self
 
 from pydantic import (
     AfterValidator,
@@ -13,6 +13,7 @@ from pydantic import (
     Field,
     SerializationInfo,
     SerializeAsAny,
+    ValidationError,
     ValidationInfo,
     field_serializer,
     model_validator,
@@ -21,7 +22,7 @@ from pydantic_core import PydanticCustomError
 
 from ..effects import Effect, Place
 from ..mesh.shapes import DomainShape
-from ..schema import Mistake, Names, Table, choose, refusal, validation_error
+from ..schema import Mistake, Names, Table, choose, located_error, refusal, validation_error
 from . import plugins
 from .consistency import contradictions
 from .effect_tables import Bodies, BoundaryTable, Materials
@@ -77,10 +78,19 @@ class Scene(Table):
     solver: SolverTable = SolverTable()
     """how to solve"""
 
-    if TYPE_CHECKING:
+    def __init__(self, **keys: Any) -> None:
+        """The keys of the scene file; tables as objects or as the scene file writes them.
 
-        def __init__(self, **keys: Any) -> None:
-            """The keys of the scene file; tables as objects or as the scene file writes them."""
+        Raises:
+            InputError: a key is unknown, or a value is not allowed.
+        """
+        try:
+            super().__init__(**keys)
+        except ValidationError as error:
+            raise located_error(error, Scene) from None
+
+    # The reader of scene files, which validates by the class, needs pydantic's own error.
+    __init__.__pydantic_base_init__ = True  # type: ignore[attr-defined]
 
     @model_validator(mode="before")
     @classmethod

@@ -18,7 +18,7 @@ from petsc4py import PETSc
 from ..runtime.timing import Timer
 from ..system.held_solver import HeldPreconditioner, LinearSettings
 from ..system.levels import Levels
-from ..system.petsc_options import configure
+from ..system.petsc_options import configure, prefix
 from ..system.system import LawModel, System
 from ..typing import Entities
 from .convergence import NOT_MEASURED, ConvergenceTest, Outcome
@@ -213,17 +213,18 @@ class _SnesRun:
         snes.setConvergenceTest(self._converged)
         snes.setTolerances(max_it=max_iterations)
         snes.getKSP().setTolerances(rtol=self.thresholds.finest_accuracy, atol=0.0, max_it=linear.krylov_iterations)
-        snes.getKSP().setPC(self._preconditioner(snes))
         near = self.thresholds.on_bound * float(np.min(system.references.scale))
         defaults = {"snes_linesearch_type": line_search, "snes_vi_zero_tolerance": near}
         configure(snes, {**defaults, **self.owner.settings.ksp})
+        self._set_preconditioner(snes)
         return snes
 
-    def _preconditioner(self, snes: PETSc.SNES) -> PETSc.PC:
+    def _set_preconditioner(self, snes: PETSc.SNES) -> None:
+        """The PC of the inactive dofs. The user's -pc_type is for the one at full size that it calls."""
         pc = snes.getKSP().getPC()
+        pc.setOptionsPrefix(f"{prefix()}inactive_")
         pc.setType(PETSc.PC.Type.PYTHON)
         pc.setPythonContext(ReducedPreconditioner(snes, self.owner.held, self._accuracy))
-        return pc
 
     def _accuracy(self, *, moved: bool) -> float:
         """Relative tolerance of a linear solve: what the tolerance needs, but loose while the active set changes."""

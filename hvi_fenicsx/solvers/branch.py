@@ -92,7 +92,7 @@ class BranchIteration(Method):
         return [law.concave.left(a) for law, a in zip(self._laws, first, strict=True)]
 
     def _progress(self, iteration: int, residual: float, contact: int) -> None:
-        self.context.progress(self.label, self._epsilon, iteration, residual, contact)
+        self.context.tell(self.label, self._epsilon, iteration, residual, contact)
 
     def _descend(self, x: PETSc.Vec, cells: list[Cells], xi: list[Array]) -> Outcome:
         """Convex steps from and into x until ξ no longer changes. The first ξ may be that of another point."""

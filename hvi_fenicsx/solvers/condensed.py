@@ -138,7 +138,7 @@ class Condensation(Method):
         """Keep and report an accepted point."""
         points.append(x.copy())
         size = float(np.linalg.norm(mixed.function(x))) / (self.system.load.norm() or 1.0)
-        self.context.progress(self.name, self.context.epsilon, len(points) - 1, size, mixed.in_contact(x))
+        self.context.tell(self.name, self.context.epsilon, len(points) - 1, size, mixed.in_contact(x))
         self.stopped = self.solver.interrupted()
         if self.stopped:
             raise _Stop

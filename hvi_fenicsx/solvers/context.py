@@ -8,6 +8,7 @@ from typing import Any
 
 from ..rigid import Solvability
 from ..runtime.log import newton_step
+from ..runtime.newton_step import NewtonStep
 from ..runtime.timing import Timer
 from ..system.held_solver import LinearSettings
 from ..system.levels import Levels
@@ -15,8 +16,8 @@ from ..system.system import System
 from .active_set import ActiveSetSolver
 from .options import SolverOptions
 
-Progress = Callable[[str, float | None, int, float, int], None]
-"""Called with the method's name, ε, iteration, residual, and vertices in contact (of all ranks)."""
+Progress = Callable[[NewtonStep], None]
+"""Called at each Newton step, on all ranks."""
 
 
 def never() -> bool:
@@ -103,6 +104,20 @@ class SolveContext:
             changes: fields of :class:`.SolverOptions` and their values.
         """
         return replace(self, options=replace(self.options, **changes))
+
+    def tell(self, method: str, epsilon: float | None, iteration: int, residual: float, contact: int) -> None:
+        """Tell a Newton step to whom the progress is shown.
+
+        Args:
+            method: its name.
+            epsilon: relative width of the smoothing; None for exact laws.
+            iteration: counted from the start of the solve.
+            residual: of the inequality, relative.
+            contact: vertices in contact, of all ranks.
+        """
+        self.progress(
+            NewtonStep(method=method, epsilon=epsilon, iteration=iteration, residual=residual, contact=contact)
+        )
 
     @property
     def epsilon(self) -> float | None:

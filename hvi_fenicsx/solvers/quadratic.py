@@ -52,7 +52,7 @@ class LinearSolve(Method):
             counts.linear += outcome.linear
             if outcome.converged:
                 break
-        self.context.progress(self.name, None, 1, outcome.measure, 0)
+        self.context.tell(self.name, None, 1, outcome.measure, 0)
         reason = "stationary" if outcome.converged else outcome.reason
         return SolveResult(
             u=self.system.displacement(x), method=self.name, converged=outcome.converged, reason=reason, counts=counts
@@ -99,7 +99,7 @@ class ConvexProgramme(Method):
         )
 
     def _progress(self, iteration: int, residual: float, contact: int) -> None:
-        self.context.progress(self.name, None, iteration, residual, contact)
+        self.context.tell(self.name, None, iteration, residual, contact)
 
     def _minimise(self, x: PETSc.Vec, counts: Counts) -> Outcome:
         """Attempts until one converges, from and into x; the outcome of the best one. Collective."""

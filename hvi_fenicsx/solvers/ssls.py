@@ -87,7 +87,7 @@ class _SnesRun(SolverRun):
 
     def _converged(self, snes: PETSc.SNES, iteration: int, norms: Any) -> int:
         found, measure = self.judge(snes.getSolution())
-        self.context.progress("ssls", self.context.epsilon, iteration, measure, self.solver.in_contact(found))
+        self.context.tell("ssls", self.context.epsilon, iteration, measure, self.solver.in_contact(found))
         found.destroy()
         self.stopped = self.solver.interrupted()
         if self.stopped:

@@ -66,7 +66,7 @@ class _TaoRun(SolverRun):
     def _converged(self, tao: PETSc.TAO) -> int | None:
         x, iteration = tao.getSolution(), tao.getIterationNumber()
         _, measure = self.judge(x)
-        self.context.progress("tao", self.context.epsilon, iteration, measure, self.solver.in_contact(x))
+        self.context.tell("tao", self.context.epsilon, iteration, measure, self.solver.in_contact(x))
         self.stopped = self.solver.interrupted()
         if self.stopped:
             return _Reason.DIVERGED_USER

@@ -22,7 +22,7 @@ from ..typing import Array, Entities
 from . import multigrid, schur
 from .levels import Levels
 from .matrix_copy import MatrixCopy
-from .petsc_options import CHOLESKY, PREFIX, configure
+from .petsc_options import CHOLESKY, configure
 from .system import System
 from .thresholds import DEFAULT, Thresholds
 
@@ -256,7 +256,7 @@ class HeldPreconditioner:
         ksp.setPC(self._preconditioner.pc)
         ksp.setTolerances(rtol=rtol, max_it=self.settings.thresholds.krylov_iterations)
         ksp.setInitialGuessNonzero(self.settings.kind != "lu")
-        configure(ksp, self.settings.ksp, PREFIX)
+        configure(ksp, self.settings.ksp)
         with self._timer("solve"):
             ksp.solve(load, x)
         if self.system.free_motions is not None:

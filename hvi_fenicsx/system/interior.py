@@ -16,7 +16,7 @@ from scipy.sparse import csr_matrix
 from ..errors import SolverError
 from ..runtime.mpi import agree
 from ..typing import Array, Integers
-from .petsc_options import CHOLESKY, PREFIX, default_options
+from .petsc_options import CHOLESKY, default_options, prefix
 from .system import System
 
 
@@ -27,7 +27,7 @@ class Interior:
         system: the system; where motions are free, their pins are held too.
         kept: unknowns of Γc (local, owned, sorted) that are kept.
         options: defaults of the factorisation's options.
-        prefix: of the options by which the user changes them.
+        own_prefix: of the options by which the user changes them, after that of all options.
 
     Attributes:
         kept: the unknowns of this rank that are kept.
@@ -43,14 +43,14 @@ class Interior:
         system: System,
         kept: Integers,
         options: Mapping[str, object] = CHOLESKY,
-        prefix: str = f"{PREFIX}condensed_",
+        own_prefix: str = "condensed_",
     ) -> None:
         self._system, self._comm, self.kept = system, system.comm, kept
         self._held = np.union1d(kept, system.pins)
         start = system.load.owner_range[0]
         self._everywhere = np.concatenate(agree(self._comm, kept + start)).astype(np.int64)
         self.coupling = self._coupled()
-        self.pc = self._factorised(options, prefix)
+        self.pc = self._factorised(options, own_prefix)
         if self.pc.getFailedReason():
             raise SolverError("the stiffness without the displacements of Γc is singular: a body is not held")
 
@@ -74,15 +74,15 @@ class Interior:
         inner[self._held] = 0.0
         return csr_matrix(self._columns(self._system.jacobian.matrix).multiply(inner[:, None]))
 
-    def _factorised(self, options: Mapping[str, object], prefix: str) -> PETSc.PC:
+    def _factorised(self, options: Mapping[str, object], own_prefix: str) -> PETSc.PC:
         matrix = self._system.jacobian.matrix.copy()
         start = self._system.load.owner_range[0]
         matrix.zeroRowsColumns((self._held + start).astype(PETSc.IntType), diag=1.0)
         matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
         pc = PETSc.PC().create(self._comm)
-        pc.setOptionsPrefix(prefix)
+        pc.setOptionsPrefix(f"{prefix()}{own_prefix}")
         pc.setOperators(matrix)
-        with default_options(options, prefix):
+        with default_options(options, own_prefix):
             pc.setFromOptions()
             pc.setUp()
         return pc

@@ -8,7 +8,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from ..typing import Entities
-from .petsc_options import PREFIX, default_options
+from .petsc_options import default_options, prefix
 from .system import System
 
 
@@ -50,7 +50,7 @@ class MatrixCopy:
 
     def _new(self) -> PETSc.PC:
         pc = PETSc.PC().create(self._system.comm)
-        pc.setOptionsPrefix(PREFIX)
+        pc.setOptionsPrefix(prefix())
         return pc
 
     def free(self) -> None:

@@ -14,7 +14,7 @@ from petsc4py import PETSc
 
 from ..typing import Entities
 from .levels import Levels
-from .petsc_options import PREFIX, default_options
+from .petsc_options import default_options, prefix
 from .system import System
 
 
@@ -37,7 +37,7 @@ class Multigrid:
     def __init__(self, system: System, levels: Levels, options: Mapping[str, object]) -> None:
         self._levels, self._options = levels, options
         self.pc, self.matrix = PETSc.PC().create(system.comm), system.jacobian.matrix
-        self.pc.setOptionsPrefix(PREFIX)
+        self.pc.setOptionsPrefix(prefix())
         self.pc.setType(PETSc.PC.Type.MG)
         self.pc.setMGLevels(len(levels) + 1)
         self.pc.setOperators(self.matrix)

@@ -1,35 +1,47 @@
 """PETSc options: the program's defaults, set only where the user set nothing, and removed after use.
 
-Precedence: command line (``--petsc``, PETSC_OPTIONS), then the program's default. One constant prefix on all ranks.
+Precedence: the user's (``--petsc``, PETSC_OPTIONS, ``petsc=`` from Python), then the program's default. All solvers of
+a run have one prefix, the same on all ranks; it is ``hvi_`` unless a Python program chooses another.
 """
 
 from __future__ import annotations
 
+import ctypes
+import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from contextvars import ContextVar
 from typing import Any
 
+from mpi4py import MPI
 from petsc4py import PETSc
 
 from ..errors import InputError
 
-PREFIX = "hvi_"
 CHOLESKY: Mapping[str, object] = {"pc_type": "cholesky", "pc_factor_mat_solver_type": "mumps"}
 """Options of a direct solver."""
+_PREFIX: ContextVar[str] = ContextVar("prefix of PETSc options", default="hvi_")
+_NAME = re.compile(r"[A-Za-z]\w*")
+_VALUES = (str, bool, int, float, type(None))
+
+
+def prefix() -> str:
+    """The prefix of the options of all solvers that are made now."""
+    return _PREFIX.get()
 
 
 @contextmanager
-def default_options(defaults: Mapping[str, Any], prefix: str = PREFIX) -> Iterator[None]:
+def default_options(defaults: Mapping[str, Any], own_prefix: str = "") -> Iterator[None]:
     """Defaults in force within a block, unless the user set the option. Collective.
 
     Levels of a multigrid read their options as late as in ``setUp``.
 
     Args:
         defaults: values by name, without prefix; None for an option without value.
-        prefix: of the options.
+        own_prefix: of one kind of solver, after that of all options.
     """
-    database = PETSc.Options()
-    unset = {f"{prefix}{k}": v for k, v in defaults.items() if not database.hasName(f"{prefix}{k}")}
+    database, before = PETSc.Options(), f"{prefix()}{own_prefix}"
+    unset = {f"{before}{k}": v for k, v in defaults.items() if not database.hasName(f"{before}{k}")}
     for name, value in unset.items():
         database.setValue(name, value)
     try:
@@ -39,17 +51,81 @@ def default_options(defaults: Mapping[str, Any], prefix: str = PREFIX) -> Iterat
             database.delValue(name)
 
 
-def configure(target: Any, defaults: Mapping[str, Any], prefix: str = PREFIX) -> None:
+def configure(target: Any, defaults: Mapping[str, Any]) -> None:
     """Call ``target.setFromOptions()`` with defaults for the options that the user did not set. Collective.
 
     Args:
         target: a PETSc object that takes options.
         defaults: values by name, without prefix.
-        prefix: of the options.
     """
-    with default_options(defaults, prefix):
-        target.setOptionsPrefix(prefix)
+    with default_options(defaults):
+        target.setOptionsPrefix(prefix())
         target.setFromOptions()
+
+
+@contextmanager
+def chosen(options: Mapping[str, Any], own_prefix: str) -> Iterator[None]:
+    """A user's options in force within a block, whose solvers have a prefix of the user's. Collective.
+
+    Args:
+        options: values by name, without prefix; None for an option without value.
+        own_prefix: of these options, and of those that are in PETSc's database already.
+
+    Raises:
+        InputError: a name or a value that no option can have, or one that PETSc cannot use.
+    """
+    _check(options, own_prefix)
+    database = PETSc.Options()
+    before = {name: value for name, value in database.getAll().items() if name.startswith(own_prefix)}
+    token = _PREFIX.set(own_prefix)
+    for name, value in options.items():
+        database.setValue(f"{own_prefix}{name}", value)
+    try:
+        with refusals_told():
+            yield
+    finally:
+        _PREFIX.reset(token)
+        for name in options:
+            database.delValue(f"{own_prefix}{name}")
+            if f"{own_prefix}{name}" in before:
+                database.setValue(f"{own_prefix}{name}", before[f"{own_prefix}{name}"] or None)
+
+
+def _check(options: Any, own_prefix: Any) -> None:
+    if not isinstance(own_prefix, str) or not _NAME.fullmatch(own_prefix):
+        raise InputError(f'petsc_prefix: {own_prefix!r} is no prefix of options; write letters and _, such as "floor_"')
+    if not isinstance(options, Mapping):
+        raise InputError(f'petsc: {options!r} is no table of options; write {{"ksp_max_it": 500}}, names without -')
+    for name, value in options.items():
+        if not isinstance(name, str) or not _NAME.fullmatch(name):
+            raise InputError(f'petsc: {name!r} is no option; write its name without - and prefix, such as "ksp_max_it"')
+        if not isinstance(value, _VALUES):
+            raise InputError(f"petsc: {name} is {value!r}; give a number, a word, or None for an option without value")
+
+
+def check_read(options: Mapping[str, Any], comm: MPI.Comm) -> None:
+    """Refuse options that no solver has read, as a misspelt one. Collective.
+
+    Args:
+        options: of :func:`chosen`, within its block.
+        comm: the ranks that solved.
+
+    Raises:
+        InputError: on all ranks alike.
+    """
+    for name in options:
+        if not comm.allreduce(_is_read(f"{prefix()}{name}"), op=MPI.LOR):
+            raise InputError(
+                f"petsc: no solver of this run has read {name}: it is misspelt, or of a solver that is not in use here "
+                '("ksp_view": None shows those that are)'
+            )
+
+
+def _is_read(name: str) -> bool:
+    """Whether some solver has asked for an option. petsc4py does not hand on this question of PETSc's."""
+    found = ctypes.c_int(0)
+    ctypes.CDLL(PETSc.__file__).PetscOptionsUsed(None, name.encode(), ctypes.byref(found))
+    return bool(found.value)
 
 
 class OptionError(InputError):
@@ -68,11 +144,11 @@ def refusals_told() -> Iterator[None]:
     try:
         yield
     except PETSc.Error as error:
-        given = [f"-{k} {v or ''}".strip() for k, v in PETSc.Options().getAll().items() if k.startswith(PREFIX)]
+        given = [f"-{k} {v or ''}".strip() for k, v in PETSc.Options().getAll().items() if k.startswith(prefix())]
         if not given:
             raise
         reason = str(error).splitlines()[-1].removeprefix(f"[{PETSc.COMM_WORLD.rank}] ")
-        raise OptionError(f"--petsc: PETSc stops with the options {' '.join(given)}: {reason}") from None
+        raise OptionError(f"PETSc stops with the options {' '.join(given)}: {reason}") from None
 
 
 def insert(text: str) -> None:

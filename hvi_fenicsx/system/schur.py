@@ -15,7 +15,7 @@ from scipy.linalg import LinAlgWarning, block_diag, lu_factor, lu_solve
 
 from ..typing import Array, Entities, Mask
 from .interior import Interior
-from .petsc_options import PREFIX
+from .petsc_options import prefix
 from .system import System
 
 
@@ -29,7 +29,7 @@ def is_worthwhile(system: System, affordable: int) -> bool:
         system: the system to be condensed.
         affordable: unknowns of Γc whose condensation costs as much as the factorisations so far.
     """
-    if system.comm.size > 1 or system.free_motions is not None or PETSc.Options().hasName(f"{PREFIX}pc_type"):
+    if system.comm.size > 1 or system.free_motions is not None or PETSc.Options().hasName(f"{prefix()}pc_type"):
         return False
     return 0 < len(system.jacobian.rows.dofs) <= affordable
 
@@ -48,7 +48,7 @@ class SchurDirect:
 
     def __init__(self, system: System, options: Mapping[str, object]) -> None:
         self._system, self._dofs = system, system.jacobian.rows.dofs
-        self._interior = Interior(system, self._dofs, options, PREFIX)
+        self._interior = Interior(system, self._dofs, options, "")
         self._stiffness = self._interior.stiffness()
         self._lu: tuple[Array, Entities] | None = None
         self._free: Mask = np.ones(len(self._dofs), dtype=bool)

@@ -236,11 +236,32 @@ def test_wrong_words_are_refused_as_in_a_scene_file(body: hvi.Body) -> None:
         (lambda: hvi.Model(body.mesh, [STEEL]), r"is no body; make one of a mesh"),  # type: ignore[arg-type]
         (lambda: hvi.Model(body, STEEL), "effects are a list"),  # type: ignore[arg-type]
         (lambda: hvi.Model(body, [STEEL, LAW]), "QuadraticLinear.* is no effect with a place"),  # type: ignore[list-item]
+        (
+            lambda: hvi.solve(steel_square(body=body), petsc={"ksp_max_itt": 5}),
+            "petsc: no solver of this run has read ksp_max_itt",
+        ),
+        (lambda: hvi.solve(steel_square(body=body), petsc={"pc_type": "luu"}), "-hvi_pc_type luu: .*PC type luu"),
+        (lambda: hvi.Scene(domain={"shape": "rectangel"}), 'domain.shape: unknown .*mean "rectangle"'),
         (lambda: hvi.solve("part.toml"), "'part.toml' is no model and no scene"),  # type: ignore[arg-type]
     ]
     for make, reason in wrong:
         with pytest.raises(hvi.InputError, match=reason):
             make()
+
+
+def test_a_preconditioner_and_a_prefix_of_the_users_choice(body: hvi.Body, found: hvi.Solution) -> None:
+    """Jacobi needs more iterations than the program's own multigrid, for the same solution."""
+    model, steps = steel_square(body=body), []
+    ways = [{}, {"pc_type": "jacobi", "ksp_max_it": 5000}]
+    own, jacobi = (
+        hvi.solve(model, linear_solver="gamg", petsc=way, petsc_prefix="floor_", progress=steps.append) for way in ways
+    )
+    assert own.solve_result is not None
+    assert jacobi.solve_result is not None
+    assert jacobi.converged
+    assert jacobi.solve_result.counts.linear > 2 * own.solve_result.counts.linear
+    assert jacobi.energy == pytest.approx(found.energy, rel=1e-10)
+    assert {type(step) for step in steps} == {hvi.NewtonStep}
 
 
 def test_a_body_that_escapes_has_no_displacement_and_says_so(body: hvi.Body) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import re
 from collections.abc import Iterator
 from typing import Any
 
@@ -11,7 +12,7 @@ import pytest
 from petsc4py import PETSc
 from scenes import P, Table, block, displacement, energy, far, model, quadratic_linear, solved
 
-from hvi_fenicsx import Scene, Solution, prepare
+from hvi_fenicsx import NewtonStep, Scene, Solution, prepare
 from hvi_fenicsx.errors import InputError
 from hvi_fenicsx.solvers.condensed import fischer_burmeister
 from hvi_fenicsx.workflow import finish
@@ -154,13 +155,14 @@ def test_an_interrupt_ends_the_iteration(method: str) -> None:
 
 @pytest.mark.parametrize("method", METHODS)
 def test_progress_is_told(method: str) -> None:
-    steps: list[tuple[Any, ...]] = []
+    steps: list[NewtonStep] = []
     prepared = prepare(Scene.model_validate(strong(8, 3 * P, 1.0e6, epsilon=0.1, method=method)))
-    finish(prepared, progress=lambda *args: steps.append(args))
-    assert {context for context, *_ in steps} == {method}
-    assert [iteration for _, _, iteration, _, _ in steps] == sorted(iteration for _, _, iteration, _, _ in steps)
-    assert all(epsilon == 0.1 for _, epsilon, *_ in steps)
-    assert steps[-1][-1] > 0
+    finish(prepared, progress=steps.append)
+    assert {step.method for step in steps} == {method}
+    assert [step.iteration for step in steps] == sorted(step.iteration for step in steps)
+    assert all(step.epsilon == 0.1 for step in steps)
+    assert steps[-1].contact > 0
+    assert re.fullmatch(rf"{method}, ε 0\.1, iteration \d+, residual \S+, \d+ vertices in contact", repr(steps[-1]))
 
 
 @pytest.mark.parametrize("method", ["tao", "ssls"])
