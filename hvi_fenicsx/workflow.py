@@ -206,6 +206,7 @@ def finish_with_levels(
     if estimating and examination.certificate.passed:
         with prepared.timer("estimate"):
             errors = estimate(prepared.system, solved.levels, solved.result.u, examination)
+        warnings += plausibility.of_estimate(errors)
     return _solution(prepared, solved.result, examination, errors, prepared.warnings + warnings), solved.levels
 
 

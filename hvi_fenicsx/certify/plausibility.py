@@ -22,6 +22,8 @@ from ..runtime.mpi import largest, total
 from ..system import existence
 from .certificate import Examination
 from .contact_state import ContactState, LawState
+from .estimate.contact_errors import ratio
+from .estimate.estimator import Estimate
 from .thresholds import PLAUSIBILITY, PlausibilityThresholds
 
 
@@ -63,6 +65,22 @@ def of_solution(
                 warnings += _slip_and_kink(problem, law, thresholds)
                 warnings += _wide_smoothing(problem, law, thresholds)
     return tuple(warnings)
+
+
+def of_estimate(errors: Estimate) -> tuple[str, ...]:
+    """What there is to warn of in an estimated error, in sentences. Local; the same on all ranks.
+
+    Args:
+        errors: of the solution.
+    """
+    if not errors.coarse:
+        return ()
+    share = ratio(errors.discretisation, errors.energy_norm)
+    size = f"{100 * share:.2g} % of the solution" if np.isfinite(share) else "as large as the solution"
+    return (
+        f"the mesh is coarse: its estimated error is {size} in the energy norm, although the equations on this mesh "
+        "are solved and certified; refine the mesh, or let the program do it: --accuracy 0.05",
+    )
 
 
 def _scales(problem: Problem, thresholds: PlausibilityThresholds) -> Iterator[str]:

@@ -16,6 +16,10 @@ from .base import Superpotential, registered
 _STRICT = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False, arbitrary_types_allowed=True)
 
 
+_FOLLOWS_PRESSURE = ("coulomb", "amontons", "mohr_coulomb")
+"""Names of friction laws in which the friction follows the contact pressure."""
+
+
 def available() -> tuple[str, ...]:
     """Names of all laws, the user's own among them."""
     return tuple(registered())
@@ -34,6 +38,12 @@ def create(name: str, parameters: Mapping[str, Any]) -> Superpotential:
         InputError: with what is allowed, and the closest match of a misspelt name.
     """
     law = registered().get(name)
+    if law is None and name.lower() in _FOLLOWS_PRESSURE:
+        raise InputError(
+            f"law {name!r}: a friction that grows with the contact pressure is no derivative of an energy, so it has "
+            'no place in a hemivariational inequality. Use the friction of a known pressure p: law = "tresca" with '
+            "the traction μ p"
+        )
     if law is None:
         raise InputError(f"unknown law {name!r}{closest(name, available())}; available: {', '.join(available())}")
     allowed = inspect.signature(law).parameters

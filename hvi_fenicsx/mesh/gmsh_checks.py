@@ -62,6 +62,12 @@ def _check_cells(gmsh: Any, path: Path, dimension: int) -> None:
         raise InputError(f"mesh file {path}: it holds neither a mesh nor a geometry; give a file that gmsh has saved")
     if found != dimension:
         raise InputError(f"mesh file {path}: its cells have dimension {found}, the material's model wants {dimension}")
+    if not gmsh.model.getPhysicalGroups(dimension):
+        kind, command = ("surface", "Physical Surface") if dimension == 2 else ("volume", "Physical Volume")
+        raise InputError(
+            f"mesh file {path}: no physical group holds cells (dimension {dimension}), so gmsh leaves them out; put "
+            f'every {kind} into one: {command}("body") = {{...}};'
+        )
     cells, sides = (set(gmsh.model.mesh.getElements(d)[0]) for d in (dimension, dimension - 1))
     if cells != {_SIMPLEX[dimension]} or not sides <= {_SIMPLEX[dimension - 1]}:
         shape = "triangles" if dimension == 2 else "tetrahedra"

@@ -18,7 +18,7 @@ from ..runtime import forms
 from ..runtime.mpi import agree
 from ..spatial_value import SpatialValue
 from ..typing import Array, Entities
-from . import contact_normals, contact_surface
+from . import contact_normals, contact_surface, facing_sides
 from .contact_surface import Surface
 from .domain_forms import DomainForms, ScaledMeasure
 from .law_term import LawTerm
@@ -48,8 +48,8 @@ def make_surfaces(
         thresholds: what is rounding of a normal, and how far it may be turned.
 
     Raises:
-        InputError: on all ranks alike: a facet lies inside the body, or two directions that meet at a vertex are
-            neither orthogonal nor equal.
+        InputError: on all ranks alike: a facet lies inside the body, two sides of a part face each other, or two
+            directions that meet at a vertex are neither orthogonal nor equal.
     """
     parts = dict.fromkeys(w for w, _, c in contributions if w is not None and (c.bounds or c.laws))
     stated = {w: b.direction for w, _, c in contributions for b in c.bounds if w and b.direction is not None}
@@ -64,6 +64,8 @@ def make_surfaces(
         )
         for where in parts
     }
+    if not context.domain.one_piece:
+        facing_sides.refuse(context.domain.mesh.comm, surfaces.values(), context.length, thresholds)
     return contact_normals.decide(context.domain.mesh.comm, surfaces, stated, fixed, context.length, thresholds)
 
 

@@ -12,6 +12,7 @@ class Thresholds:
     Attributes:
         same_displacement: difference of two prescribed displacements, relative to the largest, that is rounding.
         rounding: relative rounding of the mesh's coordinates, and of a direction that the scene states.
+        same_point: distance of two vertices over the body's length, up to which they are at one point.
         flat: angle (rad) between the normals of a part up to which the part is flat.
         uneven: angle by which the normal of a part that is not flat may be turned at a vertex that it shares with
             another part or with a prescribed component: few digits in the coordinates explain so much.
@@ -27,6 +28,7 @@ class Thresholds:
 
     same_displacement: float = 1e-9
     rounding: float = 1e-14
+    same_point: float = 1e-9
     flat: float = 1e-8
     uneven: float = 0.02
     turned_to_prescribed: float = 1e-4

@@ -137,6 +137,11 @@ class Result:
         """Whether the certificate was passed."""
         return bool((self.summary.get("certificate") or {}).get("passed"))
 
+    @property
+    def coarse(self) -> bool:
+        """Whether the mesh's estimated error is so large that the numbers are rough."""
+        return bool((self.summary.get("estimate") or {}).get("coarse"))
+
     def roles(self, part: str) -> list[Mapping[str, Any]]:
         """What the effects on a part do (:class:`hvi_fenicsx.effects.Role`)."""
         return [role for where, role in self._roles("boundary") if where == part]

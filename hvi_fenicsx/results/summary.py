@@ -60,12 +60,13 @@ def _iterations(solution: Solution) -> dict[str, int] | None:
     }
 
 
-def _estimate(solution: Solution) -> dict[str, float] | None:
-    """Norms in (J/m)^½ or J^½; ``relative`` is the total over the energy norm."""
+def _estimate(solution: Solution) -> dict[str, float | bool] | None:
+    """Norms in (J/m)^½ or J^½; ``relative`` is the total over the energy norm; ``coarse``: the numbers are rough."""
     if solution.estimate is None:
         return None
     unit = math.sqrt(solution.problem.scales.energy)
-    return {k: v if k == "relative" else v * unit for k, v in solution.estimate.as_dict().items()}
+    norms = {k: v if k == "relative" else v * unit for k, v in solution.estimate.as_dict().items()}
+    return norms | {"coarse": solution.estimate.coarse}
 
 
 def _contact(solution: Solution) -> dict[str, Any] | None:

@@ -13,6 +13,7 @@ from scenes import block, model, quadratic_linear
 from hvi_fenicsx import Scene, prepare, read_scene, solve
 from hvi_fenicsx.certify import plausibility
 from hvi_fenicsx.certify.thresholds import PlausibilityThresholds
+from hvi_fenicsx.workflow import finish
 
 LAW = quadratic_linear(1.0e6)
 COARSE = ("domain.cells=[8, 8]",)
@@ -77,7 +78,16 @@ def test_a_strain_is_told_by_its_size(strain: float) -> None:
 
 @pytest.mark.parametrize("demo", ["strong_law", "lift_off", "pushed_block", "tipping_tower", "slot"])
 def test_sane_demos_are_left_in_peace(demo: str) -> None:
-    assert solve(read_scene(ROOT / "demos" / f"{demo}.toml", COARSE)).warnings == ()
+    assert finish(prepare(read_scene(ROOT / "demos" / f"{demo}.toml", COARSE)), estimating=False).warnings == ()
+
+
+def test_a_coarse_mesh_is_told_with_its_error() -> None:
+    scene = read_scene(ROOT / "demos" / "tipping_tower.toml", COARSE)
+    solution = solve(scene)
+    (warning,) = solution.warnings
+    assert solution.estimate is not None
+    assert solution.estimate.discretisation > 0.1 * solution.estimate.energy_norm
+    assert f"error is {100 * solution.estimate.discretisation / solution.estimate.energy_norm:.2g} %" in warning
 
 
 @pytest.mark.parametrize("demo", sorted((ROOT / "demos").glob("*.toml")), ids=lambda d: d.stem)

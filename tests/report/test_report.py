@@ -144,6 +144,13 @@ def test_an_estimate_and_ranks_are_told(held: Path, tmp_path: Path) -> None:
     assert "hvi run scene.toml --out again --np 3 '--petsc=-a b'" in text
 
 
+def test_a_certified_solution_on_a_coarse_mesh_is_not_called_good(held: Path, tmp_path: Path) -> None:
+    rough = {"relative": 0.43, "total": 43.0, "discretisation": 43.0, "energy_norm": 100.0, "coarse": True}
+    page = Page(changed(held, tmp_path / "new", estimate=rough))
+    assert "Certified on a coarse mesh: the estimated error is 43 % of the solution" in page.text
+    assert "A solution exists, was found, and is certified." not in page.text
+
+
 def test_numbers_that_rounding_spoils_pass_by_rounding(held: Path, tmp_path: Path) -> None:
     spoiled = {**summary(held)["certificate"], "inclusion": 3e-8, "rounding": 5e-8}
     text = Page(changed(held, tmp_path / "new", certificate=spoiled)).text

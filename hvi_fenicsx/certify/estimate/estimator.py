@@ -53,6 +53,11 @@ class Estimate:
         """The total over |||u_h|||; infinite where u_h is a rigid motion and the error is not 0."""
         return ratio(self.total, self.energy_norm)
 
+    @property
+    def coarse(self) -> bool:
+        """Whether the mesh's error is so large that the numbers are rough."""
+        return ratio(self.discretisation, self.energy_norm) > DEFAULT.coarse
+
     def as_dict(self) -> dict[str, float]:
         """The numbers by name, nondimensional."""
         names = ("relative", "total", "discretisation", "smoothing", "algebraic", "energy_norm")

@@ -31,6 +31,7 @@ class Thresholds:
         contact_rounds: times that the bubbles are solved for where the errors on Γc are estimated.
         answer_rounds: times at most that the vertices' answer to the bubbles is corrected by the laws'.
         answer_change: relative change in energy norm of that answer up to which no further round is needed.
+        coarse: the mesh's error over the norm of the solution, above which the numbers are rough.
     """
 
     near: float = thresholds.DEFAULT.near
@@ -48,6 +49,7 @@ class Thresholds:
     contact_rounds: int = 2
     answer_rounds: int = 4
     answer_change: float = 0.05
+    coarse: float = 0.1
 
 
 DEFAULT = Thresholds()

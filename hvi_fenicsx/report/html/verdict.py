@@ -26,6 +26,8 @@ _STATES = {
 def headline(result: Result) -> dict[str, str]:
     """The answer in one line, and whether it is good news: ``good``, ``limited`` or ``bad``."""
     code, state = result.summary.get("exit_code"), result.solvability.get("state")
+    if result.certified and result.coarse:
+        return {"kind": "limited", "words": f"Certified on a coarse mesh: {_rough(result)}."}
     if result.certified and state == "held":
         return {"kind": "good", "words": "A solution exists, was found, and is certified."}
     if result.certified:
@@ -35,6 +37,14 @@ def headline(result: Result) -> dict[str, str]:
     if code == ExitCode.INTERRUPTED:
         return {"kind": "bad", "words": "The run was interrupted: what is shown is not a solution."}
     return {"kind": "bad", "words": f"No certified solution: {result.summary.get('reason')}."}
+
+
+def _rough(result: Result) -> str:
+    """The mesh's error in words."""
+    found = result.summary["estimate"]
+    norm, part = found.get("energy_norm"), found.get("discretisation")
+    size = f"{100 * part / norm:.2g} % of the solution" if norm and part is not None else "as large as the solution"
+    return f"the estimated error is {size}, so its numbers are rough; refine the mesh, or ask for an --accuracy"
 
 
 def existence(result: Result) -> Iterator[str]:
