@@ -1,13 +1,15 @@
 """Forces at vertices where a law of |u_t| shares a component with other laws or with contact, at edges in space.
 
 Only their sum is known. Each carrier may give any force of a convex set: a law at rest a disc, any other law a segment,
-contact a half-line. Forces of these sets whose sum comes nearest to the wanted one are found by minimising over one
-carrier after the other. What then is left over, no attribution accounts for.
+contact a half-line. Forces of these sets whose sum comes nearest to the wanted one are the projections of what each
+carrier is asked for. Some sweeps give to each in turn what the others leave; where the sum touches the boundary of what
+all can give they come nearer ever more slowly, so Newton steps on what is asked for follow. What then is left over, no
+attribution accounts for.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,22 +20,71 @@ from ..problem.problem import Bounds
 from ..typing import Array, Integers, Mask
 from .thresholds import DEFAULT, Thresholds
 
-Projection = Callable[[Array], Array]
 
-
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Carrier:
     """A law or a bound at those of its vertices that are shared (k of them).
 
     Attributes:
         rows: their numbers among the shared vertices, (k,).
         own: their numbers among its own vertices, (k,).
-        nearest: gives the force of its set that is nearest to a given one, (k, d) both.
+        visible: the components that no support hides, (k, d).
+        along: the direction of a segment of forces, (k, d).
+        low: the end of the segment behind, (k, 1).
+        high: the end ahead, (k, 1).
+        axes: of a disc of forces, (k, q, d).
+        radius: of the disc, (k, 1).
+        at_rest: where it may give the disc instead of the segment, (k, 1).
     """
 
     rows: Integers
     own: Integers
-    nearest: Projection
+    visible: Mask
+    along: Array
+    low: Array
+    high: Array
+    axes: Array
+    radius: Array
+    at_rest: Mask
+
+    def nearest(self, wanted: Array) -> tuple[Array, Array]:
+        """The force of its set that is nearest to a wanted one, and its derivative, both in visible components.
+
+        Args:
+            wanted: (k, d).
+
+        Returns:
+            The force (k, d), on a segment with its hidden components, and the derivative (k, d, d).
+        """
+        seen, rest = wanted * self.visible, self.at_rest
+        disc, turns = self._in_disc(seen)
+        segment, moves = self._on_segment(seen)
+        both = self.visible[:, :, None] & self.visible[:, None, :]
+        return np.where(rest, disc, segment), np.where(rest[:, :, None], turns, moves) * both
+
+    def _on_segment(self, wanted: Array) -> tuple[Array, Array]:
+        shown = self.along * self.visible
+        squares = np.sum(shown**2, axis=1, keepdims=True)
+        middle = np.clip(0.0, self.low, self.high)
+        size = np.divide(np.sum(wanted * shown, axis=1, keepdims=True), squares, out=middle, where=squares > 0.0)
+        inside = (self.low < size) & (size < self.high) & (squares > 0.0)
+        share = np.divide(1.0, squares, out=np.zeros_like(squares), where=inside)
+        return np.clip(size, self.low, self.high) * self.along, share[:, :, None] * _squares(shown)
+
+    def _in_disc(self, wanted: Array) -> tuple[Array, Array]:
+        inside = np.einsum("mkd,md->mk", self.axes, wanted)
+        length = np.linalg.norm(inside, axis=1, keepdims=True)
+        beyond = length > self.radius
+        share = np.divide(self.radius, length, out=np.ones_like(length), where=beyond)
+        flat = np.einsum("mk,mkd->md", inside, self.axes)
+        out = np.divide(flat, length, out=np.zeros_like(flat), where=beyond)
+        plane = np.einsum("mkd,mke->mde", self.axes, self.axes)
+        return share * flat, share[:, :, None] * (plane - _squares(out))
+
+
+def _squares(vectors: Array) -> Array:
+    """Squares v vᵀ of vectors (k, d), (k, d, d)."""
+    return vectors[:, :, None] * vectors[:, None, :]
 
 
 @dataclass(frozen=True)
@@ -108,7 +159,7 @@ def settle(
     carriers = [_of_law(term, row, free, u, near) for term in terms]
     carriers += [_of_bounds(*one, row, free) for one in bounds]
     wanted = np.where(free, needed.reshape(-1, d)[blocks], 0.0)
-    forces, left = _nearest_sum(carriers, wanted, thresholds)
+    forces, left = nearest_sum(carriers, wanted, thresholds)
     found = [(c.own, f + left[c.rows]) for c, f in zip(carriers, forces, strict=True)]
     return SharedForces(dict(enumerate(found[: len(terms)])), dict(enumerate(found[len(terms) :])))
 
@@ -132,51 +183,95 @@ def _of_law(term: LawTerm, row: Integers, free: Mask, u: Array, near: Array) -> 
     argument, within = term.argument(u)[own], near[term.surface.blocks][own]
     weights = term.surface.weights[own, None]
     low, high = (weights * end[:, None] for end in term.law.interval(argument, within))
-    axes = term.directions[own] * free[rows][:, None, :]
     moving = (argument > within)[:, None] | np.full((len(own), 1), not term.radial)
     unit: Array = np.ones((len(own), 1))
     if term.radial:
         unit = np.divide(term.slip(u)[own], argument[:, None], out=np.zeros((len(own), 2)), where=moving)
-    along = np.einsum("mk,mkd->md", unit, axes)
-
-    def nearest(force: Array) -> Array:
-        inside = np.einsum("mkd,md->mk", axes, force)
-        length = np.linalg.norm(inside, axis=1, keepdims=True)
-        capped = inside * np.minimum(1.0, np.divide(high, length, out=np.ones_like(length), where=length > 0))
-        disc = np.einsum("mk,mkd->md", capped, axes)
-        segment = np.clip(np.sum(force * along, axis=1, keepdims=True), low, high) * along
-        return np.where(moving, segment, disc)
-
-    return Carrier(rows, own, nearest)
+    return Carrier(
+        rows=rows,
+        own=own,
+        visible=free[rows],
+        along=np.einsum("mk,mkd->md", unit, term.directions[own]),
+        low=low,
+        high=high,
+        axes=term.directions[own],
+        radius=np.abs(high),
+        at_rest=~moving,
+    )
 
 
 def _of_bounds(bounds: Bounds, lower: Mask, upper: Mask, row: Integers, free: Mask) -> Carrier:
     rows = row[bounds.surface.blocks]
     own = np.flatnonzero((rows >= 0) & (lower | upper))
-    rows = rows[own]
-    axes = bounds.surface.normals[own] * free[rows]
-    least = np.where(lower[own], -np.inf, 0.0)[:, None]  # at the upper bound of u·n contact pushes inward
-    most = np.where(upper[own], np.inf, 0.0)[:, None]
+    return Carrier(
+        rows=rows[own],
+        own=own,
+        visible=free[rows[own]],
+        along=bounds.surface.normals[own],
+        low=np.where(lower[own], -np.inf, 0.0)[:, None],  # at the upper bound of u·n contact pushes inward
+        high=np.where(upper[own], np.inf, 0.0)[:, None],
+        axes=bounds.surface.normals[own, None],
+        radius=np.zeros((len(own), 1)),
+        at_rest=np.zeros((len(own), 1), dtype=bool),
+    )
 
-    def nearest(force: Array) -> Array:
-        return np.clip(np.sum(force * axes, axis=1, keepdims=True), least, most) * axes
 
-    return Carrier(rows, own, nearest)
+def nearest_sum(
+    carriers: Sequence[Carrier], wanted: Array, thresholds: Thresholds = DEFAULT
+) -> tuple[list[Array], Array]:
+    """Forces of all carriers whose sum is nearest to the wanted one, and what is left over.
 
+    Args:
+        carriers: at some vertices each.
+        wanted: at all shared vertices, zero in hidden components, (vertices, d).
+        thresholds: when forces are settled.
 
-def _nearest_sum(carriers: Sequence[Carrier], wanted: Array, thresholds: Thresholds) -> tuple[list[Array], Array]:
-    """Forces of all carriers whose sum is nearest to the wanted one, and what is left over."""
-    left = wanted.copy()
-    forces: list[Array] = [np.zeros((len(c.rows), wanted.shape[1])) for c in carriers]
+    Returns:
+        The forces by carrier, (k, d) each, and what is left, (vertices, d).
+    """
+    asked = [np.zeros((len(c.rows), wanted.shape[1])) for c in carriers]
+    _sweep(carriers, asked, wanted, thresholds.sweeps)
     settled = thresholds.settled * float(np.max(np.abs(wanted), initial=0.0))
-    for _ in range(thresholds.sweeps):
-        change = 0.0
-        for i, carrier in enumerate(carriers):
-            force = carrier.nearest(left[carrier.rows] + forces[i])
-            step = force - forces[i]
-            left[carrier.rows] -= step
-            forces[i] = force
-            change = max(change, float(np.max(np.abs(step), initial=0.0)))
-        if change <= settled:
+    for _ in range(thresholds.newton_steps):
+        left = _left(carriers, asked, wanted)
+        if np.all(np.abs(left) <= settled) or not _newton(carriers, asked, wanted, left, thresholds):
             break
-    return forces, left
+    return [c.nearest(a)[0] for c, a in zip(carriers, asked, strict=True)], _left(carriers, asked, wanted)
+
+
+def _left(carriers: Sequence[Carrier], asked: Sequence[Array], wanted: Array) -> Array:
+    """What the carriers leave of the wanted forces, (vertices, d)."""
+    left = wanted.copy()
+    for carrier, a in zip(carriers, asked, strict=True):
+        left[carrier.rows] -= carrier.nearest(a)[0] * carrier.visible
+    return left
+
+
+def _sweep(carriers: Sequence[Carrier], asked: list[Array], wanted: Array, count: int) -> None:
+    """Ask each carrier in turn for its force and what is left."""
+    left = _left(carriers, asked, wanted)
+    for i, carrier in [pair for _ in range(count) for pair in enumerate(carriers)]:
+        before = carrier.nearest(asked[i])[0] * carrier.visible
+        asked[i] = left[carrier.rows] + before
+        left[carrier.rows] += before - carrier.nearest(asked[i])[0] * carrier.visible
+
+
+def _newton(
+    carriers: Sequence[Carrier], asked: list[Array], wanted: Array, left: Array, thresholds: Thresholds
+) -> bool:
+    """One Newton step at each vertex where it leaves less; whether there was any."""
+    d = wanted.shape[1]
+    slopes = [c.nearest(a)[1] for c, a in zip(carriers, asked, strict=True)]
+    matrix = np.tile(thresholds.least_slope * np.eye(d), (len(wanted), 1, 1))
+    for carrier, slope in zip(carriers, slopes, strict=True):
+        matrix[carrier.rows] += slope @ slope
+    step = np.linalg.solve(matrix, left[:, :, None])
+    steps = [(slope @ step[c.rows])[:, :, 0] for c, slope in zip(carriers, slopes, strict=True)]
+    size, pending, length = np.linalg.norm(left, axis=1), np.ones(len(wanted), dtype=bool), 1.0
+    for _ in range(thresholds.halvings):
+        trial = [a + length * s for a, s in zip(asked, steps, strict=True)]
+        better = pending & (np.linalg.norm(_left(carriers, trial, wanted), axis=1) < (1 - 1e-3 * length) * size)
+        for i, carrier in enumerate(carriers):
+            asked[i] = np.where(better[carrier.rows, None], trial[i], asked[i])
+        pending, length = pending & ~better, length / 2
+    return not np.all(pending)

@@ -17,8 +17,11 @@ class Thresholds:
         along: part of a rigid motion along a direction, per radian or unit length, that is rounding.
         nothing_acts: net forces along a rigid motion that are this small beside the sum of all forces are none.
         summation: rounding error of a sum of nodal forces, relative to the sum of their sizes.
-        settled: change of shared forces, relative to the largest, at which they are settled.
-        sweeps: over their carriers, at most.
+        settled: what shared forces may leave of the wanted ones, relative to the largest, when they are settled.
+        sweeps: over their carriers before Newton steps.
+        newton_steps: on what is asked of their carriers, at most.
+        least_slope: of the carriers together, which keeps a step finite at the boundary of what they can give.
+        halvings: of a step that leaves more.
     """
 
     near: float = 1e-10
@@ -29,7 +32,10 @@ class Thresholds:
     nothing_acts: float = 1e-10
     summation: float = 1e-14
     settled: float = 1e-15
-    sweeps: int = 1000
+    sweeps: int = 20
+    newton_steps: int = 60
+    least_slope: float = 1e-14
+    halvings: int = 12
 
 
 @dataclass(frozen=True, kw_only=True)

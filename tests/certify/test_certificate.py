@@ -6,14 +6,17 @@ That it accepts what is stationary and refuses what is near is shown by enumerat
 from __future__ import annotations
 
 import copy
+import json
+from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 import pytest
 from dolfinx import fem
+from runs import process
 from scenes import STEEL, P, Q, Table, displacement, far, model, quadratic_linear, solved
 
-from hvi_fenicsx import Scene, Solution, prepare, solve
+from hvi_fenicsx import Scene, Solution, dump_scene, prepare, solve
 from hvi_fenicsx.certify.certificate import Certificate, examine
 
 Array = npt.NDArray[np.float64]
@@ -172,6 +175,19 @@ def test_two_frictions_share_the_force_at_their_edge(friction: float) -> None:
     assert solved(_floor_and_back(friction)).converged
 
 
+@pytest.mark.long
+def test_ranks_without_a_vertex_of_an_edge_divide_its_force_too(tmp_path: Path) -> None:
+    """One cell on three ranks: some own no vertex of the edge, or none of Γc at all."""
+    scene = tmp_path / "edge.toml"
+    scene.write_text(dump_scene(Scene.model_validate(_floor_and_back(2e3))), encoding="utf-8")
+    done = process("run", scene, "--out", tmp_path / "r", "--no-pictures", ranks=3)
+    assert done.returncode == 0, done.stderr
+    alone = solved(_floor_and_back(2e3))
+    assert alone.examination is not None
+    energy = json.loads((tmp_path / "r" / "summary.json").read_text(encoding="utf-8"))["energy"]
+    assert energy == pytest.approx(alone.examination.energy * alone.problem.scales.energy, rel=1e-9)
+
+
 def test_an_edge_whose_force_exceeds_both_frictions_is_not_certified() -> None:
     """The solution with a hundredth of the displacement taken off: more is needed than both laws can give."""
     found = solve(Scene.model_validate(_floor_and_back(2e3)))
@@ -179,3 +195,13 @@ def test_an_edge_whose_force_exceeds_both_frictions_is_not_certified() -> None:
     u = found.solve_result.u
     u.x.array[:] *= 0.99
     assert examine(found.problem, u, 1e-8).certificate.inclusion > 1e-3
+
+
+def test_a_law_whose_slip_is_partly_prescribed_shares_an_edge() -> None:
+    """The left end of the edge is displaced along x; what friction gives along z tells all of it."""
+    table = _floor_and_back(2e3)
+    table["boundary"]["held"] = {"on": "top", "displacement": ["free", 0.0, 0.0]}
+    table["boundary"]["moved"] = {"on": "left", "displacement": [1e-6, "free", "free"]}
+    table["boundary"]["floor"] = {"on": "bottom", "adhesion": quadratic_linear(1e6)}
+    found = solved(table)
+    assert found.exit_code == 0, str(found.examination)

@@ -1,0 +1,94 @@
+"""Forces divided among carriers: against points whose nearest sum is known in closed form."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hvi_fenicsx.certify.shared_forces import Carrier, nearest_sum
+from hvi_fenicsx.typing import Array
+
+VERTICES = 40
+PLANES = {"floor": (0, 1), "wall": (0, 2), "end": (1, 2)}
+
+
+def disc(plane: str, radius: float) -> Carrier:
+    """A law of |u_t| at rest."""
+    axes = np.tile(np.eye(3)[list(PLANES[plane])], (VERTICES, 1, 1))
+    return _carrier(axes=axes, radius=np.full((VERTICES, 1), radius), at_rest=np.ones((VERTICES, 1), dtype=bool))
+
+
+def contact(axis: int) -> Carrier:
+    """A bound that pushes against an axis."""
+    along = np.tile(np.eye(3)[axis], (VERTICES, 1))
+    return _carrier(along=along, low=np.full((VERTICES, 1), -np.inf))
+
+
+def _carrier(**given: Array) -> Carrier:
+    rows, zero = np.arange(VERTICES), np.zeros((VERTICES, 1))
+    plain = {"along": np.zeros((VERTICES, 3)), "low": zero, "high": zero, "axes": np.zeros((VERTICES, 2, 3))}
+    plain |= {"radius": zero, "at_rest": zero > 0, "visible": np.ones((VERTICES, 3), dtype=bool)}
+    return Carrier(rows=rows, own=rows, **(plain | given))
+
+
+def farthest(carriers: list[Carrier], outward: Array) -> Array:
+    """The sum of the forces that reach farthest along unit vectors: the only point of the boundary with that normal."""
+    total = np.zeros_like(outward)
+    for c in carriers:
+        flat = np.einsum("mkd,mke,me->md", c.axes, c.axes, outward)
+        length = np.linalg.norm(flat, axis=1, keepdims=True)
+        total += c.radius * np.divide(flat, length, out=np.zeros_like(flat), where=length > 0)
+    return total
+
+
+def directions(*, upward: bool = False) -> Array:
+    """Unit vectors, with contact only those that it does not pull against."""
+    v = np.random.default_rng(3).normal(size=(VERTICES, 3))
+    v[:, 2] = np.abs(v[:, 2]) if upward else v[:, 2]
+    return np.asarray(v / np.linalg.norm(v, axis=1)[:, None])
+
+
+def within(carriers: list[Carrier], forces: list[Array]) -> bool:
+    """Whether no law gives more than it can, and no contact pulls."""
+    laws = [np.linalg.norm(f, axis=1) <= c.radius[:, 0] + 1e-14 for c, f in zip(carriers, forces, strict=True)]
+    contacts = [np.all(f == np.minimum(f, 0.0)) for c, f in zip(carriers, forces, strict=True) if not np.any(c.at_rest)]
+    return all(np.all(w) for c, w in zip(carriers, laws, strict=True) if np.any(c.at_rest)) and all(contacts)
+
+
+SUMS = [
+    ([disc("floor", 1.0), disc("wall", 0.1)], False),
+    ([disc("floor", 1.0), disc("wall", 1e-3), contact(2)], True),
+    ([disc("floor", 1.0), disc("wall", 0.5), disc("end", 2.0)], False),
+]
+
+
+@pytest.mark.parametrize(("carriers", "upward"), SUMS)
+def test_a_force_at_the_limit_of_all_carriers_is_divided_to_rounding(carriers: list[Carrier], upward: bool) -> None:
+    limit = farthest(carriers, directions(upward=upward))
+    for inside in (0.0, 1e-9, 1e-5, 0.1):
+        forces, left = nearest_sum(carriers, (1.0 - inside) * limit)
+        assert np.max(np.abs(left)) < 1e-14
+        assert np.allclose(sum(forces), (1.0 - inside) * limit, atol=1e-14)
+        assert within(carriers, forces)
+
+
+@pytest.mark.parametrize(("carriers", "upward"), SUMS)
+def test_what_exceeds_all_carriers_is_left_over(carriers: list[Carrier], upward: bool) -> None:
+    """At least the distance; at most twice as much, because the last steps are slow there."""
+    outward = directions(upward=upward)
+    limit = farthest(carriers, outward)
+    for beyond in (1e-9, 1e-2):
+        _, left = nearest_sum(carriers, limit + beyond * outward)
+        sizes = np.linalg.norm(left, axis=1) / beyond
+        assert np.min(sizes) > 0.999
+        assert np.max(sizes) < 2.0
+
+
+def test_a_law_of_a_prescribed_slip_is_told_by_what_the_support_does_not_hide() -> None:
+    """The slip is (0.6, 0.8), the first component prescribed: from the second follows the whole force."""
+    visible = np.tile([False, True, True], (VERTICES, 1))
+    law = _carrier(along=np.tile([0.6, 0.8, 0.0], (VERTICES, 1)), high=np.full((VERTICES, 1), 1.0), visible=visible)
+    wanted = np.tile([0.0, 0.4, 0.0], (VERTICES, 1))
+    (force,), left = nearest_sum([law], wanted)
+    assert np.allclose(force, [0.3, 0.4, 0.0], atol=1e-15)
+    assert np.max(np.abs(left)) < 1e-15
