@@ -31,6 +31,7 @@ class References:
         load: Euclidean norm of the nodal loads that no support takes up at once, by body.
         scale: stress in units of p0, and displacement in units of u0, that drives the body, at most 1, by body.
         moved: whether something else than loads drives the body, by body.
+        driven: whether anything drives it, by body.
         holding: which scalar dofs of this rank's vertices supports, contact and laws act on, (n,).
         thresholds: what is the least force that forces are relative to.
     """
@@ -39,6 +40,7 @@ class References:
     load: Array
     scale: Array
     moved: Mask
+    driven: Mask
     holding: Mask
     thresholds: Thresholds = DEFAULT
 
@@ -69,14 +71,16 @@ class References:
         return np.asarray(self.scale[self.problem.bodies.labels[blocks]])
 
     def displacements(self, u: Array) -> Array:
-        """The largest component of a displacement, by body; where there is none, its scale. Collective.
+        """The largest component of a displacement, by body; where nothing drives, at least its scale. Collective.
+
+        Of a body that nothing drives only rounding moves, and rounding is relative to no displacement.
 
         Args:
             u: at this rank's vertices, in units of u0, any shape of (vertices, d).
         """
         sizes = np.max(np.abs(u.reshape(-1, self.problem.scales.dimension)), axis=1)
         found = self.largest(np.arange(len(sizes)), sizes)
-        return np.where(found > 0.0, found, self.scale)
+        return np.where(self.driven & (found > 0.0), found, np.maximum(found, self.scale))
 
     def forces(self, u: Array, internal: Array) -> Array:
         """What residual forces at u are relative to, as Euclidean norms of nodal forces, by body. Collective.
@@ -125,11 +129,11 @@ def of(problem: Problem, load: Array, thresholds: Thresholds = DEFAULT) -> Refer
     free = load.copy()
     free.reshape(-1)[problem.fixed_here] = 0.0
     everywhere = np.ones(len(problem.bodies.bodies))
-    found = References(problem, everywhere, everywhere, everywhere > 0, holding, thresholds)
+    found = References(problem, everywhere, everywhere, everywhere > 0, everywhere > 0, holding, thresholds)
     loaded, moved = _total(problem, _sums(problem, np.linalg.norm(load, axis=1))), _moved(problem)
     drive = np.maximum(loaded, moved)
     scale = np.where(drive > 0.0, drive / (np.max(drive) or 1.0), 1.0)
-    return replace(found, load=found.norms(free), scale=scale, moved=moved > 0.0)
+    return replace(found, load=found.norms(free), scale=scale, moved=moved > 0.0, driven=drive > 0.0)
 
 
 def _moved(problem: Problem) -> Array:

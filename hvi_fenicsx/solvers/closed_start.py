@@ -28,7 +28,8 @@ def resting_start(
 
     From u = 0 no vertex counts as active, the reduced matrix is singular and the first step is 1e9; the reactions of
     this start give the active set instead. What closed contact leaves free, the laws hold, and they may do so only far
-    from rest (a dead zone, a support at a distance): there the bodies are moved first.
+    from rest (a dead zone, a support at a distance): there the bodies are moved first. A body that nothing drives
+    remains where it is: it need not travel to its supports.
 
     Args:
         solver: of the linear solve.
@@ -40,12 +41,14 @@ def resting_start(
     """
     rtol = solver.thresholds.start_tolerance if rtol is None else rtol
     system = solver.system
-    x = _closed_contact(system)
-    models, kinks = _held_by_laws(solver, laws, x)
     contact = contact_dofs(system)
+    bodies = system.problem.bodies.labels[contact // system.problem.scales.dimension]
+    closing = contact[system.references.driven[bodies]]
+    x = _closed_contact(system, closing)
+    models, kinks = _held_by_laws(solver, laws, x)
     held = np.setdiff1d(np.union1d(contact, kinks), system.problem.fixed).astype(np.int32)
     linear = solver.newton_step(x, held, models, rtol).linear
-    if _push_onto_bounds(solver, x, contact, models):
+    if _push_onto_bounds(solver, x, closing, models):
         linear += solver.newton_step(x, held, models, rtol).linear
     return x, linear
 
@@ -68,12 +71,11 @@ def _held_by_laws(
     return rigid_position.models(solver, laws, x) if settled else at_rest, kinks
 
 
-def _closed_contact(system: System) -> PETSc.Vec:
-    """A new x: contact closed, the prescribed values, and zero elsewhere. Collective."""
+def _closed_contact(system: System, contact: Integers) -> PETSc.Vec:
+    """A new x: some contact closed, the prescribed values, and zero elsewhere. Collective."""
     x = system.load.duplicate()
     x.set(0.0)
     low, high = system.lower.array_r, system.upper.array_r
-    contact = contact_dofs(system)
     x.array[contact] = closed(low[contact], high[contact])
     system.prescribe(x)
     return x

@@ -126,3 +126,18 @@ def test_a_tolerance_beyond_rounding_is_said() -> None:
     assert any(line.startswith("tolerance 1e-300 is below the rounding errors") for line in console.outcome(found))
     table["solver"]["tolerance"] = 1e-8
     assert not any(line.startswith("tolerance") for line in console.outcome(solved(table)))
+
+
+@pytest.mark.parametrize("law", [None, {"law": "linear_spring", "stiffness": 5.7e6}])
+def test_a_body_that_nothing_drives_rests(law: Table | None) -> None:
+    """All that moves it is rounding, which is small beside the law or the unit stress, not beside itself."""
+    table = model(3, gap=1e-3)
+    side = {"friction": law or {"law": "exponential", "peak_traction": 1e6, "residual_traction": 5e5, "delta": 1e-2}}
+    table["boundary"] = {
+        "top": {"on": "top", "displacement": ["free", 0.0]},
+        "floor": table["boundary"]["floor"],
+        "side": {"on": "right", **side},
+    }
+    found = solved(table)
+    assert found.exit_code == 0
+    assert np.max(np.abs(displacement(found))) < 1e-12
