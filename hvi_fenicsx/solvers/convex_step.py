@@ -121,7 +121,7 @@ class ConvexStep:
         return cells, replace(outcome, converged=False, reason="the states of the convex kinks keep changing")
 
     def measure(self, x: PETSc.Vec, cells: Sequence[Cells], xi: Sequence[Array]) -> float:
-        """The residual of the true inequality: small if ξ is still in ∂G. Collective.
+        """The residual of the true inequality: small if ξ is still in ∂G; infinite on an overloaded kink. Collective.
 
         Args:
             x: the displacement.
@@ -130,7 +130,10 @@ class ConvexStep:
         """
         arguments = zip(self._laws, xi, self.arguments(x), strict=True)
         nearest = [np.clip(s, law.concave.left(a), law.concave.right(a)) for law, s, a in arguments]
-        self._system.residual(x, self._residual, self.majorants(cells, nearest))
+        models = self.majorants(cells, nearest)
+        if self.anywhere(self._overloaded(x, models)):
+            return math.inf
+        self._system.residual(x, self._residual, models)
         lower, upper = kink_bounds.slip_bounds(self._system, cells)
         return self._solver.measure(x, self._residual, lower, upper)
 
