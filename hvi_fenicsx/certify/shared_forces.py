@@ -229,7 +229,7 @@ def nearest_sum(
     Returns:
         The forces by carrier, (k, d) each, and what is left, (vertices, d).
     """
-    asked = [np.zeros((len(c.rows), wanted.shape[1])) for c in carriers]
+    asked: list[Array] = [np.zeros((len(c.rows), wanted.shape[1])) for c in carriers]
     _sweep(carriers, asked, wanted, thresholds.sweeps)
     settled = thresholds.settled * float(np.max(np.abs(wanted), initial=0.0))
     for _ in range(thresholds.newton_steps):
