@@ -51,6 +51,7 @@ _HOME = {
     "read_scene": "scene",
     "set_log_level": "runtime.log",
     "solve": "modelling",
+    "study": "modelling",
 }
 __all__ = [
     "Adhesion",
@@ -81,6 +82,7 @@ __all__ = [
     "read_scene",
     "set_log_level",
     "solve",
+    "study",
 ]
 
 if TYPE_CHECKING:
@@ -106,6 +108,7 @@ if TYPE_CHECKING:
         Traction,
         check,
         solve,
+        study,
     )
     from .runtime.log import set_log_level
     from .runtime.newton_step import NewtonStep

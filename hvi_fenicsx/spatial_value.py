@@ -28,7 +28,7 @@ class SpatialValue(ABC):
 
     @property
     def everywhere(self) -> bool:
-        """Whether it is known between the vertices of a mesh too."""
+        """Whether it is known at all points; else it belongs to a mesh, and on others is known at its vertices only."""
         return True
 
     @abstractmethod

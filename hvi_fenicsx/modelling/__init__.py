@@ -18,6 +18,7 @@ from .placed_effects import (
 )
 from .solution import ModelSolution as Solution
 from .solving import check, solve
+from .studying import ModelStudy, study
 
 __all__ = [
     "Adhesion",
@@ -31,6 +32,7 @@ __all__ = [
     "Friction",
     "Isotropic",
     "Model",
+    "ModelStudy",
     "On",
     "Orthotropic",
     "PlacedEffect",
@@ -40,4 +42,5 @@ __all__ = [
     "Traction",
     "check",
     "solve",
+    "study",
 ]

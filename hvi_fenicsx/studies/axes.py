@@ -53,7 +53,7 @@ class Axis:
         """The tables of a scene with a value of this axis.
 
         Args:
-            tables: the scene's, the domain as an object.
+            tables: the scene's.
             value: as the user wrote it.
             beside: the names of all axes that are given.
 
@@ -190,6 +190,8 @@ class AccuracyAxis(_Number):
 
     def setting(self, scene: Scene, value: str) -> Setting:
         """See the base class."""
+        if not meshes.can_be_refined(scene.domain):
+            raise InputError("--axis accuracy: this mesh cannot be refined; leave the axis out")
         return Setting(scene, accuracy=float(value))
 
 
@@ -242,7 +244,7 @@ def applied(tables: Tables, pairs: Mapping[str, str]) -> Tables:
     """The tables of a scene with a value of each of several axes.
 
     Args:
-        tables: the scene's, the domain as an object.
+        tables: the scene's.
         pairs: the values by axis.
 
     Raises:

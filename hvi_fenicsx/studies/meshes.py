@@ -19,7 +19,7 @@ def refined(tables: Mapping[str, Any], factor: Fraction) -> Tables | None:
     """The scene's tables with cells ``factor`` times finer each way; None where there is no such mesh.
 
     Args:
-        tables: the scene's, the domain as an object.
+        tables: the scene's.
         factor: above 1 finer, below 1 coarser; of a mesh file, a power of two.
 
     Raises:
@@ -33,11 +33,16 @@ def refined(tables: Mapping[str, Any], factor: Fraction) -> Tables | None:
     return None if finer is None else {**tables, "domain": finer}
 
 
+def can_be_refined(shape: DomainShape) -> bool:
+    """Whether a shape has finer meshes than its own."""
+    return shape.refined(Fraction(2)) is not None
+
+
 def at(tables: Mapping[str, Any], text: str) -> Tables:
     """The scene's tables with the mesh that a value of the axis names.
 
     Args:
-        tables: the scene's, the domain as an object.
+        tables: the scene's.
         text: cells along the first side of a block, a mesh size in m, refinements of a file.
 
     Raises:
@@ -56,7 +61,7 @@ def default_meshes(tables: Mapping[str, Any], thresholds: Thresholds = DEFAULT) 
     """The meshes of the default plan, coarse to fine: the scene's, halved and doubled as far as that goes.
 
     Args:
-        tables: the scene's, the domain as an object.
+        tables: the scene's.
         thresholds: how many, and how large.
     """
     powers = range(-thresholds.coarser_meshes, thresholds.finer_meshes + 1)
@@ -68,7 +73,7 @@ def reference_meshes(tables: Mapping[str, Any], thresholds: Thresholds = DEFAULT
     """The reference's mesh, four times finer or twice, and the next two coarser ones.
 
     Args:
-        tables: of the scene on the finest mesh of a plan, the domain as an object.
+        tables: of the scene on the finest mesh of a plan.
         thresholds: how large the reference may be.
     """
     finest = refined(tables, Fraction(4))

@@ -10,7 +10,7 @@ from ..errors import InputError
 from ..laws import smoothing
 from ..scene import Scene, dump_scene
 from .axes import Axis, AxisValues, applied, values_of
-from .meshes import default_meshes, reference_meshes
+from .meshes import can_be_refined, default_meshes, reference_meshes
 from .scene_tables import Tables, laws, setting_of, tables_of, unsmoothed, with_solver
 from .setting import Setting
 from .thresholds import DEFAULT, Thresholds
@@ -56,7 +56,7 @@ def make(scene: Scene, axes: Sequence[AxisValues], thresholds: Thresholds = DEFA
     wanted = list(_product(tables, combined, left_out) if axes else _default(scene, tables, thresholds, left_out))
     if not wanted:
         raise InputError("--axis: no combination of these is a scene:\n" + "\n".join(left_out))
-    others = [a for a in axes if not a.axis.combined] if axes else [values_of("accuracy", thresholds.accuracies)]
+    others = [a for a in axes if not a.axis.combined] if axes else _default_goals(scene, thresholds)
     alone = [a.axis.setting(scene, value) for a in others for value in a.values]
     own, exact = Setting(scene), setting_of(unsmoothed(tables))
     exact_on_each = [replace(s, scene=exact.scene.changed(domain=s.scene.domain)) for s in wanted]
@@ -115,6 +115,10 @@ def _default(scene: Scene, tables: Tables, thresholds: Thresholds, left_out: lis
     exact = unsmoothed(tables)
     yield from _product(exact, [values_of("tolerance", thresholds.tolerances)], left_out)
     yield from _product(exact, [values_of("linear_solver", ("lu", "gamg"))], left_out)
+
+
+def _default_goals(scene: Scene, thresholds: Thresholds) -> list[AxisValues]:
+    return [values_of("accuracy", thresholds.accuracies)] if can_be_refined(scene.domain) else []
 
 
 def _reference(finest: Scene, thresholds: Thresholds) -> Iterator[Setting]:

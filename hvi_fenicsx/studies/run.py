@@ -61,14 +61,29 @@ def _fill(folder: OutputFolder, plan: Plan, options: argparse.Namespace) -> None
     with StudyProgress() as progress:
         repeat, limit = options.repeat or DEFAULT.repetitions, options.limit or DEFAULT.time_limit
         _run(plan, Runner(store, repeat, limit, progress))
-    study, work = evaluate(plan, store), folder.stage()
+    study = evaluate(plan, store)
+    warnings = [f"warning: {text}" for text in fill(folder, study, store)]
+    place = f"{folder.target}: {MARK}, study.csv, pictures"
+    terminal.say("\n".join([*_heading(study), *said(study), *warnings, place]))
+
+
+def fill(folder: OutputFolder, study: Study, store: Store) -> list[str]:
+    """Write tables, pictures and page of a study beside its points.
+
+    Args:
+        folder: that of the study.
+        study: what was found.
+        store: the points, in that folder.
+
+    Returns:
+        What could not be done, or was moved aside, in words.
+    """
+    work = folder.stage()
     plots.draw(study, work)
     write(study, work)
     without_page = list(_failed_page(work))
-    kept = folder.move_in(inputs_of(plan.own.scene, folder.target), store.listed())
-    warnings = [f"warning: {text}" for text in (*without_page, *kept)]
-    place = f"{folder.target}: {MARK}, study.csv, pictures"
-    terminal.say("\n".join([*_heading(study), *said(study), *warnings, place]))
+    kept = folder.move_in(inputs_of(study.scene, folder.target), store.listed())
+    return [*without_page, *kept]
 
 
 def _failed_page(folder: Path) -> Iterator[str]:
@@ -90,11 +105,20 @@ def _run(plan: Plan, runner: Runner) -> None:
     wanted |= {runner.store.name(references[0].setting): references[0]}
     runs = list(wanted.values())
     runner.run(runs[:1], runs)
-    _check(plan.reference[0], runner.store)
+    check_reference(plan.reference[0], runner.store)
     runner.run(runs, runs)
 
 
-def _check(reference: Setting, store: Store) -> None:
+def check_reference(reference: Setting, store: Store) -> None:
+    """Refuse a reference that is not certified.
+
+    Args:
+        reference: its setting.
+        store: where it is.
+
+    Raises:
+        NoReferenceError: with the reason.
+    """
     record = store.record(reference) or {}
     if not record.get("converged"):
         raise NoReferenceError(

@@ -1,15 +1,14 @@
-"""A scene as tables that a study changes: as they stand in a file, but the domain as an object."""
+"""A scene as tables that a study changes: objects, but the solver table as it stands in a file."""
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping
 from typing import Any
 
 from pydantic import ValidationError
 
 from ..laws import smoothing
-from ..scene import Scene, dump_scene
+from ..scene import Scene
 from ..scene_model import options_of
 from ..schema import input_error
 from .setting import Setting
@@ -20,8 +19,10 @@ WIDTHS = ("epsilon", "epsilon_absolute")
 
 
 def tables_of(scene: Scene) -> Tables:
-    """The tables of a scene."""
-    return {**tomllib.loads(dump_scene(scene)), "domain": scene.domain}
+    """The tables of a scene, as far as they are not left to their defaults."""
+    given = {key: value for key, value in scene if key in scene.model_fields_set}
+    solver = {key: value for key, value in scene.solver if key in scene.solver.model_fields_set}
+    return {**given, "solver": solver}
 
 
 def setting_of(tables: Mapping[str, Any]) -> Setting:

@@ -8,7 +8,7 @@ from .l_shape import LShape
 from .disk import Disk, HalfDisk
 from .notched_strip import NotchedStrip
 from .fixed_mesh import FixedMesh, MeshFile, Refinements
-from .given_mesh import GivenMesh
+from .given_mesh import GivenMesh, OnlyMesh
 from .plane import PlaneShape
 # isort: on
 
@@ -22,6 +22,7 @@ __all__ = [
     "LShape",
     "MeshFile",
     "NotchedStrip",
+    "OnlyMesh",
     "PlaneShape",
     "Rectangle",
     "Refinements",

@@ -1,0 +1,169 @@
+"""What accuracy costs in time, from Python: a model or a scene solved along several axes."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, nullcontext
+from dataclasses import dataclass, replace
+from html import escape
+from pathlib import Path
+from typing import Any
+
+from mpi4py import MPI
+
+from ..errors import InputError
+from ..mesh.shapes import OnlyMesh
+from ..results.output_folder import OutputFolder
+from ..runtime.mpi import on_root
+from ..scene import Scene
+from ..spatial_value import SpatialValue
+from ..studies import axes as study_axes
+from ..studies import plan as study_plan
+from ..studies.here import run_here
+from ..studies.run import fill, said
+from ..studies.store import Store
+from ..studies.study import Study, evaluate
+from ..studies.table import Row
+from .model import Model
+from .user_energy import UserEnergy
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class ModelStudy:
+    """What accuracy costs in time; the same on all ranks.
+
+    Attributes:
+        rows: the points, cheapest mesh first.
+        sentences: what they say.
+        uncertainty: how far the reference may be from the truth, relative, by quantity; None where it is not known.
+    """
+
+    rows: tuple[Row, ...]
+    sentences: tuple[str, ...]
+    uncertainty: Mapping[str, float | None]
+
+    def __repr__(self) -> str:
+        return "\n".join(self.sentences)
+
+    def _repr_html_(self) -> str:
+        head = "".join(f"<th>{name}</th>" for name in ("point", "unknowns", "s", "error, energy norm"))
+        rows = "".join(
+            "<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in _cells(row)) + "</tr>" for row in self.rows
+        )
+        return f"<p>{escape(' '.join(self.sentences))}</p><table><tr>{head}</tr>{rows}</table>"
+
+
+def _cells(row: Row) -> Iterator[str]:
+    yield row.text
+    yield "" if row.dofs is None else f"{row.dofs:,}"
+    yield "" if row.seconds is None else f"{row.seconds:.3g}"
+    yield f"{error:.2g}" if (error := row.error("energy_norm")) is not None else row.reason
+
+
+def study(
+    model: Model | Scene,
+    folder: str | os.PathLike[str] | None = None,
+    comm: MPI.Comm | None = None,
+    *,
+    repeats: int = 3,
+    force: bool = False,
+    **axes: Sequence[Any],
+) -> ModelStudy:
+    """Solve a model or a scene along several axes, and compare each solution with a reference. Collective.
+
+    The points are solved in this program, one after the other.
+
+    Args:
+        model: what to study.
+        folder: where tables, pictures and page go, as by ``hvi study``; None: nowhere.
+        comm: the ranks; by default those of the body, for a scene all.
+        repeats: of each point at most, for the median of its time.
+        force: whether a study that is in the folder already is replaced.
+        **axes: values by axis, such as ``epsilon=["exact", 0.1]``, ``mesh=[0, 1, 2]``, ``tolerance``, ``method``,
+            ``smoothing``, ``linear_solver``, ``accuracy``; all combinations are run. Without axes: those of the default
+            plan. ``mesh`` counts refinements of a mesh that you bring, and cells along the first side of a block.
+
+    Raises:
+        InputError: on all ranks alike: there is no such axis or value, or the model has not this axis.
+        NoReferenceError: on all ranks alike: no solution exists, or the reference is not certified.
+    """
+    if not isinstance(model, Model | Scene):
+        raise InputError(f"{model!r} is no model and no scene; a file is read by hvi.read_scene(path)")
+    scene = model if isinstance(model, Scene) else _scene(model)
+    comm = comm or (MPI.COMM_WORLD if isinstance(model, Scene) else model.body.comm)
+    with _in_python_words():
+        plan = study_plan.make(scene, [_axis(name, values) for name, values in axes.items()])
+    with _target(folder, comm, force=force) as (target, output):
+        store = Store(target, comm.size)
+        run_here(plan, store, comm, repeats)
+        return on_root(comm, lambda: _finished(evaluate(plan, store), store, output))
+
+
+def _finished(found: Study, store: Store, output: OutputFolder | None) -> ModelStudy:
+    """Rank 0 only."""
+    if output is not None:
+        with output.told():
+            fill(output, found, store)
+    return ModelStudy(
+        rows=found.rows,
+        sentences=tuple(said(found)),
+        uncertainty={name: known.error for name, known in found.certain.items()},
+    )
+
+
+def _axis(name: str, values: Any) -> study_axes.AxisValues:
+    if isinstance(values, str) or not isinstance(values, Sequence):
+        raise InputError(f"study: {name} is {values!r}; give a list of values")
+    return study_axes.read(f"{name}={','.join(map(str, values))}")
+
+
+@contextmanager
+def _in_python_words() -> Iterator[None]:
+    try:
+        yield
+    except InputError as error:
+        raise InputError(str(error).replace("--axis ", "study: ")) from None
+
+
+@contextmanager
+def _target(
+    folder: str | os.PathLike[str] | None, comm: MPI.Comm, *, force: bool
+) -> Iterator[tuple[Path, OutputFolder | None]]:
+    """The folder of the points, on all ranks; on rank 0, what writes it where the user wants it. Collective."""
+    made: list[OutputFolder] = []
+    with tempfile.TemporaryDirectory() if folder is None and comm.rank == 0 else nullcontext() as aside:
+        if folder is None:
+            yield Path(comm.bcast(aside, root=0)), None
+            return
+        try:
+            target = on_root(comm, lambda: _opened(Path(folder), made, force=force))
+            yield target, made[0] if made else None
+        finally:
+            for one in made:
+                one.close()
+
+
+def _opened(folder: Path, made: list[OutputFolder], *, force: bool) -> Path:
+    output = OutputFolder(folder, "study")
+    output.check("replace" if force else "refuse")
+    made.append(output)
+    output.clear()
+    return output.target
+
+
+def _scene(model: Model) -> Scene:
+    """The model's scene; on its own mesh alone, where it has data on that."""
+    energies = [m.elasticity for m in model.scene.material.values() if isinstance(m.elasticity, UserEnergy)]
+    portable = all(energy.is_portable(model.body.mesh) for energy in energies)
+    if portable and not any(_is_of_one_mesh(placed.effect) for placed in model.scene.effects()):
+        return model.scene
+    domain = replace(model.body.domain, shared=None)
+    only = domain if portable else replace(domain, coarsening=None)
+    return model.scene.changed(domain=OnlyMesh(shape="given mesh", given=only))
+
+
+def _is_of_one_mesh(effect: Any) -> bool:
+    values = [value for _, given in effect for value in (given if isinstance(given, tuple | list) else [given])]
+    return any(isinstance(value, SpatialValue) and not value.everywhere for value in values)
