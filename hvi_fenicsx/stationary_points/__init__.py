@@ -1,0 +1,1 @@
+"""All equilibria of a problem, or the lowest with a proof; works on arrays of the condensed problem."""

@@ -1,0 +1,228 @@
+"""All stationary points: cells that no point satisfies are given up, the others divided until each has one at most.
+
+A cell gives each unknown an interval, or one joint of its law. It needs no division where the laws do not drop inside
+and S with the laws' least slopes is positive definite: then it has at most one stationary point. A drop is divided in
+three: before it, behind it, and on it, where the traction may have any value between.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from scipy.linalg import LinAlgError, cholesky
+from scipy.optimize import linprog
+
+from ..typing import Array, Integers
+from . import monotone_radius, stationarity
+from .arcs import on_interval
+from .convex_programme import minimise
+from .linear_test import LinearTest
+from .lowest import FAR, fresh_box, problem_size
+from .relaxation import Box, Relaxation, envelopes
+from .scalar_problem import ScalarProblem
+from .stationarity import Kind
+from .tightening import ForceIntervals
+
+SAME = 1e-7
+"""Points nearer than this share of the displacements are one."""
+MOST_ROUNDS = 6
+"""How often a cell is tightened before it is divided."""
+SHORTER = 0.9
+"""Tightening goes on while some interval shrinks to this share."""
+REGULAR = 1e-6
+"""Least pivot, relative to the largest, of a matrix that counts as positive definite."""
+CONDITION = 1e12
+"""Condition number beyond which a linear system is singular."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class StationaryPoint:
+    """A point that satisfies the inequality.
+
+    Attributes:
+        x: (n,).
+        energy: there.
+        kind: minimiser, saddle or undecided.
+        isolated: False where it is one of a continuum.
+    """
+
+    x: Array
+    energy: float
+    kind: Kind
+    isolated: bool
+
+
+@dataclass(kw_only=True)
+class Enumeration:
+    """A search for all stationary points.
+
+    Attributes:
+        problem: the problem.
+        points: found so far.
+        cells: looked at so far.
+        waiting: a stack of cells not yet decided.
+    """
+
+    problem: ScalarProblem
+    points: list[StationaryPoint] = field(default_factory=list)
+    cells: int = 0
+    waiting: list[Box] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self._forces = ForceIntervals(self.problem, joints_at_ends=False)
+        self._linear, self._relaxation = LinearTest(self.problem), Relaxation(self.problem)
+
+    def start(self) -> None:
+        """Begin with a cell that is far larger than the problem's displacements."""
+        problem, far = self.problem, FAR * problem_size(self.problem)
+        low, high = np.maximum(problem.lower, -far), np.minimum(problem.upper, far)
+        cell = self._tightened(fresh_box(low, high, np.zeros(problem.size)))
+        if cell is None:
+            return
+        low, high = cell.low.copy(), cell.high.copy()
+        for i in np.flatnonzero(high - low > 0.1 * far):
+            low[i], high[i] = self._linear.bounds(low, high, i)
+        self.waiting.append(replace(cell, low=low, high=high))
+
+    def run(self, stop: Callable[[], bool], report: Callable[[Enumeration], None]) -> bool:
+        """Divide cells until none is left; whether that is so.
+
+        Args:
+            stop: asked before each cell.
+            report: told after each cell.
+        """
+        while self.waiting:
+            if stop():
+                return False
+            self.cells += 1
+            cell = self._tightened(self.waiting.pop())
+            if cell is not None and not self._decided(cell) and not self._linear.excludes(cell.low, cell.high):
+                self.waiting += self._parts(cell)
+            report(self)
+        return True
+
+    def _tightened(self, cell: Box) -> Box | None:
+        """The cell made smaller; None if no stationary point is in it."""
+        for _ in range(MOST_ROUNDS):
+            sides = self._forces.tightened(cell.low, cell.high)
+            if sides is None:
+                return None
+            smaller = monotone_radius.tightened(self._relaxation, replace(cell, low=sides[0], high=sides[1]))
+            if np.any(smaller.low > smaller.high):
+                return None
+            shrinks = np.any(smaller.high - smaller.low < SHORTER * (cell.high - cell.low))
+            cell = smaller
+            if not shrinks:
+                break
+        return cell
+
+    def _decided(self, cell: Box) -> bool:
+        """Whether the cell's points, one at most or a continuum, have been found."""
+        fixed = cell.low == cell.high
+        free = np.flatnonzero(~fixed)
+        arcs, problem = self.problem.arcs, self.problem
+        if not free.size:
+            self._enter(cell.low)
+            return True
+        if np.any(arcs.drops(cell.low, cell.high) > 0.0):
+            return False
+        slopes = arcs.least_slope(cell.low, cell.high)
+        matrix = problem.stiffness[np.ix_(free, free)] + np.diag(slopes[free])
+        if _positive(matrix):
+            self._enter(self._minimum(cell, np.where(fixed, 0.0, -np.minimum(slopes, 0.0))))
+            return True
+        if np.any(arcs.meets(cell.low, cell.high)[free].sum(axis=1) > 1) or np.any(self._at_bound(cell)[free]):
+            return False
+        self._enter_linear(cell, free, matrix)
+        return True
+
+    def _minimum(self, cell: Box, added: Array) -> Array:
+        """The minimiser of a cell on which the energy is convex, the falls of its laws being less than S."""
+        chains = envelopes(self.problem, cell.low, cell.high, added)
+        return minimise(self.problem.stiffness - np.diag(added), self.problem.force, chains, cell.x).x
+
+    def _enter_linear(self, cell: Box, free: Integers, matrix: Array) -> None:
+        """The solutions of a cell in which every law is on one arc."""
+        problem, arcs, rows = self.problem, self.problem.arcs, np.arange(self.problem.size)
+        k = np.argmax(arcs.meets(cell.low, cell.high), axis=1)
+        offset = arcs.tractions[rows, k] - arcs.slopes[rows, k] * arcs.anchors[rows, k]
+        held = np.setdiff1d(rows, free)
+        right = problem.force[free] - offset[free] - problem.stiffness[np.ix_(free, held)] @ cell.low[held]
+        x, low, high = cell.low.copy(), cell.low[free], cell.high[free]
+        if np.linalg.cond(matrix) < CONDITION:
+            x[free] = np.linalg.solve(matrix, right)
+            near = SAME * (1.0 + np.abs(x[free]))
+            if np.all((x[free] >= low - near) & (x[free] <= high + near)):
+                self._enter(x)
+            return
+        size = np.abs(matrix).max()
+        sides = np.column_stack([low, high])
+        found = linprog(np.zeros(free.size), A_eq=matrix / size, b_eq=right / size, bounds=sides, method="highs")
+        if found.status == 0:
+            x[free] = found.x
+            self._enter(x, isolated=False)
+
+    def _enter(self, x: Array, *, isolated: bool = True) -> None:
+        """Keep a point if it is stationary and new."""
+        problem = self.problem
+        x = np.clip(x, problem.lower, problem.upper)
+        if stationarity.imbalance(problem, x) > stationarity.ACCURACY:
+            return
+        near = SAME * (1.0 + float(np.max(np.abs(x), initial=0.0)))
+        if any(np.max(np.abs(p.x - x), initial=0.0) < near for p in self.points):
+            return
+        kind = stationarity.kind(problem, x)
+        self.points.append(StationaryPoint(x=x, energy=problem.energy(x), kind=kind, isolated=isolated))
+
+    def _at_bound(self, cell: Box) -> Array:
+        """Where a bound of the problem can push, and the unknown is free to leave it."""
+        ends = (cell.low <= self.problem.lower) | (cell.high >= self.problem.upper)
+        return np.asarray(ends & (cell.low < cell.high))
+
+    def _parts(self, cell: Box) -> Iterator[Box]:
+        """The parts of a cell: at a drop where there is one, else at a joint, a bound, or in the middle."""
+        arcs = self.problem.arcs
+        drops = arcs.drops(cell.low, cell.high)
+        if drops.any():
+            i = int(np.argmax(drops / np.diag(self.problem.stiffness)))
+            return self._at_joint(cell, i, drops_only=True)
+        joints = np.where(cell.low < cell.high, arcs.meets(cell.low, cell.high).sum(axis=1) - 1, -1)
+        if joints.max() > 0:
+            return self._at_joint(cell, int(np.argmax(joints)), drops_only=False)
+        return self._off_bound(cell, int(np.argmax(self._at_bound(cell))))
+
+    def _at_joint(self, cell: Box, i: int, *, drops_only: bool) -> Iterator[Box]:
+        arcs = on_interval(self.problem.chains[i], float(cell.low[i]), float(cell.high[i]))
+        joints = [(a.high, b.rate(b.low) - a.rate(a.high)) for a, b in itertools.pairwise(arcs)]
+        size = max(abs(a.rate(x)) for a in arcs for x in (a.low, a.high))
+        chosen = [(x, j) for x, j in joints if j < -1e-13 * size or not drops_only]
+        at, jump = chosen[len(chosen) // 2]
+        yield _with(cell, i, cell.low[i], at)
+        yield _with(cell, i, at, cell.high[i])
+        if abs(jump) > 1e-13 * size:
+            yield _with(cell, i, at, at)
+
+    def _off_bound(self, cell: Box, i: int) -> Iterator[Box]:
+        lower = cell.low[i] <= self.problem.lower[i]
+        at = cell.low[i] if lower else cell.high[i]
+        inner = np.nextafter(at, np.inf if lower else -np.inf)
+        yield _with(cell, i, inner, cell.high[i]) if lower else _with(cell, i, cell.low[i], inner)
+        yield _with(cell, i, at, at)
+
+
+def _with(cell: Box, i: int, begin: float, end: float) -> Box:
+    low, high = cell.low.copy(), cell.high.copy()
+    low[i], high[i] = begin, end
+    return replace(cell, low=low, high=high, x=np.clip(cell.x, low, high))
+
+
+def _positive(matrix: Array) -> bool:
+    """Whether a matrix is positive definite, and not nearly singular."""
+    try:
+        pivots = np.diag(cholesky(matrix, lower=True))
+    except LinAlgError:
+        return False
+    return bool(pivots.min() > REGULAR * pivots.max())

@@ -1,0 +1,59 @@
+"""Points of low energy: the branch iteration on arrays, with one convex programme a step."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..typing import Array
+from .arcs import Arc, Chain, on_interval
+from .convex_programme import Chains, minimise
+from .scalar_problem import ScalarProblem
+
+MOST_STEPS = 60
+"""Convex programmes of one descent."""
+ROUNDING = 1e-13
+"""A fall of the energy below this share of its parts is none."""
+
+
+def majorant(arcs: Chain, low: float, high: float, x: float) -> Sequence[Arc]:
+    """A convex chain that is nowhere below the given one and equal to it at x: falls are linearised there.
+
+    Args:
+        arcs: a chain over the whole line.
+        low: begin of the interval.
+        high: end of the interval.
+        x: where they are equal.
+    """
+    part = on_interval(arcs, low, high)
+    k = next(i for i, a in enumerate(part) if x <= a.high)
+    here = part[k]
+    result = [Arc(here.low, here.high, x, here.at(x), here.rate(x), max(here.slope, 0.0))]
+    for before, a in zip(part[k:], part[k + 1 :], strict=False):
+        end, jump = result[-1], max(a.rate(a.low) - before.rate(a.low), 0.0)
+        result.append(Arc(a.low, a.high, a.low, end.at(a.low), end.rate(a.low) + jump, max(a.slope, 0.0)))
+    for after, a in zip(part[k:0:-1], part[k - 1 :: -1] if k else (), strict=False):
+        end, jump = result[0], max(after.rate(a.high) - a.rate(a.high), 0.0)
+        result.insert(0, Arc(a.low, a.high, a.high, end.at(a.high), end.rate(a.high) - jump, max(a.slope, 0.0)))
+    return result
+
+
+def descend(problem: ScalarProblem, low: Array, high: Array, x: Array) -> tuple[Array, float]:
+    """A point of a box at which no convex step lowers the energy, and its energy.
+
+    Args:
+        problem: the problem.
+        low: of the box, (n,), finite.
+        high: of the box, (n,), finite.
+        x: where to begin, (n,).
+    """
+    energy = problem.energy(x)
+    for _ in range(MOST_STEPS):
+        chains = [majorant(c, *ends) for c, *ends in zip(problem.chains, low, high, x, strict=True)]
+        found = minimise(problem.stiffness, problem.force, Chains.of(chains), x)
+        after = problem.energy(found.x)
+        if not after < energy - ROUNDING * problem.energy_size(x):
+            break
+        x, energy = found.x, after
+    return np.asarray(x), energy

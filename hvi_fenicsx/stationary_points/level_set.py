@@ -1,0 +1,73 @@
+"""A finite box that holds all points whose energy is at most a given one.
+
+Strong convexity of the relaxation bounds displacements other than rigid motions. How far a rigid motion c can go is
+bounded by the dual: c·x ≤ (E - min over x of (relaxation - τ c·x))/τ for each force τ > 0 at which that minimum exists.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..errors import SolverError
+from ..typing import Array
+from .curvature import Curvature, kernel
+from .relaxation import Box, Relaxation
+from .scalar_problem import ScalarProblem
+
+MOST_FORCES = 24
+"""Forces τ that are tried, each a quarter of the one before."""
+SLACK = 1e-6
+"""Energy, relative to its parts, that is added to the level for what the relaxation's residual could hide."""
+
+
+def level_set(problem: ScalarProblem, box: Box, curvature: Curvature, level: float) -> tuple[Array, Array]:
+    """The ends of a box (n,) with all points of at most an energy.
+
+    Args:
+        problem: the problem.
+        box: the relaxation's solution on a box that is far larger.
+        curvature: of that relaxation.
+        level: the energy.
+
+    Raises:
+        SolverError: no finite box was found.
+    """
+    energy = level + SLACK * problem.energy_size(box.x)
+    root = np.sqrt(2.0 * max(energy - box.bound, 0.0))
+    low, high = box.x - root * curvature.radii, box.x + root * curvature.radii
+    free = np.flatnonzero(~np.isfinite(curvature.radii))
+    if free.size:
+        motions = kernel(problem.stiffness)
+        spread = np.abs(motions[free]) @ _reach(problem, box, motions, energy)
+        around = root * curvature.range_radii[free] + spread
+        low[free], high[free] = box.x[free] - around, box.x[free] + around
+    return np.maximum(low, box.low), np.minimum(high, box.high)
+
+
+def _reach(problem: ScalarProblem, box: Box, motions: Array, energy: float) -> Array:
+    """How far the share of each rigid motion can be from that of x, (k,)."""
+    result = []
+    for c in motions.T:
+        here = float(c @ box.x)
+        result.append(max(_farthest(problem, box, sign * c, energy) - sign * here for sign in (1.0, -1.0)))
+    return np.array(result)
+
+
+def _farthest(problem: ScalarProblem, box: Box, c: Array, energy: float) -> float:
+    """A bound of c·x from above."""
+    best, tau = np.inf, float(np.max(np.abs(problem.force), initial=1e-300))
+    for _ in range(MOST_FORCES):
+        found, _ = Relaxation(replace(problem, force=problem.force + tau * c)).solve(replace(box, bound=-np.inf), 0.9)
+        if not np.any(
+            (found.x <= box.low) & np.isneginf(problem.lower) | (found.x >= box.high) & np.isposinf(problem.upper)
+        ):
+            bound = (energy - found.bound) / tau
+            if bound >= best:
+                return best
+            best = bound
+        tau *= 0.25
+    if not np.isfinite(best):
+        raise SolverError("no lowest energy: a body can move away without end for all that can be shown")
+    return best

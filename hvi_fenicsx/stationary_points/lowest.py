@@ -1,0 +1,256 @@
+"""The lowest energy with a proof: branch and bound over intervals of the bonded unknowns.
+
+Of the open boxes the one with the lowest bound is divided, until no open box can hold a point below the lowest
+energy found by more than the gap that is allowed. A box is made smaller first, in turn: what the balance of forces
+leaves of it, and what strong convexity of its relaxation leaves of it below the lowest energy found.
+"""
+
+from __future__ import annotations
+
+import heapq
+import math
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field, replace
+from itertools import count
+
+import numpy as np
+
+from ..errors import SolverError
+from ..typing import Array
+from .arcs import on_interval
+from .descent import descend
+from .level_set import level_set
+from .relaxation import Box, Relaxation
+from .scalar_problem import ScalarProblem
+from .tightening import ForceIntervals
+
+FAR = 1e6
+"""Ends of the first box, relative to the problem's displacements; what is found must stay off them."""
+PARTS = (0.9, 0.999)
+"""Shares of the largest curvature, in turn: the first leaves convexity to tighten with, the second bounds best."""
+MOST_ROUNDS = 6
+"""How often a box is tightened and bounded before it is divided."""
+WORTHWHILE = 0.15
+"""A round that closes less than this share of a box's gap is the last."""
+ROUNDING = 1e-13
+"""Energies that differ by less than this share of their parts are equal."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Progress:
+    """How far a search has come.
+
+    Attributes:
+        lower: no point has a lower energy.
+        upper: the lowest energy found.
+        gap: their difference, relative to the energy.
+        boxes: bounded so far.
+        waiting: not yet decided.
+    """
+
+    lower: float
+    upper: float
+    gap: float
+    boxes: int
+    waiting: int
+
+
+@dataclass(kw_only=True)
+class LowestSearch:
+    """A search for the lowest energy.
+
+    Attributes:
+        problem: the problem.
+        gap: relative gap that is allowed.
+        x: the lowest point found.
+        upper: its energy.
+        boxes: bounded so far.
+        waiting: a heap of open boxes by their bounds.
+    """
+
+    problem: ScalarProblem
+    gap: float = 1e-8
+    x: Array = field(init=False)
+    upper: float = math.inf
+    boxes: int = 0
+    waiting: list[tuple[float, int, Box]] = field(default_factory=list)
+    _numbers: Iterator[int] = field(default_factory=count)
+
+    def __post_init__(self) -> None:
+        self._relaxation = Relaxation(self.problem)
+        self._forces = ForceIntervals(self.problem)
+
+    def start(self, points: Iterable[Array] = ()) -> None:
+        """Bound the whole problem.
+
+        Args:
+            points: known points of low energy, each (n,).
+
+        Raises:
+            SolverError: the energy is not bounded from below, or this cannot be shown.
+        """
+        problem = self.problem
+        far = FAR * problem_size(problem)
+        low, high = np.maximum(problem.lower, -far), np.minimum(problem.upper, far)
+        self.x = np.clip(np.zeros(problem.size), low, high)
+        self._low, self._high = low, high
+        for x in (self.x, *points):
+            self._try(np.clip(x, low, high))
+        box = fresh_box(low, high, self.x)
+        first, curvature = self._relaxation.solve(box, PARTS[0])
+        if self._far(first.x):
+            raise SolverError("no lowest energy: it falls without limit, or only a limit far away was found")
+        self._try(first.x)
+        low, high = level_set(problem, first, curvature, self.upper)
+        self._low, self._high = low, high
+        self._enter(fresh_box(low, high, first.x))
+
+    def resume(self, boxes: Iterable[tuple[Array, Array, Array]], point: Array) -> None:
+        """Go on from open boxes, each low, high and weights, and the lowest point.
+
+        Args:
+            boxes: from :meth:`open_boxes`.
+            point: the lowest point found, (n,).
+        """
+        self.x, self.upper = point, self.problem.energy(point)
+        listed = list(boxes)
+        self._low = np.min([b[0] for b in listed], axis=0, initial=np.inf)
+        self._high = np.max([b[1] for b in listed], axis=0, initial=-np.inf)
+        for low, high, weights in listed:
+            self._enter(replace(fresh_box(low, high, point), weights=weights))
+
+    def open_boxes(self) -> Iterator[tuple[Array, Array, Array]]:
+        """Low, high and weights of the boxes that wait."""
+        return ((box.low, box.high, box.weights) for _, _, box in self.waiting)
+
+    def progress(self) -> Progress:
+        """How far the search is."""
+        lower = min(self.waiting[0][0], self.upper) if self.waiting else self.upper - self._allowed
+        return Progress(
+            lower=lower,
+            upper=self.upper,
+            gap=max(self.upper - lower, 0.0) / self._size,
+            boxes=self.boxes,
+            waiting=len(self.waiting),
+        )
+
+    @property
+    def proven(self) -> bool:
+        """Whether no point is lower than the lowest found, but for the gap allowed."""
+        return not self.waiting or self.waiting[0][0] >= self.upper - self._allowed
+
+    @property
+    def _size(self) -> float:
+        return max(abs(self.upper), 1e-6 * self.problem.energy_size(self.x), 1e-300)
+
+    @property
+    def _allowed(self) -> float:
+        return max(self.gap * self._size, ROUNDING * self.problem.energy_size(self.x))
+
+    def run(self, stop: Callable[[], bool], report: Callable[[Progress], None]) -> bool:
+        """Divide boxes until the proof is there; whether it is.
+
+        Args:
+            stop: asked before each division.
+            report: told after each division.
+        """
+        while not self.proven:
+            if stop():
+                return False
+            _, _, box = heapq.heappop(self.waiting)
+            for low, high in self._halves(box):
+                self._enter(replace(fresh_box(low, high, box.x), bound=box.bound, weights=box.weights))
+            report(self.progress())
+        return True
+
+    def _halves(self, box: Box) -> list[tuple[Array, Array]]:
+        """Two boxes: where the envelope and the law differ most, at the joint in the chord that is nearest to x."""
+        i = int(np.argmax(box.gaps))
+        at = float(box.x[i])
+        ends = (a.high for a in on_interval(self.problem.chains[i], float(box.low[i]), float(box.high[i]))[:-1])
+        inside = [e for e in ends if box.chord_low[i] < e < box.chord_high[i]]
+        if inside:
+            at = min(inside, key=lambda e: abs(e - at))
+        left, right = box.high.copy(), box.low.copy()
+        left[i] = right[i] = at
+        return [(box.low, left), (right, box.high)]
+
+    def _enter(self, box: Box) -> None:
+        """Tighten and bound a box; it waits if it is still open."""
+        self.boxes += 1
+        found = self._bounded(box)
+        if found is None:
+            return
+        if not found.gaps.any():  # every envelope is tight: the point is the box's lowest, to rounding
+            self._try(found.x)
+            if found.bound >= self.upper - self._allowed:
+                return
+            found = replace(found, gaps=found.high - found.low)
+        heapq.heappush(self.waiting, (found.bound, next(self._numbers), found))
+
+    def _bounded(self, box: Box) -> Box | None:
+        for round_ in range(MOST_ROUNDS):
+            before = box.bound
+            for part in PARTS:
+                smaller = self._forces.tightened(box.low, box.high)
+                if smaller is None:
+                    return None
+                box = replace(box, low=smaller[0], high=smaller[1], x=np.clip(box.x, *smaller))
+                box, curvature = self._relaxation.solve(box, part)
+                if self._closed(box):
+                    return None
+                if part == PARTS[-1] and round_ == 0:
+                    self._try(box.x)
+                    if self._closed(box):
+                        return None
+                reach = curvature.radii * math.sqrt(2.0 * max(self.upper - box.bound, 0.0))
+                box = replace(box, low=np.maximum(box.low, box.x - reach), high=np.minimum(box.high, box.x + reach))
+            if not box.gaps.any() or box.bound - before < WORTHWHILE * (self.upper - box.bound):
+                break
+        return box
+
+    def _closed(self, box: Box) -> bool:
+        return box.bound >= self.upper - self._allowed
+
+    def _try(self, x: Array) -> None:
+        """Descend from a point."""
+        found, energy = descend(self.problem, self._low, self._high, x)
+        if energy < self.upper:
+            self.x, self.upper = found, energy
+
+    def _far(self, x: Array) -> bool:
+        """Whether a point touches the first box where there is no bound."""
+        problem = self.problem
+        return bool(
+            np.any((x <= self._low) & np.isneginf(problem.lower) | (x >= self._high) & np.isposinf(problem.upper))
+        )
+
+
+def fresh_box(low: Array, high: Array, x: Array) -> Box:
+    """A box of which nothing is known.
+
+    Args:
+        low: (n,).
+        high: (n,).
+        x: where its relaxation is to begin, (n,).
+    """
+    none = np.zeros(len(low))
+    return Box(
+        low=low,
+        high=high,
+        bound=-math.inf,
+        x=np.clip(x, low, high),
+        weights=none,
+        gaps=none,
+        chord_low=low,
+        chord_high=high,
+    )
+
+
+def problem_size(problem: ScalarProblem) -> float:
+    """The largest displacement of a joint, at least 1.
+
+    Args:
+        problem: the problem.
+    """
+    return max([1.0, *(abs(e) for c in problem.chains for a in c for e in (a.low, a.high) if math.isfinite(e))])

@@ -1,0 +1,110 @@
+"""Whether a point is stationary, and whether it is a minimiser: arrays only."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+
+from ..typing import Array, Integers, Mask
+from .scalar_problem import ScalarProblem
+
+ACCURACY = 1e-9
+"""Forces in balance to this share of the largest one, and displacements on a joint to this share of the largest."""
+REGULAR = 1e-10
+"""Eigenvalues below this share of the largest are zero."""
+
+
+class Kind(StrEnum):
+    """What a stationary point is."""
+
+    MINIMISER = "minimiser"
+    SADDLE = "saddle"
+    UNDECIDED = "undecided"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Subdifferential:
+    """What the laws and bounds allow at a point, and what they do.
+
+    Attributes:
+        low: least force, -inf at a lower bound, (n,).
+        high: largest force, (n,).
+        falls: whether the traction drops there, (n,).
+        least: slope of the traction, the smaller one at a joint, (n,).
+        most: the larger one, (n,).
+    """
+
+    low: Array
+    high: Array
+    falls: Mask
+    least: Array
+    most: Array
+
+
+def subdifferential(problem: ScalarProblem, x: Array) -> Subdifferential:
+    """∂φ and bounds at a point.
+
+    Args:
+        problem: the problem.
+        x: the point, (n,).
+    """
+    arcs, near = problem.arcs, ACCURACY * (1.0 + np.max(np.abs(x), initial=0.0))
+    here = (arcs.low <= x[:, None] + near) & (arcs.high >= x[:, None] - near)
+    at = np.clip(x[:, None], np.where(here, arcs.low, -np.inf), np.where(here, arcs.high, np.inf))
+    t = arcs.tractions + arcs.slopes * (at - arcs.anchors)
+    low, high = np.where(here, t, np.inf).min(axis=1), np.where(here, t, -np.inf).max(axis=1)
+    drop = (
+        here[:, :-1] & here[:, 1:] & (t[:, :-1] - t[:, 1:] > ACCURACY * np.max(np.abs(problem.force), initial=1e-300))
+    )
+    return Subdifferential(
+        low=np.where(x <= problem.lower + near, -np.inf, low),
+        high=np.where(x >= problem.upper - near, np.inf, high),
+        falls=np.asarray(drop.any(axis=1)),
+        least=np.where(here, arcs.slopes, np.inf).min(axis=1),
+        most=np.where(here, arcs.slopes, -np.inf).max(axis=1),
+    )
+
+
+def imbalance(problem: ScalarProblem, x: Array) -> float:
+    """The largest force that neither law nor bound can bear, relative to the largest force.
+
+    Args:
+        problem: the problem.
+        x: the point, (n,).
+    """
+    force, allowed = problem.force - problem.stiffness @ x, subdifferential(problem, x)
+    off = np.maximum(np.maximum(allowed.low - force, force - allowed.high), 0.0)
+    return float(off.max(initial=0.0) / np.max(np.abs(problem.force), initial=1e-300))
+
+
+def kind(problem: ScalarProblem, x: Array) -> Kind:
+    """Whether a stationary point is a minimiser.
+
+    On a drop it is none. Else displacements decide that keep those unknowns at their kinks and bounds which bear a
+    force strictly inside what these can.
+
+    Args:
+        problem: the problem.
+        x: a stationary point, (n,).
+    """
+    here, force = subdifferential(problem, x), problem.force - problem.stiffness @ x
+    if here.falls.any():
+        return Kind.SADDLE
+    near = ACCURACY * max(float(np.max(np.abs(force), initial=0.0)), 1e-300)
+    jumps = here.high - here.low > near
+    inside = jumps & (force > here.low + near) & (force < here.high - near)
+    surely, perhaps = np.flatnonzero(~jumps), np.flatnonzero(~inside)
+    if _definite(problem, perhaps, here.least[perhaps]) > 0:
+        return Kind.MINIMISER
+    return Kind.SADDLE if _definite(problem, surely, here.most[surely]) < 0 else Kind.UNDECIDED
+
+
+def _definite(problem: ScalarProblem, free: Integers, slopes: Array) -> int:
+    """1: positive definite on these unknowns, 0: singular, -1: not semidefinite."""
+    if not free.size:
+        return 1
+    values = np.linalg.eigvalsh(problem.stiffness[np.ix_(free, free)] + np.diag(slopes))
+    limit = REGULAR * max(abs(float(values[-1])), float(np.trace(problem.stiffness)) / problem.size)
+    return int(values[0] > limit) - int(values[0] < -limit)
