@@ -20,8 +20,10 @@ def enter(known: dict[str, type], cls: type, name: str, kind: str) -> None:
         kind: what it is, for the message.
 
     Raises:
-        InputError: another class has that name.
+        InputError: the name is no text, or another class has it.
     """
+    if not isinstance(name, str):
+        raise InputError(f"{kind} class {cls.__name__}: its name must be a text (is {name!r})")
     old = known.get(name)
     if old is not None and (old.__module__, old.__qualname__) != (cls.__module__, cls.__qualname__):
         raise InputError(

@@ -15,6 +15,7 @@ from typing import Any, ClassVar, Protocol
 
 from pydantic import BaseModel, ConfigDict
 
+from ..class_registry import enter
 from ..laws import Superpotential
 from ..spatial_value import SpatialValue
 from .contribution import Contribution
@@ -153,9 +154,7 @@ class Effect(BaseModel):
     def __pydantic_init_subclass__(cls, **kwargs: Any) -> None:
         super().__pydantic_init_subclass__(**kwargs)
         if "key" in cls.__dict__ and cls.in_files:
-            known = Effect.registry[cls.place].setdefault(cls.key, cls)
-            if known is not cls and known.__qualname__ != cls.__qualname__:
-                raise TypeError(f"two effects are called {cls.key!r}: {known} and {cls}")
+            enter(Effect.registry[cls.place], cls, cls.key, "effect")
 
     @abstractmethod
     def contribute(self, context: FormContext, where: str | None) -> Contribution:

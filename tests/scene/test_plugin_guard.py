@@ -54,6 +54,22 @@ def test_a_plugin_is_announced_before_it_runs(tmp_path: Path, caplog: pytest.Log
     assert caplog.messages == [f"plugin {tmp_path / 'loud.py'}: its code is run", "it runs"]
 
 
+@pytest.mark.parametrize("kind", ["law", "smoothing", "effect", "method"])
+def test_a_name_that_is_no_text_is_refused(kind: str, tmp_path: Path) -> None:
+    base, name = {
+        "law": ("laws.PolylineLaw", "name"),
+        "smoothing": ("laws.smoothing.Smoothing", "name"),
+        "effect": ("effects.Effect", "place, key"),
+        "method": ("solvers.Method", "name"),
+    }[kind]
+    module, value = base.rpartition(".")[0], "effects.Place.BODY, 3" if kind == "effect" else "3"
+    text = f"import hvi_fenicsx.{module}\nfrom hvi_fenicsx import {module.split('.')[0]}\n"
+    (tmp_path / f"odd_{kind}.py").write_text(f"{text}class A({base}):\n    {name} = {value}\n", encoding="utf-8")
+    (tmp_path / "scene.toml").write_text(f'plugins = "odd_{kind}.py"', encoding="utf-8")
+    with pytest.raises(InputError, match=rf"odd_{kind}\.py:3: InputError: {kind} class A: its name must be a text"):
+        read_scene(tmp_path / "scene.toml")
+
+
 def test_a_plugin_that_ends_the_program_is_refused(tmp_path: Path) -> None:
     (tmp_path / "ending.py").write_text("import sys\nsys.exit(3)\n", encoding="utf-8")
     (tmp_path / "scene.toml").write_text('plugins = "ending.py"', encoding="utf-8")

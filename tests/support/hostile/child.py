@@ -110,8 +110,14 @@ def _alone(case: Case, place: Path) -> tuple[int, str]:
     except subprocess.TimeoutExpired:
         os.killpg(process.pid, signal.SIGKILL)
         raw, _ = process.communicate()
-        return 1, raw.decode(errors="replace") + "\nhangs"
-    return process.returncode, raw.decode(errors="replace")
+        return 1, _decoded(raw, case) + "\nhangs"
+    return process.returncode, _decoded(raw, case)
+
+
+def _decoded(raw: bytes, case: Case) -> str:
+    """The words of a process; two bytes for each character where the environment asks for that."""
+    text = raw.decode(errors="replace")
+    return text.replace("\0", "") if case.environment.get("PYTHONIOENCODING") == "utf-16" else text
 
 
 def run(folder: Path, seed: int, first: int, last: int, step: int) -> None:
