@@ -10,6 +10,7 @@ too small where the order is 1, and the index as much too large.
 from __future__ import annotations
 
 import argparse
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -173,6 +174,32 @@ def rubber(poisson_ratio: float = 0.499) -> dict[str, Any]:
     }
 
 
+def glued_plate() -> dict[str, Any]:
+    """A plate in space, clamped at a side and glued to its base; it is pulled off, and the glue drops."""
+    glue = {"law": "graph", "points": [[0, 0], [2e-6, 1e6], [2e-6, 0.4e6]], "one_sided": True}
+    return {
+        "domain": {"shape": "box", "size": [0.2, 0.2, 0.1], "cells": [2, 2, 1]},
+        "material": {"model": "three_dimensional", "youngs_modulus": 2.1e10, "poisson_ratio": 0.3},
+        "boundary": {
+            "clamp": {"on": "left", "displacement": [0.0, 0.0, 0.0]},
+            "pull": {"on": "top", "traction": [0.0, 0.0, 1.2e6]},
+            "base": {"on": "bottom", "contact": {"gap": 0.0}, "adhesion": glue},
+        },
+    }
+
+
+def waves(cells: list[int], number: float) -> dict[str, Any]:
+    """A clamped square in plane strain at ν = 0.44 under a traction in waves shorter than a facet."""
+    return {
+        "domain": {"shape": "rectangle", "size": [1.0, 1.0], "cells": cells},
+        "material": {"model": "plane_strain", "youngs_modulus": 2.15e11, "poisson_ratio": 0.44},
+        "boundary": {
+            "clamp": {"on": "bottom", "displacement": [0.0, 0.0]},
+            "press": {"on": "top", "traction": [0.0, f"-1e6*cos({number}*x)"]},
+        },
+    }
+
+
 def square(
     cells: int, pull: float = 0.0, press: str = "-1e6", gap: str = "0", friction: dict[str, Any] | None = None
 ) -> dict[str, Any]:
@@ -216,9 +243,18 @@ def scenes() -> dict[str, Scene]:
         "deep drop": Scene.model_validate(square(16, pull=6e6, friction=DEEP_DROP)),
         "gap 2e-6 sin(25 x)": Scene.model_validate(square(4, gap="2e-6*sin(25*x)")),
         "traction 1 + 2 sin(40 x)": Scene.model_validate(square(4, press="-1e6*(1 + 2*sin(40*x))")),
+        "traction cos(90 x), flat cells": Scene.model_validate(waves([4, 16], 90)),
+        "traction cos(90 x), tall cells": Scene.model_validate(waves([8, 2], 90)),
         "block_3d": _demo("block_3d", "domain.cells=[4, 4, 4]"),
         "anchor_3d": _demo("anchor_3d", "domain.cells=[4, 4, 2]"),
+        "glued plate 3D": Scene.model_validate(glued_plate()),
     }
+
+
+def _affordable(scene: Scene) -> int:
+    """How many levels fit beside their reference, which is two refinements finer."""
+    cells = math.prod(getattr(scene.domain, "cells", [1]))
+    return 4 if scene.dimension == 2 else 2 if cells >= 32 else 3
 
 
 def lines(name: str, found: Sequence[Row]) -> Iterator[str]:
@@ -260,8 +296,7 @@ def main() -> None:
     found: dict[str, list[Row]] = {}
     for name in options.scenes:
         scene = scenes()[name]
-        solid = scene.dimension == 3
-        found[name] = rows(scene, min(options.levels, 2) if solid else options.levels)
+        found[name] = rows(scene, min(options.levels, _affordable(scene)))
         print("\n".join(lines(name, found[name])), flush=True)
     if options.picture is not None:
         draw(options.picture, found)

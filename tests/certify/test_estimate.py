@@ -27,7 +27,7 @@ from hvi_fenicsx.workflow import finish
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "benchmarks"))
 
-from effectivity import l_shape, rows, rubber
+from effectivity import glued_plate, l_shape, rows, rubber, waves
 
 Array = npt.NDArray[np.float64]
 
@@ -108,6 +108,7 @@ CASES: dict[str, Table] = {
     "deep drop": model(16, pull=6e6, friction=DEEP_DROP),
     "free block": block(6, push=0.6e6, friction=STRONG),
     "l-shape": l_shape(),
+    "bending of a coarse plate": glued_plate(),
     "nearly incompressible": rubber(),
     "hardly compressible": rubber() | {"material": rubber()["material"] | {"poisson_ratio": 0.4999}},
     "half-disk": {
@@ -144,6 +145,8 @@ UNSEEN: dict[str, Table] = {
     "gap with crests between the vertices": model(4, gap="1e-6*cos(50*x)"),
     "traction": model(4),
     "displacement": model(4),
+    "traction on flat cells": waves([2, 8], 25),
+    "traction on tall cells": waves([4, 1], 45),
 }
 UNSEEN["traction"]["boundary"]["press"]["traction"] = [0.0, "-1e6*(1 + 5*cos(60*x))"]
 UNSEEN["displacement"]["boundary"] = {

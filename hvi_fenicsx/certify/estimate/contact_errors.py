@@ -18,7 +18,7 @@ from ...system.system import System
 from ...typing import Array
 from ..certificate import Examination
 from ..contact_state import ContactState, LawState
-from . import drop_errors
+from . import coupled_errors
 from .contact_facets import PartTrace
 from .dual_norm import DualNorm
 from .law_traces import ErrorField, LawTraces
@@ -59,7 +59,7 @@ def estimate_contact_errors(
     """
     traces = LawTraces(system.problem, u, examination.states, thresholds)
     inverse = DualNorm(system, levels, u, thresholds)
-    error = drop_errors.of_solution(traces, inverse)
+    error = coupled_errors.of_solution(traces, inverse)
     uncertain = _uncertainty(traces, inverse)
     inverse.destroy()
     slips = [_slip(traces, state, error, uncertain) for state in examination.states]
@@ -109,7 +109,7 @@ def _uncertainty(traces: LawTraces, inverse: DualNorm) -> fem.Function:
 def _drops(traces: LawTraces, state: ContactState, law: LawState) -> tuple[PartTrace, Array]:
     """A law's drops on the facets within which they lie, spread over their uncertain share of them, (f, q, k)."""
     points = traces.part(state.surface, law.term.directions)
-    height = drop_errors.heights(points, law, law.term.exact)
+    height = coupled_errors.heights(points, law, law.term.exact)
     slip = points.linear(traces.u)
     length = np.linalg.norm(slip, axis=2, keepdims=True)
     unit = np.divide(slip, length, out=np.zeros_like(slip), where=length > 0)

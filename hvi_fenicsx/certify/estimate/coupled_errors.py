@@ -1,6 +1,8 @@
-"""The error that bubbles, vertices and laws make together: it moves the place where a law drops.
+"""The error that bubbles, vertices and laws make together.
 
-A law that drops within an edge leaves a force on the vertices. They move, the place of the drop moves with them, and
+The bubbles alone, on vertices that stay, see too little of it on a mesh that is too coarse for the bending of a body.
+And a law that drops ties them together:
+what drops within an edge leaves a force on the vertices. They move, the place of the drop moves with them, and
 the force with that place. On one mesh several neighbouring vertices may be the last before the drop, each of them in
 equilibrium, so the place is wrong by several edges: more than the bubbles of one edge see.
 """
@@ -12,6 +14,8 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from ...laws import Superpotential
+from ...problem.problem import Problem
+from ...runtime.mpi import total
 from ...typing import Array
 from ..contact_state import LawState
 from . import defect
@@ -48,22 +52,36 @@ def heights(points: PartTrace, law: LawState, of: Superpotential) -> Array:
 
 
 def of_solution(traces: LawTraces, inverse: DualNorm) -> ErrorField:
-    """The bubbles with their influence on the vertices and, from the second round on, theirs on them. Collective.
+    """Bubbles and vertices in turns, each under the influence of the other, until their energy settles. Collective.
 
     Args:
         traces: the laws between the vertices.
         inverse: of the system.
     """
-    problem, error = traces.problem, None
+    problem, thresholds, error, size = traces.problem, traces.thresholds, None, 0.0
     vertices, stiffness = fem.Function(problem.space), BubbleStiffness(problem, traces.bubbles)
     residual = problem.bulk.residual_in(traces.bubbles, traces.u, problem.linear.values())
-    for _ in range(traces.thresholds.contact_rounds):
+    for _ in range(thresholds.coupled_rounds):
         edges, _ = traces.tested(error)
         load = residual - edges - problem.bulk.force_in(traces.bubbles, vertices)
-        error = ErrorField(vertices, defect.least_energy(stiffness, traces.u, load, traces.thresholds))
+        error = ErrorField(vertices, defect.least_energy(stiffness, traces.u, load, thresholds))
         _move_vertices(traces, inverse, error)
+        inverse.keep_within_bounds(error.vertices)
+        before, size = size, float(np.sqrt(total(stiffness.comm, float(squares(problem, error).sum()))))
+        if abs(size - before) <= thresholds.coupled_change * size:
+            break
     assert error is not None
     return error
+
+
+def squares(problem: Problem, error: ErrorField) -> Array:
+    """η_K² of the owned cells. Collective.
+
+    Args:
+        problem: what was solved.
+        error: its estimated error.
+    """
+    return problem.bulk.energy_by_cell(error.vertices + error.edges)
 
 
 def _move_vertices(traces: LawTraces, inverse: DualNorm, error: ErrorField) -> None:

@@ -23,7 +23,6 @@ from ...typing import Array, Entities
 from ..contact_state import ContactState
 from . import boundary_data
 from .contact_facets import PartTrace
-from .edge_bubbles import BubbleStiffness
 from .facet_modes import FacetModes, facet_modes
 from .facet_pressure import redistributed
 from .thresholds import Thresholds
@@ -33,21 +32,20 @@ _ALONG = 1e-6
 
 
 def squares(
-    stiffness: BubbleStiffness, u: fem.Function, states: Sequence[ContactState], thresholds: Thresholds
+    problem: Problem, bubbles: fem.FunctionSpace, states: Sequence[ContactState], thresholds: Thresholds
 ) -> Array:
     """η_K² of the owned cells that the data within facets add. Collective.
 
     Args:
-        stiffness: of the bubbles.
-        u: the P1 solution, nondimensional, ghosts updated.
-        states: of the parts of Γc at u.
+        problem: what was solved.
+        bubbles: the space of edge bubbles.
+        states: of the parts of Γc at the solution.
         thresholds: how finely the data are sampled.
     """
-    problem = stiffness.problem
     found = np.zeros(problem.domain.mesh.topology.index_map(problem.scales.dimension).size_local)
 
     def modes(facets: Entities) -> FacetModes:
-        return facet_modes(problem, stiffness, facets, thresholds)
+        return facet_modes(problem, bubbles, facets, thresholds)
 
     for facets, axis, value in boundary_data.tractions(problem):
         on = modes(facets)
@@ -58,7 +56,7 @@ def squares(
             on = modes(part.facets)
             np.add.at(found, on.facets.cells, _unprescribed(problem, on, part))
     for obstacle in _obstacles(problem, states, modes, thresholds.near):
-        np.add.at(found, obstacle.on.facets.cells, _moved_pressure(stiffness, obstacle, thresholds))
+        np.add.at(found, obstacle.on.facets.cells, _moved_pressure(problem, bubbles, obstacle, thresholds))
     return found
 
 
@@ -108,10 +106,10 @@ def _obstacles(
                 yield _Obstacle(bounds, np.maximum(push, 0.0), np.maximum(gap, 0.0), within, on)
 
 
-def _moved_pressure(stiffness: BubbleStiffness, obstacle: _Obstacle, thresholds: Thresholds) -> Array:
+def _moved_pressure(problem: Problem, bubbles: fem.FunctionSpace, obstacle: _Obstacle, thresholds: Thresholds) -> Array:
     """Energies of what a gap's variation within the facets changes of the contact pressure, (f,). Collective."""
-    problem, surface, on = stiffness.problem, obstacle.bounds.surface, obstacle.on
-    trace = PartTrace(problem, stiffness.space, surface, surface.normals[:, None, :], 1)
+    surface, on = obstacle.bounds.surface, obstacle.on
+    trace = PartTrace(problem, bubbles, surface, surface.normals[:, None, :], 1)
     normals = trace.at_vertices(surface.normals).mean(axis=1)
     compliance = np.sum(normals**2 * on.compliance, axis=1) / np.sum(normals**2, axis=1)
     pushes, gaps = (on.linear(trace.at_vertices(v[:, None])[:, :, 0]) for v in (obstacle.push, obstacle.gap))

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from dolfinx import fem
+from mpi4py import MPI
 from petsc4py import PETSc
 
 from ...problem.law_term import LawTerm
@@ -41,6 +42,7 @@ class DualNorm:
 
     def __init__(self, system: System, levels: Levels, u: fem.Function, thresholds: Thresholds = DEFAULT) -> None:
         self.system, self._before, self._tolerance = system, system.jacobian.rates, thresholds.dual_tolerance
+        self._u, self._near = u, thresholds.near
         x = system.unknowns(u)
         self.held = _held(system, x, thresholds.near)
         system.jacobian.set_rates([_rising(term, x.array_r) for term in system.terms])
@@ -61,6 +63,26 @@ class DualNorm:
             self._inverse.solve(load, x, self._tolerance if tolerance is None else tolerance)
         energy = float(load.dot(x))
         return system.displacement(x), float(np.sqrt(max(energy, 0.0)))
+
+    def keep_within_bounds(self, error: fem.Function) -> None:
+        """Put u + an error on the bounds that it leaves, in place; from then on it is held there. Collective.
+
+        Args:
+            error: a P1 field, nondimensional.
+        """
+        x = self.system.unknowns(self._u)
+        at, before = x.array_r.copy(), self.held
+        error_there = self.system.unknowns(error)
+        for bounds in self.system.bounds:
+            dofs, sign = bounds.component()
+            along = sign * (at[dofs] + error_there.array_r[dofs])
+            inside = np.clip(along, bounds.lower, bounds.upper)
+            beyond = np.abs(along - inside) > self._near
+            error_there.array[dofs[beyond]] = (sign * inside - at[dofs])[beyond]
+            self.held = np.union1d(self.held, dofs[beyond]).astype(np.int32)
+        if self.system.comm.allreduce(len(self.held) > len(before), op=MPI.LOR):
+            error.x.array[:] = self.system.displacement(error_there).x.array
+            self._inverse.prepare(self.held)
 
     def _load(self, functional: Array) -> PETSc.Vec:
         system = self.system

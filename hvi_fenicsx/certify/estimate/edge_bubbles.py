@@ -98,13 +98,6 @@ class BubbleStiffness:
         self._out.x.scatter_reverse(la.InsertMode.add)
         return np.array(self._out.x.array[: e.size]).reshape(e.shape)
 
-    def rates(self) -> Array:
-        """The diagonal's inverse at the local blocks, ghosts included, (n, d). Collective."""
-        rates = fem.Function(self.space)
-        rates.x.array[: self._inverse.size] = self._inverse.ravel()
-        rates.x.scatter_forward()
-        return np.array(rates.x.array).reshape(-1, self._inverse.shape[1])
-
     def diagonal_solve(self, r: Array) -> Array:
         """The diagonal's inverse times r (n, d)."""
         return np.asarray(r * self._inverse)

@@ -18,7 +18,7 @@ from ...system.levels import Levels
 from ...system.system import System
 from ...typing import Array
 from ..certificate import Examination
-from . import data_errors, defect, drop_errors, dual_norm, nearly_incompressible
+from . import coupled_errors, data_errors, defect, dual_norm, nearly_incompressible
 from .contact_errors import ratio
 from .edge_bubbles import BubbleStiffness
 from .law_traces import LawTraces
@@ -82,8 +82,9 @@ def estimate(
     problem, near = system.problem, thresholds.near
     traces = LawTraces(problem, u, examination.states, thresholds)
     inverse = dual_norm.DualNorm(system, levels, u, thresholds)
-    cells = _discretisation(traces, inverse)
-    cells += data_errors.squares(BubbleStiffness(problem, traces.bubbles), u, examination.states, thresholds)
+    energy = _energy(problem, u, examination)
+    cells = _discretisation(traces, inverse, energy)
+    cells += data_errors.squares(problem, traces.bubbles, examination.states, thresholds)
     smoothing = inverse.solve(dual_norm.smoothing(problem, examination.states, near))[1] if _smoothed(problem) else 0.0
     _, algebraic = inverse.solve(dual_norm.algebraic(problem, examination, near))
     inverse.destroy()
@@ -93,7 +94,7 @@ def estimate(
         "discretisation": total(comm, float(cells.sum())),
         "smoothing": smoothing**2,
         "algebraic": algebraic**2 + beyond,
-        "energy_norm": _energy(problem, u, examination),
+        "energy_norm": energy,
     }
     norms = {name: _norm(square, thresholds.rounding) for name, square in squares.items()}
     return Estimate(cells=np.sqrt(cells), **norms)
@@ -104,14 +105,15 @@ def _norm(square: float, rounding: float) -> float:
     return float(np.sqrt(square)) if square > rounding**2 else 0.0
 
 
-def _discretisation(traces: LawTraces, inverse: dual_norm.DualNorm) -> Array:
-    """η_K² of the owned cells. Collective."""
+def _discretisation(traces: LawTraces, inverse: dual_norm.DualNorm, energy: float) -> Array:
+    """η_K² of the owned cells, for a solution of the energy a(u_h, u_h). Collective."""
     if traces.problem.bulk.averages_dilatation:
         return nearly_incompressible.squares(traces, inverse)
-    if drop_errors.within_facets(traces):
-        error = drop_errors.of_solution(traces, inverse)
-        return traces.problem.bulk.energy_by_cell(error.vertices + error.edges)
-    return _between_vertices(traces, inverse)
+    if not coupled_errors.within_facets(traces):
+        cells = _between_vertices(traces, inverse)
+        if total(traces.problem.domain.mesh.comm, float(cells.sum())) <= traces.thresholds.coarse**2 * energy:
+            return cells
+    return coupled_errors.squares(traces.problem, coupled_errors.of_solution(traces, inverse))
 
 
 def _between_vertices(traces: LawTraces, inverse: dual_norm.DualNorm) -> Array:

@@ -1,9 +1,8 @@
 """Facets in Legendre modes: data sampled within them, and what displacement of the body a traction in a mode causes.
 
-A traction of wave number k on a half-space moves its surface by an amplitude proportional to 1/k. The Legendre mode of
-degree l oscillates over a facet as a wave of l + ½ half-lengths does, and the edge bubble is the wave of one. So the
-compliance of the bubble gives that of the modes, whatever the material: times what a half-space is more compliant than
-a bubble, which reaches one cell deep, and over l + ½.
+A traction of wave number k on a half-space moves its surface by an amplitude of L⁻¹/k (:mod:`.half_space`). The
+Legendre mode of degree l oscillates over a facet as a wave of l + ½ half-lengths does: on a half-plane the energy of
+its displacement is larger than that of this wave by 1 + 1/(4 l (l + 1)), since ∫ j_l(k)²/k dk = 1/(2 l (l + 1)).
 """
 
 from __future__ import annotations
@@ -14,12 +13,12 @@ from typing import Any
 
 import basix
 import numpy as np
+from dolfinx import fem
 
 from ...problem.problem import Problem
 from ...typing import Array, Entities
+from . import half_space
 from .boundary_data import FacetSamples, sample
-from .contact_facets import ContactFacets
-from .edge_bubbles import BubbleStiffness
 from .thresholds import Thresholds
 
 
@@ -63,30 +62,21 @@ class FacetModes(FacetSamples):
         return np.asarray(self.facets.areas / compliance * np.sum(squares, axis=1))
 
 
-def facet_modes(problem: Problem, stiffness: BubbleStiffness, facets: Entities, thresholds: Thresholds) -> FacetModes:
+def facet_modes(problem: Problem, bubbles: fem.FunctionSpace, facets: Entities, thresholds: Thresholds) -> FacetModes:
     """The modes on boundary facets. Collective.
 
     Args:
         problem: the mesh.
-        stiffness: of the bubbles.
+        bubbles: the space of edge bubbles.
         facets: the local facets.
         thresholds: how many modes.
     """
-    at, d = sample(problem, stiffness.space, facets, thresholds), problem.scales.dimension
+    at, d = sample(problem, bubbles, facets, thresholds), problem.scales.dimension
     degree, kind = thresholds.data_degree[d], basix.CellType.interval if d == 2 else basix.CellType.triangle
     legendre: Any = basix.tabulate_polynomials(basix.PolynomialType.legendre, kind, degree, at.barycentric[:, 1:])
     values = legendre / math.sqrt(math.factorial(d - 1))
     degrees = np.concatenate([np.full(math.comb(n + d - 2, d - 2), n) for n in range(degree + 1)])
-    compliance = thresholds.half_space * _compliance(stiffness, at.facets)
+    material = half_space.elasticity(problem, at.facets.cells)
+    size = (math.factorial(d - 1) * at.facets.areas) ** (1 / (d - 1))  # in space, a leg of a right triangle
+    compliance = size[:, None] / math.pi * half_space.compliance(material, at.corners)
     return FacetModes(at.facets, at.corners, at.barycentric, at.weights, values, degrees, compliance)
-
-
-def _compliance(stiffness: BubbleStiffness, facets: ContactFacets) -> Array:
-    """∫ b² over the facets of an edge's bubble b, over its energy: the mean of each facet's edges, (f, d).
-
-    An edge in space has two facets.
-    """
-    d = facets.vertices.shape[1]
-    square = {2: 8 / 15, 3: 2 * 8 / 45}[d] * facets.areas
-    rates = stiffness.rates()[facets.edges]
-    return np.asarray(square[:, None] * rates.mean(axis=1))

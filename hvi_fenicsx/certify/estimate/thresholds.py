@@ -22,13 +22,13 @@ class Thresholds:
         dual_tolerance: of a solve with the system's matrix, relative residual: the energy is right to about its square.
         vertex_tolerance: the same, where conjugate gradients on the bubbles solve for the vertices at each step.
         data_degree: of the modes by which the data on a facet are sampled, by dimension.
-        half_space: compliance of a half-space under a wave of which a facet is half, over that of a bubble on an
-            isosceles right triangle, at Poisson's ratio 0.3.
         gap_shifts: bisections of the body's motion along a normal, where a gap varies within facets.
         gap_sweeps: sweeps over a facet's points in each of them.
         rounding: nondimensional norms up to this are rounding: a body that meets no force has no error, not 100 % of
             nothing.
-        contact_rounds: times that the bubbles are solved for where the errors on Γc are estimated.
+        coarse: error of the bubbles alone, relative to |||u_h|||, from which the vertices are found with them.
+        coupled_rounds: times at most that bubbles and vertices are solved for in turns.
+        coupled_change: relative change in energy norm of both up to which no further round is needed.
         answer_rounds: times at most that the vertices' answer to the bubbles is corrected by the laws'.
         answer_change: relative change in energy norm of that answer up to which no further round is needed.
         coarse: the mesh's error over the norm of the solution, above which the numbers are rough.
@@ -42,11 +42,12 @@ class Thresholds:
     dual_tolerance: float = 0.1
     vertex_tolerance: float = 1e-6
     data_degree: Mapping[int, int] = field(default_factory=lambda: {2: 14, 3: 6})
-    half_space: float = 2.4
     gap_shifts: int = 20
     gap_sweeps: int = 12
     rounding: float = 1e-12
-    contact_rounds: int = 2
+    coarse: float = 0.3
+    coupled_rounds: int = 12
+    coupled_change: float = 0.02
     answer_rounds: int = 4
     answer_change: float = 0.05
     coarse: float = 0.1

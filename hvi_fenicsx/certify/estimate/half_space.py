@@ -1,0 +1,79 @@
+"""How far the surface of a half-space gives way to a traction in waves, for any elastic material.
+
+A traction t cos(k m·x) on a half-space with the normal n moves its surface by L⁻¹ t cos(k m·x)/k along t. L is the
+tensor of Barnett and Lothe, an integral over the angle in the plane of m and n (T. C. T. Ting: Anisotropic Elasticity,
+Oxford 1996, section 7.6). In an isotropic body L is E/(2(1 - ν²)) along m and n (E/2 in plane stress) and μ across that
+plane.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from dolfinx import fem
+
+from ...problem.problem import Problem
+from ...typing import Array, Entities
+
+_ANGLES = 32
+"""Of the rectangle rule on a periodic integrand; an isotropic material is met to 1e-12."""
+
+_DIRECTIONS = 4
+"""Of the waves on a surface in space, over which the compliance is averaged."""
+
+
+def elasticity(problem: Problem, cells: Entities) -> Array:
+    """C_ijkl of owned cells, nondimensional, (c, d, d, d, d). Collective.
+
+    Args:
+        problem: what is solved.
+        cells: the owned cells.
+    """
+    d, found = problem.scales.dimension, np.zeros((len(cells), *[problem.scales.dimension] * 4))
+    u = fem.Function(problem.space)
+    unloaded = problem.bulk.stress(u)
+    for i in range(d):
+        for j in range(i, d):
+            strain = np.zeros((d, d))
+            strain[i, j] = strain[j, i] = 1.0 if i == j else 0.5
+            u.x.array[:] = (problem.points[:, :d] / problem.scales.length @ strain).ravel()
+            stress = (problem.bulk.stress(u) - unloaded)[cells] / problem.scales.stress
+            found[:, :, :, i, j] = found[:, :, :, j, i] = stress[:, :d, :d]
+    return found
+
+
+def compliance(stiffness: Array, corners: Array) -> Array:
+    """Diagonal of L⁻¹, surface displacement by traction for k = 1, along each axis, (f, d).
+
+    Args:
+        stiffness: C_ijkl below each facet, (f, d, d, d, d).
+        corners: of the facets, (f, d, 3); in space, the mean of all waves along the facet.
+    """
+    d = corners.shape[1]
+    sides = np.asarray((corners[:, 1:] - corners[:, :1])[:, :, :d], dtype=np.float64)
+    along = _unit(sides[:, 0])
+    normals = (
+        np.stack([along[:, 1], -along[:, 0]], axis=1)
+        if d == 2
+        else _unit(np.asarray(np.cross(along, sides[:, 1]), dtype=np.float64))
+    )
+    waves = [along]
+    if d == 3:
+        across, angles = np.cross(normals, along), np.arange(_DIRECTIONS) * np.pi / _DIRECTIONS
+        waves = [np.cos(a) * along + np.sin(a) * across for a in angles]
+    inverses = np.linalg.inv(np.array([_barnett_lothe(stiffness, wave, normals) for wave in waves]))
+    return np.asarray(np.einsum("wfii->fi", inverses) / len(waves))
+
+
+def _unit(vectors: Array) -> Array:
+    return np.asarray(vectors / np.linalg.norm(vectors, axis=1, keepdims=True))
+
+
+def _barnett_lothe(stiffness: Array, wave: Array, normal: Array) -> Array:
+    """L of waves and normals (f, d), (f, d, d)."""
+    found = np.zeros((*wave.shape, wave.shape[1]))
+    for angle in np.arange(_ANGLES) * np.pi / _ANGLES:
+        m = np.cos(angle) * wave + np.sin(angle) * normal
+        n = np.cos(angle) * normal - np.sin(angle) * wave
+        q, r, t = (np.einsum("fijkl,fj,fl->fik", stiffness, a, b) for a, b in ((m, m), (m, n), (n, n)))
+        found += q - r @ np.linalg.solve(t, r.transpose(0, 2, 1))
+    return np.asarray(found / _ANGLES)
