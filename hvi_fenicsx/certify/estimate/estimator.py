@@ -111,7 +111,7 @@ def _discretisation(traces: LawTraces, inverse: dual_norm.DualNorm, energy: floa
         return nearly_incompressible.squares(traces, inverse)
     if not coupled_errors.within_facets(traces):
         cells = _between_vertices(traces, inverse)
-        if total(traces.problem.domain.mesh.comm, float(cells.sum())) <= traces.thresholds.coarse**2 * energy:
+        if total(traces.problem.domain.mesh.comm, float(cells.sum())) <= traces.thresholds.coupled**2 * energy:
             return cells
     return coupled_errors.squares(traces.problem, coupled_errors.of_solution(traces, inverse))
 

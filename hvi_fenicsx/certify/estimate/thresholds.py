@@ -26,7 +26,7 @@ class Thresholds:
         gap_sweeps: sweeps over a facet's points in each of them.
         rounding: nondimensional norms up to this are rounding: a body that meets no force has no error, not 100 % of
             nothing.
-        coarse: error of the bubbles alone, relative to |||u_h|||, from which the vertices are found with them.
+        coupled: error of the bubbles alone, relative to |||u_h|||, from which the vertices are found with them.
         coupled_rounds: times at most that bubbles and vertices are solved for in turns.
         coupled_change: relative change in energy norm of both up to which no further round is needed.
         answer_rounds: times at most that the vertices' answer to the bubbles is corrected by the laws'.
@@ -45,7 +45,7 @@ class Thresholds:
     gap_shifts: int = 20
     gap_sweeps: int = 12
     rounding: float = 1e-12
-    coarse: float = 0.3
+    coupled: float = 0.3
     coupled_rounds: int = 12
     coupled_change: float = 0.02
     answer_rounds: int = 4
