@@ -158,7 +158,7 @@ class Enumeration:
             if np.all((x[free] >= low - near) & (x[free] <= high + near)):
                 self._enter(x)
             return
-        size = np.abs(matrix).max()
+        size = float(np.abs(matrix).max()) or 1.0
         sides = np.column_stack([low, high])
         found = linprog(np.zeros(free.size), A_eq=matrix / size, b_eq=right / size, bounds=sides, method="highs")
         if found.status == 0:
@@ -187,7 +187,7 @@ class Enumeration:
         arcs = self.problem.arcs
         drops = arcs.drops(cell.low, cell.high)
         if drops.any():
-            i = int(np.argmax(drops / np.diag(self.problem.stiffness)))
+            i = int(np.argmax(drops / np.maximum(np.diag(self.problem.stiffness), 1e-300)))
             return self._at_joint(cell, i, drops_only=True)
         joints = np.where(cell.low < cell.high, arcs.meets(cell.low, cell.high).sum(axis=1) - 1, -1)
         if joints.max() > 0:

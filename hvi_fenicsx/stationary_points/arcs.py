@@ -101,7 +101,13 @@ def _sum(arcs: Iterable[Arc], lo: float, hi: float) -> Arc:
 
 
 def on_interval(arcs: Chain, low: float, high: float) -> list[Arc]:
-    """The part of a chain on an interval; a single point where low == high."""
+    """The part of a chain on an interval; a single point where low == high.
+
+    Args:
+        arcs: the chain.
+        low: begin of the interval.
+        high: end of the interval.
+    """
     inside = [a for a in arcs if a.low < high and a.high > low]
     if not inside or low == high:
         a = next(a for a in arcs if a.low <= low <= a.high)
@@ -110,7 +116,12 @@ def on_interval(arcs: Chain, low: float, high: float) -> list[Arc]:
 
 
 def energy(arcs: Iterable[Arc], x: float) -> float:
-    """The value of a chain at x, a point of its interval."""
+    """The value of a chain.
+
+    Args:
+        arcs: the chain.
+        x: a point of its interval.
+    """
     return next(a for a in arcs if x <= a.high).at(x)
 
 
@@ -210,7 +221,12 @@ def _apart(a: float, b: float) -> bool:
 
 
 def tangent(a: Arc, b: Arc) -> tuple[float, float, float]:
-    """The common tangent of two convex arcs, a left of b, from below: its slope, and where it touches each."""
+    """The common tangent of two convex arcs from below: its slope, and where it touches each.
+
+    Args:
+        a: the left arc.
+        b: the right arc.
+    """
     if not _apart(a.high, b.low):
         if not _apart(a.low, a.high):
             return b.rate(b.low), a.low, b.low

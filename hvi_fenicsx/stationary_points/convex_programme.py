@@ -80,25 +80,42 @@ class Chains:
         return self.ends[:, 0]
 
     def states(self, z: Array, scale: Array) -> Integers:
-        """The state of each unknown at x + t/scale = z: 2k at the end k, 2k + 1 on arc k."""
+        """The state of each unknown: 2k at the end k, 2k + 1 on arc k.
+
+        Args:
+            z: x + t/scale, (n,).
+            scale: a stiffness, (n,).
+        """
         marks = np.empty((len(z), 2 * self.ends.shape[1]))
         marks[:, 0::2] = self.ends + self.before / scale[:, None]
         marks[:, 1::2] = self.ends + self.after / scale[:, None]
         return np.asarray(np.maximum((marks <= z[:, None]).sum(axis=1) - 1, 0), dtype=np.int64)
 
     def arc_at(self, x: Array) -> Integers:
-        """The arc that holds x, of the two at a joint the left one; (n,)."""
+        """The arc that holds x, of the two at a joint the left one; (n,).
+
+        Args:
+            x: a point, (n,).
+        """
         inner = self.ends[:, 1:-1] if self.ends.shape[1] > 2 else self.ends[:, :0]
         return np.asarray((inner < x[:, None]).sum(axis=1), dtype=np.int64)
 
     def energy(self, x: Array) -> Array:
-        """φᵢ(xᵢ), (n,)."""
+        """φᵢ(xᵢ), (n,).
+
+        Args:
+            x: a point, (n,).
+        """
         rows, k = np.arange(len(x)), self.arc_at(x)
         d = x - self.anchors[rows, k]
         return np.asarray(self.values[rows, k] + (self.tractions[rows, k] + 0.5 * self.slopes[rows, k] * d) * d)
 
     def interval(self, x: Array) -> tuple[Array, Array]:
-        """The subdifferential of each φᵢ at xᵢ."""
+        """The subdifferential of each φᵢ at xᵢ, its ends (n,).
+
+        Args:
+            x: a point, (n,).
+        """
         rows, k = np.arange(len(x)), self.arc_at(x)
         inside = self.tractions[rows, k] + self.slopes[rows, k] * (x - self.anchors[rows, k])
         at_low, at_high = x <= self.low, x >= self.ends[rows, k + 1]
@@ -157,7 +174,7 @@ class _Programme:
     def __init__(self, a: Array, b: Array, chains: Chains) -> None:
         self._a, self._b, self._chains = a, b, chains
         diagonal = np.diag(a)
-        self._scale = np.maximum(diagonal, 1e-3 * float(np.max(diagonal)))
+        self._scale = np.maximum(diagonal, 1e-3 * float(np.max(diagonal)) or 1.0)
         self._rows = np.arange(len(b))
 
     def active_set(self, x: Array) -> _Iterate:

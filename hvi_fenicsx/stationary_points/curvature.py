@@ -57,7 +57,7 @@ class CurvatureShare:
 
     def __init__(self, problem: ScalarProblem) -> None:
         self._problem = problem
-        self._scale = float(np.trace(problem.stiffness)) / problem.size
+        self._scale = float(np.trace(problem.stiffness)) / problem.size or 1.0
 
     @cached_property
     def _kernel(self) -> Array:

@@ -110,7 +110,12 @@ class ArcTable:
         return np.asarray(self.values[rows, k] + (self.tractions[rows, k] + 0.5 * self.slopes[rows, k] * d) * d)
 
     def meets(self, low: Array, high: Array) -> Mask:
-        """Which arcs have more than a point in common with a box, (n, m); where the box is a point, its arc."""
+        """Which arcs have more than a point in common with a box, (n, m); where the box is a point, its arc.
+
+        Args:
+            low: of the box, (n,).
+            high: of the box, (n,).
+        """
         inside = (self.low < high[:, None]) & (self.high > low[:, None])
         points = np.flatnonzero(low >= high)
         inside[points] = False
@@ -118,7 +123,12 @@ class ArcTable:
         return np.asarray(inside)
 
     def drops(self, low: Array, high: Array) -> Array:
-        """The largest drop of the traction strictly inside a box, (n,); 0 where it only rises."""
+        """The largest drop of the traction strictly inside a box, (n,); 0 where it only rises.
+
+        Args:
+            low: of the box, (n,).
+            high: of the box, (n,).
+        """
         inside = (self.high[:, :-1] > low[:, None]) & (self.high[:, :-1] < high[:, None])
         fall = np.where(inside, self.before[:, :-1] - self.after[:, 1:], 0.0)
         sizes = np.abs(self.before[:, :-1]) + np.abs(self.after[:, 1:])
@@ -126,5 +136,10 @@ class ArcTable:
         return np.asarray(fall.max(axis=1, initial=0.0))
 
     def least_slope(self, low: Array, high: Array) -> Array:
-        """The least slope of the arcs that meet a box, (n,)."""
+        """The least slope of the arcs that meet a box, (n,).
+
+        Args:
+            low: of the box, (n,).
+            high: of the box, (n,).
+        """
         return np.asarray(np.where(self.meets(low, high), self.slopes, np.inf).min(axis=1))
