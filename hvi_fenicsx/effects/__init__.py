@@ -1,8 +1,8 @@
 """The effects: importing the package registers those that come with the program."""
 
 from ..class_registry import load_modules
-from . import anisotropic, contact, elasticity, friction, loads, normal_laws, thermal
-from .base import Drive, Effect, Evaluate, FormContext, Place, Sizes, SurfaceLoad, load_name
+from . import anisotropic, contact, elasticity, friction, loads, normal_laws, thermal, total_loads
+from .base import Drive, Effect, Evaluate, FormContext, Place, SideMoments, Sizes, SurfaceLoad, load_name
 from .contribution import Averaged, BoundaryLaw, Condition, Contribution, Direction, NormalBounds
 from .formula_field import FormulaField
 from .role import Role, role_of
@@ -21,6 +21,7 @@ __all__ = [
     "NormalBounds",
     "Place",
     "Role",
+    "SideMoments",
     "Sizes",
     "SurfaceLoad",
     "anisotropic",
@@ -32,6 +33,7 @@ __all__ = [
     "normal_laws",
     "role_of",
     "thermal",
+    "total_loads",
 ]
 
 load_modules(__name__)

@@ -18,6 +18,7 @@ from pydantic import BaseModel, ConfigDict
 from ..class_registry import enter
 from ..laws import Superpotential
 from ..spatial_value import SpatialValue
+from ..typing import Array
 from .contribution import Contribution
 
 
@@ -35,6 +36,21 @@ class Drive(Enum):
     LOAD = "load"
     KINEMATIC = "prescribed displacement or strain"
     RESISTANCE = "none: it only resists"
+
+
+@dataclass(frozen=True, kw_only=True)
+class SideMoments:
+    """A boundary part in numbers, SI.
+
+    Attributes:
+        area: m² (m in 2D).
+        centroid: (d,).
+        second: ∫ r rᵀ ds, r being the position from the centroid, (d, d).
+    """
+
+    area: float
+    centroid: Array
+    second: Array
 
 
 class FormContext(Protocol):
@@ -88,6 +104,9 @@ class FormContext(Protocol):
             part: its name.
             *values: what is integrated.
         """
+
+    def side_moments(self, part: str) -> SideMoments:
+        """Area, centroid and second moments of a boundary part. Collective."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,6 +16,7 @@ from .placed_effects import (
     Temperature,
     Traction,
 )
+from .placed_loads import Force, Moment, Pressure
 from .solution import ModelSolution as Solution
 from .solving import check, solve
 from .studying import ModelStudy, study
@@ -29,13 +30,16 @@ __all__ = [
     "ContactArrays",
     "Displacement",
     "Energy",
+    "Force",
     "Friction",
     "Isotropic",
     "Model",
     "ModelStudy",
+    "Moment",
     "On",
     "Orthotropic",
     "PlacedEffect",
+    "Pressure",
     "Solution",
     "Support",
     "Temperature",

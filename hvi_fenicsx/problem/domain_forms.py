@@ -12,12 +12,13 @@ import ufl
 from dolfinx import fem
 from petsc4py import PETSc
 
-from ..effects import Place
+from ..effects import Place, SideMoments
 from ..mesh import vertex_dofs
 from ..mesh.domain import Domain
 from ..runtime.mpi import agree
 from ..spatial_value import SpatialValue
 from ..typing import Array
+from . import side_moments
 from .scaling import Placed, Scales
 from .spaces import LOAD_DEGREE, displacement_space, scalar_space
 
@@ -84,6 +85,10 @@ class DomainForms:
         varying = any(not value.is_number for value in values)
         rule = {"quadrature_degree": LOAD_DEGREE[self.dimension]} if varying else {}
         return ScaledMeasure(self.number(self.length ** (1 - self.dimension)), self.boundary(part, **rule))
+
+    def side_moments(self, part: str) -> SideMoments:
+        """Area, centroid and second moments of a boundary part. Collective."""
+        return side_moments.of(self.domain, self.part_facets[part])
 
     def boundary(self, part: str, **metadata: Any) -> Any:
         """The measure ds over a part, SI.

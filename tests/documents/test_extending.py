@@ -24,7 +24,7 @@ BLOCKS = dict(re.findall(r"^```\w+\n# (\S+)\n(.*?)^```$", DOCUMENT, flags=re.MUL
 PLAIN = {
     'law = "plateau", strength = 1.0e6, slip = 3.0e-6': 'law = "graph", points = [[0, 0], [3e-6, 1e6], [9e-6, 1e6], '
     "[9e-6, 0.5e6]]",
-    'pressure = { value = "1e6*(1 + x)" }': 'traction = [0.0, "-1e6*(1 + x)"]',
+    "water = { level = 150.0 }": 'traction = [0.0, "-9810*(150 - y)"]',
     'plugins = ["my_law.py", "my_smoothing.py", "my_effect.py", "my_method.py", "my_quantity.py"]': "",
     'method = "lowest"': 'method = "auto"',
 }
@@ -91,8 +91,8 @@ def test_a_body_of_the_users_shape_stands_on_its_floor_with_its_weight(files: Pa
 
 def test_check_tells_what_they_add(files: Path) -> None:
     data = json.loads(process("check", "pressed.toml", "--json", cwd=files).stdout)
-    pressure = next(e for e in data["effects"] if e["effect"] == "pressure")
-    assert (pressure["adds"], pressure["terms"]) == ("<g, v> += -∫ p v·n ds", "1 linear")
+    pressure = next(e for e in data["effects"] if e["effect"] == "water")
+    assert (pressure["adds"], pressure["terms"]) == ("<g, v> += -∫ ρ g (level - y) v·n ds", "1 linear")
     assert "the lower energy" in data["solver"]
 
 
