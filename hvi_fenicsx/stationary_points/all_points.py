@@ -158,11 +158,8 @@ class Enumeration:
             if np.all((x[free] >= low - near) & (x[free] <= high + near)):
                 self._enter(x)
             return
-        size = float(np.abs(matrix).max()) or 1.0
-        sides = np.column_stack([low, high])
-        found = linprog(np.zeros(free.size), A_eq=matrix / size, b_eq=right / size, bounds=sides, method="highs")
-        if found.status == 0:
-            x[free] = found.x
+        if (inner := _some_solution(matrix, right, np.column_stack([low, high]))) is not None:
+            x[free] = inner
             self._enter(x, isolated=False)
 
     def _enter(self, x: Array, *, isolated: bool = True) -> None:
@@ -217,6 +214,16 @@ def _with(cell: Box, i: int, begin: float, end: float) -> Box:
     low, high = cell.low.copy(), cell.high.copy()
     low[i], high[i] = begin, end
     return replace(cell, low=low, high=high, x=np.clip(cell.x, low, high))
+
+
+def _some_solution(matrix: Array, right: Array, sides: Array) -> Array | None:
+    """A solution of a singular linear system within intervals (n, 2), halfway between two; None if there is none."""
+    size, n = float(np.abs(matrix).max()) or 1.0, len(right)
+    ends = [
+        linprog(np.full(n, sign), A_eq=matrix / size, b_eq=right / size, bounds=sides, method="highs")
+        for sign in (1.0, -1.0)
+    ]
+    return None if any(e.status != 0 for e in ends) else np.asarray(0.5 * (ends[0].x + ends[1].x))
 
 
 def _positive(matrix: Array) -> bool:
