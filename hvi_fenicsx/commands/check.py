@@ -12,6 +12,7 @@ from ..runtime import terminal
 from ..runtime.mpi import on_root
 from ..scene import read_scene
 from ..workflow import Preparation, prepare
+from . import sizes
 from .telling import COMM
 
 _CODES = {"escapes": ExitCode.NO_SOLUTION, "undecided": ExitCode.NOT_CONVERGED}
@@ -34,8 +35,15 @@ def execute(options: argparse.Namespace) -> int:
 
 def _report(prepared: Preparation, loads: Sequence[str], *, as_json: bool) -> str:
     """What ``check`` prints. Collective."""
+    measured = sizes.of(prepared)
     factors = {name: prepared.load_factors(name) for name in loads}
     if as_json:
-        return json.dumps(console.as_data(prepared, factors), indent=2, ensure_ascii=False)
-    lines = [*console.heading(prepared, COMM.size), *console.load_factors(factors), *console.effects(prepared)]
+        data = console.as_data(prepared, factors) | {"sizes": measured.as_dict()}
+        return json.dumps(data, indent=2, ensure_ascii=False)
+    lines = [
+        *console.heading(prepared, COMM.size),
+        *measured.lines(),
+        *console.load_factors(factors),
+        *console.effects(prepared),
+    ]
     return "\n".join(lines)

@@ -42,6 +42,17 @@ def test_the_lines_of_a_named_load_say_the_same() -> None:
     assert body == "load body alone: held at factors above 0.8; no peak"
 
 
+@pytest.mark.parametrize("ranks", [1, pytest.param(2, marks=pytest.mark.long)])
+def test_the_sizes_are_those_of_the_scene(ranks: int) -> None:
+    """A tower of 1 m by 4 m with 2.5e4 N/m³ of weight, and 5e3 N/m² of wind along its height."""
+    sizes = json.loads(hvi("check", TOWER, "--json", ranks=ranks).stdout)["sizes"]
+    assert sizes["body"] == pytest.approx([1.0, 4.0])
+    assert sizes["parts"] == pytest.approx({"wind": 4.0, "floor": 1.0})
+    assert sizes["loads"]["body.force"] == pytest.approx([0.0, -2.5e4 * 4.0])
+    assert sizes["loads"]["wind.traction"] == pytest.approx([5.0e3 * 4.0, 0.0])
+    assert "sum of wind.traction: (2e+04, 0) N/m" in hvi("check", TOWER, ranks=ranks).stdout
+
+
 def test_a_load_that_is_not_there_is_told_with_those_that_are() -> None:
     done = hvi("check", TOWER, "--load", "snow")
     assert done.returncode == 2
