@@ -278,7 +278,7 @@ def draw(path: Path, found: dict[str, list[Row]]) -> None:
         style = {"marker": "osD^vP*"[number % 7], "linestyle": "-" if number < 7 else "--"}
         axes.semilogx([r.dofs for r in rows_of_scene], [r.index for r in rows_of_scene], label=name, **style)
     axes.axhline(1.0, color="black", linewidth=0.8)
-    axes.set(xlabel="unknowns", ylabel="estimated over true error", ylim=(0.5, 2.2))
+    axes.set(xlabel="unknowns", ylabel="estimated over true error", ylim=(0.6, 1.4))
     axes.grid(alpha=0.3)
     figure.legend(loc="outside right center", frameon=False, fontsize=9)
     figure.savefig(path, dpi=120)

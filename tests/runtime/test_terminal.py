@@ -104,6 +104,15 @@ def test_home_may_be_unset(ranks: tuple[str, ...], scene: Path, tmp_path: Path) 
     assert (done.returncode, done.stderr) == (0, "")
 
 
+@pytest.mark.long
+@pytest.mark.parametrize("ranks", [(), ("--np", "2")])
+def test_warnings_of_libraries_are_no_errors(ranks: tuple[str, ...], scene: Path, tmp_path: Path) -> None:
+    words = command("run", scene, "--out", tmp_path / "r", "--no-pictures", *ranks)
+    environment = os.environ | {"PYTHONWARNINGS": "error"}
+    done = subprocess.run(words, env=environment, capture_output=True, text=True, check=False, timeout=120)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
 @pytest.mark.parametrize("ranks", [(), pytest.param(("--np", "2"), marks=pytest.mark.long)])
 def test_files_of_the_current_folder_are_neither_run_nor_read(
     ranks: tuple[str, ...], scene: Path, tmp_path: Path
