@@ -2,29 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
+import numpy.typing as npt
 from dolfinx import fem
-from dolfinx import mesh as dmesh
-from dolfinx.io import VTKFile
 
 from .. import compat
 from ..certify.contact_state import ContactState
-from ..errors import InputError
 from ..mesh.vertex_dofs import dof_of_node
 from ..problem.problem import Problem
 from ..problem.spaces import scalar_space
 from ..problem.stress import von_mises
 from ..rigid import Mode
-from ..runtime.mpi import agree
 from ..solution import Solution
-from ..typing import Array
+from ..typing import Array, Integers
+from . import vtk_files
+from .vtk_files import Grid
 
 
 def write_body(path: Path, solution: Solution, stress: Array) -> None:
-    """Write displacement and reaction by vertex; by cell stress, von Mises stress, estimated error.
+    """Write displacement and reaction by vertex; by cell stress, strain, von Mises stress, estimated error.
 
     Collective.
 
@@ -36,32 +36,68 @@ def write_body(path: Path, solution: Solution, stress: Array) -> None:
     Raises:
         InputError: it cannot be written, on all ranks alike.
     """
-    problem, solved, forces = solution.problem, solution.solve_result, solution.forces
+    problem, solved = solution.problem, solution.solve_result
     assert solved is not None
-    assert forces is not None
-    u = fem.Function(problem.space, name="displacement")
-    u.x.array[:] = solved.u.x.array * problem.scales.displacement
-    reaction = fem.Function(problem.space, name="reaction")
+    d = problem.scales.dimension
+    u = solved.u.x.array.reshape(-1, d) * problem.scales.displacement
+    cells = {"von_mises": von_mises(stress), "stress": stress, "strain": _strain(problem, u)}
+    if (estimate := solution.estimate) is not None:
+        cells["error"] = np.asarray(estimate.cells / (estimate.energy_norm or 1.0), dtype=np.float64)
+    _write_on_body(path, problem, {"displacement": u, "reaction": _reactions(solution)}, cells)
+
+
+def _reactions(solution: Solution) -> Array:
+    """The nodal forces of supports, contact and laws at all local vertices, N/m or N, (n, d). Collective."""
+    problem = solution.problem
+    assert solution.forces is not None
+    reaction = fem.Function(problem.space)
     by_vertex = reaction.x.array.reshape(-1, problem.scales.dimension)
-    for part in forces.reactions.values():
+    for part in solution.forces.reactions.values():
         by_vertex[part.blocks] += part.values * problem.scales.force
     reaction.x.scatter_forward()
-    by_cell = {"von_mises": von_mises(stress), "stress": stress}
-    if (estimate := solution.estimate) is not None:
-        by_cell["error"] = np.asarray(estimate.cells / (estimate.energy_norm or 1.0), dtype=np.float64)
-    constant = [_constant(problem.domain.mesh, name, values) for name, values in by_cell.items()]
-    _write(path, problem.domain.mesh, [u, reaction, *constant])
+    return by_vertex
 
 
-def _constant(mesh: dmesh.Mesh, name: str, values: Array) -> fem.Function:
-    """A field that is constant in each cell, of values at the owned cells, (c, ...). Collective.
+def _strain(problem: Problem, u: Array) -> Array:
+    """The symmetric gradient of a displacement (n, d) in the owned cells, (c, 3, 3); zero across a plane body."""
+    d, cells = problem.scales.dimension, _owned_cells(problem)
+    points, values = problem.points[cells][:, :, :d], u[cells]
+    gradient = np.linalg.solve(points[:, 1:] - points[:, :1], values[:, 1:] - values[:, :1])
+    strain = np.zeros((len(cells), 3, 3))
+    strain[:, :d, :d] = (gradient + gradient.transpose(0, 2, 1)) / 2
+    return strain
 
-    More than seven digits of them say nothing, and their text takes twice as long to write.
+
+def _owned_cells(problem: Problem) -> Integers:
+    topology = problem.domain.mesh.topology
+    return np.asarray(problem.space.dofmap.list[: topology.index_map(topology.dim).size_local])
+
+
+def _write_on_body(path: Path, problem: Problem, at_points: Mapping[str, Array], in_cells: Mapping[str, Array]) -> None:
+    """Write fields at all local vertices and in the owned cells. Collective.
+
+    More than seven digits of the latter say nothing.
     """
-    field = fem.Function(fem.functionspace(mesh, ("Discontinuous Lagrange", 0, values.shape[1:])), name=name)
-    field.x.array[: values.size] = _rounded(values, 7).ravel()
-    field.x.scatter_forward()
-    return field
+    cells = _owned_cells(problem)
+    used, numbered = np.unique(cells, return_inverse=True)
+    grid = Grid(
+        points=problem.points[used],
+        cells=numbered.reshape(cells.shape),
+        at_points={name: _spatial(values[used]) for name, values in at_points.items()},
+        in_cells={name: _flat(_rounded(values, 7)) for name, values in in_cells.items()},
+    )
+    vtk_files.write(path, problem.domain.mesh.comm, grid)
+
+
+def _flat(values: Array) -> npt.NDArray[np.float32]:
+    """Tensors as rows of components, numbers as they are; in single precision."""
+    rows = values if values.ndim == 1 else values.reshape(len(values), math.prod(values.shape[1:]))
+    return rows.astype(np.float32)
+
+
+def _spatial(vectors: Array) -> Array:
+    """Vectors (n, d) with three components."""
+    return np.pad(vectors, ((0, 0), (0, 3 - vectors.shape[1])))
 
 
 def _rounded(values: Array, digits: int) -> Array:
@@ -83,10 +119,8 @@ def write_escape(path: Path, problem: Problem, mode: Mode) -> None:
     Raises:
         InputError: it cannot be written, on all ranks alike.
     """
-    field = fem.Function(problem.space, name="escape_mode")
     points = np.asarray(problem.points / problem.scales.length)
-    field.x.array[:] = problem.bodies.motion(points, mode).ravel()
-    _write(path, problem.domain.mesh, [field])
+    _write_on_body(path, problem, {"escape_mode": problem.bodies.motion(points, mode)}, {})
 
 
 def write_contact(path: Path, problem: Problem, states: Sequence[ContactState]) -> None:
@@ -104,14 +138,14 @@ def write_contact(path: Path, problem: Problem, states: Sequence[ContactState]) 
     facets = np.unique(np.concatenate([s.facets for s in (state.surface for state in states)])).astype(np.int32)
     surface, nodes = compat.submesh_nodes(mesh, d - 1, facets)
     parent = dof_of_node(problem.space)[nodes]
-    space = fem.functionspace(surface, ("Lagrange", 1))
-    target = dof_of_node(space)
-    fields = []
-    for name, values in _nodal(problem, states).items():
-        field = fem.Function(space, name=name)
-        field.x.array[target] = values[parent]
-        fields.append(field)
-    _write(path, surface, fields)
+    owned = surface.topology.index_map(d - 1).size_local
+    grid = Grid(
+        points=surface.geometry.x,
+        cells=np.asarray(compat.geometry_dofmap(surface)[:owned], dtype=np.int64),
+        at_points={name: values[parent] for name, values in _nodal(problem, states).items()},
+        in_cells={},
+    )
+    vtk_files.write(path, mesh.comm, grid)
 
 
 def _nodal(problem: Problem, states: Sequence[ContactState]) -> dict[str, Array]:
@@ -139,18 +173,3 @@ def _nodal(problem: Problem, states: Sequence[ContactState]) -> dict[str, Array]
     for field in found.values():
         field.x.scatter_forward()
     return {name: field.x.array for name, field in found.items()}
-
-
-def _write(path: Path, mesh: dmesh.Mesh, fields: Sequence[fem.Function]) -> None:
-    if faults := [fault for fault in agree(mesh.comm, _fault(path, mesh, fields)) if fault]:
-        raise InputError(f"{path.name}: {faults[0]} Is the disk full?")
-
-
-def _fault(path: Path, mesh: dmesh.Mesh, fields: Sequence[fem.Function]) -> str | None:
-    """Write a file; what went wrong. The writer dies with this frame: it would write again when it is collected."""
-    try:
-        with VTKFile(mesh.comm, str(path), "w") as file:
-            file.write_function(list(fields), 0.0)
-    except RuntimeError as error:
-        return str(error)
-    return None

@@ -7,6 +7,7 @@ tangent then costs one small dense factorisation instead of one of the whole mat
 from __future__ import annotations
 
 import warnings
+import weakref
 from collections.abc import Mapping
 
 import numpy as np
@@ -34,8 +35,21 @@ def is_worthwhile(system: System, affordable: int) -> bool:
     return 0 < len(system.jacobian.rows.dofs) <= affordable
 
 
+class _Application:
+    """The context of the PC of a condensed body, to which it refers weakly: nothing would free a circle via PETSc."""
+
+    def __init__(self, owner: SchurDirect) -> None:
+        self._owner = weakref.ref(owner)
+
+    def apply(self, pc: PETSc.PC, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        """Solve y = J^-1 x."""
+        owner = self._owner()
+        assert owner is not None
+        owner.apply(pc, x, y)
+
+
 class SchurDirect:
-    """The condensed body; the context of its PC of type python. Creation is collective.
+    """The condensed body, as a preconditioner. Creation is collective.
 
     Args:
         system: the system, whose stiffness is condensed to the n unknowns of Γc.
@@ -55,7 +69,7 @@ class SchurDirect:
         self._work = system.load.duplicate()
         self.pc, self.matrix = PETSc.PC().create(system.comm), system.jacobian.matrix
         self.pc.setType(PETSc.PC.Type.PYTHON)
-        self.pc.setPythonContext(self)
+        self.pc.setPythonContext(_Application(self))
         self.pc.setOperators(self.matrix)
 
     def prepare(self, held: Entities) -> None:

@@ -48,11 +48,16 @@ def run_shell(block: Block, place: Path) -> None:
         assert done.returncode == command.code, f"{command.text}\n{done.stdout}\n{done.stderr}"
 
 
-def run_python(block: Block, before: list[str], place: Path) -> None:
+def make_result(block: Block, place: Path) -> None:
     if block.key == "needs" and not (place / block.value).exists():
         run([str(place / "hvi"), "run", f"demos/{Path(block.value).name}.toml", "--out", block.value], place)
-    done = run([sys.executable, "-c", "\n".join([*before, block.text])], place)
-    assert done.returncode == 0, f"{block.text}\n{done.stderr}"
+
+
+def run_python(program: list[str], place: Path) -> None:
+    """The page's blocks as one program, as a reader types them; the traceback shows the block that fails."""
+    (place / "page.py").write_text("\n".join(program), encoding="utf-8")
+    done = run([sys.executable, "page.py"], place)
+    assert done.returncode == 0, done.stderr
 
 
 @pytest.mark.long
@@ -68,8 +73,10 @@ def test_every_block_does_what_it_says(name: str, place: Path) -> None:
         elif block.language == "sh":
             run_shell(block, place)
         elif block.language == "python":
-            run_python(block, python, place)
+            make_result(block, place)
             python.append(block.text)
+    if python:
+        run_python(python, place)
 
 
 @pytest.mark.long

@@ -10,11 +10,13 @@ from typing import Any
 import matplotlib as mpl
 import numpy as np
 import pytest
-from runs import ROOT
+from demos_on_ranks import fibres, loop, plate
+from runs import ROOT, on_ranks
 
 import hvi_fenicsx as hvi
 
 DEMOS = ROOT / "demos"
+ON_RANKS = Path(__file__).parents[1] / "support" / "demos_on_ranks.py"
 
 
 def demo(name: str) -> dict[str, Any]:
@@ -59,6 +61,13 @@ def test_the_fibre_composite_has_the_compliance_of_its_constants(tmp_path: Path)
         assert block["spread"](free, way) == pytest.approx(way @ strain @ way, rel=1e-9)
     _, held = block["main"](tmp_path)
     assert 0.0 < held[1] < across @ strain @ across  # friction hinders the spread
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", ["own_mesh", "load_loop", "fibres_3d"])
+def test_two_ranks_find_what_one_finds(name: str, tmp_path: Path) -> None:
+    alone, told = {"fibres_3d": fibres, "load_loop": loop, "own_mesh": plate}[name](), on_ranks(2, str(ON_RANKS), name)
+    np.testing.assert_allclose(told, [alone, alone], rtol=1e-6)
 
 
 def test_the_notebook_runs() -> None:

@@ -133,6 +133,9 @@ def test_paraview_is_given_the_whole_stress_and_the_reactions_as_vectors(uniform
     assert body.point_data["displacement"].shape == body.point_data["reaction"].shape == (body.n_points, 3)
     stress = body.cell_data["stress"].reshape(-1, 3, 3)
     np.testing.assert_allclose(stress, [np.diag([P, -Q, 0.0])] * body.n_cells, atol=1e-6 * P)
+    strain = body.cell_data["strain"].reshape(-1, 3, 3)
+    plane = np.diag([P + NU * Q, -Q - NU * P, 0.0]) / E
+    np.testing.assert_allclose(strain, [plane] * body.n_cells, atol=1e-6 * P / E)
     x, reaction = body.points, body.point_data["reaction"]
     np.testing.assert_allclose(reaction.sum(axis=0), [-P, Q, 0.0], atol=1e-9 * P)
     assert not reaction[(x[:, 0] > 0) & (x[:, 1] > 0)].any()

@@ -9,7 +9,9 @@ import random
 import shutil
 import subprocess
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 from runs import ROOT, hvi
 
@@ -37,6 +39,18 @@ def result(request: pytest.FixtureRequest, tmp_path: Path) -> tuple[int, Path]:
     return dimension, folder
 
 
+def strain_by_vtk(body: Any) -> Any:
+    """The strain in each cell by VTK's own derivatives, (cells, 9)."""
+    from vtkmodules.vtkFiltersGeneral import vtkCellDerivatives
+
+    body.set_active_vectors("displacement")
+    derivatives = vtkCellDerivatives()
+    derivatives.SetInputData(body)
+    derivatives.SetTensorModeToComputeStrain()
+    derivatives.Update()
+    return pyvista.wrap(derivatives.GetOutput()).cell_data["Strain"]
+
+
 def test_every_array_that_the_macro_names_is_there(result: tuple[int, Path]) -> None:
     dimension, folder = result
     named = constants()
@@ -47,6 +61,7 @@ def test_every_array_that_the_macro_names_is_there(result: tuple[int, Path]) -> 
     if vector == "escape_mode":
         return
     assert body.cell_data[named["STRESS"]].shape == (body.n_cells,)  # type: ignore[call-overload]
+    np.testing.assert_allclose(body.cell_data["strain"], strain_by_vtk(body), atol=1e-6 * np.ptp(body["strain"]))
     contact = pyvista.get_reader(folder / "contact.pvd").read()[0]
     colour, _ = named["COLOURS"][dimension]  # type: ignore[index]
     assert contact.point_data[colour].shape == (contact.n_points,)

@@ -1,0 +1,126 @@
+"""Files for ParaView by VTK's own writer: each rank writes its cells, binary and compressed; rank 0 an index."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree as Xml
+
+import numpy as np
+import numpy.typing as npt
+from mpi4py import MPI
+
+from ..errors import InputError
+from ..runtime.log import logger
+from ..runtime.mpi import agree, on_root
+from ..typing import Array, Integers
+
+_LOG = logger("results")
+_CELLS = {2: 3, 3: 5, 4: 10}
+"""VTK's numbers of line, triangle and tetrahedron, by their vertices."""
+_NAMES = {np.dtype(np.float32): "Float32", np.dtype(np.float64): "Float64"}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Grid:
+    """The part of a mesh that a rank writes, n vertices and c cells, with its fields; all ranks have the same fields.
+
+    Attributes:
+        points: m, (n, 3).
+        cells: by their vertices, (c, k).
+        at_points: fields by name, (n,) or (n, k).
+        in_cells: fields by name, (c,) or (c, k).
+    """
+
+    points: Array
+    cells: Integers
+    at_points: Mapping[str, npt.NDArray[Any]]
+    in_cells: Mapping[str, npt.NDArray[Any]]
+
+
+def write(path: Path, comm: MPI.Comm, grid: Grid) -> None:
+    """Write NAME.pvd, its NAME.pvtu, and NAME_RANK.vtu of each rank. Collective.
+
+    Without VTK nothing is written, and a warning says so.
+
+    Args:
+        path: the first of them.
+        comm: the ranks.
+        grid: this rank's part.
+
+    Raises:
+        InputError: a file cannot be written, on all ranks alike.
+    """
+    if not all(agree(comm, find_spec("vtkmodules") is not None)):
+        _LOG.warning("%s is not written: VTK is missing; install python3-vtk9 (Debian) or vtk (pip, conda)", path.name)
+        return
+    pieces = [path.with_name(f"{path.stem}_{rank}.vtu") for rank in range(comm.size)]
+    written = _write_piece(pieces[comm.rank], grid)
+    if not all(agree(comm, written)):
+        raise InputError(f"{path.name}: VTK could not write it. Is the disk full?")
+    on_root(comm, lambda: _write_index(path, grid, pieces))
+
+
+def _write_piece(path: Path, grid: Grid) -> bool:
+    """Whether VTK could write it."""
+    from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridWriter  # a tenth of a second
+
+    writer = vtkXMLUnstructuredGridWriter()
+    writer.AddObserver("ErrorEvent", lambda *_: None)  # told by what it returns
+    writer.SetFileName(str(path))
+    writer.SetDataModeToAppended()
+    writer.EncodeAppendedDataOff()
+    writer.SetCompressorTypeToLZ4()
+    writer.SetInputData(_vtk_grid(grid))
+    return bool(writer.Write()) and writer.GetErrorCode() == 0
+
+
+def _vtk_grid(grid: Grid) -> Any:
+    from vtkmodules.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray
+    from vtkmodules.vtkCommonCore import vtkPoints
+    from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkUnstructuredGrid
+
+    count, corners = grid.cells.shape
+    made, points, cells = vtkUnstructuredGrid(), vtkPoints(), vtkCellArray()
+    points.SetData(numpy_to_vtk(np.ascontiguousarray(grid.points), deep=True))
+    offsets = np.arange(0, (count + 1) * corners, corners, dtype=np.int64)
+    connectivity = np.ascontiguousarray(grid.cells, dtype=np.int64).ravel()
+    cells.SetData(numpy_to_vtkIdTypeArray(offsets, deep=True), numpy_to_vtkIdTypeArray(connectivity, deep=True))
+    made.SetPoints(points)
+    made.SetCells(_CELLS[corners], cells)
+    for fields, data in ((grid.at_points, made.GetPointData()), (grid.in_cells, made.GetCellData())):
+        for name, values in fields.items():
+            array = numpy_to_vtk(np.ascontiguousarray(values), deep=True)
+            array.SetName(name)
+            data.AddArray(array)
+    return made
+
+
+def _write_index(path: Path, grid: Grid, pieces: list[Path]) -> None:
+    """The two files that name the pieces. Rank 0 only."""
+    parallel = Xml.Element(
+        "VTKFile", type="PUnstructuredGrid", version="1.0", byte_order=f"{sys.byteorder.title()}Endian"
+    )
+    whole = Xml.SubElement(parallel, "PUnstructuredGrid", GhostLevel="0")
+    for place, fields in (("PPointData", grid.at_points), ("PCellData", grid.in_cells)):
+        Xml.SubElement(whole, place).extend(_declared(fields))
+    Xml.SubElement(whole, "PPoints").extend(_declared({"Points": grid.points}))
+    for piece in pieces:
+        Xml.SubElement(whole, "Piece", Source=piece.name)
+    collection = Xml.Element("VTKFile", type="Collection", version="0.1")
+    entries = Xml.SubElement(collection, "Collection")
+    Xml.SubElement(entries, "DataSet", timestep="0", part="0", file=path.with_suffix(".pvtu").name)
+    for root, file in ((parallel, path.with_suffix(".pvtu")), (collection, path)):
+        Xml.indent(root)
+        Xml.ElementTree(root).write(file, encoding="utf-8", xml_declaration=True)
+
+
+def _declared(fields: Mapping[str, npt.NDArray[Any]]) -> Iterator[Xml.Element]:
+    for name, values in fields.items():
+        components = values.shape[1] if values.ndim > 1 else 1
+        kind = _NAMES[values.dtype]
+        yield Xml.Element("PDataArray", type=kind, Name=name, NumberOfComponents=str(components))
