@@ -11,7 +11,9 @@ from petsc4py import PETSc
 from ..system.system import LawModel
 from .active_set import ActiveSetSolver
 from .convergence import Outcome
+from .projected_newton import ProjectedNewton
 from .result import Counts
+from .thresholds import EXACT
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -20,7 +22,7 @@ class Attempt:
 
     Attributes:
         models: what takes the place of the laws, by term.
-        line_search: PETSc's name.
+        line_search: PETSc's name, or that of the projected Newton method.
         max_iterations: Newton steps at most.
         lowers_energy: whether it lowers the energy even where it does not converge; the next attempt then begins where
             this one ended, else where this one began.
@@ -84,6 +86,8 @@ def _solve(
     solver: ActiveSetSolver, x: PETSc.Vec, attempt: Attempt, tolerance: float, bounds: tuple[PETSc.Vec, PETSc.Vec]
 ) -> Outcome:
     """How one attempt ends, from and into x. Collective."""
+    if attempt.line_search == EXACT:
+        return ProjectedNewton(solver, attempt.models, *bounds).solve(x, tolerance, attempt.max_iterations)
     return solver.solve(
         x,
         attempt.models,

@@ -7,8 +7,11 @@ from dataclasses import dataclass, field
 
 from ..system.thresholds import Thresholds as LinearThresholds
 
+EXACT = "exact"
+"""The line search of :mod:`.projected_newton`, beside PETSc's."""
 BRANCH_ATTEMPTS = (
     (False, "basic", 30),
+    (False, EXACT, 60),
     (False, "bt", 60),
     (True, "bt", 40),
     (False, "basic", 30),
@@ -17,7 +20,7 @@ BRANCH_ATTEMPTS = (
     (False, "basic", 30),
 )
 """See :attr:`BranchThresholds.attempts`; the order was found on the hard cases (docs/hard-cases.md)."""
-PROGRAMME_ATTEMPTS = (("basic", 30), ("basic", 30), ("bt", 60), ("basic", 60), ("bt", 200))
+PROGRAMME_ATTEMPTS = (("basic", 30), ("basic", 30), (EXACT, 60), ("bt", 60), ("basic", 60), ("bt", 200))
 """See :attr:`Thresholds.programme_attempts`."""
 
 
@@ -58,12 +61,35 @@ class ActiveSetThresholds:
 
 
 @dataclass(frozen=True, kw_only=True)
+class ProjectedNewtonThresholds:
+    """How the projected Newton method steps.
+
+    Attributes:
+        foundation: stiffness per area, in units of E0/L, that keeps the matrix regular where laws have none.
+        linear_tolerance: relative tolerance of a step's linear solve.
+        flat: slope, relative to that at the start of a step, at which a line search ends.
+        doublings: of a step along which the slope does not change its sign, at most.
+        searches: slopes that are looked at between two lengths, at most.
+        least_share: of the interval that is known to hold the minimum, by which it shrinks at least.
+        stalled_steps: steps without halving the residual after which a solve ends.
+    """
+
+    foundation: float = 1e-8
+    linear_tolerance: float = 1e-4
+    flat: float = 1e-2
+    doublings: int = 40
+    searches: int = 60
+    stalled_steps: int = 20
+    least_share: float = 1e-2
+
+
+@dataclass(frozen=True, kw_only=True)
 class BranchThresholds:
     """How convex steps of the branch iteration are solved, and when it gives up.
 
     Attributes:
-        attempts: ways to solve a convex step, until one converges: whether with secant stiffness, PETSc's line search,
-            Newton steps at most.
+        attempts: ways to solve a convex step, until one converges: whether with secant stiffness, line search, Newton
+            steps at most.
         foundation: stiffness per area, in units of E0/L, that attempts with secant stiffness add to the laws': where
             these have none, as in a dead zone, the matrix would be singular.
         loose_tolerance: of convex steps while the pieces of the laws still change.
@@ -110,6 +136,7 @@ class Thresholds:
     Attributes:
         linear: of the linear solvers.
         active_set: of the active set solver.
+        projected_newton: of the projected Newton method.
         branch: of the branch iteration.
         nested_from: unknowns from which a coarser level pays.
         coarse_tolerance: tolerance of the solution on a coarser level.
@@ -132,6 +159,7 @@ class Thresholds:
 
     linear: LinearThresholds = field(default_factory=LinearThresholds)
     active_set: ActiveSetThresholds = field(default_factory=ActiveSetThresholds)
+    projected_newton: ProjectedNewtonThresholds = field(default_factory=ProjectedNewtonThresholds)
     branch: BranchThresholds = field(default_factory=BranchThresholds)
     nested_from: int = 5_000
     coarse_tolerance: float = 1e-4
