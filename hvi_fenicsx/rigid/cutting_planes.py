@@ -202,9 +202,14 @@ class Programme:
         raise SolverError(f"HiGHS on the rigid motions: {result.message}")
 
     def _rows(self, f: Functional, region: Region, active: list[int]) -> tuple[Array, Array, Array]:
-        """Cost and inequality rows of the cut model in (y, one height for each part with factor > 0)."""
+        """Cost and inequality rows of the cut model in (y, one height for each part with factor > 0).
+
+        Heights are in units of the part's largest cut: HiGHS' tolerances are absolute, and parts may be small.
+        """
         parts = [p for p, b in enumerate(f.factors) if b > 0.0]
         cuts = [np.array(self.cuts[p]) for p in parts]
+        sizes = [float(np.abs(rows).max()) or 1.0 for rows in cuts]
+        cuts = [rows / size for rows, size in zip(cuts, sizes, strict=True)]
         left = np.vstack([region.upper, f.cone[active], *cuts])
         heights = np.zeros((len(left), len(parts)))
         top = len(region.upper) + len(active)
@@ -213,7 +218,7 @@ class Programme:
             top += len(rows)
         right = np.zeros(len(left))
         right[: len(region.upper)] = 1.0
-        return np.r_[f.linear, f.factors[parts]], np.hstack([left, heights]), right
+        return np.r_[f.linear, f.factors[parts] * sizes], np.hstack([left, heights]), right
 
     def _solve_line(self, f: Functional, region: Region) -> Minimum | None:
         """One motion only: two rays and the origin, no linear programme."""

@@ -461,6 +461,22 @@ def test_a_torque_about_the_vertical_meets_growth_times_distance() -> None:
     assert verdict.critical.name == "rotation about the axis through (1, 0.5, 0.5) along +z"
 
 
+@pytest.mark.parametrize("size", [1e-3, 1e-6])
+def test_a_small_part_that_strong_laws_hold_is_judged_as_a_large_one(size: float) -> None:
+    """Loads and areas in proportion: the margin is so too, and no tolerance of the programmes hides it."""
+    whole = slab((0.1, 0.2), torque=0.05)
+    part = whole.resistances[0]
+    small = replace(
+        whole,
+        loads={name: size * load for name, load in whole.loads.items()},
+        resistances=(replace(part, weights=size * part.weights),),
+    )
+    expected, found = analyse(ALONE, whole), analyse(ALONE, small)
+    assert found.state == expected.state == "held"
+    assert expected.margin is not None
+    assert found.margin == pytest.approx(size * expected.margin, rel=1e-8)
+
+
 def test_a_block_in_space_tips_about_an_edge_of_its_base() -> None:
     """2 × 1 base, weight 3 in the middle, pushed along y at height 2: 3 · 0.5 = 2 P."""
     body = RigidBody(3, np.array([1.0, 0.5, 0.5]))
