@@ -3,8 +3,10 @@
 The unbroken branch comes first. For a narrowly smoothed law, the solution of the unsmoothed law is the next start. For
 a body that rolls or tips on its way to rest, it is the position at rest of the rigid body (:mod:`.rigid_start`). In the
 metastable state the iteration may slide off while an equilibrium exists on other pieces of the laws: starts on the
-pieces of the resting slips, with every bond broken, and a continuation in the smoothing look for it there. Where an
-equilibrium may not exist, the search ends after a number of Newton steps.
+pieces of the resting slips, with every bond broken, and a continuation in the smoothing look for it there. Where laws
+push, the only equilibrium may be no minimum of the energy, from which every descent leads away; Newton's method on the
+laws themselves looks for such ones last. Where an equilibrium may not exist, the search ends after a number of Newton
+steps.
 """
 
 from __future__ import annotations
@@ -93,6 +95,8 @@ class Auto(BranchIteration):
             pieces.scale(factor)
             yield from self._attempt(self._iteration().solve, None, pieces)
         yield from self._attempt(Continuation(self.context).solve)
+        for start in (self.system.undisplaced(), resting):
+            yield from self._attempt(self._iteration().newton, start)
 
     def _from_rest(self) -> Iterator[SolveResult]:
         """From bodies at rest on their supports, since closed contact is no start where bodies roll.

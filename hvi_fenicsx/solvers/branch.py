@@ -79,6 +79,17 @@ class BranchIteration(Method):
                 better.copy(x)
         return self._result(x, outcome)
 
+    def newton(self, start: PETSc.Vec) -> SolveResult:
+        """A stationary point near a start by Newton's method on the laws themselves, perhaps no minimum. Collective.
+
+        Args:
+            start: where to begin.
+        """
+        x = start.copy()
+        with self.solver.reporting(self._progress):
+            outcome, stationary = self._convex.newton(x, self._convex.cells(x), "basic")
+        return self._result(x, replace(outcome, converged=stationary))
+
     def _resting(self) -> PETSc.Vec:
         x, linear = resting_start(self.solver, self._laws)
         self.counts.linear += linear

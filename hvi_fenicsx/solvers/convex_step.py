@@ -154,21 +154,31 @@ class ConvexStep:
         if not self.anywhere([np.asarray(law.concave.second(a) > 0) for law, a in arguments]):
             return outcome, False
         trial = x.copy()
-        exact = [ExactLaw(law, c) for law, c in zip(self._laws, cells, strict=True)]
-        found = self._newton(trial, exact, cells)
+        found, stationary = self.newton(trial, cells, "bt")
         if not found.converged or self.energy(trial) > self.energy(x) + self.energy_rounding(self.energy(x), x):
             return outcome, False
         trial.copy(x)
-        return found, not self.anywhere(self._overloaded(x, exact))
+        return found, stationary
 
-    def _newton(self, x: PETSc.Vec, exact: Sequence[ExactLaw], cells: Sequence[Cells]) -> Outcome:
+    def newton(self, x: PETSc.Vec, cells: Sequence[Cells], line_search: str) -> tuple[Outcome, bool]:
+        """Newton steps on the laws themselves, each vertex kept in its cell. Collective.
+
+        Args:
+            x: start and result.
+            cells: where each vertex is kept, by term.
+            line_search: PETSc's name.
+
+        Returns:
+            How it ended, and whether x is stationary.
+        """
         lower, upper = kink_bounds.slip_bounds(self._system, cells)
+        exact = [ExactLaw(law, c) for law, c in zip(self._laws, cells, strict=True)]
         most = self._thresholds.newton_steps
         found = self._solver.solve(
-            x, exact, self._options.tolerance, lower=lower, upper=upper, line_search="bt", max_iterations=most
+            x, exact, self._options.tolerance, lower=lower, upper=upper, line_search=line_search, max_iterations=most
         )
         self._counts.add_outcome(found)
-        return found
+        return found, found.converged and not self.anywhere(self._overloaded(x, exact))
 
     def _overloaded(self, x: PETSc.Vec, models: Sequence[Majorant | ExactLaw]) -> list[npt.NDArray[np.int64]]:
         self._system.residual(x, self._residual, models)
