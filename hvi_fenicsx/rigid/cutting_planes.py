@@ -209,11 +209,11 @@ class Programme:
         parts = [p for p, b in enumerate(f.factors) if b > 0.0]
         cuts = [np.array(self.cuts[p]) for p in parts]
         sizes = [float(np.abs(rows).max()) or 1.0 for rows in cuts]
-        cuts = [rows / size for rows, size in zip(cuts, sizes, strict=True)]
-        left = np.vstack([region.upper, f.cone[active], *cuts])
+        scaled = [rows / size for rows, size in zip(cuts, sizes, strict=True)]
+        left = np.vstack([region.upper, f.cone[active], *scaled])
         heights = np.zeros((len(left), len(parts)))
         top = len(region.upper) + len(active)
-        for column, rows in enumerate(cuts):
+        for column, rows in enumerate(scaled):
             heights[top : top + len(rows), column] = -1.0
             top += len(rows)
         right = np.zeros(len(left))
