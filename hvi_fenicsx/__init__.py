@@ -50,6 +50,7 @@ _HOME = {
     "Traction": "modelling",
     "check": "modelling",
     "dump_scene": "scene",
+    "equilibria": "modelling",
     "prepare": "workflow",
     "read_scene": "scene",
     "set_log_level": "runtime.log",
@@ -83,6 +84,7 @@ __all__ = [
     "__version__",
     "check",
     "dump_scene",
+    "equilibria",
     "laws",
     "prepare",
     "read_scene",
@@ -116,6 +118,7 @@ if TYPE_CHECKING:
         Temperature,
         Traction,
         check,
+        equilibria,
         solve,
         study,
     )

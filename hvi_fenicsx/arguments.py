@@ -38,6 +38,8 @@ def parser() -> argparse.ArgumentParser:
     commands = main_parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     _add_run_options(_add(commands, "run", "solve a scene; results go to results/SCENE or --out", _RunHelp))
     _add_check_options(_add(commands, "check", "validate a scene and say whether a solution exists; solves nothing"))
+    text = "find all equilibria of a scene, or the lowest with a proof; by default into results/SCENE-equilibria"
+    _add_equilibria_options(_add(commands, "equilibria", text))
     _add_study_options(_add(commands, "study", "measure what accuracy costs in time, along several axes"))
     _add(commands, "version", "versions of everything")
     return main_parser
@@ -92,6 +94,25 @@ def _add_check_options(check: argparse.ArgumentParser) -> None:
         help="also print the factors of this load, the others constant: its part or region, or PART.traction",
     )
     check.add_argument("--json", action="store_true", help="print the report as JSON")
+
+
+def _add_equilibria_options(equilibria: argparse.ArgumentParser) -> None:
+    _add_scene_options(equilibria)
+    equilibria.add_argument("--lowest", action="store_true", help="the lowest energy with a proof, instead of all")
+    equilibria.add_argument(
+        "--gap",
+        type=_relative_error,
+        default=1e-8,
+        metavar="REL",
+        help="what the proof of the lowest energy may leave open, relative to the energy; by default 1e-8",
+    )
+    equilibria.add_argument("--limit", type=_seconds, metavar="SECONDS", help="stop the search after so many seconds")
+    equilibria.add_argument("--out", type=Path, metavar="DIR", help="the folder for the results")
+    equilibria.add_argument("--force", action="store_true", help="replace results that are there")
+    equilibria.add_argument("--resume", action="store_true", help="go on with a search that was stopped")
+    equilibria.add_argument("--np", type=_ranks, metavar="N", help="run on N MPI ranks")
+    equilibria.add_argument("--petsc", default="", metavar="OPTIONS", help="PETSc options")
+    equilibria.add_argument("--no-pictures", action="store_true", help="write no pictures")
 
 
 def _add_study_options(study: argparse.ArgumentParser) -> None:

@@ -1,4 +1,4 @@
-"""The command line: ``hvi run | check | study | version``. A command imports what it needs: help is instant."""
+"""The command line. A command imports what it needs: help is instant."""
 
 from __future__ import annotations
 

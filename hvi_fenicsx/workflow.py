@@ -210,6 +210,17 @@ def finish_with_levels(
     return _solution(prepared, solved.result, examination, errors, prepared.warnings + warnings), solved.levels
 
 
+def certified(prepared: Preparation, found: SolveResult) -> Solution:
+    """A displacement that was found elsewhere, certified; no error is estimated. Collective.
+
+    Args:
+        prepared: the scene.
+        found: the displacement.
+    """
+    examination, warnings = _examined(prepared, found)
+    return _solution(prepared, found, examination, None, prepared.warnings + warnings)
+
+
 def _examined(prepared: Preparation, found: SolveResult) -> tuple[Examination, tuple[str, ...]]:
     """The certificate, and warnings about the solution. Collective."""
     options = prepared.options

@@ -19,6 +19,7 @@ from .placed_effects import (
 from .placed_loads import Force, Moment, Pressure
 from .solution import ModelSolution as Solution
 from .solving import check, solve
+from .stationary import Equilibria, equilibria
 from .studying import ModelStudy, study
 
 __all__ = [
@@ -30,6 +31,7 @@ __all__ = [
     "ContactArrays",
     "Displacement",
     "Energy",
+    "Equilibria",
     "Force",
     "Friction",
     "Isotropic",
@@ -45,6 +47,7 @@ __all__ = [
     "Temperature",
     "Traction",
     "check",
+    "equilibria",
     "solve",
     "study",
 ]

@@ -125,14 +125,14 @@ class Enumeration:
         free = np.flatnonzero(~fixed)
         arcs, problem = self.problem.arcs, self.problem
         if not free.size:
-            self._enter(cell.low)
+            self.enter(cell.low)
             return True
         if np.any(arcs.drops(cell.low, cell.high) > 0.0):
             return False
         slopes = arcs.least_slope(cell.low, cell.high)
         matrix = problem.stiffness[np.ix_(free, free)] + np.diag(slopes[free])
         if _positive(matrix):
-            self._enter(self._minimum(cell, np.where(fixed, 0.0, -np.minimum(slopes, 0.0))))
+            self.enter(self._minimum(cell, np.where(fixed, 0.0, -np.minimum(slopes, 0.0))))
             return True
         if np.any(arcs.meets(cell.low, cell.high)[free].sum(axis=1) > 1) or np.any(self._at_bound(cell)[free]):
             return False
@@ -156,14 +156,19 @@ class Enumeration:
             x[free] = np.linalg.solve(matrix, right)
             near = SAME * (1.0 + np.abs(x[free]))
             if np.all((x[free] >= low - near) & (x[free] <= high + near)):
-                self._enter(x)
+                self.enter(x)
             return
         if (inner := _some_solution(matrix, right, np.column_stack([low, high]))) is not None:
             x[free] = inner
-            self._enter(x, isolated=False)
+            self.enter(x, isolated=False)
 
-    def _enter(self, x: Array, *, isolated: bool = True) -> None:
-        """Keep a point if it is stationary and new."""
+    def enter(self, x: Array, *, isolated: bool = True) -> None:
+        """Keep a point if it is stationary and new.
+
+        Args:
+            x: the point, (n,).
+            isolated: False where it is one of a continuum.
+        """
         problem = self.problem
         x = np.clip(x, problem.lower, problem.upper)
         if stationarity.imbalance(problem, x) > stationarity.ACCURACY:
@@ -197,10 +202,10 @@ class Enumeration:
         size = max(abs(a.rate(x)) for a in arcs for x in (a.low, a.high))
         chosen = [(x, j) for x, j in joints if j < -1e-13 * size or not drops_only]
         at, jump = chosen[len(chosen) // 2]
+        if abs(jump) > 1e-13 * size:  # looked at last: a minimiser is on no drop
+            yield _with(cell, i, at, at)
         yield _with(cell, i, cell.low[i], at)
         yield _with(cell, i, at, cell.high[i])
-        if abs(jump) > 1e-13 * size:
-            yield _with(cell, i, at, at)
 
     def _off_bound(self, cell: Box, i: int) -> Iterator[Box]:
         lower = cell.low[i] <= self.problem.lower[i]

@@ -1,0 +1,169 @@
+"""``hvi equilibria``: all equilibria of a scene, or the lowest with a proof, each in a result folder of its own."""
+
+from __future__ import annotations
+
+import argparse
+import shutil
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from .. import console, results
+from ..errors import ExitCode
+from ..report.pictures import equilibria as picture
+from ..results.output_folder import Existing
+from ..results.whole import write_whole
+from ..runtime import log
+from ..runtime.mpi import on_root
+from ..runtime.signals import Interrupt
+from ..runtime.timing import Timer
+from ..scene import read_scene
+from ..stationary_points.bodies import Equilibria
+from ..stationary_points.search import Found, Saved
+from ..system import petsc_options
+from ..workflow import Preparation, prepare
+from . import equilibria_files as files
+from . import telling
+from .telling import COMM
+
+BETWEEN = 0.2
+"""Seconds between two reports of progress."""
+MOST_TOLD = 20
+"""Equilibria that are told on the terminal."""
+MOST_DRAWN = 10
+"""Equilibria whose result folders get pictures."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Request:
+    """What ``hvi equilibria`` is asked for.
+
+    Attributes:
+        options: the words of the command line.
+        prepared: the scene, assembled.
+        folder: where the results go.
+        saved: what an earlier search left.
+    """
+
+    options: argparse.Namespace
+    prepared: Preparation
+    folder: results.ResultFolder
+    saved: Saved | None
+
+
+def execute(options: argparse.Namespace) -> int:
+    """Search a scene's equilibria and write them; the exit code by the contract. Collective.
+
+    Raises:
+        InputError: on all ranks alike.
+    """
+    timer = Timer()
+    petsc_options.insert(options.petsc)
+    scene = on_root(COMM, lambda: read_scene(options.scene, options.overrides))
+    default = Path("results") / f"{options.scene.stem}-equilibria"
+    target = on_root(COMM, lambda: results.resolved(options.out or default))
+    record, saved = on_root(COMM, lambda: files.earlier(target, scene)) if options.resume else (None, None)
+    if record is not None and record["equilibria"]["proven"]:
+        telling.say([f"{target}: finished already ({record['reason']})"])
+        return int(record["exit_code"])
+    existing: Existing = "replace" if options.force or options.resume else "refuse"
+    folder = results.ResultFolder(COMM, target, existing, inputs=[options.scene])
+    try:
+        with log.Handlers(*telling.on_first_rank(log.TerminalDisplay)):
+            prepared = prepare(scene, COMM, timer)
+            return _run(Request(options=options, prepared=prepared, folder=folder, saved=saved))
+    except BaseException:
+        folder.discard()
+        raise
+
+
+def _run(request: Request) -> int:
+    """Search, write and tell; the exit code. Collective."""
+    interrupt = Interrupt(COMM)
+    interrupt.watch()
+    prepared, folder = request.prepared, request.folder
+    run_logs = telling.on_first_rank(lambda: log.RunLog(folder.work / "run.log"))
+    with log.Handlers(*run_logs):
+        telling.say(console.heading(prepared, COMM.size))
+        bodies = Equilibria(prepared)
+        found = bodies.find(
+            lowest=request.options.lowest,
+            gap=request.options.gap,
+            stop=_stop(interrupt, request.options.limit),
+            report=_reporter(),
+            saved=request.saved,
+        )
+        code = _exit_code(prepared, found, interrupted=interrupt.requested())
+        rows = [_written(request, bodies, found, i) for i in range(len(found.points))]
+        files.write(folder, prepared, found, rows, code, request.options.given)
+        if not request.options.no_pictures and rows:
+            on_root(COMM, lambda: picture.draw(folder.work))
+        telling.say(_lines(prepared, found, rows))
+    on_root(COMM, lambda: telling.finish(run_logs))
+    on_root(COMM, lambda: _remove_earlier(folder.target))
+    folder.commit(prepared.scene)
+    telling.say([f"{folder.target}: {prepared.timer.total:.1f} s in all"])
+    return int(code)
+
+
+def _stop(interrupt: Interrupt, limit: float | None) -> Callable[[], bool]:
+    """Whether to stop: a signal, or the time is over on rank 0. Collective."""
+    start = time.monotonic()
+    return lambda: (
+        interrupt.requested() or bool(COMM.bcast(limit is not None and time.monotonic() - start > limit, root=0))
+    )
+
+
+def _reporter() -> Callable[[str], None]:
+    last = [0.0]
+
+    def report(text: str) -> None:
+        if time.monotonic() - last[0] > BETWEEN:
+            last[0] = time.monotonic()
+            telling.LOG.debug("%s", text, extra={"moving": True})
+
+    return report
+
+
+def _exit_code(prepared: Preparation, found: Found, *, interrupted: bool) -> ExitCode:
+    if prepared.solvability.state == "escapes":
+        return ExitCode.NO_SOLUTION
+    if found.proven:
+        return ExitCode.CERTIFIED
+    return ExitCode.INTERRUPTED if interrupted else ExitCode.NOT_CONVERGED
+
+
+def _written(request: Request, bodies: Equilibria, found: Found, i: int) -> files.Row:
+    """Write one equilibrium into a result folder of its own; its row. Collective."""
+    solution, folder = bodies.solution(found.points[i]), request.folder
+    name = f"equilibrium-{i + 1:0{len(str(len(found.points)))}d}"
+    own = results.ResultFolder(COMM, folder.work / name)
+    try:
+        given = {"command": request.options.given, "petsc": request.options.petsc}
+        draw = not request.options.no_pictures and i < MOST_DRAWN
+        write_whole(own, solution, request.prepared.timer, given, telling.LOG.info, draw=draw)
+        own.commit(request.prepared.scene)
+    finally:
+        own.discard()
+    return files.row(i + 1, bodies, found.points[i], solution, name)
+
+
+def _lines(prepared: Preparation, found: Found, rows: list[files.Row]) -> Iterator[str]:
+    yield f"result: {found.reason}; {found.nodes} boxes"
+    unit = "J/m" if prepared.problem.scales.dimension == 2 else "J"
+    for row in rows[:MOST_TOLD]:
+        uncertified = "" if row.certified else "  NOT CERTIFIED"
+        yield f"{row.index:4d}  {row.energy:.10g} {unit}  {row.kind}  {row.broken} broken{uncertified}"
+    if len(rows) > MOST_TOLD:
+        yield f"      and {len(rows) - MOST_TOLD} more in {files.TABLE}"
+    if found.gap is not None and found.lower_bound is not None:
+        bound = found.lower_bound * prepared.problem.scales.energy
+        yield f"no displacement has an energy below {bound:.10g} {unit} (relative gap {found.gap:.1e})"
+
+
+def _remove_earlier(target: Path) -> None:
+    """Remove the equilibria of an earlier search from the folder. Rank 0 only."""
+    for folder in sorted(target.glob("equilibrium-*")):
+        if results.finished.is_result(folder):
+            shutil.rmtree(folder)

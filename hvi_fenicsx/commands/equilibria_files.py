@@ -1,0 +1,172 @@
+"""The files of ``hvi equilibria`` beside the result folders: the table, the summary, and what is left of a search."""
+
+from __future__ import annotations
+
+import csv
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .. import results
+from ..certify.contact_state import ContactState
+from ..errors import ExitCode
+from ..results.write import write_record
+from ..runtime import memory, versions
+from ..runtime.mpi import largest, on_root
+from ..scene import Scene, dump_scene
+from ..solution import Solution
+from ..stationary_points.all_points import StationaryPoint
+from ..stationary_points.bodies import Equilibria
+from ..stationary_points.search import Found, Saved, falls_passed
+from ..workflow import Preparation
+
+TABLE, LEFT = "equilibria.csv", "search.npz"
+COLUMNS = ("index", "energy", "kind", "max_slip", "max_opening", "broken", "folder")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Row:
+    """One equilibrium in ``equilibria.csv``.
+
+    Attributes:
+        index: from 1, by energy.
+        energy: J/m or J.
+        kind: minimiser, saddle or undecided.
+        max_slip: largest |u_t| on Γc, m.
+        max_opening: largest displacement off the obstacle, m.
+        broken: unknowns of Γc beyond a drop of their law, or on or beyond a falling part.
+        folder: of its result.
+        isolated: False where it stands for a continuum.
+        certified: whether its certificate passed.
+    """
+
+    index: int
+    energy: float
+    kind: str
+    max_slip: float
+    max_opening: float
+    broken: int
+    folder: str
+    isolated: bool
+    certified: bool
+
+
+def row(index: int, bodies: Equilibria, point: StationaryPoint, solution: Solution, folder: str) -> Row:
+    """The row of an equilibrium. Collective.
+
+    Args:
+        index: from 1, by energy.
+        bodies: that were searched.
+        point: the equilibrium.
+        solution: the same of the whole bodies.
+        folder: of its result.
+    """
+    problem, examination = solution.problem, solution.examination
+    assert bodies.problem is not None
+    assert examination is not None
+    comm, unit = problem.domain.mesh.comm, problem.scales.displacement
+    slip = max((_largest(np.linalg.norm(s.slip, axis=1)) for s in examination.states), default=0.0)
+    opening = max((_largest(_opening(s)) for s in examination.states), default=0.0)
+    return Row(
+        index=index,
+        energy=examination.energy * problem.scales.energy,
+        kind=point.kind,
+        max_slip=largest(comm, slip) * unit,
+        max_opening=largest(comm, opening) * unit,
+        broken=falls_passed(bodies.problem, point.x),
+        folder=folder,
+        isolated=point.isolated,
+        certified=solution.converged,
+    )
+
+
+def _opening(state: ContactState) -> np.ndarray[Any, np.dtype[np.float64]]:
+    return np.where(np.isfinite(state.gap), state.gap, -state.normal)
+
+
+def _largest(values: np.ndarray[Any, np.dtype[np.float64]]) -> float:
+    return float(np.max(values, initial=0.0))
+
+
+def write(
+    folder: results.ResultFolder, prepared: Preparation, found: Found, rows: list[Row], code: ExitCode, command: str
+) -> None:
+    """Write table, summary, scene and what is left of the search. Collective.
+
+    Args:
+        folder: being written.
+        prepared: the scene.
+        found: by the search.
+        rows: of its equilibria.
+        code: what the command ends with.
+        command: the command line.
+    """
+    record = _record(prepared, found, rows, code, command)
+    on_root(folder.comm, lambda: _write(folder, prepared.scene, found, rows, record))
+
+
+def _write(folder: results.ResultFolder, scene: Scene, found: Found, rows: list[Row], record: dict[str, Any]) -> None:
+    with (folder.work / TABLE).open("w", encoding="utf-8", newline="") as file:
+        table = csv.writer(file)
+        table.writerow(COLUMNS)
+        table.writerows([_cell(getattr(r, name)) for name in COLUMNS] for r in rows)
+    (folder.work / "scene.toml").write_text(dump_scene(scene, folder.target), encoding="utf-8")
+    if found.left:
+        np.savez_compressed(folder.work / LEFT, allow_pickle=False, **found.left)
+    write_record(folder.work, record)
+
+
+def _cell(value: object) -> str:
+    return repr(float(value)) if isinstance(value, float) else str(value)
+
+
+def _record(prepared: Preparation, found: Found, rows: list[Row], code: ExitCode, command: str) -> dict[str, Any]:
+    """``summary.json``. Collective."""
+    scales, comm = prepared.problem.scales, prepared.system.comm
+    bound = math.nan if found.lower_bound is None else found.lower_bound * scales.energy
+    return dict(
+        results.plain(
+            {
+                "scene": prepared.scene.title,
+                "dofs": prepared.system.dofs,
+                "ranks": comm.size,
+                "reason": found.reason,
+                "exit_code": int(code),
+                "equilibria": {
+                    "count": len(rows),
+                    "complete": found.complete,
+                    "lowest_energy": rows[0].energy if rows else None,
+                    "lower_bound": bound,
+                    "gap": found.gap,
+                    "proven": found.proven,
+                    "nodes": found.nodes,
+                    "continua": [r.index for r in rows if not r.isolated],
+                    "uncertified": [r.index for r in rows if not r.certified],
+                },
+                "solvability": prepared.solvability.summary(),
+                "time": {name: largest(comm, value) for name, value in prepared.timer.report().items()},
+                "peak_memory_mb": memory.peak(comm),
+                "versions": versions.versions(),
+                "command": command,
+            }
+        )
+    )
+
+
+def earlier(target: Path, scene: Scene) -> tuple[dict[str, Any] | None, Saved | None]:
+    """The summary of an earlier search of the same scene, and what it left. Rank 0 only.
+
+    Args:
+        target: the folder.
+        scene: the scene.
+    """
+    record = results.finished.read(target, scene).record
+    if record is None or "equilibria" not in record:
+        return None, None
+    if not (target / LEFT).exists():
+        return record, None
+    with np.load(target / LEFT, allow_pickle=False) as arrays:
+        return record, dict(arrays)

@@ -1,0 +1,88 @@
+"""All equilibria of a model, or the lowest with a proof, from Python."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, fields
+from typing import Any
+
+from mpi4py import MPI
+
+from ..errors import InputError
+from ..scene import Scene
+from ..stationary_points import bodies
+from .model import Model
+from .solution import ModelSolution
+from .solving import check
+
+
+@dataclass(frozen=True, kw_only=True)
+class Equilibria:
+    """What :func:`equilibria` found.
+
+    Attributes:
+        solutions: by energy, each certified; their kind is in ``kinds``.
+        kinds: minimiser, saddle or undecided.
+        complete: whether these are all equilibria.
+        lower_bound: no displacement has a lower energy, J/m or J; None where no bound is known.
+        gap: lowest energy minus bound, relative to the energy; None where no bound is known.
+        proven: whether what was asked for is proven.
+        nodes: boxes that were bounded or tested.
+        reason: how the search ended, for people.
+    """
+
+    solutions: tuple[ModelSolution, ...]
+    kinds: tuple[str, ...]
+    complete: bool
+    lower_bound: float | None
+    gap: float | None
+    proven: bool
+    nodes: int
+    reason: str
+
+
+def equilibria(
+    model: Model | Scene,
+    comm: MPI.Comm | None = None,
+    *,
+    lowest: bool = False,
+    gap: float = 1e-8,
+    limit: float | None = None,
+    **options: Any,
+) -> Equilibria:
+    """All equilibria of a model or a scene, or the lowest with a proof. Collective.
+
+    Args:
+        model: what to search; its laws are polylines, unsmoothed.
+        comm: the ranks; by default those of the body, for a scene all.
+        lowest: the lowest energy with a proof, instead of all equilibria.
+        gap: what that proof may leave open, relative to the energy.
+        limit: seconds after which the search stops; None: none.
+        **options: the keys of the scene's table ``[solver]``.
+
+    Raises:
+        InputError: on all ranks alike: a law is of a kind that is not searched, or a number is not allowed.
+    """
+    if not 0.0 < gap < 1.0:
+        raise InputError(f"gap: must be between 0 and 1 (is {gap!r})")
+    prepared = check(model, comm, **options)
+    ranks, start = prepared.system.comm, time.monotonic()
+    searched = bodies.Equilibria(prepared)
+    found = searched.find(
+        lowest=lowest,
+        gap=gap,
+        stop=lambda: bool(ranks.bcast(limit is not None and time.monotonic() - start > limit)),
+        report=lambda _: None,
+    )
+    solutions = [searched.solution(point) for point in found.points]
+    bound = None if found.lower_bound is None else found.lower_bound * prepared.problem.scales.energy
+    return Equilibria(
+        solutions=tuple(ModelSolution(**{f.name: getattr(s, f.name) for f in fields(s)}) for s in solutions),
+        kinds=tuple(str(point.kind) for point in found.points),
+        complete=found.complete,
+        lower_bound=bound,
+        gap=found.gap,
+        proven=found.proven,
+        nodes=found.nodes,
+        reason=found.reason,
+    )

@@ -1,0 +1,85 @@
+"""Equilibria of whole bodies: a search on the condensed problem, and each point it finds expanded and certified."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from ..errors import SolverError
+from ..solution import Solution
+from ..solvers.result import SolveResult
+from ..system.condensation import Condensation
+from ..workflow import Preparation, certified
+from .all_points import StationaryPoint
+from .condensed_form import scalar_problem
+from .scalar_problem import ScalarProblem
+from .search import Found, Saved, Wanted, find
+
+NONE = Found(points=(), complete=True, lower_bound=None, proven=True, nodes=0, reason="no solution exists")
+"""What is found where the load moves a body away."""
+
+
+class Equilibria:
+    """The equilibria of a scene. Creation is collective.
+
+    Args:
+        prepared: the scene, assembled.
+
+    Attributes:
+        problem: the condensed problem; None where no solution exists, and nothing is searched.
+
+    Raises:
+        InputError: on all ranks alike: a law is of a kind that is not searched.
+    """
+
+    def __init__(self, prepared: Preparation) -> None:
+        self._prepared = prepared
+        self.problem: ScalarProblem | None = None
+        if prepared.solvability.state != "escapes":
+            with prepared.timer("assembly"):
+                self._condensation = Condensation(prepared.system)
+                self.problem = scalar_problem(self._condensation.problem)
+
+    def find(
+        self,
+        *,
+        lowest: bool,
+        gap: float,
+        stop: Callable[[], bool],
+        report: Callable[[str], None],
+        saved: Saved | None = None,
+    ) -> Found:
+        """Search; all ranks do the same. Collective.
+
+        Args:
+            lowest: the lowest energy with a proof; else all.
+            gap: what that proof may leave open, relative to the energy.
+            stop: asked before each box, by all ranks.
+            report: told how far it is.
+            saved: what an earlier search left.
+
+        Raises:
+            InputError: an earlier search was for something else.
+        """
+        if self.problem is None:
+            return NONE
+        wanted = Wanted(lowest=lowest, gap=gap, bounded=self._prepared.solvability.state == "held")
+        with self._prepared.timer("solve"):
+            return find(self.problem, wanted, stop, report, saved)
+
+    def solution(self, point: StationaryPoint) -> Solution:
+        """The whole bodies at a stationary point, certified. Collective.
+
+        Args:
+            point: from :meth:`find`.
+
+        Raises:
+            SolverError: the ranks found different points.
+        """
+        comm = self._prepared.system.comm
+        if not np.allclose(comm.bcast(point.x), point.x, rtol=1e-9, atol=1e-12):
+            raise SolverError("the ranks found different equilibria; run on one")
+        u = self._prepared.system.displacement(self._condensation.expand(point.x))
+        found = SolveResult(u=u, method="stationary points of the condensed problem", converged=True, reason=point.kind)
+        return certified(self._prepared, found)

@@ -1,0 +1,193 @@
+"""The two searches behind one face: what was found, how much of it is proven, and what is needed to go on."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..errors import InputError, SolverError
+from ..typing import Array
+from . import stationarity
+from .all_points import Enumeration, StationaryPoint
+from .lowest import LowestSearch, fresh_box
+from .scalar_problem import ScalarProblem
+
+Saved = Mapping[str, Array]
+"""What is left of an unfinished search: arrays, by name."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Wanted:
+    """What is asked for.
+
+    Attributes:
+        lowest: the lowest energy with a proof; else all equilibria.
+        gap: relative gap that the proof of the lowest may leave.
+        bounded: whether the energy is known to be bounded from below.
+    """
+
+    lowest: bool = False
+    gap: float = 1e-8
+    bounded: bool = True
+
+
+@dataclass(frozen=True, kw_only=True)
+class Found:
+    """What a search found.
+
+    Attributes:
+        points: by energy.
+        complete: whether these are all stationary points.
+        lower_bound: no point has a lower energy; None where none is known.
+        proven: whether what was asked for is proven.
+        nodes: boxes that were bounded or tested.
+        reason: how it ended, for people.
+        left: what is needed to go on; empty if there is nothing left.
+    """
+
+    points: tuple[StationaryPoint, ...]
+    complete: bool
+    lower_bound: float | None
+    proven: bool
+    nodes: int
+    reason: str
+    left: Saved = field(default_factory=dict)
+
+    @property
+    def gap(self) -> float | None:
+        """Lowest energy found minus lower bound, relative to that energy; None where there is no bound."""
+        if self.lower_bound is None or not self.points:
+            return None
+        lowest = self.points[0].energy
+        return max(lowest - self.lower_bound, 0.0) / (abs(lowest) or 1.0)
+
+
+def find(
+    problem: ScalarProblem,
+    wanted: Wanted,
+    stop: Callable[[], bool],
+    report: Callable[[str], None],
+    saved: Saved | None = None,
+) -> Found:
+    """All stationary points, or the lowest energy.
+
+    Args:
+        problem: the problem.
+        wanted: what is asked for.
+        stop: asked before each box.
+        report: told how far it is, in words.
+        saved: what an earlier search of the same problem left.
+
+    Raises:
+        InputError: an earlier search was for something else.
+    """
+    if saved is not None and bool(saved["lowest"]) != wanted.lowest:
+        raise InputError(
+            "--resume: the search there was for something else: give or leave --lowest as then, or --force"
+        )
+    if wanted.lowest:
+        return _lowest(problem, wanted, stop, report, saved)
+    return _all(problem, wanted, stop, report, saved)
+
+
+def _lowest(
+    problem: ScalarProblem,
+    wanted: Wanted,
+    stop: Callable[[], bool],
+    report: Callable[[str], None],
+    saved: Saved | None,
+) -> Found:
+    search = LowestSearch(problem=problem, gap=wanted.gap)
+    try:
+        if saved is None:
+            search.start()
+        else:
+            search.resume(zip(saved["low"], saved["high"], saved["weights"], strict=True), saved["x"][0])
+    except SolverError as error:
+        return Found(points=(), complete=False, lower_bound=None, proven=False, nodes=search.boxes, reason=str(error))
+
+    def tell(_: object) -> None:
+        now = search.progress()
+        report(f"lowest: gap {now.gap:.1e}, {now.boxes} boxes, {now.waiting} open")
+
+    proven = search.run(stop, tell)
+    now = search.progress()
+    kind = stationarity.kind(problem, search.x)
+    point = StationaryPoint(x=search.x, energy=search.upper, kind=kind, isolated=True)
+    listed = list(search.open_boxes())
+    left = {} if proven else {"lowest": np.array(True), "x": search.x[None], **_stacked(listed)}
+    reason = "the lowest energy, proven" if proven else f"a gap of {now.gap:.1e} is open in {now.waiting} boxes"
+    return Found(
+        points=(point,),
+        complete=False,
+        lower_bound=now.lower,
+        proven=proven,
+        nodes=now.boxes,
+        reason=reason,
+        left=left,
+    )
+
+
+def _all(
+    problem: ScalarProblem,
+    wanted: Wanted,
+    stop: Callable[[], bool],
+    report: Callable[[str], None],
+    saved: Saved | None,
+) -> Found:
+    search = Enumeration(problem=problem)
+    if saved is None:
+        search.start()
+    else:
+        for x in saved["x"]:
+            search.enter(x)
+        low, high = saved["low"], saved["high"]
+        search.waiting = [fresh_box(low[i], high[i], 0.5 * (low[i] + high[i])) for i in range(len(low))]
+
+    def tell(_: object) -> None:
+        report(f"all equilibria: {len(search.points)} found, {search.cells} cells, {len(search.waiting)} open")
+
+    complete = search.run(stop, tell)
+    points = tuple(sorted(search.points, key=lambda p: p.energy))
+    listed = [(c.low, c.high, c.weights) for c in search.waiting]
+    none = np.empty((0, problem.size))
+    left = {"lowest": np.array(False), "x": np.array([p.x for p in points]) if points else none, **_stacked(listed)}
+    bound = points[0].energy if complete and points and wanted.bounded else None
+    return Found(
+        points=points,
+        complete=complete,
+        lower_bound=bound,
+        proven=complete,
+        nodes=search.cells,
+        reason=_in_words(points) if complete else f"{len(points)} found, and {len(listed)} cells are open",
+        left={} if complete else left,
+    )
+
+
+def _in_words(points: tuple[StationaryPoint, ...]) -> str:
+    if not points:
+        return "no equilibrium, proven"
+    continua = sum(not p.isolated for p in points)
+    return f"all equilibria, proven: {len(points)}" + (
+        f", of these {continua} stand for a continuum" if continua else ""
+    )
+
+
+def _stacked(boxes: list[tuple[Array, Array, Array]]) -> dict[str, Array]:
+    return {name: np.array([box[k] for box in boxes]) for k, name in enumerate(("low", "high", "weights"))}
+
+
+def falls_passed(problem: ScalarProblem, x: Array) -> int:
+    """Number of unknowns beyond a drop of their law, or on or beyond a falling part.
+
+    Args:
+        problem: the problem.
+        x: a point, (n,).
+    """
+    low, high = np.minimum(x, 0.0), np.maximum(x, 0.0)
+    moved = high > low
+    dropped = problem.arcs.drops(low, high) > 0.0
+    slopes = problem.arcs.least_slope(low, high)
+    return int(np.count_nonzero(moved & (dropped | (np.isfinite(slopes) & (slopes < 0.0)))))

@@ -1,0 +1,78 @@
+"""`hvi equilibria` and `hvi.equilibria`: files, exit codes, stop and resume, against brute force."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+
+import pytest
+import tomli_w
+from enumeration import Floor, polyline
+from scenes import DELTA, block, model, quadratic_linear
+
+import hvi_fenicsx as hvi
+from hvi_fenicsx.cli import main
+
+GAMMA = 3e6
+STRONG = quadratic_linear(GAMMA)
+
+
+def written(folder: Path, **more: object) -> Path:
+    path = folder / "scene.toml"
+    path.write_text(tomli_w.dumps({"title": "three equilibria", **model(3, 6e6, friction=STRONG), **more}))
+    return path
+
+
+def energies() -> list[float]:
+    law = polyline([(0.0, 0.0), (DELTA, GAMMA), (DELTA, GAMMA / 2)])
+    return [p.energy for p in Floor(3, 6e6, 1e6, law).stationary()]
+
+
+def test_python_finds_all_certified_and_proves_the_lowest() -> None:
+    scene = hvi.Scene.model_validate(model(3, 6e6, friction=STRONG))
+    found = hvi.equilibria(scene)
+    assert found.complete
+    assert found.kinds == ("minimiser", "minimiser", "saddle")
+    assert [s.energy for s in found.solutions] == pytest.approx(energies(), rel=1e-9)
+    assert all(s.converged for s in found.solutions)
+    lowest = hvi.equilibria(scene, lowest=True)
+    assert lowest.proven
+    assert lowest.lower_bound is not None
+    assert energies()[0] * (1 + 2e-8) <= lowest.lower_bound <= energies()[0]
+
+
+def test_the_command_writes_each_equilibrium_and_refuses_what_is_there(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    words = ["equilibria", str(written(tmp_path)), "--out", str(out), "--no-pictures"]
+    assert main(words) == 0
+    with (out / "equilibria.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert list(rows[0]) == ["index", "energy", "kind", "max_slip", "max_opening", "broken", "folder"]
+    assert [float(r["energy"]) for r in rows] == pytest.approx(energies(), rel=1e-9)
+    for row in rows:
+        own = json.loads((out / row["folder"] / "summary.json").read_text())
+        assert own["certificate"]["passed"]
+        assert own["energy"] == pytest.approx(float(row["energy"]), rel=1e-12)
+    known = json.loads((out / "summary.json").read_text())["equilibria"]
+    assert (known["count"], known["complete"], known["proven"]) == (3, True, True)
+    assert main(words) == 2
+    assert main([*words, "--resume"]) == 0
+
+
+@pytest.mark.long
+def test_a_search_that_is_stopped_goes_on_where_it_was(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    words = ["equilibria", str(written(tmp_path)), "--out", str(out), "--no-pictures"]
+    assert main([*words, "--limit", "1e-9"]) == 4
+    assert (out / "search.npz").exists()
+    assert main([*words, "--resume"]) == 0
+    assert json.loads((out / "summary.json").read_text())["equilibria"]["count"] == 3
+    assert not (out / "search.npz").exists()
+
+
+@pytest.mark.long
+def test_a_metastable_block_has_no_lowest_energy(tmp_path: Path) -> None:
+    path = tmp_path / "scene.toml"
+    path.write_text(tomli_w.dumps({"title": "block", **block(2, 7e5, friction=quadratic_linear(1e6))}))
+    assert main(["equilibria", str(path), "--lowest", "--out", str(tmp_path / "out"), "--no-pictures"]) == 4
