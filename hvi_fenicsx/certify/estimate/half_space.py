@@ -15,10 +15,10 @@ from ...problem.problem import Problem
 from ...typing import Array, Entities
 
 _ANGLES = 32
-"""Of the rectangle rule on a periodic integrand; an isotropic material is met to 1e-12."""
+"""Angles of the rectangle rule on a periodic integrand; an isotropic material is met to 1e-12."""
 
 _DIRECTIONS = 4
-"""Of the waves on a surface in space, over which the compliance is averaged."""
+"""Directions of the waves on a surface in space, over which the compliance is averaged."""
 
 
 def elasticity(problem: Problem, cells: Entities) -> Array:
