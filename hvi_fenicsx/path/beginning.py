@@ -1,0 +1,104 @@
+"""Where a path begins: the equilibrium under the constant loads alone, at the factor 0."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..system.condensed_problem import CondensedProblem
+from ..typing import Array
+from .bonds import BondTable
+from .cells import Cells
+from .descent import Descent
+from .passing import go_on
+from .placing import place
+from .step import FACTOR
+from .tracer import Tracer
+
+_FIRST = 1e-3
+"""Part of the first load at which a body that nothing holds at rest is looked for."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Beginning:
+    """The first state.
+
+    Attributes:
+        cells: where the unknowns are; None: there is no such state.
+        memory: what the bonds remember, (bonds, 4).
+        reason: why there is none.
+        constant: the path from there to the constant loads, its factor from 0 to 1; None where there are none.
+    """
+
+    cells: Cells | None
+    memory: Array
+    reason: str = ""
+    constant: CondensedProblem | None = None
+
+
+def at_rest(problem: CondensedProblem, remember: Collection[int], aim: float) -> Beginning:
+    """The state at the factor 0, before constant loads act: these are applied along a path of their own.
+
+    Args:
+        problem: the problem.
+        remember: numbers of the problem's bonds that remember.
+        aim: the factor that the path goes to first.
+    """
+    bonds = BondTable(problem, remember)
+    chains = [bonds.chain(i) for i in range(problem.size)]
+    x = np.clip(np.zeros(problem.size), problem.lower, problem.upper)
+    force = _nearest(bonds, x, problem.force - problem.stiffness @ x)
+    held = problem.stiffness @ x + force
+    away = problem.force - held
+    size = float(np.max(np.abs(held), initial=0.0)) + float(np.max(np.abs(problem.force), initial=0.0))
+    rate = away if np.max(np.abs(away), initial=0.0) > 1e-14 * size else aim * problem.force_rate
+    cells = place(problem.stiffness, chains, x, force)
+    if not _regular(cells):
+        settled = _settled(bonds, replace(problem, force=held, force_rate=rate))
+        if settled is None:
+            return Beginning(cells=None, memory=bonds.memory, reason="nothing holds the body at rest")
+        cells = settled
+    if rate is not away:
+        return Beginning(cells=cells, memory=bonds.memory)
+    alone = replace(problem, force=held, force_rate=away)
+    return Beginning(cells=cells, memory=bonds.memory, constant=alone)
+
+
+def _nearest(bonds: BondTable, x: Array, wanted: Array) -> Array:
+    """The forces of laws and bounds at given displacements, as near to wanted ones as they can be, (n,)."""
+    problem, found = bonds.problem, np.zeros_like(x)
+    for i in range(len(x)):
+        standing = [s for s in bonds.chain(i) if s.displacement(s.coordinate(float(x[i]), s.force)) == x[i]]
+        options = [s.force + (s.rise or s.slope) * s.coordinate(float(x[i]), 0.0) for s in standing]
+        found[i] = min(options, key=abs) if options else 0.0
+    return np.where((problem.lower == problem.upper), wanted, found)
+
+
+def _regular(cells: Cells) -> bool:
+    """Whether the tangent holds the body."""
+    matrix, free = cells.tangent()
+    if not free.size:
+        return True
+    values = np.linalg.eigvalsh(matrix)
+    return bool(values[0] > 1e-11 * values[-1])
+
+
+def _settled(bonds: BondTable, problem: CondensedProblem) -> Cells | None:
+    """Where a small part of the loads takes a body that nothing holds at rest, and back to no load; None: away."""
+    chains = [bonds.chain(i) for i in range(problem.size)]
+    load = problem.load(_FIRST)
+    start = np.clip(np.zeros(problem.size), problem.lower, problem.upper)
+    landing = Descent(bonds, load).land(start, start)
+    if not landing.found:
+        return None
+    cells = place(problem.stiffness, chains, landing.x, load - problem.stiffness @ landing.x)
+    tracer = Tracer(problem.stiffness, problem.force, problem.force_rate, cells, _FIRST, driver=FACTOR, heading=-1)
+    while True:
+        step = tracer.advance(0.0)
+        if step.variable is None:
+            return None
+        if step.variable == FACTOR:
+            return tracer.cells
+        go_on(tracer, bonds, step)

@@ -1,0 +1,141 @@
+"""One cell of the piecewise linear equations: on which segment of its graph each unknown is, and where.
+
+S x(τ) + r(τ) = f0 + λ f1, with x and r linear in the coordinates τ on the segments.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..typing import Array, Integers, Mask
+from .segments import Kind, Segment
+
+
+class Cells:
+    """The segments of all n unknowns and their coordinates.
+
+    Args:
+        stiffness: S, (n, n).
+        chains: the segments of each unknown.
+        numbers: which of them it is on, (n,).
+        coordinates: τ, (n,).
+
+    Attributes:
+        numbers: as given; changed by :meth:`enter`.
+        tau: the coordinates.
+        slope: of the force, (n,).
+        rise: ±1 where the displacement stands, else 0, (n,).
+        low: least coordinates, (n,).
+        high: greatest coordinates, (n,).
+        outward: directions in which bonds with memory go on, (n,).
+        bound: whether the unknown is at a bound, (n,).
+    """
+
+    def __init__(
+        self, stiffness: Array, chains: Sequence[tuple[Segment, ...]], numbers: Integers, coordinates: Array
+    ) -> None:
+        self._stiffness, self._chains, n = stiffness, list(chains), len(chains)
+        self.numbers, self.tau = np.zeros(n, dtype=np.int64), np.zeros(n)
+        self._x, self._force = np.zeros(n), np.zeros(n)
+        self.slope, self.rise, self.low, self.high = (np.zeros(n) for _ in range(4))
+        self.outward, self.bound = np.zeros(n), np.zeros(n, dtype=bool)
+        for i in range(n):
+            self.enter(i, int(numbers[i]), float(coordinates[i]))
+
+    def __len__(self) -> int:
+        return len(self.tau)
+
+    def segment(self, i: int) -> Segment:
+        """Where an unknown is."""
+        return self._chains[i][self.numbers[i]]
+
+    def chain(self, i: int) -> tuple[Segment, ...]:
+        """The segments of an unknown."""
+        return self._chains[i]
+
+    def enter(self, i: int, number: int, coordinate: float) -> None:
+        """Put an unknown on a segment.
+
+        Args:
+            i: the unknown.
+            number: of the segment.
+            coordinate: τ there.
+        """
+        segment = self._chains[i][number]
+        self.numbers[i], self.tau[i] = number, coordinate
+        self._x[i], self._force[i] = segment.x, segment.force
+        self.slope[i], self.rise[i] = segment.slope, segment.rise
+        self.low[i], self.high[i], self.outward[i] = segment.low, segment.high, segment.outward
+        self.bound[i] = segment.kind is Kind.BOUND
+
+    def replace_chain(self, i: int, chain: tuple[Segment, ...], number: int, coordinate: float) -> None:
+        """Give an unknown other segments, and put it on one of them.
+
+        Args:
+            i: the unknown.
+            chain: its segments.
+            number: of the one that it is on.
+            coordinate: τ there.
+        """
+        self._chains[i] = chain
+        self.enter(i, number, coordinate)
+
+    @property
+    def moving(self) -> Mask:
+        """The unknowns whose displacement moves, (n,)."""
+        return np.asarray(self.rise == 0.0)
+
+    @property
+    def x(self) -> Array:
+        """The displacements, (n,)."""
+        return self._x + np.where(self.rise == 0.0, self.tau, 0.0)
+
+    @property
+    def force(self) -> Array:
+        """The forces of laws and bounds, (n,)."""
+        return self._force + np.where(self.rise == 0.0, self.slope, self.rise) * self.tau
+
+    @property
+    def bond_force(self) -> Array:
+        """The forces of the laws alone, (n,)."""
+        return np.asarray(np.where(self.bound, self._force, self.force))
+
+    @property
+    def standing_force(self) -> Array:
+        """The forces at τ = 0, (n,)."""
+        return self._force
+
+    def column(self, i: int) -> Array:
+        """How the equations change with a coordinate, (n,)."""
+        if self.rise[i]:
+            found = np.zeros(len(self))
+            found[i] = self.rise[i]
+            return found
+        found = self._stiffness[i].copy()
+        found[i] += self.slope[i]
+        return found
+
+    def matrix(self) -> Array:
+        """All columns, (n, n)."""
+        found = np.where(self.moving, self._stiffness, 0.0)
+        found[np.diag_indices(len(self))] += np.where(self.moving, self.slope, self.rise)
+        return np.asarray(found)
+
+    def tangent(self) -> tuple[Array, Integers]:
+        """S + W K of the unknowns that move, and their numbers."""
+        free = np.flatnonzero(self.moving)
+        return self._stiffness[np.ix_(free, free)] + np.diag(self.slope[free]), free
+
+    def unstable_directions(self, negligible: float = 1e-12) -> int:
+        """The number of directions in which the energy falls at constant loads.
+
+        Args:
+            negligible: an eigenvalue that is zero, relative to the greatest.
+        """
+        matrix, free = self.tangent()
+        values = np.linalg.eigvalsh(matrix) if free.size else np.empty(0)
+        size = float(np.max(np.abs(values), initial=0.0))
+        drops = np.count_nonzero((self.rise < 0.0) & ~self.bound)
+        return int(np.count_nonzero(values < -negligible * size) + drops)

@@ -1,0 +1,252 @@
+"""From a state that is not stable down to the next stable equilibrium at the same loads.
+
+The branch iteration on Γc: of each law the falling parts are replaced by their tangents (a majorant), a small proximal
+term keeps the problem strictly convex, and the minimiser of that is followed to exactly (:mod:`.tracer`), from the
+present point: the energy falls at each step. As soon as the linear equations of one cell have a stable solution within
+that cell, this is the equilibrium.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import eigh
+
+from ..typing import Array
+from .bonds import BondTable
+from .cells import Cells
+from .placing import place
+from .segments import Component, Segment, chain
+from .tracer import Tracer
+
+
+@dataclass(frozen=True, kw_only=True)
+class Landing:
+    """Where a descent ended.
+
+    Attributes:
+        x: the displacements; of a body that escapes, far away, (n,).
+        escapes: whether the energy falls without end.
+        found: whether a stable equilibrium was found.
+        steps: of the iteration.
+    """
+
+    x: Array
+    escapes: bool
+    found: bool
+    steps: int
+
+
+class Descent:
+    """The iteration at constant loads.
+
+    Args:
+        bonds: the problem with the present graphs of its laws.
+        load: f, (n,).
+        proximal: stiffness of the proximal term, relative to the elastic one.
+        most: steps at most.
+        far: a displacement that is infinite, in units of all lengths of the problem.
+    """
+
+    def __init__(
+        self, bonds: BondTable, load: Array, *, proximal: float = 1e-6, most: int = 2_000, far: float = 1e3
+    ) -> None:
+        self._bonds, self._load, self._most = bonds, load, most
+        problem = bonds.problem
+        self._stiffness, self._n = problem.stiffness, problem.size
+        self._proximal = proximal * float(np.max(np.diag(self._stiffness), initial=1e-300))
+        self._true = [bonds.chain(i) for i in range(self._n)]
+        self._split = [[(b.weight, *b.present.split()) for b in bonds.at(i)] for i in range(self._n)]
+        self._convex = [self._convex_chain(i) for i in range(self._n)]
+        self._far = far * self._length()
+
+    def _convex_chain(self, i: int) -> tuple[Segment, ...]:
+        rising = [Component(graph=h, weight=w) for w, h, _ in self._split[i]]
+        problem = self._bonds.problem
+        return chain(rising, float(problem.lower[i]), float(problem.upper[i]))
+
+    def _length(self) -> float:
+        ends = [s.x for segments in self._true for s in segments] + [1e-300]
+        ends += [s.x + s.high for segments in self._true for s in segments if np.isfinite(s.high) and not s.rise]
+        return float(np.max(np.abs(ends)))
+
+    def energy(self, x: Array) -> float:
+        """½ xᵀS x - fᵀx + Σ w j.
+
+        Args:
+            x: within its bounds, (n,).
+        """
+        return 0.5 * float(x @ (self._stiffness @ x)) - float(self._load @ x) + self._bond_energy(x)
+
+    def _bond_energy(self, x: Array) -> float:
+        return float(sum(b.weight * float(b.present.primitive(x[b.unknown])) for b in self._bonds.bonds))
+
+    def pushed(self, cells: Cells, rates: Array) -> Array:
+        """A point of lower energy beside a state that is not stable; the state itself where none is found.
+
+        Args:
+            cells: the state.
+            rates: directions of its coordinates along the path, (n,).
+        """
+        best, lowest = cells.x, self.energy(cells.x)
+        rounding = 1e-13 * (abs(lowest) + abs(float(self._load @ cells.x)))
+        for direction in self._pushes(cells, rates):
+            for length in self._far / 1e3 * 0.25 ** np.arange(1, 16):
+                for side in (1.0, -1.0):
+                    trial = self._within(cells.x + side * length * direction)
+                    energy = self.energy(trial)
+                    if energy < lowest - rounding:
+                        best, lowest = trial, energy
+        return best
+
+    def _pushes(self, cells: Cells, rates: Array) -> Iterator[Array]:
+        """Directions in which the energy may fall, of length 1 in the maximum norm."""
+        matrix, free = cells.tangent()
+        along = np.where(cells.moving, rates, 0.0)
+        if np.any(along):
+            yield along / np.max(np.abs(along))
+        if free.size:
+            _, vectors = eigh(matrix, subset_by_index=[0, 0])
+            found = np.zeros(self._n)
+            found[free] = vectors[:, 0] / np.max(np.abs(vectors[:, 0]))
+            yield found
+        for i in np.flatnonzero((cells.rise < 0.0) & ~cells.bound):
+            yield np.eye(1, self._n, i)[0]
+
+    def _within(self, x: Array) -> Array:
+        problem = self._bonds.problem
+        return np.clip(x, problem.lower, problem.upper)
+
+    def land(self, x: Array, before: Array) -> Landing:
+        """The equilibrium below a point.
+
+        Args:
+            x: where to begin, (n,).
+            before: where one comes from: at a drop, its other side counts, (n,).
+        """
+        for step in range(1, self._most + 1):
+            following = self._convex_minimiser(x, x - before)
+            if self._gone(following, following - x):
+                return Landing(x=following, escapes=True, found=False, steps=step)
+            settled = self._settled(following)
+            if settled is not None:
+                return Landing(x=settled, escapes=False, found=True, steps=step)
+            before, x = x, self._hastened(following, following - x)
+            x = self._hastened(x, self._curved(x))
+        return Landing(x=x, escapes=False, found=False, steps=self._most)
+
+    def _gone(self, x: Array, step: Array) -> bool:
+        """Whether a rigid motion has taken the body out of all reach."""
+        size = float(np.max(np.abs(step), initial=0.0))
+        stiff = float(np.max(np.abs(self._stiffness @ step), initial=0.0))
+        return bool(np.max(np.abs(x), initial=0.0) > self._far) and stiff <= 1e-4 * size * float(
+            np.max(np.diag(self._stiffness), initial=0.0)
+        )
+
+    def _hastened(self, x: Array, step: Array) -> Array:
+        """Farther along a direction, while the energy falls."""
+        best, lowest = x, self.energy(x)
+        for factor in 2.0 ** np.arange(-3, 20):
+            trial = self._within(x + factor * step)
+            energy = self.energy(trial)
+            if energy >= lowest and factor >= 1.0:
+                break
+            if energy < lowest:
+                best, lowest = trial, energy
+        return best
+
+    def _curved(self, x: Array) -> Array:
+        """A Newton step in which negative curvatures count as positive ones: it leaves saddles fast."""
+        cells = self._cell(x)
+        matrix, free = cells.tangent()
+        step = np.zeros(self._n)
+        if free.size:
+            values, vectors = eigh(matrix)
+            least = 1e-9 * float(np.max(np.abs(values)))
+            slope = vectors.T @ (self._load - self._stiffness @ cells.x - cells.force)[free]
+            step[free] = vectors @ (slope / np.maximum(np.abs(values), least))
+        return step
+
+    def _subtracted(self, x: Array, direction: Array) -> Array:
+        """The traction of the subtracted convex parts, on the side where one is going, (n,)."""
+        found, at, sides = np.zeros(self._n), x[:, None], np.where(direction < 0.0, "left", "right")
+        for i, parts in enumerate(self._split):
+            found[i] = sum(w * float(g.traction(at[i], str(sides[i]))[0]) for w, _, g in parts)
+        return found
+
+    def _convex_minimiser(self, x: Array, direction: Array) -> Array:
+        """The minimiser of the majorant at a point."""
+        stiffness = self._stiffness + self._proximal * np.eye(self._n)
+        load = self._load + self._subtracted(x, direction) + self._proximal * x
+        force = np.clip(load - stiffness @ x, *self._convex_forces(x))
+        held = stiffness @ x + force
+        cells = place(stiffness, self._convex, x, force)
+        tracer = Tracer(stiffness, held, load - held, cells, 0.0)
+        while True:
+            step = tracer.advance(1.0)
+            if step.variable is None or step.variable < 0:
+                self._cells = tracer.cells
+                return tracer.cells.x
+            i, forward = step.variable, bool(tracer.rates[step.variable] > 0.0)
+            number = int(tracer.cells.numbers[i]) + (1 if forward else -1)
+            segment = tracer.cells.chain(i)[number]
+            tracer.enter(i, number, segment.low if forward else segment.high)
+
+    def _convex_forces(self, x: Array) -> tuple[Array, Array]:
+        """The least and the greatest force of rising parts and bounds, (n,) each."""
+        problem = self._bonds.problem
+        ends = [
+            [sum(w * float(h.traction(x[i : i + 1], side)[0]) for w, h, _ in self._split[i]) for i in range(self._n)]
+            for side in ("left", "right")
+        ]
+        low, high = np.array(ends[0], dtype=float), np.array(ends[1], dtype=float)
+        return np.where(x <= problem.lower, -np.inf, low), np.where(x >= problem.upper, np.inf, high)
+
+    def _settled(self, x: Array) -> Array | None:
+        """The stable solution of the equations of a point's cell, if it is within that cell."""
+        cells = self._cell(x)
+        if np.any((cells.rise < 0.0) & ~cells.bound):
+            return None
+        return self._solved(cells)
+
+    def _cell(self, x: Array) -> Cells:
+        """The cell of a point, with the unknowns held that the majorant held."""
+        force = self._load - self._stiffness @ x
+        numbers, held = np.zeros(self._n, dtype=np.int64), self._cells.rise != 0.0
+        for i, segments in enumerate(self._true):
+            numbers[i] = _number(segments, float(x[i]), held=bool(held[i]))
+        coordinates = [
+            s[k].coordinate(float(x[i]), float(force[i]))
+            for i, (s, k) in enumerate(zip(self._true, numbers, strict=True))
+        ]
+        return Cells(self._stiffness, self._true, numbers, np.array(coordinates))
+
+    def _solved(self, cells: Cells) -> Array | None:
+        matrix, free = cells.tangent()
+        residual = self._stiffness @ cells.x + cells.force - self._load
+        try:
+            np.linalg.cholesky(matrix)
+        except np.linalg.LinAlgError:
+            return None
+        if free.size:
+            cells.tau[free] -= np.linalg.solve(matrix, residual[free])
+        force = self._load - self._stiffness @ cells.x
+        stands = ~cells.moving
+        cells.tau[stands] = cells.rise[stands] * (force - cells.standing_force)[stands]
+        slack = 1e-10 * (np.abs(cells.tau) + np.where(np.isfinite(cells.high - cells.low), cells.high - cells.low, 0.0))
+        inside = (cells.tau >= cells.low - slack) & (cells.tau <= cells.high + slack)
+        return cells.x if bool(np.all(inside)) else None
+
+
+def _number(segments: tuple[Segment, ...], x: float, *, held: bool) -> int:
+    """The segment of a displacement: one on which it stands, if it is held, else a piece."""
+    found = [
+        abs(s.displacement(s.coordinate(x, s.force)) - x) + (0.0 if bool(s.rise) == held else np.inf) for s in segments
+    ]
+    return (
+        int(np.argmin(found))
+        if np.isfinite(min(found))
+        else int(np.argmin([abs(s.displacement(s.coordinate(x, s.force)) - x) for s in segments]))
+    )

@@ -1,0 +1,284 @@
+"""Load paths of bounds and piecewise linear laws: exact, from event to event, with no step size."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from ..system.condensed_problem import CondensedProblem
+from ..typing import Array, Integers
+from .beginning import Beginning, at_rest
+from .bonds import BondTable
+from .books import EnergyBalance
+from .cells import Cells
+from .descent import Descent, Landing
+from .passing import Passing, classify, go_on
+from .placing import place
+from .snap import snap
+from .state import End, Event, Follow, PathOptions, PathState, Place, Position
+from .step import FACTOR
+from .tracer import Tracer
+
+
+def never() -> bool:
+    """Nobody interrupts."""
+    return False
+
+
+class ExactFollower:
+    """The path of a problem. A :class:`.Follower`.
+
+    Args:
+        problem: the problem.
+        options: what path is wanted.
+        resume: the state after which to go on; by default the path begins at factor 0.
+        interrupted: whether to stop, asked at each event.
+        beginning: the first state, where it is known.
+
+    Attributes:
+        end: how the path ended; None before.
+        reason: that in a sentence.
+        tracer: the curve that is followed.
+
+    Raises:
+        InputError: a law is not piecewise linear, or acts on |u_t| in 3D.
+    """
+
+    def __init__(
+        self,
+        problem: CondensedProblem,
+        options: PathOptions,
+        resume: PathState | None = None,
+        interrupted: Callable[[], bool] = never,
+        beginning: Beginning | None = None,
+    ) -> None:
+        self._problem, self._options, self._interrupted = problem, options, interrupted
+        self._beginning = beginning
+        self._bonds = BondTable(problem, options.remember)
+        self._resume, self._events, self._leg = resume, 0, 0
+        self.end: End | None = None
+        self.reason = ""
+        self._unstable = 0
+        self._moved, self._direction = 0, 1
+        self._peak, self._floats = 0.0, _is_singular(problem.stiffness)
+        self.tracer: Tracer
+
+    def states(self) -> Iterator[PathState]:
+        """The states from start to end; the first one of a path that is resumed is the next one."""
+        begin = self._begun() if self._resume is None else self._resumed(self._resume)
+        yield from begin
+        programme = list(self._options.programme)
+        while self.end is None and self._leg < len(programme):
+            yield from self._towards(programme[self._leg])
+            self._leg += 1
+            if self.end is None:
+                last = self._leg == len(programme)
+                if last:
+                    self._finish(End.REACHED, "the programme is done")
+                yield self._state(Event.END if last else Event.TURN)
+
+    # -- beginning
+
+    def _begun(self) -> Iterator[PathState]:
+        programme, remember = self._options.programme, self._options.remember
+        start = self._beginning or at_rest(self._problem, remember, programme[0])
+        if start.constant is not None:
+            start = self._loaded(start, start.constant)
+        self._bonds.restore(start.memory)
+        self._balance = EnergyBalance(self._problem, self._bonds)
+        if start.cells is None:
+            self._finish(End.ESCAPES, start.reason)
+            return
+        self._unstable = start.cells.unstable_directions()
+        self._follow_from(start.cells, 0.0)
+        self._begin_balance(anew=True)
+        yield self._state(Event.START)
+
+    def _loaded(self, start: Beginning, constant: CondensedProblem) -> Beginning:
+        """From rest to the constant loads, as stable as it goes."""
+        options = PathOptions(remember=self._options.remember)
+        follower = ExactFollower(constant, options, beginning=replace(start, constant=None))
+        for _ in follower.states():
+            pass
+        if follower.end is not End.REACHED:
+            reason = f"under the constant loads alone: {follower.reason}"
+            return Beginning(cells=None, memory=follower.memory, reason=reason)
+        return Beginning(cells=follower.tracer.cells, memory=follower.memory)
+
+    def _resumed(self, state: PathState) -> Iterator[PathState]:
+        if state.memory is not None:
+            self._bonds.restore(state.memory)
+        self._balance = EnergyBalance(self._problem, self._bonds, state.work, state.dissipated)
+        self._unstable, self._leg = state.unstable, state.position.leg
+        self._follow_from(self._placed(state.x, state.factor, state.position.numbers), state.factor, state.position)
+        self._begin_balance(anew=False)
+        yield from ()
+
+    def _placed(self, x: Array, factor: float, numbers: Integers | None = None) -> Cells:
+        """The cell of an equilibrium."""
+        problem = self._problem
+        chains = [self._bonds.chain(i) for i in range(problem.size)]
+        return place(problem.stiffness, chains, x, problem.load(factor) - problem.stiffness @ x, numbers)
+
+    def _follow_from(self, cells: Cells, factor: float, position: Position | None = None) -> None:
+        given, problem = position, self._problem
+        self.tracer = Tracer(
+            problem.stiffness,
+            problem.force,
+            problem.force_rate,
+            cells,
+            factor,
+            driver=FACTOR if given is None else given.driver,
+            heading=1 if given is None else given.heading,
+            small=None if given is None else given.small,
+        )
+
+    def _begin_balance(self, *, anew: bool) -> None:
+        cells = self.tracer.cells
+        self._balance.begin(cells.x, cells.bond_force, self.tracer.factor, anew=anew)
+
+    # -- one leg of the programme
+
+    def _towards(self, aim: float) -> Iterator[PathState]:
+        """From event to event until the factor reaches its aim or the path ends."""
+        self._orient(aim)
+        while self.end is None and self.tracer.factor != aim:
+            if self._must_jump(aim):
+                yield from self._jump(aim)
+                continue
+            step = self.tracer.advance(aim)
+            cells = self.tracer.cells
+            if step.variable is None:
+                self._endless()
+                yield self._state(Event.END)
+                return
+            self._balance.go(cells.x, cells.bond_force, self.tracer.factor)
+            if step.variable != FACTOR:
+                yield self._pass(go_on(self.tracer, self._bonds, step))
+            self._watch()
+            if self.end is not None:
+                yield self._state(Event.END)
+
+    def _orient(self, aim: float) -> None:
+        wanted = np.sign(aim - self.tracer.factor)
+        resumed, self._resume = self._resume, None
+        under_way = resumed is not None and resumed.event not in (Event.START, Event.TURN)
+        if not under_way and self.tracer.factor_rate * wanted < 0.0:
+            self.tracer.turn()
+
+    def _watch(self) -> None:
+        self._events += 1
+        self._peak = max(self._peak, abs(self.tracer.factor))
+        if self._floats and self._peak > 0.0 and self.tracer.at_rest(self._peak):
+            self._finish(End.ESCAPES, "the load is back at zero, and nothing holds the body any more")
+        elif self._interrupted():
+            self._finish(End.INTERRUPTED, "interrupted")
+        elif self._events > self._options.most_events:
+            self._finish(End.LOST, f"no end after {self._options.most_events} events")
+
+    def _pass(self, passing: Passing) -> PathState:
+        """The state after an event."""
+        self._unstable += passing.unstable_change
+        if passing.unstable_change > 0 or passing.neutral:
+            self._moved, self._direction = passing.unknown, passing.direction
+        if passing.neutral:
+            self._unstable = self.tracer.cells.unstable_directions()
+        return self._state(classify(passing), passing)
+
+    def _endless(self) -> None:
+        """Nothing stops the curve: at a factor that stands a body escapes."""
+        if self.tracer.stands:
+            self._finish(End.ESCAPES, f"at the factor {self.tracer.factor:.6g} a body comes off")
+        else:
+            self._finish(End.LOST, "the path leads away from the wanted factor for ever")
+
+    # -- jumps
+
+    def _must_jump(self, aim: float) -> bool:
+        if self._options.follow is Follow.EXACT or self._unstable == 0:
+            return False
+        return not self.tracer.at_end(aim)
+
+    def _jump(self, aim: float) -> Iterator[PathState]:
+        """On to the next stable equilibrium at the same factor, or off."""
+        cells, factor = self.tracer.cells, self.tracer.factor
+        found = snap(self._bonds, self._problem.load(factor), cells, self._moved, self._direction)
+        if found is not None and found.cells is not None:
+            yield self._landed(found.cells, aim)
+            return
+        landing = self._descended() if found is None else Landing(x=cells.x, escapes=True, found=False, steps=0)
+        if landing.escapes:
+            self._finish(End.ESCAPES, f"at the factor {factor:.6g} no equilibrium is left: a body comes off")
+            yield self._state(Event.END)
+        elif not landing.found:
+            self._finish(End.LOST, f"no stable equilibrium found at the factor {factor:.6g}")
+            yield self._state(Event.END)
+        else:
+            yield self._landed(self._placed(landing.x, factor), aim)
+
+    def _descended(self) -> Landing:
+        """Down by the branch iteration."""
+        cells, rates = self.tracer.cells, self.tracer.rates
+        self._remember_all()
+        descent = Descent(self._bonds, self._problem.load(self.tracer.factor))
+        return descent.land(descent.pushed(cells, rates), cells.x)
+
+    def _landed(self, cells: Cells, aim: float) -> PathState:
+        self._follow_from(cells, self.tracer.factor)
+        self._unstable = self.tracer.cells.unstable_directions()
+        cells = self.tracer.cells
+        released = self._balance.leap(cells.x, cells.bond_force)
+        self._orient(aim)
+        return replace(self._state(Event.JUMP), released=released)
+
+    def _remember_all(self) -> None:
+        cells = self.tracer.cells
+        x, force = cells.x, cells.bond_force
+        for i in self._bonds.with_memory:
+            self._bonds.remember(i, float(x[i]), float(force[i]))
+
+    @property
+    def memory(self) -> Array:
+        """What the bonds remember, (bonds, 4)."""
+        return self._bonds.memory
+
+    # -- reports
+
+    def _finish(self, end: End, reason: str) -> None:
+        self.end, self.reason = end, reason
+
+    def _state(self, event: Event, passing: Passing | None = None) -> PathState:
+        tracer, balance = self.tracer, self._balance
+        return PathState(
+            factor=tracer.factor,
+            event=event,
+            place=None if passing is None else self._place(passing),
+            x=tracer.cells.x,
+            energy=balance.energy,
+            work=balance.work,
+            dissipated=balance.dissipated,
+            unstable=self._unstable,
+            memory=self._bonds.memory if self._bonds.remembers else None,
+            bifurcation=passing is not None and passing.bifurcation,
+            position=Position(
+                leg=self._leg,
+                numbers=tracer.cells.numbers.copy(),
+                driver=tracer.driver,
+                heading=tracer.heading,
+                small=tracer.small.copy(),
+            ),
+        )
+
+    def _place(self, passing: Passing) -> Place:
+        i, problem = passing.unknown, self._problem
+        bonds = self._bonds.at(i)
+        part = problem.bonds[bonds[0].group].part if bonds and not passing.at_bound else problem.parts[i]
+        return Place(part=part, unknown=i, point=problem.points[i])
+
+
+def _is_singular(stiffness: Array) -> bool:
+    """Whether bounds and laws alone hold the body."""
+    values = np.linalg.eigvalsh(stiffness) if len(stiffness) else np.ones(1)
+    return bool(values[0] <= 1e-11 * values[-1])

@@ -1,0 +1,64 @@
+"""On which segments the unknowns are, at an equilibrium that is given by its displacements and forces."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..typing import Array, Integers
+from .cells import Cells
+from .segments import Kind, Segment
+
+
+def place(
+    stiffness: Array,
+    chains: Sequence[tuple[Segment, ...]],
+    x: Array,
+    force: Array,
+    known: Integers | None = None,
+    rounding: float = 1e-9,
+) -> Cells:
+    """The cell of an equilibrium; of several segments that meet there the one that holds best.
+
+    Args:
+        stiffness: S, (n, n).
+        chains: the segments of each unknown.
+        x: the displacements, (n,).
+        force: of laws and bounds, (n,).
+        known: numbers of the segments, where they are known, (n,).
+        rounding: distance from a segment that is none, relative to the greatest force.
+    """
+    size = float(np.max(np.abs(force), initial=0.0)) + float(np.max(np.abs(stiffness @ x), initial=0.0)) or 1.0
+    scale = np.diag(stiffness) if len(x) else np.empty(0)
+    numbers, coordinates = np.zeros(len(x), dtype=np.int64), np.zeros(len(x))
+    for i, chain in enumerate(chains):
+        at = float(x[i]), float(force[i])
+        numbers[i] = known[i] if known is not None else _best(chain, *at, float(scale[i]), rounding * size)
+        coordinates[i] = _snapped(chain[numbers[i]], *at)
+    return Cells(stiffness, chains, numbers, coordinates)
+
+
+def _best(chain: Sequence[Segment], x: float, force: float, stiffness: float, allowed: float) -> int:
+    far = [segment.distance(x, force, stiffness) for segment in chain]
+    near = [i for i, distance in enumerate(far) if distance <= max(allowed, min(far))]
+    return max(near, key=lambda i: _hold(chain[i]))
+
+
+def _hold(segment: Segment) -> tuple[int, float]:
+    """How well a segment holds: bounds, rising jumps, pieces by their slope, drops."""
+    if segment.kind is Kind.PIECE:
+        return 0, segment.slope
+    if segment.kind is Kind.BOUND:
+        return 2, 0.0
+    return (1, 0.0) if segment.rise > 0.0 else (-1, 0.0)
+
+
+def _snapped(segment: Segment, x: float, force: float) -> float:
+    """The coordinate; the end itself where it is that but for rounding."""
+    found = segment.coordinate(x, force)
+    length = segment.high - segment.low
+    for end in (segment.low, segment.high):
+        if abs(found - end) <= 1e-12 * (length if np.isfinite(length) else abs(found)):
+            return end
+    return found

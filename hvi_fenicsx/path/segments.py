@@ -1,0 +1,233 @@
+"""The graph of force over displacement of one unknown, with its laws and bounds, as a chain of segments.
+
+Pieces of laws have a slope. Where a law jumps, and at a bound, the displacement stands and the force moves. All of them
+form one continuous curve, which a coordinate runs along.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+
+from ..laws.traction_graph import TractionGraph
+from ..typing import Array
+
+
+class Kind(Enum):
+    """What moves on a segment."""
+
+    PIECE = "piece"
+    """The displacement, and the force with it."""
+    JUMP = "jump"
+    """The force, at a jump of a law."""
+    BOUND = "bound"
+    """The force, at a bound."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Segment:
+    """A straight part of the graph; its coordinate τ grows along the graph, the displacement never falls.
+
+    Attributes:
+        kind: what moves.
+        x: displacement at τ = 0.
+        force: at τ = 0.
+        slope: of the force over the displacement; of a piece.
+        rise: of the force over τ where the displacement stands: 1, or -1 at a drop; 0 on a piece.
+        low: least τ.
+        high: greatest τ.
+        outward: on a piece or jump that a bond with memory has not passed yet, the direction in which it does, 1 or -1;
+            else 0.
+    """
+
+    kind: Kind
+    x: float
+    force: float
+    slope: float = 0.0
+    rise: float = 0.0
+    low: float
+    high: float
+    outward: int = 0
+
+    def weighted(self, weight: float) -> Segment:
+        """The segment with all forces multiplied."""
+        stands = self.rise != 0.0
+        return Segment(
+            kind=self.kind,
+            x=self.x,
+            force=self.force * weight,
+            slope=self.slope * weight,
+            rise=self.rise,
+            low=self.low * weight if stands else self.low,
+            high=self.high * weight if stands else self.high,
+            outward=self.outward,
+        )
+
+    def displacement(self, coordinate: float) -> float:
+        """The displacement at τ."""
+        return self.x if self.rise else self.x + coordinate
+
+    def coordinate(self, x: float, force: float) -> float:
+        """The τ of a displacement (or, where it stands, of a force), at most that of an end.
+
+        Args:
+            x: the displacement.
+            force: the force.
+        """
+        wanted = (force - self.force) / self.rise if self.rise else x - self.x
+        return min(max(wanted, self.low), self.high)
+
+    def distance(self, x: float, force: float, stiffness: float) -> float:
+        """How far a point is from the segment, in units of force.
+
+        Args:
+            x: its displacement.
+            force: its force.
+            stiffness: force for one unit of displacement.
+        """
+        at = self.coordinate(x, force)
+        on = self.force + (self.rise or self.slope) * at
+        return abs(on - force) + stiffness * abs(self.displacement(at) - x)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Component:
+    """One bond's law on an unknown.
+
+    Attributes:
+        graph: traction over the unknown.
+        weight: lumped area.
+        passed: displacements (least, greatest) up to which a bond with memory has been; None without memory.
+    """
+
+    graph: TractionGraph
+    weight: float
+    passed: tuple[float, float] | None = None
+
+    def force(self, x: Array, side: str) -> Array:
+        """The limit of the force from one side, (m,).
+
+        Args:
+            x: displacements, (m,).
+            side: "left" or "right".
+        """
+        return self.weight * self.graph.traction(x, side)
+
+    def slope(self, x: float) -> float:
+        """The slope of the force off the breaks."""
+        return self.weight * float(self.graph.slopes[np.searchsorted(self.graph.breaks, x)])
+
+    def fresh(self, x: float, slope: float | None = None) -> bool:
+        """Whether a bond with memory has not been at x, and does not return on a line through 0 as it came.
+
+        Args:
+            x: the displacement.
+            slope: of the force there; None at a jump.
+        """
+        if self.passed is None or self.passed[0] < x < self.passed[1]:
+            return False
+        if slope is None:
+            return x != 0.0
+        line = float(self.force(np.array([x]), "right")[0])
+        return abs(line - slope * x) > 1e-12 * (abs(line) + abs(slope * x))
+
+
+def chain(components: Sequence[Component], lower: float, upper: float) -> tuple[Segment, ...]:
+    """The segments of an unknown, from the least displacement to the greatest.
+
+    Args:
+        components: the laws that act on it.
+        lower: its lower bound, or -inf.
+        upper: its upper bound, or inf.
+    """
+    if lower == upper:
+        return (Segment(kind=Kind.BOUND, x=lower, force=0.0, rise=1.0, low=-math.inf, high=math.inf),)
+    found = _inside(components, lower, upper)
+    if math.isfinite(lower):
+        found.insert(0, _bound(lower, _forces(components, lower, "right"), low=-math.inf, high=0.0))
+    if math.isfinite(upper):
+        found.append(_bound(upper, _forces(components, upper, "left"), low=0.0, high=math.inf))
+    return tuple(found)
+
+
+def _bound(x: float, force: float, low: float, high: float) -> Segment:
+    return Segment(kind=Kind.BOUND, x=x, force=force, rise=1.0, low=low, high=high)
+
+
+def _forces(components: Sequence[Component], x: float, side: str) -> float:
+    return float(sum(c.force(np.array([x]), side)[0] for c in components))
+
+
+def _inside(components: Sequence[Component], lower: float, upper: float) -> list[Segment]:
+    """Pieces and jumps between the bounds; breaks at which nothing changes are left out."""
+    breaks = _breaks(components, lower, upper)
+    ends = [lower, *breaks, upper]
+    found = [_piece(components, a, b) for a, b in itertools.pairwise(ends)]
+    chained: list[Segment] = []
+    for at, piece in zip([None, *breaks], found, strict=True):
+        jump = None if at is None else _jump(components, at)
+        if jump is not None:
+            chained.append(jump)
+        chained.append(piece)
+    return chained
+
+
+def _breaks(components: Sequence[Component], lower: float, upper: float) -> list[float]:
+    every = sorted({float(b) for c in components for b in c.graph.breaks if lower < b < upper})
+    return [b for b in every if any(_changes(c, b) for c in components)]
+
+
+def _changes(component: Component, at: float) -> bool:
+    graph = component.graph
+    number = int(np.searchsorted(graph.breaks, at))
+    if number == len(graph.breaks) or graph.breaks[number] != at:
+        return False
+    return bool(graph.left[number] != graph.right[number] or graph.slopes[number] != graph.slopes[number + 1])
+
+
+def _jump(components: Sequence[Component], at: float) -> Segment | None:
+    left, right = (_forces(components, at, side) for side in ("left", "right"))
+    if left == right:
+        return None
+    fresh = any(c.fresh(at) for c in components)
+    rise = math.copysign(1.0, right - left)
+    return Segment(
+        kind=Kind.JUMP,
+        x=at,
+        force=left,
+        rise=rise,
+        low=0.0,
+        high=abs(right - left),
+        outward=int(np.sign(at)) if fresh else 0,
+    )
+
+
+def _piece(components: Sequence[Component], start: float, end: float) -> Segment:
+    middle = _between(start, end)
+    slopes = [c.slope(middle) for c in components]
+    fresh = any(c.fresh(middle, slope) for c, slope in zip(components, slopes, strict=True))
+    anchor, side = (start, "right") if math.isfinite(start) else (end, "left")
+    anchor = anchor if math.isfinite(anchor) else 0.0
+    return Segment(
+        kind=Kind.PIECE,
+        x=anchor,
+        force=_forces(components, anchor, side),
+        slope=math.fsum(slopes),
+        low=start - anchor,
+        high=end - anchor,
+        outward=int(np.sign(middle)) if fresh else 0,
+    )
+
+
+def _between(start: float, end: float) -> float:
+    """A displacement inside an interval, of the sign of the interval."""
+    if math.isfinite(start) and math.isfinite(end):
+        return 0.5 * (start + end)
+    if math.isfinite(start):
+        return start + 1.0 + abs(start)
+    return end - 1.0 - abs(end) if math.isfinite(end) else 0.0

@@ -1,0 +1,149 @@
+"""What is asked of a follower, and what it reports: the states along a load path, and how the path ended."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Protocol
+
+from ..typing import Array, Integers
+
+
+class Event(StrEnum):
+    """Why a state is reported."""
+
+    START = "start"
+    KINK = "kink"
+    """A vertex passes from one piece of its law to another."""
+    CONTACT = "contact"
+    RELEASE = "release"
+    FOLD = "fold"
+    """The factor turns."""
+    JUMP = "jump"
+    """The body has jumped to the next stable equilibrium."""
+    TURN = "turn"
+    """The programme turns."""
+    END = "end"
+
+
+class Follow(StrEnum):
+    """How a path goes on where it is no longer stable."""
+
+    STABLE = "stable"
+    """On to the next stable equilibrium at the same loads."""
+    EXACT = "exact"
+    """Along the curve of all equilibria, the factor rising and falling."""
+
+
+class End(StrEnum):
+    """How a path ended."""
+
+    REACHED = "reached"
+    ESCAPES = "escapes"
+    LOST = "lost"
+    INTERRUPTED = "interrupted"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Place:
+    """Where an event happened.
+
+    Attributes:
+        part: boundary part.
+        unknown: number of the condensed unknown.
+        point: its vertex, m, (3,).
+    """
+
+    part: str
+    unknown: int
+    point: Array
+
+
+@dataclass(frozen=True, kw_only=True)
+class Position:
+    """Where on its curve a path is: with factor, unknowns and memory all that it needs to go on.
+
+    Attributes:
+        leg: number of the programme's part that comes next.
+        numbers: of the segments on which the unknowns are, (n,).
+        driver: the variable that drives.
+        heading: its direction, 1 or -1.
+        small: parts of the order ε of the coordinates, which say who comes first where several come at once, (n,).
+    """
+
+    leg: int
+    numbers: Integers
+    driver: int
+    heading: int
+    small: Array
+
+
+@dataclass(frozen=True, kw_only=True)
+class PathState:
+    """An equilibrium on a path, nondimensional.
+
+    Attributes:
+        factor: λ.
+        event: why it is reported.
+        place: where that happened; None where it is not at one vertex.
+        x: the condensed unknowns, (n,).
+        energy: ½ a(u, u) - <g, u> + what the bonds would give back.
+        work: of loads and of what moves prescribed displacements, since the start.
+        dissipated: lost in bonds with memory.
+        released: at a jump, what the body has lost in motion.
+        unstable: number of directions in which the energy falls.
+        memory: what the bonds remember, (bonds, 4) as :attr:`.BondTable.memory`; None without memory.
+        bifurcation: several vertices reached an end at once, and not all of them went on: there are other branches.
+        position: where on its curve the path is.
+    """
+
+    factor: float
+    event: Event
+    place: Place | None
+    x: Array
+    energy: float
+    work: float
+    dissipated: float
+    released: float = 0.0
+    unstable: int
+    memory: Array | None
+    bifurcation: bool = False
+    position: Position
+
+    @property
+    def stable(self) -> bool:
+        """Whether it is."""
+        return self.unstable == 0
+
+
+@dataclass(frozen=True, kw_only=True)
+class PathOptions:
+    """What path is wanted.
+
+    Attributes:
+        programme: the factors to go to, one after the other, from 0.
+        follow: how to go on where the path is not stable.
+        remember: numbers of the problem's bonds that remember.
+        most_events: events at most.
+    """
+
+    programme: Sequence[float] = (1.0,)
+    follow: Follow = Follow.STABLE
+    remember: Collection[int] = ()
+    most_events: int = 1_000_000
+
+
+class Follower(Protocol):
+    """Something that follows a path.
+
+    Attributes:
+        end: how the path ended; None before.
+        reason: that in a sentence.
+    """
+
+    end: End | None
+    reason: str
+
+    def states(self) -> Iterator[PathState]:
+        """The states from start to end."""

@@ -1,0 +1,288 @@
+"""The equilibria of bounds and piecewise linear laws as a curve, followed from one end of a cell to the next.
+
+In one cell the equations are linear: n equations for n coordinates τ and the factor λ. One of these n + 1 variables
+drives, the others form a basis whose inverse is kept. Where a coordinate reaches the end of its segment, the unknown
+goes on into the next one in the same direction along its graph, and its new coordinate drives: one column of the basis
+changes, and whether λ then rises or falls follows. Never is a matrix singular where λ stands still. (Complementary
+pivoting: Lemke 1965; Eaves 1976; for elastic-plastic frames Maier 1970.)
+
+Where several unknowns reach ends at once, the load is imagined to be perturbed by ε q, with ε infinitesimal and q at
+random: each coordinate then has a part of the order ε as well, which says who comes first.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from scipy.linalg.blas import dger
+
+from ..typing import Array, Integers
+from .cells import Cells
+from .segments import Segment
+from .step import FACTOR, Step
+
+
+class Tracer:
+    """The curve from one of its points on.
+
+    Args:
+        stiffness: S, (n, n).
+        constant: f0, (n,).
+        rate: f1, (n,).
+        cells: where all unknowns are; changed.
+        factor: λ.
+        driver: the variable that drives.
+        heading: its direction, 1 or -1.
+        small: parts of the order ε of the coordinates, (n,); by default at random.
+        seed: of the perturbation.
+
+    Attributes:
+        factor: λ.
+        cells: where all unknowns are.
+        driver: the variable that drives.
+        heading: its direction, 1 or -1.
+        refactored: how often the inverse was computed anew.
+        small: parts of the order ε of the coordinates, (n,).
+        rates: how all coordinates change with the driving variable, (n,).
+        factor_rate: how the factor does.
+        stands: whether the factor stands still while unknowns move.
+        worst: the greatest residual met, relative to the forces.
+
+    Raises:
+        numpy.linalg.LinAlgError: the tangent is singular.
+    """
+
+    def __init__(
+        self,
+        stiffness: Array,
+        constant: Array,
+        rate: Array,
+        cells: Cells,
+        factor: float,
+        *,
+        driver: int = FACTOR,
+        heading: int = 1,
+        small: Array | None = None,
+        seed: int = 0,
+    ) -> None:
+        self._stiffness, self._constant, self._rate = stiffness, constant, rate
+        self.cells, self.factor, self.driver, self.heading = cells, factor, driver, heading
+        self.refactored, self.worst, self._size = 0, 0.0, 0.0
+        self._inverse: Any = None
+        self._column = np.empty(0)
+        self._generator = np.random.default_rng(seed)
+        self._perturb()
+        if small is not None:
+            self.small = np.array(small)
+        self._factorise()
+        self._find_direction()
+
+    # -- the perturbation
+
+    def _perturb(self) -> None:
+        """Coordinates of the order ε, inside the segments where a coordinate is at an end; q follows from them."""
+        cells = self.cells
+        self.small = self._generator.uniform(0.5, 1.5, len(cells))
+        ends = np.isclose(cells.tau, cells.high, rtol=0.0, atol=0.0)
+        self.small[ends] *= -1.0
+        self._lag = self._generator.uniform(0.5, 1.5, len(cells))
+        self._behind = self._lag.copy()
+
+    # -- linear algebra
+
+    def _factorise(self) -> None:
+        matrix = self.cells.matrix()
+        if self.driver != FACTOR:
+            matrix[:, self.driver] = -self._rate
+        self._inverse = self._inverse_of(matrix)
+        self.refactored += 1
+
+    @staticmethod
+    def _inverse_of(matrix: Array) -> Array:
+        found = np.asarray(np.asfortranarray(np.linalg.inv(matrix)), dtype=np.float64)
+        if not np.all(np.isfinite(found)):
+            raise np.linalg.LinAlgError("the tangent is singular")
+        return found
+
+    def _driving_column(self) -> Array:
+        return -self._rate if self.driver == FACTOR else self.cells.column(self.driver)
+
+    def _find_direction(self) -> None:
+        """How all variables change with the driving one."""
+        self._column = self._inverse @ self._driving_column()
+        rates = -self.heading * self._column
+        if self.driver == FACTOR:
+            self.factor_rate = float(self.heading)
+        else:
+            self.factor_rate = float(rates[self.driver])
+            rates[self.driver] = self.heading
+        self.rates: Array = rates
+        self.stands = self._factor_stands()
+
+    def _exchange(self, leaving: int) -> None:
+        """Let the driving variable enter the basis, and a coordinate leave it, which drives from now on."""
+        spread, row = self._column.copy(), self._inverse[leaving].copy()
+        pivot = spread[leaving]
+        spread[leaving] -= 1.0
+        self._inverse = dger(-1.0 / pivot, spread, row, a=self._inverse, overwrite_a=1)
+        if self.driver != FACTOR:
+            pair = [leaving, self.driver]
+            self._inverse[pair] = self._inverse[pair[::-1]]
+        self.driver = leaving
+
+    def _residual(self) -> Array:
+        cells = self.cells
+        self.elastic = self._stiffness @ cells.x
+        return np.asarray(self.elastic + cells.force - self._constant - self.factor * self._rate)
+
+    def refine(self, allowed: float = 1e-9) -> None:
+        """Take out what rounding has left in the equations; factorise anew where the inverse has lost digits.
+
+        Args:
+            allowed: residual up to which the inverse is kept, relative to the forces.
+        """
+        residual = self._residual()
+        forces = [self.elastic, self.cells.force, self._constant, self.factor * self._rate]
+        self._size = max(self._size, *(float(np.max(np.abs(f), initial=0.0)) for f in forces))
+        left = float(np.max(np.abs(residual), initial=0.0)) / (self._size or 1.0)
+        self.worst = max(self.worst, left)
+        if left > allowed:
+            self._factorise()
+        correction = self._inverse @ residual
+        if self.driver != FACTOR:
+            self.factor -= float(correction[self.driver])
+            correction[self.driver] = 0.0
+        self.cells.tau -= correction
+
+    # -- events
+
+    def advance(self, aim: float) -> Step:
+        """Go to the end of the cell, or until the factor reaches its aim; there, on into the next cell.
+
+        Args:
+            aim: the factor at which to stop.
+        """
+        chosen = self._first_end(aim)
+        if chosen is None:
+            return Step(variable=None)
+        variable, length, small, tied = chosen
+        self._move(length, small)
+        if variable == FACTOR:
+            self.factor = aim
+            return Step(variable=FACTOR, length=length)
+        before, turned = self.cells.segment(variable), self._turns(variable)
+        return Step(variable=variable, before=before, length=length, tied=tied, reversed=turned)
+
+    def _turns(self, i: int) -> bool:
+        return bool(self.rates[i] * self.cells.outward[i] < 0.0)
+
+    def _move(self, length: float, small: float) -> None:
+        self.cells.tau += length * self.rates
+        self.factor += length * self.factor_rate
+        self.small += small * self.rates
+        inward = self.cells.outward * self.rates < 0.0
+        self._behind = np.where(inward, self._behind - small * np.abs(self.rates), self._lag)
+
+    def _first_end(self, aim: float) -> tuple[int, float, float, int] | None:
+        """Which variable reaches its end first, the way to there, that of the order ε, and how many tie."""
+        numbers, slack, small, speed, allowed = self._ends()
+        if not numbers.size and not self._approaches(aim):
+            return None
+        if self._approaches(aim):
+            until = (aim - self.factor) / self.factor_rate
+            reach = float(np.min((slack + allowed) / speed, initial=np.inf))
+            if until <= reach:
+                return FACTOR, max(until, 0.0), 0.0, 1
+        ways = slack / speed
+        near = np.flatnonzero(ways <= np.min((slack + allowed) / speed))
+        first = near[np.argmin(small[near] / speed[near])]
+        return int(numbers[first]), float(ways[first]), float(small[first] / speed[first]), len(near)
+
+    def _approaches(self, aim: float) -> bool:
+        return bool((aim - self.factor) * self.factor_rate > 0.0) and not self.stands
+
+    def _ends(self) -> tuple[Integers, Array, Array, Array, Array]:
+        """The variables that approach an end: numbers, distances, distances of the order ε, speeds, roundings."""
+        cells, rates = self.cells, self.rates
+        speed, size = np.abs(rates), self._sizes()
+        inward = cells.outward * rates < 0.0
+        distance = np.where(rates > 0.0, cells.high - cells.tau, cells.tau - cells.low)
+        small = np.where(rates > 0.0, -self.small, self.small)
+        distance, small = np.where(inward, 0.0, distance), np.where(inward, self._behind, small)
+        moves = speed > 1e-11 * self._fastest(speed)
+        at = np.flatnonzero(moves & np.isfinite(distance))
+        return at, np.maximum(distance[at], 0.0), small[at], speed[at], 1e-11 * size[at]
+
+    def _fastest(self, speed: Array) -> Array:
+        """The greatest speed of the same kind, of displacements or of forces, (n,)."""
+        moving = self.cells.moving
+        kinds = [float(np.max(speed[kind], initial=0.0)) for kind in (moving, ~moving)]
+        return np.asarray(np.where(moving, kinds[0], kinds[1]))
+
+    def _sizes(self) -> Array:
+        """What coordinates are measured by: displacements or forces, (n,)."""
+        cells = self.cells
+        moving = cells.moving
+        lengths = np.where(np.isfinite(cells.high - cells.low), cells.high - cells.low, 0.0)
+        kinds = [
+            max(float(np.max(lengths[kind], initial=0.0)), float(np.max(np.abs(cells.tau[kind]), initial=0.0)))
+            for kind in (moving, ~moving)
+        ]
+        return np.asarray(np.where(moving, kinds[0], kinds[1]))
+
+    def enter(self, i: int, number: int, coordinate: float, chain: tuple[Segment, ...] | None = None) -> None:
+        """Let an unknown go on, in its present direction along its graph, on another segment.
+
+        Args:
+            i: the unknown.
+            number: of the segment.
+            coordinate: τ there.
+            chain: the segments, where they have changed.
+        """
+        direction = 1 if self.rates[i] > 0.0 else -1
+        if i != self.driver:
+            self._exchange(i)
+        self.heading = direction
+        if chain is None:
+            self.cells.enter(i, number, coordinate)
+        else:
+            self.cells.replace_chain(i, chain, number, coordinate)
+        self.small[i] = 0.0
+        self._behind[i] = self._lag[i]
+        self.refine()
+        self._find_direction()
+
+    def _factor_stands(self) -> bool:
+        """Whether the factor stands still, but for rounding, while unknowns move."""
+        cells, rates = self.cells, self.rates
+        moved = float(np.max(np.abs(np.where(cells.moving, rates, 0.0)), initial=0.0))
+        forces = float(np.max(np.abs(np.where(cells.moving, cells.slope, cells.rise) * rates), initial=0.0))
+        size = float(np.max(np.diag(self._stiffness), initial=0.0)) * moved + forces
+        return abs(self.factor_rate) * float(np.max(np.abs(self._rate), initial=0.0)) <= 1e-10 * size
+
+    def at_end(self, aim: float) -> bool:
+        """Whether another unknown is at the end of its segment already.
+
+        Args:
+            aim: the factor at which to stop.
+        """
+        chosen = self._first_end(aim)
+        if chosen is None or chosen[0] == FACTOR:
+            return False
+        numbers, slack, _, _, allowed = self._ends()
+        return bool(np.any(slack[numbers == chosen[0]] <= allowed[numbers == chosen[0]]))
+
+    def at_rest(self, peak: float) -> bool:
+        """Whether loads and forces have gone back to nothing: where nothing else holds a body, it is free.
+
+        Args:
+            peak: the greatest factor so far.
+        """
+        small = 1e-9 * self._size
+        return abs(self.factor) <= 1e-9 * peak and bool(np.all(np.abs(self.cells.force) <= small))
+
+    def turn(self) -> None:
+        """Go back."""
+        self.heading = -self.heading
+        self._find_direction()
