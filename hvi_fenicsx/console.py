@@ -10,7 +10,7 @@ from .accuracy import quantities
 from .accuracy.goal import AccuracyResult
 from .certify.estimate.estimator import Estimate
 from .problem import effect_summary
-from .rigid import LoadFactors, Mode, RigidBody
+from .rigid import AnyBody, LoadFactors, Mode
 from .solution import Solution
 from .solvers import nested_iteration, registry
 from .workflow import Preparation
@@ -60,7 +60,7 @@ def existence(prepared: Preparation) -> str:
     return "; ".join(parts)
 
 
-def motions(found: Sequence[Mode], bodies: Sequence[RigidBody]) -> str:
+def motions(found: Sequence[Mode], bodies: Sequence[AnyBody]) -> str:
     """Rigid motions: a few by their names, more by their number.
 
     Args:

@@ -8,6 +8,7 @@ from .errors import InputError
 from .laws import smoothing
 from .problem.compose import Model
 from .problem.contact_parts import Modification, unchanged
+from .problem.interfaces import Sides
 from .scene import Scene, SolverTable
 from .solvers import registry
 from .solvers.options import SolverOptions
@@ -17,7 +18,10 @@ from .solvers.thresholds import DEFAULT, Thresholds
 def model_of(scene: Scene) -> Model:
     """The effects of a scene and their places, its laws smoothed where it says so."""
     return Model(
-        scene.parts, [(placed.where, placed.effect) for placed in scene.effects()], _modification(scene.solver)
+        scene.parts,
+        [(placed.where, placed.effect) for placed in scene.effects()],
+        _modification(scene.solver),
+        {name: Sides(first=i.between[0], second=i.between[1], tied=i.tied) for name, i in scene.interface.items()},
     )
 
 

@@ -203,7 +203,7 @@ def finish_with_levels(
     solved = _solved(prepared, control, start)
     examination, warnings = _examined(prepared, solved.result)
     errors = None
-    if estimating and examination.certificate.passed:
+    if estimating and examination.certificate.passed and not prepared.problem.interfaces:
         with prepared.timer("estimate"):
             errors = estimate(prepared.system, solved.levels, solved.result.u, examination)
         warnings += plausibility.of_estimate(errors)

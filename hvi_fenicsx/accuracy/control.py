@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, replace
 
 from mpi4py import MPI
 
+from ..errors import InputError
 from ..mesh.refinement import Refinement
 from ..runtime import memory
 from ..runtime.mpi import largest
@@ -46,8 +47,13 @@ def solve_to_goal(
         thresholds: how mesh, smoothing and tolerance follow from the error.
 
     Raises:
-        InputError: on all ranks alike: the scene has no such quantity, or does not fit its mesh.
+        InputError: on all ranks alike: the scene has no such quantity, has interfaces, or does not fit its mesh.
     """
+    if scene.interface:
+        raise InputError(
+            f"interface.{next(iter(scene.interface))}: the error of bodies that meet is not estimated yet, so no "
+            "accuracy can be asked for; leave --accuracy out, and compare two meshes"
+        )
     return _AdaptiveRun(scene, comm, goal, solver, report, thresholds).run()
 
 

@@ -13,7 +13,6 @@ from dolfinx import fem
 
 from ..problem.problem import Problem
 from ..problem.references import References
-from ..rigid import rigid_fields
 from ..system import net_forces as rigid_balance
 from ..system.net_forces import ActingForces, Holder, spread
 from ..typing import Array
@@ -53,7 +52,7 @@ def rounding_sample(problem: Problem, u: Array) -> Array:
     signs = np.random.default_rng(problem.domain.mesh.comm.rank).choice([-1.0, 1.0], len(u))
     shuffled.x.array[:] = u * signs * np.finfo(float).eps
     shuffled.x.scatter_forward()
-    return problem.bulk.force(shuffled)
+    return problem.combined(problem.bulk.force(shuffled))
 
 
 def net_forces(
@@ -103,7 +102,7 @@ def _acting(
 ) -> ActingForces:
     problem = references.problem
     holders = [holder for state in states for holder in _holders(problem, state)]
-    foundation = -problem.bulk.foundation_force(u)
+    foundation = -problem.combined(problem.bulk.foundation_force(u))
     return ActingForces(
         left=np.sum([forces.pushing, foundation, *(holder.forces for holder in holders)], axis=0),
         loads=forces.pushing,
@@ -161,7 +160,7 @@ def _without_rigid_part(problem: Problem, u: Array) -> Array:
     points, values = np.asarray(problem.points / problem.scales.length), u.reshape(-1, d).copy()
     for body in problem.bodies:
         mine = problem.bodies.labels == body.index
-        fields, owned = rigid_fields(points[mine], body), np.flatnonzero(mine) < here
+        fields, owned = problem.bodies.fields(points[mine], np.flatnonzero(mine), body), np.flatnonzero(mine) < here
         gram = comm.allreduce(np.einsum("vnd,vmd->nm", fields[owned], fields[owned]))
         parts = comm.allreduce(np.einsum("vnd,vd->n", fields[owned], values[mine][owned]))
         values[mine] -= np.einsum("n,vnd->vd", np.linalg.solve(gram, parts), fields)

@@ -140,7 +140,7 @@ def _within(entries: Mapping[str, Array], limit: float | Array) -> bool:
 
 def _energy(problem: Problem, u: fem.Function, forces: Forces, states: Sequence[ContactState]) -> float:
     """½u·(Au) - b·u = ½u·(reaction - load), plus the laws. Collective."""
-    values = u.x.array[: forces.load.size]
+    values = problem.relative(u.x.array)[: forces.load.size]
     elastic = 0.5 * float(values @ (forces.reaction - forces.load).ravel())
     laws = sum(
         float(np.sum(state.surface.weights * law.term.law.value(law.argument)))

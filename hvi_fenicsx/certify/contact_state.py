@@ -26,7 +26,7 @@ from .thresholds import DEFAULT, Thresholds
 
 @dataclass(frozen=True)
 class Forces:
-    """Forces by vertex (owned), nondimensional, (blocks, d).
+    """Forces by vertex (owned), nondimensional, (blocks, d); those on the unknowns where bodies meet.
 
     Attributes:
         reaction: internal forces minus loads, the reaction of whatever holds the body: zero off supports, contact and
@@ -128,7 +128,7 @@ def forces(problem: Problem, u: fem.Function) -> Forces:
     for name, form in problem.linear.items():
         (strains if name in problem.bulk.strains else pushing)[:] += nodal(form)
     load = pushing + strains
-    return Forces(internal - load, load, pushing)
+    return Forces(*(problem.combined(force) for force in (internal - load, load, pushing)))
 
 
 def states(
@@ -142,7 +142,8 @@ def states(
         reaction: internal forces minus loads at u, (blocks, d).
         thresholds: when a vertex is on a kink or a bound.
     """
-    values, problem = u.x.array, references.problem
+    problem = references.problem
+    values = problem.relative(u.x.array)
     near = thresholds.near * references.at(np.arange(len(reaction)))
     attribution = force_attribution.attribute(problem, values, reaction, near)
     laws = [

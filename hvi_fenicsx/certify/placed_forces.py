@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,10 +11,14 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from ..effects import Direction, Place
+from ..problem.contact_surface import Surface
 from ..problem.problem import Problem
 from ..problem.vectors import nodal
 from ..typing import Array, Entities
 from .contact_state import ContactState, Forces
+
+SECOND = ".second"
+"""What the name of an interface is followed by where the forces on its second body are meant."""
 
 
 @dataclass(frozen=True)
@@ -107,7 +111,8 @@ def reactions(
     for state in states:
         own = _traction(state) * state.surface.weights[:, None]
         np.subtract.at(left, state.surface.blocks, own)
-        _add(found, state.surface.part, NodalForces(state.surface.blocks, own))
+        for name, acting in _on_bodies(problem, state.surface, own):
+            _add(found, name, acting)
     for part, dofs in problem.held:
         own_dofs = dofs[dofs < left.size]
         support = np.zeros_like(left)
@@ -115,6 +120,25 @@ def reactions(
         left.ravel()[own_dofs] = 0.0
         _add(found, part, NodalForces.of(support))
     return found
+
+
+def _on_bodies(problem: Problem, surface: Surface, own: Array) -> Iterator[tuple[str, NodalForces]]:
+    """The forces (m, d) at a part's vertices; of an interface, those on each of the two bodies. Collective."""
+    if problem.coupling is None or all(one.surface is not surface for one in problem.interfaces):
+        yield surface.part, NodalForces(surface.blocks, own)
+        return
+    every = np.zeros((problem.space.dofmap.index_map.size_local, own.shape[1]))
+    every[surface.blocks] = own
+    acting, first = problem.on_bodies(every), np.zeros(len(every), dtype=bool)
+    first[_owned_on(problem, surface.facets)] = True
+    yield surface.part, NodalForces.of(np.where(first[:, None], acting, 0.0))
+    yield f"{surface.part}{SECOND}", NodalForces.of(np.where(first[:, None], 0.0, acting))
+
+
+def _owned_on(problem: Problem, facets: Entities) -> Entities:
+    """The vertices of facets that this rank owns. Collective."""
+    dofs = fem.locate_dofs_topological(problem.space, problem.domain.dimension - 1, facets)
+    return np.asarray(dofs[dofs < problem.space.dofmap.index_map.size_local])
 
 
 def _springs(problem: Problem, u: fem.Function) -> dict[str, NodalForces]:
@@ -134,8 +158,9 @@ def _add(found: dict[str, NodalForces], name: str, forces: NodalForces) -> None:
 def _traction(state: ContactState) -> Array:
     """The traction that contact and laws put on the body, (m, d)."""
     traction = np.zeros_like(state.surface.normals)
-    if state.bounds is not None or any(law.term.direction is not Direction.SLIP for law in state.laws):
+    tied = state.surface.tied
+    if tied or state.bounds is not None or any(law.term.direction is not Direction.SLIP for law in state.laws):
         traction += state.pressure[:, None] * state.surface.normals
-    if any(law.term.direction is Direction.SLIP for law in state.laws):
+    if tied or any(law.term.direction is Direction.SLIP for law in state.laws):
         traction -= np.einsum("mk,mkd->md", state.friction, state.surface.tangents)
     return traction

@@ -17,7 +17,7 @@ from ..effects import Direction
 from ..problem.contact_normals import largest_turn
 from ..problem.law_term import LawTerm
 from ..problem.problem import Problem
-from ..rigid import kernel, rigid_fields
+from ..rigid import kernel
 from ..runtime.mpi import largest, total
 from ..system import existence
 from .certificate import Examination
@@ -130,7 +130,7 @@ def _holds(problem: Problem, forces: Mapping[str, PETSc.Vec], term: LawTerm, rou
     for rigid in existence.rigid_problems(problem, forces):
         basis = kernel(comm, rigid.body, rigid.fixed)
         mine = existence.inside(problem, rigid.body, surface.blocks)
-        fields = rigid_fields(np.asarray(surface.points[mine] / problem.scales.length), rigid.body)
+        fields = problem.motions_at(surface.blocks[mine], rigid.body)
         along = np.einsum("mkd,mnd,nj->mkj", term.directions[mine], fields, basis)
         work = max(work, float(np.max(np.abs(along), initial=0.0)))
     return largest(comm, work) > rounding

@@ -40,7 +40,7 @@ def status(references: References, u: fem.Function, forces: Array, tolerance: fl
     """
     problem = references.problem
     comm = problem.domain.mesh.comm
-    found = growth(references, u.x.array, forces, tolerance)
+    found = growth(references, problem.relative(u.x.array), forces, tolerance)
     if comm.allreduce(bool(np.any(found.falls)), op=MPI.LOR):
         return NO_MINIMISER
     if not comm.allreduce(bool(np.any(found.softens)), op=MPI.LOR):

@@ -153,6 +153,7 @@ class Effect(BaseModel):
         exclusive: whether a side of the body bears only one of its kind.
         bounds_normal: whether it bounds the normal displacement, as contact does.
         in_files: whether its key may stand in scene files.
+        on_interfaces: whether it may act between two bodies, on their relative displacement.
     """
 
     model_config = ConfigDict(
@@ -167,6 +168,7 @@ class Effect(BaseModel):
     exclusive: ClassVar[bool] = False
     bounds_normal: ClassVar[bool] = False
     in_files: ClassVar[bool] = True
+    on_interfaces: ClassVar[bool] = False
     registry: ClassVar[dict[Place, dict[str, type[Effect]]]] = {place: {} for place in Place}
 
     @classmethod

@@ -3,18 +3,35 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, model_serializer, model_validator
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    PlainSerializer,
+    model_serializer,
+    model_validator,
+)
 from typing_extensions import override
 
 from ..formula import COORDINATES, Formula
 from ..schema import refusal
+from ..spatial_value import SpatialValue
 from .base import Drive, Effect, Evaluate, FormContext, Place, Sizes
 from .contribution import Contribution, NormalBounds
-from .formula_field import FormulaField, require_components
+from .formula_field import FormulaField, as_formula, require_components
 
 Coordinate = Annotated[float, Field(allow_inf_nan=False)]
+MEASURED = "measured"
+"""The gap between two bodies is the distance of their sides as they are meshed."""
+Gap = Annotated[
+    SpatialValue | Literal["measured"],
+    BeforeValidator(lambda value: value if value == MEASURED else as_formula(value)),
+    PlainSerializer(lambda gap: gap if isinstance(gap, str) else gap.source),
+]
+"""A number, a formula in x, y, z (SI), or "measured"."""
 
 
 class Obstacle(BaseModel):
@@ -38,11 +55,13 @@ class Contact(Effect):
     place: ClassVar[Place] = Place.BOUNDARY
     exclusive: ClassVar[bool] = True
     bounds_normal: ClassVar[bool] = True
+    on_interfaces: ClassVar[bool] = True
     drive: ClassVar[Drive] = Drive.KINEMATIC
     term: ClassVar[str] = "K: gap - u·n ≥ 0 on Γc, or lower ≤ -u·n ≤ upper"
 
-    gap: FormulaField | None = None
-    """unilateral contact: how far the body may move outward, m, a number or a formula in x, y, z"""
+    gap: Gap | None = None
+    """unilateral contact: how far the body may move outward, m, a number or a formula in x, y, z; between two bodies
+    also "measured", the distance of their sides as they are meshed"""
     lower: FormulaField | None = None
     """bilateral contact, instead of `gap`: the smallest opening -u·n, m, a number or a formula"""
     upper: FormulaField | None = None
@@ -67,6 +86,8 @@ class Contact(Effect):
 
     @model_serializer(mode="plain")
     def _as_table(self) -> dict[str, Any]:
+        if self.gap == MEASURED:
+            return {"gap": MEASURED}
         found = {k: f.source for k in ("gap", "lower", "upper") if (f := getattr(self, k)) is not None}
         return found if self.obstacle is None else {"obstacle": self.obstacle.model_dump(mode="json")}
 
@@ -86,6 +107,8 @@ class Contact(Effect):
     def _bounds(self) -> NormalBounds:
         if self.obstacle is not None:
             return _towards(self.obstacle)
+        if isinstance(self.gap, str):
+            return NormalBounds(lower=Formula(0.0), upper=None, measured=True)
         return NormalBounds(lower=self.lower if self.gap is None else self.gap.negative(), upper=self.upper)
 
     @override

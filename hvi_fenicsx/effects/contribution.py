@@ -42,11 +42,13 @@ class NormalBounds:
         lower: m; None: no bound.
         upper: m; None: no bound.
         direction: the unit vector towards a flat obstacle, which stands for n; None: the part's own normal.
+        measured: whether the distance of the two sides of an interface, as they are meshed, is added to the gap.
     """
 
     lower: SpatialValue | None
     upper: SpatialValue | None
     direction: tuple[float, ...] | None = None
+    measured: bool = False
 
 
 @dataclass(frozen=True, slots=True)

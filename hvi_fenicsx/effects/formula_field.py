@@ -12,7 +12,15 @@ from ..schema import refusal
 from ..spatial_value import SpatialValue
 
 
-def _formula(value: Any) -> SpatialValue:
+def as_formula(value: Any) -> SpatialValue:
+    """A value as a scene or a program gives it, for a validator.
+
+    Args:
+        value: a number, a formula's text, or a value already.
+
+    Raises:
+        PydanticCustomError: it is none of these.
+    """
     try:
         return value if isinstance(value, SpatialValue) else Formula(value)
     except InputError as error:
@@ -21,7 +29,7 @@ def _formula(value: Any) -> SpatialValue:
 
 FormulaField = Annotated[
     SpatialValue,
-    BeforeValidator(_formula),
+    BeforeValidator(as_formula),
     PlainSerializer(lambda f: f.source),
 ]
 """A number or a formula in x, y, z (SI), as a field of a scene model."""

@@ -55,6 +55,7 @@ class LawEffect(Effect):
 
     place: ClassVar[Place] = Place.BOUNDARY
     exclusive: ClassVar[bool] = True
+    on_interfaces: ClassVar[bool] = True
     direction: ClassVar[Direction]
 
     law: LawField

@@ -1,6 +1,7 @@
 """The bodies of a mesh: its parts that share no facet with each other, numbered alike on all ranks.
 
-Each rank joins the cells that share a facet; the facets that ranks share join what the ranks found.
+Bodies that meet in interfaces are taken together: what happens to one of them, the others feel. Each rank joins the
+cells that share a facet; the facets that ranks share join what the ranks found.
 """
 
 from __future__ import annotations
@@ -10,14 +11,15 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 from dolfinx import fem, la
 from mpi4py import MPI
 
 from ..errors import InputError
 from ..mesh.domain import Domain
-from ..rigid import Mode, RigidBody, motion_at
+from ..rigid import AnyBody, JoinedBodies, Mode, RigidBody, rigid_fields
 from ..runtime.mpi import agree
-from ..typing import Array, Integers
+from ..typing import Array, Entities, Integers
 
 
 @dataclass(frozen=True)
@@ -25,24 +27,57 @@ class MeshBodies:
     """The bodies, from left to right (then from bottom to top), lengths in units of L.
 
     Attributes:
-        bodies: what each is, the same on all ranks.
-        labels: the body of each local vertex (owned and ghost), (n,).
+        bodies: what each is, those that meet in interfaces together; the same on all ranks.
+        labels: which of these each local vertex (owned and ghost) belongs to, (n,).
+        members: which body among those that meet, (n,); 0 of a body that is alone.
     """
 
-    bodies: tuple[RigidBody, ...]
+    bodies: tuple[AnyBody, ...]
     labels: Integers
+    members: Integers
 
-    def __iter__(self) -> Iterator[RigidBody]:
+    def __iter__(self) -> Iterator[AnyBody]:
         return iter(self.bodies)
 
+    def single(self) -> tuple[RigidBody, ...]:
+        """All bodies, one by one."""
+        each = (body.bodies if isinstance(body, JoinedBodies) else (body,) for body in self.bodies)
+        return tuple(one for several in each for one in several)
+
+    def number_at(self, blocks: npt.NDArray[np.integer]) -> Integers:
+        """The numbers of the single bodies of some vertices, (m,).
+
+        Args:
+            blocks: local vertices, (m,).
+        """
+        counts = [len(body.bodies) if isinstance(body, JoinedBodies) else 1 for body in self.bodies]
+        return np.cumsum([0, *counts])[self.labels[blocks]] + self.members[blocks]
+
+    def fields(self, points: Array, blocks: npt.NDArray[np.integer], body: AnyBody) -> Array:
+        """The basis motions of a body at some of its vertices, (m, motions, d).
+
+        Args:
+            points: these vertices in units of L, (m, 3).
+            blocks: their local numbers, (m,).
+            body: one of these.
+        """
+        if isinstance(body, RigidBody):
+            return rigid_fields(points, body)
+        found = np.zeros((len(points), body.motions, body.dimension))
+        for number, one in enumerate(body.bodies):
+            here = np.flatnonzero(self.members[blocks] == number)
+            found[here[:, None], body.own(number)] = rigid_fields(points[here], one)
+        return found
+
     def motion(self, points: Array, mode: Mode) -> Array:
-        """A rigid motion of one body, the others at rest, (n, d).
+        """A rigid motion of one body, or of several that meet, the others at rest, (n, d).
 
         Args:
             points: all local vertices in units of L, (n, 3).
             mode: which body moves, and how.
         """
-        field = motion_at(points, self.bodies[mode.body], mode.coefficients)
+        every = self.fields(points, np.arange(len(points)), self.bodies[mode.body])
+        field = np.einsum("n,mnd->md", np.asarray(mode.coefficients), every)
         return np.where((self.labels == mode.body)[:, None], field, 0.0)
 
 
@@ -51,23 +86,24 @@ def whole(domain: Domain) -> RigidBody:
     return RigidBody(domain.dimension, np.asarray(domain.centre / domain.length), domain.length)
 
 
-def find(domain: Domain, space: fem.FunctionSpace, points: Array) -> MeshBodies:
+def find(domain: Domain, space: fem.FunctionSpace, points: Array, meetings: Sequence[Entities] = ()) -> MeshBodies:
     """The bodies of a domain. Collective.
 
     Args:
         domain: what is looked through.
         space: P1 vectors on its mesh.
         points: its local vertices in m, (n, 3).
+        meetings: for each interface the local vertices of both sides.
 
     Raises:
         InputError: on all ranks alike: two bodies meet at a vertex (in 3D perhaps along an edge) only, a hinge.
     """
     one = whole(domain)
     if domain.one_piece:
-        return MeshBodies((one,), np.zeros(len(points), np.int64))
+        return MeshBodies((one,), *np.zeros((2, len(points)), np.int64))
     cells, count = _cells(domain)
     if count == 1:
-        return MeshBodies((one,), np.zeros(len(points), np.int64))
+        return MeshBodies((one,), *np.zeros((2, len(points)), np.int64))
     labels = _vertices(domain, space, cells, points)
     lower, upper = _boxes(domain, points[:, : domain.dimension], labels, count)
     centres = (lower + upper) / 2
@@ -75,8 +111,33 @@ def find(domain: Domain, space: fem.FunctionSpace, points: Array) -> MeshBodies:
     place = np.argsort(order)
     found = [replace(one, centre=np.pad(centres[i] / domain.length, (0, 3 - domain.dimension))) for i in order]
     names = _names(domain, place[cells], found)
-    bodies = (replace(body, name=name, index=i) for i, (body, name) in enumerate(zip(found, names, strict=True)))
-    return MeshBodies(tuple(bodies), place[labels])
+    bodies = [replace(body, name=name, index=i) for i, (body, name) in enumerate(zip(found, names, strict=True))]
+    return _together(bodies, place[labels], _meeting(domain.mesh.comm, place[labels], meetings))
+
+
+def _meeting(comm: MPI.Comm, labels: Integers, meetings: Sequence[Entities]) -> list[tuple[int, int]]:
+    """The pairs of bodies that meet. Collective."""
+    pairs: set[tuple[int, int]] = set()
+    for vertices in meetings:
+        found = sorted({int(label) for rank in agree(comm, np.unique(labels[vertices])) for label in rank})
+        pairs |= {(found[0], other) for other in found[1:]}
+    return sorted(pairs)
+
+
+def _together(bodies: Sequence[RigidBody], labels: Integers, pairs: Sequence[tuple[int, int]]) -> MeshBodies:
+    """The bodies with their labels (n,), those of pairs together."""
+    group = list(range(len(bodies)))
+    for one, other in pairs:
+        low, high = sorted((group[one], group[other]))
+        group = [low if g == high else g for g in group]
+    members: list[list[int]] = [[i for i, g in enumerate(group) if g == first] for first in sorted(set(group))]
+    label, member = np.zeros((2, len(bodies)), np.int64)
+    found: list[AnyBody] = []
+    for index, those in enumerate(members):
+        label[those], member[those] = index, np.arange(len(those))
+        own = tuple(replace(bodies[i], index=k) for k, i in enumerate(those))
+        found.append(replace(own[0], index=index) if len(own) == 1 else JoinedBodies(own, index))
+    return MeshBodies(tuple(found), label[labels], member[labels])
 
 
 def _cells(domain: Domain) -> tuple[Integers, int]:

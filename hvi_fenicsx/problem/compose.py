@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import dolfinx
@@ -20,9 +20,10 @@ from ..mesh.domain import Domain
 from ..runtime.mpi import agree
 from ..spatial_value import SpatialValue
 from ..typing import Array, Entities
-from . import bulk, contact_parts, dirichlet, scaling
+from . import bulk, contact_parts, dirichlet, interfaces, scaling
 from .contact_parts import Modification, unchanged
 from .domain_forms import DomainForms
+from .interfaces import Sides
 from .problem import PlacedContribution, PrescribedComponent, Problem
 from .scaling import Placed, Scales
 from .thresholds import DEFAULT, Thresholds
@@ -33,14 +34,16 @@ class Model:
     """What is solved, on any mesh of the body.
 
     Attributes:
-        parts: the sides that each boundary part lies on.
+        parts: the sides that each boundary part lies on; of an interface, the first one.
         effects: (where, effect), where being a boundary part, a region, or None for the whole body.
         modify: what is solved in the place of each law.
+        interfaces: the two sides of each, by name.
     """
 
     parts: Mapping[str, Sequence[str]]
     effects: Sequence[Placed]
     modify: Modification = unchanged
+    interfaces: Mapping[str, Sides] = field(default_factory=dict)
 
 
 def compose(domain: Domain, model: Model, thresholds: Thresholds = DEFAULT) -> Problem:
@@ -64,7 +67,7 @@ def compose(domain: Domain, model: Model, thresholds: Thresholds = DEFAULT) -> P
     context = DomainForms(domain, parts, scales, effects)
     contributions = [PlacedContribution(where, effect, effect.contribute(context, where)) for where, effect in effects]
     implausible = [f"{scaling.place(e)}: {text}" for e in effects for text in e[1].implausible(evaluate(e), sizes)]
-    return _problem(context, scales, contributions, model.modify, tuple(implausible), thresholds)
+    return _problem(context, scales, contributions, model, tuple(implausible), thresholds)
 
 
 def _evaluation(domain: Domain, parts: Mapping[str, Sequence[str]], placed: Placed) -> Evaluate:
@@ -106,19 +109,24 @@ def _problem(
     context: DomainForms,
     scales: Scales,
     contributions: Sequence[PlacedContribution],
-    modify: Modification,
+    model: Model,
     implausible: tuple[str, ...],
     thresholds: Thresholds,
 ) -> Problem:
     """All contributions together. Collective."""
     conditions, held, fixed = _conditions(context, scales, contributions, thresholds)
     prescribed = dirichlet.values(context, conditions)
-    surfaces = contact_parts.make_surfaces(context, contributions, fixed, thresholds)
-    bounds = contact_parts.make_bounds(context, scales, surfaces, contributions, prescribed)
+    surfaces = contact_parts.make_surfaces(context, contributions, fixed, model.interfaces, thresholds)
+    occupied = np.concatenate([fixed // context.dimension, *(surface.blocks for surface in surfaces.values())])
+    found = interfaces.find(context, model.interfaces, occupied.astype(np.int32), thresholds)
+    surfaces |= {one.name: one.surface for one in found}
+    fixed = np.unique(np.concatenate([fixed, *(one.tied for one in found)])).astype(np.int32)
+    gaps = {one.name: one.gap for one in found}
+    bounds = contact_parts.make_bounds(context, scales, surfaces, contributions, prescribed, gaps)
     contact_parts.check_bounds(context, bounds, prescribed, fixed, thresholds)
     contact_parts.check_contradictions(context, scales, bounds, thresholds)
     contact_parts.check_normal_laws(contributions)
-    terms = contact_parts.make_terms(context, scales, surfaces, contributions, fixed, modify)
+    terms = contact_parts.make_terms(context, scales, surfaces, contributions, fixed, model.modify, gaps)
     linear, strains = (_by_name(contributions, kind) for kind in ("linear", "strains"))
     return Problem(
         domain=context.domain,
@@ -137,6 +145,7 @@ def _problem(
         contributions=tuple(contributions),
         held=held,
         part_facets=context.part_facets,
+        interfaces=found,
     )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from itertools import combinations_with_replacement
 from typing import Any
@@ -37,22 +37,28 @@ def unchanged(law: Superpotential) -> Superpotential:
 
 
 def make_surfaces(
-    context: DomainForms, contributions: Sequence[PlacedContribution], fixed: Entities, thresholds: Thresholds
+    context: DomainForms,
+    contributions: Sequence[PlacedContribution],
+    fixed: Entities,
+    interfaces: Collection[str],
+    thresholds: Thresholds,
 ) -> dict[str, Surface]:
-    """The surfaces of the parts with bounds or laws, by part, in the scene's order. Collective.
+    """The surfaces of the boundary parts with bounds or laws, by part, in the scene's order. Collective.
 
     Args:
         context: spaces, parts and vertices.
         contributions: of all effects.
         fixed: local scalar dofs that are prescribed.
+        interfaces: names of interfaces, which are no boundary parts.
         thresholds: what is rounding of a normal, and how far it may be turned.
 
     Raises:
         InputError: on all ranks alike: a facet lies inside the body, two sides of a part face each other, or two
             directions that meet at a vertex are neither orthogonal nor equal.
     """
-    parts = dict.fromkeys(w for w, _, c in contributions if w is not None and (c.bounds or c.laws))
-    stated = {w: b.direction for w, _, c in contributions for b in c.bounds if w and b.direction is not None}
+    found = dict.fromkeys(w for w, _, c in contributions if w is not None and (c.bounds or c.laws))
+    parts = [where for where in found if where not in interfaces]
+    stated = {w: b.direction for w, _, c in contributions for b in c.bounds if w in parts and b.direction is not None}
     surfaces = {
         where: contact_surface.make_surface(
             where,
@@ -75,6 +81,7 @@ def make_bounds(
     surfaces: Mapping[str, Surface],
     contributions: Sequence[PlacedContribution],
     prescribed: Array,
+    gaps: Mapping[str, Array],
 ) -> tuple[Bounds, ...]:
     """The bounds on u·n. Collective.
 
@@ -84,13 +91,21 @@ def make_bounds(
         surfaces: by part.
         contributions: of all effects.
         prescribed: the prescribed values at the local scalar dofs, zero at the others.
+        gaps: of interfaces as they are meshed, m, by name.
 
     Raises:
-        InputError: on all ranks alike: a bound that is not a finite number at some vertex.
+        InputError: on all ranks alike: a bound that is not a finite number at some vertex, or a measured gap of a part
+            that is no interface.
     """
     wanted = [(surfaces[w], e.key, b) for w, e, c in contributions if w is not None for b in c.bounds]
+    for surface, key, bound in wanted:
+        if bound.measured and surface.part not in gaps:
+            raise InputError(f'boundary.{surface.part}.{key}: gap = "measured" needs two bodies; give a number')
+        if bound.direction is not None and surface.part in gaps:
+            raise InputError(f'boundary.{surface.part}.{key}: an obstacle is no body; give gap = 0.0 or "measured"')
     return tuple(
-        _along_normal(_bounds(context, surface, key, bounds, scales), prescribed) for surface, key, bounds in wanted
+        _along_normal(_bounds(context, surface, key, bounds, scales, gaps), prescribed)
+        for surface, key, bounds in wanted
     )
 
 
@@ -105,7 +120,14 @@ def _along_normal(stated: Bounds, prescribed: Array) -> Bounds:
     return replace(stated, lower=(stated.lower - known) / along[:, 0], upper=(stated.upper - known) / along[:, 0])
 
 
-def _bounds(context: DomainForms, where: Surface, effect: str, bounds: NormalBounds, scales: Scales) -> Bounds:
+def _bounds(
+    context: DomainForms,
+    where: Surface,
+    effect: str,
+    bounds: NormalBounds,
+    scales: Scales,
+    gaps: Mapping[str, Array],
+) -> Bounds:
     """The bounds on u·m, m being the normal of the scene, that an effect puts on a part. Collective."""
 
     def value(formula: SpatialValue | None) -> Array:
@@ -118,7 +140,8 @@ def _bounds(context: DomainForms, where: Surface, effect: str, bounds: NormalBou
         return np.asarray(found)
 
     # lower ≤ -u·n ≤ upper
-    return Bounds(where, -value(bounds.upper), -value(bounds.lower) if bounds.lower else value(None))
+    open_by = gaps[where.part] / scales.displacement if bounds.measured else 0.0
+    return Bounds(where, -value(bounds.upper), open_by - value(bounds.lower) if bounds.lower else value(None))
 
 
 def check_bounds(
@@ -208,6 +231,7 @@ def make_terms(
     contributions: Sequence[PlacedContribution],
     fixed: Entities,
     modify: Modification,
+    interfaces: Collection[str],
 ) -> tuple[LawTerm, ...]:
     """The laws at the vertices of their parts. Collective.
 
@@ -218,12 +242,16 @@ def make_terms(
         contributions: of all effects.
         fixed: local scalar dofs that are prescribed.
         modify: the law that is solved in the place of each law.
+        interfaces: names of interfaces, whose weights are no vertex rule.
 
     Raises:
         InputError: on all ranks alike: a law that cannot be solved in 3D.
     """
     laws = [(surfaces[w], e.key, law) for w, e, c in contributions if w is not None for law in c.laws]
-    return tuple(_term(context, surface, key, law, modify, scales, fixed) for surface, key, law in laws)
+    return tuple(
+        _term(context, surface, key, law, modify, scales, fixed, by_rule=surface.part not in interfaces)
+        for surface, key, law in laws
+    )
 
 
 def _term(
@@ -234,6 +262,8 @@ def _term(
     modify: Modification,
     scales: Scales,
     fixed: Entities,
+    *,
+    by_rule: bool,
 ) -> LawTerm:
     directions = {
         Direction.SLIP: where.tangents,
@@ -255,7 +285,7 @@ def _term(
         directions=directions,
         free=(~np.isin(where.dofs, fixed)).astype(np.float64),
         density=density,
-        residual=forms.compiled(_residual(context, where, density)),
+        residual=forms.compiled(_residual(context, where, density)) if by_rule else None,
     )
 
 

@@ -32,6 +32,7 @@ class Surface:
             shares a vertex with a prescribed component or with another part, (m, d).
         tangents: unit tangents (:func:`tangents`), (m, d-1, d).
         weights: lumped area of each vertex over L^(d-1), (m,).
+        tied: whether the displacement is held at zero: that of two bodies that are glued, relative to each other.
     """
 
     part: str
@@ -42,6 +43,7 @@ class Surface:
     measured: Array
     tangents: Array
     weights: Array
+    tied: bool = False
 
     @property
     def dofs(self) -> Integers:

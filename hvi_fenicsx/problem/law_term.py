@@ -11,6 +11,8 @@ from typing import Any
 
 import numpy as np
 from dolfinx import fem
+from dolfinx.fem.petsc import assemble_vector
+from petsc4py import PETSc
 
 from ..effects import Direction
 from ..laws import Superpotential
@@ -30,7 +32,7 @@ class LawTerm:
         directions: what the displacement is multiplied with, (m, k, d); k = 2 for |u_t| in 3D.
         free: 1 where a component is not prescribed, (m, d).
         density: the P1 field τ.
-        residual: the compiled form ∫ τ·v ds.
+        residual: the compiled form ∫ τ·v ds; None where no quadrature of the functions lumps it.
     """
 
     surface: Surface
@@ -40,7 +42,7 @@ class LawTerm:
     directions: Array
     free: Array
     density: fem.Function
-    residual: Any
+    residual: Any | None
 
     @property
     def radial(self) -> bool:
@@ -55,6 +57,21 @@ class LawTerm:
         """What the law's j acts on: the signed slip, or |u_t| in 3D; shape (m,)."""
         slip = self.slip(u)
         return slip[:, 0] if slip.shape[1] == 1 else np.linalg.norm(slip, axis=1)
+
+    def add_force(self, out: PETSc.Vec, u: Array, derivative: Array) -> None:
+        """Add the law's nodal forces to a vector, whose ghosts are to be added to their owners. Collective.
+
+        Args:
+            out: a vector with ghosts.
+            u: the displacement, a local array.
+            derivative: of the law at u, (m,).
+        """
+        if self.residual is not None:
+            self.set_traction(u, derivative)
+            assemble_vector(out, self.residual)
+            return
+        force = self.surface.weights[:, None] * self._vector(u, derivative) * self.free
+        out.array.reshape(-1, force.shape[1])[self.surface.blocks] += force
 
     def set_traction(self, u: Array, derivative: Array) -> None:
         """Write τ into ``density``; ghosts are updated. Collective.

@@ -12,16 +12,20 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 from dolfinx import fem
 
 from ..effects import Contribution, Effect
 from ..mesh.domain import Domain
+from ..rigid import AnyBody
 from ..spatial_value import SpatialValue
 from ..typing import Array, Entities, Integers
-from . import bodies, contact_surface
+from . import bodies, contact_surface, coupling
 from .bodies import MeshBodies
 from .bulk import Bulk
 from .contact_surface import Surface
+from .coupling import Coupling
+from .interfaces import Interface
 from .law_term import LawTerm
 from .scaling import Scales
 
@@ -99,6 +103,7 @@ class Problem:
         contributions: what each effect contributed.
         held: the dofs of each condition, with its part.
         part_facets: the local facets of each boundary part.
+        interfaces: where two bodies meet; their relative displacements are unknowns.
     """
 
     domain: Domain
@@ -117,6 +122,7 @@ class Problem:
     contributions: tuple[PlacedContribution, ...]
     held: tuple[tuple[str, Entities], ...]
     part_facets: Mapping[str, Entities]
+    interfaces: tuple[Interface, ...] = ()
 
     @functools.cached_property
     def fixed_here(self) -> Entities:
@@ -125,5 +131,45 @@ class Problem:
 
     @functools.cached_property
     def bodies(self) -> MeshBodies:
-        """The connected parts of the mesh. Collective when first used."""
-        return bodies.find(self.domain, self.space, self.points)
+        """The bodies, those that meet in an interface together. Collective when first used."""
+        return bodies.find(self.domain, self.space, self.points, [one.members for one in self.interfaces])
+
+    @functools.cached_property
+    def coupling(self) -> Coupling | None:
+        """The way between displacements and unknowns; None where both are the same. Collective when first used."""
+        return coupling.of(self.space, self.interfaces)
+
+    @functools.cached_property
+    def _relative_motions(self) -> tuple[Array, ...]:
+        """The basis motions of each body at all local vertices, relative on interfaces, (n, motions, d) each."""
+        points, every = np.asarray(self.points / self.scales.length), np.arange(len(self.points), dtype=np.int32)
+        found = []
+        for body in self.bodies:
+            mine = (self.bodies.labels == body.index)[:, None, None]
+            fields = np.where(mine, self.bodies.fields(points, every, body), 0.0)
+            columns = [self.relative(np.ascontiguousarray(f)).reshape(f.shape) for f in np.moveaxis(fields, 1, 0)]
+            found.append(np.stack(columns, axis=1))
+        return tuple(found)
+
+    def motions_at(self, blocks: npt.NDArray[np.integer], body: AnyBody) -> Array:
+        """The basis motions at vertices of a body as bounds and laws see them, (m, motions, d). Collective at first.
+
+        Args:
+            blocks: local vertices, (m,).
+            body: one of the bodies.
+        """
+        if self.coupling is not None:
+            return self._relative_motions[body.index][blocks]
+        return self.bodies.fields(np.asarray(self.points[blocks] / self.scales.length), blocks, body)
+
+    def relative(self, u: Array) -> Array:
+        """A displacement as what bounds and laws see: relative on interfaces; both local arrays. Collective."""
+        return u if self.coupling is None else self.coupling.relative(u)
+
+    def combined(self, forces: Array) -> Array:
+        """Forces by owned vertex (n, d) as those that bounds and laws balance: Tᵀ f. Collective."""
+        return forces if self.coupling is None else self.coupling.forces(forces)
+
+    def on_bodies(self, forces: Array) -> Array:
+        """Forces of bounds and laws by owned vertex (n, d) as those that act on the bodies. Collective."""
+        return forces if self.coupling is None else self.coupling.forces_on_bodies(forces)

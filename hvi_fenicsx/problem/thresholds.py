@@ -23,6 +23,10 @@ class Thresholds:
         largest_scale: of stresses (N/m²) and displacements (m); its inverse is the smallest. Energies are products of
             both, so beyond this they are no numbers any more.
         law_scale: smallest scale of a law's traction, in units of the load's stress: a weaker law is not judged finer.
+        facing: cosine of the largest angle between the normal of a facet and that against the one that it meets.
+        sliver: part of a facet that is too little to lie over another one.
+        uncovered: part of a facet at its end that may lie beyond the other side.
+        overlap: part of a facet's length by which bodies may overlap: curved sides that touch do so by less.
         least_force: forces that are a smaller part of stiffness times displacement are not judged finer.
     """
 
@@ -36,6 +40,10 @@ class Thresholds:
     outside_bounds: float = 1e-12
     largest_scale: float = 1e100
     law_scale: float = 1e-3
+    facing: float = 0.5
+    sliver: float = 1e-12
+    uncovered: float = 1e-6
+    overlap: float = 0.1
     least_force: float = 1e-5
 
 

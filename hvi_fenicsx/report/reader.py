@@ -156,6 +156,14 @@ class Result:
         roles = sorted((role for _, role in self._roles("body")), key=lambda role: role["drive"] != "load")
         return list(dict.fromkeys(role["label"] for role in roles))
 
+    def between_bodies(self, part: str) -> bool:
+        """Whether a part is where two bodies meet.
+
+        Args:
+            part: its name.
+        """
+        return part in self.scene.get("interface", {})
+
     def obstacle(self, part: str) -> Array | None:
         """The unit vector (3,) from a part towards its flat obstacle, if it has one."""
         known = [role["obstacle"] for role in self.roles(part) if role["obstacle"]]

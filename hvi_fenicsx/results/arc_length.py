@@ -68,14 +68,17 @@ def along(points: Array, numbers: Integers, pairs: Integers) -> tuple[Integers, 
     Args:
         points: the vertices, m, (m, 2).
         numbers: of the vertices, (m,).
-        pairs: the facets by these numbers, the body to their left, (k, 2); a facet may be there twice.
+        pairs: the facets by these numbers, the body to their left, (k, 2); a facet may be there twice. One with a
+            vertex that is none of these is left out.
     """
     rank = np.empty(len(points), dtype=np.int64)
     rank[lexicographic(points)] = np.arange(len(points))
     by_number = np.argsort(numbers)
-    edges = by_number[np.searchsorted(numbers[by_number], np.unique(pairs, axis=0))]
+    within = np.unique(pairs[np.isin(pairs, numbers).all(axis=1)], axis=0)
+    edges = by_number[np.searchsorted(numbers[by_number], within)]
     inner = np.unique(edges[:, 1])
     found = [chain if chain[0] in inner else _oriented(chain, rank) for chain in chains(edges, rank)]
+    found += [np.array([alone]) for alone in np.setdiff1d(np.arange(len(points)), edges)]
     return _measured(points, sorted(found, key=lambda chain: int(np.min(rank[chain]))), rank)
 
 

@@ -107,7 +107,7 @@ def _part(problem: Problem, state: ContactState) -> PartArrays | None:
     return PartArrays(
         columns=columns,
         vertices=vertices[order],
-        facets=facets,
+        facets=facets[np.isin(facets, vertices).all(axis=1)],
         weights=weights[order],
         normals=normals[order],
         drops=np.concatenate([np.empty(0), *drops]) * scales.displacement,

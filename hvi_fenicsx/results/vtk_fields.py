@@ -43,6 +43,8 @@ def write_body(path: Path, solution: Solution, stress: Array) -> None:
     cells = {"von_mises": von_mises(stress), "stress": stress, "strain": _strain(problem, u)}
     if (estimate := solution.estimate) is not None:
         cells["error"] = np.asarray(estimate.cells / (estimate.energy_norm or 1.0), dtype=np.float64)
+    if len(problem.bodies.single()) > 1:
+        cells["body"] = problem.bodies.number_at(_owned_cells(problem)[:, 0]).astype(np.float64)
     _write_on_body(path, problem, {"displacement": u, "reaction": _reactions(solution)}, cells)
 
 

@@ -4,18 +4,21 @@ from ..laws.convex_parts import Directional
 from .analyse import analyse, load_factors
 from .kernel import FixedDirections, kernel, modes, null_space
 from .least_energy import Rest, Sides, least_energy
-from .motions import Mode, RigidBody, describe, motion_at, rigid_fields
+from .motions import AnyBody, JoinedBodies, Mode, MotionFields, RigidBody, describe, fields_at, motion_at, rigid_fields
 from .reduction import ContactCone, Resistance, RigidProblem
 from .solvability import ExistenceState, LoadFactors, PaperConditions, Solvability, combine, combine_factors, undecided
 from .thresholds import Thresholds
 
 __all__ = [
+    "AnyBody",
     "ContactCone",
     "Directional",
     "ExistenceState",
     "FixedDirections",
+    "JoinedBodies",
     "LoadFactors",
     "Mode",
+    "MotionFields",
     "PaperConditions",
     "Resistance",
     "Rest",
@@ -28,6 +31,7 @@ __all__ = [
     "combine",
     "combine_factors",
     "describe",
+    "fields_at",
     "kernel",
     "least_energy",
     "load_factors",

@@ -9,7 +9,7 @@ import numpy as np
 from mpi4py import MPI
 
 from ..typing import Array
-from .motions import Mode, RigidBody, mode_of, rigid_fields
+from .motions import AnyBody, Mode, Places, fields_at, is_place, mode_of
 from .thresholds import DEFAULT, Thresholds
 
 
@@ -18,21 +18,19 @@ class FixedDirections:
     """Conditions direction·y(x) = 0; each rank gives its own rows.
 
     Attributes:
-        points: x, (k, 3).
+        points: x, (k, 3), or the motions there.
         directions: (k, d).
     """
 
-    points: Array
+    points: Places
     directions: Array
 
     def __post_init__(self) -> None:
-        if np.ndim(self.directions) != 2 or np.shape(self.points) != (len(self.directions), 3):
+        if np.ndim(self.directions) != 2 or not is_place(self.points, len(self.directions)):
             raise ValueError("FixedDirections needs points (k, 3) and directions (k, d) with the same k")
 
 
-def kernel(
-    comm: MPI.Comm, body: RigidBody, fixed: Sequence[FixedDirections], thresholds: Thresholds = DEFAULT
-) -> Array:
+def kernel(comm: MPI.Comm, body: AnyBody, fixed: Sequence[FixedDirections], thresholds: Thresholds = DEFAULT) -> Array:
     """A basis of Y as columns of rigid coefficients, (3|6, k). Collective; the same on all ranks.
 
     First the translations, orthonormal; then rotations about orthonormal axes, one radian each, whose
@@ -47,15 +45,15 @@ def kernel(
     """
     rows = np.vstack([np.zeros((0, body.motions)), *(_condition_rows(part, body) for part in fixed)])
     factors = comm.gather(triangle(rows), root=0)
-    basis = None if factors is None else _natural_null_space(np.vstack(factors), body.dimension, thresholds)
+    basis = None if factors is None else _natural_null_space(np.vstack(factors), body.shifts, thresholds)
     return np.asarray(comm.bcast(basis, root=0))
 
 
-def _natural_null_space(rows: Array, dimension: int, thresholds: Thresholds) -> Array:
-    return natural_basis(null_space(rows, thresholds), dimension, thresholds)
+def _natural_null_space(rows: Array, shifts: int, thresholds: Thresholds) -> Array:
+    return natural_basis(null_space(rows, thresholds), shifts, thresholds)
 
 
-def modes(basis: Array, body: RigidBody) -> tuple[Mode, ...]:
+def modes(basis: Array, body: AnyBody) -> tuple[Mode, ...]:
     """The motions of a kernel's basis. Local.
 
     Args:
@@ -84,21 +82,21 @@ def null_space(rows: Array, thresholds: Thresholds = DEFAULT) -> Array:
     return np.asarray(right[values <= thresholds.rank * values[0]].T)
 
 
-def natural_basis(basis: Array, dimension: int, thresholds: Thresholds = DEFAULT) -> Array:
+def natural_basis(basis: Array, count: int, thresholds: Thresholds = DEFAULT) -> Array:
     """The same space by translations first, then rotations, see `kernel`.
 
     Args:
         basis: rigid coefficients (3|6, k), one column for each motion.
-        dimension: of space, 2 or 3.
+        count: how many of the coefficients are translations; they come first.
         thresholds: what counts as zero.
     """
     basis = np.where(np.abs(basis) <= thresholds.rank, 0.0, basis)
-    shifts = _sparse_basis(basis[:dimension] @ null_space(basis[dimension:], thresholds), thresholds)
-    spins = _sparse_basis(basis[dimension:], thresholds)
-    lift = np.linalg.lstsq(basis[dimension:], spins, rcond=thresholds.rank)[0]
-    centre = basis[:dimension] @ lift
+    shifts = _sparse_basis(basis[:count] @ null_space(basis[count:], thresholds), thresholds)
+    spins = _sparse_basis(basis[count:], thresholds)
+    lift = np.linalg.lstsq(basis[count:], spins, rcond=thresholds.rank)[0]
+    centre = basis[:count] @ lift
     centre = centre - shifts @ (shifts.T @ centre)
-    zeros = np.zeros((len(basis) - dimension, shifts.shape[1]))
+    zeros = np.zeros((len(basis) - count, shifts.shape[1]))
     return _snap(np.hstack([np.vstack([shifts, zeros]), np.vstack([centre, spins])]))
 
 
@@ -130,6 +128,6 @@ def _snap(values: Array) -> Array:
     return np.where(np.abs(values) < 1e-13, 0.0, values)
 
 
-def _condition_rows(part: FixedDirections, body: RigidBody) -> Array:
+def _condition_rows(part: FixedDirections, body: AnyBody) -> Array:
     """(k, 3|6): the work of each condition on the basis motions."""
-    return np.asarray(np.einsum("kd,knd->kn", part.directions, rigid_fields(part.points, body)))
+    return np.asarray(np.einsum("kd,knd->kn", part.directions, fields_at(part.points, body)))

@@ -77,7 +77,7 @@ class Analysis:
         start = -self._factor(self.growth, -self.work, still)[0] if self._pushes else -np.inf
         margin = self._margin(self.growth)
         state = self._state(margin)
-        free = natural_basis(self.reduced.frame @ self.free, self.problem.body.dimension, self.thresholds)
+        free = natural_basis(self.reduced.frame @ self.free, self.problem.body.shifts, self.thresholds)
         return Solvability(
             state=state,
             margin=None if margin is None else self._flat(margin.value),
@@ -197,7 +197,8 @@ class Analysis:
         gram = sum(
             (g for g, c in zip(self.reduced.traces, c4, strict=True) if c > 0.0), np.zeros((len(self.work),) * 2)
         )
-        trace = max(float(y @ gram @ y) for y in vertices(self.reduced.frame, self.thresholds.rank))
+        corners = vertices(self.reduced.frame, self.thresholds.rank) if c4.any() else ()
+        trace = max((float(y @ gram @ y) for y in corners), default=0.0)
         return float(np.sqrt(c4**2 @ self.reduced.areas * trace))
 
     def _flat(self, margin: float) -> float:

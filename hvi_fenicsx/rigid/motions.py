@@ -1,16 +1,17 @@
-"""Rigid motions of one body: their fields, and what they are called.
+"""Rigid motions of one body, or of bodies that meet: their fields, and what they are called.
 
-Basis: in 2D (t1, t2, r) with the rotation field (-(x2 - c2), x1 - c1); in 3D (t1, t2, t3, r1, r2, r3) with
-r × (x - c). c is the body's centre; all lengths are nondimensional.
+Basis of one body: in 2D (t1, t2, r) with the rotation field (-(x2 - c2), x1 - c1); in 3D (t1, t2, t3, r1, r2, r3) with
+r × (x - c). c is the body's centre; all lengths are nondimensional. Of several bodies: first the translations of all,
+body by body, then the rotations of all.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..typing import Array
+from ..typing import Array, Integers
 
 NEGLIGIBLE = 1e-9
 """A coefficient this small beside the largest is not named."""
@@ -46,15 +47,118 @@ class RigidBody:
         """Number of rigid motions: 3 in 2D, 6 in 3D."""
         return 3 if self.dimension == 2 else 6
 
+    @property
+    def shifts(self) -> int:
+        """Number of translations among them; they come first."""
+        return self.dimension
+
+    def describe(self, coefficients: Array, *, signed: bool) -> str:
+        """A motion in words; see :func:`describe`.
+
+        Args:
+            coefficients: (3|6,), on the basis of this module.
+            signed: whether the name has the sense too.
+        """
+        return describe(coefficients, self, signed=signed)
+
+
+@dataclass(frozen=True)
+class JoinedBodies:
+    """Bodies that meet in interfaces, as far as their rigid motions need it; nondimensional.
+
+    Attributes:
+        bodies: at least two; the index of each is its number here.
+        index: the number of the whole among all that do not meet.
+    """
+
+    bodies: tuple[RigidBody, ...]
+    index: int = 0
+
+    @property
+    def dimension(self) -> int:
+        """2 or 3."""
+        return self.bodies[0].dimension
+
+    @property
+    def name(self) -> str:
+        """All names."""
+        return " and ".join(body.name for body in self.bodies)
+
+    @property
+    def motions(self) -> int:
+        """Number of rigid motions."""
+        return sum(body.motions for body in self.bodies)
+
+    @property
+    def shifts(self) -> int:
+        """Number of translations among them; they come first."""
+        return sum(body.shifts for body in self.bodies)
+
+    def own(self, number: int) -> Integers:
+        """Which of the motions are those of one body, (3|6,).
+
+        Args:
+            number: of the body.
+        """
+        shifts, spins = self.bodies[number].shifts, self.bodies[number].motions - self.bodies[number].shifts
+        first = self.shifts + number * spins
+        return np.r_[number * shifts : (number + 1) * shifts, first : first + spins]
+
+    def describe(self, coefficients: Array, *, signed: bool) -> str:
+        """A motion in words: what the bodies do that move, those together that do the same.
+
+        Args:
+            coefficients: on the basis of this module.
+            signed: whether the name has the sense too.
+        """
+        found: dict[str, list[str]] = {}
+        for number, body in enumerate(self.bodies):
+            own = np.asarray(coefficients)[self.own(number)]
+            if np.abs(own).max() > NEGLIGIBLE * np.abs(coefficients).max():
+                found.setdefault(describe(own, replace(body, name=""), signed=signed), []).append(body.name)
+        return ", ".join(f"{motion} of {' and '.join(names)}" for motion, names in found.items())
+
+
+AnyBody = RigidBody | JoinedBodies
+"""What moves."""
+
+
+@dataclass(frozen=True)
+class MotionFields:
+    """What the basis motions are at some vertices: the displacement, on an interface the relative one.
+
+    Attributes:
+        values: (m, motions, d).
+    """
+
+    values: Array
+
+    def __len__(self) -> int:
+        return len(self.values)
+
+
+Places = Array | MotionFields
+"""Points (m, 3) of one body, nondimensional, or the motions there."""
+
+
+def is_place(places: Places, count: int) -> bool:
+    """Whether these are so many places.
+
+    Args:
+        places: points or motions.
+        count: their number.
+    """
+    return len(places) == count and (isinstance(places, MotionFields) or np.shape(places) == (count, 3))
+
 
 @dataclass(frozen=True)
 class Mode:
-    """A rigid motion of one body.
+    """A rigid motion of one body, or of bodies that meet.
 
     Attributes:
         name: the motion in words.
-        coefficients: (3|6,), on the basis of this module.
-        body: the body's index.
+        coefficients: (motions,), on the basis of this module.
+        body: the index of what moves.
     """
 
     name: str
@@ -62,7 +166,7 @@ class Mode:
     body: int = 0
 
 
-def mode_of(coefficients: Array, body: RigidBody, *, signed: bool) -> Mode:
+def mode_of(coefficients: Array, body: AnyBody, *, signed: bool) -> Mode:
     """The motion with the given coefficients, with its name.
 
     Args:
@@ -70,11 +174,25 @@ def mode_of(coefficients: Array, body: RigidBody, *, signed: bool) -> Mode:
         body: the body that moves.
         signed: whether the name has the sense too.
     """
-    return Mode(describe(coefficients, body, signed=signed), tuple(float(c) for c in coefficients), body.index)
+    return Mode(body.describe(coefficients, signed=signed), tuple(float(c) for c in coefficients), body.index)
+
+
+def fields_at(places: Places, body: AnyBody) -> Array:
+    """The basis motions, (m, motions, d). Local to the rank.
+
+    Args:
+        places: points of the body, or the motions there.
+        body: what moves.
+    """
+    if isinstance(places, MotionFields):
+        return places.values
+    if isinstance(body, JoinedBodies):
+        raise ValueError("points do not say which of several bodies they belong to; give MotionFields")
+    return rigid_fields(places, body)
 
 
 def rigid_fields(points: Array, body: RigidBody) -> Array:
-    """The basis motions, (m, 3|6, d). Local to the rank.
+    """The basis motions of one body, (m, 3|6, d). Local to the rank.
 
     Args:
         points: (m, 3), nondimensional.

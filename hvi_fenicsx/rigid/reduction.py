@@ -17,7 +17,7 @@ from ..laws.convex_parts import Directional
 from ..typing import Array
 from .functional import Functional, SlipIntegral
 from .kernel import FixedDirections, kernel
-from .motions import RigidBody, rigid_fields
+from .motions import AnyBody, Places, fields_at, is_place
 from .thresholds import DEFAULT, Thresholds
 
 
@@ -26,15 +26,15 @@ class ContactCone:
     """Unilateral contact: y·n <= 0.
 
     Attributes:
-        points: vertices (m, 3).
+        points: vertices (m, 3), or the motions there.
         normals: n, outward, of unit length, (m, d).
     """
 
-    points: Array
+    points: Places
     normals: Array
 
     def __post_init__(self) -> None:
-        if np.ndim(self.normals) != 2 or np.shape(self.points) != (len(self.normals), 3):
+        if np.ndim(self.normals) != 2 or not is_place(self.points, len(self.normals)):
             raise ValueError("ContactCone needs points (m, 3) and normals (m, d) with the same m")
 
 
@@ -55,7 +55,7 @@ class Resistance:
     """One part that carries a law.
 
     Attributes:
-        points: vertices (m, 3).
+        points: vertices (m, 3), or the motions there.
         weights: lumped areas (m,).
         directions: (m, r, d). r = 1: the law acts on the scalar slip y·direction (in 2D the tangent; for a
             normal law the inward normal for opening, the outward one for penetration). r = 2: on the length
@@ -65,7 +65,7 @@ class Resistance:
         c4: the paper's growth constant, η(-ξ) <= c4|ξ| for η in ∂j(ξ); a traction.
     """
 
-    points: Array
+    points: Places
     weights: Array
     directions: Array
     growth: Directional
@@ -74,7 +74,7 @@ class Resistance:
 
     def __post_init__(self) -> None:
         m = len(self.weights)
-        if np.shape(self.points) != (m, 3) or np.ndim(self.directions) != 3 or len(self.directions) != m:
+        if not is_place(self.points, m) or np.ndim(self.directions) != 3 or len(self.directions) != m:
             raise ValueError("Resistance needs points (m, 3), weights (m,), directions (m, r, d), one m")
         values = (self.growth.minus, self.growth.plus, self.peak.minus, self.peak.plus)
         if not all(value > -np.inf for value in values):  # also refuses nan
@@ -85,7 +85,7 @@ class Resistance:
 
 @dataclass(frozen=True, kw_only=True)
 class RigidProblem:
-    """What the rigid motions of one body meet.
+    """What the rigid motions of one body, or of bodies that meet in interfaces, meet.
 
     Attributes:
         body: the body.
@@ -96,7 +96,7 @@ class RigidProblem:
         force: sum of the absolute nodal forces: beside it a work is rounding or not, however well loads balance.
     """
 
-    body: RigidBody
+    body: AnyBody
     loads: Mapping[str, Array]
     fixed: tuple[FixedDirections, ...] = ()
     contact: tuple[ContactCone, ...] = ()
@@ -208,12 +208,12 @@ def unit_rows(rows: Array, tiny: float) -> Array:
     return np.asarray(rows[length > tiny] / length[length > tiny, None])
 
 
-def _trace(part: Resistance, body: RigidBody, basis: Array) -> Array:
+def _trace(part: Resistance, body: AnyBody, basis: Array) -> Array:
     """∫ y·y over this rank's vertices of a part, as a quadratic form on the kernel's basis, (k, k)."""
-    fields = np.einsum("mnd,nk->mdk", rigid_fields(part.points, body), basis)
+    fields = np.einsum("mnd,nk->mdk", fields_at(part.points, body), basis)
     return np.asarray(np.einsum("m,mdk,mdl->kl", part.weights, fields, fields))
 
 
-def _work(points: Array, directions: Array, body: RigidBody, basis: Array) -> Array:
+def _work(points: Places, directions: Array, body: AnyBody, basis: Array) -> Array:
     """direction·y of each basis motion of the kernel: directions (m, r, d) give (m, r, k)."""
-    return np.asarray(np.einsum("mrd,mnd->mrn", directions, rigid_fields(points, body)) @ basis)
+    return np.asarray(np.einsum("mrd,mnd->mrn", directions, fields_at(points, body)) @ basis)

@@ -11,7 +11,7 @@ from ..errors import InputError
 from ..laws import smoothing
 from ..mesh.shapes import DomainShape
 from ..schema import Mistake, shown, unknown
-from .effect_tables import BodyTable, BoundaryTable, MaterialTable
+from .effect_tables import BodyTable, BoundaryTable, InterfaceTable, MaterialTable
 from .named_tables import WHOLE
 from .solver_table import SolverTable
 
@@ -44,6 +44,10 @@ class Tables(Protocol):
         """Boundary parts by name."""
 
     @property
+    def interface(self) -> Mapping[str, InterfaceTable]:
+        """Interfaces by name."""
+
+    @property
     def solver(self) -> SolverTable:
         """How to solve."""
 
@@ -55,6 +59,7 @@ def contradictions(scene: Tables) -> list[Mistake]:
 
 def _coarse(scene: Tables) -> Iterator[Mistake]:
     yield from _unknown_sides(scene)
+    yield from _interfaces(scene)
     yield from _regions(scene)
     yield from _one_by_one(scene)
     yield from _start(scene)
@@ -72,11 +77,23 @@ def _unknown_sides(scene: Tables) -> Iterator[Mistake]:
     if scene.domain.normals is None:
         return
     known = list(scene.domain.normals)
-    for name, boundary in scene.boundary.items():
-        for side in boundary.on:
-            if side not in known:
-                text = f"{unknown('side', side, known)} (a {scene.domain.shape})"
-                yield Mistake(("boundary", name, "on"), text)
+    wanted = [(("boundary", name, "on"), side) for name, part in scene.boundary.items() for side in part.on]
+    wanted += [(("interface", n, "between"), side) for n, part in scene.interface.items() for side in part.between]
+    for key, side in wanted:
+        if side not in known:
+            yield Mistake(key, f"{unknown('side', side, known)} (a {scene.domain.shape})")
+
+
+def _interfaces(scene: Tables) -> Iterator[Mistake]:
+    """Interfaces and boundary parts have names of their own, and a pair of sides meets once."""
+    met: dict[frozenset[str], str] = {}
+    for name, part in scene.interface.items():
+        if name in scene.boundary:
+            yield Mistake(("interface", name), f"boundary.{name} has this name already; choose another")
+        sides = frozenset(part.between)
+        if sides in met:
+            yield Mistake(("interface", name, "between"), f"these sides meet in interface.{met[sides]} already")
+        met.setdefault(sides, name)
 
 
 def _regions(scene: Tables) -> Iterator[Mistake]:
@@ -111,6 +128,7 @@ def _one_by_one(scene: Tables) -> Iterator[Mistake]:
     materials = [(("material", n), m.elasticity) for n, m in scene.material.items()]
     bodies = [(("body", n, e.key), e) for n, b in scene.body.items() for e in b.effects]
     parts = [(key, effect) for key, _, effect in _on_boundary(scene.boundary)]
+    parts += [(("interface", n, e.key), e) for n, part in scene.interface.items() for e in part.effects]
     for key, effect in [*materials, *bodies, *parts]:
         try:
             effect.check(scene.dimension)
@@ -131,7 +149,8 @@ def _on_boundary(boundary: Mapping[str, BoundaryTable]) -> Iterator[_Item]:
 
 
 def _smoothing(scene: Tables) -> Iterator[Mistake]:
-    names = sorted({law.name for _, _, effect in _on_boundary(scene.boundary) for law in effect.superpotentials()})
+    tables = (*scene.boundary.values(), *scene.interface.values())
+    names = sorted({law.name for part in tables for effect in part.effects for law in effect.superpotentials()})
     wanted = scene.solver.smoothing
     fitting = None if wanted is None else smoothing.registered()[wanted].laws
     if fitting is not None and (others := [n for n in names if n not in fitting]):

@@ -20,7 +20,7 @@ from pydantic import (
 )
 
 from ..effects import Effect, Place
-from ..schema import Key, Mistake, Names, Table, mistakes_of, unknown, validation_error
+from ..schema import Key, Mistake, Names, Table, mistakes_of, unknown, validation_error, vector
 from .named_tables import WHOLE, named_or_whole
 
 DEFAULT_ELASTICITY = "isotropic"
@@ -40,7 +40,12 @@ class EffectTable(Table):
     @classmethod
     def keys(cls) -> list[str]:
         """All keys it may have."""
-        return [*cls.model_fields, *Effect.registry[cls.place]]
+        return [*cls.model_fields, *cls.kinds()]
+
+    @classmethod
+    def kinds(cls) -> Mapping[str, type[Effect]]:
+        """The effects that it may have, by key."""
+        return Effect.registry[cls.place]
 
     @model_validator(mode="wrap")
     @classmethod
@@ -55,10 +60,10 @@ class EffectTable(Table):
     def _read(cls, key: str, value: Any, mistakes: list[Mistake]) -> Any:
         if key in cls.model_fields:
             return value
-        if key not in Effect.registry[cls.place]:
+        if key not in cls.kinds():
             mistakes.append(Mistake((key,), unknown("key", key, cls.keys())))
             return value
-        return read_effect(Effect.registry[cls.place][key], value, (key,), mistakes)
+        return read_effect(cls.kinds()[key], value, (key,), mistakes)
 
 
 def read_effect(
@@ -113,6 +118,43 @@ class BoundaryTable(EffectTable):
 
         def __init__(self, **keys: Any) -> None:
             """The keys of the scene file, the effects as objects or as the scene file writes them."""
+
+
+class InterfaceTable(EffectTable):
+    """Where two bodies meet, and what acts between them, on the displacement of the first relative to the second.
+
+    NAME is the name of the part in the results.
+    """
+
+    place: ClassVar[Place] = Place.BOUNDARY
+
+    between: Annotated[tuple[str, str], vector(2)]
+    """the two sides, like ["lower.top", "upper.bottom"]; the vertices of the first carry contact and laws, and its
+    outward normal counts: the finer one, or the one that lies within the other, should be the first"""
+    tied: bool = False
+    """whether the sides are glued for ever; then no effect acts between them"""
+
+    if TYPE_CHECKING:
+
+        def __init__(self, **keys: Any) -> None:
+            """The keys of the scene file, the effects as objects or as the scene file writes them."""
+
+    @classmethod
+    def kinds(cls) -> Mapping[str, type[Effect]]:
+        """The effects that may act between two bodies, by key."""
+        return {key: kind for key, kind in Effect.registry[cls.place].items() if kind.on_interfaces}
+
+    @model_validator(mode="after")
+    def _something_acts(self) -> InterfaceTable:
+        if self.between[0] == self.between[1]:
+            raise validation_error([Mistake(("between",), "names one side twice; name the sides of two bodies")])
+        if self.tied and self.effects:
+            keys = ", ".join(effect.key for effect in self.effects)
+            raise validation_error([Mistake(("tied",), f"glues the sides for ever: leave out {keys}, or tied")])
+        if not self.tied and not self.effects:
+            text = f"nothing acts between the sides: give tied = true, or one of {', '.join(self.kinds())}"
+            raise validation_error([Mistake((), text)])
+        return self
 
 
 class BodyTable(EffectTable):

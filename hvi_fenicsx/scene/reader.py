@@ -23,7 +23,7 @@ from .toml_lines import line_of, lines_of
 
 _LARGEST = 1_000_000
 """Bytes of a scene file at most."""
-_KEY = re.compile(r"((?:title|plugins|domain|material|body|boundary|solver)\.[^:]+): ")
+_KEY = re.compile(r"((?:title|plugins|domain|material|body|boundary|interface|solver)\.[^:]+): ")
 """How a message begins that names a key of the scene."""
 _MOST_MISTAKES = 10
 """Mistakes that one message lists."""
@@ -110,7 +110,7 @@ class _Source:
     def path(self, key: str) -> _Place:
         """The keys down to a place that a message names, joined by dots; names may have dots in them, too."""
         known = {".".join(map(str, place)): place for place in (*self._lines, *self.overridden)}
-        known |= _effects_by_region(self.tables.get("body", {}))
+        known |= _effects_by_region(self.tables.get("body", {})) | _interfaces(self.tables.get("interface"))
         begins = [text for text in known if f"{key}.".startswith(f"{text}.")]
         nearest = max(begins, key=len, default="")
         rest = key[len(nearest) :].strip(".")
@@ -146,6 +146,11 @@ def _effects_by_region(body: Any) -> dict[str, _Place]:
             for key in table if isinstance(table, dict) else ():
                 found[".".join(filter(None, ("body", region, key)))] = (*place, key)
     return found
+
+
+def _interfaces(tables: Any) -> dict[str, _Place]:
+    """The places of the interfaces by the names that they have among the boundary parts."""
+    return {f"boundary.{name}": ("interface", name) for name in tables} if isinstance(tables, dict) else {}
 
 
 def _text(file: Path) -> str:

@@ -15,8 +15,8 @@ from pydantic.fields import FieldInfo
 
 from ..effects import Effect, Place
 from ..laws.base import registered
-from ..mesh.shapes import DomainShape
-from .effect_tables import DEFAULT_ELASTICITY, BodyTable, BoundaryTable, MaterialTable
+from ..mesh.shapes import DomainShape, PlacedShape
+from .effect_tables import DEFAULT_ELASTICITY, BodyTable, BoundaryTable, InterfaceTable, MaterialTable
 from .scene import Scene
 from .solver_table import OneOf, SolverTable
 
@@ -44,7 +44,8 @@ The command line can change every value:
 | `--set 'solver.method="branch"'` | a text, in quotes; the outer quotes are for the shell |
 | `--set 'solver={}'` | a whole table; here all its keys get their defaults, so the unsmoothed law is solved |
 
-The name of a boundary table (`floor` in `[boundary.floor]`) is the name of the part in the results.
+The name of a boundary table (`floor` in `[boundary.floor]`) is the name of the part in the results. Where there are
+several bodies, their sides are named `"upper.left"`, and their regions `"upper"`.
 """
 
 
@@ -58,12 +59,14 @@ def _document() -> Iterator[str]:
     yield from _table("Top level", Scene, ["title", "plugins"])
     for name, shape in _provided(DomainShape.registry).items():
         yield from _table(f'`[domain]` with `shape = "{name}"`', shape)
+    yield from _table("`[domain.NAME]`, where there are several bodies", PlacedShape, ["origin", "angle"])
     yield from _table("`[material]`, or `[material.NAME]` where there are several", MaterialTable)
     yield from _effects(Place.MATERIAL, 'The keys of `elasticity = "{key}"`')
     yield from _table("`[body]`, or `[body.NAME]`", BodyTable)
     yield from _effects(Place.BODY, "`{key}` in a body table")
     yield from _table("`[boundary.NAME]`", BoundaryTable)
     yield from _effects(Place.BOUNDARY, "`{key}` in a boundary table")
+    yield from _table("`[interface.NAME]`", InterfaceTable)
     yield from _laws()
     yield from _table("`[solver]`", SolverTable)
 

@@ -21,11 +21,11 @@ from pydantic import (
 from pydantic_core import PydanticCustomError
 
 from ..effects import Effect, Place
-from ..mesh.shapes import DomainShape
+from ..mesh.shapes import DomainShape, SeveralBodies
 from ..schema import Mistake, Names, Table, choose, located_error, refusal, validation_error
 from . import plugins
 from .consistency import contradictions
-from .effect_tables import Bodies, BoundaryTable, Materials
+from .effect_tables import Bodies, BoundaryTable, InterfaceTable, Materials
 from .solver_table import SolverTable
 
 _NAME = re.compile(r"\w[\w.-]{0,99}")
@@ -52,6 +52,8 @@ def _title(text: str) -> str:
 
 
 def _shape(value: Any, info: ValidationInfo) -> Any:
+    if SeveralBodies.named(value):
+        return SeveralBodies.model_validate(value, context=info.context)
     return choose(value, "shape", DomainShape.registry, info.context)
 
 
@@ -75,6 +77,8 @@ class Scene(Table):
     """what acts in the body's volume"""
     boundary: dict[str, BoundaryTable] = Field(default_factory=dict)
     """parts of the boundary and what acts on them"""
+    interface: dict[str, InterfaceTable] = Field(default_factory=dict)
+    """where two bodies meet, and what acts between them"""
     solver: SolverTable = SolverTable()
     """how to solve"""
 
@@ -117,7 +121,8 @@ class Scene(Table):
 
     @model_validator(mode="after")
     def _consistent(self) -> Scene:
-        mistakes = [*_bad_names(self.boundary)] or contradictions(self)
+        names = [*_bad_names("boundary", self.boundary), *_bad_names("interface", self.interface)]
+        mistakes = names or contradictions(self)
         if mistakes:
             raise validation_error(mistakes)
         return self
@@ -132,8 +137,9 @@ class Scene(Table):
 
     @property
     def parts(self) -> dict[str, tuple[str, ...]]:
-        """The sides (or physical groups) that each boundary table stands on."""
-        return {name: boundary.on for name, boundary in self.boundary.items()}
+        """The sides (or physical groups) that each boundary table stands on, and the first side of each interface."""
+        own = {name: boundary.on for name, boundary in self.boundary.items()}
+        return own | {name: (interface.between[0],) for name, interface in self.interface.items()}
 
     def with_domain(self, **values: Any) -> Self:
         """The scene with other values in ``[domain]``, validated again.
@@ -165,15 +171,15 @@ class Scene(Table):
         for body in self.body.values():
             for region in body.region or (None,):
                 yield from (PlacedEffect(Place.BODY, region, effect) for effect in body.effects)
-        for name, boundary in self.boundary.items():
-            yield from (PlacedEffect(Place.BOUNDARY, name, effect) for effect in boundary.effects)
+        for name, table in (*self.boundary.items(), *self.interface.items()):
+            yield from (PlacedEffect(Place.BOUNDARY, name, effect) for effect in table.effects)
 
 
 def _read_again(tables: dict[str, Any]) -> Scene:
     return Scene.model_validate(tables)
 
 
-def _bad_names(boundary: Mapping[str, Any]) -> Iterator[Mistake]:
+def _bad_names(table: str, parts: Mapping[str, Any]) -> Iterator[Mistake]:
     """Names go into tables and file names."""
     text = "cannot be the name of a part; use letters, digits, _ - . only"
-    return (Mistake(("boundary", name), text) for name in boundary if not _NAME.fullmatch(name))
+    return (Mistake((table, name), text) for name in parts if not _NAME.fullmatch(name))

@@ -12,7 +12,7 @@ from ..laws import Superpotential
 from ..laws.convex_parts import Directional
 from ..problem.law_term import LawTerm
 from ..problem.problem import Problem
-from ..rigid import Resistance, RigidBody, RigidProblem, analyse, rigid_fields
+from ..rigid import AnyBody, Resistance, RigidProblem, analyse, fields_at
 from ..typing import Array
 from . import existence
 from .thresholds import DEFAULT, Thresholds
@@ -47,7 +47,7 @@ def is_unbounded(
 def _majorant(
     problem: Problem,
     forces: Mapping[str, PETSc.Vec],
-    body: RigidBody,
+    body: AnyBody,
     terms: Sequence[tuple[LawTerm, Directional, Array]],
 ) -> RigidProblem:
     """The existence question of one body with H - ξ in the place of its laws, given as (term, H^∞, ξ). Collective."""
@@ -82,9 +82,9 @@ def _majorised(part: Resistance, term: LawTerm, growth: Directional, xi: Array) 
     return replace(part, weights=part.weights * np.maximum(1.0 - xi / growth.plus, 0.0), growth=growth, peak=growth)
 
 
-def _work(body: RigidBody, part: Resistance, term: LawTerm, xi: Array) -> Array:
+def _work(body: AnyBody, part: Resistance, term: LawTerm, xi: Array) -> Array:
     """∫ ξ·y over this rank's vertices for the rigid basis, (3|6,); 0 for a law of |u_t|."""
     if term.radial:
         return np.zeros(body.motions)
-    fields = rigid_fields(part.points, body)
+    fields = fields_at(part.points, body)
     return np.asarray(np.einsum("m,md,mnd->n", part.weights * xi, part.directions[:, 0, :], fields))

@@ -14,12 +14,13 @@ from ..problem.contact_surface import Surface
 from ..problem.law_term import LawTerm
 from ..problem.problem import Bounds, Problem
 from ..rigid import (
+    AnyBody,
     ContactCone,
     FixedDirections,
     LoadFactors,
     Mode,
+    MotionFields,
     Resistance,
-    RigidBody,
     RigidProblem,
     Solvability,
     analyse,
@@ -27,7 +28,6 @@ from ..rigid import (
     kernel,
     modes,
     null_space,
-    rigid_fields,
 )
 from ..typing import Array, Entities, Mask
 
@@ -116,7 +116,7 @@ def loads_of_rigid_motions(problem: Problem, forces: Mapping[str, PETSc.Vec]) ->
     return {name: force for name, force in forces.items() if name not in problem.bulk.strains}
 
 
-def rigid_problem(problem: Problem, forces: Mapping[str, PETSc.Vec], body: RigidBody) -> RigidProblem:
+def rigid_problem(problem: Problem, forces: Mapping[str, PETSc.Vec], body: AnyBody) -> RigidProblem:
     """The data of the existence question of one body. Collective.
 
     Args:
@@ -141,7 +141,7 @@ def _bilateral(bounds: Bounds) -> bool:
     return bool(np.all(np.isfinite(bounds.lower) & np.isfinite(bounds.upper)))
 
 
-def inside(problem: Problem, body: RigidBody, blocks: Entities) -> Mask:
+def inside(problem: Problem, body: AnyBody, blocks: Entities) -> Mask:
     """Which vertices belong to a body, (n,).
 
     Args:
@@ -152,13 +152,13 @@ def inside(problem: Problem, body: RigidBody, blocks: Entities) -> Mask:
     return np.asarray(problem.bodies.labels[blocks] == body.index)
 
 
-def _normals(problem: Problem, body: RigidBody, surface: Surface) -> FixedDirections:
+def _normals(problem: Problem, body: AnyBody, surface: Surface) -> FixedDirections:
     """The normals of a surface at the body's vertices."""
     mine = inside(problem, body, surface.blocks)
-    return FixedDirections(np.asarray(surface.points[mine] / problem.scales.length), surface.normals[mine])
+    return FixedDirections(MotionFields(problem.motions_at(surface.blocks[mine], body)), surface.normals[mine])
 
 
-def prescribed_directions(problem: Problem, body: RigidBody) -> FixedDirections:
+def prescribed_directions(problem: Problem, body: AnyBody) -> FixedDirections:
     """The prescribed components at the body's vertices.
 
     Args:
@@ -167,11 +167,10 @@ def prescribed_directions(problem: Problem, body: RigidBody) -> FixedDirections:
     """
     d, dofs = problem.scales.dimension, problem.fixed_here
     dofs = dofs[inside(problem, body, dofs // d)]
-    points = problem.points[dofs // d]
-    return FixedDirections(np.asarray(points / problem.scales.length), np.asarray(np.eye(d)[dofs % d]))
+    return FixedDirections(MotionFields(problem.motions_at(dofs // d, body)), np.asarray(np.eye(d)[dofs % d]))
 
 
-def _works(problem: Problem, forces: Mapping[str, PETSc.Vec], body: RigidBody) -> tuple[dict[str, Array], float]:
+def _works(problem: Problem, forces: Mapping[str, PETSc.Vec], body: AnyBody) -> tuple[dict[str, Array], float]:
     """<g, y> of each load on the rigid basis, and the sum of the absolute nodal forces. Collective."""
     comm, d = problem.domain.mesh.comm, problem.scales.dimension
     points = problem.points
@@ -179,13 +178,13 @@ def _works(problem: Problem, forces: Mapping[str, PETSc.Vec], body: RigidBody) -
     for name, force in forces.items():
         nodal = force.array_r.reshape(-1, d)
         loaded = np.flatnonzero(nodal.any(axis=1) & (problem.bodies.labels[: len(nodal)] == body.index))
-        fields = rigid_fields(np.asarray(points[loaded] / problem.scales.length), body)
+        fields = problem.bodies.fields(np.asarray(points[loaded] / problem.scales.length), loaded, body)
         works[name] = comm.allreduce(np.einsum("vd,vnd->n", nodal[loaded], fields))
         size += comm.allreduce(float(np.abs(nodal[loaded]).sum()))
     return works, size
 
 
-def acts_on(problem: Problem, body: RigidBody, term: LawTerm) -> bool:
+def acts_on(problem: Problem, body: AnyBody, term: LawTerm) -> bool:
     """Whether a law acts on a body. Collective.
 
     Args:
@@ -197,12 +196,11 @@ def acts_on(problem: Problem, body: RigidBody, term: LawTerm) -> bool:
     return bool(problem.domain.mesh.comm.allreduce(mine, op=MPI.LOR))
 
 
-def _resistance(problem: Problem, body: RigidBody, term: LawTerm) -> Resistance:
+def _resistance(problem: Problem, body: AnyBody, term: LawTerm) -> Resistance:
     surface, law = term.surface, term.exact
     mine = inside(problem, body, surface.blocks)
-    points = np.asarray(surface.points[mine] / problem.scales.length)
     return Resistance(
-        points=points,
+        points=MotionFields(problem.motions_at(surface.blocks[mine], body)),
         weights=surface.weights[mine],
         directions=term.directions[mine],
         growth=law.growth,

@@ -90,6 +90,7 @@ def _part(system: System, names: Collection[str], prescribed: Array, *, scaled: 
     for name, force in system.forces.items():
         if (name in names) is scaled:
             load.axpy(1.0, force)
+    load.array[:] = system.problem.combined(load.array_r)
     fixed = system.problem.fixed_here
     load.axpy(-1.0, system.holding.spread(prescribed[fixed]))
     load.array[fixed] = prescribed[fixed]

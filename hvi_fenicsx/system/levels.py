@@ -68,6 +68,10 @@ def prolongation(fine: System, coarse: System, transfer: Transfer) -> PETSc.Mat:
     """
     points = fine.problem.points, coarse.problem.points
     step = transfer.prolongation(fine.problem.space, coarse.problem.space, points)
+    if coarse.problem.coupling is not None:
+        step = step.matMult(coarse.problem.coupling.matrix)
+    if fine.problem.coupling is not None:
+        step = fine.problem.coupling.inverse.matMult(step)
     if coarse.rotation is not None:
         step = step.matMult(coarse.rotation)
     return step if fine.rotation is None else fine.rotation.transposeMatMult(step)

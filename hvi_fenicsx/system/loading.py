@@ -70,6 +70,7 @@ def _column(system: System, chosen: Collection[str]) -> tuple[Array, Array, Arra
     applied, prescribed = new_vector(problem.space), new_vector(problem.space)
     for name in system.forces.keys() & set(chosen):
         applied.axpy(1.0, system.forces[name])
+    applied.array[:] = problem.combined(applied.array_r)
     named = zip(problem.conditions, _conditions(system), strict=True)
     set_bc(prescribed, [condition for condition, name in named if name in chosen])
     pull = system.holding.pull(prescribed)

@@ -26,7 +26,7 @@ def rigid_modes(problem: Problem, rotation: PETSc.Mat | None) -> PETSc.NullSpace
     fields = rigid_fields(np.asarray(owned / problem.scales.length), body)
     for number in range(body.motions):
         vector = new_vector(problem.space)
-        vector.array[:] = fields[:, number].ravel()
+        vector.array[:] = problem.relative(fields[:, number].ravel())[: vector.local_size]
         turn(vector, rotation)
         vectors.append(vector)
     return null_space(vectors)

@@ -15,7 +15,7 @@ from mpi4py import MPI
 from ..problem.contact_surface import Surface
 from ..problem.problem import Problem
 from ..problem.references import References
-from ..rigid import FixedDirections, RigidBody, kernel, rigid_fields
+from ..rigid import AnyBody, FixedDirections, MotionFields, kernel
 from ..typing import Array, Mask
 from . import existence
 
@@ -116,28 +116,30 @@ class NetForces:
         return float(np.max(found, initial=0.0))
 
 
-def motions(problem: Problem, body: RigidBody, closed: Sequence[tuple[Surface, Mask]]) -> Array:
+def motions(problem: Problem, body: AnyBody, closed: Sequence[tuple[Surface, Mask]]) -> Array:
     """Rigid motions that supports leave, then those that closed contact does not see, (j, vertices, d). Collective.
+
+    On interfaces they are relative, as forces there are those of bounds and laws.
 
     Args:
         problem: the problem.
         body: the body that moves; the fields are zero on the others.
         closed: surfaces, and at which of their vertices contact is closed.
     """
-    comm, points = problem.domain.mesh.comm, np.asarray(problem.points / problem.scales.length)
+    comm = problem.domain.mesh.comm
     fixed = existence.prescribed_directions(problem, body)
     rows = [_normals(problem, body, surface, mask) for surface, mask in closed]
     free, unseen = kernel(comm, body, [fixed]), kernel(comm, body, [fixed, *rows])
     basis = free if unseen.shape == free.shape else np.hstack([free, unseen])
     here = problem.space.dofmap.index_map.size_local
     mine = problem.bodies.labels[:here] == body.index
-    fields = np.einsum("vnd,nj->jvd", rigid_fields(points[:here], body), basis)
+    fields = np.einsum("vnd,nj->jvd", problem.motions_at(np.arange(here, dtype=np.int32), body), basis)
     return np.where(mine[:, None], fields, 0.0)
 
 
-def _normals(problem: Problem, body: RigidBody, surface: Surface, closed: Mask) -> FixedDirections:
+def _normals(problem: Problem, body: AnyBody, surface: Surface, closed: Mask) -> FixedDirections:
     mine = closed & existence.inside(problem, body, surface.blocks)
-    return FixedDirections(np.asarray(surface.points[mine] / problem.scales.length), surface.normals[mine])
+    return FixedDirections(MotionFields(problem.motions_at(surface.blocks[mine], body)), surface.normals[mine])
 
 
 def capable(problem: Problem) -> list[Array]:
@@ -162,7 +164,7 @@ def spread(problem: Problem, surface: Surface, values: Array) -> Array:
     return found
 
 
-def along(references: References, body: RigidBody, fields: Array, acting: ActingForces) -> NetForces:
+def along(references: References, body: AnyBody, fields: Array, acting: ActingForces) -> NetForces:
     """The net forces of one body. Collective.
 
     Args:

@@ -13,7 +13,7 @@ from typing import Protocol
 
 import numpy as np
 from dolfinx import fem
-from dolfinx.fem.petsc import assemble_vector, set_bc
+from dolfinx.fem.petsc import set_bc
 from mpi4py import MPI
 from petsc4py import PETSc
 
@@ -114,6 +114,12 @@ class System:
         return self.problem.domain.mesh.comm
 
     @property
+    def _owned(self) -> int:
+        """Number of unknowns of this rank."""
+        dofmap = self.problem.space.dofmap
+        return int(dofmap.index_map.size_local * dofmap.index_map_bs)
+
+    @property
     def dofs(self) -> int:
         """Global number of unknowns."""
         return int(self.load.size)
@@ -156,6 +162,8 @@ class System:
         """The displacement field of unknowns x: Cartesian, in units of u0, ghosts updated. Collective."""
         u = fem.Function(self.problem.space, name="displacement")
         cartesian = x if self.rotation is None else self.rotation * x
+        if self.problem.coupling is not None:
+            cartesian = self.problem.coupling.matrix * cartesian
         u.x.array[: x.local_size] = cartesian.array_r
         u.x.scatter_forward()
         return u
@@ -163,7 +171,7 @@ class System:
     def unknowns(self, u: fem.Function) -> PETSc.Vec:
         """The unknowns of a displacement field (in units of u0). Collective."""
         x = new_vector(self.problem.space)
-        x.array[:] = u.x.array[: x.local_size]
+        x.array[:] = self.problem.relative(u.x.array)[: x.local_size]
         turn(x, self.rotation)
         return x
 
@@ -179,16 +187,15 @@ class System:
         return x
 
     def _sum_of(self, forces: Mapping[str, PETSc.Vec]) -> Array:
-        """The sum of some load vectors, (vertices, d)."""
+        """The sum of some load vectors as bounds and laws balance it, (vertices, d). Collective."""
         d = self.problem.scales.dimension
-        total = sum((force.array_r for force in forces.values()), np.zeros(self.load.local_size))
-        return np.array(total).reshape(-1, d)
+        total = sum((force.array_r for force in forces.values()), np.zeros(self._owned))
+        return self.problem.combined(np.array(total).reshape(-1, d))
 
     def _unlifted(self) -> PETSc.Vec:
-        """The sum of the loads, in Cartesian components. Collective."""
+        """The sum of the loads as bounds and laws balance it, in Cartesian components. Collective."""
         load = new_vector(self.problem.space)
-        for force in self.forces.values():
-            load.axpy(1.0, force)
+        load.array[:] = self._sum_of(self.forces).ravel()
         return load
 
     def _lifted_by(self) -> Array:
@@ -201,9 +208,19 @@ class System:
         """The elastic forces that supports, contact and laws take up; zero elsewhere, (n,). Collective."""
         return self.holding.at(x, self.rotation, self.jacobian.rows, self._lift)
 
+    def _coupled(self, stiffness: PETSc.Mat) -> PETSc.Mat:
+        """The stiffness of the unknowns, Cartesian: Tᵀ A T where bodies meet. Collective."""
+        if self.problem.coupling is None:
+            return stiffness
+        coupled = stiffness.ptap(self.problem.coupling.matrix)
+        coupled.setLGMap(*stiffness.getLGMap())
+        coupled.setBlockSize(self.problem.scales.dimension)
+        stiffness.destroy()
+        return coupled
+
     def _constrained(self) -> tuple[PETSc.Mat, PETSc.Vec]:
         """Stiffness and load with the prescribed values: rows and columns of the identity, the load lifted."""
-        matrix = self.problem.bulk.matrix()
+        matrix = self._coupled(self.problem.bulk.matrix())
         load, prescribed = self._unlifted(), new_vector(self.problem.space)
         self.holding = HoldingForces(self.problem, matrix)
         set_bc(prescribed, list(self.problem.conditions))
@@ -243,8 +260,7 @@ class System:
             local.array_w[out.local_size :] = 0.0
         for term, model in zip(self.terms, models, strict=True):
             u = x.array_r
-            term.set_traction(u, model.derivative(term.argument(u)))
-            assemble_vector(out, term.residual)
+            term.add_force(out, u, model.derivative(term.argument(u)))
         out.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
 
     def tangents(self, x: PETSc.Vec, models: Sequence[LawModel], foundation: float = 0.0) -> list[Array]:

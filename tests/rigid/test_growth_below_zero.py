@@ -21,6 +21,7 @@ from hvi_fenicsx.rigid import (
     RigidProblem,
     Solvability,
     analyse,
+    fields_at,
     rigid_fields,
 )
 from hvi_fenicsx.system.existence import rigid_problems
@@ -33,7 +34,7 @@ def growth(problem: RigidProblem, motions: Array) -> Array:
     """∫ j^∞(y) of motions (t, n), (t,)."""
     total = np.zeros(len(motions))
     for part in problem.resistances:
-        slips = np.einsum("mrd,mnd,tn->tmr", part.directions, rigid_fields(part.points, problem.body), motions)
+        slips = np.einsum("mrd,mnd,tn->tmr", part.directions, fields_at(part.points, problem.body), motions)
         size = np.linalg.norm(slips, axis=2)
         ahead = slips[:, :, 0] >= 0 if slips.shape[2] == 1 else np.ones_like(size, dtype=bool)
         total += (size * np.where(ahead, part.growth.plus, part.growth.minus)) @ part.weights
@@ -43,9 +44,7 @@ def growth(problem: RigidProblem, motions: Array) -> Array:
 def lowest(problem: RigidProblem, function: Callable[[Array], Array], seed: int = 0) -> float:
     """Minimum of a function of unit motions over the cone: random motions, the best of them varied less and less."""
     rng, n = np.random.default_rng(seed), problem.body.motions
-    rows = np.vstack(
-        [np.einsum("md,mnd->mn", c.normals, rigid_fields(c.points, problem.body)) for c in problem.contact]
-    )
+    rows = np.vstack([np.einsum("md,mnd->mn", c.normals, fields_at(c.points, problem.body)) for c in problem.contact])
     known = np.zeros((0, n))
     for spread in [np.inf, *np.geomspace(1.0, 1e-7, 40)]:
         trials = rng.normal(size=(20_000 if spread == np.inf else 4_000, n))
@@ -143,7 +142,7 @@ def test_the_papers_condition_holds_the_body_wherever_it_is_satisfied(seed: int)
     paper = analyse(ALONE, problem).paper
     assert paper.margin is not None
     trials = np.random.default_rng(1).choice([-1.0, 0.0, 1.0], size=(500, 3))
-    fields = np.einsum("tn,mnd->tmd", trials, rigid_fields(part.points, problem.body))
+    fields = np.einsum("tn,mnd->tmd", trials, fields_at(part.points, problem.body))
     trace = np.sqrt(np.max(np.sum(fields**2, axis=2) @ part.weights))
     assert paper.c == pytest.approx(part.c4 * np.sqrt(part.weights.sum()) * trace, rel=1e-12)
     just = analyse(ALONE, loaded(problem, 1.0001 * paper.c / paper.margin))

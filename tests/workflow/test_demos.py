@@ -189,3 +189,23 @@ def test_the_giving_support_has_the_solutions_of_its_header(start: str, broken: 
     assert found.examination.certificate.second_order == "local minimiser"
     sunk = state(found, "ground").normal * found.problem.scales.displacement > 0.1
     assert np.count_nonzero(sunk) == broken
+
+
+def test_the_glue_of_the_lap_joint_carries_the_whole_pull() -> None:
+    found = demo("single_lap")
+    glue = state(found, "glue")
+    scales = found.problem.scales
+    carried = glue.surface.weights @ glue.friction[:, 0] * scales.force
+    assert carried == pytest.approx(3.0e7 * 0.002, rel=1e-8)
+    assert found.solvability.lambda_peak == pytest.approx(2e7 * 0.025 / (3.0e7 * 0.002), rel=1e-8)
+    ends = np.argsort(glue.surface.points[:, 0])[[0, -1]]
+    assert set(np.argsort(np.abs(glue.friction[:, 0]))[-2:]) == set(ends)
+
+
+def test_two_cylinders_meet_with_the_pressure_of_hertz() -> None:
+    found = demo("two_cylinders")
+    met, scales = state(found, "contact"), found.problem.scales
+    force = float(met.surface.weights @ (met.pressure * met.surface.normals[:, 1])) * scales.force
+    modulus, radius = 2.1e11 / (2 * (1 - 0.3**2)), 0.05
+    peak = float(np.sqrt(force * modulus / (np.pi * radius)))
+    assert -float(met.pressure.min()) * scales.stress == pytest.approx(peak, rel=1e-2)

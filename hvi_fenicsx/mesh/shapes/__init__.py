@@ -10,6 +10,7 @@ from .notched_strip import NotchedStrip
 from .fixed_mesh import FixedMesh, MeshFile, Refinements
 from .given_mesh import GivenMesh, OnlyMesh
 from .plane import PlaneShape
+from .several import PlacedShape, SeveralBodies
 # isort: on
 
 __all__ = [
@@ -23,9 +24,11 @@ __all__ = [
     "MeshFile",
     "NotchedStrip",
     "OnlyMesh",
+    "PlacedShape",
     "PlaneShape",
     "Rectangle",
     "Refinements",
+    "SeveralBodies",
     "Thresholds",
 ]
 

@@ -54,6 +54,7 @@ class PartGeometry:
         facets: its facets in the body, looking outwards, (k, 2) or (k, 3).
         row: of each vertex of the body its row in the part's table, (n,); 0 off the part.
         obstacle: the unit vector (3,) towards a flat obstacle; None where the gap is along the part's normals.
+        between_bodies: whether another body is what it meets, which is drawn itself.
     """
 
     part: ContactPart
@@ -61,6 +62,7 @@ class PartGeometry:
     facets: Integers
     row: Integers
     obstacle: Array | None
+    between_bodies: bool = False
 
     def values(self, column: Array, vertices: Integers) -> Array:
         """A column of the table at some vertices.
@@ -79,7 +81,8 @@ def part_geometries(result: Result) -> list[PartGeometry]:
         row = np.zeros(len(body.points), dtype=np.int64)
         row[part.vertices] = np.arange(len(part.vertices))
         facets = body.oriented(part.facets)
-        found.append(PartGeometry(part, part.vertices, facets, row, result.obstacle(part.name)))
+        obstacle, met = result.obstacle(part.name), result.between_bodies(part.name)
+        found.append(PartGeometry(part, part.vertices, facets, row, obstacle, met))
     return found
 
 

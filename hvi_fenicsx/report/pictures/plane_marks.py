@@ -180,9 +180,10 @@ def contact(shape: DeformedBody, geometry: PartGeometry, largest: float) -> Iter
         if geometry.obstacle is not None:
             outward = np.broadcast_to(geometry.obstacle[:2], outward.shape)
         gap = np.nan_to_num(geometry.values(geometry.part["gap"], chain))
-        base = shape.points[chain, :2] + (shape.factor * gap)[:, None] * outward
+        away = 0.0 if geometry.between_bodies else shape.factor * gap[:, None]
+        base = shape.points[chain, :2] + away * outward
         pressure = np.nan_to_num(geometry.values(geometry.part.pressure, chain))
-        if geometry.part.has("gap"):
+        if geometry.part.has("gap") and not geometry.between_bodies:
             yield _obstacle(base + OBSTACLE * shape.body.size * outward)
         off = geometry.part.lifted[geometry.row[chain]]
         if off.any():

@@ -1,0 +1,228 @@
+"""Several bodies as one mesh of several connected parts: each with its own shape, mesh and place.
+
+A body's mesh keeps its own coordinates and its own coarser meshes. The common mesh has copies of them in their places;
+its coarser meshes are the common ones of the bodies' coarser meshes, and so is the transfer between them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from dolfinx import fem
+from dolfinx import mesh as dmesh
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from .. import compat
+from ..geometry import Arc
+from ..runtime.mpi import agree
+from ..typing import Array, Entities, Integers
+from . import vertex_dofs
+from .domain import Domain
+from .transfer import Rows, Transfer
+
+
+@dataclass(frozen=True, kw_only=True)
+class PlacedBody:
+    """A body and where it is.
+
+    Attributes:
+        name: of the body.
+        domain: the body on its mesh, in its own coordinates.
+        origin: where the origin of these coordinates is, m, (d,).
+        rotation: how they are turned about it, (d, d).
+    """
+
+    name: str
+    domain: Domain
+    origin: Array
+    rotation: Array
+
+    def at(self, points: Array) -> Array:
+        """Points of the body's own coordinates (n, d) in their place, m, (n, d)."""
+        return np.asarray(points @ self.rotation.T + self.origin)
+
+    def arcs(self) -> dict[str, Arc]:
+        """The curves of its sides in their place."""
+        found = {}
+        for side, arc in self.domain.curves.items():
+            x, y = self.at(np.array([arc.centre]))[0]
+            found[f"{self.name}.{side}"] = Arc((float(x), float(y)), arc.radius)
+        return found
+
+
+def joined(comm: MPI.Comm, bodies: Sequence[PlacedBody]) -> Domain:
+    """The bodies on one mesh. Collective.
+
+    Sides are called BODY.SIDE, regions BODY and BODY.REGION.
+
+    Args:
+        comm: the ranks that share each of the meshes.
+        bodies: at least one, all of one dimension.
+    """
+    numbers = [_numbers(comm, bodies, i) for i in range(len(bodies))]
+    cells = [
+        found[compat.geometry_dofmap(b.domain.mesh)][: _cells(b)] for b, found in zip(bodies, numbers, strict=True)
+    ]
+    d = bodies[0].domain.dimension
+    points = [b.at(b.domain.mesh.geometry.x[: _nodes(b), :d]) for b in bodies]
+    kind = bodies[0].domain.mesh.topology.cell_name()
+    mesh = compat.simplex_mesh(comm, np.vstack(cells), np.vstack(points), kind)
+    sides: dict[str, Entities] = {}
+    for body, known in zip(bodies, numbers, strict=True):
+        sides |= {f"{body.name}.{side}": _facets(mesh, body, known, f) for side, f in body.domain.sides.items()}
+    curves = {name: arc for body in bodies for name, arc in body.arcs().items()}
+    domain = Domain.from_mesh(mesh, sides, _regions(mesh, bodies), curves)
+    if all(body.domain.coarsening is None for body in bodies):
+        return domain
+    return replace(domain, coarsening=lambda: _coarser(mesh, bodies, numbers))
+
+
+def _cells(body: PlacedBody) -> int:
+    """Cells that this rank owns."""
+    return int(body.domain.mesh.topology.index_map(body.domain.dimension).size_local)
+
+
+def _nodes(body: PlacedBody) -> int:
+    """Vertices of the geometry that this rank owns."""
+    return int(body.domain.mesh.geometry.index_map().size_local)
+
+
+def _numbers(comm: MPI.Comm, bodies: Sequence[PlacedBody], number: int) -> Integers:
+    """The number that the common mesh gives to each local vertex of a body. Collective.
+
+    It counts the vertices through the ranks, on each of them body by body.
+    """
+    counts = np.array(agree(comm, [_nodes(body) for body in bodies]), dtype=np.int64)
+    before = np.concatenate([[0], np.cumsum(counts.sum(axis=1))])[:-1] + counts[:, :number].sum(axis=1)
+    starts = np.concatenate([[0], np.cumsum(counts[:, number])])
+    own = bodies[number].domain.mesh.geometry.index_map()
+    every = own.local_to_global(np.arange(own.size_local + own.num_ghosts, dtype=np.int32))
+    rank = np.searchsorted(starts, every, side="right") - 1
+    return np.asarray(before[rank] + every - starts[rank], dtype=np.int64)
+
+
+def _facets(mesh: dmesh.Mesh, body: PlacedBody, numbers: Integers, facets: Entities) -> Entities:
+    """The local facets of the common mesh that a body's facets are. Collective."""
+    d = body.domain.dimension
+    nodes = np.empty((0, d), dtype=np.int64)
+    if len(facets):  # dolfinx divides by their number
+        nodes = numbers[dmesh.entities_to_geometry(body.domain.mesh, d - 1, facets)]
+    found, _ = compat.local_entities(mesh, d - 1, nodes, np.zeros(len(nodes), dtype=np.int32))
+    return np.asarray(found, dtype=np.int32)
+
+
+def _regions(mesh: dmesh.Mesh, bodies: Sequence[PlacedBody]) -> dict[str, Entities]:
+    """The local cells of the bodies and of their regions."""
+    counts = [_cells(body) for body in bodies]
+    offset = mesh.comm.exscan(sum(counts)) or 0
+    came_from = np.asarray(mesh.topology.original_cell_index)[: sum(counts)] - offset
+    found, first = {}, 0
+    for body, count in zip(bodies, counts, strict=True):
+        known: Mapping[str, Entities] = {f"{body.name}.{name}": c for name, c in body.domain.regions.items()}
+        for name, cells in {body.name: np.arange(count), **known}.items():
+            found[name] = np.flatnonzero(np.isin(came_from, cells[cells < count] + first)).astype(np.int32)
+        first += count
+    return found
+
+
+def _coarser(
+    mesh: dmesh.Mesh, bodies: Sequence[PlacedBody], numbers: Sequence[Integers]
+) -> tuple[Domain, JoinedTransfer]:
+    """The common mesh of the coarser meshes, a body without one as it is. Collective."""
+    steps = [body.domain.coarser() or (body.domain, None) for body in bodies]
+    coarse = [replace(body, domain=step[0]) for body, step in zip(bodies, steps, strict=True)]
+    below = joined(mesh.comm, coarse)
+    others = [_numbers(mesh.comm, coarse, i) for i in range(len(coarse))]
+    pairs = zip(bodies, coarse, numbers, others, steps, strict=True)
+    transfers = [
+        BodyTransfer(fine=b.domain.mesh, coarse=c.domain.mesh, numbers=(n, m), transfer=step[1])
+        for b, c, n, m, step in pairs
+    ]
+    return below, JoinedTransfer(tuple(transfers))
+
+
+@dataclass(frozen=True, kw_only=True)
+class BodyTransfer:
+    """The transfer between the meshes of one body.
+
+    Attributes:
+        fine: its finer mesh, in its own coordinates.
+        coarse: its coarser mesh, likewise.
+        numbers: the numbers of their local vertices in the finer and in the coarser common mesh.
+        transfer: from the coarser to the finer; None where both are the same.
+    """
+
+    fine: dmesh.Mesh
+    coarse: dmesh.Mesh
+    numbers: tuple[Integers, Integers]
+    transfer: Transfer | None
+
+    def prolongation(self, fine: fem.FunctionSpace, coarse: fem.FunctionSpace) -> PETSc.Mat:
+        """The prolongation of this body in the unknowns of the common meshes. Collective.
+
+        Args:
+            fine: P1 vectors on the finer common mesh.
+            coarse: P1 vectors on the coarser common mesh.
+        """
+        own, other = (_vectors(mesh) for mesh in (self.fine, self.coarse))
+        to_coarse = _selection(other, coarse, self.numbers[1])
+        step = to_coarse if self.transfer is None else self.transfer.prolongation(own, other).matMult(to_coarse)
+        return _selection(own, fine, self.numbers[0]).transposeMatMult(step)
+
+
+@dataclass(frozen=True)
+class JoinedTransfer(Transfer):
+    """Between common meshes of the same bodies.
+
+    Attributes:
+        bodies: the transfer of each body.
+    """
+
+    bodies: tuple[BodyTransfer, ...]
+
+    def rows(self, fine: fem.FunctionSpace, coarse: fem.FunctionSpace, points: tuple[Array, Array]) -> Rows:
+        """Each fine vertex has the weights that its body's transfer gives it. Collective."""
+        whole = self.bodies[0].prolongation(fine, coarse)
+        for body in self.bodies[1:]:
+            whole.axpy(1.0, body.prolongation(fine, coarse))
+        start, columns, values = whole.getValuesCSR()
+        return start, columns, values
+
+
+def _vectors(mesh: dmesh.Mesh) -> fem.FunctionSpace:
+    """P1 vectors on a mesh."""
+    return fem.functionspace(mesh, ("Lagrange", 1, (mesh.geometry.dim,)))
+
+
+def _selection(space: fem.FunctionSpace, common: fem.FunctionSpace, numbers: Integers) -> PETSc.Mat:
+    """The matrix that takes the unknowns of a common mesh to those of one body. Collective.
+
+    Args:
+        space: P1 vectors on the body's mesh.
+        common: P1 vectors on the common mesh.
+        numbers: of the body's local vertices in the common mesh.
+    """
+    d, here = common.dofmap.index_map_bs, space.dofmap.index_map.size_local
+    wanted = _by_dof(space, numbers)[:here]
+    known = _by_dof(common, np.asarray(common.mesh.geometry.input_global_indices, dtype=np.int64))
+    start, end = common.dofmap.index_map.local_range
+    order = PETSc.AO().createMemoryScalable(
+        known[: end - start].astype(PETSc.IntType), np.arange(start, end, dtype=PETSc.IntType), comm=common.mesh.comm
+    )
+    blocks = np.asarray(order.app2petsc(wanted.astype(PETSc.IntType)))
+    columns = (blocks[:, None] * d + np.arange(d)).ravel().astype(PETSc.IntType)
+    sizes = [(m.size_local * d, m.size_global * d) for m in (space.dofmap.index_map, common.dofmap.index_map)]
+    rows = np.arange(here * d + 1, dtype=PETSc.IntType)
+    matrix = PETSc.Mat().createAIJ(sizes, csr=(rows, columns, np.ones(here * d)), comm=common.mesh.comm)
+    matrix.assemble()
+    return matrix
+
+
+def _by_dof(space: fem.FunctionSpace, by_node: Integers) -> Integers:
+    """Values at the geometry's vertices as values at the (block) dofs of a P1 space."""
+    found = np.empty(len(by_node), dtype=np.int64)
+    found[vertex_dofs.dof_of_node(space)] = by_node
+    return found

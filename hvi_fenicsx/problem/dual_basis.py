@@ -1,0 +1,96 @@
+"""The relative displacement of two sides at the vertices of the first, by a dual basis (Wohlmuth 2000).
+
+For the vertices i that carry contact and laws there are functions ψ_i of the first side's facets with
+∫ψ_i φ_j = δ_ij ∫φ_j for all such j, and Σψ_i = 1 wherever the second side is. The relative displacement at i is
+
+    w_i = (∫ψ_i u_first - ∫ψ_i u_second) / ∫ψ_i,
+
+its weight ∫ψ_i. A vertex that carries nothing (beyond the end of the second side, prescribed, on another part) leaves
+its share to its neighbours (Cichosz and Bischoff 2011). So affine fields are reproduced, and the forces of both sides
+balance, whatever the meshes, and wherever the second side ends.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import coo_array, csr_array
+
+from ..typing import Array, Integers, Mask
+from .facet_overlaps import Facets, Overlaps
+
+
+@dataclass(frozen=True, kw_only=True)
+class RelativeRows:
+    """Rows over all N vertices of the mesh: one for each vertex of the first side that carries something.
+
+    Attributes:
+        weights: ∫ψ_i, by vertex of the mesh, 0 for all others, m^(d-1), (N,).
+        first: ∫ψ_i φ_j on the first side, (N, N).
+        second: ∫ψ_i φ_k on the second, (N, N).
+    """
+
+    weights: Array
+    first: csr_array
+    second: csr_array
+
+
+def relative_rows(first: Facets, second: Facets, overlaps: Overlaps, kept: Mask, size: int) -> RelativeRows:
+    """The rows of two sides.
+
+    Args:
+        first: the side that carries contact and laws.
+        second: the other one.
+        overlaps: of their facets.
+        kept: whether a vertex of the first side's facets carries anything, (f, d).
+        size: N.
+    """
+    basis = _coefficients(overlaps, kept)
+    values = np.einsum("pik,pk->pi", basis[overlaps.first], overlaps.on_first)  # ψ at the points
+    values *= overlaps.weights[:, None]
+    rows = first.vertices[overlaps.first]
+    weights = np.bincount(rows.ravel(), weights=values.ravel(), minlength=size).astype(np.float64)
+    return RelativeRows(
+        weights=weights,
+        first=_matrix(rows, rows, values, overlaps.on_first, size),
+        second=_matrix(rows, second.vertices[overlaps.second], values, overlaps.on_second, size),
+    )
+
+
+def _matrix(rows: Integers, columns: Integers, values: Array, functions: Array, size: int) -> csr_array:
+    """Sums of values (p, d) times functions (p, d) at rows and columns."""
+    shape = (*values.shape, functions.shape[1])
+    entries = np.einsum("pi,pk->pik", values, functions)
+    at = np.broadcast_to(rows[:, :, None], shape), np.broadcast_to(columns[:, None, :], shape)
+    nonzero = np.broadcast_to(values[:, :, None] != 0.0, shape)
+    pairs = at[0][nonzero], at[1][nonzero]
+    return csr_array(coo_array((entries[nonzero], pairs), shape=(size, size)))
+
+
+def _coefficients(overlaps: Overlaps, kept: Mask) -> Array:
+    """ψ_i = Σ_k basis_ik φ_k on each facet, zero rows where a vertex carries nothing, (f, d, d)."""
+    count, d = kept.shape
+    mass = np.zeros((count, d, d))
+    products = np.einsum("p,pk,pj->pkj", overlaps.weights, overlaps.on_first, overlaps.on_first)
+    np.add.at(mass, overlaps.first, products)
+    basis = np.zeros((count, d, d))
+    covered = np.zeros(count, dtype=bool)
+    covered[overlaps.first] = True
+    for pattern in np.unique(kept[covered], axis=0):
+        here, own = np.flatnonzero(covered & np.all(kept == pattern, axis=1)), np.flatnonzero(pattern)
+        if len(own):
+            spread = _shared(pattern)[own]  # φ of the kept vertices, with the shares of the others
+            gram = spread @ mass[here][:, :, own]
+            areas = mass[here].sum(axis=1)[:, own]
+            basis[np.ix_(here, own)] = areas[:, :, None] * np.linalg.solve(
+                gram, np.broadcast_to(spread, (len(here), *spread.shape))
+            )
+    return basis
+
+
+def _shared(pattern: Mask) -> Array:
+    """Functions that sum up to 1: those of kept vertices take equal shares of the others', (d, d)."""
+    spread = np.eye(len(pattern))
+    spread[:, ~pattern] = 1.0 / max(int(np.count_nonzero(pattern)), 1)
+    return spread

@@ -1,0 +1,351 @@
+"""Two bodies that meet: patch tests on meshes that do not match, balance of forces, limits of one body."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from scenes import NESTED, Table, quadratic_linear
+
+from hvi_fenicsx import InputError, Scene, Solution, prepare, solve
+from hvi_fenicsx.certify import placed_forces
+from hvi_fenicsx.problem.problem import Problem
+from hvi_fenicsx.scene.writer import dump_scene
+
+Array = npt.NDArray[np.float64]
+E, NU = 2.0e11, 0.3
+MATERIAL = {"model": "plane_stress", "youngs_modulus": E, "poisson_ratio": NU}
+CONTACT = {"contact": {"gap": 0.0}}
+
+
+def rectangle(size: list[float], cells: list[int], origin: Any = (0.0, 0.0), angle: float = 0.0) -> Table:
+    return {"shape": "rectangle", "size": size, "cells": cells, "origin": list(origin), "angle": angle}
+
+
+def turned(angle: float, x: float, y: float) -> list[float]:
+    c, s = math.cos(math.radians(angle)), math.sin(math.radians(angle))
+    return [c * x - s * y, s * x + c * y]
+
+
+def stacked(
+    boundary: Table, between: Table, angle: float = 0.0, upper: tuple[float, float] = (0.0, 1.0), **solver: Any
+) -> Scene:
+    """A block (0.9 high) on a block of width 1 and height 0.5, cut otherwise; upper: where it begins and its width."""
+    low, high = rectangle([1.0, 0.5], [7, 4], angle=angle), rectangle([upper[1], 0.4], [5, 3], angle=angle)
+    high["origin"] = turned(angle, upper[0], 0.5)
+    return Scene.model_validate(
+        {
+            "domain": {"lower": low, "upper": high},
+            "material": MATERIAL,
+            "boundary": boundary,
+            "interface": {"seam": {"between": ["upper.bottom", "lower.top"], **between}},
+            "solver": {"tolerance": 1e-10, **solver},
+        }
+    )
+
+
+def pulled(angle: float, stress: Array) -> Table:
+    """The tractions of a uniform stress (in the blocks' own axes) on all outer sides."""
+    normals = {"left": (-1.0, 0.0), "right": (1.0, 0.0), "bottom": (0.0, -1.0), "top": (0.0, 1.0)}
+    sides = ["lower.left", "lower.right", "lower.bottom", "upper.left", "upper.right", "upper.top"]
+    forces = {side: stress @ np.array(normals[side.split(".")[1]]) for side in sides}
+    return {s.replace(".", "_"): {"on": s, "traction": turned(angle, *map(float, t))} for s, t in forces.items()}
+
+
+def seam(found: Solution) -> Any:
+    assert found.examination is not None
+    return next(state for state in found.examination.states if state.surface.part == "seam")
+
+
+def away_from_affine(found: Solution) -> float:
+    """The largest part of the displacement of a body that is not affine, relative."""
+    assert found.solve_result is not None
+    problem = found.problem
+    u = found.solve_result.u.x.array.reshape(-1, problem.scales.dimension)
+    x = np.column_stack([np.ones(len(u)), problem.points[:, :2]])
+    worst = 0.0
+    for member in np.unique(problem.bodies.members):
+        mine = problem.bodies.members == member
+        fitted = np.linalg.lstsq(x[mine], u[mine], rcond=None)[0]
+        worst = max(worst, float(np.abs(x[mine] @ fitted - u[mine]).max()))
+    return worst / float(np.abs(u).max())
+
+
+@pytest.mark.parametrize("angle", [0.0, 25.0])
+@pytest.mark.parametrize("between", [CONTACT, {"tied": True}])
+def test_uniform_pressure_crosses_meshes_that_do_not_match(angle: float, between: Table) -> None:
+    found = solve(stacked(pulled(angle, np.diag([0.0, -1e6])), between, angle))
+    assert found.exit_code == 0
+    assert seam(found).pressure * found.problem.scales.stress == pytest.approx(-1e6, rel=1e-10)
+    assert away_from_affine(found) < 1e-10
+
+
+@pytest.mark.parametrize("angle", [0.0, 25.0])
+def test_uniform_shear_crosses_a_glued_seam(angle: float) -> None:
+    found = solve(stacked(pulled(angle, np.array([[0.0, 1e6], [1e6, 0.0]])), {"tied": True}, angle))
+    assert seam(found).friction * found.problem.scales.stress == pytest.approx(1e6, rel=1e-10)
+    assert away_from_affine(found) < 1e-10
+
+
+def held(angle: float, upper: tuple[float, float], **extra: Any) -> Problem:
+    base = {"base": {"on": "lower.bottom", "displacement": [0.0, 0.0]}, **extra}
+    return prepare(stacked(base, CONTACT, angle, upper)).problem
+
+
+@pytest.mark.parametrize("upper", [(0.0, 1.0), (0.23, 0.5), (-0.31, 1.7), (0.4, 1.1)])
+def test_affine_fields_do_not_open_a_flat_seam(upper: tuple[float, float]) -> None:
+    problem = held(25.0, upper)
+    x = problem.points[:, :2]
+    for field in (np.ones_like(x), x @ np.array([[0.0, 1.0], [-1.0, 0.0]]), x @ np.array([[1.3, -0.2], [0.7, 2.1]])):
+        opened = problem.relative(np.ascontiguousarray(field).ravel())
+        assert np.abs(problem.surfaces[0].values(opened)).max() < 1e-13
+
+
+@pytest.mark.parametrize("upper", [(0.0, 1.0), (0.23, 0.5), (-0.31, 1.7), (0.4, 1.1)])
+def test_a_uniform_pressure_loads_both_sides_alike_where_they_cover_each_other(upper: tuple[float, float]) -> None:
+    problem = held(0.0, upper)
+    surface = problem.surfaces[0]
+    forces = np.zeros((len(problem.points), 2))
+    forces[surface.blocks] = surface.weights[:, None] * surface.normals
+    nodal = problem.on_bodies(forces)[:, 1]
+    begin, end = max(upper[0], 0.0), min(sum(upper), 1.0)
+    x, y = problem.points[:, 0], problem.points[:, 1]
+    names = [body.name for body in problem.bodies.single()]
+    for sign, name, columns, width in ((-1.0, 'body "upper"', 5, upper[1]), (1.0, 'body "lower"', 7, 1.0)):
+        here = np.flatnonzero((np.abs(y - 0.5) < 1e-9) & (problem.bodies.members == names.index(name)))
+        h = width / columns
+        fine = np.linspace(begin, end, 200_001)
+        middles, step = (fine[1:] + fine[:-1]) / 2, fine[1] - fine[0]
+        expected = [step * np.maximum(0.0, 1.0 - np.abs(middles - x[i]) / h).sum() for i in here]
+        assert nodal[here] * problem.scales.length == pytest.approx(sign * np.array(expected), abs=1e-9)
+    assert abs(nodal.sum()) < 1e-14
+    assert abs(nodal @ x) < 1e-14
+
+
+def test_what_is_prescribed_leaves_its_share_to_its_neighbour() -> None:
+    walls = {"wall": {"on": ["lower.left", "upper.left"], "displacement": [0.0, "free"]}}
+    press = {"press": {"on": "upper.top", "traction": [0.0, -1e6]}}
+    found = solve(stacked({**walls, **press, "base": {"on": "lower.bottom", "displacement": ["free", 0.0]}}, CONTACT))
+    assert len(seam(found).surface.blocks) == 5
+    assert seam(found).surface.weights.sum() * found.problem.scales.length == pytest.approx(1.0, rel=1e-14)
+    assert seam(found).pressure * found.problem.scales.stress == pytest.approx(-1e6, rel=1e-10)
+    assert away_from_affine(found) < 1e-10
+
+
+def pushed(push: float, **between: Any) -> Scene:
+    boundary = {
+        "base": {"on": "lower.bottom", "displacement": [0.0, 0.0]},
+        "press": {"on": "upper.top", "traction": [0.0, -1e6]},
+        "push": {"on": "upper.left", "traction": [push, 0.0]},
+    }
+    return stacked(boundary, {**CONTACT, **between}, upper=(0.2, 0.6))
+
+
+def test_both_sides_carry_opposite_forces() -> None:
+    found = solve(pushed(3e5, friction=quadratic_linear(1e6, 1e-6)))
+    assert found.forces is not None
+    forces = found.forces.resultants(found.problem.domain.mesh.comm)
+    unit = found.problem.scales.force
+    assert forces["seam"] * unit == pytest.approx([-3e5 * 0.4, 1e6 * 0.6], rel=1e-10)
+    assert forces["seam"] + forces[f"seam{placed_forces.SECOND}"] == pytest.approx([0.0, 0.0], abs=1e-12)
+
+
+def test_a_block_slides_off_the_other_at_the_load_of_statics() -> None:
+    friction = {"law": "graph", "points": [[0, 0], [1e-6, 8e5], [1e-6, 5e5]]}
+    factors = prepare(pushed(1e6, friction=friction)).load_factors("push")
+    assert factors.held == pytest.approx(5e5 * 0.6 / (1e6 * 0.4), rel=1e-9)
+    assert factors.peak == pytest.approx(8e5 * 0.6 / (1e6 * 0.4), rel=1e-9)
+    escaped = solve(pushed(1.3e6, friction=friction))
+    assert escaped.solvability.state == "escapes"
+    assert escaped.solvability.direction is not None
+    assert escaped.solvability.direction.name == 'translation along +x of body "upper"'
+
+
+def test_a_block_tips_over_on_the_other_at_the_load_of_statics() -> None:
+    stuck = {"law": "graph", "points": [[0, 0], [1e-6, 1e9]]}
+    factors = prepare(pushed(1e6, friction=stuck)).load_factors("push")
+    assert factors.held == pytest.approx(1e6 * 0.6 * 0.3 / (1e6 * 0.4 * 0.2), rel=1e-9)
+
+
+def test_bodies_that_only_hold_each_other_separate_or_not() -> None:
+    apart = {
+        "down": {"on": "lower.bottom", "traction": [0.0, -1e6]},
+        "up": {"on": "upper.top", "traction": [0.0, 1e6]},
+    }
+    bond = {"law": "graph", "points": [[0, 0], [1e-6, 4e6], [1e-5, 0]], "one_sided": True}
+    friction = {"law": "graph", "points": [[0, 0], [1e-6, 4e5]]}
+    found = solve(stacked(apart, {**CONTACT, "adhesion": bond, "friction": friction}))
+    assert found.exit_code == 0
+    assert found.solvability.state == "metastable"
+    assert seam(found).gap * found.problem.scales.displacement == pytest.approx(0.25e-6, rel=1e-9)
+    assert found.solvability.lambda_peak == pytest.approx(4.0, rel=1e-9)
+    assert solve(stacked(apart, CONTACT)).solvability.state == "escapes"
+
+
+@pytest.mark.parametrize("push", [2e5, 6e5])
+def test_a_stiff_partner_is_a_rigid_floor(push: float) -> None:
+    friction = quadratic_linear(2e6, 1e-6)
+    table = pushed(push, friction=friction).model_dump()
+    table["material"] = {
+        "soft": {**MATERIAL, "region": "upper"},
+        "stiff": {**MATERIAL, "region": "lower", "youngs_modulus": 1e6 * E},
+    }
+    two = solve(Scene.model_validate(table))
+    one = solve(
+        Scene.model_validate(
+            {
+                "domain": {"upper": table["domain"]["upper"]},
+                "material": MATERIAL,
+                "boundary": {
+                    "press": table["boundary"]["press"],
+                    "push": table["boundary"]["push"],
+                    "seam": {"on": "upper.bottom", **CONTACT, "friction": friction},
+                },
+                "solver": {"tolerance": 1e-10},
+            }
+        )
+    )
+    assert two.exit_code == one.exit_code == 0
+    order = [np.argsort(seam(found).surface.points[:, 0]) for found in (two, one)]
+    for name in ("pressure", "friction"):
+        values = [
+            getattr(seam(found), name)[at] * found.problem.scales.stress
+            for found, at in zip((two, one), order, strict=True)
+        ]
+        assert np.abs(values[0] - values[1]).max() < 1e-5 * np.abs(values[1]).max()
+
+
+def test_multigrid_on_levels_with_their_own_seams_finds_the_same() -> None:
+    table = pushed(6e5, friction=quadratic_linear(1e6, 2e-6)).model_dump()
+    table["domain"]["lower"]["cells"], table["domain"]["upper"]["cells"] = [32, 32], [48, 32]
+    table["solver"] = {"tolerance": 1e-10}
+    scene = Scene.model_validate(table)
+    levels, direct = solve(scene, thresholds=NESTED), solve(scene.with_solver(linear_solver="lu"))
+    assert levels.solve_result is not None
+    assert levels.solve_result.levels > 1
+    assert levels.examination is not None
+    assert direct.examination is not None
+    assert levels.examination.energy == pytest.approx(direct.examination.energy, rel=1e-9)
+
+
+def test_a_measured_gap_closes_before_it_carries() -> None:
+    boundary = {
+        "base": {"on": "lower.bottom", "displacement": [0.0, 0.0]},
+        "sink": {"on": "upper.top", "displacement": [0.0, -3e-6]},
+    }
+    table = stacked(boundary, {"contact": {"gap": "measured"}}).model_dump()
+    table["domain"]["upper"]["origin"] = [0.0, 0.5 + 2e-6]
+    found = solve(Scene.model_validate(table))
+    strain = 1e-6 / 0.9
+    pressure = -seam(found).pressure * found.problem.scales.stress
+    assert found.exit_code == 0
+    assert pressure.min() > 0.8 * E * strain
+    table["boundary"]["sink"]["displacement"] = [0.0, -1.9e-6]
+    apart = seam(solve(Scene.model_validate(table)))
+    assert not apart.contact.any()
+
+
+def test_three_blocks_in_a_row_pass_a_pressure_on() -> None:
+    blocks = {
+        "low": rectangle([1.0, 0.3], [9, 3]),
+        "mid": rectangle([1.0, 0.3], [7, 2], [0.0, 0.3]),
+        "top": rectangle([1.0, 0.3], [4, 2], [0.0, 0.6]),
+    }
+    found = solve(
+        Scene.model_validate(
+            {
+                "domain": blocks,
+                "material": MATERIAL,
+                "boundary": {
+                    "base": {"on": "low.bottom", "displacement": ["free", 0.0]},
+                    "press": {"on": "top.top", "traction": [0.0, -1e6]},
+                },
+                "interface": {
+                    "a": {"between": ["mid.bottom", "low.top"], **CONTACT},
+                    "b": {"between": ["mid.top", "top.bottom"], **CONTACT},
+                },
+            }
+        )
+    )
+    assert found.exit_code == 0
+    assert len(found.solvability.free) == 3
+    assert found.examination is not None
+    for state in found.examination.states:
+        assert state.pressure * found.problem.scales.stress == pytest.approx(-1e6, rel=1e-9)
+
+
+def test_a_scene_with_bodies_and_interfaces_is_written_and_read_again() -> None:
+    import tomllib
+
+    scene = pushed(3e5, friction=quadratic_linear(1e6, 1e-6))
+    assert Scene.model_validate(tomllib.loads(dump_scene(scene))) == scene
+
+
+def changed(path: str, value: Any) -> Table:
+    table = pushed(3e5).model_dump(exclude_none=True)
+    *keys, last = path.split(".")
+    place = table
+    for key in keys:
+        place = place.setdefault(key, {})
+    place[last] = value
+    return table
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "words"),
+    [
+        ("interface.seam.between", ["upper.bottom", "lower.bottom"], "do not face each other"),
+        ("interface.seam.between", ["upper.bottom", "upper.bottom"], "one side twice"),
+        ("interface.seam.between", ["upper.bottom", "middle.top"], 'unknown side "middle.top"'),
+        ("interface.seam.between", ["upper.bottom"], "2 entries"),
+        ("interface.seam.tied", True, "leave out contact"),
+        ("interface.other", {"between": ["lower.top", "upper.bottom"], "tied": True}, "meet in interface.seam"),
+        ("interface.push", {"between": ["lower.left", "upper.bottom"], "tied": True}, "has this name already"),
+        ("interface.seam.traction", [0.0, 1.0], 'unknown key "traction"'),
+        ("interface.seam.contact", {"obstacle": {"point": [0, 0], "normal": [0, 1]}}, "no body"),
+        ("boundary.press.contact", {"gap": "measured"}, "needs two bodies"),
+        ("domain.upper.origin", [0.2, 0.3], "inside of the body"),
+        ("domain.upper.origin", [1.2, 0.5], "do not face each other"),
+        ("domain.upper.origin", [0.2, 0.5, 0.0], "wants 2"),
+        ("domain.upper.shape", "sphere", "unknown shape"),
+        ("domain.up-per", rectangle([1.0, 1.0], [2, 2], [5.0, 5.0]), "name of a body"),
+        ("boundary.base.on", ["lower.bottom", "upper.bottom"], "free to carry"),
+        ("material.region", "middle", 'unknown region "middle"'),
+    ],
+)
+def test_what_does_not_fit_is_refused_with_the_mend(path: str, value: Any, words: str) -> None:
+    with pytest.raises((InputError, ValueError), match=words):
+        prepare(Scene.model_validate(changed(path, value)))
+
+
+def test_bodies_in_space_are_joined_but_their_interfaces_are_refused() -> None:
+    box = {"shape": "box", "size": [1.0, 1.0, 1.0], "cells": [2, 2, 2]}
+    table: Table = {
+        "domain": {"lower": box, "upper": {**box, "origin": [0.0, 0.0, 1.0]}},
+        "material": {**MATERIAL, "model": "three_dimensional"},
+        "boundary": {"base": {"on": ["lower.bottom", "upper.bottom"], "displacement": [0.0, 0.0, 0.0]}},
+    }
+    assert len(prepare(Scene.model_validate(table)).problem.bodies.bodies) == 2
+    table["boundary"]["base"]["on"] = "lower.bottom"
+    table["interface"] = {"seam": {"between": ["upper.bottom", "lower.top"], **CONTACT}}
+    with pytest.raises(InputError, match="in space are not supported yet"):
+        prepare(Scene.model_validate(table))
+
+
+@pytest.mark.long
+def test_sides_exchanged_change_less_than_a_finer_mesh_does() -> None:
+    energies = []
+    for finer in (2, 4, 8):
+        for between in (["upper.bottom", "lower.top"], ["lower.top", "upper.bottom"]):
+            table = pushed(3e5, friction=quadratic_linear(1e6, 1e-6)).model_dump()
+            table["interface"]["seam"]["between"] = between
+            for body in table["domain"].values():
+                body["cells"] = [finer * n for n in body["cells"]]
+            found = solve(Scene.model_validate(table))
+            assert found.examination is not None
+            energies.append(found.examination.energy)
+    values = np.array(energies).reshape(3, 2)
+    assert np.all(np.abs(values[:2, 0] - values[:2, 1]) < np.abs(np.diff(values[:, 0])))
