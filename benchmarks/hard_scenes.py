@@ -85,7 +85,7 @@ def scene(case: Case, data: Mapping[str, Any], method: str) -> Scene:
             "domain": {"shape": "rectangle", "size": [f.width, f.height], "cells": [case["cells"]] * 2},
             "material": {"model": model, "youngs_modulus": f.modulus, "poisson_ratio": float(nu)},
             "boundary": boundary,
-            "solver": _solver(case, method, data["tolerance"]),
+            "solver": _solver(case, method, data["tolerance"]) | {"degree": data.get("degree", 1)},
         }
     )
 

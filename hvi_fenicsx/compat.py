@@ -46,18 +46,6 @@ def local_entities(
     return np.asarray(found.indices), np.asarray(found.values)
 
 
-def submesh_nodes(mesh: _mesh.Mesh, dimension: int, entities: Entities) -> tuple[Any, Any]:
-    """Submesh of the entities, and for each of its geometry nodes the node of ``mesh``. Collective.
-
-    Args:
-        mesh: the whole one.
-        dimension: of the entities.
-        entities: local numbers.
-    """
-    result = _mesh.create_submesh(mesh, dimension, entities)
-    return result[0], np.asarray(result[3])
-
-
 def refine(mesh: _mesh.Mesh, edges: Entities | None) -> tuple[_mesh.Mesh, Entities]:
     """Bisect edges by Plaza's rule; children stay on the ranks of their parents. Collective.
 

@@ -127,6 +127,8 @@ def outcome(solution: Solution) -> Iterator[str]:
         yield f"smoothing: -σ_t is up to {away:.3g} N/m² from what the unsmoothed law gives there"
     if solution.estimate is not None:
         yield error(solution.estimate)
+    elif solution.converged and solution.scene.solver.degree != 1:
+        yield "no error estimate: there is none at degree 2 yet"
     energy = solution.examination.energy * solution.problem.scales.energy
     unit = "J/m" if solution.problem.scales.dimension == 2 else "J"
     yield (

@@ -54,6 +54,11 @@ def solve_to_goal(
             f"interface.{next(iter(scene.interface))}: the error of bodies that meet is not estimated yet, so no "
             "accuracy can be asked for; leave --accuracy out, and compare two meshes"
         )
+    if scene.solver.degree != 1:
+        raise InputError(
+            "solver.degree: an accuracy or a time budget needs the error estimate, which there is at degree 1 only; "
+            "leave out solver.degree, or the accuracy and the time budget"
+        )
     return _AdaptiveRun(scene, comm, goal, solver, report, thresholds).run()
 
 

@@ -16,7 +16,7 @@ from ..problem import references
 from ..problem.problem import Problem
 from ..runtime.mpi import largest, total
 from ..typing import Array
-from . import balance, contact_state, deviations
+from . import balance, between_nodes, contact_state, deviations
 from . import second_order as stability
 from .contact_state import ContactState, Forces
 from .thresholds import DEFAULT, Thresholds
@@ -82,6 +82,7 @@ class Examination:
         forces: reactions and loads.
         states: of the parts of Γc.
         smoothing_error: largest distance of a law's traction from the unsmoothed law's, in units of p0.
+        between_nodes: largest penetration anywhere on Γc; None at degree 1, where there is none between the nodes.
     """
 
     certificate: Certificate
@@ -89,6 +90,7 @@ class Examination:
     forces: Forces
     states: tuple[ContactState, ...]
     smoothing_error: float
+    between_nodes: float | None = None
 
 
 def examine(
@@ -131,7 +133,8 @@ def examine(
         passed=passed,
         rounding=rounding,
     )
-    return Examination(certificate, _energy(problem, u, forces, states), forces, states, error)
+    dip = between_nodes.largest_penetration(problem, states)
+    return Examination(certificate, _energy(problem, u, forces, states), forces, states, error, dip)
 
 
 def _within(entries: Mapping[str, Array], limit: float | Array) -> bool:

@@ -13,6 +13,7 @@ import numpy as np
 from dolfinx import fem
 
 from ..effects import Direction
+from ..problem import spaces
 from ..problem.contact_surface import Surface
 from ..problem.law_term import LawTerm
 from ..problem.problem import Bounds, Problem
@@ -81,8 +82,9 @@ class ContactState:
         surface: the part.
         bounds: of its normal displacement, or None.
         laws: the states of its laws.
-        normal: u·n, (m,).
-        slip: u·t, (m, d-1).
+        values: the displacement at the nodes, (m, d).
+        normal: u·n of the coefficients, on which bounds and laws act, (m,).
+        slip: u·t of the coefficients, (m, d-1).
         gap: distance to the lower bound of -u·n, (m,), infinite where there is none.
         pressure: σ_n, (m,).
         contact_pressure: the part of σ_n that contact carries, (m,).
@@ -94,6 +96,7 @@ class ContactState:
     surface: Surface
     bounds: Bounds | None
     laws: tuple[LawState, ...]
+    values: Array
     normal: Array
     slip: Array
     gap: Array
@@ -102,6 +105,16 @@ class ContactState:
     friction: Array
     on_lower: Mask
     on_upper: Mask
+
+    @property
+    def normal_displacement(self) -> Array:
+        """u·n at the nodes, (m,)."""
+        return np.asarray(np.sum(self.values * self.surface.normals, axis=1))
+
+    @property
+    def tangential_displacement(self) -> Array:
+        """u·t at the nodes, (m, d-1)."""
+        return np.asarray(np.einsum("mkd,md->mk", self.surface.tangents, self.values))
 
     @property
     def contact(self) -> Mask:
@@ -241,6 +254,7 @@ def _state(
         surface=surface,
         bounds=bounds,
         laws=here,
+        values=surface.values(spaces.values(problem.space, u)),
         normal=normal,
         slip=slip,
         gap=np.full(len(normal), np.inf) if bounds is None else bounds.upper - normal,

@@ -59,6 +59,7 @@ def of_solution(
     warnings = [*_strain(problem, u, thresholds)]
     if examination.certificate.passed:
         size = largest(problem.domain.mesh.comm, float(np.max(np.abs(u.x.array), initial=0.0)))
+        warnings += _dips(problem, examination, size, thresholds)
         for state in examination.states:
             warnings += _distant_obstacle(problem, state, size, thresholds)
             for law in state.laws:
@@ -149,6 +150,16 @@ def _strain(problem: Problem, u: fem.Function, thresholds: PlausibilityThreshold
     strain = largest(problem.domain.mesh.comm, most) * scales.displacement
     if strain > thresholds.largest_strain:
         yield f"the largest strain is {strain:.3g}, where small strains are assumed; is the modulus in N/m²?"
+
+
+def _dips(problem: Problem, examination: Examination, size: float, thresholds: PlausibilityThresholds) -> Iterator[str]:
+    """A penetration between the nodes that is not small."""
+    dip = examination.between_nodes
+    if dip is not None and dip > thresholds.dip * size > 0:
+        yield (
+            f"between the nodes of Γc, where nothing bounds it, a body goes {dip * problem.scales.displacement:.3g} m "
+            f"beyond its bound, {dip / size:.1e} of the largest displacement; a finer mesh there makes it smaller"
+        )
 
 
 def _distant_obstacle(

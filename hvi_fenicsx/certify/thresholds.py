@@ -55,6 +55,7 @@ class PlausibilityThresholds:
         rounding: displacement or work of a rigid motion, nondimensional, up to which it is none.
         flat: angle (rad) between the normals of a part, up to which the part is flat.
         uneven: angle up to which it may be meant to be flat.
+        dip: penetration between nodes over the largest displacement that matters.
     """
 
     largest_strain: float = 0.1
@@ -69,6 +70,7 @@ class PlausibilityThresholds:
     rounding: float = 1e-10
     flat: float = 1e-8
     uneven: float = 0.02
+    dip: float = 1e-2
 
 
 DEFAULT = Thresholds()

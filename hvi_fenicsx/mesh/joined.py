@@ -19,7 +19,7 @@ from .. import compat
 from ..geometry import Arc
 from ..runtime.mpi import agree
 from ..typing import Array, Entities, Integers
-from . import vertex_dofs
+from . import nodes
 from .domain import Domain
 from .transfer import Rows, Transfer
 
@@ -224,5 +224,5 @@ def _selection(space: fem.FunctionSpace, common: fem.FunctionSpace, numbers: Int
 def _by_dof(space: fem.FunctionSpace, by_node: Integers) -> Integers:
     """Values at the geometry's vertices as values at the (block) dofs of a P1 space."""
     found = np.empty(len(by_node), dtype=np.int64)
-    found[vertex_dofs.dof_of_node(space)] = by_node
+    found[nodes.dof_of_node(space)] = by_node
     return found

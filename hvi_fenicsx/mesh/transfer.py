@@ -18,7 +18,7 @@ from dolfinx import fem
 from petsc4py import PETSc
 
 from ..typing import Array, Entities
-from . import point_location, vertex_dofs
+from . import nodes, point_location
 
 Numbers = npt.NDArray[np.integer]
 Halves = npt.NDArray[np.int8]
@@ -52,7 +52,7 @@ class Transfer(ABC):
         Returns:
             Rows are the fine unknowns, columns the coarse ones.
         """
-        near, far = points or (vertex_dofs.points(fine), vertex_dofs.points(coarse))
+        near, far = points or (nodes.points(fine), nodes.points(coarse))
         rows = self.rows(fine, coarse, (near[: fine.dofmap.index_map.size_local], far))
         # The rows are used in place: PETSc would insert them one by one.
         used = rows if fine.mesh.comm.size == 1 else _split(*rows, coarse)
@@ -91,6 +91,19 @@ class ParentCellTransfer(Transfer):
         local[vertices[vertices < owned]] = found[vertices < owned]
         numbers = coarse.dofmap.index_map.local_to_global(local.ravel())
         return np.asarray(numbers, dtype=PETSc.IntType).reshape(-1, 2)
+
+
+class DegreeTransfer(Transfer):
+    """From degree 1 to degree 2 on one mesh: exact, and the same for all bases whose linear functions are nodal."""
+
+    def rows(self, fine: fem.FunctionSpace, coarse: fem.FunctionSpace, points: tuple[Array, Array]) -> Rows:
+        """Each node is the mean of the ends of its edge; a vertex is itself. Local."""
+        corners = coarse.dofmap.list.shape[1]
+        vertex = np.zeros(len(nodes.points(fine)), dtype=np.int32)
+        vertex[fine.dofmap.list[:, :corners]] = coarse.dofmap.list
+        ends = vertex[nodes.edge_ends(fine)[: fine.dofmap.index_map.size_local]]
+        numbers = coarse.dofmap.index_map.local_to_global(ends.ravel())
+        return _mean_rows(np.asarray(numbers, dtype=PETSc.IntType).reshape(-1, 2), fine.dofmap.index_map_bs)
 
 
 @dataclass(frozen=True)

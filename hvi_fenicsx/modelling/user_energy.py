@@ -17,7 +17,7 @@ from typing_extensions import override
 
 from ..effects import Contribution, Effect, FormContext, Place
 from ..errors import InputError
-from ..mesh import vertex_dofs
+from ..mesh import nodes
 from ..problem.spaces import displacement_space
 from ..rigid import RigidBody, rigid_fields
 from ..runtime import forms
@@ -131,7 +131,7 @@ def _energy(matrix: PETSc.Mat, field: Array) -> float:
 
 
 def _owned_points(space: fem.FunctionSpace) -> Array:
-    return vertex_dofs.points(space)[: space.dofmap.index_map.size_local]
+    return nodes.points(space)[: space.dofmap.index_map.size_local]
 
 
 def _stretch_stiffness(matrix: PETSc.Mat, space: fem.FunctionSpace) -> float:

@@ -15,7 +15,7 @@ from typing_extensions import override
 from .. import compat
 from ..errors import InputError
 from ..formula import Formula
-from ..mesh import vertex_dofs
+from ..mesh import nodes
 from ..spatial_value import SpatialValue
 from ..typing import Array
 
@@ -73,13 +73,13 @@ class Expression(SpatialValue):
 
     @override
     def at(self, points: Array) -> Array:
-        space = fem.functionspace(self._mesh, ("Lagrange", 1))
+        space = fem.functionspace(self._mesh, ("Lagrange", 2))
         sampled = fem.Function(space)
         sampled.interpolate(compat.expression(self._expression, space))
-        vertices = vertex_dofs.points(space)
-        if not len(vertices):
+        known = nodes.points(space)
+        if not len(known):
             return np.zeros(len(points))
-        return np.asarray(sampled.x.array[cKDTree(vertices).query(points)[1]], dtype=np.float64)
+        return np.asarray(sampled.x.array[cKDTree(known).query(points)[1]], dtype=np.float64)
 
     @override
     def in_ufl(self, mesh: Any, number: Callable[[float], Any]) -> Any:

@@ -18,6 +18,7 @@ from dolfinx.fem.petsc import assemble_matrix
 from petsc4py import PETSc
 
 from ..effects import Averaged, Contribution, Effect, Place
+from ..mesh import nodes
 from ..runtime import forms
 from ..typing import Array
 from . import nodal_averaging, stress
@@ -262,6 +263,6 @@ def make_bulk(
         averaged=tuple(part for _, _, c in made for part in c.averaged),
         strains=strains,
         across=tuple(form for _, _, c in made for form in c.across),
-        origin=(scales.length, scales.modulus, *elastic),
+        origin=(nodes.degree(space), scales.length, scales.modulus, *elastic),
         shared=shared,
     )

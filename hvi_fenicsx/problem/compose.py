@@ -38,12 +38,14 @@ class Model:
         effects: (where, effect), where being a boundary part, a region, or None for the whole body.
         modify: what is solved in the place of each law.
         interfaces: the two sides of each, by name.
+        degree: of the elements, 1 or 2.
     """
 
     parts: Mapping[str, Sequence[str]]
     effects: Sequence[Placed]
     modify: Modification = unchanged
     interfaces: Mapping[str, Sides] = field(default_factory=dict)
+    degree: int = 1
 
 
 def compose(domain: Domain, model: Model, thresholds: Thresholds = DEFAULT) -> Problem:
@@ -59,12 +61,17 @@ def compose(domain: Domain, model: Model, thresholds: Thresholds = DEFAULT) -> P
             that excludes a prescribed displacement.
     """
     parts, effects = model.parts, model.effects
+    if model.interfaces and model.degree != 1:
+        raise InputError(
+            f"solver.degree: interface.{next(iter(model.interfaces))} joins bodies, which degree 1 alone can; "
+            "leave out solver.degree"
+        )
     for name, on in parts.items():
         if not sum(agree(domain.mesh.comm, len(domain.facets(on)))):
             raise InputError(f"boundary.{name}: no facet lies on it; see `on`")
     sizes, evaluate = scaling.sizes(domain.length, effects), functools.partial(_evaluation, domain, parts)
     scales = scaling.choose(sizes, domain.dimension, effects, evaluate, thresholds)
-    context = DomainForms(domain, parts, scales, effects)
+    context = DomainForms(domain, parts, scales, effects, model.degree)
     contributions = [PlacedContribution(where, effect, effect.contribute(context, where)) for where, effect in effects]
     implausible = [f"{scaling.place(e)}: {text}" for e in effects for text in e[1].implausible(evaluate(e), sizes)]
     return _problem(context, scales, contributions, model, tuple(implausible), thresholds)

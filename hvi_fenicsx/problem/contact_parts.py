@@ -14,6 +14,7 @@ from dolfinx import fem
 from ..effects import BoundaryLaw, Direction, NormalBounds
 from ..errors import InputError
 from ..laws import Superpotential
+from ..mesh import nodes
 from ..runtime import forms
 from ..runtime.mpi import agree
 from ..spatial_value import SpatialValue
@@ -24,7 +25,7 @@ from .domain_forms import DomainForms, ScaledMeasure
 from .law_term import LawTerm
 from .problem import Bounds, PlacedContribution
 from .scaling import Scales
-from .spaces import CONTACT_RULE
+from .spaces import contact_rule, edge_share
 from .thresholds import Thresholds
 
 Modification = Callable[[Superpotential], Superpotential]
@@ -65,7 +66,7 @@ def make_surfaces(
             context.space,
             context.points,
             context.part_facets[where],
-            context.boundary(where, **CONTACT_RULE),
+            context.boundary(where, **contact_rule(nodes.degree(context.space))),
             context.length ** (context.dimension - 1),
         )
         for where in parts
@@ -133,7 +134,7 @@ def _bounds(
     def value(formula: SpatialValue | None) -> Array:
         if formula is None:
             return np.full(len(where.blocks), np.inf)
-        found = formula.at(where.points) / scales.displacement
+        found = _coefficients(context, where, formula) / scales.displacement
         if not all(agree(context.domain.mesh.comm, bool(np.all(np.isfinite(found))))):
             reason = "the gap is not finite everywhere there; see its formula"
             raise InputError(f"boundary.{where.part}.{effect}: {reason}")
@@ -142,6 +143,18 @@ def _bounds(
     # lower ≤ -u·n ≤ upper
     open_by = gaps[where.part] / scales.displacement if bounds.measured else 0.0
     return Bounds(where, -value(bounds.upper), open_by - value(bounds.lower) if bounds.lower else value(None))
+
+
+def _coefficients(context: DomainForms, where: Surface, formula: SpatialValue) -> Array:
+    """The coefficients of a formula at the nodes of a part: bounds of those of the displacement, (m,)."""
+    if nodes.degree(context.space) == 1 or formula.is_number:
+        return np.asarray(formula.at(where.points))
+    points, share = context.points_on_curves, edge_share(context.space)
+    found = formula.at(points[where.blocks])
+    if share == 0.0:
+        return np.asarray(found)
+    ends = points[nodes.edge_ends(context.space)[where.blocks]]
+    return np.asarray((found - share * (formula.at(ends[:, 0]) + formula.at(ends[:, 1]))) / (1 - 2 * share))
 
 
 def check_bounds(
@@ -248,8 +261,9 @@ def make_terms(
         InputError: on all ranks alike: a law that cannot be solved in 3D.
     """
     laws = [(surfaces[w], e.key, law) for w, e, c in contributions if w is not None for law in c.laws]
+    by_rule = nodes.degree(context.space) == 1
     return tuple(
-        _term(context, surface, key, law, modify, scales, fixed, by_rule=surface.part not in interfaces)
+        _term(context, surface, key, law, modify, scales, fixed, by_rule=by_rule and surface.part not in interfaces)
         for surface, key, law in laws
     )
 
@@ -305,4 +319,4 @@ def _scaled(law: Superpotential, scales: Scales, place: str) -> Superpotential:
 def _residual(context: DomainForms, where: Surface, density: fem.Function) -> Any:
     """∫ density·v ds over a part, nondimensional."""
     area = context.number(context.length ** (1 - context.dimension))
-    return ufl.inner(density, context.test) * ScaledMeasure(area, context.boundary(where.part, **CONTACT_RULE))
+    return ufl.inner(density, context.test) * ScaledMeasure(area, context.boundary(where.part, **contact_rule(1)))

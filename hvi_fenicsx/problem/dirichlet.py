@@ -15,6 +15,7 @@ from ..runtime.mpi import agree
 from ..typing import Array, Entities
 from .domain_forms import DomainForms
 from .scaling import Scales
+from .spaces import edge_share
 from .thresholds import DEFAULT, Thresholds
 
 
@@ -57,12 +58,12 @@ def values(context: DomainForms, conditions: Sequence[fem.DirichletBC]) -> Array
 def _condition(context: DomainForms, scales: Scales, part: str, condition: Condition) -> fem.DirichletBC:
     facets, dim = context.part_facets[part], context.dimension - 1
     component = context.space.sub(condition.component)
-    if condition.value.is_number:
+    if condition.value.is_number and edge_share(context.space) == 0.0:
         value = PETSc.ScalarType(condition.value.source / scales.displacement)  # type: ignore[operator]
         return fem.dirichletbc(value, fem.locate_dofs_topological(component, dim, facets), component)
     collapsed, _ = component.collapse()
     function = fem.Function(collapsed)
-    function.interpolate(lambda x: condition.value.at(x.T) / scales.displacement)
+    function.interpolate(lambda x: np.asarray(condition.value.at(x.T) / scales.displacement))
     return fem.dirichletbc(function, fem.locate_dofs_topological((component, collapsed), dim, facets), component)
 
 

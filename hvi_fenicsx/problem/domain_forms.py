@@ -13,25 +13,30 @@ from dolfinx import fem
 from petsc4py import PETSc
 
 from ..effects import Place, SideMoments
-from ..mesh import vertex_dofs
+from ..mesh import nodes
 from ..mesh.domain import Domain
 from ..runtime.mpi import agree
 from ..spatial_value import SpatialValue
 from ..typing import Array
 from . import side_moments
 from .scaling import Placed, Scales
-from .spaces import LOAD_DEGREE, displacement_space, scalar_space
+from .spaces import LOAD_DEGREE, displacement_space, pressure_space
 
 
 class DomainForms:
     """What effects see of the problem while it is composed (:class:`.effects.FormContext`)."""
 
     def __init__(
-        self, domain: Domain, parts: Mapping[str, Sequence[str]], scales: Scales, effects: Sequence[Placed]
+        self,
+        domain: Domain,
+        parts: Mapping[str, Sequence[str]],
+        scales: Scales,
+        effects: Sequence[Placed],
+        degree: int = 1,
     ) -> None:
         self.domain, self.dimension = domain, domain.dimension
         self.length, self.stress, self.modulus = scales.length, scales.stress, scales.modulus
-        self.space = _space(domain)
+        self.space = _space(domain, degree)
         self.trial, self.test = ufl.TrialFunction(self.space), ufl.TestFunction(self.space)
         self.normal = ufl.FacetNormal(domain.mesh)
         self.materials = [placed for placed in effects if placed[1].place is Place.MATERIAL]
@@ -39,13 +44,22 @@ class DomainForms:
 
     @functools.cached_property
     def points(self) -> Array:
-        """The local vertices (owned and ghost), m, (n, 3)."""
-        return vertex_dofs.points(self.space)
+        """The local nodes (owned and ghost), m, (n, 3)."""
+        return nodes.points(self.space)
+
+    @functools.cached_property
+    def points_on_curves(self) -> Array:
+        """The local nodes, those of curved sides on their curves and off their facets, m, (n, 3)."""
+        found = self.points.copy()
+        for name, curve in self.domain.curves.items():
+            on = np.unique(nodes.facet_nodes(self.space, self.domain.sides[name]))
+            found[on, :2] = curve.nearest(found[on, :2])
+        return found
 
     @functools.cached_property
     def scalar_test(self) -> Any:
         """A test function of scalar P1; few effects want it, and its space takes time."""
-        return ufl.TestFunction(scalar_space(self.domain.mesh))
+        return ufl.TestFunction(pressure_space(self.domain.mesh))
 
     def number(self, value: float) -> Any:
         """A constant that is not compiled into the form."""
@@ -102,13 +116,14 @@ class DomainForms:
         return measure(ids[part])
 
 
-def _space(domain: Domain) -> fem.FunctionSpace:
-    """The displacements, one space for all problems on a shared mesh. Collective."""
+def _space(domain: Domain, degree: int) -> fem.FunctionSpace:
+    """The displacements, one space for all problems of a degree on a shared mesh. Collective."""
     if domain.shared is None:
-        return displacement_space(domain.mesh)
-    if "space" not in domain.shared:
-        domain.shared["space"] = displacement_space(domain.mesh)
-    return domain.shared["space"]
+        return displacement_space(domain.mesh, degree)
+    key = f"space of degree {degree}"
+    if key not in domain.shared:
+        domain.shared[key] = displacement_space(domain.mesh, degree)
+    return domain.shared[key]
 
 
 class ScaledMeasure:

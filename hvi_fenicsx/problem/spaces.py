@@ -1,28 +1,119 @@
-"""The finite element of the displacement: its degree, its spaces, and the quadrature on Γc that goes with it.
+"""The finite element of the displacement: its degree, its basis, and the quadrature on Γc that goes with it.
 
-An element of degree 2 begins here. What stands on degree 1 beside it: the vertices as dofs (mesh/vertex_dofs), the
-transfer between levels (mesh/transfer), the surfaces of Γc (problem/contact_surface), the averaged dilatation
-(problem/nodal_averaging), the blocks of Γc's vertices (system/contact_rows), the error estimate (certify/estimate), and
-the arrays that are written (results/gathering).
+A basis function belongs to each node (mesh/nodes). Bounds and laws act on the coefficients at the nodes of Γc, weighted
+with the integrals of the basis functions there; so these must be positive, and a uniform traction is in balance with
+nodal forces that are exactly those of the law or the contact. At degree 1 that is the vertex rule of the paper. At
+degree 2 in the plane it is Simpson's rule. In space Lagrange's functions of the vertices have no integral over a facet,
+and the basis is transformed (Popp, Wohlmuth, Gee and Wall 2012): a share of each function of an edge goes to its ends.
+The functions are those of Lagrange's element in any case; a linear one has its nodal values as coefficients.
 """
 
 from __future__ import annotations
 
+import functools
+from typing import Any
+
+import basix
+import basix.ufl
+import numpy as np
 from dolfinx import fem
 from dolfinx import mesh as dmesh
 
-DEGREE = 1
-CONTACT_RULE = {"quadrature_rule": "vertex", "quadrature_degree": 1}
-"""Quadrature of bounds and laws on Γc (UFL metadata): the vertex rule of the paper, which lumps them at the nodes."""
+from ..mesh import nodes
+from ..typing import Array
+
+EDGE_SHARE = {2: 0.0, 3: 0.125}
+"""The share of an edge's function that goes to each of its ends at degree 2, by dimension (docs/degree-2.md)."""
+_VERTEX_RULE = {"quadrature_rule": "vertex", "quadrature_degree": 1}
 LOAD_DEGREE = {2: 20, 3: 12}
 """Degree of the quadrature of a traction that varies, by dimension: what a mesh cannot follow must not be missed."""
 
 
-def displacement_space(mesh: dmesh.Mesh) -> fem.FunctionSpace:
-    """The space of the displacements, vectors. Collective."""
-    return fem.functionspace(mesh, ("Lagrange", DEGREE, (mesh.geometry.dim,)))
+def contact_rule(degree: int) -> dict[str, Any]:
+    """The quadrature of the basis functions on Γc, as UFL metadata.
+
+    Args:
+        degree: of the elements.
+    """
+    return _VERTEX_RULE if degree == 1 else {"quadrature_degree": degree}
 
 
-def scalar_space(mesh: dmesh.Mesh) -> fem.FunctionSpace:
-    """The scalar space of the same degree. Collective."""
-    return fem.functionspace(mesh, ("Lagrange", DEGREE))
+def displacement_space(mesh: dmesh.Mesh, degree: int = 1) -> fem.FunctionSpace:
+    """The space of the displacements, vectors. Collective.
+
+    Args:
+        mesh: the mesh.
+        degree: of the elements, 1 or 2.
+    """
+    d = mesh.geometry.dim
+    if degree == 1 or EDGE_SHARE[d] == 0.0:
+        return fem.functionspace(mesh, ("Lagrange", degree, (d,)))
+    return fem.functionspace(mesh, basix.ufl.blocked_element(_transformed(mesh.topology.cell_name()), shape=(d,)))
+
+
+def pressure_space(mesh: dmesh.Mesh) -> fem.FunctionSpace:
+    """The space of averaged volumetric stresses, P1: at degree 2 with Taylor and Hood's displacements. Collective."""
+    return fem.functionspace(mesh, ("Lagrange", 1))
+
+
+def edge_share(space: fem.FunctionSpace) -> float:
+    """The share of an edge's function that goes to each of its ends, 0 where coefficients are values.
+
+    Args:
+        space: of the displacements.
+    """
+    return 0.0 if nodes.degree(space) == 1 else EDGE_SHARE[space.mesh.geometry.dim]
+
+
+def values(space: fem.FunctionSpace, coefficients: Array) -> Array:
+    """The values of a displacement at the local nodes, (n, d).
+
+    Args:
+        space: of the displacements.
+        coefficients: at the local nodes, ghosts among them, of any shape that reshapes to (n, d).
+    """
+    found, share = np.asarray(coefficients.reshape(-1, space.mesh.geometry.dim)), edge_share(space)
+    if share == 0.0:
+        return found
+    return np.asarray((1 - 2 * share) * found + share * found[nodes.edge_ends(space)].sum(axis=1))
+
+
+def facet_weights(space: fem.FunctionSpace, sizes: Array) -> Array:
+    """The integrals of the basis functions over facets, by their nodes (:func:`.nodes.facet_nodes`), (k, nodes).
+
+    Args:
+        space: of the displacements.
+        sizes: lengths or areas of the facets, (k,).
+    """
+    d, share = space.mesh.geometry.dim, edge_share(space)
+    if nodes.degree(space) == 1:
+        return np.repeat((sizes / d)[:, None], d, axis=1)
+    vertex, edge = (1 / 6, 2 / 3) if d == 2 else (0.0, 1 / 3)
+    edges_of_vertex, edges = (1, 1) if d == 2 else (2, 3)
+    shares = [vertex + share * edges_of_vertex * edge] * d + [(1 - 2 * share) * edge] * edges
+    return np.asarray(sizes[:, None] * np.array(shares, dtype=np.float64))
+
+
+@functools.cache
+def _transformed(cell: str) -> Any:
+    """The transformed element of degree 2, a scalar one.
+
+    With the share α, the coefficient of an edge is (u - α (u_a + u_b))/(1 - 2α), u at the middle, u_a and u_b at the
+    ends.
+    """
+    kind = basix.CellType[cell]
+    topology: Any = basix.topology(kind)
+    corners = np.asarray(basix.geometry(kind), dtype=np.float64)
+    d = corners.shape[1]
+    extra = EDGE_SHARE[d] / (1 - 2 * EDGE_SHARE[d])
+    where: list[list[Any]] = [[np.zeros((0, d)) for _ in entities] for entities in topology] + [[]] * (3 - d)
+    what: list[list[Any]] = [[np.zeros((0, 1, 0, 1)) for _ in entities] for entities in topology] + [[]] * (3 - d)
+    where[0], what[0] = [corner[None, :] for corner in corners], [np.ones((1, 1, 1, 1)) for _ in corners]
+    ends = [corners[list(edge)] for edge in topology[1]]
+    where[1] = [np.vstack([pair.mean(axis=0), pair]) for pair in ends]
+    what[1] = [np.array([1 + 2 * extra, -extra, -extra]).reshape(1, 1, 3, 1) for _ in ends]
+    count = len(corners) + len(ends)
+    smooth, standard = basix.SobolevSpace.H1, basix.PolysetType.standard
+    return basix.ufl.custom_element(
+        kind, [], np.eye(count), where, what, 0, basix.MapType.identity, smooth, False, 2, 2, standard
+    )

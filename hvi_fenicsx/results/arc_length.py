@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from .. import compat
 from ..geometry import chains
-from ..mesh.vertex_dofs import dof_of_node
+from ..mesh import nodes
 from ..problem.contact_surface import Surface
 from ..problem.problem import Problem
 from ..typing import Array, Integers
@@ -28,7 +28,7 @@ def vertices(problem: Problem, surface: Surface) -> Integers:
 
 
 def edges(problem: Problem, surface: Surface) -> Integers:
-    """A part's facets that this rank knows as pairs of global vertices, the body to their left; (k, 2).
+    """A part's facets that this rank knows by their global ends, the body to their left, at degree 2 halves; (k, 2).
 
     Args:
         problem: what was solved.
@@ -38,16 +38,20 @@ def edges(problem: Problem, surface: Surface) -> Integers:
     facets = np.asarray(surface.facets, dtype=np.int32)
     if not len(facets):
         return np.empty((0, 2), dtype=np.int64)
-    nodes = dolfinx.mesh.entities_to_geometry(mesh, 1, facets)
+    corners = dolfinx.mesh.entities_to_geometry(mesh, 1, facets)
     mesh.topology.create_connectivity(1, 2)
     cells = [mesh.topology.connectivity(1, 2).links(f)[0] for f in facets]
     x = mesh.geometry.x[:, :2]
-    ends = x[nodes]
-    inwards = x[compat.geometry_dofmap(mesh)[cells]].mean(axis=1) - ends[:, 0]
-    along = ends[:, 1] - ends[:, 0]
+    first, last = x[corners[:, 0]], x[corners[:, 1]]
+    inwards = x[compat.geometry_dofmap(mesh)[cells]].mean(axis=1) - first
+    along = last - first
     left = along[:, 0] * inwards[:, 1] - along[:, 1] * inwards[:, 0] > 0
-    nodes = np.where(left[:, None], nodes, nodes[:, ::-1])
-    dofs = dof_of_node(space)[nodes]
+    corners = np.where(left[:, None], corners, corners[:, ::-1])
+    ends = nodes.dof_of_node(space)[corners]
+    dofs = ends
+    if nodes.degree(space) == 2:
+        middle = nodes.between(space, ends)
+        dofs = np.vstack([np.column_stack([ends[:, 0], middle]), np.column_stack([middle, ends[:, 1]])])
     found = space.dofmap.index_map.local_to_global(dofs.ravel().astype(np.int32))
     return np.asarray(found, dtype=np.int64).reshape(-1, 2)
 

@@ -14,7 +14,8 @@ from dolfinx import fem, la
 
 from ..certify import placed_forces
 from ..certify.placed_forces import NodalForces
-from ..mesh.vertex_dofs import dof_of_node
+from ..mesh import nodes
+from ..problem import spaces
 from ..problem.problem import Problem
 from ..solution import Solution
 from ..typing import Array, Entities
@@ -46,7 +47,7 @@ def _columns(solution: Solution, loads: Mapping[str, NodalForces], part: str) ->
     if part in loads:
         found[:, 2, :d] = loads[part].at(blocks) * scales.force / _areas(problem, facets)[blocks, None]
     if solution.solve_result is not None and forces is not None:
-        found[:, 1, :d] = solution.solve_result.u.x.array.reshape(-1, d)[blocks] * scales.displacement
+        found[:, 1, :d] = spaces.values(problem.space, solution.solve_result.u.x.array)[blocks] * scales.displacement
         reaction = forces.reactions.get(part)
         found[:, 3, :d] = 0.0 if reaction is None else reaction.at(blocks) * scales.force
     return found.reshape(len(blocks), len(COLUMNS) - 1)
@@ -64,11 +65,10 @@ def _areas(problem: Problem, facets: Entities) -> Array:
     own = facets[facets < mesh.topology.index_map(d - 1).size_local]
     found = la.vector(problem.space.dofmap.index_map)
     if len(own):  # dolfinx divides by their number
-        nodes = dolfinx.mesh.entities_to_geometry(mesh, d - 1, own)
-        corners = mesh.geometry.x[nodes]
+        corners = mesh.geometry.x[dolfinx.mesh.entities_to_geometry(mesh, d - 1, own)]
         edges = corners[:, 1:] - corners[:, :1]
         sizes = np.linalg.norm(edges[:, 0] if d == 2 else np.cross(edges[:, 0], edges[:, 1]) / 2, axis=1)
-        np.add.at(found.array, dof_of_node(problem.space)[nodes], (sizes / d)[:, None])
+        np.add.at(found.array, nodes.facet_nodes(problem.space, own), spaces.facet_weights(problem.space, sizes))
     found.scatter_reverse(la.InsertMode.add)
     return np.asarray(found.array[: problem.space.dofmap.index_map.size_local], dtype=np.float64)
 

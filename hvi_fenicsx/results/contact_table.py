@@ -45,9 +45,9 @@ def columns(problem: Problem, state: ContactState) -> dict[str, Array]:
     found = {"x": state.surface.points[:, 0], "y": state.surface.points[:, 1]}
     if d == 3:
         found["z"] = state.surface.points[:, 2]
-    found["u_n"] = state.normal * u
+    found["u_n"] = state.normal_displacement * u
     for i in range(d - 1):
-        found[f"u_t{i + 1}"] = state.slip[:, i] * u
+        found[f"u_t{i + 1}"] = state.tangential_displacement[:, i] * u
         found[f"friction_t{i + 1}"] = state.friction[:, i] * p
     if state.bounds is not None:
         found["gap"] = np.where(np.isfinite(state.gap), state.gap * u, np.nan)

@@ -1,11 +1,13 @@
-"""A solution as plain arrays on rank 0, in SI, whatever the ranks; its vertices are numbered as the unknowns are."""
+"""A solution as plain arrays on rank 0, in SI, whatever the ranks; its vertices are numbered as the unknowns are.
+
+At degree 2 its vertices are the nodes, and its cells and facets the parts of those of the mesh: the once refined mesh.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from typing import Any
 
-import dolfinx
 import numpy as np
 import numpy.typing as npt
 from dolfinx import fem
@@ -13,7 +15,8 @@ from mpi4py import MPI
 
 from ..certify.contact_state import ContactState
 from ..effects import Direction
-from ..mesh.vertex_dofs import dof_of_node
+from ..mesh import nodes
+from ..problem import spaces
 from ..problem.problem import Problem
 from ..report.solution_arrays import PartArrays, Singles, SolutionArrays
 from ..solution import Solution
@@ -33,29 +36,27 @@ def solution_arrays(solution: Solution, von_mises: Singles | None = None) -> Sol
     owned = problem.space.dofmap.index_map.size_local
     fields: dict[str, npt.NDArray[Any]] = {"points": problem.points[:owned, :d], "cells": _cells(problem)}
     if solution.solve_result is not None:
-        fields["displacement"] = _by_vertex(problem, solution.solve_result.u) * problem.scales.displacement
+        fields["displacement"] = _by_node(problem, solution.solve_result.u) * problem.scales.displacement
     elif solution.solvability.direction is not None:
         points = np.asarray(problem.points / problem.scales.length)
         fields["escape_mode"] = problem.bodies.motion(points, solution.solvability.direction)[:owned]
     if von_mises is not None:
-        fields["von_mises"] = von_mises
+        fields["von_mises"] = np.repeat(von_mises, nodes.parts_of_cell(problem.space))
     gathered = {name: _joined(comm, values) for name, values in fields.items()}
     sides = {name: _facets(problem, problem.domain.facets(on)) for name, on in solution.scene.parts.items()}
     parts = part_arrays(problem, () if solution.examination is None else solution.examination.states)
     return None if comm.rank else SolutionArrays(**gathered, sides=sides, parts=parts)
 
 
-def _by_vertex(problem: Problem, u: fem.Function) -> Array:
-    """The vectors at the vertices that this rank owns, (n, d)."""
+def _by_node(problem: Problem, u: fem.Function) -> Array:
+    """The vectors at the nodes that this rank owns, (n, d)."""
     owned = problem.space.dofmap.index_map.size_local
-    return np.asarray(u.x.array.reshape(-1, problem.scales.dimension)[:owned], dtype=np.float64)
+    return np.asarray(spaces.values(problem.space, u.x.array)[:owned], dtype=np.float64)
 
 
 def _cells(problem: Problem) -> Integers:
-    """The cells that this rank owns by their global vertices, (c, d+1)."""
-    space, topology = problem.space, problem.domain.mesh.topology
-    own = space.dofmap.list[: topology.index_map(topology.dim).size_local]
-    return _globally(problem, own)
+    """The cells that this rank owns by their global nodes, at degree 2 their parts, (c, d+1)."""
+    return _globally(problem, nodes.linear_cells(problem.space))
 
 
 def _globally(problem: Problem, vertices: Entities) -> Integers:
@@ -65,12 +66,9 @@ def _globally(problem: Problem, vertices: Entities) -> Integers:
 
 
 def _facets(problem: Problem, facets: Entities) -> Integers:
-    """Local facets by their global vertices, each once and ascending, (k, d); right on rank 0 alone. Collective."""
-    mesh, d = problem.domain.mesh, problem.scales.dimension
-    corners = np.empty((0, d), dtype=np.int32)
-    if len(facets):  # dolfinx divides by their number
-        corners = dof_of_node(problem.space)[dolfinx.mesh.entities_to_geometry(mesh, d - 1, facets)]
-    return np.unique(np.sort(_joined(mesh.comm, _globally(problem, corners)), axis=1), axis=0)
+    """Local facets by their global nodes, each once and ascending, (k, d); right on rank 0 alone. Collective."""
+    corners = nodes.linear_facets(problem.space, facets)
+    return np.unique(np.sort(_joined(problem.domain.mesh.comm, _globally(problem, corners)), axis=1), axis=0)
 
 
 def part_arrays(problem: Problem, states: Sequence[ContactState]) -> dict[str, PartArrays]:

@@ -85,6 +85,7 @@ def _contact(solution: Solution) -> dict[str, Any] | None:
         "max_gap": largest(comm, max((float(np.max(g, initial=0.0)) for g in gaps), default=0.0)) * scales.displacement,
         "max_penetration": largest(comm, max((float(np.max(0.0 - g, initial=0.0)) for g in gaps), default=0.0))
         * scales.displacement,
+        "penetration_between_nodes": None if (dip := examination.between_nodes) is None else dip * scales.displacement,
         "resultant": [float(f) * scales.force for f in resultant],
     }
 

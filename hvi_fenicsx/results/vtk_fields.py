@@ -8,13 +8,12 @@ from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
-from dolfinx import fem
+from dolfinx import fem, la
 
-from .. import compat
 from ..certify.contact_state import ContactState
-from ..mesh.vertex_dofs import dof_of_node
+from ..mesh import nodes
+from ..problem import spaces
 from ..problem.problem import Problem
-from ..problem.spaces import scalar_space
 from ..problem.stress import von_mises
 from ..rigid import Mode
 from ..solution import Solution
@@ -38,8 +37,7 @@ def write_body(path: Path, solution: Solution, stress: Array) -> None:
     """
     problem, solved = solution.problem, solution.solve_result
     assert solved is not None
-    d = problem.scales.dimension
-    u = solved.u.x.array.reshape(-1, d) * problem.scales.displacement
+    u = spaces.values(problem.space, solved.u.x.array) * problem.scales.displacement
     cells = {"von_mises": von_mises(stress), "stress": stress, "strain": _strain(problem, u)}
     if (estimate := solution.estimate) is not None:
         cells["error"] = np.asarray(estimate.cells / (estimate.energy_norm or 1.0), dtype=np.float64)
@@ -61,9 +59,18 @@ def _reactions(solution: Solution) -> Array:
 
 
 def _strain(problem: Problem, u: Array) -> Array:
-    """The symmetric gradient of a displacement (n, d) in the owned cells, (c, 3, 3); zero across a plane body."""
+    """The mean symmetric gradient in the owned cells of a displacement (n, d) by its values at the nodes, (c, 3, 3).
+
+    It is zero across a plane body. The mean gradient of a quadratic function is its gradient at the middle, and that of
+    the linear function with these values at the vertices.
+    """
     d, cells = problem.scales.dimension, _owned_cells(problem)
-    points, values = problem.points[cells][:, :, :d], u[cells]
+    corners = cells[:, : d + 1]
+    points, values = problem.points[corners][:, :, :d], u[corners]
+    if nodes.degree(problem.space) == 2:
+        values = values * (4 / (d + 1) - 1)
+        for number, ends in enumerate(nodes.edges(problem.space)):
+            values[:, ends] += 4 / (d + 1) * u[cells[:, [d + 1 + number]]]
     gradient = np.linalg.solve(points[:, 1:] - points[:, :1], values[:, 1:] - values[:, :1])
     strain = np.zeros((len(cells), 3, 3))
     strain[:, :d, :d] = (gradient + gradient.transpose(0, 2, 1)) / 2
@@ -76,17 +83,17 @@ def _owned_cells(problem: Problem) -> Integers:
 
 
 def _write_on_body(path: Path, problem: Problem, at_points: Mapping[str, Array], in_cells: Mapping[str, Array]) -> None:
-    """Write fields at all local vertices and in the owned cells. Collective.
+    """Write fields at all local nodes and in the owned cells, at degree 2 on their parts. Collective.
 
     More than seven digits of the latter say nothing.
     """
-    cells = _owned_cells(problem)
+    cells, parts = nodes.linear_cells(problem.space), nodes.parts_of_cell(problem.space)
     used, numbered = np.unique(cells, return_inverse=True)
     grid = Grid(
         points=problem.points[used],
         cells=numbered.reshape(cells.shape),
         at_points={name: _spatial(values[used]) for name, values in at_points.items()},
-        in_cells={name: _flat(_rounded(values, 7)) for name, values in in_cells.items()},
+        in_cells={name: _flat(np.repeat(_rounded(values, 7), parts, axis=0)) for name, values in in_cells.items()},
     )
     vtk_files.write(path, problem.domain.mesh.comm, grid)
 
@@ -138,40 +145,39 @@ def write_contact(path: Path, problem: Problem, states: Sequence[ContactState]) 
     """
     mesh, d = problem.domain.mesh, problem.scales.dimension
     facets = np.unique(np.concatenate([s.facets for s in (state.surface for state in states)])).astype(np.int32)
-    surface, nodes = compat.submesh_nodes(mesh, d - 1, facets)
-    parent = dof_of_node(problem.space)[nodes]
-    owned = surface.topology.index_map(d - 1).size_local
+    owned = facets[facets < mesh.topology.index_map(d - 1).size_local]
+    cells = nodes.linear_facets(problem.space, owned).astype(np.int64)
+    used, numbered = np.unique(cells, return_inverse=True)
     grid = Grid(
-        points=surface.geometry.x,
-        cells=np.asarray(compat.geometry_dofmap(surface)[:owned], dtype=np.int64),
-        at_points={name: values[parent] for name, values in _nodal(problem, states).items()},
+        points=problem.points[used],
+        cells=numbered.reshape(cells.shape),
+        at_points={name: values[used] for name, values in _nodal(problem, states).items()},
         in_cells={},
     )
     vtk_files.write(path, mesh.comm, grid)
 
 
 def _nodal(problem: Problem, states: Sequence[ContactState]) -> dict[str, Array]:
-    """By name, values at all local vertices of the body (NaN where there is none). Collective."""
-    scalar = scalar_space(problem.domain.mesh)
+    """By name, values at all local nodes of the body (NaN where there is none). Collective."""
     u, p = problem.scales.displacement, problem.scales.stress
-    found: dict[str, fem.Function] = {}
+    found: dict[str, la.Vector] = {}
 
     def put(name: str, state: ContactState, values: Array) -> None:
         if name not in found:
-            found[name] = fem.Function(scalar)
-            found[name].x.array[:] = np.nan
-        found[name].x.array[state.surface.blocks] = values
+            found[name] = la.vector(problem.space.dofmap.index_map)
+            found[name].array[:] = np.nan
+        found[name].array[state.surface.blocks] = values
 
     for state in states:
-        put("u_n", state, state.normal * u)
+        put("u_n", state, state.normal_displacement * u)
         put("sigma_n", state, state.pressure * p)
         put("gap", state, state.gap * u)
         put("contact", state, state.contact.astype(float))
         for i in range(problem.scales.dimension - 1):
-            put(f"u_t{i + 1}", state, state.slip[:, i] * u)
+            put(f"u_t{i + 1}", state, state.tangential_displacement[:, i] * u)
             put(f"friction_t{i + 1}", state, state.friction[:, i] * p)
         distances = [law.distance for law in state.laws]
         put("inclusion_distance", state, np.max(distances, axis=0) * p if distances else 0.0 * state.normal)
     for field in found.values():
-        field.x.scatter_forward()
-    return {name: field.x.array for name, field in found.items()}
+        field.scatter_forward()
+    return {name: field.array for name, field in found.items()}

@@ -11,7 +11,8 @@ from dataclasses import dataclass, replace
 from dolfinx import fem
 from petsc4py import PETSc
 
-from ..mesh.transfer import Transfer
+from ..mesh import nodes
+from ..mesh.transfer import DegreeTransfer, Transfer
 from ..problem.compose import Model
 from ..rigid import Solvability
 from ..runtime.log import logger
@@ -75,7 +76,8 @@ def linear_settings(system: System, options: SolverOptions) -> LinearSettings:
 
 def _has_coarser(system: System, options: SolverOptions) -> bool:
     """Whether there is a coarser mesh, and the system is large enough for it to pay."""
-    return system.dofs >= options.thresholds.nested_from and system.problem.domain.coarsening is not None
+    domain, degree = system.problem.domain, nodes.degree(system.problem.space)
+    return system.dofs >= options.thresholds.nested_from and (degree > 1 or domain.coarsening is not None)
 
 
 def solve(
@@ -198,12 +200,15 @@ def coarser_levels(model: Model, system: System, options: SolverOptions, control
 
 
 def _coarser_system(model: Model, system: System, control: RunControl) -> tuple[System, Transfer]:
-    """The system on the next coarser mesh, and the transfer from that mesh. Collective."""
+    """The next coarser system, of degree 1 first, then on coarser meshes, and the transfer from it. Collective."""
+    domain = system.problem.domain
+    if nodes.degree(system.problem.space) > 1:
+        return assemble(domain, replace(model, degree=1), control.timer, system.thresholds), DegreeTransfer()
     with control.timer("mesh"):
-        coarser = system.problem.domain.coarser()
+        coarser = domain.coarser()
     assert coarser is not None
     domain, transfer = coarser
-    return assemble(domain, model, control.timer, system.thresholds), transfer
+    return assemble(domain, replace(model, degree=1), control.timer, system.thresholds), transfer
 
 
 def _with_coarse_tolerance(options: SolverOptions) -> SolverOptions:

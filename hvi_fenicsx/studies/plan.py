@@ -67,6 +67,11 @@ def make(scene: Scene, axes: Sequence[AxisValues], thresholds: Thresholds = DEFA
 
 
 def _check(scene: Scene, axes: Sequence[AxisValues]) -> None:
+    if scene.solver.degree != 1:
+        raise InputError(
+            "solver.degree: a study compares solutions of degree 1 only; leave out solver.degree, or compare the "
+            "energies in summary.json of runs of your own"
+        )
     names = [a.name for a in axes]
     for a in axes:
         if names.count(a.name) > 1:

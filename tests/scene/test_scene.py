@@ -338,7 +338,7 @@ WRONG_OVERRIDES = {
     "title.x=1": '--set title.x=1: title is "Wall left", not a table; it has no "x"',
     "solver": "--set solver: must be KEY=VALUE, like --set solver.tolerance=1e-10",
     "solver.tolerence=1e-3": '--set solver.tolerence: unknown key "tolerence"; did you mean "tolerance"? '
-    "allowed: method, "
+    "allowed: degree, method, "
     "smoothing, epsilon, epsilon_absolute, start, tolerance, linear_solver, second_order, max_iterations",
 }
 

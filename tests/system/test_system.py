@@ -18,7 +18,7 @@ from petsc4py import PETSc
 from scenes import DELTA, NU, E, P, Q, Table, block, energy, model, quadratic_linear, solved
 
 from hvi_fenicsx import Scene, Superpotential, prepare
-from hvi_fenicsx.mesh import blocks, vertex_dofs
+from hvi_fenicsx.mesh import blocks, nodes
 from hvi_fenicsx.workflow import Preparation
 
 Array = npt.NDArray[np.float64]
@@ -157,10 +157,11 @@ def test_weights_in_space_add_up_to_the_area() -> None:
         np.testing.assert_array_equal(surface.tangents[:, 1], np.cross(surface.normals, surface.tangents[:, 0]))
 
 
-def test_vertices_are_where_dolfinx_tabulates_them() -> None:
+@pytest.mark.parametrize("degree", [1, 2])
+def test_nodes_are_where_dolfinx_tabulates_them(degree: int) -> None:
     for size in ([3.0, 0.7], [1.0, 2.0, 3.0]):
-        space = fem.functionspace(blocks.block(MPI.COMM_SELF, size, [5, 4, 3][: len(size)]).mesh, ("Lagrange", 1))
-        np.testing.assert_allclose(vertex_dofs.points(space), space.tabulate_dof_coordinates(), rtol=0, atol=1e-15)
+        space = fem.functionspace(blocks.block(MPI.COMM_SELF, size, [5, 4, 3][: len(size)]).mesh, ("Lagrange", degree))
+        np.testing.assert_allclose(nodes.points(space), space.tabulate_dof_coordinates(), rtol=0, atol=1e-15)
 
 
 def test_the_sides_of_a_box_are_where_they_are_said_to_be() -> None:

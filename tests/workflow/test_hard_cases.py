@@ -33,14 +33,20 @@ def parameters(chosen: list[Case]) -> list[Any]:
     return [pytest.param(case, id=case.key) for case in chosen]
 
 
-def solve_and_judge(case: Case) -> None:
-    record = hard_run.attempt(case, TABLE.data, "auto", TABLE.data["limit"])
+def solve_and_judge(case: Case, degree: int = 1) -> None:
+    record = hard_run.attempt(case, {**TABLE.data, "degree": degree}, "auto", TABLE.data["limit"])
     assert record["outcome"] in SOLVED, f"{case.values}: {record['reason']} {record.get('certificate')}"
 
 
 @pytest.mark.parametrize("case", parameters(FAST))
 def test_auto_solves_a_small_case(case: Case) -> None:
     solve_and_judge(case)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("case", parameters(FAST))
+def test_auto_solves_a_small_case_at_degree_two(case: Case) -> None:
+    solve_and_judge(case, degree=2)
 
 
 @pytest.mark.long

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from runs import ROOT, contact, run_all, summary, table
-from scenes import Table, block, model, quadratic_linear
+from scenes import STEEL, Table, block, model, quadratic_linear
 
 from hvi_fenicsx import read_scene
 
@@ -35,6 +35,16 @@ TWO_BODIES: Table = {
     "solver": {},
 }
 TWO_BODIES["interface"]["seam"]["friction"] = quadratic_linear(1e6, 1e-6)
+CUBE: Table = {
+    "domain": {"shape": "box", "size": [1.0, 1.0, 1.0], "cells": [2, 2, 2]},
+    "material": STEEL | {"model": "three_dimensional"},
+    "boundary": {
+        "wall": {"on": "left", "displacement": [0.0, "free", "free"]},
+        "press": {"on": "top", "traction": ["1e6*x", 0.0, "-1e6*(1.2 - 1.8*x)"]},
+        "floor": {"on": "bottom", "contact": {"gap": "1e-7*x*y"}, "friction": quadratic_linear(1e6)},
+    },
+    "solver": {"degree": 2},
+}
 SCENES: dict[str, Table] = {
     "paper": model(16, friction=PAPER, smoothing="paper", epsilon_absolute=0.1),
     "exact": model(16, friction=PAPER),
@@ -46,6 +56,8 @@ SCENES: dict[str, Table] = {
     "of-a-mesh-file": model(4, 6e6, 1e6, quadratic_linear(3e6)),
     "linear": HELD_BELOW,
     "two-bodies": TWO_BODIES,
+    "degree-2": model(6, 6e6, 1e6, quadratic_linear(3e6), degree=2),
+    "degree-2-in-space": CUBE,
 }
 LIFTING = {"on": "top", "traction": [0.0, "-1e6*(1 - 1.8*x)"]}
 METHODS = {name: model(8, 3e6, friction=quadratic_linear(1e6), epsilon=0.1, method=name) for name in ("tao", "ssls")}

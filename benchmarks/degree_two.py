@@ -1,0 +1,216 @@
+"""Degree 2: the rule on Γc in space, the pressure, what it saves, and the penetration between nodes.
+
+    ./hvi exec python3 benchmarks/degree_two.py rules|pressure|block|strip|hertz|dips
+
+Energies decide: the square root of the relative error of the energy is the relative error in the energy norm, but for
+what the rule on Γc adds to the energy.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from dolfinx import mesh as dmesh
+from mpi4py import MPI
+
+import hvi_fenicsx as hvi
+from hvi_fenicsx.problem import contact_surface, spaces
+
+SHARES = (0.02, 0.05, 0.1, 0.125, 0.2, 0.25)
+OWN = spaces.EDGE_SHARE[3]
+_make_surface = contact_surface.make_surface
+STEEL = {"model": "plane_stress", "youngs_modulus": 2.15e11, "poisson_ratio": 0.29}
+RUBBER = {"model": "three_dimensional", "youngs_modulus": 1e7, "poisson_ratio": 0.3}
+SPRING = {"law": "graph", "points": [[0, 0], [1.0, 1e8]]}
+
+
+def _untransformed(part: str, space: Any, *data: Any) -> Any:
+    """The surface with the lumped areas of the once refined facets (1/12 and 1/4), in Lagrange's basis."""
+    if space.dofmap.list.shape[1] == 4:
+        return _make_surface(part, space, *data)
+    with_share(0.125)
+    like = spaces.displacement_space(space.mesh, 2)
+    with_share(0.0)
+    return _make_surface(part, like, *data)
+
+
+def with_share(share: float) -> None:
+    """The transformed basis with another share."""
+    spaces._transformed.cache_clear()
+    spaces.EDGE_SHARE[3] = share
+
+
+def with_rule(name: str | float) -> None:
+    """A rule on Γc in space: the share of an edge's function, or ``lagrange``."""
+    with_share(0.0 if isinstance(name, str) else name)
+    contact_surface.make_surface = _untransformed if isinstance(name, str) else _make_surface
+
+
+def box(
+    cells: Sequence[int], height: float, top: Any, floor: dict[str, Any], *, closed: bool = False
+) -> dict[str, Any]:
+    """A block between planes of symmetry; closed: on four sides."""
+    sides = {"left": 0, "front": 1} | ({"right": 0, "back": 1} if closed else {})
+    held = {
+        side: {"on": side, "displacement": [0.0 if i == axis else "free" for i in range(3)]}
+        for side, axis in sides.items()
+    }
+    return {
+        "domain": {"shape": "box", "size": [1.0, 1.0, height], "cells": list(cells)},
+        "material": RUBBER,
+        "boundary": held | {"top": {"on": "top", "traction": [0.0, 0.0, top]}, "floor": {"on": "bottom", **floor}},
+    }
+
+
+def solved(table: dict[str, Any], degree: int) -> hvi.ModelSolution:
+    """The solution, certified."""
+    found = hvi.solve(hvi.Scene.model_validate(table), degree=degree, estimate=False)
+    assert found.converged
+    return found
+
+
+def ball(cells: Sequence[int], height: float, *, closed: bool) -> dict[str, Any]:
+    """The quarter of a block above a paraboloid."""
+    return box(cells, height, -5e4, {"contact": {"gap": "(x*x + y*y)/20"}}, closed=closed)
+
+
+def rules() -> None:
+    """Patch tests by contact and by a law, and energies of a bonded and of a touching block in space, by rule."""
+    for name in ("lagrange", *SHARES):
+        with_rule(name)
+        found = [
+            solved(box([3, 3, 3], 1.0, sign * 1e5, floor), 2).contact["floor"].pressure
+            for sign, floor in ((-1, {"contact": {"gap": 0.0}}), (1, {"adhesion": SPRING}))
+        ]
+        print(f"{name}: spread of a uniform pressure {', '.join(f'{np.ptp(p) / 1e5:.1e}' for p in found)}", flush=True)
+    scenes: dict[str, Callable[[int], dict[str, Any]]] = {
+        "bond": lambda n: box([n, n, n // 2], 0.5, "1e5*cos(3*x)*cos(2*y)", {"adhesion": SPRING}),
+        "ball": lambda n: ball([n, n, n // 2], 0.5, closed=False),
+    }
+    for scene, table in scenes.items():
+        with_rule(0.05)
+        fine = solved(table(16), 2).energy
+        for name in ("lagrange", *SHARES):
+            with_rule(name)
+            print(f"{scene}, {name}: {_errors([solved(table(n), 2).energy for n in (2, 4, 8)], fine)}", flush=True)
+
+
+def _errors(energies: Sequence[float], fine: float) -> str:
+    return " ".join(f"{np.sqrt(abs(e / fine - 1)):.2e}" for e in energies)
+
+
+def from_ellipse(points: Any, p: Any) -> Any:
+    """How far pressures (m,) at points (m, 3) are from the best a √(1 - r²/b²) (1 + c r²), over a, within 0.75 b."""
+    from scipy.optimize import least_squares
+
+    r = np.hypot(points[:, 0], points[:, 1])
+    radius = r[p > 0.05 * p.max()].max()
+    near = r < 0.75 * radius
+
+    def away(q: Any) -> Any:
+        return q[0] * np.sqrt(np.maximum(1 - (r[near] / q[1]) ** 2, 0)) * (1 + q[2] * r[near] ** 2) - p[near]
+
+    scales = [p.max(), radius, 1.0]
+    fit = least_squares(away, [p.max(), radius, 0.0], x_scale=scales).x
+    return away(fit) / fit[0]
+
+
+def pressure() -> None:
+    """The pressure under a ball in space beside the best ellipse, with the same unknowns."""
+    for degree, name, cells in [(1, OWN, 20), (2, "lagrange", 10), *((2, share, 10) for share in SHARES)]:
+        with_rule(name)
+        part = solved(ball([cells] * 3, 1.0, closed=True), degree).contact["floor"]
+        away = from_ellipse(part.x, part.pressure)
+        rms = np.sqrt(np.mean(away**2))
+        print(f"degree {degree}, {name}: away from the ellipse {rms:.2e}, at most {abs(away).max():.2e}", flush=True)
+    with_rule(OWN)
+
+
+def lifting(cells: int) -> dict[str, Any]:
+    """A square that lifts off."""
+    return {
+        "domain": {"shape": "rectangle", "size": [1.0, 1.0], "cells": [cells, cells]},
+        "material": STEEL,
+        "boundary": {
+            "wall": {"on": "left", "displacement": [0.0, "free"]},
+            "pull": {"on": "right", "traction": [1e6, 0.0]},
+            "press": {"on": "top", "traction": [0.0, "-1e6*(1 - 1.8*x)"]},
+            "floor": {"on": "bottom", "contact": {"gap": 0.0}},
+        },
+    }
+
+
+def block() -> None:
+    """The square that lifts off: error by unknowns."""
+    fine = solved(lifting(256), 2).energy
+    for degree, meshes in ((1, (16, 32, 64, 128)), (2, (8, 16, 32, 64))):
+        found = [solved(lifting(n), degree) for n in meshes]
+        print(f"degree {degree}: unknowns {[s.dofs for s in found]}, {_errors([s.energy for s in found], fine)}")
+
+
+def strip_of(cells: tuple[int, int], degree: int) -> hvi.ModelSolution:
+    """An adhesive strip, its arm free over 90 mm, on a linear bond."""
+    mesh = dmesh.create_rectangle(MPI.COMM_WORLD, [[0, 0], [0.15, 0.005]], cells)
+    glued = dmesh.locate_entities_boundary(mesh, 1, lambda x: np.isclose(x[1], 0) & (x[0] > 0.09 - 1e-9))
+    sides = [dmesh.locate_entities_boundary(mesh, 1, lambda x, at=at: np.isclose(x[0], at)) for at in (0.0, 0.15)]
+    facets = np.concatenate([glued, *sides])
+    tags, order = np.repeat([1, 2, 3], [len(glued), *map(len, sides)]).astype(np.int32), np.argsort(facets)
+    marked = dmesh.meshtags(mesh, 1, facets[order], tags[order])
+    body = hvi.Body(mesh, facets=marked, names={"glue": 1, "lifted": 2, "far": 3})
+    effects = [
+        hvi.Isotropic(youngs_modulus=7e10, poisson_ratio=0.3, model="plane_strain"),
+        hvi.Displacement("lifted", [None, 1e-3]),
+        hvi.Displacement("far", [0.0, 0.0]),
+        hvi.Adhesion("glue", hvi.laws.Graph(points=[[0, 0], [1.0, 1.25e12]])),
+    ]
+    return hvi.solve(hvi.Model(body, effects), degree=degree, estimate=False)
+
+
+def strip() -> None:
+    """The strip: error by unknowns."""
+    fine = strip_of((600, 20), 2).energy
+    print(f"energy {fine:.10g}")
+    for degree, meshes in ((1, ((150, 6), (300, 12), (600, 24))), (2, ((50, 2), (100, 3), (150, 4), (300, 8)))):
+        found = [strip_of(cells, degree) for cells in meshes]
+        print(f"degree {degree}: unknowns {[s.dofs for s in found]}, {_errors([s.energy for s in found], fine)}")
+
+
+def hertz() -> None:
+    """Hertz' half-disk: the pressure away from the best half ellipse, and its largest value, by degree."""
+    for degree, size in ((1, 0.25e-3), (2, 0.5e-3), (1, 0.5e-3)):
+        scene = hvi.read_scene("demos/hertz.toml", [f"domain.mesh_size_below={size}", f"solver.degree={degree}"])
+        found = hvi.solve(scene, estimate=False)
+        part = found.contact["floor"]
+        x, p = part.x[:, 0] - 0.0, part.pressure
+        inside = p > 0.3 * p.max()
+        (a, b), *_ = np.linalg.lstsq(
+            np.column_stack([np.ones(inside.sum()), x[inside] ** 2]), p[inside] ** 2, rcond=None
+        )
+        away = p[inside] / np.sqrt(np.maximum(a + b * x[inside] ** 2, 0)) - 1
+        print(
+            f"degree {degree}, {found.dofs} unknowns: largest of the ellipse {np.sqrt(a) / 1e3:.4g} kPa, half-width "
+            f"{np.sqrt(-a / b) * 1e3:.4g} mm, away from it {np.sqrt(np.mean(away**2)):.1e}, at most "
+            f"{abs(away).max():.1e}"
+        )
+
+
+def dips() -> None:
+    """The largest penetration between nodes over the largest displacement, by mesh."""
+    scenes: dict[str, tuple[Callable[[int], dict[str, Any]], Sequence[int]]] = {
+        "square": (lifting, (8, 16, 32, 64, 128)),
+        "ball": (lambda n: ball([n] * 3, 1.0, closed=True), (4, 8, 12)),
+    }
+    for name, (table, meshes) in scenes.items():
+        for cells in meshes:
+            found = solved(table(cells), 2)
+            assert found.solve_result is not None
+            assert found.examination is not None
+            most = np.abs(found.solve_result.u.x.array).max()
+            print(f"{name}, {cells} cells: {(found.examination.between_nodes or 0.0) / most:.1e}", flush=True)
+
+
+if __name__ == "__main__":
+    {f.__name__: f for f in (rules, pressure, block, strip, hertz, dips)}[sys.argv[1]]()

@@ -1,0 +1,156 @@
+"""The nodes of a space of degree 1 or 2 on simplices: the vertices, and at degree 2 the midpoints of the edges.
+
+Nodes are numbered as the (block) dofs of the space. Cells and facets whose corners are all nodes (``linear_cells``,
+``linear_facets``) are those of the mesh at degree 1, and of the once refined mesh at degree 2.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import basix
+import numpy as np
+from dolfinx import fem
+
+from .. import compat
+from ..typing import Array, Entities
+
+_SPLIT: dict[str, tuple[tuple[int, ...], ...]] = {
+    "interval": ((0, 2), (2, 1)),
+    "triangle": ((0, 5, 4), (5, 1, 3), (4, 3, 2), (3, 4, 5)),
+    "tetrahedron": (
+        (0, 9, 8, 7),
+        (9, 1, 6, 5),
+        (8, 6, 2, 4),
+        (7, 5, 4, 3),
+        (9, 8, 7, 4),
+        (9, 6, 8, 4),
+        (9, 5, 6, 4),
+        (9, 7, 5, 4),
+    ),
+}
+"""The parts of a simplex by its nodes, corners first, then the midpoints of the edges in the order of basix."""
+
+
+def degree(space: fem.FunctionSpace) -> int:
+    """The degree of a space, 1 or 2."""
+    return 1 if space.dofmap.list.shape[1] == space.mesh.topology.dim + 1 else 2
+
+
+def points(space: fem.FunctionSpace) -> Array:
+    """The local nodes (owned and ghost), m, (n, 3).
+
+    ``tabulate_dof_coordinates`` maps each from each of its cells, four times as slowly.
+    """
+    count = space.mesh.topology.index_map(space.mesh.topology.dim)
+    corners = compat.geometry_dofmap(space.mesh)[: count.size_local + count.num_ghosts]
+    dofs, vertices = space.dofmap.list[: len(corners)], corners.shape[1]
+    index_map = space.dofmap.index_map
+    size = index_map.size_local + index_map.num_ghosts
+    node = np.zeros(size, dtype=np.int32)
+    node[dofs[:, :vertices]] = corners
+    x = space.mesh.geometry.x
+    found = np.asarray(x[node], dtype=np.float64)
+    for number, (a, b) in enumerate(edges(space) if dofs.shape[1] > vertices else ()):
+        found[dofs[:, vertices + number]] = (x[corners[:, a]] + x[corners[:, b]]) / 2
+    return found
+
+
+def dof_of_node(space: fem.FunctionSpace) -> Entities:
+    """The (block) dof at each geometry node of the mesh, whose nodes are its vertices, (nodes,)."""
+    count = space.mesh.topology.index_map(space.mesh.topology.dim)
+    corners = compat.geometry_dofmap(space.mesh)[: count.size_local + count.num_ghosts]
+    result = np.zeros(space.mesh.geometry.x.shape[0], dtype=np.int32)
+    result[corners] = space.dofmap.list[: len(corners), : corners.shape[1]]
+    return result
+
+
+def edge_ends(space: fem.FunctionSpace) -> Entities:
+    """The vertices whose middle each local node is, by their numbers, (n, 2): a vertex is named twice."""
+    index_map, cells = space.dofmap.index_map, space.dofmap.list
+    found = np.repeat(np.arange(index_map.size_local + index_map.num_ghosts, dtype=np.int32)[:, None], 2, axis=1)
+    corners = space.mesh.topology.dim + 1
+    for number, ends in enumerate(edges(space) if cells.shape[1] > corners else ()):
+        found[cells[:, corners + number]] = cells[:, list(ends)]
+    return found
+
+
+def between(space: fem.FunctionSpace, ends: Entities) -> Entities:
+    """The local nodes that are the middles of pairs of vertices (k, 2), or the vertex that is named twice, (k,).
+
+    Args:
+        space: whose nodes are sought.
+        ends: vertices, by their numbers among the nodes.
+    """
+    known = np.sort(edge_ends(space).astype(np.int64), axis=1)
+    keys, wanted = (pairs[:, 0] * len(known) + pairs[:, 1] for pairs in (known, np.sort(ends.astype(np.int64), axis=1)))
+    order = np.argsort(keys)
+    return np.asarray(order[np.searchsorted(keys[order], wanted)], dtype=np.int32)
+
+
+def linear_cells(space: fem.FunctionSpace) -> Entities:
+    """The parts of the cells that this rank owns, by their nodes, (c, d+1); those of a cell follow one another."""
+    topology = space.mesh.topology
+    own = space.dofmap.list[: topology.index_map(topology.dim).size_local]
+    return own if degree(space) == 1 else _split(own, _name(space))
+
+
+def parts_of_cell(space: fem.FunctionSpace) -> int:
+    """How many of ``linear_cells`` a cell has."""
+    return 1 if degree(space) == 1 else len(_SPLIT[_name(space)])
+
+
+def linear_facets(space: fem.FunctionSpace, facets: Entities) -> Entities:
+    """The parts of local facets by their nodes, (k, d); those of a facet follow one another.
+
+    Args:
+        space: of degree 1 or 2.
+        facets: local facets.
+    """
+    own = facet_nodes(space, facets)
+    kind = {2: "interval", 3: "triangle"}[space.mesh.geometry.dim]
+    return own if degree(space) == 1 else _split(own, kind)
+
+
+def facet_nodes(space: fem.FunctionSpace, facets: Entities) -> Entities:
+    """The nodes of local facets: corners, then midpoints of edges in the order of basix, (k, nodes).
+
+    Args:
+        space: of degree 1 or 2.
+        facets: local facets.
+    """
+    topology, d = space.mesh.topology, space.mesh.geometry.dim
+    topology.create_connectivity(d - 1, d)
+    topology.create_connectivity(d, d - 1)
+    to_cells, to_facets = topology.connectivity(d - 1, d), topology.connectivity(d, d - 1)
+    cells = to_cells.array[to_cells.offsets[facets]]
+    of_cells = to_facets.array.reshape(-1, d + 1)[cells]
+    local = np.argmax(of_cells == np.asarray(facets)[:, None], axis=1)
+    table = np.array(_closures(_name(space), degree(space)), dtype=np.int32)
+    return np.take_along_axis(space.dofmap.list[cells], table[local], axis=1)
+
+
+def _split(nodes: Entities, kind: str) -> Entities:
+    table = np.array(_SPLIT[kind])
+    return np.ascontiguousarray(nodes[:, table].reshape(-1, table.shape[1]))
+
+
+def _name(space: fem.FunctionSpace) -> str:
+    return str(space.mesh.topology.cell_name())
+
+
+def edges(space: fem.FunctionSpace) -> list[list[int]]:
+    """The edges of a cell by its corners, in the order of their midpoints."""
+    found: list[list[int]] = basix.topology(basix.CellType[_name(space)])[1]
+    return found
+
+
+def _closures(cell: str, wanted: int) -> list[list[int]]:
+    """The local nodes of each facet of a cell."""
+    topology: Any = basix.topology(basix.CellType[cell])
+    d = len(topology) - 1
+    middles = {frozenset(edge): d + 1 + number for number, edge in enumerate(topology[1])}
+    facet_edges = basix.topology(basix.CellType[{2: "interval", 3: "triangle"}[d]])[1] if wanted == 2 else []
+    return [
+        [*facet, *(middles[frozenset(facet[i] for i in ends)] for ends in facet_edges)] for facet in topology[d - 1]
+    ]
