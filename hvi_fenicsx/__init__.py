@@ -51,6 +51,7 @@ _HOME = {
     "check": "modelling",
     "dump_scene": "scene",
     "equilibria": "modelling",
+    "follow": "modelling",
     "prepare": "workflow",
     "read_scene": "scene",
     "set_log_level": "runtime.log",
@@ -85,6 +86,7 @@ __all__ = [
     "check",
     "dump_scene",
     "equilibria",
+    "follow",
     "laws",
     "prepare",
     "read_scene",
@@ -119,6 +121,7 @@ if TYPE_CHECKING:
         Traction,
         check,
         equilibria,
+        follow,
         solve,
         study,
     )

@@ -37,6 +37,9 @@ def parser() -> argparse.ArgumentParser:
     )
     commands = main_parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     _add_run_options(_add(commands, "run", "solve a scene; results go to results/SCENE or --out", _RunHelp))
+    _add_path_options(
+        _add(commands, "path", "follow the equilibria of a scene over its load, through peak and unloading")
+    )
     _add_check_options(_add(commands, "check", "validate a scene and say whether a solution exists; solves nothing"))
     text = "find all equilibria of a scene, or the lowest with a proof; by default into results/SCENE-equilibria"
     _add_equilibria_options(_add(commands, "equilibria", text))
@@ -81,6 +84,16 @@ def _add_run_options(run: argparse.ArgumentParser) -> None:
     run.add_argument("--np", type=_ranks, metavar="N", help="run on N MPI ranks")
     run.add_argument("--petsc", default="", metavar="OPTIONS", help='PETSc options, like "-hvi_ksp_monitor"')
     run.add_argument("--no-pictures", action="store_true", help="write no pictures")
+
+
+def _add_path_options(path: argparse.ArgumentParser) -> None:
+    _add_scene_options(path)
+    path.add_argument("--out", type=Path, metavar="DIR", help="the folder for the path; else results/SCENE-path")
+    path.add_argument("--force", action="store_true", help="replace a result that is there")
+    path.add_argument("--resume", action="store_true", help="keep a finished path, else go on from its last row")
+    path.add_argument("--np", type=_ranks, metavar="N", help="run on N MPI ranks")
+    path.add_argument("--petsc", default="", metavar="OPTIONS", help='PETSc options, like "-hvi_ksp_monitor"')
+    path.add_argument("--no-pictures", action="store_true", help="write no pictures")
 
 
 def _add_check_options(check: argparse.ArgumentParser) -> None:

@@ -9,12 +9,19 @@ from typing import Any
 from .accuracy import quantities
 from .accuracy.goal import AccuracyResult
 from .certify.estimate.estimator import Estimate
+from .load_path import LoadPath
 from .problem import effect_summary
 from .rigid import AnyBody, LoadFactors, Mode
+from .scene import PathTable
 from .solution import Solution
 from .solvers import nested_iteration, registry
+from .system import loading
 from .workflow import Preparation
 
+NO_HISTORY = (
+    "a single run has none: it finds an equilibrium at this load, and a joint that is unloaded heals; `hvi path` "
+    "follows the load, and its bonds remember"
+)
 _LISTED = 3
 """So many rigid motions are named one by one; of more, only the number is given."""
 
@@ -190,3 +197,47 @@ def as_data(prepared: Preparation, factors: Mapping[str, LoadFactors]) -> dict[s
         "solver": solver(prepared),
         "warnings": list(prepared.warnings),
     }
+
+
+def history(prepared: Preparation) -> Iterator[str]:
+    """That a single run has none, where a law can break; and the load path that the scene asks for.
+
+    Args:
+        prepared: the scene, assembled.
+    """
+    if any(not term.law.is_linear for term in prepared.problem.terms):
+        yield f"history: {NO_HISTORY}"
+    if (wanted := prepared.scene.path) is not None:
+        yield from path_wanted(wanted, wanted.scaled or loading.names(prepared.system))
+
+
+def path_wanted(wanted: PathTable, scaled: Sequence[str]) -> Iterator[str]:
+    """What a load path is of, and what it takes bonds for.
+
+    Args:
+        wanted: the scene's table.
+        scaled: the names of what the factor multiplies.
+    """
+    way = " → ".join(f"{factor:g}" for factor in (0.0, *wanted.to))
+    yield f"path: the factor goes {way} and multiplies {', '.join(scaled)}"
+    kind = "unload along the secant, and what is broken stays broken" if wanted.memory else "heal on unloading"
+    then = "on to the next stable state" if wanted.follow == "stable" else "the path itself, also where it is unstable"
+    yield f"path: at a limit point {then}; bonds {kind}"
+
+
+def path_outcome(path: LoadPath) -> Iterator[str]:
+    """What was found of a load path.
+
+    Args:
+        path: the path.
+    """
+    yield f"result: {path.headline}"
+    unit = "N/m" if path.dimension == 2 else "N"
+    for part in path.parts:
+        row = path.strongest(part)
+        force = ", ".join(f"{f:.6g}" for f in path.rows[row].forces[part])
+        yield f"largest force on {part}: ({force}) {unit}, at factor {path.rows[row].factor:.6g} (row {row})"
+    released = [f"{path.rows[n].factor:.6g}" for n in path.jumps]
+    jumps = f", jumps at {', '.join(released[:6])}" + (" ..." if len(released) > 6 else "") if released else ""
+    passed = len(path.rows) - path.uncertified
+    yield f"{len(path.rows)} rows, {len(path.folds)} limit points{jumps}; certified: {passed} of {len(path.rows)}"

@@ -45,5 +45,6 @@ def _report(prepared: Preparation, loads: Sequence[str], *, as_json: bool) -> st
         *measured.lines(),
         *console.load_factors(factors),
         *console.effects(prepared),
+        *console.history(prepared),
     ]
     return "\n".join(lines)

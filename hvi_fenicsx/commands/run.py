@@ -136,7 +136,11 @@ def _finished(target: Path, scene: Scene, goal: Goal | None) -> int | None:
     record, fault = results.finished.read(target, scene)
     if fault is not None:
         terminal.say(f"{target}: {fault}; the scene is run again")
-    if record is None or record["exit_code"] not in (ExitCode.CERTIFIED, ExitCode.NO_SOLUTION):
+    if (
+        record is None
+        or record.get("path") is not None
+        or record["exit_code"] not in (ExitCode.CERTIFIED, ExitCode.NO_SOLUTION)
+    ):
         return None
     if not _same_goal(goal, record["accuracy"]):
         return None

@@ -2,6 +2,7 @@
 
 from .body import Body
 from .contact_arrays import ContactArrays
+from .following import ModelPath, follow
 from .materials import Anisotropic, Energy, Isotropic, Orthotropic
 from .model import Model
 from .placed_effects import (
@@ -36,6 +37,7 @@ __all__ = [
     "Friction",
     "Isotropic",
     "Model",
+    "ModelPath",
     "ModelStudy",
     "Moment",
     "On",
@@ -48,6 +50,7 @@ __all__ = [
     "Traction",
     "check",
     "equilibria",
+    "follow",
     "solve",
     "study",
 ]

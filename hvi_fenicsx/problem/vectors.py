@@ -31,7 +31,11 @@ def assembled(form: fem.Form) -> PETSc.Vec:
 
 def nodal(form: Any) -> Array:
     """A UFL linear form's values at the blocks that this rank owns, (n, d). Collective."""
-    compiled = forms.compiled(form)
+    return nodal_values(forms.compiled(form))
+
+
+def nodal_values(compiled: fem.Form) -> Array:
+    """As :func:`nodal`, of a compiled form. Collective."""
     dofs = compiled.function_spaces[0].dofmap
     vector = fem.assemble_vector(compiled)
     vector.scatter_reverse(la.InsertMode.add)

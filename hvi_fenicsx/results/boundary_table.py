@@ -8,17 +8,14 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import dolfinx
 import numpy as np
-from dolfinx import fem, la
 
 from ..certify import placed_forces
 from ..certify.placed_forces import NodalForces
-from ..mesh import nodes
-from ..problem import spaces
+from ..problem import part_areas, spaces
 from ..problem.problem import Problem
 from ..solution import Solution
-from ..typing import Array, Entities
+from ..typing import Array
 
 QUANTITIES = ("", "u_", "traction_", "reaction_")
 """The vertex, its displacement, the part's load there, what the part's support, contact and laws put on the body."""
@@ -40,37 +37,17 @@ def _columns(solution: Solution, loads: Mapping[str, NodalForces], part: str) ->
     """The columns at the vertices of a part that this rank owns, in the order of the table, (m, 12). Collective."""
     problem, forces = solution.problem, solution.forces
     facets = problem.part_facets[part]
-    blocks = _vertices(problem, facets)
+    blocks = part_areas.vertices(problem, facets)
     d, scales = problem.scales.dimension, problem.scales
     found = np.full((len(blocks), len(QUANTITIES), 3), np.nan)
     found[:, 0, :d] = problem.points[blocks, :d]
     if part in loads:
-        found[:, 2, :d] = loads[part].at(blocks) * scales.force / _areas(problem, facets)[blocks, None]
+        found[:, 2, :d] = loads[part].at(blocks) * scales.force / part_areas.lumped(problem, facets)[blocks, None]
     if solution.solve_result is not None and forces is not None:
         found[:, 1, :d] = spaces.values(problem.space, solution.solve_result.u.x.array)[blocks] * scales.displacement
         reaction = forces.reactions.get(part)
         found[:, 3, :d] = 0.0 if reaction is None else reaction.at(blocks) * scales.force
     return found.reshape(len(blocks), len(COLUMNS) - 1)
-
-
-def _vertices(problem: Problem, facets: Entities) -> Entities:
-    """The vertices of facets that this rank owns, ascending."""
-    dofs = fem.locate_dofs_topological(problem.space, problem.domain.dimension - 1, facets)
-    return np.unique(dofs[dofs < problem.space.dofmap.index_map.size_local])
-
-
-def _areas(problem: Problem, facets: Entities) -> Array:
-    """The lumped length (m) or area (m²) of facets at each vertex that this rank owns, (n,). Collective."""
-    mesh, d = problem.domain.mesh, problem.scales.dimension
-    own = facets[facets < mesh.topology.index_map(d - 1).size_local]
-    found = la.vector(problem.space.dofmap.index_map)
-    if len(own):  # dolfinx divides by their number
-        corners = mesh.geometry.x[dolfinx.mesh.entities_to_geometry(mesh, d - 1, own)]
-        edges = corners[:, 1:] - corners[:, :1]
-        sizes = np.linalg.norm(edges[:, 0] if d == 2 else np.cross(edges[:, 0], edges[:, 1]) / 2, axis=1)
-        np.add.at(found.array, nodes.facet_nodes(problem.space, own), spaces.facet_weights(problem.space, sizes))
-    found.scatter_reverse(la.InsertMode.add)
-    return np.asarray(found.array[: problem.space.dofmap.index_map.size_local], dtype=np.float64)
 
 
 def _gathered(problem: Problem, columns: Array) -> Array:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -73,13 +73,22 @@ def write_csv(path: Path, parts: Mapping[str, PartArrays]) -> None:
     with path.open("w", newline="", encoding="utf-8") as stream:
         writer = csv.writer(stream, lineterminator="\n")
         writer.writerow(COLUMNS)
-        for name, part in parts.items():
-            size = len(part.vertices)
-            cells = [
-                [name] * size,
-                *([_text(c, v) for v in part.columns[c]] if c in part.columns else [""] * size for c in COLUMNS[1:]),
-            ]
-            writer.writerows(zip(*cells, strict=True))
+        writer.writerows(cells(parts))
+
+
+def cells(parts: Mapping[str, PartArrays]) -> Iterator[tuple[str, ...]]:
+    """The table below its header, as texts.
+
+    Args:
+        parts: the parts of Γc by name, in the order of the table.
+    """
+    for name, part in parts.items():
+        size = len(part.vertices)
+        columns = [
+            [name] * size,
+            *([_text(c, v) for v in part.columns[c]] if c in part.columns else [""] * size for c in COLUMNS[1:]),
+        ]
+        yield from zip(*columns, strict=True)
 
 
 def _text(column: str, value: float) -> str:

@@ -51,6 +51,18 @@ class ResultFolder:
         self._folder.check(existing, inputs)
         return self._folder.target, self._folder.stage()
 
+    def announce(self, name: str) -> Path:
+        """A file in the target itself that grows while the result is made. Rank 0 only.
+
+        Args:
+            name: of the file.
+
+        Raises:
+            InputError: it cannot be listed.
+        """
+        assert self._folder is not None
+        return self._folder.announce(name)
+
     def commit(self, scene: Scene) -> None:
         """Make the written files the result, all at once. Collective.
 

@@ -31,6 +31,8 @@ Existing = Literal["refuse", "replace", "resume"]
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 _WAYS = {"result": "--force replaces it", "study": "--resume keeps its finished points, --force begins anew"}
 """What a user may do with a folder that is there, by its kind."""
+_UNFINISHED = "--resume goes on with it, --force begins anew"
+"""And with one that a killed process has left."""
 
 
 class OutputFolder:
@@ -98,8 +100,11 @@ class OutputFolder:
         if found.kind != self.kind:
             raise self._refused(f"holds a {found.kind}, and this is a {self.kind}; choose a new or empty folder")
         if existing == "refuse":
-            state = "already holds a" if (self.target / MARKS[self.kind]).exists() else "holds an unfinished"
-            raise self._refused(f"{state} {self.kind}; {_WAYS[self.kind]}, --out DIR writes beside")
+            finished = (self.target / MARKS[self.kind]).exists()
+            state, ways = "already holds a", _WAYS[self.kind]
+            if not finished:
+                state, ways = "holds an unfinished", _UNFINISHED
+            raise self._refused(f"{state} {self.kind}; {ways}, --out DIR writes beside")
         owned = {self.target / name for name in found.owned}
         for file in inputs:
             if Path(os.path.realpath(file)) in owned:
@@ -118,6 +123,22 @@ class OutputFolder:
             work.mkdir()
         self.work = work
         return work
+
+    def announce(self, name: str) -> Path:
+        """A file in the folder itself, to be written while the others are not there yet, and listed at once.
+
+        Args:
+            name: of the file.
+
+        Raises:
+            InputError: it cannot be listed.
+        """
+        with self.told():
+            self.target.mkdir(exist_ok=True)
+            if manifest.read(self.target) is None:
+                manifest.write(self.target, Manifest(kind=self.kind, files={}))
+            manifest.add(self.target, [name], changing=True)
+        return self.target / name
 
     def move_in(self, inputs: Mapping[str, str], other: Mapping[str, str | None] | None = None) -> tuple[str, ...]:
         """Make the written files the folder's, in the place of those that the program wrote before.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -87,15 +87,41 @@ def _write_on_body(path: Path, problem: Problem, at_points: Mapping[str, Array],
 
     More than seven digits of the latter say nothing.
     """
+    vtk_files.write(path, problem.domain.mesh.comm, _grid(problem, at_points, in_cells))
+
+
+def _grid(problem: Problem, at_points: Mapping[str, Array], in_cells: Mapping[str, Array]) -> Grid:
+    """This rank's part of the body with fields at all local vertices and in the owned cells."""
     cells, parts = nodes.linear_cells(problem.space), nodes.parts_of_cell(problem.space)
     used, numbered = np.unique(cells, return_inverse=True)
-    grid = Grid(
+    return Grid(
         points=problem.points[used],
         cells=numbered.reshape(cells.shape),
         at_points={name: _spatial(values[used]) for name, values in at_points.items()},
         in_cells={name: _flat(np.repeat(_rounded(values, 7), parts, axis=0)) for name, values in in_cells.items()},
     )
-    vtk_files.write(path, problem.domain.mesh.comm, grid)
+
+
+def write_series(path: Path, problem: Problem, states: Iterable[tuple[float, float, fem.Function]]) -> None:
+    """Write displacements one after the other, with the load factor of each. Collective.
+
+    Args:
+        path: the file.
+        problem: what was solved.
+        states: time, factor and displacement (nondimensional) of each; times rise.
+
+    Raises:
+        InputError: it cannot be written, on all ranks alike.
+    """
+    topology = problem.domain.mesh.topology
+    count = topology.index_map(topology.dim).size_local
+
+    def grids() -> Iterator[tuple[float, Grid]]:
+        for time, factor, u in states:
+            field = spaces.values(problem.space, u.x.array) * problem.scales.displacement
+            yield time, _grid(problem, {"displacement": field}, {"factor": np.full(count, factor)})
+
+    vtk_files.write_series(path, problem.domain.mesh.comm, grids())
 
 
 def _flat(values: Array) -> npt.NDArray[np.float32]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
@@ -55,14 +55,49 @@ def write(path: Path, comm: MPI.Comm, grid: Grid) -> None:
     Raises:
         InputError: a file cannot be written, on all ranks alike.
     """
-    if not all(agree(comm, find_spec("vtkmodules") is not None)):
-        _LOG.warning("%s is not written: VTK is missing; install python3-vtk9 (Debian) or vtk (pip, conda)", path.name)
+    if _is_there(path, comm):
+        _write_parallel(path.with_suffix(".pvtu"), comm, grid)
+        on_root(comm, lambda: _write_collection(path, [(0.0, path.with_suffix(".pvtu").name)]))
+
+
+def write_series(path: Path, comm: MPI.Comm, series: Iterable[tuple[float, Grid]]) -> None:
+    """Write NAME.pvd, and for each time NAME-NUMBER.pvtu with its NAME-NUMBER_RANK.vtu of each rank. Collective.
+
+    Without VTK nothing is written, and a warning says so.
+
+    Args:
+        path: the first of them.
+        comm: the ranks.
+        series: times, rising, and this rank's part at each.
+
+    Raises:
+        InputError: a file cannot be written, on all ranks alike.
+    """
+    if not _is_there(path, comm):
         return
+    entries = []
+    for number, (time, grid) in enumerate(series):
+        file = path.with_name(f"{path.stem}-{number:05d}.pvtu")
+        _write_parallel(file, comm, grid)
+        entries.append((time, file.name))
+    on_root(comm, lambda: _write_collection(path, entries))
+
+
+def _is_there(path: Path, comm: MPI.Comm) -> bool:
+    """Whether all ranks have VTK; otherwise a warning says what is not written. Collective."""
+    if all(agree(comm, find_spec("vtkmodules") is not None)):
+        return True
+    _LOG.warning("%s is not written: VTK is missing; install python3-vtk9 (Debian) or vtk (pip, conda)", path.name)
+    return False
+
+
+def _write_parallel(path: Path, comm: MPI.Comm, grid: Grid) -> None:
+    """Write a grid: its pieces, and the file that names them. Collective."""
     pieces = [path.with_name(f"{path.stem}_{rank}.vtu") for rank in range(comm.size)]
     written = _write_piece(pieces[comm.rank], grid)
     if not all(agree(comm, written)):
         raise InputError(f"{path.name}: VTK could not write it. Is the disk full?")
-    on_root(comm, lambda: _write_index(path, grid, pieces))
+    on_root(comm, lambda: _write_pieces(path, grid, pieces))
 
 
 def _write_piece(path: Path, grid: Grid) -> bool:
@@ -100,8 +135,8 @@ def _vtk_grid(grid: Grid) -> Any:
     return made
 
 
-def _write_index(path: Path, grid: Grid, pieces: list[Path]) -> None:
-    """The two files that name the pieces. Rank 0 only."""
+def _write_pieces(path: Path, grid: Grid, pieces: list[Path]) -> None:
+    """The file that names the pieces. Rank 0 only."""
     parallel = Xml.Element(
         "VTKFile", type="PUnstructuredGrid", version="1.0", byte_order=f"{sys.byteorder.title()}Endian"
     )
@@ -111,12 +146,21 @@ def _write_index(path: Path, grid: Grid, pieces: list[Path]) -> None:
     Xml.SubElement(whole, "PPoints").extend(_declared({"Points": grid.points}))
     for piece in pieces:
         Xml.SubElement(whole, "Piece", Source=piece.name)
-    collection = Xml.Element("VTKFile", type="Collection", version="0.1")
-    entries = Xml.SubElement(collection, "Collection")
-    Xml.SubElement(entries, "DataSet", timestep="0", part="0", file=path.with_suffix(".pvtu").name)
-    for root, file in ((parallel, path.with_suffix(".pvtu")), (collection, path)):
-        Xml.indent(root)
-        Xml.ElementTree(root).write(file, encoding="utf-8", xml_declaration=True)
+    _write_xml(path, parallel)
+
+
+def _write_collection(path: Path, entries: Iterable[tuple[float, str]]) -> None:
+    """The file that ParaView opens: the files by their times. Rank 0 only."""
+    root = Xml.Element("VTKFile", type="Collection", version="0.1")
+    collection = Xml.SubElement(root, "Collection")
+    for time, name in entries:
+        Xml.SubElement(collection, "DataSet", timestep=f"{time:g}", part="0", file=name)
+    _write_xml(path, root)
+
+
+def _write_xml(path: Path, root: Xml.Element) -> None:
+    Xml.indent(root)
+    Xml.ElementTree(root).write(path, encoding="utf-8", xml_declaration=True)
 
 
 def _declared(fields: Mapping[str, npt.NDArray[Any]]) -> Iterator[Xml.Element]:

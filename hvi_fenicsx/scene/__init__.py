@@ -1,6 +1,7 @@
 """The scene: what the user asked for, from a TOML file (:func:`read_scene`) or Python (:class:`Scene`)."""
 
 from .effect_tables import BodyTable, BoundaryTable, MaterialTable
+from .path_table import PathTable
 from .reader import read_scene, with_place
 from .scene import PlacedEffect, Scene
 from .solver_table import SolverTable
@@ -10,6 +11,7 @@ __all__ = [
     "BodyTable",
     "BoundaryTable",
     "MaterialTable",
+    "PathTable",
     "PlacedEffect",
     "Scene",
     "SolverTable",

@@ -6,13 +6,14 @@ from collections.abc import Iterable, Iterator, Mapping
 from itertools import chain, combinations
 from typing import Any, Protocol
 
-from ..effects import Effect
+from ..effects import Drive, Effect, Place, load_name
 from ..errors import InputError
 from ..laws import smoothing
 from ..mesh.shapes import DomainShape
 from ..schema import Mistake, shown, unknown
 from .effect_tables import BodyTable, BoundaryTable, InterfaceTable, MaterialTable
 from .named_tables import WHOLE
+from .path_table import PathTable
 from .solver_table import SolverTable
 
 _Keys = tuple[str, ...]
@@ -51,6 +52,13 @@ class Tables(Protocol):
     def solver(self) -> SolverTable:
         """How to solve."""
 
+    @property
+    def path(self) -> PathTable | None:
+        """The load path."""
+
+    def effects(self) -> Iterable[tuple[Place, str | None, Effect]]:
+        """All effects with their places."""
+
 
 def contradictions(scene: Tables) -> list[Mistake]:
     """All that does not fit; the finer checks are made only where the coarse ones find nothing."""
@@ -63,6 +71,7 @@ def _coarse(scene: Tables) -> Iterator[Mistake]:
     yield from _regions(scene)
     yield from _one_by_one(scene)
     yield from _start(scene)
+    yield from _path(scene)
 
 
 def _fine(scene: Tables) -> Iterator[Mistake]:
@@ -141,6 +150,15 @@ def _start(scene: Tables) -> Iterator[Mistake]:
     if not isinstance(start, str) and len(start) != scene.dimension:
         text = f"has {len(start)} components; a {scene.dimension}D scene wants {scene.dimension}"
         yield Mistake(("solver", "start"), text)
+
+
+def _path(scene: Tables) -> Iterator[Mistake]:
+    """What the factor of the load path multiplies must be there."""
+    driving = [one for one in scene.effects() if one[2].drive is not Drive.RESISTANCE and not one[2].bounds_normal]
+    known = list(dict.fromkeys(load_name(where, effect) for _, where, effect in driving))
+    for name in (scene.path.scaled if scene.path else None) or ():
+        if name not in known:
+            yield Mistake(("path", "scaled"), unknown("load or prescribed displacement", name, known))
 
 
 def _on_boundary(boundary: Mapping[str, BoundaryTable]) -> Iterator[_Item]:

@@ -23,7 +23,7 @@ from .toml_lines import line_of, lines_of
 
 _LARGEST = 1_000_000
 """Bytes of a scene file at most."""
-_KEY = re.compile(r"((?:title|plugins|domain|material|body|boundary|interface|solver)\.[^:]+): ")
+_KEY = re.compile(r"((?:title|plugins|domain|material|body|boundary|interface|solver|path)\.[^:]+): ")
 """How a message begins that names a key of the scene."""
 _MOST_MISTAKES = 10
 """Mistakes that one message lists."""

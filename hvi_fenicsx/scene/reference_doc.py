@@ -17,6 +17,7 @@ from ..effects import Effect, Place
 from ..laws.base import registered
 from ..mesh.shapes import DomainShape, PlacedShape
 from .effect_tables import DEFAULT_ELASTICITY, BodyTable, BoundaryTable, InterfaceTable, MaterialTable
+from .path_table import PathTable
 from .scene import Scene
 from .solver_table import OneOf, SolverTable
 
@@ -69,6 +70,7 @@ def _document() -> Iterator[str]:
     yield from _table("`[interface.NAME]`", InterfaceTable)
     yield from _laws()
     yield from _table("`[solver]`", SolverTable)
+    yield from _table("`[path]`", PathTable)
 
 
 def _table(title: str, model: type[BaseModel], only: Iterable[str] | None = None) -> Iterator[str]:
@@ -134,7 +136,9 @@ def _provided(registry: Mapping[str, type[T]]) -> dict[str, type[T]]:
 
 
 def _toml(value: Any) -> str:
-    if value is None or value == "":
+    if isinstance(value, tuple) and len(value) == 1:
+        return _toml(value[0])
+    if value is None or value in ("", ()):
         return "none"
     return f'`"{value}"`' if isinstance(value, str) else f"`{str(value).lower()}`"
 

@@ -26,6 +26,7 @@ from ..schema import Mistake, Names, Table, choose, located_error, refusal, vali
 from . import plugins
 from .consistency import contradictions
 from .effect_tables import Bodies, BoundaryTable, InterfaceTable, Materials
+from .path_table import PathTable
 from .solver_table import SolverTable
 
 _NAME = re.compile(r"\w[\w.-]{0,99}")
@@ -81,6 +82,8 @@ class Scene(Table):
     """where two bodies meet, and what acts between them"""
     solver: SolverTable = SolverTable()
     """how to solve"""
+    path: PathTable | None = None
+    """the load path that `hvi path` follows; other commands do not look at it"""
 
     def __init__(self, **keys: Any) -> None:
         """The keys of the scene file; tables as objects or as the scene file writes them.

@@ -104,23 +104,33 @@ class Condensation:
         """Condensed forces and applied loads (n, 2), and the constants of the energy and of <g, u>. Collective."""
         interior, load, total = self._interior, self._loading, self._system.comm.allreduce
         fixed = self._system.problem.fixed_here
-        inner = interior.solve(load.lifted)
-        inside = inner.copy()
+        inside = interior.solve(load.lifted)
         inside[fixed] = 0.0
-        lifted, applied = load.lifted.copy(), load.applied.copy()
-        lifted[fixed] = applied[fixed] = 0.0
+        lifted = load.lifted.copy()
+        lifted[fixed] = 0.0
         self._force = interior.gathered(lifted) - interior.pulled(inside)
-        outer = interior.gathered(applied) - interior.pulled(interior.solve(applied))
         held = 0.5 * load.prescribed.T @ load.pulled - load.prescribed.T @ load.applied
-        constant = total(held - 0.5 * lifted.T @ inside)
-        product = total(load.applied.T @ inner)
-        gone, stay = self._gone, self._stay
-        moved = self._eliminated(self._force[gone])
-        constant = constant - 0.5 * self._force[gone].T @ moved
-        product = product + outer[gone].T @ moved
-        force = self._force[stay] - self._coupling.T @ moved
-        outer = outer[stay] - self._coupling.T @ self._eliminated(outer[gone])
-        return force, outer, _quadratic(constant), _quadratic(product)
+        moved = self._eliminated(self._force[self._gone])
+        constant = total(held - 0.5 * lifted.T @ inside) - 0.5 * self._force[self._gone].T @ moved
+        force = self._force[self._stay] - self._coupling.T @ moved
+        product, outer = self.products(load.applied)
+        return force, outer.T, _quadratic(constant), _quadratic(product)
+
+    def products(self, vectors: Array) -> tuple[Array, Array]:
+        """The products of vectors c with the body's displacement u: c·u = constants + λ rates + rows x. Collective.
+
+        Args:
+            vectors: c as columns, in the components of the unknowns, (local unknowns, k).
+
+        Returns:
+            Constants and rates, (k, 2); rows, (k, n).
+        """
+        interior = self._interior
+        outer = interior.gathered(vectors) - interior.pulled(interior.solve(vectors))
+        gone = self._eliminated(outer[self._gone])
+        inside = self._system.comm.allreduce(vectors.T @ interior.solve(self._loading.lifted))
+        rows = outer[self._stay] - self._coupling.T @ gone
+        return np.asarray(inside + gone.T @ self._force[self._gone]), np.asarray(rows.T)
 
     def values(self, x: Array, factor: float = 1.0) -> Array:
         """The displacements of all unknowns of Γc that the body keeps, (n of the interior,).

@@ -62,14 +62,3 @@ class HoldingForces:
         self._rows.multTranspose(values, found)
         values.destroy()
         return found
-
-    def spread(self, values: Array) -> PETSc.Vec:
-        """The elastic forces that displacements of the prescribed unknowns alone make, Cartesian. Collective.
-
-        Args:
-            values: of those that this rank owns.
-        """
-        self._product.array[:] = values
-        forces = self._rows.createVecRight()
-        self._rows.multTranspose(self._product, forces)
-        return forces

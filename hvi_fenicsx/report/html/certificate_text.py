@@ -26,6 +26,11 @@ _SECOND_ORDER = {
     "undecided": "Whether the equilibrium is stable was left undecided; second_order = true in [solver] asks for it.",
 }
 
+_NO_HISTORY = (
+    "A single run has no history: this is an equilibrium at this load, not of necessity that of loading, and "
+    "a joint that is unloaded heals. `hvi path` follows the load."
+)
+
 
 def certificate(result: Result) -> dict[str, Any] | None:
     """Its rows and what goes with them; None where nothing was solved."""
@@ -65,6 +70,8 @@ def _two_digits(value: float | None) -> str:
 def _remarks(result: Result, found: Mapping[str, Any]) -> Iterator[str]:
     if found["passed"]:
         yield _SECOND_ORDER.get(str(found["second_order"]), str(found["second_order"]))
+    if any(role["laws"] for part in result.parts for role in result.roles(part.name)):
+        yield _NO_HISTORY
     if result.summary.get("smoothing") and result.summary["epsilon"] is not None:  # null: there is no law
         yield _smoothed(result.summary, found)
 

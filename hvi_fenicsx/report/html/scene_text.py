@@ -14,13 +14,18 @@ _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 def body(result: Result) -> Iterator[tuple[str, str]]:
     """The body's shape and what it is made of, each with a name."""
-    domain = dict(result.scene.get("domain") or {})
+    return body_of(result.scene)
+
+
+def body_of(scene: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    """As :func:`body`, of the scene's tables."""
+    domain = dict(scene.get("domain") or {})
     if "file" in domain:
         domain["file"] = PurePath(str(domain["file"])).name
     yield "body", _entries(domain)
-    for name, table in _named(result.scene.get("material") or {}):
+    for name, table in _named(scene.get("material") or {}):
         yield f"material{name}", _entries(table)
-    for name, table in _named(result.scene.get("body") or {}):
+    for name, table in _named(scene.get("body") or {}):
         yield f"in the volume{name}", _entries(table)
 
 
@@ -32,7 +37,12 @@ def _named(table: Mapping[str, Any]) -> list[tuple[str, Mapping[str, Any]]]:
 
 def parts(result: Result) -> Iterator[dict[str, Any]]:
     """Each boundary part: its name, where it lies, and what acts on it."""
-    for name, table in (result.scene.get("boundary") or {}).items():
+    return parts_of(result.scene)
+
+
+def parts_of(scene: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
+    """As :func:`parts`, of the scene's tables."""
+    for name, table in (scene.get("boundary") or {}).items():
         on = table.get("on", ())
         acts = [(key, value_text(value)) for key, value in table.items() if key not in _PLACE]
         yield {"name": name, "on": on if isinstance(on, str) else ", ".join(on), "acts": acts}

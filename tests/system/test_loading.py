@@ -10,7 +10,7 @@ import pytest
 from scenes import STEEL, Table
 
 from hvi_fenicsx import InputError, Scene, prepare
-from hvi_fenicsx.system import factored_load
+from hvi_fenicsx.system import loading
 
 FACTOR = -0.4
 
@@ -51,20 +51,19 @@ def load(table: Table) -> npt.NDArray[np.float64]:
 def test_a_factor_multiplies_the_named_loads_and_displacements(names: list[str]) -> None:
     system = prepare(Scene.model_validate(scene())).system
     assert system.rotation is not None  # the slope turns components
-    split = factored_load.factored(system, names)
-    np.testing.assert_allclose(split.at(FACTOR).array, load(multiplied(scene(), names)), rtol=0, atol=1e-13)
-    np.testing.assert_allclose(split.at(1.0).array, system.load.array, rtol=0, atol=1e-13)
+    constant, rate = loading.make(system, names).lifted.T
+    np.testing.assert_allclose(constant + FACTOR * rate, load(multiplied(scene(), names)), rtol=0, atol=1e-13)
+    np.testing.assert_allclose(constant + rate, system.load.array, rtol=0, atol=1e-13)
 
 
 def test_without_names_the_factor_multiplies_all() -> None:
-    split = factored_load.factored(prepare(Scene.model_validate(scene())).system)
-    assert split.constant.norm() == 0.0
+    assert not np.any(loading.make(prepare(Scene.model_validate(scene())).system, None).lifted[:, 0])
 
 
 def test_a_name_that_does_not_exist_is_refused_with_those_that_do() -> None:
     system = prepare(Scene.model_validate(scene())).system
-    with pytest.raises(InputError, match=r"no 'pull.traction'; there are: body.force, press.traction, wall.disp"):
-        factored_load.factored(system, ["pull.traction"])
+    with pytest.raises(InputError, match=r"no load 'pull.traction'; there are: body.force, press.traction, wall.disp"):
+        loading.make(system, ["pull.traction"])
 
 
 def test_two_parts_that_share_a_moved_vertex_are_scaled_together() -> None:
@@ -72,5 +71,5 @@ def test_two_parts_that_share_a_moved_vertex_are_scaled_together() -> None:
     del table["boundary"]["press"]
     table["boundary"]["lid"] = {"on": "top", "displacement": ["free", "1e-7*(1 + x)"]}
     system = prepare(Scene.model_validate(table)).system
-    with pytest.raises(InputError, match=r"boundary.lid and boundary.wall meet"):
-        factored_load.factored(system, ["wall.displacement"])
+    with pytest.raises(InputError, match=r"two boundary parts meet"):
+        loading.make(system, ["wall.displacement"])

@@ -1,0 +1,177 @@
+"""``hvi path``: the equilibria of a scene over its load factor, into a result folder."""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import json
+from collections.abc import Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from .. import console, path_output, results
+from ..load_path import INTERRUPTED, PathRow
+from ..path import journal
+from ..path.following import Control, PathRun
+from ..path.journal import Journal, Record
+from ..report.html.render import NAME as PAGE
+from ..results.folder import inputs_of
+from ..results.output_folder import Existing
+from ..runtime import log, terminal
+from ..runtime.mpi import on_root
+from ..runtime.signals import Interrupt
+from ..runtime.timing import Timer
+from ..runtime.versions import __version__
+from ..scene import PathTable, Scene, dump_scene, read_scene
+from ..system import petsc_options
+from ..workflow import prepare
+from . import telling
+from .telling import COMM
+
+
+@dataclass(frozen=True, kw_only=True)
+class PathRequest:
+    """What ``hvi path`` is asked for.
+
+    Attributes:
+        scene: what to follow; it has the table.
+        wanted: the table.
+        folder: where the result goes.
+        known: the records of a path that was begun.
+        timer: where time goes.
+        given: the command line and PETSc's options, for ``summary.json``.
+        draw: whether to make a picture.
+    """
+
+    scene: Scene
+    wanted: PathTable
+    folder: results.ResultFolder
+    known: Sequence[Record]
+    timer: Timer
+    given: dict[str, str]
+    draw: bool
+
+    @property
+    def identity(self) -> str:
+        """What the journal says that it is of."""
+        return _identity(self.scene, self.folder.target)
+
+
+def execute(options: argparse.Namespace) -> int:
+    """Follow a scene's path into a folder; the exit code by the contract. Collective.
+
+    Raises:
+        InputError: on all ranks alike.
+    """
+    timer = Timer()
+    petsc_options.insert(options.petsc)
+    read = on_root(COMM, lambda: read_scene(options.scene, options.overrides))
+    wanted = read.path or PathTable()
+    scene = read.changed(path=wanted)
+    target = on_root(COMM, lambda: results.resolved(options.out or Path("results") / f"{options.scene.stem}-path"))
+    if options.resume and (code := on_root(COMM, lambda: _finished(target, scene))) is not None:
+        return code
+    existing: Existing = "replace" if options.force or options.resume else "refuse"
+    folder = results.ResultFolder(COMM, target, existing, inputs=[options.scene])
+    try:
+        known = on_root(COMM, lambda: _known(folder, scene) if options.resume else [])
+        request = PathRequest(
+            scene=scene,
+            wanted=wanted,
+            folder=folder,
+            known=known,
+            timer=timer,
+            given={"command": options.given, "petsc": options.petsc},
+            draw=not options.no_pictures,
+        )
+        return _run(request)
+    except BaseException:
+        folder.discard()
+        raise
+
+
+def _identity(scene: Scene, target: Path) -> str:
+    """What a path depends on; on another number of ranks the unknowns have another order."""
+    parts = [__version__, COMM.size, dump_scene(scene, target), sorted(inputs_of(scene, target).items())]
+    return hashlib.sha256(json.dumps(parts).encode()).hexdigest()
+
+
+def _known(folder: results.ResultFolder, scene: Scene) -> list[Record]:
+    """The records of a path that was begun. Rank 0 only."""
+    return journal.read(folder.target / journal.NAME, _identity(scene, folder.target))
+
+
+def _finished(target: Path, scene: Scene) -> int | None:
+    """The exit code of a finished path of the same scene; None where there is none. Rank 0 only."""
+    record, fault = results.finished.read(target, scene)
+    if fault is not None:
+        terminal.say(f"{target}: {fault}; the path is followed again")
+    if record is None or record.get("path") is None or record["path"]["end"] == INTERRUPTED:
+        return None
+    terminal.say(f"{target}: finished already ({record['reason']})")
+    return int(record["exit_code"])
+
+
+def _run(request: PathRequest) -> int:
+    """Follow, write and tell; the exit code. Collective."""
+    interrupt = Interrupt(COMM)
+    interrupt.watch()
+    folder, run_logs = request.folder, telling.on_first_rank(lambda: log.RunLog(request.folder.work / "run.log"))
+    with log.Handlers(*telling.on_first_rank(log.TerminalDisplay)):
+        with log.Handlers(*run_logs):
+            record = _followed(request, interrupt)
+        on_root(COMM, lambda: telling.finish(run_logs))
+        folder.commit(request.scene)
+        telling.say([*(f"warning: {text}" for text in folder.kept), on_root(COMM, lambda: _where(request))])
+    return int(record["exit_code"])
+
+
+def _where(request: PathRequest) -> str:
+    """Where the result is, and with what to begin."""
+    first = f"; open {PAGE} there" if (request.folder.target / PAGE).is_file() else ""
+    return f"{request.folder.target}: {request.timer.total:.1f} s in all{first}"
+
+
+def _followed(request: PathRequest, interrupt: Interrupt) -> dict[str, Any]:
+    """The summary of the path that was followed and written. Collective."""
+    prepared = prepare(request.scene, COMM, request.timer)
+    telling.say(console.heading(prepared, COMM.size))
+    run = PathRun(prepared, request.wanted)
+    telling.say(console.path_wanted(request.wanted, run.scaled))
+    if request.known:
+        telling.say([f"{len(request.known)} rows are there already; on from factor {request.known[-1]['factor']:.6g}"])
+    with ExitStack() as stack:
+        writer = _JournalWriter(request, stack)
+        control = Control(keep=writer.keep, progress=_tell, interrupted=interrupt.requested)
+        path = run.follow(control, request.known)
+    telling.say(console.path_outcome(path))
+    return path_output.write(request.folder, run, path, request.given, telling.LOG.info, draw=request.draw)
+
+
+class _JournalWriter:
+    """Keeps each new state in the folder of the result; the file is opened with the first of them."""
+
+    def __init__(self, request: PathRequest, stack: ExitStack) -> None:
+        self._request, self._stack = request, stack
+        self._journal: Journal | None = None
+
+    def keep(self, record: Record) -> None:
+        """Keep a record. Collective."""
+        on_root(COMM, lambda: self._append(record))
+
+    def _append(self, record: Record) -> None:
+        if self._journal is None:
+            file = self._request.folder.announce(journal.NAME)
+            if not self._request.known:
+                file.unlink(missing_ok=True)
+            self._journal = self._stack.enter_context(Journal(file, self._request.identity))
+        self._journal.append(record)
+
+
+def _tell(number: int, row: PathRow) -> None:
+    """The moving line."""
+    place = f" on {row.part}" if row.part else ""
+    kind = "" if row.stable else ", unstable"
+    telling.LOG.debug("row %d, factor %.6g%s: %s%s", number, row.factor, kind, row.event, place, extra={"moving": True})

@@ -1,0 +1,185 @@
+"""Follow the load path of a model or a scene from Python."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from dolfinx import fem
+from matplotlib.figure import Figure
+from mpi4py import MPI
+from pydantic import ValidationError
+
+from .. import console, path_output
+from ..errors import InputError
+from ..load_path import LoadPath
+from ..path.following import Control, PathRun
+from ..report.path_reader import PathResult
+from ..results import ResultFolder
+from ..results.output_folder import Existing
+from ..runtime import log
+from ..scene import PathTable, Scene
+from ..schema import located_error
+from ..typing import Array
+from .model import Model
+from .solving import check
+
+_LOG = log.logger("modelling")
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class ModelPath(LoadPath):
+    """A load path with its columns as arrays, in SI.
+
+    Attributes:
+        run: what found it.
+    """
+
+    run: PathRun
+
+    @property
+    def factor(self) -> Array:
+        """The factor λ of all rows, (rows,)."""
+        return self.factors
+
+    @property
+    def peak_factor(self) -> float:
+        """The largest factor that is borne."""
+        return self.rows[self.peak].factor
+
+    @property
+    def events(self) -> tuple[str, ...]:
+        """What happens at each row, as in ``path.csv``."""
+        return tuple(row.event for row in self.rows)
+
+    @cached_property
+    def stable(self) -> Array:
+        """Which rows are stable, (rows,) of booleans."""
+        return np.array([row.stable for row in self.rows])
+
+    def force(self, part: str) -> Array:
+        """The resultant of what acts on the body at a part, N/m in 2D, N in 3D; (rows, d).
+
+        Args:
+            part: a part with a load or a prescribed displacement.
+
+        Raises:
+            InputError: there is no such part.
+        """
+        return np.array([row.forces[self._known(part)] for row in self.rows])
+
+    def displacement(self, part: str) -> Array:
+        """The mean displacement of a part, m; (rows, d).
+
+        Args:
+            part: a part with a load or a prescribed displacement.
+
+        Raises:
+            InputError: there is no such part.
+        """
+        return np.array([row.displacements[self._known(part)] for row in self.rows])
+
+    def _known(self, part: str) -> str:
+        if part not in self.parts:
+            raise InputError(f"nothing drives or holds {part!r}; there are: {', '.join(self.parts)}")
+        return part
+
+    def u(self, row: int) -> fem.Function:
+        """The displacement at a row, m, ghosts updated; P1 on the body's mesh. Collective.
+
+        Args:
+            row: its number.
+        """
+        field = self.run.displacement(range(len(self.rows))[row])
+        field.x.array[:] *= self.run.prepared.problem.scales.displacement
+        return field
+
+    def plot(self) -> Figure | None:
+        """Force over displacement of the driven part, as a matplotlib figure; None where no part is driven."""
+        from ..report.pictures import path_picture
+
+        shown = self._as_read()
+        return None if shown.driven is None else path_picture.make(shown)
+
+    def _as_read(self) -> PathResult:
+        """As the report reads it from its folder."""
+        columns = {"stable": self.stable.astype(float)}
+        for part in self.parts:
+            for kind, values in (("f", self.force(part)), ("u", self.displacement(part))):
+                columns |= {f"{part}.{kind}{'xyz'[i]}": values[:, i] for i in range(self.dimension)}
+        title = self.run.prepared.scene.title or "load path"
+        return PathResult(
+            folder=Path("."),
+            scene={"title": title},
+            summary={"path": self.summary()},
+            columns=columns,
+            events=self.events,
+        )
+
+    def write(self, folder: str | os.PathLike[str], *, force: bool = False, pictures: bool = True) -> None:
+        """Write the folder that ``hvi path`` writes. Collective.
+
+        Args:
+            folder: where to.
+            force: whether a result that is there already is replaced.
+            pictures: whether to draw.
+
+        Raises:
+            InputError: on all ranks alike: the folder holds a result or other files, or cannot be written.
+        """
+        existing: Existing = "replace" if force else "refuse"
+        target = ResultFolder(self.run.prepared.system.comm, Path(folder), existing)
+        try:
+            given = {"command": None, "petsc": None}
+            path_output.write(target, self.run, self, given, _LOG.warning, draw=pictures)
+            target.commit(self.run.prepared.scene)
+        except BaseException:
+            target.discard()
+            raise
+
+    def __repr__(self) -> str:
+        return "\n".join(console.path_outcome(self))
+
+
+def follow(
+    model: Model | Scene,
+    comm: MPI.Comm | None = None,
+    *,
+    to: float | Sequence[float] | None = None,
+    tolerance: float | None = None,
+    **path: Any,
+) -> ModelPath:
+    """Follow the equilibria of a model or a scene over a load factor. Collective.
+
+    Args:
+        model: what to follow.
+        comm: the ranks; by default those of the body, for a scene all.
+        to: the factor at which the path ends, or a programme with turns; by default what the scene says, else 1.
+        tolerance: of the certificate.
+        **path: the other keys of the scene's table ``[path]``: scaled, follow, memory.
+
+    Raises:
+        InputError: on all ranks alike: an option is not allowed, or the path cannot be followed.
+    """
+    options: dict[str, Any] = {} if tolerance is None else {"tolerance": tolerance}
+    prepared = check(model, comm, **options)
+    wanted = _wanted(prepared.scene, path if to is None else {**path, "to": to})
+    prepared = type(prepared)(
+        **{f.name: getattr(prepared, f.name) for f in fields(prepared)} | {"scene": prepared.scene.changed(path=wanted)}
+    )
+    run = PathRun(prepared, wanted)
+    found = run.follow(Control())
+    return ModelPath(**{f.name: getattr(found, f.name) for f in fields(found)}, run=run)
+
+
+def _wanted(scene: Scene, changes: dict[str, Any]) -> PathTable:
+    known = scene.path or PathTable()
+    try:
+        return scene.changed(path=known.changed(**changes)).path or known
+    except ValidationError as error:
+        raise located_error(error, Scene) from None

@@ -1,0 +1,194 @@
+"""A prepared scene followed over its load factor: states, certified, as rows in SI."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from dolfinx import fem
+
+from ..errors import InputError
+from ..load_path import LoadPath, PathRow
+from ..problem.factored_problem import FactoredProblem
+from ..problem.problem import Problem
+from ..scene import PathTable
+from ..system import loading
+from ..system.condensation import Condensation
+from ..typing import Array
+from ..workflow import Preparation
+from . import records
+from .certifying import Certifier, Verdict
+from .exact import ExactFollower
+from .journal import Record
+from .measures import Measures
+from .state import End, Event, Follow, PathOptions, PathState
+
+
+@dataclass(frozen=True, kw_only=True)
+class Control:
+    """What a path is followed with.
+
+    Attributes:
+        keep: is given the record of each new state, on all ranks.
+        progress: is told each new row.
+        interrupted: whether to stop (collective).
+    """
+
+    keep: Callable[[Record], None] = lambda record: None
+    progress: Callable[[int, PathRow], None] = lambda number, row: None
+    interrupted: Callable[[], bool] = lambda: False
+
+
+class PathRun:
+    """The path of a prepared scene. Creation is collective.
+
+    Args:
+        prepared: the scene, assembled.
+        wanted: what path is wanted.
+
+    Raises:
+        InputError: on all ranks alike: the path cannot be followed.
+
+    Attributes:
+        prepared: the scene.
+        wanted: what path is wanted.
+        scaled: the names of what the factor multiplies.
+        states: those found so far.
+    """
+
+    def __init__(self, prepared: Preparation, wanted: PathTable) -> None:
+        _refuse_smoothing(prepared)
+        self.prepared, self.wanted = prepared, wanted
+        system = prepared.system
+        known = loading.names(system)
+        self.scaled = known if wanted.scaled is None else wanted.scaled
+        if not known:
+            raise InputError("path: nothing drives the body; add a load or a prescribed displacement")
+        with prepared.timer("setup"):
+            self._condensation = Condensation(system, self.scaled)
+            self._measures = Measures(system, self._condensation, self.scaled)
+        self._remember = range(len(self._condensation.problem.bonds) if wanted.memory else 0)
+        self._factored = FactoredProblem(system.problem, self.scaled)
+        self._certifier = Certifier(
+            system, self._condensation, self._factored, prepared.options.tolerance, self._remember
+        )
+        self.states: list[PathState] = []
+        self._verdicts: list[Verdict] = []
+        self._extremes: list[tuple[float, float]] = []
+
+    def follow(self, control: Control, known: Sequence[Record] = ()) -> LoadPath:
+        """Follow the path to its end. Collective.
+
+        Args:
+            control: what it is followed with.
+            known: the records of its first states, from which to go on.
+
+        Raises:
+            InputError: on all ranks alike: the path cannot be followed.
+        """
+        for one in known:
+            self._take(*records.state(one))
+        rows = list(self._rows())
+        follower = self._follower(control)
+        with self.prepared.timer("solve"):
+            for state in _finite(follower.states()):
+                if follower.end is End.INTERRUPTED:
+                    break  # the last state is no event: the path goes on from the one before
+                with self.prepared.timer("certificate"):
+                    verdict = self._certifier.verdict(state, len(self.states))
+                self._take(state, verdict)
+                control.keep(records.record(state, verdict))
+                rows.append(self._row(len(rows)))
+                control.progress(len(rows) - 1, rows[-1])
+        return LoadPath(
+            dimension=self.prepared.problem.scales.dimension,
+            scaled=self.scaled,
+            rows=tuple(rows),
+            end=str(follower.end or End.LOST),
+            reason=follower.reason,
+            examined=sum(verdict.whole for verdict in self._verdicts),
+        )
+
+    def _follower(self, control: Control) -> ExactFollower:
+        options = PathOptions(programme=self.wanted.to, follow=Follow(self.wanted.follow), remember=self._remember)
+        resume = self.states[-1] if self.states else None
+        return ExactFollower(self._condensation.problem, options, resume, control.interrupted)
+
+    def _take(self, state: PathState, verdict: Verdict) -> None:
+        self.states.append(state)
+        self._verdicts.append(verdict)
+
+    def _rows(self) -> Iterator[PathRow]:
+        return (self._row(number) for number in range(len(self.states)))
+
+    def _row(self, number: int) -> PathRow:
+        state, verdict, scales = self.states[number], self._verdicts[number], self.prepared.problem.scales
+        largest = self._reached(number) if self.wanted.memory else None
+        place, d = state.place, scales.dimension
+        return PathRow(
+            factor=state.factor,
+            event=str(state.event),
+            part=None if place is None else place.part,
+            point=None if place is None else np.asarray(place.point[:d]),
+            energy=state.energy * scales.energy,
+            work=state.work * scales.energy,
+            dissipated=state.dissipated * scales.energy,
+            released=state.released * scales.energy,
+            unstable=state.unstable,
+            forces=self._measures.forces(state.x, state.factor, largest),
+            displacements=self._measures.displacements(state.x, state.factor),
+            certified=verdict.certified,
+        )
+
+    def _reached(self, number: int) -> tuple[float, float]:
+        """The least and the greatest factor up to a row."""
+        for state in self.states[len(self._extremes) : number + 1]:
+            low, high = self._extremes[-1] if self._extremes else (0.0, 0.0)
+            self._extremes.append((min(low, state.factor), max(high, state.factor)))
+        return self._extremes[number]
+
+    def displacement(self, number: int) -> fem.Function:
+        """The displacement at a row, nondimensional, ghosts updated. Collective.
+
+        Args:
+            number: of the row.
+        """
+        state = self.states[number]
+        return self._expanded(state.x, state.factor)
+
+    def crossings(self, factor: float) -> Iterator[tuple[int, Problem, fem.Function]]:
+        """The states at which the path crosses a factor: the row before, problem and displacement. Collective.
+
+        Between two events the path is straight.
+
+        Args:
+            factor: λ.
+        """
+        for number, (before, after) in enumerate(zip(self.states, self.states[1:], strict=False)):
+            low, high = sorted((before.factor, after.factor))
+            last = number + 2 == len(self.states)
+            if after.event is Event.JUMP or not low <= factor <= high or low == high:
+                continue
+            if factor == after.factor and not last:
+                continue
+            share = (factor - before.factor) / (after.factor - before.factor)
+            x = before.x + share * (after.x - before.x)
+            yield number, self._factored.at(factor), self._expanded(x, factor)
+
+    def _expanded(self, x: Array, factor: float) -> fem.Function:
+        return self.prepared.system.displacement(self._condensation.expand(x, factor))
+
+
+def _finite(states: Iterator[PathState]) -> Iterator[PathState]:
+    """The states up to the first that is no number."""
+    return itertools.takewhile(lambda state: np.isfinite(state.factor) and bool(np.all(np.isfinite(state.x))), states)
+
+
+def _refuse_smoothing(prepared: Preparation) -> None:
+    if prepared.scene.solver.smoothing is not None:
+        raise InputError(
+            "solver.smoothing: a load path is followed with the laws themselves, kinks and jumps; leave smoothing and "
+            "epsilon out"
+        )

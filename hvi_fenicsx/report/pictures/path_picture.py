@@ -1,0 +1,123 @@
+"""``path.png``: the force over the displacement of the driven part, stable and unstable stretches, jumps and events."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from ...typing import Array, Mask
+from ..path_reader import PathResult, read
+from ..units import Unit, unit_for
+from .style import BLUE, GREEN, GREY, HEADING, INK, ORANGE, VERMILION, area, figure, save, titled
+
+NAME = "path.png"
+_CAPTION = (
+    "The load path: force over mean displacement of the driven part. Solid: stable; dashed: unstable, which a test "
+    "cannot hold; dotted: jumps; dots: events on the way."
+)
+_DOTS = 400
+"""So many events have a dot at most."""
+
+
+def draw(folder: Path) -> Path | None:
+    """Draw the picture of a finished load path into its folder; None where no part is driven. Rank 0 only.
+
+    Args:
+        folder: of the path.
+
+    Raises:
+        ResultError: no load path is there, or its files are damaged.
+    """
+    result = read(folder)
+    if result.driven is None:
+        return None
+    save(make(result), folder / NAME, _CAPTION)
+    return folder / NAME
+
+
+def make(result: PathResult) -> Figure:
+    """The picture.
+
+    Args:
+        result: the path; a part of it is driven.
+    """
+    assert result.driven is not None
+    u, force = result.along(result.driven)
+    units = unit_for(float(np.max(np.abs(u))), "m"), unit_for(float(np.max(np.abs(force))), _unit(result))
+    fig = figure(HEADING + 5.4)
+    titled(fig, result.title, _subject(result), *_verdict(result))
+    axes = area(fig, 1.15, 0.85, 6.5, 4.45)
+    x, y = np.asarray(u / units[0].size), np.asarray(force / units[1].size)
+    _stretches(axes, result, x, y)
+    _marks(axes, result, x, y, units)
+    axes.axhline(0.0, color=GREY, lw=0.8, zorder=0)
+    axes.set_xlabel(f"mean displacement of “{result.driven}” along its force ({units[0].name})")
+    axes.set_ylabel(f"force on “{result.driven}” ({units[1].name})")
+    axes.margins(0.06, 0.10)
+    axes.legend(loc="lower right", bbox_to_anchor=(1.015, 1.0), ncols=5, frameon=False, fontsize=10, borderaxespad=0.0,
+                handlelength=1.6, columnspacing=0.9)  # fmt: skip
+    return fig
+
+
+def _unit(result: PathResult) -> str:
+    return "N" if len(result.axes) == 3 else "N/m"
+
+
+def _subject(result: PathResult) -> str:
+    path = result.path
+    return f"load path · largest factor {path['peak_factor']:.5g} · {path['events'] + path['folds']} events"
+
+
+def _verdict(result: PathResult) -> tuple[str, str]:
+    path = result.path
+    if path["uncertified"]:
+        return f"✗ {path['uncertified']} rows NOT certified", VERMILION
+    words = {"reached": "✓ certified to its end", "escapes": "✓ certified, then it comes off"}
+    return (words[path["end"]], GREEN) if path["end"] in words else (f"✗ {path['end']}", VERMILION)
+
+
+def _stretches(axes: Axes, result: PathResult, x: Array, y: Array) -> None:
+    """The curve, each kind of it as one line that has gaps."""
+    jump = np.array([event == "jump" for event in result.events[1:]], dtype=bool)
+    stable = result.stable[:-1] & ~jump
+    kinds: tuple[tuple[Mask, str, dict[str, Any]], ...] = (
+        (stable, "stable", {"color": BLUE, "ls": "-", "lw": 2.4, "zorder": 3}),
+        (~stable & ~jump, "unstable", {"color": VERMILION, "ls": (0, (4, 2)), "lw": 1.5, "zorder": 2}),
+        (jump, "jump", {"color": GREY, "ls": ":", "lw": 2.2, "zorder": 2}),
+    )
+    for chosen, name, look in kinds:
+        if np.any(chosen):
+            axes.plot(*_with_gaps(x, y, chosen), label=name, **look)
+
+
+def _with_gaps(x: Array, y: Array, chosen: Mask) -> tuple[Array, Array]:
+    """The chosen stretches between neighbouring rows, others left out."""
+    points = np.column_stack([x, y])
+    parts = [np.vstack([points[at : at + 2], [[np.nan, np.nan]]]) for at in np.flatnonzero(chosen)]
+    joined = np.vstack(parts)
+    return joined[:, 0], joined[:, 1]
+
+
+def _marks(axes: Axes, result: PathResult, x: Array, y: Array, units: tuple[Unit, Unit]) -> None:
+    """Events as dots, the largest force, turns and the end by name."""
+    events = np.flatnonzero([e in ("kink", "contact", "release", "fold") for e in result.events])
+    shown = events[:: max(1, -(-len(events) // _DOTS))]
+    axes.plot(x[shown], y[shown], "o", color=INK, ms=3.4, alpha=0.8, mew=0, zorder=4, label="event")
+    for number, marker, colour, text in _named(result, x, y, units):
+        axes.plot(x[number], y[number], marker, color=colour, ms=9, mec="white", mew=0.8, zorder=6, label=text)
+
+
+def _named(
+    result: PathResult, x: Array, y: Array, units: tuple[Unit, Unit]
+) -> Iterator[tuple[int, str, str, str | None]]:
+    peak = int(np.argmax(y))
+    yield peak, "^", ORANGE, f"peak {y[peak]:.4g} {units[1].name} at {x[peak]:.4g} {units[0].name}"
+    for count, number in enumerate(n for n, event in enumerate(result.events) if event == "turn"):
+        yield number, "s", INK, None if count else "turn"
+    if result.path["end"] != "reached":
+        yield len(x) - 1, "X", VERMILION, str(result.path["end"])

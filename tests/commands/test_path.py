@@ -1,0 +1,147 @@
+"""`hvi path`: strength against closed forms, the files of the contract, resume after interruptions and kills."""
+
+from __future__ import annotations
+
+import csv
+import json
+import random
+import shutil
+import signal
+import subprocess
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from runs import ROOT, command, hvi
+
+from hvi_fenicsx import prepare, read_scene
+from hvi_fenicsx.load_path import LoadPath
+from hvi_fenicsx.path import journal
+from hvi_fenicsx.path.following import Control, PathRun
+from hvi_fenicsx.path.journal import Record
+from hvi_fenicsx.scene import PathTable
+
+BAR = ROOT / "demos" / "glued_bar.toml"
+SHORT = ("--set", "domain.size=[0.05, 0.001]", "--set", "domain.cells=[50, 1]")
+COLUMNS = "row,factor,event,part,x,y,z,energy,work,dissipated,stable,pull.fx,pull.fy,pull.ux,pull.uy"
+KEYS = {"rows", "events", "peak_factor", "peak_row", "folds", "jumps", "work", "dissipated", "end", "certified"}
+
+
+def rows(folder: Path) -> list[dict[str, str]]:
+    with (folder / "path.csv").open(newline="", encoding="utf-8") as stream:
+        return list(csv.DictReader(stream))
+
+
+def summary(folder: Path) -> dict[str, Any]:
+    found: dict[str, Any] = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+    return found
+
+
+def test_the_strength_of_a_short_glued_bar_and_what_the_folder_holds(tmp_path: Path) -> None:
+    """Yuan and Teng's closed form: 215.771 N/mm."""
+    out = tmp_path / "bar"
+    done = hvi("path", BAR, "--out", out, *SHORT)
+    assert done.returncode == 0, done.stderr
+    assert "largest factor that is borne: 1.07" in done.stdout
+    assert "then the body comes off" in done.stdout
+    found = summary(out)["path"]
+    assert found.keys() >= KEYS | {"uncertified"}
+    assert found["end"] == "escapes"
+    assert found["uncertified"] == 0
+    assert found["certified"] == found["rows"] == len(rows(out))
+    assert found["peak_forces"]["pull"]["force"][0] == pytest.approx(215.771e3, rel=1e-3)
+    assert (out / "path.csv").read_text(encoding="utf-8").splitlines()[0] == COLUMNS
+    assert rows(out)[0]["event"] == "start"
+    assert {f.name for f in out.iterdir()} >= {"path.png", "displacement.pvd", "scene.toml", "run.log", "report.html"}
+    assert journal.NAME not in {f.name for f in out.iterdir()}
+    refused = hvi("path", BAR, "--out", out, *SHORT)
+    assert refused.returncode == 2
+    assert "already holds a result" in refused.stderr
+    assert "finished already" in hvi("path", BAR, "--out", out, *SHORT, "--resume").stdout
+
+
+def follow(run: PathRun, stop: int | None = None, known: list[Record] | None = None) -> tuple[LoadPath, list[Record]]:
+    kept: list[Record] = list(known or [])
+    control = Control(keep=kept.append, interrupted=lambda: stop is not None and len(kept) >= stop)
+    return run.follow(control, known or []), kept
+
+
+def test_a_path_that_is_interrupted_goes_on_to_the_same_end_with_energies_in_balance() -> None:
+    """Loaded, unloaded and loaded again, with memory."""
+    scene = read_scene(BAR, ["domain.size=[0.05, 0.001]", "domain.cells=[25, 1]", "path.to=[1.0, 0.3, 1.05]"])
+    prepared, wanted = prepare(scene), scene.path or PathTable()
+    whole, _ = follow(PathRun(prepared, wanted))
+    assert whole.converged
+    assert [row.event for row in whole.rows].count("turn") == 2
+    for stop in (1, 9, len(whole.rows) - 2):
+        first, kept = follow(PathRun(prepared, wanted), stop)
+        assert first.end == "interrupted"
+        assert len(kept) < len(whole.rows)
+        again, _ = follow(PathRun(prepared, wanted), None, kept)
+        assert [(r.event, r.part) for r in again.rows] == [(r.event, r.part) for r in whole.rows]
+        for one, other in zip(again.rows, whole.rows, strict=True):
+            np.testing.assert_allclose(
+                [one.factor, one.work, one.dissipated, *one.displacements["pull"]],
+                [other.factor, other.work, other.dissipated, *other.displacements["pull"]],
+                rtol=1e-9,
+                atol=1e-12,
+            )
+    force = np.array([row.forces["pull"][0] for row in whole.rows])
+    moved = np.array([row.displacements["pull"][0] for row in whole.rows])
+    work = np.concatenate([[0.0], np.cumsum(0.5 * (force[1:] + force[:-1]) * np.diff(moved))])
+    np.testing.assert_allclose([row.work for row in whole.rows], work, atol=1e-8 * work[-1])
+    dissipated = np.array([row.dissipated for row in whole.rows])
+    assert np.all(np.diff(dissipated) >= -1e-9 * dissipated[-1])
+    stored = np.array([row.energy for row in whole.rows]) + force * moved
+    np.testing.assert_allclose(stored + dissipated, work, atol=1e-8 * work[-1])
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("follow_how", ["stable", "exact"])
+def test_the_strength_of_the_glued_bar(follow_how: str, tmp_path: Path) -> None:
+    """Yuan and Teng's closed form: 220.591 N/mm; exactly, the path goes on to the last bond and dissipates all."""
+    done = hvi("path", BAR, "--out", tmp_path / "bar", "--set", f'path.follow="{follow_how}"')
+    assert done.returncode == 0, done.stderr
+    found = summary(tmp_path / "bar")["path"]
+    assert found["peak_forces"]["pull"]["force"][0] == pytest.approx(220.591e3, rel=1e-3)
+    if follow_how == "exact":
+        assert found["dissipated"] == pytest.approx(0.5 * 7.2e6 * 1.6e-4 * 0.19, rel=1e-9)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("ranks", [2, 3])
+def test_several_ranks_give_the_same_rows(ranks: int, tmp_path: Path) -> None:
+    words = (BAR, *SHORT, "--set", "path.to=[1.0, 0.3, 1.05]", "--no-pictures")
+    assert hvi("path", *words, "--out", tmp_path / "one").returncode == 0
+    done = hvi("path", *words, "--out", tmp_path / "many", ranks=ranks)
+    assert done.returncode == 0, done.stderr
+    one, many = rows(tmp_path / "one"), rows(tmp_path / "many")
+    assert [r["event"] for r in one] == [r["event"] for r in many]
+    for name in ("factor", "energy", "work", "dissipated", "pull.fx", "pull.ux"):
+        values = [np.array([float(r[name]) for r in table]) for table in (one, many)]
+        np.testing.assert_allclose(values[1], values[0], rtol=1e-8, atol=1e-9 * np.max(np.abs(values[0])))
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("seed", range(5))
+def test_a_killed_path_is_resumed_to_the_same_rows(seed: int, tmp_path: Path) -> None:
+    words = ["path", BAR, *SHORT, "--set", "path.to=[1.0, 0.3, 1.05]", "--no-pictures", "--out", tmp_path / "bar"]
+    assert hvi(*words).returncode == 0
+    wanted = rows(tmp_path / "bar")
+    shutil.rmtree(tmp_path / "bar")
+    process = subprocess.Popen(command(*words), cwd=ROOT, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    log, count = tmp_path / "bar" / journal.NAME, random.Random(seed).randrange(200, 20_000)
+    while process.poll() is None and not (log.exists() and log.stat().st_size > count):
+        time.sleep(0.002)
+    process.send_signal(signal.SIGKILL)
+    process.wait()
+    done = hvi(*words, "--resume")
+    assert done.returncode == 0, done.stderr
+    found = rows(tmp_path / "bar")
+    assert [r["event"] for r in found] == [r["event"] for r in wanted]
+    for name in ("factor", "work", "pull.ux"):
+        np.testing.assert_allclose(
+            [float(r[name]) for r in found], [float(r[name]) for r in wanted], rtol=1e-9, atol=1e-15
+        )
