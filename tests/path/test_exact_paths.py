@@ -171,6 +171,31 @@ def test_energies_balance_where_bonds_remember(seed: int, follow: Follow) -> Non
     assert largest_imbalance(given, states) < 1e-9
 
 
+def random_chain(seed: int) -> CondensedProblem:
+    """20 to 60 points in a row on one random law, some held by contact, pulled at an end; some are not held at all."""
+    g = np.random.default_rng(seed)
+    n = int(g.integers(20, 60))
+    stiffness = chain(n, g.uniform(0.5, 20)) + (0.0 if g.random() < 0.3 else 0.05) * np.eye(n)
+    lower = np.where(g.random(n) < 0.2, -g.choice([0, 0.3], n), -np.inf)
+    rate = np.eye(1, n, n - 1)[0] + 0.1 * g.standard_normal(n)
+    return problem(stiffness, rate, bonds(random_law(g), np.arange(n), g.uniform(0.2, 1)), lower=lower)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("remember", [(), (0,)])
+@pytest.mark.parametrize("follow", Follow)
+@pytest.mark.parametrize("seed", range(60))
+def test_no_path_of_a_longer_chain_is_lost(seed: int, follow: Follow, remember: tuple[int, ...]) -> None:
+    given = random_chain(seed)
+    programme = (1.0, 0.2, 4.0) if remember else (5.0,)
+    follower, states = path(given, programme=programme, follow=follow, remember=remember, most_events=20_000)
+    assert follower.end in (End.REACHED, End.ESCAPES), follower.reason
+    assert largest_imbalance(given, states) < 1e-9
+    if not remember:
+        size = 1.0 + float(np.max(np.abs(given.load(5.0))))
+        assert max(violation(given, s.x, s.factor, size) for s in states) < 1e-8
+
+
 def largest_imbalance(given: CondensedProblem, states: Sequence[PathState]) -> float:
     """Work - stored - dissipated - released, relative to the work; 0 at the start."""
     released, balances, size = 0.0, [], 1.0
