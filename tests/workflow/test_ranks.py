@@ -21,20 +21,6 @@ RANKS = (1, 2, 3)
 PAPER = quadratic_linear(1.0e3)
 HELD_BELOW = model(4)
 HELD_BELOW["boundary"]["floor"] = {"on": "bottom", "displacement": ["free", 0.0]}
-TWO_BODIES: Table = {
-    "domain": {
-        "lower": {"shape": "rectangle", "size": [1.0, 0.5], "cells": [11, 5], "angle": 10.0},
-        "upper": {"shape": "rectangle", "size": [1.0, 0.4], "cells": [8, 3], "origin": [0.1, 0.5], "angle": 10.0},
-    },
-    "material": model(1)["material"],
-    "boundary": {
-        "base": {"on": "lower.bottom", "displacement": [0.0, 0.0]},
-        "press": {"on": "upper.top", "traction": [0.2e6, -1.0e6]},
-    },
-    "interface": {"seam": {"between": ["upper.bottom", "lower.top"], "contact": {"gap": "measured"}}},
-    "solver": {},
-}
-TWO_BODIES["interface"]["seam"]["friction"] = quadratic_linear(1e6, 1e-6)
 CUBE: Table = {
     "domain": {"shape": "box", "size": [1.0, 1.0, 1.0], "cells": [2, 2, 2]},
     "material": STEEL | {"model": "three_dimensional"},
@@ -55,7 +41,6 @@ SCENES: dict[str, Table] = {
     "metastable": block(6, 0.6e6, 1e6, quadratic_linear(1e6)),
     "of-a-mesh-file": model(4, 6e6, 1e6, quadratic_linear(3e6)),
     "linear": HELD_BELOW,
-    "two-bodies": TWO_BODIES,
     "degree-2": model(6, 6e6, 1e6, quadratic_linear(3e6), degree=2),
     "degree-2-in-space": CUBE,
 }
