@@ -37,9 +37,9 @@ def refuse(comm: MPI.Comm, surfaces: Iterable[Surface], length: float, threshold
             at = ", ".join(f"{c:.6g}" for c in found[: normals.shape[1]])
             raise InputError(
                 f"boundary.{surface.part}: two sides lie on each other at ({at}) and face each other. Contact and laws "
-                "act between the body and a rigid obstacle, not between two bodies: each side would be held by an "
-                "obstacle of its own. Give the part one of the sides only, or make both bodies one mesh that shares "
-                "its vertices there"
+                "of a boundary part act between the body and a rigid obstacle: each side would be held by an "
+                "obstacle of its own. Give the part one of the sides only; in the plane, name both in an "
+                "[interface.NAME]"
             )
 
 

@@ -49,6 +49,12 @@ def _rows(path: Path) -> list[dict[str, str]]:
         return list(csv.DictReader(file))
 
 
+def _unit(folder: Path) -> str:
+    """The unit of energy: J in space, where contact.csv has a z."""
+    rows = _rows(folder / _rows(folder / "equilibria.csv")[0]["folder"] / "contact.csv")
+    return "J" if rows and rows[0]["z"] else "J/m"
+
+
 def _colour(branch: str) -> str:
     return _CELLS.get(branch) or _FURTHER[(int(branch) - 1) % len(_FURTHER)]
 
@@ -60,9 +66,10 @@ def main(folder: Path) -> None:
         folder: with ``equilibria.csv``.
     """
     from matplotlib.figure import Figure
+    from matplotlib.ticker import MaxNLocator
 
     rows = _rows(folder / "equilibria.csv")[:MOST]
-    fig = Figure(figsize=(8.0, 1.6 + 0.42 * len(rows)), dpi=150)
+    fig = Figure(figsize=(8.0, 1.8 + 0.45 * len(rows)), dpi=150)
     energies, states = fig.subplots(1, 2, sharey=True, width_ratios=(1, 2))
     values = [float(r["energy"]) for r in rows]
     marks = {"minimiser": "o", "saddle": "^"}
@@ -71,12 +78,16 @@ def main(folder: Path) -> None:
         energies.plot(value - values[0], i, marks.get(row["kind"], "s"), color="#222222", mfc=face, ms=8)
         _state(states, i, _rows(folder / row["folder"] / "contact.csv"))
     energies.set_yticks(range(len(rows)), [r["index"] for r in rows])
-    energies.invert_yaxis()
-    energies.set_xlabel(f"energy above {values[0]:.6g}")
+    energies.set_ylim(len(rows) - 0.4, -0.7)
+    spread = values[-1] - values[0]
+    energies.set_xlim(-0.08 * spread if spread else -1.0, 1.08 * spread if spread else 1.0)
+    energies.xaxis.set_major_locator(MaxNLocator(3))
+    states.xaxis.set_major_locator(MaxNLocator(integer=True))
+    energies.set_xlabel(f"energy above {values[0]:.6g} ({_unit(folder)})")
     energies.set_ylabel("equilibrium")
     energies.set_title("● minimiser  △ saddle", fontsize=10)
     states.set_xlabel("vertices along the parts")
-    states.set_title("blue unbroken, orange broken, red on a kink; above: lifted", fontsize=10)
+    states.set_title("first piece of the law: blue; further: orange ...; on a kink: red; bar above: lifted", fontsize=9)
     for axes in (energies, states):
         axes.spines[["top", "right"]].set_visible(False)
     fig.tight_layout()
