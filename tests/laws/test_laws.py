@@ -363,7 +363,8 @@ def test_names_and_parameters_from_plain_data() -> None:
     ("name", "parameters", "said"),
     [
         ("quadratic_linera", {}, "did you mean 'quadratic_linear'"),
-        ("coulomb", {}, "available: .*tresca"),
+        ("nothing", {}, "available: .*tresca"),
+        ("coulomb", {}, "no derivative of an energy"),
         ("tresca", {"yield_tracton": 1.0}, "did you mean 'yield_traction'.*takes yield_traction"),
         ("tresca", {}, "yield_traction missing"),
         ("tresca", {"yield_traction": "3"}, "valid number"),
