@@ -22,6 +22,8 @@ NO_HISTORY = (
     "a single run has none: it finds an equilibrium at this load, and a joint that is unloaded heals; `hvi path` "
     "follows the load, and its bonds remember"
 )
+_OTHERS = {"unique": "there is none", "lowest": "none has a lower energy", "unknown": "unknown"}
+"""What is known about them, by the state of :class:`.Uniqueness`."""
 _LISTED = 3
 """So many rigid motions are named one by one; of more, only the number is given."""
 
@@ -124,6 +126,8 @@ def outcome(solution: Solution) -> Iterator[str]:
         return
     c, counts = solution.examination.certificate, solution.solve_result.counts
     yield f"certificate ({c.tolerance:g}): {c}"
+    if solution.uniqueness is not None:
+        yield f"other equilibria: {_OTHERS[solution.uniqueness.state]}; {solution.uniqueness.why}"
     if c.rounding is not None and c.rounding > c.tolerance:
         yield (
             f"tolerance {c.tolerance:g} is below the rounding errors at this displacement: {c.rounding:.1e} was asked "

@@ -9,6 +9,7 @@ from .certify import placed_forces
 from .certify.certificate import Examination
 from .certify.estimate.estimator import Estimate
 from .certify.placed_forces import PlacedForces
+from .certify.uniqueness import Uniqueness
 from .errors import ExitCode
 from .problem.problem import Problem
 from .rigid import Solvability
@@ -31,6 +32,7 @@ class Solution:
         dofs: unknowns.
         epsilon: relative width of the smoothing, None for exact laws.
         timer: wall time by phase.
+        uniqueness: what is known about other equilibria; None where nothing was certified, or it was found elsewhere.
         warnings: sentences about numbers that may be mistakes (:mod:`.plausibility`).
     """
 
@@ -44,6 +46,7 @@ class Solution:
     epsilon: float | None
     timer: Timer
     warnings: tuple[str, ...] = ()
+    uniqueness: Uniqueness | None = None
 
     @property
     def converged(self) -> bool:

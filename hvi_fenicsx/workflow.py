@@ -11,6 +11,7 @@ from mpi4py import MPI
 from .certify import certificate, plausibility
 from .certify.certificate import Examination
 from .certify.estimate.estimator import Estimate, estimate
+from .certify.uniqueness import Uniqueness, uniqueness
 from .errors import SolverError
 from .mesh.domain import Domain
 from .mesh.thresholds import Thresholds as MeshThresholds
@@ -198,7 +199,7 @@ def finish_with_levels(
         estimating: whether to estimate the error.
     """
     if prepared.solvability.state == "escapes":
-        return _solution(prepared, None, None, None, prepared.warnings), ()
+        return _solution(prepared, None, None, prepared.warnings), ()
     control = RunControl(timer=prepared.timer, progress=progress, interrupted=interrupted)
     solved = _solved(prepared, control, start)
     examination, warnings = _examined(prepared, solved.result)
@@ -208,18 +209,28 @@ def finish_with_levels(
         with prepared.timer("estimate"):
             errors = estimate(prepared.system, solved.levels, solved.result.u, examination)
         warnings += plausibility.of_estimate(errors)
-    return _solution(prepared, solved.result, examination, errors, prepared.warnings + warnings), solved.levels
+    only = _uniqueness(prepared, solved.result, examination)
+    found = _solution(prepared, solved.result, examination, prepared.warnings + warnings, errors, only)
+    return found, solved.levels
 
 
 def certified(prepared: Preparation, found: SolveResult) -> Solution:
-    """A displacement that was found elsewhere, certified; no error is estimated. Collective.
+    """A displacement that was found elsewhere, certified; no error is estimated, no other one excluded. Collective.
 
     Args:
         prepared: the scene.
         found: the displacement.
     """
     examination, warnings = _examined(prepared, found)
-    return _solution(prepared, found, examination, None, prepared.warnings + warnings)
+    return _solution(prepared, found, examination, prepared.warnings + warnings)
+
+
+def _uniqueness(prepared: Preparation, found: SolveResult, examination: Examination) -> Uniqueness | None:
+    """What is known about other equilibria; None where nothing was certified. Collective."""
+    if not examination.certificate.passed:
+        return None
+    with prepared.timer("certificate"):
+        return uniqueness(prepared.system, found.u, examination)
 
 
 def _examined(prepared: Preparation, found: SolveResult) -> tuple[Examination, tuple[str, ...]]:
@@ -237,8 +248,9 @@ def _solution(
     prepared: Preparation,
     found: SolveResult | None,
     examination: Examination | None,
-    errors: Estimate | None,
     warnings: tuple[str, ...],
+    errors: Estimate | None = None,
+    only: Uniqueness | None = None,
 ) -> Solution:
     return Solution(
         scene=prepared.scene,
@@ -247,6 +259,7 @@ def _solution(
         solve_result=found,
         examination=examination,
         estimate=errors,
+        uniqueness=only,
         dofs=prepared.system.dofs,
         epsilon=prepared.options.relative_width(prepared.system),
         timer=prepared.timer,

@@ -58,13 +58,18 @@ def _by_inertia(problem: Problem, u: fem.Function, found: Growth) -> str:
         models.append(ExactLaw(term.law, Cells.around(term.law.convex, argument, radial=term.radial)))
     system.jacobian.set_rates(system.tangents(x, models))
     strong, weak = np.flatnonzero(found.strong), np.flatnonzero(found.weak)
-    if _negative(system, strong) == 0:
+    if negative_eigenvalues(system, strong) == 0:
         return LOCAL_MINIMISER
-    return NO_MINIMISER if _negative(system, np.union1d(strong, weak)) > 0 else UNDECIDED
+    return NO_MINIMISER if negative_eigenvalues(system, np.union1d(strong, weak)) > 0 else UNDECIDED
 
 
-def _negative(system: System, held: Integers) -> int:
-    """Negative eigenvalues of the Hessian with some dofs held. Collective."""
+def negative_eigenvalues(system: System, held: Integers) -> int:
+    """How many eigenvalues of a system's matrix are negative, by a factorisation. Collective.
+
+    Args:
+        system: the system, with the tangents that are set.
+        held: dofs (local, owned) that are held.
+    """
     matrix = system.jacobian.matrix.copy()
     start = system.load.owner_range[0]
     matrix.zeroRowsColumns((held + start).astype(PETSc.IntType), diag=1.0)

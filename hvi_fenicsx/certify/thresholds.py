@@ -73,5 +73,23 @@ class PlausibilityThresholds:
     dip: float = 1e-2
 
 
+@dataclass(frozen=True, kw_only=True)
+class UniquenessThresholds:
+    """How far it is tried to prove that there is no other equilibrium.
+
+    Attributes:
+        most_on_boundary: unknowns of Γc up to which the body's stiffness is compared with laws that fall.
+        most_unknowns: unknowns in all up to which it is.
+        enlarged: the falls are enlarged by this share, against the rounding of the comparison.
+        rounding: squared share of a rigid motion, or displacement by one, that is none.
+    """
+
+    most_on_boundary: int = 300
+    most_unknowns: int = 50_000
+    enlarged: float = 1e-6
+    rounding: float = 1e-10
+
+
 DEFAULT = Thresholds()
 PLAUSIBILITY = PlausibilityThresholds()
+UNIQUENESS = UniquenessThresholds()

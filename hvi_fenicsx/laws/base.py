@@ -26,6 +26,8 @@ from .parameter_checks import require_positive
 from .traction_bounds import Extremes, extremes
 
 _REGISTRY: dict[str, type] = {}
+_FAR = 1e100
+"""A displacement (m) beyond all that a law tells apart."""
 
 
 class Superpotential(ABC):
@@ -82,6 +84,18 @@ class Superpotential(ABC):
     def is_linear(self) -> bool:
         """Whether the traction is proportional to the displacement, so that j adds nothing nonsmooth."""
         return False
+
+    @cached_property
+    def is_convex(self) -> bool:
+        """Whether j is convex: the derivative of G, which never falls, is the same at both ends of the line."""
+        with np.errstate(all="ignore"):
+            low, high = self.concave.right(np.array([-_FAR, _FAR]))
+        return bool(low == high)
+
+    @property
+    def steepest_fall(self) -> float:
+        """A bound from above of -j'', N/m³: 0 where j is convex, inf where the traction drops or no bound is known."""
+        return 0.0 if self.is_convex else np.inf
 
     @property
     def traction_scale(self) -> float:
@@ -263,6 +277,11 @@ class ScaledLaw(Superpotential, register=False):
     @property
     def is_linear(self) -> bool:
         return self.law.is_linear
+
+    @override
+    @property
+    def steepest_fall(self) -> float:
+        return self.law.steepest_fall * (self.length / self.traction)
 
     @override
     def piece(self, x: Array) -> Integers:

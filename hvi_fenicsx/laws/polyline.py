@@ -122,6 +122,12 @@ class PolylineLaw(Superpotential):
 
     @override
     @cached_property
+    def steepest_fall(self) -> float:
+        drops = bool(np.any(self.graph.jumps < 0.0))
+        return np.inf if drops else max(0.0, -float(np.min(self.graph.slopes)))
+
+    @override
+    @cached_property
     def growth(self) -> Directional:
         g = self.graph
         return Directional(_limit(-g.left[0], g.slopes[0]), _limit(g.right[-1], g.slopes[-1]))

@@ -123,6 +123,11 @@ class Exponential(WeakeningLaw):
     name = "exponential"
 
     @override
+    @property
+    def steepest_fall(self) -> float:
+        return (self.peak_traction - self.residual_traction) / self.delta
+
+    @override
     def shape(self, z: Array) -> tuple[Array, Array, Array]:
         decay = np.exp(-z)
         return z + np.expm1(-z), -np.expm1(-z), decay

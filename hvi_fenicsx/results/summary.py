@@ -36,6 +36,7 @@ def summary(solution: Solution) -> dict[str, Any]:
             "resultants": _resultants(solution),
             "solvability": solution.solvability.summary(),
             "certificate": examination.certificate.as_dict() if examination else None,
+            "uniqueness": solution.uniqueness.as_dict() if solution.uniqueness else None,
             "estimate": _estimate(solution),
             "accuracy": None,
             "warnings": list(solution.warnings),

@@ -43,6 +43,7 @@ SUMMARY = {
         *("equilibrium", "net_force", "penetration", "tension", "complementarity", "inclusion"),
         *("inclusion_true", "second_order", "tolerance", "passed"),
     ],
+    "uniqueness": ["state", "why"],
     "estimate": (dict, type(None)),
     "warnings": list,
     "effects": list,

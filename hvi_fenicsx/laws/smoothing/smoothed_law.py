@@ -169,6 +169,11 @@ class PlusSmoothedLaw(SmoothedLaw, register=False):
     def concave(self) -> ConvexPart:
         return self._smooth_concave
 
+    @property
+    @override
+    def steepest_fall(self) -> float:
+        return self.law.steepest_fall  # what smooths an upward jump rises; a drop leaves inf
+
     @cached_property
     def _smooth_convex(self) -> SmoothedPart:
         return SmoothedPart(self.law.convex, self.plus, self.epsilon_absolute, self.law.even)

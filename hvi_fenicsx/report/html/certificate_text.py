@@ -25,7 +25,11 @@ _SECOND_ORDER = {
     "not a minimiser": "The solution is an equilibrium, but not a minimiser of the energy: it is unstable.",
     "undecided": "Whether the equilibrium is stable was left undecided; second_order = true in [solver] asks for it.",
 }
-
+_OTHERS = {
+    "unique": "It is the only equilibrium.",
+    "lowest": "No equilibrium has a lower energy.",
+    "unknown": "Whether there are other equilibria is not known.",
+}
 _NO_HISTORY = (
     "A single run has no history: this is an equilibrium at this load, not of necessity that of loading, and "
     "a joint that is unloaded heals. `hvi path` follows the load."
@@ -70,6 +74,8 @@ def _two_digits(value: float | None) -> str:
 def _remarks(result: Result, found: Mapping[str, Any]) -> Iterator[str]:
     if found["passed"]:
         yield _SECOND_ORDER.get(str(found["second_order"]), str(found["second_order"]))
+    if others := result.summary.get("uniqueness"):
+        yield f"{_OTHERS[others['state']]} {others['why'][0].upper()}{others['why'][1:]}."
     if any(role["laws"] for part in result.parts for role in result.roles(part.name)):
         yield _NO_HISTORY
     if result.summary.get("smoothing") and result.summary["epsilon"] is not None:  # null: there is no law

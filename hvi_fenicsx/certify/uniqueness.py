@@ -1,0 +1,154 @@
+"""Is it the only equilibrium? What convexity of the energy proves, at the cost of one factorisation at most.
+
+Where no law drops, let c bound how steeply each falls: w (j + ½ c x²) is convex, also on |u_t|, and the energy is
+convex if the stiffness A less C, the sum of c w over the laws' vertices, is positive semidefinite. By Sylvester's law
+its negative pivots decide. Every equilibrium is then one of lowest energy, and two of them differ by a rigid motion
+that the supports leave. There is no other one where such motions meet a component in which the energy grows to first
+order in each direction (a pressed contact, a kink that is not used up), or a law that is a spring.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import Literal
+
+import numpy as np
+from dolfinx import fem
+
+from ..laws.polyline import PolylineLaw
+from ..problem import references
+from ..problem.law_term import LawTerm
+from ..rigid import Mode
+from ..runtime.mpi import agree, largest, total
+from ..system import existence, free_motions
+from ..system.system import System
+from ..typing import Array
+from .certificate import Examination
+from .directional import growth
+from .second_order import negative_eigenvalues
+from .thresholds import UNIQUENESS, UniquenessThresholds
+
+WAY_OUT = "`hvi equilibria SCENE --lowest` finds out"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Uniqueness:
+    """What is known about other equilibria.
+
+    Attributes:
+        state: ``unique``: there is no other; ``lowest``: none has a lower energy; ``unknown``.
+        why: the proof, or what stands in its way.
+    """
+
+    state: Literal["unique", "lowest", "unknown"]
+    why: str
+
+    def as_dict(self) -> dict[str, str]:
+        """For ``summary.json``."""
+        return asdict(self)
+
+
+def uniqueness(
+    system: System, u: fem.Function, examination: Examination, thresholds: UniquenessThresholds = UNIQUENESS
+) -> Uniqueness:
+    """What is known about equilibria beside a certified one; the laws' tangents of the system are set to 0. Collective.
+
+    Args:
+        system: the system that was solved.
+        u: its solution, nondimensional, ghosts updated.
+        examination: of u.
+        thresholds: what is tried, and what is rounding.
+    """
+    modes = existence.motions(system.problem, contact_closed=False)
+    motions = [system.unknowns(field).array_r.copy() for field in free_motions.fields(system.problem, modes)]
+    doubt = _doubt(system, modes, motions, thresholds)
+    if doubt is not None:
+        searched = all(isinstance(term.law, PolylineLaw) and not term.radial for term in system.terms)
+        return Uniqueness(state="unknown", why=f"{doubt}; {WAY_OUT}" if searched else doubt)
+    falling = any(term.law.steepest_fall > 0.0 for term in system.terms)
+    proof = "the body is stiffer than its laws fall, so the energy is convex" if falling else "the energy is convex"
+    left = _left(system, modes, motions, u, examination, thresholds)
+    if not left:
+        return Uniqueness(state="unique", why=f"{proof}, and no rigid motion leaves it as it is")
+    return Uniqueness(state="lowest", why=f"{proof}; others of the same energy may differ by: {left}")
+
+
+def _doubt(
+    system: System, modes: Sequence[Mode], motions: Sequence[Array], thresholds: UniquenessThresholds
+) -> str | None:
+    """Why the energy is not known to be convex; None where it is. Collective."""
+    falls = [_fall(term) for term in system.terms]
+    for term, fall in zip(system.terms, falls, strict=True):
+        if not np.isfinite(fall):
+            return f"boundary.{term.surface.part}: {_steepness(term)}"
+    if not any(falls):
+        return None
+    unknowns = int(total(system.comm, float(len(system.jacobian.rows.dofs))))
+    if unknowns > thresholds.most_on_boundary or system.dofs > thresholds.most_unknowns:
+        return (
+            f"a law falls, and it was not tried whether the body is stiffer: more than {thresholds.most_on_boundary} "
+            f"unknowns on Γc, or {thresholds.most_unknowns:,} in all"
+        )
+    for mode, motion in zip(modes, motions, strict=True):
+        falling = [term.slip(motion) for term, fall in zip(system.terms, falls, strict=True) if fall > 0.0]
+        if largest(system.comm, _size(falling)) > thresholds.rounding:
+            return f"a law falls, and only laws and contact hold the motion {mode.name}"
+    return None if _stiffer(system, modes, falls, thresholds) else "a law falls more steeply than the body is stiff"
+
+
+def _fall(term: LawTerm) -> float:
+    """A bound of how steeply a law falls; inf where a law of |u_t| has a slope at 0 that points inwards."""
+    inwards = term.radial and bool(term.law.right(np.zeros(1))[0] < 0.0)
+    return np.inf if inwards else float(term.law.steepest_fall)
+
+
+def _steepness(term: LawTerm) -> str:
+    """Why there is no bound of how steeply a law falls."""
+    if term.exact.concave.kinks.size:
+        return "the law's traction drops"
+    return "how steeply the law's traction falls is not known"
+
+
+def _size(values: Sequence[Array]) -> float:
+    return max((float(np.max(np.abs(v), initial=0.0)) for v in values), default=0.0)
+
+
+def _stiffer(system: System, modes: Sequence[Mode], falls: Sequence[float], thresholds: UniquenessThresholds) -> bool:
+    """Whether A less C, a little enlarged, is positive but for the motions, which C does not feel. Collective."""
+    vectors = [system.unknowns(field) for field in free_motions.fields(system.problem, modes)]
+    pins = free_motions.create(vectors, modes).pins.astype(np.int64) if modes else np.empty(0, np.int64)
+    enlarged = 1.0 + thresholds.enlarged
+    system.jacobian.set_rates([_rate(t, -enlarged * c) for t, c in zip(system.terms, falls, strict=True)])
+    negative = negative_eigenvalues(system, pins)
+    system.jacobian.set_rates([_rate(term, 0.0) for term in system.terms])
+    return negative == 0
+
+
+def _rate(term: LawTerm, slope: float) -> Array:
+    """The tangent of a law with the same slope in all its directions, (m, d, d)."""
+    full = slope * np.einsum("mka,mkb->mab", term.directions, term.directions)
+    return np.asarray(term.free[:, :, None] * full * term.free[:, None, :])
+
+
+def _left(
+    system: System,
+    modes: Sequence[Mode],
+    motions: Sequence[Array],
+    u: fem.Function,
+    examination: Examination,
+    thresholds: UniquenessThresholds,
+) -> str:
+    """The rigid motions if some of them, together, are not shown to raise the energy; else nothing. Collective."""
+    if not modes:
+        return ""
+    problem, certificate = system.problem, examination.certificate
+    allowed = max(certificate.tolerance, certificate.rounding or 0.0)
+    known = references.of(problem, examination.forces.load)
+    strong = growth(known, problem.relative(u.x.array), examination.forces.reaction, allowed).strong
+    springs = [term for term in system.terms if term.law.is_linear]
+    rows = [np.concatenate([m[strong], *(term.slip(m).ravel() for term in springs)]) for m in motions]
+    gram = sum(agree(system.comm, np.array([[a @ b for a in rows] for b in rows])))
+    least, most = np.linalg.eigvalsh(gram)[[0, -1]]
+    held = bool(least > thresholds.rounding * most)
+    return "" if held else ", ".join(mode.name for mode in modes)
