@@ -85,7 +85,7 @@ class UniquenessThresholds:
     """
 
     most_on_boundary: int = 300
-    most_unknowns: int = 50_000
+    most_unknowns: int = 5_000
     enlarged: float = 1e-6
     rounding: float = 1e-10
 
