@@ -16,6 +16,7 @@ from .cells import Cells
 from .descent import Descent, Landing
 from .passing import Passing, classify, go_on
 from .placing import place
+from .rounds import Rounds
 from .snap import snap
 from .state import End, Event, Follow, PathOptions, PathState, Place, Position
 from .step import FACTOR
@@ -144,6 +145,7 @@ class ExactFollower:
     def _towards(self, aim: float) -> Iterator[PathState]:
         """From event to event until the factor reaches its aim or the path ends."""
         self._orient(aim)
+        self._rounds = Rounds()
         while self.end is None and self.tracer.factor != aim:
             if self._must_jump(aim):
                 yield from self._jump(aim)
@@ -156,7 +158,7 @@ class ExactFollower:
                 return
             self._balance.go(cells.x, cells.bond_force, self.tracer.factor)
             if step.variable != FACTOR:
-                yield self._pass(go_on(self.tracer, self._bonds, step))
+                yield self._noted(self._pass(go_on(self.tracer, self._bonds, step)))
             self._watch()
             if self.end is not None:
                 yield self._state(Event.END)
@@ -171,12 +173,21 @@ class ExactFollower:
     def _watch(self) -> None:
         self._events += 1
         self._peak = max(self._peak, abs(self.tracer.factor))
+        if self.end is not None:
+            return
         if self._floats and self._peak > 0.0 and self.tracer.at_rest(self._peak):
             self._finish(End.ESCAPES, "the load is back at zero, and nothing holds the body any more")
         elif self._interrupted():
             self._finish(End.INTERRUPTED, "interrupted")
         elif self._events > self._options.most_events:
             self._finish(End.LOST, f"no end after {self._options.most_events} events")
+
+    def _noted(self, state: PathState) -> PathState:
+        """The state after an event; the path ends where it comes back to one."""
+        found = self._rounds.note(state)
+        if found is not None:
+            self._finish(End.LOST, f"at the factor {state.factor:.6g} the path comes back to where it was: {found.value}")
+        return state
 
     def _pass(self, passing: Passing) -> PathState:
         """The state after an event."""

@@ -1,0 +1,47 @@
+"""Does a path come back to where it has been? In one cell there is one line: what comes back goes round for ever."""
+
+from __future__ import annotations
+
+from enum import Enum
+
+import numpy as np
+
+from .state import PathState
+
+
+class Round(Enum):
+    """How a path came back."""
+
+    CLOSED = "its equilibria form a closed curve, which it has gone round: none of them has the wanted factor"
+    BLOCKED = "several bonds are at ends of their pieces at once, and each way on leads from one of them to the other"
+
+
+class Rounds:
+    """The events of one leg of a programme, by cell and direction. Positions are kept as numbers of 64 bits."""
+
+    def __init__(self) -> None:
+        self._known: dict[int, tuple[float, float]] = {}
+        self._x = np.empty(0)
+        self._way = 0.0
+
+    def note(self, state: PathState) -> Round | None:
+        """Note a state; says how the path came back to it, or None if it is new.
+
+        Args:
+            state: of an event.
+        """
+        if self._x.size:
+            self._way += float(np.max(np.abs(state.x - self._x), initial=0.0))
+        self._x, key = state.x, _key(state)
+        factor, way = self._known.get(key, (np.inf, 0.0))
+        self._known[key] = state.factor, self._way
+        if abs(factor - state.factor) > 1e-9 * (1.0 + abs(state.factor)):
+            return None
+        size = float(np.max(np.abs(state.x), initial=0.0))
+        return Round.CLOSED if self._way - way > 1e-9 * size else Round.BLOCKED
+
+
+def _key(state: PathState) -> int:
+    position = state.position
+    memory = b"" if state.memory is None else state.memory.tobytes()
+    return hash((position.numbers.tobytes(), position.driver, position.heading, memory))
