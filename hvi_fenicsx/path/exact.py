@@ -186,7 +186,8 @@ class ExactFollower:
         """The state after an event; the path ends where it comes back to one."""
         found = self._rounds.note(state)
         if found is not None:
-            self._finish(End.LOST, f"at the factor {state.factor:.6g} the path comes back to where it was: {found.value}")
+            where = f"at the factor {state.factor:.6g} the path comes back to where it was"
+            self._finish(End.LOST, f"{where}: {found.value}")
         return state
 
     def _pass(self, passing: Passing) -> PathState:
