@@ -6,6 +6,7 @@ from enum import Enum
 
 import numpy as np
 
+from ..typing import Array
 from .state import PathState
 
 
@@ -21,7 +22,7 @@ class Rounds:
 
     def __init__(self) -> None:
         self._known: dict[int, tuple[float, float]] = {}
-        self._x = np.empty(0)
+        self._x: Array = np.empty(0)
         self._way = 0.0
 
     def note(self, state: PathState) -> Round | None:
