@@ -13,6 +13,8 @@ from .typing import Array
 
 REACHED, ESCAPES, LOST, INTERRUPTED = "reached", "escapes", "lost", "interrupted"
 """How a path ends: at the end of its programme; where the body comes off; where it was lost; by the user."""
+_ROUNDING = 1e-9
+"""Factors that are so small beside the largest are zero."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -86,7 +88,8 @@ class LoadPath:
     @cached_property
     def peak(self) -> int:
         """The row of the largest factor that is borne, in the direction in which the path begins."""
-        ahead = self.factors[np.flatnonzero(self.factors)[:1]]
+        size = np.abs(self.factors)
+        ahead = self.factors[np.flatnonzero(size > _ROUNDING * np.max(size, initial=0.0))[:1]]
         return int(np.argmax(self.factors * np.sign(ahead))) if len(ahead) else 0
 
     @property
@@ -123,14 +126,12 @@ class LoadPath:
             return f"no state is borne: {self.reason or self.end}"
         row = self.rows[self.peak]
         kind = "limit point" if row.event == "fold" else f"{'stable' if row.stable else 'unstable'} state"
-        return f"largest factor that is borne: {row.factor:.6g} ({kind}, row {self.peak}); {self._then()}"
+        return f"largest factor that is borne: {self._shown(self.peak)} ({kind}, row {self.peak}); {self._then()}"
 
     def _then(self) -> str:
         """What happens after the largest factor."""
         if self.end in (LOST, INTERRUPTED):
-            return f"the path is {self.end} at {self.rows[-1].factor:.6g}" + (
-                f" ({self.reason})" if self.reason else ""
-            )
+            return f"the path is {self.end} at {self._shown(-1)}" + (f" ({self.reason})" if self.reason else "")
         after = next((n for n in self.jumps if n > self.peak), None)
         if after is not None and self.rows[after].factor >= self.rows[self.peak].factor * (1 - 1e-9):
             return f"there the body jumps to the next stable state, {self.ending}"
@@ -140,8 +141,13 @@ class LoadPath:
     def ending(self) -> str:
         """How the path ends, in words."""
         if self.end == ESCAPES:
-            return f"then the body comes off, at {self.rows[-1].factor:.6g}"
-        return f"the path ends where it was to end, at {self.rows[-1].factor:.6g}"
+            return f"then the body comes off, at {self._shown(-1)}"
+        return f"the path ends where it was to end, at {self._shown(-1)}"
+
+    def _shown(self, number: int) -> str:
+        """The factor of a row in digits; 0 where it is rounding."""
+        factor = self.factors[number]
+        return f"{factor:.6g}" if abs(factor) > _ROUNDING * np.max(np.abs(self.factors)) else "0"
 
     def strongest(self, part: str) -> int:
         """The row in which the resultant at a part is largest.

@@ -1,0 +1,43 @@
+"""What is told of a path: its largest factor, and numbers without rounding."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hvi_fenicsx.load_path import ESCAPES, REACHED, LoadPath, PathRow
+
+
+def path(*factors: float, end: str = REACHED) -> LoadPath:
+    """A path with these factors, and nothing else in its rows."""
+    rows = tuple(
+        PathRow(
+            factor=factor,
+            event="kink",
+            part=None,
+            point=None,
+            energy=0.0,
+            work=0.0,
+            dissipated=0.0,
+            released=0.0,
+            unstable=0,
+            forces={"pull": np.zeros(2)},
+            displacements={"pull": np.zeros(2)},
+            certified=True,
+        )
+        for factor in factors
+    )
+    return LoadPath(dimension=2, scaled=("pull.traction",), rows=rows, end=end, reason="", examined=len(rows))
+
+
+def test_events_at_a_factor_that_is_rounding_do_not_turn_the_path() -> None:
+    found = path(0.0, -4e-18, 3e-14, 0.5, 1.0)
+    assert found.peak == 4
+    assert found.summary()["peak_factor"] == 1.0
+
+
+def test_a_path_that_begins_downwards_has_its_largest_factor_there() -> None:
+    assert path(0.0, -0.5, -1.0, 0.2).peak == 2
+
+
+def test_an_end_at_zero_is_told_as_zero() -> None:
+    assert path(0.0, 1.1, -1e-12, end=ESCAPES).ending == "then the body comes off, at 0"
