@@ -50,7 +50,8 @@ def test_on_a_terminal_the_last_newton_step_moves_and_is_gone_in_the_end(scene: 
     assert "\x1b[2K" in shown  # the line is wiped
     assert "residual" in shown
     assert not any("residual" in line for line in lines)
-    assert [line.split()[0].rstrip(":") for line in lines[1:5]] == ["existence", "result", "certificate", "estimated"]
+    begun = [line.split()[0].rstrip(":") for line in lines[1:6]]
+    assert begun == ["existence", "result", "certificate", "other", "estimated"]
 
 
 def test_the_log_has_the_lines_of_the_terminal_and_every_newton_step(scene: Path, tmp_path: Path) -> None:
