@@ -66,11 +66,22 @@ def _add_scene_options(command: argparse.ArgumentParser) -> None:
     )
 
 
+def _add_solve_options(command: argparse.ArgumentParser, result: str, *, resume: str) -> None:
+    """What all commands have that solve a scene into a folder."""
+    _add_folder_options(command, result, resume=resume)
+    command.add_argument("--petsc", default="", metavar="OPTIONS", help='PETSc options, like "-hvi_ksp_monitor"')
+    command.add_argument("--no-pictures", action="store_true", help="write no pictures")
+
+
+def _add_folder_options(command: argparse.ArgumentParser, result: str, *, resume: str) -> None:
+    command.add_argument("--out", type=Path, metavar="DIR", help=f"the folder for the {result}")
+    command.add_argument("--force", action="store_true", help="replace what is there")
+    command.add_argument("--resume", action="store_true", help=resume)
+    command.add_argument("--np", type=_ranks, metavar="N", help="run on N MPI ranks")
+
+
 def _add_run_options(run: argparse.ArgumentParser) -> None:
     _add_scene_options(run)
-    run.add_argument("--out", type=Path, metavar="DIR", help="the folder for the result")
-    run.add_argument("--force", action="store_true", help="replace a result that is there")
-    run.add_argument("--resume", action="store_true", help="keep a finished result of the same scene, else run it")
     run.add_argument(
         "--accuracy",
         type=_relative_error,
@@ -81,19 +92,16 @@ def _add_run_options(run: argparse.ArgumentParser) -> None:
     run.add_argument(
         "--time-budget", type=_seconds, metavar="S", help="find the most accurate solution within S seconds"
     )
-    run.add_argument("--np", type=_ranks, metavar="N", help="run on N MPI ranks")
-    run.add_argument("--petsc", default="", metavar="OPTIONS", help='PETSc options, like "-hvi_ksp_monitor"')
-    run.add_argument("--no-pictures", action="store_true", help="write no pictures")
+    _add_solve_options(
+        run, "result; else results/SCENE", resume="keep a finished result of the same scene, else run it"
+    )
 
 
 def _add_path_options(path: argparse.ArgumentParser) -> None:
     _add_scene_options(path)
-    path.add_argument("--out", type=Path, metavar="DIR", help="the folder for the path; else results/SCENE-path")
-    path.add_argument("--force", action="store_true", help="replace a result that is there")
-    path.add_argument("--resume", action="store_true", help="keep a finished path, else go on from its last row")
-    path.add_argument("--np", type=_ranks, metavar="N", help="run on N MPI ranks")
-    path.add_argument("--petsc", default="", metavar="OPTIONS", help='PETSc options, like "-hvi_ksp_monitor"')
-    path.add_argument("--no-pictures", action="store_true", help="write no pictures")
+    _add_solve_options(
+        path, "path; else results/SCENE-path", resume="keep a finished path, else go on from its last row"
+    )
 
 
 def _add_check_options(check: argparse.ArgumentParser) -> None:
@@ -120,12 +128,9 @@ def _add_equilibria_options(equilibria: argparse.ArgumentParser) -> None:
         help="what the proof of the lowest energy may leave open, relative to the energy; by default 1e-8",
     )
     equilibria.add_argument("--limit", type=_seconds, metavar="SECONDS", help="stop the search after so many seconds")
-    equilibria.add_argument("--out", type=Path, metavar="DIR", help="the folder for the results")
-    equilibria.add_argument("--force", action="store_true", help="replace results that are there")
-    equilibria.add_argument("--resume", action="store_true", help="go on with a search that was stopped")
-    equilibria.add_argument("--np", type=_ranks, metavar="N", help="run on N MPI ranks")
-    equilibria.add_argument("--petsc", default="", metavar="OPTIONS", help="PETSc options")
-    equilibria.add_argument("--no-pictures", action="store_true", help="write no pictures")
+    _add_solve_options(
+        equilibria, "results; else results/SCENE-equilibria", resume="go on with a search that was stopped"
+    )
 
 
 def _add_study_options(study: argparse.ArgumentParser) -> None:
@@ -138,12 +143,9 @@ def _add_study_options(study: argparse.ArgumentParser) -> None:
         help="solve the scene for each VALUE of mesh, epsilon, epsilon_absolute, smoothing, method, tolerance, "
         "linear_solver or accuracy; several axes: all combinations; none: the program plans the study",
     )
-    study.add_argument("--out", type=Path, metavar="DIR", help="the folder for the study; else results/SCENE-study")
-    study.add_argument("--force", action="store_true", help="replace a study that is there")
-    study.add_argument("--resume", action="store_true", help="keep the points that are finished")
     study.add_argument("--repeat", type=_repetitions, metavar="N", help="solve a point at most N times for its time")
     study.add_argument("--limit", type=_seconds, metavar="SECONDS", help="give a point up after so many seconds")
-    study.add_argument("--np", type=_ranks, metavar="N", help="run each point on N MPI ranks")
+    _add_folder_options(study, "study; else results/SCENE-study", resume="keep the points that are finished")
 
 
 def _relative_error(text: str) -> float:

@@ -15,8 +15,7 @@ from .results import ResultFolder, path_files
 from .results.path_files import Crossing
 from .results.write import write_record
 from .runtime.mpi import on_root
-from .solution import Solution
-from .workflow import Preparation
+from .workflow import unsolved
 
 
 def write(
@@ -45,7 +44,7 @@ def write(
     with timer("output"):
         rows = path_files.shown_rows(path, run.wanted.states)
         frames = ((row, run.displacement(row)) for row in rows)
-        solution = _unsolved(run.prepared)
+        solution = unsolved(run.prepared)
         record = path_files.write(folder.work, folder.target, solution, path, frames, _crossings(run))
         record = {**record, **given}
         on_root(comm, lambda: _from_files(folder, record, path, tell, draw=draw))
@@ -58,22 +57,6 @@ def _crossings(run: PathRun) -> Iterator[Crossing]:
     for factor in run.wanted.contact_at:
         for row, problem, u in run.crossings(factor):
             yield Crossing(row=row, factor=factor, problem=problem, u=u)
-
-
-def _unsolved(prepared: Preparation) -> Solution:
-    """Scene and problem as the writers want them; a path is no single solution."""
-    return Solution(
-        scene=prepared.scene,
-        problem=prepared.problem,
-        solvability=prepared.solvability,
-        solve_result=None,
-        examination=None,
-        estimate=None,
-        dofs=prepared.system.dofs,
-        epsilon=None,
-        timer=prepared.timer,
-        warnings=prepared.warnings,
-    )
 
 
 def _from_files(

@@ -7,8 +7,8 @@ import functools
 from .errors import InputError
 from .laws import smoothing
 from .problem.compose import Model
-from .problem.contact_parts import Modification, unchanged
 from .problem.interfaces import Sides
+from .problem.part_laws import Modification, unchanged
 from .scene import Scene, SolverTable
 from .solvers import registry
 from .solvers.options import SolverOptions

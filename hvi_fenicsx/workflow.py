@@ -199,7 +199,7 @@ def finish_with_levels(
         estimating: whether to estimate the error.
     """
     if prepared.solvability.state == "escapes":
-        return _solution(prepared, None, None, prepared.warnings), ()
+        return unsolved(prepared), ()
     control = RunControl(timer=prepared.timer, progress=progress, interrupted=interrupted)
     solved = _solved(prepared, control, start)
     examination, warnings = _examined(prepared, solved.result)
@@ -242,6 +242,15 @@ def _examined(prepared: Preparation, found: SolveResult) -> tuple[Examination, t
     _log_warnings(warnings)
     _log_certificate(examination.certificate)
     return examination, warnings
+
+
+def unsolved(prepared: Preparation) -> Solution:
+    """A scene of which nothing was solved, or no single solution is meant.
+
+    Args:
+        prepared: the scene.
+    """
+    return _solution(prepared, None, None, prepared.warnings)
 
 
 def _solution(

@@ -68,14 +68,10 @@ def execute(options: argparse.Namespace) -> int:
         telling.say([f"{target}: finished already ({record['reason']})"])
         return int(record["exit_code"])
     existing: Existing = "replace" if options.force or options.resume else "refuse"
-    folder = results.ResultFolder(COMM, target, existing, inputs=[options.scene])
-    try:
-        with log.Handlers(*telling.on_first_rank(log.TerminalDisplay)):
-            prepared = prepare(scene, COMM, timer)
-            return _run(Request(options=options, prepared=prepared, folder=folder, saved=saved))
-    except BaseException:
-        folder.discard()
-        raise
+    display = telling.on_first_rank(log.TerminalDisplay)
+    with results.ResultFolder(COMM, target, existing, inputs=[options.scene]) as folder, log.Handlers(*display):
+        prepared = prepare(scene, COMM, timer)
+        return _run(Request(options=options, prepared=prepared, folder=folder, saved=saved))
 
 
 def _run(request: Request) -> int:
@@ -138,14 +134,11 @@ def _written(request: Request, bodies: Equilibria, found: Found, i: int) -> file
     """Write one equilibrium into a result folder of its own; its row. Collective."""
     solution, folder = bodies.solution(found.points[i]), request.folder
     name = f"equilibrium-{i + 1:0{len(str(len(found.points)))}d}"
-    own = results.ResultFolder(COMM, folder.work / name)
-    try:
+    with results.ResultFolder(COMM, folder.work / name) as own:
         given = {"command": request.options.given, "petsc": request.options.petsc}
         draw = not request.options.no_pictures and i < MOST_DRAWN
         write_whole(own, solution, request.prepared.timer, given, telling.LOG.info, draw=draw)
         own.commit(request.prepared.scene)
-    finally:
-        own.discard()
     return files.row(i + 1, bodies, found.points[i], solution, name)
 
 

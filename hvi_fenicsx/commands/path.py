@@ -74,8 +74,7 @@ def execute(options: argparse.Namespace) -> int:
     if options.resume and (code := on_root(COMM, lambda: _finished(target, scene))) is not None:
         return code
     existing: Existing = "replace" if options.force or options.resume else "refuse"
-    folder = results.ResultFolder(COMM, target, existing, inputs=[options.scene])
-    try:
+    with results.ResultFolder(COMM, target, existing, inputs=[options.scene]) as folder:
         known = on_root(COMM, lambda: _known(folder, scene) if options.resume else [])
         request = PathRequest(
             scene=scene,
@@ -87,9 +86,6 @@ def execute(options: argparse.Namespace) -> int:
             draw=not options.no_pictures,
         )
         return _run(request)
-    except BaseException:
-        folder.discard()
-        raise
 
 
 def _identity(scene: Scene, target: Path) -> str:

@@ -64,14 +64,10 @@ def execute(options: argparse.Namespace) -> int:
     if options.resume and (code := on_root(COMM, lambda: _finished(target, scene, goal))) is not None:
         return code
     existing: Existing = "replace" if options.force or options.resume else "refuse"
-    folder = results.ResultFolder(COMM, target, existing, inputs=[options.scene])
     given = {"command": options.given, "petsc": options.petsc}
     draw = not options.no_pictures
-    try:
+    with results.ResultFolder(COMM, target, existing, inputs=[options.scene]) as folder:
         return _run(RunRequest(scene=scene, goal=goal, folder=folder, timer=timer, given=given, draw=draw))
-    except BaseException:
-        folder.discard()
-        raise
 
 
 def _goal(options: argparse.Namespace) -> Goal | None:

@@ -7,11 +7,9 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
-from mpi4py import MPI
 from petsc4py import PETSc
 
 from ..problem import side_moments
-from ..problem.problem import Problem
 from ..system import existence
 from ..workflow import Preparation
 
@@ -54,7 +52,7 @@ def of(prepared: Preparation) -> Sizes:
     unit, d, comm = problem.scales.force, problem.scales.dimension, problem.domain.mesh.comm
     sums = {name: force.array_r.reshape(-1, d).sum(axis=0) for name, force in _loads(prepared).items()}
     return Sizes(
-        body=_extent(problem),
+        body=tuple(map(float, problem.domain.upper - problem.domain.lower)),
         parts={name: side_moments.of(problem.domain, facets).area for name, facets in problem.part_facets.items()},
         loads={name: _rounded(comm.allreduce(found) * unit) for name, found in sums.items()},
     )
@@ -63,17 +61,6 @@ def of(prepared: Preparation) -> Sizes:
 def _loads(prepared: Preparation) -> Mapping[str, PETSc.Vec]:
     """The loads that are forces; given strains are none."""
     return existence.loads_of_rigid_motions(prepared.problem, prepared.system.forces)
-
-
-def _extent(problem: Problem) -> tuple[float, ...]:
-    d, comm = problem.scales.dimension, problem.domain.mesh.comm
-    points = problem.domain.mesh.geometry.x[:, :d]
-    low, high = np.full((2, d), [[np.inf], [-np.inf]])
-    if len(points):
-        low, high = points.min(axis=0), points.max(axis=0)
-    comm.Allreduce(MPI.IN_PLACE, low, op=MPI.MIN)
-    comm.Allreduce(MPI.IN_PLACE, high, op=MPI.MAX)
-    return tuple(map(float, high - low))
 
 
 def _rounded(force: Any) -> tuple[float, ...]:

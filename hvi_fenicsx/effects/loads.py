@@ -4,49 +4,20 @@ from __future__ import annotations
 
 from typing import Annotated, Any, ClassVar
 
-from pydantic import (
-    BeforeValidator,
-    PlainSerializer,
-    SerializerFunctionWrapHandler,
-    model_serializer,
-    model_validator,
-)
+from pydantic import BeforeValidator, PlainSerializer
 from typing_extensions import override
 
 from ..errors import InputError
 from ..formula import Formula
 from ..schema import refusal
 from ..spatial_value import SpatialValue
-from .base import Drive, Effect, Evaluate, FormContext, Place, Sizes, SurfaceLoad
+from .base import Drive, Evaluate, FormContext, Place, Sizes, SurfaceLoad
 from .contribution import Condition, Contribution
-from .formula_field import FormulaField, require_components
+from .formula_field import FormulaField
+from .plain_values import Listed
 
 
-class _Listed(Effect):
-    """An effect that the scene file writes as a bare list: ``traction = [1e6, 0]``."""
-
-    values: tuple[Any, ...]
-
-    @model_validator(mode="before")
-    @classmethod
-    def _from_list(cls, data: Any) -> Any:
-        if isinstance(data, list | tuple):
-            return {"values": tuple(data)}
-        if isinstance(data, cls) or (isinstance(data, dict) and "values" in data):
-            return data
-        raise refusal("must be a list in square brackets, one entry for each component, like [1e6, 0.0]")
-
-    @model_serializer(mode="wrap")
-    def _as_list(self, handler: SerializerFunctionWrapHandler) -> Any:
-        return list(handler(self)["values"])
-
-    @override
-    def check(self, dimension: int) -> None:
-        """As many components as the scene has dimensions."""
-        require_components(self.values, dimension, self.key)
-
-
-class Traction(_Listed):
+class Traction(Listed):
     """A surface traction t (N/m²): a list of formulas, one for each component."""
 
     key: ClassVar[str] = "traction"
@@ -77,7 +48,7 @@ class Traction(_Listed):
         return max(largest(f) for f in self.values)
 
 
-class BodyForce(_Listed):
+class BodyForce(Listed):
     """A force per volume f (N/m³): a list of formulas, one for each component."""
 
     key: ClassVar[str] = "force"
@@ -118,7 +89,7 @@ Component = Annotated[
 """A formula or "free"."""
 
 
-class PrescribedDisplacement(_Listed):
+class PrescribedDisplacement(Listed):
     """A prescribed displacement (m): a list of formulas, one for each component. ``"free"`` prescribes nothing."""
 
     key: ClassVar[str] = "displacement"

@@ -5,17 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any, ClassVar
 
-from pydantic import SerializerFunctionWrapHandler, model_serializer, model_validator
 from typing_extensions import override
 
 from ..errors import InputError
-from .base import Drive, Effect, Evaluate, FormContext, Place, Sizes
+from .base import Drive, Evaluate, FormContext, Place, Sizes
 from .contribution import Contribution
 from .elasticity import Elasticity, strain
-from .formula_field import FormulaField
+from .plain_values import OneValue
 
 
-class Temperature(Effect):
+class Temperature(OneValue):
     """The temperature above that of the stress-free state (K): a number or a formula.
 
     Strains α ΔT by the material's `thermal_expansion`; the stress is C : (ε(u) - α ΔT I).
@@ -26,17 +25,6 @@ class Temperature(Effect):
     place: ClassVar[Place] = Place.BODY
     drive: ClassVar[Drive] = Drive.KINEMATIC
     term: ClassVar[str] = "<g, v> += ∫ C:(α ΔT I):ε(v) dx"
-
-    value: FormulaField
-
-    @model_validator(mode="before")
-    @classmethod
-    def _from_value(cls, data: Any) -> Any:
-        return data if isinstance(data, cls | dict) else {"value": data}
-
-    @model_serializer(mode="wrap")
-    def _as_value(self, handler: SerializerFunctionWrapHandler) -> Any:
-        return handler(self)["value"]
 
     @override
     def contribute(self, context: FormContext, where: str | None) -> Contribution:

@@ -5,35 +5,24 @@ from __future__ import annotations
 from typing import Any, ClassVar
 
 import numpy as np
-from pydantic import SerializerFunctionWrapHandler, model_serializer, model_validator
+from pydantic import SerializerFunctionWrapHandler, model_serializer
 from typing_extensions import override
 
 from ..errors import InputError
 from ..schema import refusal
 from ..typing import Array
-from .base import Drive, Effect, Evaluate, FormContext, Place, Sizes, SurfaceLoad
+from .base import Drive, Evaluate, FormContext, Place, Sizes, SurfaceLoad
 from .contribution import Contribution
-from .formula_field import FormulaField, require_components
+from .plain_values import Listed, OneValue
 
 
-class Pressure(Effect):
+class Pressure(OneValue):
     """A pressure p (N/m²) against the boundary: a number or a formula; negative: suction."""
 
     key: ClassVar[str] = "pressure"
     place: ClassVar[Place] = Place.BOUNDARY
     drive: ClassVar[Drive] = Drive.LOAD
     term: ClassVar[str] = "<g, v> += -∫ p v·n ds"
-
-    value: FormulaField
-
-    @model_validator(mode="before")
-    @classmethod
-    def _from_value(cls, data: Any) -> Any:
-        return data if isinstance(data, dict | cls) else {"value": data}
-
-    @model_serializer(mode="wrap")
-    def _as_value(self, handler: SerializerFunctionWrapHandler) -> Any:
-        return handler(self)["value"]
 
     @override
     def contribute(self, context: FormContext, where: str | None) -> Contribution:
@@ -55,23 +44,21 @@ class Pressure(Effect):
         return largest(self.value)
 
 
-class _Total(Effect):
-    """A load that is stated as a sum over its part."""
+class _Total(Listed):
+    """A load that is stated as a sum over its part; one of a single number is written without brackets."""
 
     place: ClassVar[Place] = Place.BOUNDARY
     drive: ClassVar[Drive] = Drive.LOAD
 
     values: tuple[float, ...]
 
-    @model_validator(mode="before")
+    @override
     @classmethod
-    def _from_numbers(cls, data: Any) -> Any:
-        if isinstance(data, dict | cls):
-            return data
+    def _entries(cls, data: Any) -> tuple[Any, ...]:
         numbers = tuple(data) if isinstance(data, list | tuple) else (data,)
         if not all(isinstance(n, int | float) and not isinstance(n, bool) for n in numbers):
             raise refusal("is the sum over the part: numbers only; for a load that varies use traction")
-        return {"values": tuple(map(float, numbers))}
+        return tuple(map(float, numbers))
 
     @model_serializer(mode="wrap")
     def _as_numbers(self, handler: SerializerFunctionWrapHandler) -> Any:
@@ -85,11 +72,6 @@ class TotalForce(_Total):
     key: ClassVar[str] = "force"
     label: ClassVar[str] = "a force on the whole part"
     term: ClassVar[str] = "<g, v> += ∫ F/|part| · v ds"
-
-    @override
-    def check(self, dimension: int) -> None:
-        """As many components as the scene has dimensions."""
-        require_components(self.values, dimension, self.key)
 
     @override
     def contribute(self, context: FormContext, where: str | None) -> Contribution:

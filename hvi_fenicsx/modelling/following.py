@@ -133,14 +133,10 @@ class ModelPath(LoadPath):
             InputError: on all ranks alike: the folder holds a result or other files, or cannot be written.
         """
         existing: Existing = "replace" if force else "refuse"
-        target = ResultFolder(self.run.prepared.system.comm, Path(folder), existing)
-        try:
-            given = {"command": None, "petsc": None}
+        given = {"command": None, "petsc": None}
+        with ResultFolder(self.run.prepared.system.comm, Path(folder), existing) as target:
             path_output.write(target, self.run, self, given, _LOG.warning, draw=pictures)
             target.commit(self.run.prepared.scene)
-        except BaseException:
-            target.discard()
-            raise
 
     def __repr__(self) -> str:
         return "\n".join(console.path_outcome(self))

@@ -140,13 +140,9 @@ class ModelSolution(Solution):
             InputError: on all ranks alike: the folder holds a result or other files, or cannot be written.
         """
         existing: Existing = "replace" if force else "refuse"
-        target = ResultFolder(self.problem.domain.mesh.comm, Path(folder), existing)
-        try:
+        with ResultFolder(self.problem.domain.mesh.comm, Path(folder), existing) as target:
             write_whole(target, self, self.timer, {"command": None, "petsc": None}, _LOG.warning, draw=pictures)
             target.commit(self.scene)
-        except BaseException:
-            target.discard()
-            raise
 
     @property
     def _solved(self) -> SolveResult:

@@ -20,10 +20,10 @@ from ..mesh.domain import Domain
 from ..runtime.mpi import agree
 from ..spatial_value import SpatialValue
 from ..typing import Array, Entities
-from . import bulk, contact_parts, dirichlet, interfaces, scaling
-from .contact_parts import Modification, unchanged
+from . import bulk, contact_parts, dirichlet, interfaces, part_laws, scaling
 from .domain_forms import DomainForms
 from .interfaces import Sides
+from .part_laws import Modification, unchanged
 from .problem import PlacedContribution, PrescribedComponent, Problem
 from .scaling import Placed, Scales
 from .thresholds import DEFAULT, Thresholds
@@ -132,8 +132,8 @@ def _problem(
     bounds = contact_parts.make_bounds(context, scales, surfaces, contributions, prescribed, gaps)
     contact_parts.check_bounds(context, bounds, prescribed, fixed, thresholds)
     contact_parts.check_contradictions(context, scales, bounds, thresholds)
-    contact_parts.check_normal_laws(contributions)
-    terms = contact_parts.make_terms(context, scales, surfaces, contributions, fixed, model.modify, gaps)
+    part_laws.check_normal_laws(contributions)
+    terms = part_laws.make_terms(context, scales, surfaces, contributions, fixed, model.modify, gaps)
     linear, strains = (_by_name(contributions, kind) for kind in ("linear", "strains"))
     return Problem(
         domain=context.domain,

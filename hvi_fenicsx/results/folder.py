@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable
 from pathlib import Path
+from typing import Self
 
 from mpi4py import MPI
 
@@ -20,7 +21,7 @@ _LONGEST_END = 64
 
 
 class ResultFolder:
-    """A folder for one result.
+    """A folder for one result. As a context it is discarded where an exception leaves it.
 
     Args:
         comm: the ranks that write.
@@ -45,6 +46,14 @@ class ResultFolder:
         self.kept: tuple[str, ...] = ()
         self._folder: OutputFolder | None = None
         self.target, self.work = on_root(comm, lambda: self._open(target, existing, inputs))
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: object, trace: object) -> None:
+        """Leave nothing behind of a result that was not finished; not collective."""
+        if kind is not None:
+            self.discard()
 
     def _open(self, target: Path, existing: Existing, inputs: Iterable[Path]) -> tuple[Path, Path]:
         self._folder = OutputFolder(target, "result")

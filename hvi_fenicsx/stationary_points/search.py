@@ -34,6 +34,17 @@ class Wanted:
 
 
 @dataclass(frozen=True, kw_only=True)
+class _Task:
+    """A search to be made: the arguments of :func:`find`."""
+
+    problem: ScalarProblem
+    wanted: Wanted
+    stop: Callable[[], bool]
+    report: Callable[[str], None]
+    saved: Saved | None
+
+
+@dataclass(frozen=True, kw_only=True)
 class Found:
     """What a search found.
 
@@ -87,19 +98,13 @@ def find(
         raise InputError(
             "--resume: the search there was for something else: give or leave --lowest as then, or --force"
         )
-    if wanted.lowest:
-        return _lowest(problem, wanted, stop, report, saved)
-    return _all(problem, wanted, stop, report, saved)
+    task = _Task(problem=problem, wanted=wanted, stop=stop, report=report, saved=saved)
+    return _lowest(task) if wanted.lowest else _all(task)
 
 
-def _lowest(
-    problem: ScalarProblem,
-    wanted: Wanted,
-    stop: Callable[[], bool],
-    report: Callable[[str], None],
-    saved: Saved | None,
-) -> Found:
-    search = LowestSearch(problem=problem, gap=wanted.gap)
+def _lowest(task: _Task) -> Found:
+    problem, saved = task.problem, task.saved
+    search = LowestSearch(problem=problem, gap=task.wanted.gap)
     try:
         if saved is None:
             search.start()
@@ -110,9 +115,9 @@ def _lowest(
 
     def tell(_: object) -> None:
         now = search.progress()
-        report(f"lowest: gap {now.gap:.1e}, {now.boxes} boxes, {now.waiting} open")
+        task.report(f"lowest: gap {now.gap:.1e}, {now.boxes} boxes, {now.waiting} open")
 
-    proven = search.run(stop, tell)
+    proven = search.run(task.stop, tell)
     now = search.progress()
     kind = stationarity.kind(problem, search.x)
     point = StationaryPoint(x=search.x, energy=search.upper, kind=kind, isolated=True)
@@ -130,13 +135,8 @@ def _lowest(
     )
 
 
-def _all(
-    problem: ScalarProblem,
-    wanted: Wanted,
-    stop: Callable[[], bool],
-    report: Callable[[str], None],
-    saved: Saved | None,
-) -> Found:
+def _all(task: _Task) -> Found:
+    problem, saved = task.problem, task.saved
     search = Enumeration(problem=problem)
     if saved is None:
         search.start()
@@ -147,14 +147,14 @@ def _all(
         search.waiting = [fresh_box(low[i], high[i], 0.5 * (low[i] + high[i])) for i in range(len(low))]
 
     def tell(_: object) -> None:
-        report(f"all equilibria: {len(search.points)} found, {search.cells} cells, {len(search.waiting)} open")
+        task.report(f"all equilibria: {len(search.points)} found, {search.cells} cells, {len(search.waiting)} open")
 
-    complete = search.run(stop, tell)
+    complete = search.run(task.stop, tell)
     points = tuple(sorted(search.points, key=lambda p: p.energy))
     listed = [(c.low, c.high, c.weights) for c in search.waiting]
     none = np.empty((0, problem.size))
     left = {"lowest": np.array(False), "x": np.array([p.x for p in points]) if points else none, **_stacked(listed)}
-    bound = points[0].energy if complete and points and wanted.bounded else None
+    bound = points[0].energy if complete and points and task.wanted.bounded else None
     return Found(
         points=points,
         complete=complete,

@@ -9,6 +9,7 @@ import basix
 import numpy as np
 from dolfinx import fem
 
+from ...mesh import facet_sizes
 from ...problem.contact_surface import Surface
 from ...problem.problem import Problem
 from ...typing import Array, Entities
@@ -60,15 +61,7 @@ def contact_facets(problem: Problem, bubbles: fem.FunctionSpace, local: Entities
         numbers = [cell_edges.index((corners[a], corners[b])) for a, b in pairs]
         edges[here] = bubbles.dofmap.list[cells[here]][:, numbers]
     points = np.asarray(problem.points[vertices] / problem.scales.length)
-    return ContactFacets(vertices, edges, pairs, _areas(points), cells)
-
-
-def _areas(points: Array) -> Array:
-    """Lengths of segments or areas of triangles (f, d, 3)."""
-    sides = points[:, 1:] - points[:, :1]
-    if sides.shape[1] == 1:
-        return np.asarray(np.linalg.norm(sides[:, 0], axis=1))
-    return np.asarray(np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1) / 2)
+    return ContactFacets(vertices, edges, pairs, facet_sizes.areas(points), cells)
 
 
 class PartTrace:

@@ -6,13 +6,11 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from ...runtime import manifest
-from ..errors import PageError
 from ..path_reader import PathResult, read
 from ..units import quantity
 from . import scene_text
 from .content import picture, pictures
-from .render import NAME, render
+from .render import page_of
 
 
 def write(folder: Path) -> Path:
@@ -22,12 +20,7 @@ def write(folder: Path) -> Path:
         ResultError: no load path is there, or its files are damaged.
         PageError: the page cannot be written.
     """
-    page = render("path.html.j2", _content(read(folder)), folder / NAME)
-    try:
-        manifest.add(folder, [NAME])
-    except OSError as error:
-        raise PageError(f"{folder / manifest.NAME}: cannot be written: {error.strerror or error}") from None
-    return page
+    return page_of("path.html.j2", _content(read(folder)), folder)
 
 
 def _content(result: PathResult) -> dict[str, Any]:

@@ -26,7 +26,24 @@ def write(folder: Path) -> Path:
     """
     from .content import content
 
-    page = render("run.html.j2", content(read(folder)), folder / NAME)
+    return page_of("run.html.j2", content(read(folder)), folder)
+
+
+def page_of(template: str, values: dict[str, Any], folder: Path) -> Path:
+    """Write the page of a result folder, and list it among the folder's files.
+
+    Args:
+        template: its name.
+        values: what it shows, by name.
+        folder: of the result.
+
+    Returns:
+        The file.
+
+    Raises:
+        PageError: it cannot be written.
+    """
+    page = render(template, values, folder / NAME)
     try:
         manifest.add(folder, [NAME])
     except OSError as error:
@@ -70,4 +87,4 @@ def _environment() -> jinja2.Environment:
     )
 
 
-__all__ = ["NAME", "render", "write"]
+__all__ = ["NAME", "page_of", "render", "write"]
