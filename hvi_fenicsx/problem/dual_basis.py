@@ -6,8 +6,9 @@ For the vertices i that carry contact and laws there are functions ψ_i of the f
     w_i = (∫ψ_i u_first - ∫ψ_i u_second) / ∫ψ_i,
 
 its weight ∫ψ_i. A vertex that carries nothing (beyond the end of the second side, prescribed, on another part) leaves
-its share to its neighbours (Cichosz and Bischoff 2011). So affine fields are reproduced, and the forces of both sides
-balance, whatever the meshes, and wherever the second side ends.
+its share to its neighbours (Cichosz and Bischoff 2011), and a facet of none but such vertices to the nearest one that
+carries. So affine fields are reproduced, and the forces of both sides balance, whatever the meshes, and wherever the
+second side ends.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ import numpy as np
 from scipy.sparse import coo_array, csr_array
 
 from ..typing import Array, Integers, Mask
-from .facet_overlaps import Facets, Overlaps
+from .facet_overlaps import Facets, OverlapPoints, Overlaps
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,16 +47,38 @@ def relative_rows(first: Facets, second: Facets, overlaps: Overlaps, kept: Mask,
         kept: whether a vertex of the first side's facets carries anything, (f, d).
         size: N.
     """
-    basis = _coefficients(overlaps, kept)
-    values = np.einsum("pik,pk->pi", basis[overlaps.first], overlaps.on_first)  # ψ at the points
-    values *= overlaps.weights[:, None]
-    rows = first.vertices[overlaps.first]
+    points = overlaps.points()
+    basis, carriers = _coefficients(points, kept), first.vertices.copy()
+    for facet, vertex in adopted(first, overlaps, kept).items():
+        basis[facet, 0], carriers[facet, 0] = 1.0, vertex
+    values = np.einsum("pik,pk->pi", basis[points.first], points.on_first)  # ψ at the points
+    values *= points.weights[:, None]
+    rows = carriers[points.first]
     weights = np.bincount(rows.ravel(), weights=values.ravel(), minlength=size).astype(np.float64)
     return RelativeRows(
         weights=weights,
-        first=_matrix(rows, rows, values, overlaps.on_first, size),
-        second=_matrix(rows, second.vertices[overlaps.second], values, overlaps.on_second, size),
+        first=_matrix(rows, rows, values, points.on_first, size),
+        second=_matrix(rows, second.vertices[points.second], values, points.on_second, size),
     )
+
+
+def adopted(first: Facets, overlaps: Overlaps, kept: Mask) -> dict[int, int]:
+    """The facets without a vertex of their own that carries something, and the nearest such vertex of a neighbour.
+
+    Its ψ is 1 there: it stays orthogonal to the functions of all vertices that carry something.
+
+    Args:
+        first: the side that carries contact and laws.
+        overlaps: of its facets.
+        kept: whether a vertex of its facets carries anything, (f, d).
+    """
+    found = {}
+    for facet in np.setdiff1d(overlaps.first, np.flatnonzero(kept.any(axis=1))):
+        near = kept & np.any(np.isin(first.vertices, first.vertices[facet]), axis=1, keepdims=True)
+        if near.any():
+            away = np.linalg.norm(first.corners[near] - first.corners[facet].mean(axis=0), axis=1)
+            found[int(facet)] = int(first.vertices[near][np.argmin(np.round(away / away.max(), 9))])
+    return found
 
 
 def _matrix(rows: Integers, columns: Integers, values: Array, functions: Array, size: int) -> csr_array:
@@ -68,15 +91,15 @@ def _matrix(rows: Integers, columns: Integers, values: Array, functions: Array, 
     return csr_array(coo_array((entries[nonzero], pairs), shape=(size, size)))
 
 
-def _coefficients(overlaps: Overlaps, kept: Mask) -> Array:
+def _coefficients(points: OverlapPoints, kept: Mask) -> Array:
     """ψ_i = Σ_k basis_ik φ_k on each facet, zero rows where a vertex carries nothing, (f, d, d)."""
     count, d = kept.shape
     mass = np.zeros((count, d, d))
-    products = np.einsum("p,pk,pj->pkj", overlaps.weights, overlaps.on_first, overlaps.on_first)
-    np.add.at(mass, overlaps.first, products)
+    products = np.einsum("p,pk,pj->pkj", points.weights, points.on_first, points.on_first)
+    np.add.at(mass, points.first, products)
     basis = np.zeros((count, d, d))
     covered = np.zeros(count, dtype=bool)
-    covered[overlaps.first] = True
+    covered[points.first] = True
     for pattern in np.unique(kept[covered], axis=0):
         here, own = np.flatnonzero(covered & np.all(kept == pattern, axis=1)), np.flatnonzero(pattern)
         if len(own):

@@ -13,9 +13,6 @@ import numpy as np
 from ..typing import Array, Integers, Mask
 from .thresholds import DEFAULT, Thresholds
 
-_GAUSS = np.array([0.5 - np.sqrt(3.0) / 6.0, 0.5 + np.sqrt(3.0) / 6.0])
-"""Points of the Gauss rule on [0, 1] that is exact up to degree 3; the weights are one half each."""
-
 
 @dataclass(frozen=True, kw_only=True)
 class Facets:
@@ -31,10 +28,21 @@ class Facets:
     corners: Array
     normals: Array
 
+    @property
+    def areas(self) -> Array:
+        """Lengths or areas, m^(d-1), (f,)."""
+        sides = self.corners[:, 1:] - self.corners[:, :1]
+        return np.sqrt(np.linalg.det(sides @ sides.transpose(0, 2, 1))) / sides.shape[1]
+
+    @property
+    def width(self) -> float:
+        """The longest edge, m."""
+        return float(np.max(np.linalg.norm(self.corners - np.roll(self.corners, 1, axis=1), axis=2)))
+
 
 @dataclass(frozen=True, kw_only=True)
-class Overlaps:
-    """Integration points on the intersections of facets (p of them).
+class OverlapPoints:
+    """Integration points on intersections of facets (p of them).
 
     Attributes:
         first: number of the first side's facet, (p,).
@@ -42,7 +50,6 @@ class Overlaps:
         weights: of the points, m^(d-1), (p,).
         on_first: barycentric coordinates in the first facet, (p, d).
         on_second: in the second facet, (p, d).
-        covered: whether each vertex of the first side's facets lies over the second side, (f, d).
     """
 
     first: Integers
@@ -50,7 +57,43 @@ class Overlaps:
     weights: Array
     on_first: Array
     on_second: Array
+
+
+@dataclass(frozen=True, kw_only=True)
+class Overlaps:
+    """The intersections of facets, cut into segments or triangles (k of them).
+
+    Attributes:
+        first: number of the first side's facet, (k,).
+        second: number of the second side's facet, (k,).
+        areas: m^(d-1), (k,).
+        on_first: barycentric coordinates of the corners in the first facet, (k, d, d).
+        on_second: in the second facet, (k, d, d).
+        covered: whether each vertex of the first side's facets lies over the second side, (f, d).
+    """
+
+    first: Integers
+    second: Integers
+    areas: Array
+    on_first: Array
+    on_second: Array
     covered: Mask
+
+    def points(self) -> OverlapPoints:
+        """The points of a rule that is exact for products of two linear functions."""
+        d = self.on_first.shape[1]
+        rule = np.full((d, d), _OFF[d]) + np.eye(d) * (1.0 - d * _OFF[d])
+        return OverlapPoints(
+            first=np.repeat(self.first, d),
+            second=np.repeat(self.second, d),
+            weights=np.repeat(self.areas / d, d),
+            on_first=(rule @ self.on_first).reshape(-1, d),
+            on_second=(rule @ self.on_second).reshape(-1, d),
+        )
+
+
+_OFF = {2: 0.5 - np.sqrt(3.0) / 6.0, 3: 1.0 / 6.0}
+"""The smaller barycentric coordinates of the d points with equal weights, by dimension."""
 
 
 def in_plane(first: Facets, second: Facets, thresholds: Thresholds = DEFAULT) -> Overlaps:
@@ -69,7 +112,7 @@ def in_plane(first: Facets, second: Facets, thresholds: Thresholds = DEFAULT) ->
         begin, end = found[:, 1].min(initial=np.inf), found[:, 2].max(initial=-np.inf)
         covered[number] = begin <= thresholds.uncovered, end >= 1.0 - thresholds.uncovered
     whole = np.vstack(pieces)
-    return _points(first, whole, covered)
+    return _pieces(first, whole, covered)
 
 
 def _intervals(first: Facets, second: Facets, number: int, thresholds: Thresholds) -> Array:
@@ -98,18 +141,14 @@ def _nearest(intervals: Array) -> Array:
     return np.array(kept).reshape(-1, 5)
 
 
-def _points(first: Facets, pieces: Array, covered: Mask) -> Overlaps:
-    """The integration points of intervals (first facet, second facet, begin, end, both on the second facet)."""
-    number, other = pieces[:, 0].astype(np.int64), pieces[:, 1].astype(np.int64)
-    lengths = np.linalg.norm(first.corners[number, 1] - first.corners[number, 0], axis=1)
-    x = pieces[:, 2, None] + (pieces[:, 3] - pieces[:, 2])[:, None] * _GAUSS
-    y = pieces[:, 4, None] + (pieces[:, 5] - pieces[:, 4])[:, None] * _GAUSS
-    weights = np.repeat(lengths * (pieces[:, 3] - pieces[:, 2]) / 2.0, 2)
+def _pieces(first: Facets, found: Array, covered: Mask) -> Overlaps:
+    """Intervals (first facet, second facet, begin, end, both on the second facet) as intersections."""
+    number, x, y = found[:, 0].astype(np.int64), found[:, 2:4], found[:, 4:6]
     return Overlaps(
-        first=np.repeat(number, 2),
-        second=np.repeat(other, 2),
-        weights=weights,
-        on_first=np.column_stack([1.0 - x.ravel(), x.ravel()]),
-        on_second=np.column_stack([1.0 - y.ravel(), y.ravel()]),
+        first=number,
+        second=found[:, 1].astype(np.int64),
+        areas=first.areas[number] * (x[:, 1] - x[:, 0]),
+        on_first=np.stack([1.0 - x, x], axis=2),
+        on_second=np.stack([1.0 - y, y], axis=2),
         covered=covered,
     )

@@ -86,8 +86,6 @@ def find(
     """
     if not wanted:
         return ()
-    if context.dimension != 2:
-        raise InputError(f"interface.{next(iter(wanted))}: interfaces between bodies in space are not supported yet")
     pairs = {name: _pair(context, name, sides) for name, sides in wanted.items()}
     taken = context.space.dofmap.index_map.local_to_global(np.asarray(occupied, dtype=np.int32))
     taken = np.unique(np.concatenate(agree(context.domain.mesh.comm, taken)))
@@ -130,9 +128,11 @@ def _gathered(context: DomainForms, local: Entities) -> Facets:
 
 
 def _outward(corners: Array, inner: Array) -> Array:
-    """Unit normals of segments (f, 2, 2) away from points inside (f, 2)."""
-    along = corners[:, 1] - corners[:, 0]
-    normals = np.column_stack([along[:, 1], -along[:, 0]]) / np.linalg.norm(along, axis=1, keepdims=True)
+    """Unit normals of segments or triangles (f, d, d) away from points inside (f, d)."""
+    sides = corners[:, 1:] - corners[:, :1]
+    plane = corners.shape[1] == 2
+    across = np.column_stack([sides[:, 0, 1], -sides[:, 0, 0]]) if plane else np.cross(sides[:, 0], sides[:, 1])
+    normals = across / np.linalg.norm(across, axis=1, keepdims=True)
     return np.asarray(normals * -np.sign(np.sum(normals * (inner - corners[:, 0]), axis=1, keepdims=True)))
 
 
@@ -140,8 +140,8 @@ def _interface(
     context: DomainForms, name: str, pairs: Mapping[str, _Pair], taken: Integers, thresholds: Thresholds
 ) -> Interface:
     pair = pairs[name]
-    overlaps = facet_overlaps.in_plane(pair.first, pair.second, thresholds)
-    if not len(overlaps.weights):
+    overlaps = _overlaps(pair, thresholds)
+    if not len(overlaps.areas):
         raise InputError(
             f'interface.{name}.between: "{pair.sides.first}" and "{pair.sides.second}" do not face each other: nowhere '
             "does a normal of the first meet a facet of the second; name sides that lie over each other"
@@ -160,6 +160,15 @@ def _interface(
     return Interface(name=name, tied=tied, surface=surface, gap=gap, rows=rows, members=_members(context, pair))
 
 
+def _overlaps(pair: _Pair, thresholds: Thresholds) -> Overlaps:
+    """The intersections of the facets of both sides."""
+    if pair.first.vertices.shape[1] == 2:
+        return facet_overlaps.in_plane(pair.first, pair.second, thresholds)
+    from . import facet_polygons  # shapely, which plane bodies do not need
+
+    return facet_polygons.in_space(pair.first, pair.second, thresholds)
+
+
 def _kept(first: Facets, overlaps: Overlaps, busy: Mask) -> Mask:
     """Which vertices carry something: those over the second side in all of their facets, (f, d)."""
     left_out = np.unique(first.vertices[~overlaps.covered | busy])
@@ -174,12 +183,13 @@ def _check_pieces(context: DomainForms, name: str, pair: _Pair, overlaps: Overla
             f'beyond the end of "{pair.sides.second}", is prescribed, or is on another part; name the longer side '
             "second, or make the mesh of the first finer"
         )
-    lost = [n for n in np.unique(overlaps.first) if not kept[n].any() and busy[n].any()]
-    if lost:
+    lost = np.setdiff1d(overlaps.first, np.flatnonzero(kept.any(axis=1) | ~busy.any(axis=1)))
+    lost = np.setdiff1d(lost, list(dual_basis.adopted(pair.first, overlaps, kept)))
+    if len(lost):
         at = tuple(float(f"{c:.6g}") for c in pair.first.corners[lost[0]].mean(axis=0))
         raise InputError(
-            f"interface.{name}: nothing carries the facet at {at}: both of its ends are prescribed or on other parts; "
-            "make the mesh there finer"
+            f"interface.{name}: nothing carries the facet at {at}: its vertices and those near it are prescribed or on "
+            "other parts; make the mesh there finer"
         )
 
 
@@ -192,10 +202,9 @@ def _own(context: DomainForms, rows: RelativeRows) -> Entities:
 def _surface(context: DomainForms, name: str, pair: _Pair, rows: RelativeRows) -> Surface:
     d, start = context.dimension, context.space.dofmap.index_map.local_range[0]
     blocks = _own(context, rows)
-    sizes = np.linalg.norm(pair.first.corners[:, 1] - pair.first.corners[:, 0], axis=1)
     sums = np.zeros((len(rows.weights), d))
     for corner in range(d):
-        np.add.at(sums, pair.first.vertices[:, corner], sizes[:, None] * pair.first.normals)
+        np.add.at(sums, pair.first.vertices[:, corner], pair.first.areas[:, None] * pair.first.normals)
     mean = sums[start + blocks]
     normals = mean / np.linalg.norm(mean, axis=1, keepdims=True)
     normals = np.where(np.abs(normals) < DEFAULT.rounding * 10, 0.0, normals)
@@ -227,10 +236,9 @@ def _check_gaps(
     context: DomainForms, name: str, pair: _Pair, surface: Surface, gap: Array, thresholds: Thresholds
 ) -> None:
     """Refuse bodies that overlap by more than the facets of their curved sides do."""
-    width = float(np.max(np.linalg.norm(pair.first.corners[:, 1] - pair.first.corners[:, 0], axis=1)))
     deepest = [(float(gap[i]), tuple(map(float, surface.points[i][: context.dimension]))) for i in _lowest(gap)]
     depth, at = min((pair for rank in agree(context.domain.mesh.comm, deepest) for pair in rank), default=(0.0, ()))
-    if depth < -thresholds.overlap * width:
+    if depth < -thresholds.overlap * pair.first.width:
         place = ", ".join(f"{c:.6g}" for c in at)
         raise InputError(
             f'interface.{name}.between: at ({place}) "{pair.sides.second}" lies {-depth:.3g} m inside of the body of '

@@ -321,20 +321,6 @@ def test_what_does_not_fit_is_refused_with_the_mend(path: str, value: Any, words
         prepare(Scene.model_validate(changed(path, value)))
 
 
-def test_bodies_in_space_are_joined_but_their_interfaces_are_refused() -> None:
-    box = {"shape": "box", "size": [1.0, 1.0, 1.0], "cells": [2, 2, 2]}
-    table: Table = {
-        "domain": {"lower": box, "upper": {**box, "origin": [0.0, 0.0, 1.0]}},
-        "material": {**MATERIAL, "model": "three_dimensional"},
-        "boundary": {"base": {"on": ["lower.bottom", "upper.bottom"], "displacement": [0.0, 0.0, 0.0]}},
-    }
-    assert len(prepare(Scene.model_validate(table)).problem.bodies.bodies) == 2
-    table["boundary"]["base"]["on"] = "lower.bottom"
-    table["interface"] = {"seam": {"between": ["upper.bottom", "lower.top"], **CONTACT}}
-    with pytest.raises(InputError, match="in space are not supported yet"):
-        prepare(Scene.model_validate(table))
-
-
 @pytest.mark.long
 def test_sides_exchanged_change_less_than_a_finer_mesh_does() -> None:
     energies = []
