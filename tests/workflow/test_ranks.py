@@ -34,7 +34,7 @@ CUBE: Table = {
 
 
 def joined(shape: str, flat: list[float], cells: list[list[int]], elasticity: str) -> Table:
-    """Two blocks with friction between them, pressed askew and pushed, so that they part at one end; no mesh matches."""
+    """Two blocks with friction between them, pressed askew and pushed, so that they part at one end; meshes differ."""
     rest = [0.0] * len(flat)
     return {
         "domain": {
