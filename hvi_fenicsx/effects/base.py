@@ -140,6 +140,11 @@ class SurfaceLoad:
     components: tuple[SpatialValue, ...] = ()
     pressure: SpatialValue | None = None
 
+    @property
+    def values(self) -> tuple[SpatialValue, ...]:
+        """All that it is given by."""
+        return self.components if self.pressure is None else (*self.components, self.pressure)
+
 
 class Effect(BaseModel):
     """One physical contribution: validated data (SI) and what it adds.

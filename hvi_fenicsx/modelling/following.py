@@ -112,10 +112,9 @@ class ModelPath(LoadPath):
         for part in self.parts:
             for kind, values in (("f", self.force(part)), ("u", self.displacement(part))):
                 columns |= {f"{part}.{kind}{'xyz'[i]}": values[:, i] for i in range(self.dimension)}
-        title = self.run.prepared.scene.title or "load path"
         return PathResult(
             folder=Path("."),
-            scene={"title": title},
+            scene={"title": self.run.prepared.scene.title},
             summary={"path": self.summary()},
             columns=columns,
             events=self.events,

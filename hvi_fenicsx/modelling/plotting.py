@@ -41,7 +41,7 @@ def draw(solution: Solution, picture: str) -> Figure | None:
 
     def make() -> None:
         assert arrays is not None
-        title = {"title": solution.scene.title or "solution"}
+        title = {"title": solution.scene.title}
         figures.append(_figure(Result(Path("."), title, record, arrays), picture))
 
     on_root(solution.problem.domain.mesh.comm, make)

@@ -15,6 +15,7 @@ import numpy as np
 
 from ..typing import Array, Mask
 from .errors import ResultError
+from .reader import title_of
 
 _WORDS = frozenset({"event", "part"})
 """Columns that are no numbers."""
@@ -45,8 +46,8 @@ class PathResult:
 
     @property
     def title(self) -> str:
-        """The scene's title, or the folder's name."""
-        return str(self.scene.get("title") or self.folder.name)
+        """The scene's title."""
+        return title_of(self.scene)
 
     @cached_property
     def axes(self) -> str:

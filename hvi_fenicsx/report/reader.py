@@ -106,6 +106,11 @@ class Result:
     summary: Mapping[str, Any]
     arrays: SolutionArrays
 
+    @property
+    def title(self) -> str:
+        """The scene's title."""
+        return title_of(self.scene)
+
     @cached_property
     def body(self) -> BodyMesh:
         """The body with its fields."""
@@ -203,6 +208,15 @@ class Result:
         """The laws that act on a displacement of a part, as a scene writes them."""
         brought = [law for role in self.roles(part) for law in role["laws"]]
         return [law["law"] for law in brought if law["direction"] == direction]
+
+
+def title_of(scene: Mapping[str, Any]) -> str:
+    """The title of a scene, for headings.
+
+    Args:
+        scene: its tables.
+    """
+    return str(scene.get("title") or "untitled")
 
 
 def read(folder: Path) -> Result:

@@ -5,7 +5,10 @@ This module alone knows the keys of the file. With n vertices and c cells in d d
 - ``points`` (n, d) in m; ``cells`` (c, d+1), the vertices of each cell
 - ``displacement`` (n, d) in m, or ``escape_mode`` (n, d) where no solution exists
 - ``von_mises`` (c,) in N/m²
+- ``region:NAME`` (k,), the cells of a region of the mesh
 - ``side:NAME`` (k, d), the vertices of each facet of a boundary table of the scene
+- ``load:NAME:KEY``, a load there that no formula of the scene tells, at m vertices: ``vertices`` (m,), ``traction``
+  (m, d) and ``pressure`` (m,) against the boundary in N/m²
 - ``part:NAME:KEY``, a part of Γc with m vertices: ``vertices`` (m,), ``facets`` (k, d), ``weights`` (m,), ``normals``
   (m, d), ``drops``, and the columns of ``contact.csv`` by their names, (m,) each
 """
@@ -29,7 +32,7 @@ from .errors import ResultError
 Singles = npt.NDArray[np.float32]
 """Real numbers in single precision, whose seven digits are enough for a stress."""
 FILE = "solution.npz"
-_SIDE, _PART = "side:", "part:"
+_SIDE, _REGION, _LOAD, _PART = "side:", "region:", "load:", "part:"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,6 +58,21 @@ class PartArrays:
 
 
 @dataclass(frozen=True, kw_only=True)
+class LoadArrays:
+    """A load on a side at m vertices, in d dimensions.
+
+    Attributes:
+        vertices: the vertices of the body, ascending, (m,).
+        traction: N/m², (m, d).
+        pressure: N/m², against the boundary, (m,).
+    """
+
+    vertices: Integers
+    traction: Array
+    pressure: Array
+
+
+@dataclass(frozen=True, kw_only=True)
 class SolutionArrays:
     """A solution with n vertices and c cells in d dimensions.
 
@@ -65,6 +83,8 @@ class SolutionArrays:
         escape_mode: the rigid motion along which the body escapes, (n, d); None where it does not.
         von_mises: the von Mises stress of each cell, N/m², (c,); None where it was not computed.
         sides: the facets of each boundary table of the scene, (k, d), each row ascending.
+        regions: the cells of each region of the mesh, (k,).
+        loads: by boundary table, the loads that no formula of the scene tells.
         parts: the parts of Γc by name.
     """
 
@@ -74,6 +94,8 @@ class SolutionArrays:
     escape_mode: Array | None = None
     von_mises: Singles | None = None
     sides: Mapping[str, Integers] = field(default_factory=dict)
+    regions: Mapping[str, Integers] = field(default_factory=dict)
+    loads: Mapping[str, LoadArrays] = field(default_factory=dict)
     parts: Mapping[str, PartArrays] = field(default_factory=dict)
 
 
@@ -98,9 +120,12 @@ def save(path: Path, arrays: SolutionArrays) -> None:
 
 def _members(arrays: SolutionArrays) -> Iterator[tuple[str, Any]]:
     """The arrays by their keys; those that are None are left out."""
-    plain = {key: value for key, value in vars(arrays).items() if key not in ("sides", "parts")}
+    plain = {key: value for key, value in vars(arrays).items() if not isinstance(value, Mapping)}
     yield from ((key, value) for key, value in plain.items() if value is not None)
     yield from ((f"{_SIDE}{name}", facets) for name, facets in arrays.sides.items())
+    yield from ((f"{_REGION}{name}", cells) for name, cells in arrays.regions.items())
+    for name, load in arrays.loads.items():
+        yield from ((f"{_LOAD}{name}:{key}", value) for key, value in vars(load).items())
     for name, part in arrays.parts.items():
         own = {key: value for key, value in vars(part).items() if key != "columns"}
         yield from ((f"{_PART}{name}:{key}", value) for key, value in {**own, **part.columns}.items())
@@ -126,16 +151,25 @@ def load(path: Path) -> SolutionArrays:
 
 
 def _arrays(members: Mapping[str, Any]) -> SolutionArrays:
-    parts: dict[str, dict[str, Any]] = {}
-    for key in members:
-        if key.startswith(_PART):
-            name, own = key.removeprefix(_PART).rsplit(":", 1)
-            parts.setdefault(name, {})[own] = members[key]
     return SolutionArrays(
-        **{key: value for key, value in members.items() if not key.startswith((_SIDE, _PART))},
-        sides={key.removeprefix(_SIDE): value for key, value in members.items() if key.startswith(_SIDE)},
-        parts={name: _part(own) for name, own in parts.items()},
+        **{key: value for key, value in members.items() if ":" not in key},
+        sides=_named(members, _SIDE),
+        regions=_named(members, _REGION),
+        loads={name: LoadArrays(**own) for name, own in _grouped(members, _LOAD).items()},
+        parts={name: _part(own) for name, own in _grouped(members, _PART).items()},
     )
+
+
+def _named(members: Mapping[str, Any], kind: str) -> dict[str, Any]:
+    return {key.removeprefix(kind): value for key, value in members.items() if key.startswith(kind)}
+
+
+def _grouped(members: Mapping[str, Any], kind: str) -> dict[str, dict[str, Any]]:
+    found: dict[str, dict[str, Any]] = {}
+    for key, value in _named(members, kind).items():
+        name, own = key.rsplit(":", 1)
+        found.setdefault(name, {})[own] = value
+    return found
 
 
 def _part(members: dict[str, Any]) -> PartArrays:
@@ -148,12 +182,15 @@ def _check(arrays: SolutionArrays) -> None:
     n = len(arrays.points)
     numbers = [arrays.cells, *arrays.sides.values()]
     numbers += [values for part in arrays.parts.values() for values in (part.vertices, part.facets)]
+    numbers += [load.vertices for load in arrays.loads.values()]
     by_vertex = [values for values in (arrays.displacement, arrays.escape_mode) if values is not None]
     lengths = [(n, len(values)) for values in by_vertex]
     lengths += [(len(arrays.cells), len(arrays.von_mises))] if arrays.von_mises is not None else []
+    lengths += [(len(load.vertices), len(v)) for load in arrays.loads.values() for v in (load.traction, load.pressure)]
     for part in arrays.parts.values():
         lengths += [(len(part.vertices), len(v)) for v in (part.weights, part.normals, *part.columns.values())]
+    fits = [(values, n) for values in numbers] + [(cells, len(arrays.cells)) for cells in arrays.regions.values()]
     if any(one != other for one, other in lengths) or any(
-        values.size and not 0 <= values.min() <= values.max() < n for values in numbers
+        values.size and not 0 <= values.min() <= values.max() < count for values, count in fits
     ):
         raise ValueError("its arrays do not belong together")

@@ -14,11 +14,13 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from ..certify.contact_state import ContactState
-from ..effects import Direction
+from ..effects import Direction, SurfaceLoad
+from ..formula import Formula
 from ..mesh import nodes
 from ..problem import spaces
 from ..problem.problem import Problem
-from ..report.solution_arrays import PartArrays, Singles, SolutionArrays
+from ..report.solution_arrays import LoadArrays, PartArrays, Singles, SolutionArrays
+from ..runtime.mpi import agree
 from ..solution import Solution
 from ..typing import Array, Entities, Integers
 from . import arc_length, contact_table
@@ -44,8 +46,9 @@ def solution_arrays(solution: Solution, von_mises: Singles | None = None) -> Sol
         fields["von_mises"] = np.repeat(von_mises, nodes.parts_of_cell(problem.space))
     gathered = {name: _joined(comm, values) for name, values in fields.items()}
     sides = {name: _facets(problem, problem.domain.facets(on)) for name, on in solution.scene.parts.items()}
+    loads, regions = _loads(problem), _regions(problem)
     parts = part_arrays(problem, () if solution.examination is None else solution.examination.states)
-    return None if comm.rank else SolutionArrays(**gathered, sides=sides, parts=parts)
+    return None if comm.rank else SolutionArrays(**gathered, sides=sides, regions=regions, loads=loads, parts=parts)
 
 
 def _by_node(problem: Problem, u: fem.Function) -> Array:
@@ -69,6 +72,45 @@ def _facets(problem: Problem, facets: Entities) -> Integers:
     """Local facets by their global nodes, each once and ascending, (k, d); right on rank 0 alone. Collective."""
     corners = nodes.linear_facets(problem.space, facets)
     return np.unique(np.sort(_joined(problem.domain.mesh.comm, _globally(problem, corners)), axis=1), axis=0)
+
+
+def _regions(problem: Problem) -> dict[str, Integers]:
+    """The cells of each region, as numbers of the gathered cells; right on rank 0 alone. Collective."""
+    comm, parts = problem.domain.mesh.comm, nodes.parts_of_cell(problem.space)
+    owned = problem.domain.mesh.topology.index_map(problem.scales.dimension).size_local
+    first = int(sum(agree(comm, owned)[: comm.rank])) * parts
+
+    def numbers(cells: Entities) -> Integers:
+        own = np.asarray(cells[cells < owned], dtype=np.int64)
+        return np.asarray((first + own[:, None] * parts + np.arange(parts)).ravel())
+
+    return {name: _joined(comm, numbers(cells)) for name, cells in sorted(problem.domain.regions.items())}
+
+
+def _loads(problem: Problem) -> dict[str, LoadArrays]:
+    """The loads of each part that are no formulas, which a reader of files cannot evaluate. Collective."""
+    found: dict[str, list[SurfaceLoad]] = {}
+    for where, effect, _ in problem.contributions:
+        load = effect.surface_load()
+        if where is not None and load is not None and not all(isinstance(v, Formula) for v in load.values):
+            found.setdefault(where, []).append(load)
+    return {name: _load(problem, problem.part_facets[name], loads) for name, loads in found.items()}
+
+
+def _load(problem: Problem, facets: Entities, loads: Sequence[SurfaceLoad]) -> LoadArrays:
+    """Loads on one part, added up; right on rank 0 alone. Collective."""
+    comm, d = problem.domain.mesh.comm, problem.scales.dimension
+    local = np.unique(nodes.facet_nodes(problem.space, facets))
+    traction, pressure = np.zeros((len(local), d)), np.zeros(len(local))
+    for load in loads:
+        for i, component in enumerate(load.components):
+            traction[:, i] += component.at(problem.points[local])
+        if load.pressure is not None:
+            pressure += load.pressure.at(problem.points[local])
+    vertices, first = np.unique(_joined(comm, _globally(problem, local)), return_index=True)
+    return LoadArrays(
+        vertices=vertices, traction=_joined(comm, traction)[first], pressure=_joined(comm, pressure)[first]
+    )
 
 
 def part_arrays(problem: Problem, states: Sequence[ContactState]) -> dict[str, PartArrays]:

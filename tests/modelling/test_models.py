@@ -22,6 +22,11 @@ from scenes import model as scene_table
 from scenes import quadratic_linear
 
 import hvi_fenicsx as hvi
+from hvi_fenicsx.report.pictures import loads_supports
+from hvi_fenicsx.report.pictures.regions import regions
+from hvi_fenicsx.report.reader import Result
+from hvi_fenicsx.results import gathering
+from hvi_fenicsx.results.summary import summary
 
 E, NU = 2.15e11, 0.29
 
@@ -106,8 +111,23 @@ def test_a_load_may_be_a_formula_a_function_or_ufl(body: hvi.Body) -> None:
         ufl.as_vector([0.0, -1e6 * (1 + x[0])]),
         [0.0, field],
     ]
-    energies = [hvi.solve(steel_square(body=body, press=press)).energy for press in ways]
-    np.testing.assert_allclose(energies, energies[0], rtol=1e-11)
+    found = [hvi.solve(steel_square(body=body, press=press), estimate=False) for press in ways]
+    others = [one for one in steel_square(body=body).effects if getattr(one, "side", "") != "press"]
+    found.append(hvi.solve(hvi.Model(body, [*others, hvi.Pressure("press", 1e6 * (1 + x[0]))]), estimate=False))
+    for solution in found:
+        assert solution.energy == pytest.approx(found[0].energy, rel=1e-11)
+        shown = {load.side.part: load for load in loads_supports.loaded_sides(as_read(solution))}
+        at = solution.problem.points[shown["press"].side.vertices]  # on one rank vertices are numbered alike
+        np.testing.assert_allclose(shown["press"].traction[:, 1], -1e6 * (1 + at[:, 0]), rtol=1e-9)
+        np.testing.assert_allclose(shown["press"].traction[:, [0, 2]], 0.0, atol=1e-6)
+        np.testing.assert_allclose(shown["pull"].traction, np.tile([3e6, 0, 0], (9, 1)))
+
+
+def as_read(solution: hvi.Solution) -> Result:
+    """A solution as pictures read it from its folder."""
+    arrays = gathering.solution_arrays(solution)
+    assert arrays is not None
+    return Result(Path("."), {}, summary(solution), arrays)
 
 
 def test_gaps_and_prescribed_values_may_be_functions(body: hvi.Body) -> None:
@@ -201,6 +221,11 @@ def test_regions_by_tags_of_cells(body: hvi.Body) -> None:
 
     by_formula = hvi.solve(steel_square(body=body, material=hvi.Energy(graded)))
     assert by_tags.energy == pytest.approx(by_formula.energy, rel=1e-10)
+    shown = {region.name: region.cells for region in regions(as_read(by_tags))}
+    assert {name: set(numbers) for name, numbers in shown.items()} == {
+        "hard": set(cells[~right]),
+        "soft": set(cells[right]),
+    }
 
 
 def test_what_is_wrong_with_a_mesh_or_its_tags_is_said() -> None:

@@ -21,7 +21,7 @@ def content(result: Result) -> dict[str, Any]:
     """All that the template shows."""
     shown = {path.stem: picture(path) for path in pictures(result.folder, _FIRST)}
     return {
-        "title": str(result.scene.get("title") or result.summary.get("scene") or result.folder.name),
+        "title": result.title,
         "summary": result.summary,
         "verdict": verdict.headline(result),
         "existence": list(verdict.existence(result)),

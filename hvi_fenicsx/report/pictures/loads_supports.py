@@ -14,6 +14,7 @@ from ...geometry import chains
 from ...typing import Array, Integers
 from ..body_mesh import BodyMesh
 from ..reader import Result
+from ..solution_arrays import LoadArrays
 from .outline import normals
 from .vtk_view import area_vectors
 
@@ -72,6 +73,7 @@ def loaded_sides(result: Result) -> list[LoadedSide]:
     found = []
     for side, roles in roles_by_side(result):
         traction = np.sum([_traction(role, result.body.points[side.vertices], side.normals) for role in roles], axis=0)
+        traction = traction + _given(result.arrays.loads.get(side.part), side)
         if np.any(traction):
             found.append(LoadedSide(side, traction))
     return found
@@ -113,6 +115,17 @@ def _faces(name: str, body: BodyMesh, facets: Integers) -> Iterator[Side]:
     for corner in index.reshape(facets.shape).T:
         np.add.at(outward, corner, area_vectors(body.points, facets))
     yield Side(name, vertices, facets, outward / np.linalg.norm(outward, axis=1)[:, None])
+
+
+def _given(load: LoadArrays | None, side: Side) -> Array:
+    """A load that the result has at vertices, N/m², (m, 3); it is zero at vertices that it does not have."""
+    traction = np.zeros((len(side.vertices), 3))
+    if load is not None:
+        at = np.flatnonzero(np.isin(side.vertices, load.vertices))
+        own = np.searchsorted(load.vertices, side.vertices[at])
+        traction[at, : load.traction.shape[1]] = load.traction[own]
+        traction[at] -= load.pressure[own, None] * side.normals[at]
+    return np.asarray(np.nan_to_num(traction))
 
 
 def _traction(role: Mapping[str, Any], points: Array, normals: Array) -> Array:

@@ -117,8 +117,7 @@ def heading(fig: Figure, result: Result, subject: str) -> None:
         result: the result.
         subject: what is shown.
     """
-    title = str(result.scene.get("title") or "") or result.folder.name
-    titled(fig, title, f"{subject} · {_facts(result)}", *_verdict(result))
+    titled(fig, result.title, f"{subject} · {_facts(result)}", *_verdict(result))
 
 
 def titled(fig: Figure, title: str, below: str, words: str = "", colour: str = INK) -> None:

@@ -21,6 +21,8 @@ from ..footprints import FACING
 from ..legend import legend
 from ..loads_supports import Side, held_sides, loaded_sides, roles_by_side
 from ..plane_canvas import canvas
+from ..regions import Region, regions
+from ..regions import keys as region_keys
 from ..registry import picture
 from ..scene_legend import inside, say, touches
 from ..style import BLUE, INK, PALE, heading
@@ -69,12 +71,14 @@ def draw(result: Result) -> Figure:
     fig, axes = canvas(view.project(everything))
     heading(fig, result, "the scene")
     depths = (float(view.depth(everything).min()), float(view.depth(everything).max()))
-    render(axes, view, depths, partial(_fill, body=body, shown=shown, arrows=arrows, toward=view.toward))
+    areas = regions(result)
+    fill = partial(_fill, body=body, areas=areas, shown=shown, arrows=arrows, toward=view.toward)
+    render(axes, view, depths, fill)
     for part in shown:
         _name(axes, view, body, part)
     vtk_loads.labels(axes, view, rest, pulled)
     say(fig, body)
-    legend(fig, [*keys(shown), *inside(result)])
+    legend(fig, [*keys(shown), *region_keys(areas), *inside(result)])
     return fig
 
 
@@ -99,11 +103,15 @@ def _fill(
     plotter: pyvista.Plotter,
     *,
     body: BodyMesh,
+    areas: list[Region],
     shown: list[ColouredSide],
     arrows: list[tuple[Array, Array]],
     toward: Array,
 ) -> None:
-    plotter.add_mesh(surface(body.points, body.boundary), color=PALE, ambient=0.75, diffuse=0.3)
+    skins = [(body.boundary[np.isin(body.behind, area.cells)], area.tint) for area in areas]
+    for facets, colour in skins or [(body.boundary, PALE)]:
+        if len(facets):
+            plotter.add_mesh(surface(body.points, facets), color=colour, ambient=0.75, diffuse=0.3)
     plotter.add_mesh(creases(body.points, body.boundary), color=INK, line_width=3)
     for part in shown:
         points = body.points + part.away + 1e-3 * body.size * toward
