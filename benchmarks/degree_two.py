@@ -13,8 +13,6 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-from dolfinx import mesh as dmesh
-from mpi4py import MPI
 
 import hvi_fenicsx as hvi
 from hvi_fenicsx.problem import contact_surface, spaces
@@ -153,20 +151,8 @@ def block() -> None:
 
 def strip_of(cells: tuple[int, int], degree: int) -> hvi.ModelSolution:
     """An adhesive strip, its arm free over 90 mm, on a linear bond."""
-    mesh = dmesh.create_rectangle(MPI.COMM_WORLD, [[0, 0], [0.15, 0.005]], cells)
-    glued = dmesh.locate_entities_boundary(mesh, 1, lambda x: np.isclose(x[1], 0) & (x[0] > 0.09 - 1e-9))
-    sides = [dmesh.locate_entities_boundary(mesh, 1, lambda x, at=at: np.isclose(x[0], at)) for at in (0.0, 0.15)]
-    facets = np.concatenate([glued, *sides])
-    tags, order = np.repeat([1, 2, 3], [len(glued), *map(len, sides)]).astype(np.int32), np.argsort(facets)
-    marked = dmesh.meshtags(mesh, 1, facets[order], tags[order])
-    body = hvi.Body(mesh, facets=marked, names={"glue": 1, "lifted": 2, "far": 3})
-    effects = [
-        hvi.Isotropic(youngs_modulus=7e10, poisson_ratio=0.3, model="plane_strain"),
-        hvi.Displacement("lifted", [None, 1e-3]),
-        hvi.Displacement("far", [0.0, 0.0]),
-        hvi.Adhesion("glue", hvi.laws.Graph(points=[[0, 0], [1.0, 1.25e12]])),
-    ]
-    return hvi.solve(hvi.Model(body, effects), degree=degree, estimate=False)
+    scene = hvi.read_scene("benchmarks/strip.toml", [f"domain.cells={list(cells)}", f"solver.degree={degree}"])
+    return hvi.solve(scene, estimate=False)
 
 
 def strip() -> None:

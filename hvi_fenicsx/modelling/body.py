@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import functools
 import os
 from collections.abc import Mapping, Sequence
@@ -16,11 +17,12 @@ from pydantic import ValidationError
 
 from ..errors import InputError
 from ..mesh import given
+from ..mesh.boundary_part import BoundaryPart, Inequalities
 from ..mesh.domain import Domain
 from ..mesh.shapes import Box, DomainShape, GivenMesh, MeshFile, Rectangle
 from ..mesh.thresholds import DEFAULT
 from ..mesh.transfer import Transfer
-from ..schema import located_error
+from ..schema import located_error, unknown
 
 
 class Body:
@@ -56,6 +58,7 @@ class Body:
 
     def _set(self, shape: DomainShape, comm: MPI.Comm) -> None:
         self.shape, self.comm = shape, comm
+        self.pieces: Mapping[str, BoundaryPart] = {}
 
     @classmethod
     def from_shape(cls, shape: DomainShape, comm: MPI.Comm = MPI.COMM_WORLD) -> Self:
@@ -124,6 +127,25 @@ class Body:
         body.dimension = dimension
         return body
 
+    def piece(self, name: str, side: str, where: str) -> Self:
+        """The body with one more side: a piece of a side, of the facets whose midpoints lie in it.
+
+        Args:
+            name: of the piece.
+            side: of which it is a piece.
+            where: inequalities in x, y, z (m), like ``"x > 0.3"`` or ``"0.1 < x < 0.2 and y < 1"``.
+
+        Raises:
+            InputError: the name is taken, there is no such side, or these are no inequalities.
+        """
+        if side not in self.sides:
+            raise InputError(f"piece: {unknown('side', side, self.sides)}")
+        if name in (*self.sides, *self.pieces):
+            raise InputError(f"piece: there is a side {name!r} already; choose another name")
+        body = copy.copy(self)
+        body.pieces = {**self.pieces, name: BoundaryPart((side,), Inequalities(where))}
+        return body
+
     @cached_property
     def dimension(self) -> int:
         """2 or 3."""
@@ -141,7 +163,7 @@ class Body:
 
     @property
     def sides(self) -> tuple[str, ...]:
-        """The names of the sides. Collective when first used."""
+        """The names of the sides, without pieces of them. Collective when first used."""
         return tuple(self.domain.sides)
 
     @property

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from pydantic import ValidationError
 
 from ..effects import Effect, Place
 from ..errors import InputError
+from ..mesh.boundary_part import BoundaryPart
 from ..scene import BodyTable, BoundaryTable, MaterialTable, Scene
 from ..schema import located_error, unknown
 from .body import Body
-from .placed_effects import PlacedEffect
+from .placed_effects import OnSide, PlacedEffect
 
 _WHOLE = "whole body"
 _Key = tuple[Place, str, str | None]
@@ -78,7 +79,7 @@ def _check_kinds(body: Any, effects: Any) -> None:
 
 
 def _check_place(body: Body, placed: PlacedEffect) -> None:
-    known = placed.places(body.domain)
+    known = [*placed.places(body.domain), *(body.pieces if isinstance(placed, OnSide) else ())]
     if placed.where is not None and placed.where not in known:
         reason = unknown("place", placed.where, known) if known else f"the body has no place {placed.where!r}"
         raise InputError(f"{type(placed).__name__}: {reason}")
@@ -108,7 +109,7 @@ def _scene(body: Body, effects: Iterable[tuple[str | None, Effect]], title: str)
             domain=body.shape,
             material=_materials(tables[Place.MATERIAL]),
             body={where or _WHOLE: BodyTable(region=where, **own) for where, own in tables[Place.BODY]},
-            boundary=dict(_boundary(tables[Place.BOUNDARY])),
+            boundary=dict(_boundary(tables[Place.BOUNDARY], body.pieces)),
         )
     except ValidationError as error:
         raise located_error(error, Scene) from None
@@ -130,10 +131,13 @@ def _materials(tables: Sequence[tuple[str | None, dict[str, Any]]]) -> Any:
     return {where or f"{_WHOLE} {number}": table for number, (where, table) in enumerate(made)}
 
 
-def _boundary(tables: Sequence[tuple[str | None, dict[str, Any]]]) -> Iterable[tuple[str, BoundaryTable]]:
+def _boundary(
+    tables: Sequence[tuple[str | None, dict[str, Any]]], pieces: Mapping[str, BoundaryPart]
+) -> Iterable[tuple[str, BoundaryTable]]:
     """Tables by name: that of the side, with a number from the second one on."""
     seen: dict[str | None, int] = {}
     for where, own in tables:
         seen[where] = seen.get(where, 0) + 1
         name = f"{where}" if seen[where] == 1 else f"{where}.{seen[where]}"
-        yield name, BoundaryTable(on=where, **own)
+        piece = pieces.get(f"{where}", BoundaryPart((f"{where}",)))
+        yield name, BoundaryTable(on=piece.on, where=piece.where, **own)

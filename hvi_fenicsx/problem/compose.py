@@ -16,11 +16,12 @@ from dolfinx import fem
 
 from ..effects import Evaluate, Place, load_name
 from ..errors import InputError
+from ..mesh.boundary_part import BoundaryPart
 from ..mesh.domain import Domain
 from ..runtime.mpi import agree
 from ..spatial_value import SpatialValue
 from ..typing import Array, Entities
-from . import bulk, contact_parts, dirichlet, interfaces, part_laws, scaling
+from . import bulk, contact_parts, dirichlet, interfaces, part_facets, part_laws, scaling
 from .domain_forms import DomainForms
 from .interfaces import Sides
 from .part_laws import Modification, unchanged
@@ -34,14 +35,14 @@ class Model:
     """What is solved, on any mesh of the body.
 
     Attributes:
-        parts: the sides that each boundary part lies on; of an interface, the first one.
+        parts: the boundary parts by name; of an interface, the first side.
         effects: (where, effect), where being a boundary part, a region, or None for the whole body.
         modify: what is solved in the place of each law.
         interfaces: the two sides of each, by name.
         degree: of the elements, 1 or 2.
     """
 
-    parts: Mapping[str, Sequence[str]]
+    parts: Mapping[str, BoundaryPart]
     effects: Sequence[Placed]
     modify: Modification = unchanged
     interfaces: Mapping[str, Sides] = field(default_factory=dict)
@@ -60,31 +61,29 @@ def compose(domain: Domain, model: Model, thresholds: Thresholds = DEFAULT) -> P
         InputError: on all ranks alike: a part without facets, a load that is not finite somewhere on its part, a bound
             that excludes a prescribed displacement.
     """
-    parts, effects = model.parts, model.effects
+    effects = model.effects
     if model.interfaces and model.degree != 1:
         raise InputError(
             f"solver.degree: interface.{next(iter(model.interfaces))} joins bodies, which degree 1 alone can; "
             "leave out solver.degree"
         )
-    for name, on in parts.items():
-        if not sum(agree(domain.mesh.comm, len(domain.facets(on)))):
-            raise InputError(f"boundary.{name}: no facet lies on it; see `on`")
-    sizes, evaluate = scaling.sizes(domain.length, effects), functools.partial(_evaluation, domain, parts)
+    facets = part_facets.find(domain, model.parts, effects)
+    sizes, evaluate = scaling.sizes(domain.length, effects), functools.partial(_evaluation, domain, facets)
     scales = scaling.choose(sizes, domain.dimension, effects, evaluate, thresholds)
-    context = DomainForms(domain, parts, scales, effects, model.degree)
+    context = DomainForms(domain, facets, scales, effects, model.degree)
     contributions = [PlacedContribution(where, effect, effect.contribute(context, where)) for where, effect in effects]
     implausible = [f"{scaling.place(e)}: {text}" for e in effects for text in e[1].implausible(evaluate(e), sizes)]
     return _problem(context, scales, contributions, model, tuple(implausible), thresholds)
 
 
-def _evaluation(domain: Domain, parts: Mapping[str, Sequence[str]], placed: Placed) -> Evaluate:
+def _evaluation(domain: Domain, facets: Mapping[str, Entities], placed: Placed) -> Evaluate:
     """The function that finds a formula's largest absolute value where an effect acts."""
-    return functools.partial(_largest, domain, parts, placed)
+    return functools.partial(_largest, domain, facets, placed)
 
 
-def _largest(domain: Domain, parts: Mapping[str, Sequence[str]], placed: Placed, formula: SpatialValue) -> float:
+def _largest(domain: Domain, facets: Mapping[str, Entities], placed: Placed, formula: SpatialValue) -> float:
     """The largest absolute value of a formula where an effect acts. Collective."""
-    values = formula.at(_points(domain, _entities(domain, parts, placed)))
+    values = formula.at(_points(domain, _entities(domain, facets, placed)))
     finite = bool(np.all(np.isfinite(values)))
     gathered = agree(domain.mesh.comm, (finite, float(np.max(np.abs(values), initial=0.0))))
     if not all(ok for ok, _ in gathered):
@@ -92,13 +91,13 @@ def _largest(domain: Domain, parts: Mapping[str, Sequence[str]], placed: Placed,
     return max(value for _, value in gathered)
 
 
-def _entities(domain: Domain, parts: Mapping[str, Sequence[str]], placed: Placed) -> tuple[int, Any]:
+def _entities(domain: Domain, facets: Mapping[str, Entities], placed: Placed) -> tuple[int, Any]:
     """Dimension and local entities of where an effect acts; None: the whole body."""
     where, effect = placed
     if where is None:
         return domain.dimension, None
     if effect.place is Place.BOUNDARY:
-        return domain.dimension - 1, domain.facets(parts[where])
+        return domain.dimension - 1, facets[where]
     return domain.dimension, domain.cells([where])
 
 

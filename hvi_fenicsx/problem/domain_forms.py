@@ -17,7 +17,7 @@ from ..mesh import nodes
 from ..mesh.domain import Domain
 from ..runtime.mpi import agree
 from ..spatial_value import SpatialValue
-from ..typing import Array
+from ..typing import Array, Entities
 from . import side_moments
 from .scaling import Placed, Scales
 from .spaces import LOAD_DEGREE, displacement_space, pressure_space
@@ -29,7 +29,7 @@ class DomainForms:
     def __init__(
         self,
         domain: Domain,
-        parts: Mapping[str, Sequence[str]],
+        part_facets: Mapping[str, Entities],
         scales: Scales,
         effects: Sequence[Placed],
         degree: int = 1,
@@ -40,7 +40,7 @@ class DomainForms:
         self.trial, self.test = ufl.TrialFunction(self.space), ufl.TestFunction(self.space)
         self.normal = ufl.FacetNormal(domain.mesh)
         self.materials = [placed for placed in effects if placed[1].place is Place.MATERIAL]
-        self.part_facets = {name: domain.facets(on) for name, on in parts.items()}
+        self.part_facets = dict(part_facets)
 
     @functools.cached_property
     def points(self) -> Array:

@@ -45,7 +45,7 @@ def solution_arrays(solution: Solution, von_mises: Singles | None = None) -> Sol
     if von_mises is not None:
         fields["von_mises"] = np.repeat(von_mises, nodes.parts_of_cell(problem.space))
     gathered = {name: _joined(comm, values) for name, values in fields.items()}
-    sides = {name: _facets(problem, problem.domain.facets(on)) for name, on in solution.scene.parts.items()}
+    sides = {name: _facets(problem, facets) for name, facets in problem.part_facets.items()}
     loads, regions = _loads(problem), _regions(problem)
     parts = part_arrays(problem, () if solution.examination is None else solution.examination.states)
     return None if comm.rank else SolutionArrays(**gathered, sides=sides, regions=regions, loads=loads, parts=parts)

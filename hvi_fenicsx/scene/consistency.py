@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from itertools import chain, combinations
+from itertools import combinations
 from typing import Any, Protocol
 
 from ..effects import Drive, Effect, Place, load_name
 from ..errors import InputError
 from ..laws import smoothing
+from ..mesh.boundary_part import BoundaryPart
 from ..mesh.shapes import DomainShape
 from ..schema import Mistake, shown, unknown
 from .effect_tables import BodyTable, BoundaryTable, InterfaceTable, MaterialTable
@@ -17,8 +18,8 @@ from .path_table import PathTable
 from .solver_table import SolverTable
 
 _Keys = tuple[str, ...]
-_Item = tuple[_Keys, tuple[str, ...], Effect]
-"""The place in the scene, the sides, the effect."""
+_Item = tuple[_Keys, BoundaryPart, Effect]
+"""The place in the scene, the sides or their piece, the effect."""
 
 
 class Tables(Protocol):
@@ -78,8 +79,10 @@ def _fine(scene: Tables) -> Iterator[Mistake]:
     yield from _smoothing(scene)
     items = [*_on_boundary(scene.boundary)]
     yield from _exclusive(items)
-    for side in dict.fromkeys(chain.from_iterable(on for _, on, _ in items)):
-        yield from _on_side(side, [(key, effect) for key, on, effect in items if side in on], scene)
+    places = dict.fromkeys((side, part.where) for _, part, _ in items for side in part.on)
+    for side, where in places:
+        own = [(key, effect) for key, part, effect in items if side in part.on and part.where == where]
+        yield from _on_side(side, own, scene)
 
 
 def _unknown_sides(scene: Tables) -> Iterator[Mistake]:
@@ -163,7 +166,9 @@ def _path(scene: Tables) -> Iterator[Mistake]:
 
 def _on_boundary(boundary: Mapping[str, BoundaryTable]) -> Iterator[_Item]:
     for name, part in boundary.items():
-        yield from ((("boundary", name, effect.key), part.on, effect) for effect in part.effects)
+        yield from (
+            (("boundary", name, effect.key), BoundaryPart(part.on, part.where), effect) for effect in part.effects
+        )
 
 
 def _smoothing(scene: Tables) -> Iterator[Mistake]:
@@ -177,9 +182,10 @@ def _smoothing(scene: Tables) -> Iterator[Mistake]:
 
 
 def _exclusive(items: Iterable[_Item]) -> Iterator[Mistake]:
-    """A side bears one effect of an exclusive kind."""
-    for (key, on, effect), (other, sides, second) in combinations(items, 2):
-        shared = sorted(set(on) & set(sides))
+    """A side bears one effect of an exclusive kind; whether pieces share facets, only the mesh knows."""
+    whole = (item for item in items if item[1].where is None)
+    for (key, part, effect), (other, others, second) in combinations(whole, 2):
+        shared = sorted(set(part.on) & set(others.on))
         if effect.key == second.key and effect.exclusive and shared:
             text = f"{_quoted(shared)} has {effect.key} already, from {_dotted(key)}; give it once"
             yield Mistake(other, text)

@@ -20,16 +20,28 @@ from pydantic import (
 )
 
 from ..effects import Effect, Place
-from ..schema import Key, Mistake, Names, Table, mistakes_of, unknown, validation_error, vector
+from ..errors import InputError
+from ..mesh.boundary_part import Inequalities
+from ..schema import Key, Mistake, Names, Table, mistakes_of, refusal, unknown, validation_error, vector
 from .named_tables import WHOLE, named_or_whole
 
+
+def _piece(value: Any) -> Inequalities:
+    try:
+        return value if isinstance(value, Inequalities) else Inequalities(value)
+    except InputError as error:
+        raise refusal(str(error)) from None
+
+
+Piece = Annotated[Inequalities, BeforeValidator(_piece), PlainSerializer(lambda piece: piece.source)]
+"""Inequalities, as a field of a table."""
 DEFAULT_ELASTICITY = "isotropic"
 
 
 class EffectTable(Table):
     """A table whose further keys are effects, read by the classes registered for its place."""
 
-    model_config = ConfigDict(extra="allow")
+    model_config = ConfigDict(extra="allow", arbitrary_types_allowed=True)
     place: ClassVar[Place]
 
     @property
@@ -113,6 +125,9 @@ class BoundaryTable(EffectTable):
 
     on: Names
     """a side of the shape, a physical group of the mesh file, or a list of them"""
+    where: Piece | None = None
+    """only a piece of it: inequalities in x, y, z (m) that hold at the midpoints of its facets, like `"x > 0.3"` or
+    `"0.1 < x < 0.2 and y < 1"`"""
 
     if TYPE_CHECKING:
 

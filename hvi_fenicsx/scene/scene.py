@@ -21,6 +21,7 @@ from pydantic import (
 from pydantic_core import PydanticCustomError
 
 from ..effects import Effect, Place
+from ..mesh.boundary_part import BoundaryPart
 from ..mesh.shapes import DomainShape, SeveralBodies
 from ..schema import Mistake, Names, Table, choose, located_error, refusal, validation_error
 from . import plugins
@@ -139,10 +140,10 @@ class Scene(Table):
         return next((dimension for dimension in known if dimension), 2)
 
     @property
-    def parts(self) -> dict[str, tuple[str, ...]]:
-        """The sides (or physical groups) that each boundary table stands on, and the first side of each interface."""
-        own = {name: boundary.on for name, boundary in self.boundary.items()}
-        return own | {name: (interface.between[0],) for name, interface in self.interface.items()}
+    def parts(self) -> dict[str, BoundaryPart]:
+        """Where each boundary table stands, and the first side of each interface."""
+        own = {name: BoundaryPart(table.on, table.where) for name, table in self.boundary.items()}
+        return own | {name: BoundaryPart((interface.between[0],)) for name, interface in self.interface.items()}
 
     def with_domain(self, **values: Any) -> Self:
         """The scene with other values in ``[domain]``, validated again.

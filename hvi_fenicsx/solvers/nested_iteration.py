@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from dolfinx import fem
 from petsc4py import PETSc
 
+from ..errors import InputError
 from ..mesh import nodes
 from ..mesh.transfer import DegreeTransfer, Transfer
 from ..problem.compose import Model
@@ -97,12 +98,13 @@ def solve(
     """
     kind = registry.choose(options, system)
     nested = _has_coarser(system, options)
-    if not nested or not kind.takes_start:
+    coarser = _coarser_system(model, system, control) if nested and kind.takes_start else None
+    if coarser is None:
         levels = coarser_levels(model, system, options, control) if nested and kind is LinearSolve else ()
         context = SolveContext.create(system, levels, solvability, options, control)
         _log_level(system, kind)
         return LevelSolution(system=system, levels=levels, result=kind(context).solve())
-    coarse, transfer = _coarser_system(model, system, control)
+    coarse, transfer = coarser
     coarse.attach_free_motions(system.free_motions.modes if system.free_motions else ())
     found = solve(model, coarse, solvability, _with_coarse_tolerance(options), control)
     with control.timer("setup"):
@@ -193,14 +195,20 @@ def coarser_levels(model: Model, system: System, options: SolverOptions, control
     """
     if not _has_coarser(system, options):
         return ()
-    coarse, transfer = _coarser_system(model, system, control)
+    coarser = _coarser_system(model, system, control)
+    if coarser is None:
+        return ()
+    coarse, transfer = coarser
     levels = coarser_levels(model, coarse, options, control)
     with control.timer("setup"):
         return (Level(system, coarse, prolongation(system, coarse, transfer)), *levels)
 
 
-def _coarser_system(model: Model, system: System, control: RunControl) -> tuple[System, Transfer]:
-    """The next coarser system, of degree 1 first, then on coarser meshes, and the transfer from it. Collective."""
+def _coarser_system(model: Model, system: System, control: RunControl) -> tuple[System, Transfer] | None:
+    """The next coarser system, of degree 1 first, then on coarser meshes, and the transfer from it. Collective.
+
+    None where a piece of a side is lost on the coarser mesh, or meets another one there.
+    """
     domain = system.problem.domain
     if nodes.degree(system.problem.space) > 1:
         return assemble(domain, replace(model, degree=1), control.timer, system.thresholds), DegreeTransfer()
@@ -208,7 +216,12 @@ def _coarser_system(model: Model, system: System, control: RunControl) -> tuple[
         coarser = domain.coarser()
     assert coarser is not None
     domain, transfer = coarser
-    return assemble(domain, replace(model, degree=1), control.timer, system.thresholds), transfer
+    try:
+        return assemble(domain, replace(model, degree=1), control.timer, system.thresholds), transfer
+    except InputError:
+        if all(part.where is None for part in model.parts.values()):
+            raise
+        return None
 
 
 def _with_coarse_tolerance(options: SolverOptions) -> SolverOptions:

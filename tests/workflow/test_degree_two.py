@@ -161,21 +161,10 @@ def test_the_order_in_the_energy_norm_is_the_degree(degree: int) -> None:
 
 
 def strip(cells: tuple[int, int], degree: int) -> float:
-    """The energy of an adhesive strip, its arm free over 90 mm, on a linear bond."""
-    mesh = dmesh.create_rectangle(MPI.COMM_WORLD, [[0, 0], [0.15, 0.005]], cells)
-    glued = dmesh.locate_entities_boundary(mesh, 1, lambda x: np.isclose(x[1], 0) & (x[0] > 0.09 - 1e-9))
-    sides = [dmesh.locate_entities_boundary(mesh, 1, lambda x, at=at: np.isclose(x[0], at)) for at in (0.0, 0.15)]
-    facets = np.concatenate([glued, *sides])
-    tags, order = np.repeat([1, 2, 3], [len(glued), *map(len, sides)]).astype(np.int32), np.argsort(facets)
-    marked = dmesh.meshtags(mesh, 1, facets[order], tags[order])
-    body = hvi.Body(mesh, facets=marked, names={"glue": 1, "lifted": 2, "far": 3})
-    effects = [
-        hvi.Isotropic(youngs_modulus=7e10, poisson_ratio=0.3, model="plane_strain"),
-        hvi.Displacement("lifted", [None, 1e-3]),
-        hvi.Displacement("far", [0.0, 0.0]),
-        hvi.Adhesion("glue", hvi.laws.Graph(points=[[0, 0], [1.0, 1.25e12]])),
-    ]
-    return float(hvi.solve(hvi.Model(body, effects), degree=degree, estimate=False).energy)
+    """The energy of an adhesive strip."""
+    file = Path(__file__).parents[2] / "benchmarks" / "strip.toml"
+    scene = hvi.read_scene(file, [f"domain.cells={list(cells)}", f"solver.degree={degree}"])
+    return float(hvi.solve(scene, estimate=False).energy)
 
 
 def test_a_thin_strip_needs_few_unknowns() -> None:

@@ -8,7 +8,7 @@ from typing import Any
 
 from ..reader import Result
 
-_PLACE = {"on", "region"}
+_PLACE = {"on", "where", "region"}
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
@@ -45,7 +45,9 @@ def parts_of(scene: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
     for name, table in (scene.get("boundary") or {}).items():
         on = table.get("on", ())
         acts = [(key, value_text(value)) for key, value in table.items() if key not in _PLACE]
-        yield {"name": name, "on": on if isinstance(on, str) else ", ".join(on), "acts": acts}
+        place = on if isinstance(on, str) else ", ".join(on)
+        piece = f" where {table['where']}" if "where" in table else ""
+        yield {"name": name, "on": place + piece, "acts": acts}
 
 
 def effects(result: Result) -> Iterator[dict[str, str]]:

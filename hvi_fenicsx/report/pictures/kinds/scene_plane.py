@@ -48,7 +48,7 @@ def draw(result: Result) -> Figure:
     areas = regions(result)
     for region in areas:
         corners = body.points[body.cells[region.cells], :2]
-        axes.add_collection(PolyCollection(corners, fc=region.tint, ec=region.tint, lw=0.3, zorder=0.5))
+        axes.add_collection(PolyCollection(list(corners), fc=region.tint, ec=region.tint, lw=0.3, zorder=0.5))
     outline = closed_path(body.points, chains(body.boundary))
     axes.add_patch(PathPatch(outline, fc="none" if areas else PALE_BODY, ec=INK, lw=1.6, joinstyle="round", zorder=1))
     found = list(roles_by_side(result))
