@@ -224,6 +224,13 @@ def _demo(name: str, *overrides: str) -> Scene:
     return read_scene(DEMOS / f"{name}.toml", overrides)
 
 
+_WIDER = [
+    f"domain.{body}.{key}={2 ** (body == 'lower') * size}"
+    for body in ("lower", "upper")
+    for key, size in (("mesh_size", 0.01), ("mesh_size_below", 5e-4))
+]
+
+
 def scenes() -> dict[str, Scene]:
     """By name; meshes are the coarsest of their mesh hierarchies."""
     plane = "domain.cells=[8, 8]"
@@ -238,6 +245,8 @@ def scenes() -> dict[str, Scene]:
         "hertz": _demo("hertz", "domain.mesh_size=0.02", "domain.mesh_size_below=2e-3"),
         "thermal_bar": _demo("thermal_bar"),
         "L-shape": Scene.model_validate(l_shape()),
+        "two_cylinders": _demo("two_cylinders", *_WIDER),
+        "single_lap": _demo("single_lap", "domain.lower.cells=[50, 2]", "domain.upper.cells=[64, 2]"),
         "rubber, ν = 0.499": Scene.model_validate(rubber()),
         "rubber, ν = 0.4999": Scene.model_validate(rubber(0.4999)),
         "deep drop": Scene.model_validate(square(16, pull=6e6, friction=DEEP_DROP)),

@@ -204,7 +204,7 @@ def finish_with_levels(
     solved = _solved(prepared, control, start)
     examination, warnings = _examined(prepared, solved.result)
     errors = None
-    known = prepared.model.degree == 1 and not prepared.problem.interfaces
+    known = prepared.model.degree == 1
     if estimating and examination.certificate.passed and known:
         with prepared.timer("estimate"):
             errors = estimate(prepared.system, solved.levels, solved.result.u, examination)

@@ -47,13 +47,8 @@ def solve_to_goal(
         thresholds: how mesh, smoothing and tolerance follow from the error.
 
     Raises:
-        InputError: on all ranks alike: the scene has no such quantity, has interfaces, or does not fit its mesh.
+        InputError: on all ranks alike: the scene has no such quantity, or does not fit its mesh.
     """
-    if scene.interface:
-        raise InputError(
-            f"interface.{next(iter(scene.interface))}: the error of bodies that meet is not estimated yet, so no "
-            "accuracy can be asked for; leave --accuracy out, and compare two meshes"
-        )
     if scene.solver.degree != 1:
         raise InputError(
             "solver.degree: an accuracy or a time budget needs the error estimate, which there is at degree 1 only; "

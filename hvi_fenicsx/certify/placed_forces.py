@@ -109,7 +109,7 @@ def reactions(
     found = _springs(problem, u)
     left = forces.reaction.copy()
     for state in states:
-        own = _traction(state) * state.surface.weights[:, None]
+        own = traction(state) * state.surface.weights[:, None]
         np.subtract.at(left, state.surface.blocks, own)
         for name, acting in _on_bodies(problem, state.surface, own):
             _add(found, name, acting)
@@ -124,7 +124,7 @@ def reactions(
 
 def _on_bodies(problem: Problem, surface: Surface, own: Array) -> Iterator[tuple[str, NodalForces]]:
     """The forces (m, d) at a part's vertices; of an interface, those on each of the two bodies. Collective."""
-    if problem.coupling is None or all(one.surface is not surface for one in problem.interfaces):
+    if problem.interface_of(surface) is None:
         yield surface.part, NodalForces(surface.blocks, own)
         return
     every = np.zeros((problem.space.dofmap.index_map.size_local, own.shape[1]))
@@ -155,12 +155,16 @@ def _add(found: dict[str, NodalForces], name: str, forces: NodalForces) -> None:
     found[name] = found[name] + forces if name in found else forces
 
 
-def _traction(state: ContactState) -> Array:
-    """The traction that contact and laws put on the body, (m, d)."""
-    traction = np.zeros_like(state.surface.normals)
+def traction(state: ContactState) -> Array:
+    """The traction that contact and laws put on the body, (m, d).
+
+    Args:
+        state: of their part.
+    """
+    found = np.zeros_like(state.surface.normals)
     tied = state.surface.tied
     if tied or state.bounds is not None or any(law.term.direction is not Direction.SLIP for law in state.laws):
-        traction += state.pressure[:, None] * state.surface.normals
+        found += state.pressure[:, None] * state.surface.normals
     if tied or any(law.term.direction is Direction.SLIP for law in state.laws):
-        traction -= np.einsum("mk,mkd->md", state.friction, state.surface.tangents)
-    return traction
+        found -= np.einsum("mk,mkd->md", state.friction, state.surface.tangents)
+    return found

@@ -50,6 +50,10 @@ class Interface:
         surface: the vertices of the first side that carry something, as a part with contact or laws has them.
         gap: the distance of the two sides as they are meshed, at these vertices, m, (m,).
         rows: what the relative displacement is made of, the same on all ranks.
+        first: the facets of the first side.
+        second: those of the second.
+        overlaps: their intersections.
+        sides: what the scene says of it.
         members: local vertices of both sides.
     """
 
@@ -59,6 +63,10 @@ class Interface:
     gap: Array
     rows: RelativeRows
     members: Entities
+    first: Facets
+    second: Facets
+    overlaps: Overlaps
+    sides: Sides
 
 
 @dataclass(frozen=True)
@@ -157,7 +165,18 @@ def _interface(
     gap = _gaps(context, surface, pair, rows)
     _check_gaps(context, name, pair, surface, gap, thresholds)
     tied = _dofs(context, surface) if pair.sides.tied else np.empty(0, np.int32)
-    return Interface(name=name, tied=tied, surface=surface, gap=gap, rows=rows, members=_members(context, pair))
+    return Interface(
+        name=name,
+        tied=tied,
+        surface=surface,
+        gap=gap,
+        rows=rows,
+        members=_members(context, pair),
+        first=pair.first,
+        second=pair.second,
+        overlaps=overlaps,
+        sides=pair.sides,
+    )
 
 
 def _overlaps(pair: _Pair, thresholds: Thresholds) -> Overlaps:

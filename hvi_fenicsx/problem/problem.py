@@ -162,6 +162,14 @@ class Problem:
             return self._relative_motions[body.index][blocks]
         return self.bodies.fields(np.asarray(self.points[blocks] / self.scales.length), blocks, body)
 
+    def interface_of(self, surface: Surface) -> Interface | None:
+        """The interface whose first side it is; None for a part of the boundary.
+
+        Args:
+            surface: one of the problem's.
+        """
+        return next((one for one in self.interfaces if one.surface is surface), None)
+
     def relative(self, u: Array) -> Array:
         """A displacement as what bounds and laws see: relative on interfaces; both local arrays. Collective."""
         return u if self.coupling is None else self.coupling.relative(u)

@@ -52,6 +52,31 @@ def block(cells: int = 3, push: float = P, press: float = Q, friction: Table | N
     return table
 
 
+def two_blocks(shape: str, flat: list[float], cells: list[list[int]], elasticity: str, **solver: Any) -> Table:
+    """Two blocks with friction between them, pressed askew and pushed, so that they part at one end; meshes differ."""
+    rest = [0.0] * len(flat)
+    return {
+        "domain": {
+            "lower": {"shape": shape, "size": [*flat, 0.5], "cells": cells[0]},
+            "upper": {"shape": shape, "size": [*flat, 0.4], "cells": cells[1], "origin": [0.21, *rest[1:], 0.5]},
+        },
+        "material": STEEL | {"model": elasticity},
+        "boundary": {
+            "base": {"on": "lower.bottom", "displacement": [*rest, 0.0]},
+            "press": {"on": "upper.top", "traction": [*rest, "-1e6*(2.4 - 2.6*x)"]},
+            "push": {"on": "upper.left", "traction": [6e5, *rest]},
+        },
+        "interface": {
+            "seam": {
+                "between": ["upper.bottom", "lower.top"],
+                "contact": {"gap": 0.0},
+                "friction": quadratic_linear(1e6, 1e-6),
+            }
+        },
+        "solver": solver,
+    }
+
+
 NESTED = Thresholds(
     solvers=SolverThresholds(nested_from=1_000, linear=LinearThresholds(largest_direct={2: 1_000, 3: 1_000}))
 )

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from runs import ROOT, contact, run_all, summary, table
-from scenes import STEEL, Table, block, model, quadratic_linear
+from scenes import STEEL, Table, block, model, quadratic_linear, two_blocks
 
 from hvi_fenicsx import read_scene
 
@@ -33,31 +33,6 @@ CUBE: Table = {
 }
 
 
-def joined(shape: str, flat: list[float], cells: list[list[int]], elasticity: str) -> Table:
-    """Two blocks with friction between them, pressed askew and pushed, so that they part at one end; meshes differ."""
-    rest = [0.0] * len(flat)
-    return {
-        "domain": {
-            "lower": {"shape": shape, "size": [*flat, 0.5], "cells": cells[0]},
-            "upper": {"shape": shape, "size": [*flat, 0.4], "cells": cells[1], "origin": [0.21, *rest[1:], 0.5]},
-        },
-        "material": STEEL | {"model": elasticity},
-        "boundary": {
-            "base": {"on": "lower.bottom", "displacement": [*rest, 0.0]},
-            "press": {"on": "upper.top", "traction": [*rest, "-1e6*(2.4 - 2.6*x)"]},
-            "push": {"on": "upper.left", "traction": [6e5, *rest]},
-        },
-        "interface": {
-            "seam": {
-                "between": ["upper.bottom", "lower.top"],
-                "contact": {"gap": 0.0},
-                "friction": quadratic_linear(1e6, 1e-6),
-            }
-        },
-        "solver": {},
-    }
-
-
 SCENES: dict[str, Table] = {
     "paper": model(16, friction=PAPER, smoothing="paper", epsilon_absolute=0.1),
     "exact": model(16, friction=PAPER),
@@ -70,8 +45,8 @@ SCENES: dict[str, Table] = {
     "linear": HELD_BELOW,
     "degree-2": model(6, 6e6, 1e6, quadratic_linear(3e6), degree=2),
     "degree-2-in-space": CUBE,
-    "joined": joined("rectangle", [1.0], [[9, 4], [7, 3]], "plane_stress"),
-    "joined-in-space": joined("box", [1.0, 1.0], [[4, 3, 2], [3, 4, 2]], "three_dimensional"),
+    "joined": two_blocks("rectangle", [1.0], [[9, 4], [7, 3]], "plane_stress"),
+    "joined-in-space": two_blocks("box", [1.0, 1.0], [[4, 3, 2], [3, 4, 2]], "three_dimensional"),
 }
 LIFTING = {"on": "top", "traction": [0.0, "-1e6*(1 - 1.8*x)"]}
 METHODS = {name: model(8, 3e6, friction=quadratic_linear(1e6), epsilon=0.1, method=name) for name in ("tao", "ssls")}
@@ -120,7 +95,7 @@ def test_each_of_them_is_certified(name: str, ranks: int, results: Path) -> None
 
 
 @pytest.mark.parametrize("ranks", RANKS[1:])
-@pytest.mark.parametrize("name", ["lift-off", "tresca", "of-a-mesh-file"])
+@pytest.mark.parametrize("name", ["lift-off", "tresca", "of-a-mesh-file", "joined", "joined-in-space"])
 def test_the_error_is_estimated_alike(name: str, ranks: int, results: Path) -> None:
     one, other = (summary(results / f"{name}-{n}")["estimate"] for n in (1, ranks))
     for entry in ("relative", "discretisation", "energy_norm"):

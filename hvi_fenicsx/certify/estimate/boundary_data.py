@@ -33,9 +33,11 @@ def tractions(problem: Problem) -> Iterator[tuple[Entities, int, SpatialValue]]:
 
 
 def gaps(problem: Problem) -> Iterator[tuple[Bounds, SpatialValue | None, SpatialValue | None]]:
-    """The bounds of each part with contact, and the values of lower and upper -u·n that vary."""
+    """The bounds of each part of the boundary with contact, and the values of lower and upper -u·n that vary."""
     stated = [b for where, _, c in problem.contributions if where is not None for b in c.bounds]
     for bounds, values in zip(problem.bounds, stated, strict=True):
+        if problem.interface_of(bounds.surface) is not None:
+            continue
         lower, upper = (value if varies(value) else None for value in (values.lower, values.upper))
         yield bounds, lower, upper
 

@@ -19,9 +19,8 @@ from ...typing import Array
 from ..certificate import Examination
 from ..contact_state import ContactState, LawState
 from . import coupled_errors
-from .contact_facets import PartTrace
 from .dual_norm import DualNorm
-from .law_traces import ErrorField, LawTraces
+from .law_traces import ErrorField, LawTraces, Trace
 from .thresholds import DEFAULT, Thresholds
 
 _PLACE = 1 / (2 * np.sqrt(12))
@@ -106,7 +105,7 @@ def _uncertainty(traces: LawTraces, inverse: DualNorm) -> fem.Function:
     return field
 
 
-def _drops(traces: LawTraces, state: ContactState, law: LawState) -> tuple[PartTrace, Array]:
+def _drops(traces: LawTraces, state: ContactState, law: LawState) -> tuple[Trace, Array]:
     """A law's drops on the facets within which they lie, spread over their uncertain share of them, (f, q, k)."""
     points = traces.part(state.surface, law.term.directions)
     height = coupled_errors.heights(points, law, law.term.exact)

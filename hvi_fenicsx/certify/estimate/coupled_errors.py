@@ -19,10 +19,9 @@ from ...runtime.mpi import total
 from ...typing import Array
 from ..contact_state import LawState
 from . import defect
-from .contact_facets import PartTrace
 from .dual_norm import DualNorm
 from .edge_bubbles import BubbleStiffness
-from .law_traces import ErrorField, LawTraces
+from .law_traces import ErrorField, LawTraces, Trace
 
 
 def within_facets(traces: LawTraces) -> bool:
@@ -35,7 +34,7 @@ def within_facets(traces: LawTraces) -> bool:
     return bool(traces.problem.domain.mesh.comm.allreduce(any(found), op=MPI.LOR))
 
 
-def heights(points: PartTrace, law: LawState, of: Superpotential) -> Array:
+def heights(points: Trace, law: LawState, of: Superpotential) -> Array:
     """By how much the law drops within each facet, (f,). Collective.
 
     Args:
@@ -90,7 +89,8 @@ def _move_vertices(traces: LawTraces, inverse: DualNorm, error: ErrorField) -> N
     size, bubbling = 0.0, problem.bulk.force_in(problem.space, error.edges)
     for _ in range(thresholds.answer_rounds):
         _, laws = traces.tested(error)
-        step, length = inverse.solve(laws - problem.bulk.force_in(problem.space, error.vertices) - bubbling)
+        internal = problem.bulk.force_in(problem.space, error.vertices) + bubbling
+        step, length = inverse.solve(laws - problem.combined(internal))
         error.vertices.x.array[:] += step.x.array
         size = max(size, length)
         if length <= thresholds.answer_change * size:

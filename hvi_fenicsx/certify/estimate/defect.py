@@ -138,7 +138,8 @@ def least_energy(
     """
     problem, space = stiffness.problem, stiffness.space
     free, value = prescribed(problem, u, space)
-    solve(stiffness, load, free, value, [edge_bounds(problem, u, b, space) for b in problem.bounds], thresholds)
+    bounds = [edge_bounds(problem, u, b, space) for b in problem.bounds if problem.interface_of(b.surface) is None]
+    solve(stiffness, load, free, value, bounds, thresholds)
     e = fem.Function(space)
     e.x.array[: value.size] = value.ravel()
     e.x.scatter_forward()

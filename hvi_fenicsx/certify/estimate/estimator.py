@@ -136,4 +136,4 @@ def _smoothed(problem: Problem) -> bool:
 def _energy(problem: Problem, u: fem.Function, examination: Examination) -> float:
     """a(u, u). Collective."""
     internal = examination.forces.reaction + examination.forces.load
-    return total(problem.domain.mesh.comm, float(u.x.array[: internal.size] @ internal.ravel()))
+    return total(problem.domain.mesh.comm, float(problem.relative(u.x.array)[: internal.size] @ internal.ravel()))

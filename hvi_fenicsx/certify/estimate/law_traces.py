@@ -17,9 +17,14 @@ from ...problem.contact_surface import Surface
 from ...problem.problem import Problem
 from ...typing import Array
 from ..contact_state import ContactState, LawState
+from ..placed_forces import traction
 from . import edge_bubbles
 from .contact_facets import PartTrace, local_blocks
+from .interface_traces import InterfacePoints, InterfaceTrace
 from .thresholds import DEFAULT, Thresholds
+
+Trace = PartTrace | InterfaceTrace
+"""The facets of a part, or of two bodies that meet, between their vertices."""
 
 
 def nearest(law: Superpotential, slip: Array, traction: Array, near: float) -> Array:
@@ -96,7 +101,7 @@ class LawTrace:
         traction: those of the law nearest to them.
     """
 
-    points: PartTrace
+    points: Trace
     nodal: Array
     traction: Array
 
@@ -117,15 +122,21 @@ class LawTraces:
     ) -> None:
         self.problem, self.u, self.states, self.thresholds = problem, u, states, thresholds
         self.bubbles = edge_bubbles.space(problem.domain.mesh)
+        self._interfaces: dict[str, InterfacePoints] = {}
 
-    def part(self, surface: Surface, directions: Array) -> PartTrace:
-        """The quadrature points of a part. Collective.
+    def part(self, surface: Surface, directions: Array) -> Trace:
+        """The quadrature points of a part, or of an interface. Collective.
 
         Args:
             surface: the part.
             directions: along which displacements are looked at, (m, k, d).
         """
-        return PartTrace(self.problem, self.bubbles, surface, directions, self.thresholds.facet_degree)
+        problem, bubbles, degree = self.problem, self.bubbles, self.thresholds.interface_degree
+        if (interface := problem.interface_of(surface)) is None:
+            return PartTrace(problem, bubbles, surface, directions, self.thresholds.facet_degree)
+        if interface.name not in self._interfaces:
+            self._interfaces[interface.name] = InterfacePoints(problem, bubbles, interface, degree)
+        return InterfaceTrace(problem, bubbles, self._interfaces[interface.name], surface, directions)
 
     def of_law(self, state: ContactState, law: LawState, error: ErrorField | None = None) -> LawTrace:
         """One law between the vertices. Collective.
@@ -151,7 +162,8 @@ class LawTraces:
     def tested(self, error: ErrorField | None = None) -> tuple[Array, Array]:
         """∫ τ·v ds of all laws tested with edge bubbles; the nodal forces minus that with P1; each (n, d). Collective.
 
-        ``error`` is added to u_h as in :meth:`of_law`.
+        ``error`` is added to u_h as in :meth:`of_law`. The bubbles of two bodies that meet feel what contact or glue
+        carries, too.
         """
         d = self.problem.scales.dimension
         edges = np.zeros((local_blocks(self.bubbles), d))
@@ -164,7 +176,18 @@ class LawTraces:
                 edges += at_edges
                 vertices -= at_vertices
                 np.add.at(vertices, state.surface.blocks, np.einsum("mk,mkd->md", nodal, law.term.directions))
+            if self.problem.interface_of(state.surface) is not None:
+                edges += self._carried(state)
         return _gathered(self.bubbles, edges), _gathered(self.problem.space, vertices)
+
+    def _carried(self, state: ContactState) -> Array:
+        """∫ τ·v ds of what bodies that meet put on each other without a law, tested with edge bubbles. Collective."""
+        force = -traction(state)
+        for law in state.laws:
+            force -= np.einsum("mk,mkd->md", tractions(state, law), law.term.directions)
+        axes = np.tile(np.eye(force.shape[1]), (len(force), 1, 1))
+        points = self.part(state.surface, axes)
+        return points.tested(points.interpolated(force))[0]
 
 
 def _gathered(space: fem.FunctionSpace, values: Array) -> Array:

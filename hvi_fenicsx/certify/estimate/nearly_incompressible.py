@@ -69,7 +69,7 @@ class CondensedStiffness(BubbleStiffness):
         self._in.x.scatter_forward()
         self.vertices.x.array[:] = 0.0
         self._press()
-        force = -_assembled(self._at_vertices, self.vertices)
+        force = -self.problem.combined(_assembled(self._at_vertices, self.vertices))
         if unmet is not None:
             force += unmet
         self.vertices.x.array[:] = self._vertex_inverse.solve(force, self._tolerance)[0].x.array

@@ -16,6 +16,7 @@ class Thresholds:
         near: distance (of u0) from a kink or a bound that counts as being on it; variation of a gap that is rounding.
         facet_degree: of the quadrature of the laws on a facet: a drop within an edge is met to a fourteenth of its
             length.
+        interface_degree: the same on the intersections of the facets of two bodies, which are smaller.
         bubble_tolerance: of a solve for bubbles, in the energy norm: their energy is right to about its square.
         bubble_steps: conjugate gradient steps at most of such a solve.
         bubble_rounds: of the active set of the bounds at midpoints, at most.
@@ -36,6 +37,7 @@ class Thresholds:
 
     near: float = thresholds.DEFAULT.near
     facet_degree: int = 12
+    interface_degree: int = 6
     bubble_tolerance: float = 0.1
     bubble_steps: int = 30
     bubble_rounds: int = 4

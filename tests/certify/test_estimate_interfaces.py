@@ -1,0 +1,92 @@
+"""The estimated error of bodies that meet: none where both hold the solution, near the true one else, on both sides."""
+
+from __future__ import annotations
+
+import math
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scenes import STEEL, Table, two_blocks
+
+from hvi_fenicsx import Scene, Solution, solve
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "benchmarks"))
+
+from effectivity import rows, scenes
+
+BLOCKS = two_blocks("rectangle", [1.0], [[9, 4], [7, 3]], "plane_stress", tolerance=1e-10)
+
+
+def uniform(between: Table, stress: list[list[float]], upper: tuple[float, float]) -> Scene:
+    """Two blocks on meshes that do not match, under a uniform stress; upper: where the upper one begins, its width."""
+    normals = {"left": (-1, 0), "right": (1, 0), "bottom": (0, -1), "top": (0, 1)}
+    sides = [f"lower.{s}" for s in ("left", "right", "bottom")] + [f"upper.{s}" for s in ("left", "right", "top")]
+    loads = {s: [float(np.dot(row, normals[s.split(".")[1]])) for row in stress] for s in sides}
+    low = {"shape": "rectangle", "size": [1.0, 0.5], "cells": [7, 4]}
+    high = {"shape": "rectangle", "size": [upper[1], 0.4], "cells": [5, 3], "origin": [upper[0], 0.5]}
+    return Scene.model_validate(
+        {
+            "domain": {"lower": low, "upper": high},
+            "material": STEEL,
+            "boundary": {s.replace(".", "_"): {"on": s, "traction": t} for s, t in loads.items()},
+            "interface": {"seam": {"between": ["upper.bottom", "lower.top"], **between}},
+            "solver": {"tolerance": 1e-11},
+        }
+    )
+
+
+@pytest.mark.parametrize(
+    ("between", "stress"),
+    [
+        ({"contact": {"gap": 0.0}}, [[0.0, 0.0], [0.0, -1e6]]),
+        ({"tied": True}, [[0.0, 1e6], [1e6, 0.0]]),
+        ({"adhesion": {"law": "graph", "points": [[0, 0], [1e-6, 4e6]]}}, [[0.0, 0.0], [0.0, 1e6]]),
+    ],
+)
+def test_a_uniform_stress_has_no_error(between: Table, stress: list[list[float]]) -> None:
+    found = solve(uniform(between, stress, (0.0, 1.0)))
+    assert found.exit_code == 0
+    assert found.estimate is not None
+    assert found.estimate.discretisation < 1e-10 * found.estimate.energy_norm
+    assert found.estimate.total < 1e-8 * found.estimate.energy_norm
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", ["single_lap", "two_cylinders"])
+def test_the_estimate_is_near_the_error_of_demos(name: str) -> None:
+    for row in rows(scenes()[name], 2):
+        assert row.certified
+        assert row.index == pytest.approx(1.0, abs=0.2)
+
+
+@pytest.mark.long
+def test_an_accuracy_is_reached_by_refining_both_bodies() -> None:
+    """The distance of two energies is half the square of the error; the finer one stands for the exact one."""
+    coarse, fine = (refined(accuracy) for accuracy in (0.15, 0.04))
+    assert coarse.examination is not None
+    assert fine.examination is not None
+    assert coarse.estimate is not None
+    away = math.sqrt(2 * (coarse.examination.energy - fine.examination.energy))
+    assert away < 0.15 * coarse.estimate.energy_norm
+    assert away == pytest.approx(coarse.estimate.total, rel=0.25)
+    for name in ("lower", "upper"):
+        cells = fine.problem.domain.regions[name]
+        assert len(cells) > 2 * len(coarse.problem.domain.regions[name])
+
+
+def refined(accuracy: float) -> Solution:
+    from mpi4py import MPI
+
+    from hvi_fenicsx.accuracy.adaptive import AdaptiveSolver
+    from hvi_fenicsx.accuracy.control import solve_to_goal
+    from hvi_fenicsx.accuracy.goal import Goal
+    from hvi_fenicsx.runtime.timing import Timer
+
+    scene: Any = Scene.model_validate(BLOCKS)
+    goal, lines = Goal(accuracy=accuracy), []
+    found = solve_to_goal(scene, MPI.COMM_WORLD, goal, AdaptiveSolver(timer=Timer()), lines.append)
+    assert found.why is None
+    return found.solution
