@@ -53,7 +53,7 @@ def _arguments(words: list[str]) -> argparse.Namespace:
     parser.add_argument("--number", type=int, help="this scene of the seed only")
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--out", type=Path, help="where contradictions are kept")
-    parser.add_argument("--limit", type=float, default=30.0, help="seconds for one solve")
+    parser.add_argument("--limit", type=float, default=30.0, help="seconds of processor time for one solve")
     parser.add_argument("--verbose", action="store_true")
     return parser.parse_args(words)
 
@@ -79,7 +79,7 @@ def series(seed: int, numbers: Iterable[int], out: Path, limit: float = 30.0, *,
         seed: of the scenes.
         numbers: which scenes of it.
         out: the folder.
-        limit: seconds for one solve.
+        limit: seconds of processor time for one solve.
         verbose: whether to print every verdict, and to keep every scene.
     """
     counts = Counts()

@@ -13,14 +13,14 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parent))
 
 from generator.kinds import draw
-from judge import CONTRADICTS, judge
+from judge import CONTRADICTS, blurred, judge
 from program import Answer
 from referee.assembly import assemble
 from referee.coordinates import Floor
 from referee.equilibria import find
 from referee.laws import exact_law, law_of
 from referee.meshes import block
-from referee.minimality import examine
+from referee.minimality import examine, sampled_descent
 from referee.programmes import verdict
 from referee.solution import Check
 
@@ -123,6 +123,41 @@ def test_a_concave_kink_is_no_minimum_and_a_bound_makes_it_one() -> None:
     check = Check(problem, u)
     assert not check.wrongs()
     assert examine(check, Floor(problem)).minimiser is True
+
+
+def test_a_vertex_that_touches_its_bound_does_not_descend_through_rounding() -> None:
+    problem = assemble(scene(), block([1.0, 1.0], [2, 2]))
+    u = closed_form(problem.mesh.points)
+    u[1, 1] += 5e-8 * np.abs(u).max()
+    check = Check(problem, u)
+    assert not check.wrongs()
+    assert sampled_descent(check, Floor(problem), np.random.default_rng(0)) > -1e-4
+
+
+def test_a_jump_far_weaker_than_the_loads_may_still_hold_a_vertex() -> None:
+    weak = {"law": "graph", "points": [[0.0, 5.0], [1e-13, 0.0]], "one_sided": False}
+    table = scene(0.0, weak) | {"material": STEEL | {"poisson_ratio": 0.0}}
+    problem = assemble(table, block([1.0, 1.0], [2, 2]))
+    check = Check(problem, problem.mesh.points * [0.0, -1e6 / 2.15e11])
+    assert not check.wrongs()
+    assert examine(check, Floor(problem)).minimiser is None
+
+
+def test_zero_is_wrong_where_any_other_value_is_prescribed() -> None:
+    table = scene(0.0)
+    table["boundary"] = {"wall": {"on": "left", "displacement": [1e-6, 0.0]}, "floor": table["boundary"]["floor"]}
+    problem = assemble(table, block([1.0, 1.0], [2, 2]))
+    assert any("prescribed" in line for line in Check(problem, np.zeros_like(problem.mesh.points)).wrongs())
+
+
+@pytest.mark.parametrize(("moved", "excused"), [(0.0, True), (3e-4, False)])
+def test_rounding_excuses_no_more_than_its_bound(moved: float, excused: bool) -> None:
+    """Far from its place a body's tractions are lost in rounding; what is wrong beyond this bound is no solution."""
+    problem = assemble(scene(0.0, wall=False), block([1.0, 1.0], [2, 2]))
+    stretch = 1e6 / 2.15e11
+    u = problem.mesh.points * [0.29 * stretch, -stretch] - [10.0, 0.0]
+    u[4] += moved * stretch
+    assert blurred(Check(problem, u)) == excused
 
 
 def test_at_a_corner_the_uneven_part_is_turned_whatever_the_order() -> None:

@@ -9,7 +9,10 @@ import numpy as np
 from referee.coordinates import Coordinate, Floor
 from referee.laws import Law
 from referee.meshes import Array
-from referee.solution import Check
+from referee.solution import EPS, Check
+
+SOLVED = 3.0
+"""A vanishing force is one below so many times the scene's tolerance; nothing is concluded from larger ones."""
 
 
 @dataclass(frozen=True)
@@ -36,7 +39,7 @@ def examine(check: Check, floor: Floor) -> Finding:
         if all(d > 1.0 for d in slopes):
             continue
         open_sides = [k for d, k in sides if d <= 1.0]
-        (free if max(slopes) <= 1.0 else weak).append(i)
+        (free if max(slopes) <= _level(check, c) else weak).append(i)
         curvatures.append((i, min(open_sides), max(open_sides)))
     if not floor.coordinates:
         return Finding(True, "linear")
@@ -48,6 +51,12 @@ def examine(check: Check, floor: Floor) -> Finding:
     if _least(low, sorted(free + weak)) > 1e-7 * size:
         return Finding(True, "positive curvature wherever nothing blocks")
     return Finding(None, "a tie")
+
+
+def _level(check: Check, c: Coordinate) -> float:
+    """What a slope that vanishes may be, in the unit of ``_side``: rounding, and what the scene's tolerance leaves."""
+    left = SOLVED * check.problem.tolerance * weight_of(check, c) + float(check.rounding[c.vertex].max())
+    return left / (check.wrong * weight_of(check, c))
 
 
 def _diagonal(n: int, curvatures: list[tuple[int, float, float]], which: int) -> Array:
@@ -94,26 +103,37 @@ def _slope(law: Law, at: float, to: float) -> float:
 
 
 def sampled_descent(check: Check, floor: Floor, rng: np.random.Generator) -> float:
-    """The lowest energy found nearby, relative to what tractions could do over the step; negative beyond -1e-5."""
+    """The lowest energy found nearby, relative to what tractions could do over the step; negative beyond -1e-5.
+
+    What rounding may do to the change of the energy is added to it.
+    """
     s, _, lift, _ = floor.condensed
     p, worst = check.problem, 0.0
-    residual = -(lift.T @ check.missing.ravel())
+    residual, blurred = -(lift.T @ check.missing.ravel()), np.abs(lift.T) @ check.rounding.ravel()
     u0 = float(check.traction.max() * p.mesh.size / p.modulus)
     for _ in range(40):
         d = rng.standard_normal(len(s)) * (rng.random(len(s)) < rng.choice([0.1, 0.5, 1.0]))
         step = _within_pieces(check, floor, d * u0 * 10.0 ** rng.uniform(-6, -2))
-        force, laws = 0.0, 0.0
+        force, laws, lost = 0.0, 0.0, float(np.abs(step) @ blurred)
         for i, c in enumerate(floor.coordinates):
             x = float(c.direction @ check.u[c.vertex])
-            step[i] = np.clip(x + step[i], c.lower, c.upper) - x if c.lower <= x <= c.upper else 0.0
+            step[i] = np.clip(step[i], *_room(check, c, x))
             for law, turn, weight in c.laws:
                 values = law.value(np.array([turn * (x + step[i]), turn * x]))
                 laws += weight * float(values[0] - values[1])
+                lost += 4 * EPS * weight * (float(np.abs(values).max()) + abs(x) * law.scale)
             force += abs(step[i]) * weight_of(check, c)
-        change = float(step @ residual + step @ s @ step / 2) + laws
+        change = float(step @ residual + step @ s @ step / 2) + laws + lost
         if np.abs(step).max(initial=0.0) > 1e-8 * u0:  # else it is rounding
             worst = min(worst, change / force)
     return worst
+
+
+def _room(check: Check, c: Coordinate, x: float) -> tuple[float, float]:
+    """How far a coordinate may go to either side; nowhere beyond a bound that it touches."""
+    touching = check.touching(c.vertex)
+    down, up = min(c.lower - x, 0.0), max(c.upper - x, 0.0)
+    return (down if down < -touching else 0.0), (up if up > touching else 0.0)
 
 
 def _within_pieces(check: Check, floor: Floor, step: Array) -> Array:

@@ -135,7 +135,7 @@ class Check:
 
     def _prescribed(self) -> list[str]:
         p = self.problem
-        size = np.abs(self.u).max() or 1.0
+        size = max(np.abs(self.u).max(), np.abs(p.values).max(initial=0.0)) or 1.0
         off = float(np.abs(self.u.ravel()[p.fixed] - p.values).max(initial=0.0)) / size
         return [f"prescribed displacement missed by {off:.1e}"] if off > self.wrong else []
 
