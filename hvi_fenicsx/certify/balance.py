@@ -13,6 +13,7 @@ from dolfinx import fem
 
 from ..problem.problem import Problem
 from ..problem.references import References
+from ..problem.strained import strained
 from ..system import net_forces as rigid_balance
 from ..system.net_forces import ActingForces, Holder, spread
 from ..typing import Array
@@ -118,7 +119,7 @@ def _acting(
 def _with_noise(references: References, acting: ActingForces, u: fem.Function, thresholds: Thresholds) -> ActingForces:
     """With the rounding errors of the stresses. Collective."""
     problem = references.problem
-    noise = references.norms(rounding_sample(problem, _without_rigid_part(problem, u.x.array)))
+    noise = references.norms(rounding_sample(problem, strained(problem, u, travel=0.0).x.array))
     unknowns = references.vertices * problem.scales.dimension
     return replace(acting, noise=thresholds.rounding_safety * noise / np.sqrt(unknowns))
 
@@ -151,17 +152,3 @@ def _pressures(state: ContactState) -> tuple[Array, Array]:
 def allowed_pressure(state: ContactState) -> Array:
     """The part of σ_n on its bounds that contact may carry, (m,)."""
     return np.clip(state.contact_pressure, *_pressures(state))
-
-
-def _without_rigid_part(problem: Problem, u: Array) -> Array:
-    """A displacement (a local array) without the rigid motion of each body that is nearest to it. Collective."""
-    d, comm = problem.scales.dimension, problem.domain.mesh.comm
-    here = problem.space.dofmap.index_map.size_local
-    points, values = np.asarray(problem.points / problem.scales.length), u.reshape(-1, d).copy()
-    for body in problem.bodies:
-        mine = problem.bodies.labels == body.index
-        fields, owned = problem.bodies.fields(points[mine], np.flatnonzero(mine), body), np.flatnonzero(mine) < here
-        gram = comm.allreduce(np.einsum("vnd,vmd->nm", fields[owned], fields[owned]))
-        parts = comm.allreduce(np.einsum("vnd,vd->n", fields[owned], values[mine][owned]))
-        values[mine] -= np.einsum("n,vnd->vd", np.linalg.solve(gram, parts), fields)
-    return values.ravel()

@@ -18,6 +18,7 @@ from ..problem.contact_surface import Surface
 from ..problem.law_term import LawTerm
 from ..problem.problem import Bounds, Problem
 from ..problem.references import References
+from ..problem.strained import strained
 from ..problem.vectors import nodal
 from ..typing import Array, Integers, Mask
 from . import force_attribution, shared_forces
@@ -136,12 +137,20 @@ def forces(problem: Problem, u: fem.Function) -> Forces:
         problem: what is solved.
         u: nondimensional, ghosts updated.
     """
-    internal = problem.bulk.force(u)
+    internal = _internal(problem, u)
     pushing, strains = np.zeros_like(internal), np.zeros_like(internal)
     for name, form in problem.linear.items():
         (strains if name in problem.bulk.strains else pushing)[:] += nodal(form)
     load = pushing + strains
     return Forces(*(problem.combined(force) for force in (internal - load, load, pushing)))
+
+
+def _internal(problem: Problem, u: fem.Function) -> Array:
+    """a(u, v) of the test functions, (blocks, d): strains first, since travel would leave them its rounding."""
+    bulk, strains = problem.bulk, strained(problem, u)
+    travel = fem.Function(problem.space)
+    travel.x.array[:] = u.x.array - strains.x.array
+    return bulk.force(strains) + bulk.foundation_force(travel)
 
 
 def states(

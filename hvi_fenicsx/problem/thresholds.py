@@ -28,6 +28,8 @@ class Thresholds:
         uncovered: part of a facet at its end that may lie beyond the other side.
         overlap: part of a facet's length by which bodies may overlap: curved sides that touch do so by less.
         least_force: forces that are a smaller part of stiffness times displacement are not judged finer.
+        travel: a body that travels so many times its deformation has stresses without this travel: to take it off
+            rounds too, so of other bodies it is not taken off.
     """
 
     same_displacement: float = 1e-9
@@ -45,6 +47,7 @@ class Thresholds:
     uncovered: float = 1e-6
     overlap: float = 0.1
     least_force: float = 1e-5
+    travel: float = 100.0
 
 
 DEFAULT = Thresholds()

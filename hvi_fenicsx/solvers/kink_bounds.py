@@ -12,6 +12,7 @@ from ..problem.contact_surface import component_dofs
 from ..problem.law_term import LawTerm
 from ..system.system import System
 from ..typing import Array, Integers, Mask
+from . import radial_kinks
 from .law_models import Cells, ExactLaw, Majorant
 
 
@@ -29,10 +30,8 @@ def slip_bounds(system: System, cells: Sequence[Cells]) -> tuple[PETSc.Vec, PETS
         return system.lower, system.upper
     lower, upper = system.lower.copy(), system.upper.copy()
     for term, c in zip(system.terms, cells, strict=True):
-        if term.radial:
-            _hold_stuck(term, c, lower, upper)
-        else:
-            _keep_in_cells(term, c, lower, upper)
+        hold = _hold_stuck if term.radial else _keep_in_cells
+        hold(term, c, lower, upper)
     return lower, upper
 
 
@@ -57,12 +56,28 @@ def overloaded(
         models: of the step, by term.
         slack: traction by which the kink may be exceeded, relative to the law's scale.
     """
-    moves = []
-    for term, model in zip(system.terms, models, strict=True):
-        find = _radial_moves if term.radial else _signed_moves
+    moves, shared = [], radial_kinks.Shared(system.terms, models, _left_to_radial(system, x, residual, models))
+    for number, (term, model) in enumerate(zip(system.terms, models, strict=True)):
         excess = slack * system.references.traction_scale(term) * term.surface.weights
-        moves.append(find(term, model, term.argument(x.array_r), residual, excess))
+        argument = term.argument(x.array_r)
+        if term.radial:
+            moves.append(shared.moves(number, argument, excess))
+        else:
+            moves.append(_signed_moves(term, model, argument, residual, excess))
     return moves
+
+
+def _left_to_radial(system: System, x: PETSc.Vec, residual: PETSc.Vec, models: Sequence[Majorant | ExactLaw]) -> Array:
+    """The residual (n,) without what contact and the kinks of signed slips hold: laws of |u_t| need not carry that."""
+    lower, upper = system.lower.copy(), system.upper.copy()
+    for term, model in zip(system.terms, models, strict=True):
+        if not term.radial:
+            _keep_in_cells(term, model.cells, lower, upper)
+    held = (x.array_r <= lower.array_r) & (residual.array_r > 0)
+    held |= (x.array_r >= upper.array_r) & (residual.array_r < 0)
+    for bound in (lower, upper):
+        bound.destroy()
+    return np.where(held, 0.0, residual.array_r)
 
 
 def _signed_moves(
@@ -83,21 +98,6 @@ def _hold_stuck(term: LawTerm, cells: Cells, lower: PETSc.Vec, upper: PETSc.Vec)
     stuck = (cells.index == 0)[:, None] & np.any(np.abs(term.directions) > 0.5, axis=1) & (term.free > 0)
     if len(cells.kinks):
         lower.array[dofs[stuck]] = upper.array[dofs[stuck]] = 0.0
-
-
-def _radial_moves(
-    term: LawTerm, model: Majorant | ExactLaw, argument: Array, residual: PETSc.Vec, excess: Array
-) -> Integers:
-    """The moves for a law of |u_t|: a stuck vertex slips if the force leaves the kink's disc, a slow one sticks."""
-    cells = model.cells
-    if not len(cells.kinks):
-        return np.zeros(len(argument), dtype=np.int64)
-    force = np.einsum("mkd,md->mk", term.directions, term.surface.values(residual.array_r) * term.free)
-    weight = term.surface.weights
-    disc = weight * model.law.convex.right(np.zeros_like(argument))
-    go = (cells.index == 0) & (np.linalg.norm(force, axis=1) > disc + excess)
-    stick = (cells.index == 1) & (argument <= cells.ramp)
-    return go.astype(np.int64) - stick.astype(np.int64)
 
 
 def _slip_dofs(term: LawTerm) -> tuple[Integers, Array, Mask]:

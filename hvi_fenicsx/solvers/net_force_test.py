@@ -42,7 +42,7 @@ class NetForceTest:
         self._find_motions(x)
         at = system.jacobian.rows.dofs
         laws = np.zeros_like(residual)
-        laws[at] = residual[at] - system.jacobian.rows.elastic(x) + system.load.array_r[at]
+        laws[at] = residual[at] - system.jacobian.elastic_at_contact(x) + system.load.array_r[at]
         acting = ActingForces(
             left=-self._blocks(projected),
             loads=self._loads,

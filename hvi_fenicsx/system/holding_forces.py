@@ -31,7 +31,7 @@ class HoldingForces:
         """The forces by owned unknown, zero where nothing holds the body, (n,). Collective.
 
         Args:
-            x: the unknowns.
+            x: the unknowns, perhaps without their rigid part.
             rotation: Q with u = Q x; None where both are the same.
             rows: those of the vertices of Γc, with the prescribed columns left out.
             lift: what these columns add there.

@@ -15,6 +15,7 @@ from ..problem.law_term import LawTerm
 from ..problem.problem import Bounds
 from ..typing import Array, Entities
 from .contact_rows import ContactRows
+from .rigid_part import RigidPart
 from .thresholds import DEFAULT, Thresholds
 
 
@@ -26,6 +27,7 @@ class Jacobian:
         terms: the laws.
         bounds: the contact bounds.
         thresholds: how unknowns are held.
+        rigid: what of the unknowns A does not see; None: nothing.
 
     Attributes:
         matrix: J; Dirichlet rows and columns are those of the identity; block size d.
@@ -39,8 +41,9 @@ class Jacobian:
         terms: Sequence[LawTerm],
         bounds: Sequence[Bounds],
         thresholds: Thresholds = DEFAULT,
+        rigid: RigidPart | None = None,
     ) -> None:
-        self.matrix, self._terms = stiffness, tuple(terms)
+        self.matrix, self._terms, self._rigid = stiffness, tuple(terms), rigid
         surfaces = [*(t.surface for t in terms), *(b.surface for b in bounds)]
         self.rows = ContactRows(stiffness, surfaces, thresholds.held_stiffness)
         self._rates = [np.zeros((*t.free.shape, t.free.shape[1])) for t in terms]
@@ -99,5 +102,22 @@ class Jacobian:
             x: the vector.
             out: where the product is written.
         """
-        self.matrix.mult(x, out)
-        self.rows.overwrite(x, out)
+        strained = self.strained(x)
+        self.matrix.mult(strained, out)
+        self.rows.overwrite(strained, out)
+
+    def elastic_at_contact(self, x: PETSc.Vec) -> Array:
+        """The rows of A x at the vertices of Γc, (m d,). Collective.
+
+        Args:
+            x: the vector.
+        """
+        return self.rows.elastic(self.strained(x))
+
+    def strained(self, x: PETSc.Vec) -> PETSc.Vec:
+        """X without what A does not see of it; it is overwritten by the next call. Collective.
+
+        Args:
+            x: the vector.
+        """
+        return x if self._rigid is None else self._rigid.without(x)

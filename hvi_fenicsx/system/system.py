@@ -29,6 +29,7 @@ from . import existence, free_motions, local_frames, near_null_space
 from .free_motions import FreeMotions
 from .holding_forces import HoldingForces
 from .jacobian import Jacobian
+from .rigid_part import RigidPart
 from .thresholds import DEFAULT, Thresholds
 
 
@@ -101,7 +102,8 @@ class System:
             self.forces = {name: assembled(form) for name, form in compiled.linear.items()}
             stiffness, self.load = self._constrained()
             stiffness, self.rotation, self.terms, self.bounds = self._in_local_components(stiffness)
-            self.jacobian = Jacobian(stiffness, self.terms, self.bounds, thresholds)
+            rigid = RigidPart.of(problem, self.unknowns)
+            self.jacobian = Jacobian(stiffness, self.terms, self.bounds, thresholds, rigid)
             self.references = references.of(problem, self._sum_of(self.forces))
             self.pushing = self._sum_of(existence.loads_of_rigid_motions(problem, self.forces))
             self._lift = self._lifted_by()
@@ -206,7 +208,7 @@ class System:
 
     def holding_forces(self, x: PETSc.Vec) -> Array:
         """The elastic forces that supports, contact and laws take up; zero elsewhere, (n,). Collective."""
-        return self.holding.at(x, self.rotation, self.jacobian.rows, self._lift)
+        return self.holding.at(self.jacobian.strained(x), self.rotation, self.jacobian.rows, self._lift)
 
     def _coupled(self, stiffness: PETSc.Mat) -> PETSc.Mat:
         """The stiffness of the unknowns, Cartesian: Tᵀ A T where bodies meet. Collective."""

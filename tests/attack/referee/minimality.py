@@ -77,15 +77,16 @@ def _side(check: Check, c: Coordinate, sign: float) -> tuple[float, float]:
     if (sign > 0 and x >= c.upper - touching) or (sign < 0 and x <= c.lower + touching):
         return np.inf, 0.0
     slope = -sign * float(c.direction @ check.missing[c.vertex])
-    curvature = 0.0
+    curvature, tolerance = 0.0, weight_of(check, c) * check.wrong
     for law, turn, weight in c.laws:
-        at = turn * x
-        kinks = law.breaks[np.abs(law.breaks - at) <= near]
-        at, to = (float(kinks[0]) if len(kinks) else at), sign * turn
+        place, to = turn * x, sign * turn
+        kinks = law.breaks[np.abs(law.breaks - place) <= near]
+        at = float(kinks[0]) if len(kinks) else place
         traction = float(law.side(np.array([at]), "right" if to > 0 else "left")[0])
         slope += weight * to * traction
         curvature += weight * _slope(law, at, to)
-    tolerance = weight_of(check, c) * check.wrong
+        steepest = max(abs(_slope(law, at, side)) for side in (-1.0, 1.0))
+        tolerance += weight * steepest * abs(at - place)  # a kink nearby is not the place itself
     return slope / tolerance, curvature
 
 
