@@ -21,6 +21,7 @@ from ..errors import InputError
 CHOLESKY: Mapping[str, object] = {"pc_type": "cholesky", "pc_factor_mat_solver_type": "mumps"}
 """Options of a direct solver."""
 _PREFIX: ContextVar[str] = ContextVar("prefix of PETSc options", default="hvi_")
+_OPTION = re.compile(r"--?[A-Za-z]")
 _NAME = re.compile(r"[A-Za-z]\w*")
 _VALUES = (str, bool, int, float, type(None))
 
@@ -152,5 +153,15 @@ def refusals_told() -> Iterator[None]:
 
 
 def insert(text: str) -> None:
-    """Add a user's options string (``-hvi_ksp_monitor -hvi_snes_max_it 50``) to PETSc's database."""
+    """Add a user's options string (``-hvi_ksp_monitor -hvi_snes_max_it 50``) to PETSc's database.
+
+    Raises:
+        InputError: a word of it is neither an option nor the value of one; PETSc would pass over it.
+    """
+    words = text.split()
+    for before, word in zip(["", *words], words, strict=False):
+        if not _OPTION.match(word) and not _OPTION.match(before):
+            raise InputError(f'--petsc: "{word}" is no option and no value of one; options begin with a dash')
     PETSc.Options().insertString(text)
+    if any(word.startswith("-log_view") for word in words):
+        PETSc.Log.begin()  # PETSc itself asks for this option when it starts

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from typing import Any
 
 import pytest
@@ -50,6 +52,21 @@ def test_options_and_prefix_hold_within_the_block_only() -> None:
 def test_what_is_no_option_is_refused(options: Any, prefix: str, reason: str) -> None:
     with pytest.raises(InputError, match=reason), petsc_options.chosen(options, prefix):
         pass
+
+
+@pytest.mark.parametrize("text", ["hvi_ksp_monitor", "-hvi_ksp_rtol -1e-3 3"])
+def test_a_word_without_dash_is_refused(text: str) -> None:
+    """PETSc would pass over it."""
+    with pytest.raises(InputError, match=r'"(hvi_ksp_monitor|3)" is no option'):
+        petsc_options.insert(text)
+
+
+def test_petscs_own_times_are_printed_where_they_are_asked_for() -> None:
+    """PETSc asks for this option when it starts, and fails at its end where it comes later."""
+    script = "from hvi_fenicsx.system import petsc_options; petsc_options.insert('-log_view')"
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False, timeout=60)
+    assert "PETSc Performance Summary" in done.stdout
+    assert "ERROR" not in done.stderr
 
 
 def test_an_error_that_no_option_can_have_made_stays() -> None:
