@@ -27,7 +27,7 @@ class ContactArrays:
         gap: the distance to the obstacle, m, (m,); NaN where there is no contact.
         slip: u_t, m: (m,) in 2D, (m, 2) in 3D, along the tangents.
         pressure: -σ_n, positive where the part is pressed, N/m², (m,).
-        friction: -σ_t, N/m², as ``slip``.
+        friction: -σ_t, N/m², as ``slip``; NaN where no law of the slip acts.
         active: whether the vertex is in contact, (m,).
         branch: the active piece of the law of the slip, from 0, -1 on a kink; (m,); None where there is no such law.
         normal_branch: that of the law of the opening or penetration, likewise.
@@ -51,6 +51,7 @@ class ContactArrays:
     def of(cls, part: PartArrays) -> Self:
         """The arrays of a part as results have them."""
         columns = part.columns
+        slip = _tangential(columns, "u_t")
         return cls(
             x=np.column_stack([columns[axis] for axis in "xyz" if axis in columns]),
             s=columns.get("s"),
@@ -59,9 +60,9 @@ class ContactArrays:
             tangents=contact_surface.tangents(part.normals),
             displacement=columns["u_n"],
             gap=columns.get("gap", np.full(len(part.weights), np.nan)),
-            slip=_tangential(columns, "u_t"),
+            slip=slip,
             pressure=-columns["sigma_n"],
-            friction=_tangential(columns, "friction_t"),
+            friction=_tangential(columns, "friction_t") if "friction_t1" in columns else np.full_like(slip, np.nan),
             active=columns.get("contact", np.zeros(len(part.weights))) == 1.0,
             branch=_pieces(columns, "branch_t"),
             normal_branch=_pieces(columns, "branch_n"),

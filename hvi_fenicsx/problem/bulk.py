@@ -24,6 +24,7 @@ from ..typing import Array
 from . import nodal_averaging, stress
 from .nodal_averaging import Dilatation
 from .scaling import Scales
+from .strain_energy import feels_no_rigid_motion
 from .vectors import nodal, nodal_sum, nodal_values
 
 
@@ -251,7 +252,9 @@ def make_bulk(
     strains: Mapping[str, Any],
     shared: dict[str, Any] | None = None,
 ) -> Bulk:
-    """The elastic operator that effects contribute.
+    """The elastic operator that effects contribute. Collective.
+
+    A form that an effect other than a material brings belongs to the stress where it feels no rigid motion.
 
     Args:
         space: the displacements, P1 vectors.
@@ -261,12 +264,14 @@ def make_bulk(
         shared: where problems on one mesh share their matrix; None: each makes its own.
     """
     elastic = tuple((where, effect) for where, effect, c in made if c.bilinear or c.averaged)
-    foundations = [form for _, effect, c in made if effect.place is not Place.MATERIAL for form in c.bilinear]
+    brought = [(form, effect.place is Place.MATERIAL) for _, effect, c in made for form in c.bilinear]
+    strained = [own or feels_no_rigid_motion(form, space) for form, own in brought]
+    foundations = [form for (form, _), of_strain in zip(brought, strained, strict=True) if not of_strain]
     return Bulk(
         space=space,
         scales=scales,
-        form=sum(form for _, _, c in made for form in c.bilinear),
-        material=sum(form for _, effect, c in made if effect.place is Place.MATERIAL for form in c.bilinear),
+        form=sum(form for form, _ in brought),
+        material=sum(form for (form, _), of_strain in zip(brought, strained, strict=True) if of_strain),
         foundation=sum(foundations) if foundations else None,
         averaged=tuple(part for _, _, c in made for part in c.averaged),
         strains=strains,

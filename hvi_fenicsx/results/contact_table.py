@@ -46,9 +46,11 @@ def columns(problem: Problem, state: ContactState) -> dict[str, Array]:
     if d == 3:
         found["z"] = state.surface.points[:, 2]
     found["u_n"] = state.normal_displacement * u
+    slips = state.branch(Direction.SLIP) is not None
     for i in range(d - 1):
         found[f"u_t{i + 1}"] = state.tangential_displacement[:, i] * u
-        found[f"friction_t{i + 1}"] = state.friction[:, i] * p
+        if slips:  # else σ_t is a support's, at a corner
+            found[f"friction_t{i + 1}"] = state.friction[:, i] * p
     if state.bounds is not None:
         found["gap"] = np.where(np.isfinite(state.gap), state.gap * u, np.nan)
         found["contact"] = state.contact.astype(float)

@@ -11,6 +11,7 @@ import numpy.typing as npt
 from dolfinx import fem, la
 
 from ..certify.contact_state import ContactState
+from ..effects import Direction
 from ..mesh import nodes
 from ..problem import spaces
 from ..problem.problem import Problem
@@ -190,20 +191,25 @@ def _nodal(problem: Problem, states: Sequence[ContactState]) -> dict[str, Array]
 
     def put(name: str, state: ContactState, values: Array) -> None:
         if name not in found:
-            found[name] = la.vector(problem.space.dofmap.index_map)
+            found[name] = la.vector(problem.space.dofmap.index_map, 3 if values.ndim > 1 else 1)
             found[name].array[:] = np.nan
-        found[name].array[state.surface.blocks] = values
+        width = found[name].block_size
+        found[name].array.reshape(-1, width)[state.surface.blocks] = values.reshape(-1, width)
 
     for state in states:
         put("u_n", state, state.normal_displacement * u)
         put("sigma_n", state, state.pressure * p)
         put("gap", state, state.gap * u)
         put("contact", state, state.contact.astype(float))
+        put("normal", state, _spatial(state.surface.normals))
+        slips = state.branch(Direction.SLIP) is not None
         for i in range(problem.scales.dimension - 1):
+            put(f"t{i + 1}", state, _spatial(state.surface.tangents[:, i]))
             put(f"u_t{i + 1}", state, state.tangential_displacement[:, i] * u)
-            put(f"friction_t{i + 1}", state, state.friction[:, i] * p)
+            if slips:
+                put(f"friction_t{i + 1}", state, state.friction[:, i] * p)
         distances = [law.distance for law in state.laws]
         put("inclusion_distance", state, np.max(distances, axis=0) * p if distances else 0.0 * state.normal)
     for field in found.values():
         field.scatter_forward()
-    return {name: field.array for name, field in found.items()}
+    return {name: field.array if field.block_size == 1 else field.array.reshape(-1, 3) for name, field in found.items()}

@@ -79,14 +79,14 @@ def _part(part: PartArrays, points: Array) -> PartFields:
     """A part in the order of the body's vertices."""
     order = np.argsort(part.vertices)
     columns = {name: values[order] for name, values in part.columns.items()}
-    bounded = "contact" in columns
+    bounded, slip = "contact" in columns, _tangential(columns, "u_t")
     return PartFields(
         facets=np.searchsorted(part.vertices[order], part.facets),
         points=points[part.vertices[order]],
         weights=part.weights[order],
         normals=part.normals[order],
-        slip=_tangential(columns, "u_t"),
-        friction=_tangential(columns, "friction_t") * ("branch_t" in columns),
+        slip=slip,
+        friction=_tangential(columns, "friction_t") if "friction_t1" in columns else np.zeros_like(slip),
         pressure=columns["sigma_n"] * (bounded or "branch_n" in columns),
         contact=columns["contact"] if bounded else np.zeros(len(order)),
         drops=part.drops,

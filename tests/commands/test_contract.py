@@ -145,6 +145,8 @@ def test_paraview_files_open_and_hold_their_arrays(result: Path) -> None:
     assert body.n_points == 81 or ranks > 1
     assert body["displacement"].shape == (body.n_points, 3)
     assert {"u_n", "u_t1", "sigma_n", "friction_t1", "gap", "contact"} <= set(floor.array_names)
+    np.testing.assert_allclose(floor["normal"], np.tile([0.0, -1.0, 0.0], (floor.n_points, 1)), atol=1e-15)
+    np.testing.assert_allclose(floor["t1"], np.tile([1.0, 0.0, 0.0], (floor.n_points, 1)), atol=1e-15)
     table = contact(result)
     at = np.rint(floor.points[:, 0] * 8).astype(int)
     for name in ("u_t1", "sigma_n", "friction_t1", "gap"):

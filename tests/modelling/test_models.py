@@ -330,6 +330,8 @@ def test_the_slip_of_a_part_turns_with_its_tangents() -> None:
     box = hvi.Body.box([1.0, 1.0, 1.0], [1, 1, 1], MPI.COMM_SELF)
     whole = [hvi.Isotropic(youngs_modulus=E, poisson_ratio=NU), hvi.Displacement("top", [1e-5, 2e-5, 0.0])]
     floor = hvi.solve(hvi.Model(box, [*whole, hvi.Contact("bottom")])).contact["bottom"]
+    assert floor.friction.shape == (4, 2)
+    assert np.isnan(floor.friction).all()  # no law: the shear there is a support's
     slip = np.einsum("mk,mkd->md", floor.slip, floor.tangents)
     np.testing.assert_allclose(slip, np.tile([1e-5, 2e-5, 0.0], (4, 1)), atol=1e-18)
 

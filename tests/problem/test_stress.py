@@ -10,11 +10,15 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pytest
+import ufl
+from dolfinx import fem
 from runs import ROOT
 from scenes import Table, solved
 
-from hvi_fenicsx import Solution, read_scene, solve
-from hvi_fenicsx.problem import stress
+from hvi_fenicsx import Scene, Solution, prepare, read_scene, solve
+from hvi_fenicsx.effects import Contribution
+from hvi_fenicsx.problem import bulk, stress
+from hvi_fenicsx.problem.problem import PlacedContribution
 
 Array = npt.NDArray[np.float64]
 E, ALPHA, HEAT, PULL = 2.0e11, 1.2e-5, 40.0, 3.0e6
@@ -98,6 +102,24 @@ def test_wood_in_plane_strain_is_held_across_by_its_own_compliance() -> None:
     assert_uniform(pull, PULL, 0.0, WOOD_NU[1] / WOOD_E[0] * WOOD_E[2] * PULL)
     heat = stresses(solved(wood(thermal_expansion=ALPHA) | {"body": {"temperature": HEAT}}))
     assert_uniform(heat, 0.0, 0.0, -WOOD_E[2] * ALPHA * HEAT)
+
+
+def test_a_users_own_form_of_the_strain_belongs_to_the_stress() -> None:
+    """Fibres along x beside the material; an elastic bed is no stress, and a force instead."""
+    problem = prepare(Scene.model_validate(pulled(body("plane_stress", youngs_modulus=E, poisson_ratio=0.0)))).problem
+    v, u = problem.bulk.form.arguments()
+    fibres = Contribution(bilinear=(0.5 * ufl.grad(u)[0, 0] * ufl.grad(v)[0, 0] * ufl.dx,))
+    bed = Contribution(bilinear=(2.0 * ufl.inner(u, v) * ufl.dx,))
+    pull = next(placed.effect for placed in problem.contributions if placed.where == "pull")
+    made = [*problem.contributions, *(PlacedContribution(None, pull, one) for one in (fibres, bed))]
+    own = bulk.make_bulk(problem.space, problem.scales, made, {})
+    stretched = fem.Function(problem.space)
+    stretched.interpolate(lambda x: np.stack([x[0], x[1]]))
+    alone, both = problem.bulk.stress(stretched), own.stress(stretched)
+    unit = problem.scales.stress * problem.scales.length  # a form's integrals are over m², its gradients in 1/m
+    np.testing.assert_allclose(both[:, 0, 0] - alone[:, 0, 0], 0.5 * unit, rtol=1e-10)
+    np.testing.assert_allclose(both[:, 1, 1], alone[:, 1, 1], rtol=1e-10)
+    np.testing.assert_allclose(own.foundation_force(stretched).sum(axis=0), [4.0, 2.0], rtol=1e-10)
 
 
 def test_pure_shear_and_its_von_mises_stress() -> None:

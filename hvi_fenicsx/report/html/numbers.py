@@ -58,11 +58,11 @@ def contact(part: ContactPart) -> dict[str, Any]:
     rows += [("largest slip", _largest(np.abs(part.slip), "m"))]
     if part.has("branch_t"):
         rows.append(("largest friction", _largest(np.abs(part.friction), "Pa")))
-        rows.append(("pieces of the friction law in use", _pieces(part["branch_t"])))
+        rows.append(("pieces of the friction law in use, from 0", _pieces(part["branch_t"])))
     rows += [("largest pressure", _largest(part.pressure, "Pa"))]
     if part.has("branch_n"):
         rows.append(("largest tension", _largest(part["sigma_n"], "Pa")))
-        rows.append(("pieces of the normal law in use", _pieces(part["branch_n"])))
+        rows.append(("pieces of the normal law in use, from 0", _pieces(part["branch_n"])))
     return {"name": part.name, "rows": rows}
 
 
@@ -84,10 +84,10 @@ def _largest(values: Any, unit: str) -> str:
 
 
 def _pieces(branch: Any) -> str:
-    """How many vertices are on which piece of the law's graph."""
+    """How many vertices are on which piece of the law's graph, counted from 0 as in ``contact.csv``."""
     found, counts = np.unique(branch[np.isfinite(branch)].astype(int), return_counts=True)
     return ", ".join(f"{thousands(int(n))} {_piece(int(piece))}" for piece, n in zip(found, counts, strict=True))
 
 
 def _piece(index: int) -> str:
-    return "on a kink" if index < 0 else f"on piece {index + 1}"
+    return "on a kink" if index < 0 else f"on piece {index}"
