@@ -22,6 +22,7 @@ from ..mesh.domain import Domain
 from ..mesh.shapes import Box, DomainShape, GivenMesh, MeshFile, Rectangle
 from ..mesh.thresholds import DEFAULT
 from ..mesh.transfer import Transfer
+from ..problem.interfaces import Sides
 from ..schema import located_error, unknown
 
 
@@ -59,6 +60,7 @@ class Body:
     def _set(self, shape: DomainShape, comm: MPI.Comm) -> None:
         self.shape, self.comm = shape, comm
         self.pieces: Mapping[str, BoundaryPart] = {}
+        self.interfaces: Mapping[str, Sides] = {}
 
     @classmethod
     def from_shape(cls, shape: DomainShape, comm: MPI.Comm = MPI.COMM_WORLD) -> Self:
@@ -138,13 +140,37 @@ class Body:
         Raises:
             InputError: the name is taken, there is no such side, or these are no inequalities.
         """
-        if side not in self.sides:
-            raise InputError(f"piece: {unknown('side', side, self.sides)}")
-        if name in (*self.sides, *self.pieces):
-            raise InputError(f"piece: there is a side {name!r} already; choose another name")
+        self._check_new("piece", name, side)
         body = copy.copy(self)
         body.pieces = {**self.pieces, name: BoundaryPart((side,), Inequalities(where))}
         return body
+
+    def interface(self, name: str, first: str, second: str, *, tied: bool = False) -> Self:
+        """The body with one more place: where two of its sides meet, which no cells or vertices join.
+
+        Effects there act on the displacement of the first side relative to the second.
+
+        Args:
+            name: of the interface.
+            first: the side whose vertices carry contact and laws: that of the finer mesh, or that within the other.
+            second: the other side.
+            tied: whether the sides are glued for ever; then no effect acts between them.
+
+        Raises:
+            InputError: the name is taken, or there is no such side.
+        """
+        self._check_new("interface", name, first, second)
+        body = copy.copy(self)
+        body.interfaces = {**self.interfaces, name: Sides(first=first, second=second, tied=tied)}
+        return body
+
+    def _check_new(self, kind: str, name: str, *sides: str) -> None:
+        """Refuse a name that is taken, and sides that are none."""
+        for side in sides:
+            if side not in self.sides:
+                raise InputError(f"{kind}: {unknown('side', side, self.sides)}")
+        if name in (*self.sides, *self.pieces, *self.interfaces):
+            raise InputError(f"{kind}: there is a side {name!r} already; choose another name")
 
     @cached_property
     def dimension(self) -> int:

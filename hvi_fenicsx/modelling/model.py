@@ -10,7 +10,8 @@ from pydantic import ValidationError
 from ..effects import Effect, Place
 from ..errors import InputError
 from ..mesh.boundary_part import BoundaryPart
-from ..scene import BodyTable, BoundaryTable, MaterialTable, Scene
+from ..problem.interfaces import Sides
+from ..scene import BodyTable, BoundaryTable, InterfaceTable, MaterialTable, Scene
 from ..schema import located_error, unknown
 from .body import Body
 from .placed_effects import OnSide, PlacedEffect
@@ -79,7 +80,7 @@ def _check_kinds(body: Any, effects: Any) -> None:
 
 
 def _check_place(body: Body, placed: PlacedEffect) -> None:
-    known = [*placed.places(body.domain), *(body.pieces if isinstance(placed, OnSide) else ())]
+    known = [*placed.places(body.domain), *((*body.pieces, *body.interfaces) if isinstance(placed, OnSide) else ())]
     if placed.where is not None and placed.where not in known:
         reason = unknown("place", placed.where, known) if known else f"the body has no place {placed.where!r}"
         raise InputError(f"{type(placed).__name__}: {reason}")
@@ -103,13 +104,16 @@ def _scene(body: Body, effects: Iterable[tuple[str | None, Effect]], title: str)
     tables: dict[Place, list[tuple[str | None, dict[str, Any]]]] = {place: [] for place in Place}
     for where, effect in effects:
         _add(tables[effect.place], where, effect)
+    on_interfaces = [table for table in tables[Place.BOUNDARY] if table[0] in body.interfaces]
+    on_sides = [table for table in tables[Place.BOUNDARY] if table[0] not in body.interfaces]
     try:
         return Scene(
             title=title,
             domain=body.shape,
             material=_materials(tables[Place.MATERIAL]),
             body={where or _WHOLE: BodyTable(region=where, **own) for where, own in tables[Place.BODY]},
-            boundary=dict(_boundary(tables[Place.BOUNDARY], body.pieces)),
+            boundary=dict(_boundary(on_sides, body.pieces)),
+            interface={name: _interface(name, sides, on_interfaces) for name, sides in body.interfaces.items()},
         )
     except ValidationError as error:
         raise located_error(error, Scene) from None
@@ -129,6 +133,14 @@ def _materials(tables: Sequence[tuple[str | None, dict[str, Any]]]) -> Any:
     if len(made) == 1 and made[0][0] is None:
         return made[0][1]
     return {where or f"{_WHOLE} {number}": table for number, (where, table) in enumerate(made)}
+
+
+def _interface(name: str, sides: Sides, tables: Sequence[tuple[str | None, dict[str, Any]]]) -> InterfaceTable:
+    """The table of an interface."""
+    found = [own for where, own in tables if where == name]
+    if len(found) > 1:
+        raise InputError(f"{name}: {next(iter(found[1]))} acts there already; give it once")
+    return InterfaceTable(between=(sides.first, sides.second), tied=sides.tied, **(found[0] if found else {}))
 
 
 def _boundary(

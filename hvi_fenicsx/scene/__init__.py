@@ -1,6 +1,6 @@
 """The scene: what the user asked for, from a TOML file (:func:`read_scene`) or Python (:class:`Scene`)."""
 
-from .effect_tables import BodyTable, BoundaryTable, MaterialTable
+from .effect_tables import BodyTable, BoundaryTable, InterfaceTable, MaterialTable
 from .path_table import PathTable
 from .reader import read_scene, with_place
 from .scene import PlacedEffect, Scene
@@ -10,6 +10,7 @@ from .writer import dump_scene
 __all__ = [
     "BodyTable",
     "BoundaryTable",
+    "InterfaceTable",
     "MaterialTable",
     "PathTable",
     "PlacedEffect",

@@ -202,6 +202,35 @@ def test_the_glue_of_the_lap_joint_carries_the_whole_pull() -> None:
     assert set(np.argsort(np.abs(glue.friction[:, 0]))[-2:]) == set(ends)
 
 
+@pytest.mark.long
+def test_the_glue_of_the_bracket_carries_force_and_moment() -> None:
+    """The strength of the whole glue about the front edge of the foot, over the moment of the load about the plate."""
+    found = demo("bracket_3d")
+    glue, scales = state(found, "glue"), found.problem.scales
+    traction = glue.pressure[:, None] * glue.surface.normals
+    traction -= np.einsum("mk,mkd->md", glue.friction, glue.surface.tangents)
+    forces = traction * glue.surface.weights[:, None] * scales.force
+    assert forces.sum(axis=0) == pytest.approx([-600.0, 0.0, 0.0], abs=1e-5)
+    moment = np.cross(glue.surface.points, forces).sum(axis=0)
+    assert moment == pytest.approx([0.0, -600.0 * 0.05, 600.0 * 0.025], abs=1e-6)
+    opened = glue.surface.points[np.argsort(glue.normal)[:10]]
+    assert opened[:, 0].max() < 0.006
+    assert found.solvability.lambda_peak == pytest.approx(1e7 * 0.03 * 0.04**2 / 2 / (600 * 0.05), rel=1e-8)
+
+
+@pytest.mark.long
+def test_the_fault_slips_as_a_crack_does() -> None:
+    """Eshelby's crack in an infinite body; that of the demo is 20 times as wide as the crack's half."""
+    found = demo("fault")
+    fault = state(found, "fault")
+    x, slip = fault.surface.points[:, 0] / 1e3, np.abs(fault.slip[:, 0]) * found.problem.scales.displacement
+    crack = 4 * (1 - 0.25**2) * 1e7 * 1e3 / 5e10
+    assert slip.max() == pytest.approx(crack, rel=0.01)
+    inner = np.abs(x) < 0.98  # the vertices next to the tips carry the share of these too
+    assert slip[inner] == pytest.approx(crack * np.sqrt(1 - x[inner] ** 2), abs=0.02 * crack)
+    assert fault.friction[:, 0] * found.problem.scales.stress == pytest.approx(2e7, rel=1e-9)
+
+
 def test_two_cylinders_meet_with_the_pressure_of_hertz() -> None:
     found = demo("two_cylinders")
     met, scales = state(found, "contact"), found.problem.scales

@@ -1,0 +1,79 @@
+"""Bodies that meet on a mesh of one's own: an interface between two tagged sides does what that of a scene does."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from dolfinx import mesh
+from mpi4py import MPI
+from scenes import NU, E, two_blocks
+
+import hvi_fenicsx as hvi
+from hvi_fenicsx import compat
+
+TAGS = {"base": 1, "seat": 2, "foot": 3, "press": 4, "push": 5}
+LAW = hvi.laws.QuadraticLinear(gamma1=1e6, gamma2=5e5, delta=1e-6)
+
+
+def two_block_body() -> hvi.Body:
+    """The blocks of :func:`scenes.two_blocks` as one mesh of two parts, its sides tagged."""
+    kind = mesh.DiagonalType.right
+    corners = [((0.0, 0.0), (1.0, 0.5)), ((0.21, 0.5), (1.21, 0.9))]
+    parts = [
+        mesh.create_rectangle(MPI.COMM_SELF, corner, cells, diagonal=kind)
+        for corner, cells in zip(corners, ([9, 4], [7, 3]), strict=True)
+    ]
+    points = [part.geometry.x[:, :2] for part in parts]
+    cells = [compat.geometry_dofmap(parts[0]), compat.geometry_dofmap(parts[1]) + len(points[0])]
+    whole = compat.simplex_mesh(MPI.COMM_SELF, np.vstack(cells).astype(np.int64), np.vstack(points), "triangle")
+    whole.topology.create_connectivity(1, 2)
+    outer, of_facet = mesh.exterior_facet_indices(whole.topology), whole.topology.connectivity(1, 2)
+    x, y = mesh.compute_midpoints(whole, 1, outer)[:, :2].T
+    inner = mesh.compute_midpoints(whole, 2, of_facet.array[of_facet.offsets[outer]])[:, 1]
+    level, inside = np.isclose(y, 0.5), inner < 0.5
+    marks = {1: np.isclose(y, 0.0), 2: level & inside, 3: level & ~inside, 4: np.isclose(y, 0.9)}
+    marks[5] = np.isclose(x, 0.21)
+    values = sum(tag * mark.astype(np.int32) for tag, mark in marks.items())
+    tags = mesh.meshtags(whole, 1, outer[values > 0], values[values > 0].astype(np.int32))
+    return hvi.Body(whole, facets=tags, names=TAGS)
+
+
+LOADS = [
+    hvi.Isotropic(youngs_modulus=E, poisson_ratio=NU),
+    hvi.Displacement("base", [0.0, 0.0]),
+    hvi.Traction("press", [0.0, "-1e6*(2.4 - 2.6*x)"]),
+    hvi.Traction("push", [6e5, 0.0]),
+]
+
+
+def test_an_interface_between_tagged_sides_is_that_of_a_scene() -> None:
+    body = two_block_body().interface("seam", "foot", "seat")
+    model = hvi.Model(body, [*LOADS, hvi.Contact("seam"), hvi.Friction("seam", LAW)])
+    found = hvi.solve(model, tolerance=1e-10)
+    table = two_blocks("rectangle", [1.0], [[9, 4], [7, 3]], "plane_stress", tolerance=1e-10)
+    same = hvi.solve(hvi.Scene.model_validate(table), MPI.COMM_SELF)
+    assert found.converged
+    assert found.energy == pytest.approx(same.energy, rel=1e-9)
+    assert found.contact["seam"].pressure == pytest.approx(same.contact["seam"].pressure, rel=1e-6, abs=1.0)
+    assert found.resultant("seam") == pytest.approx(-found.resultant("seam.second"), rel=1e-9)
+
+
+def test_glued_sides_are_one_body() -> None:
+    glued = hvi.Model(two_block_body().interface("seam", "foot", "seat", tied=True), LOADS)
+    found = hvi.solve(glued, tolerance=1e-10)
+    assert found.converged
+    assert found.solvability.state == "held"
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "effects", "words"),
+    [
+        ("foot", "sole", [], "sole"),
+        ("foot", "seat", [], "nothing acts"),
+        ("foot", "base", [hvi.Contact("seam")], "do not face each other"),
+        ("foot", "seat", [hvi.Contact("seam"), hvi.Contact("seam")], "give it once"),
+    ],
+)
+def test_what_does_not_fit_is_refused(first: str, second: str, effects: list[hvi.Contact], words: str) -> None:
+    with pytest.raises(hvi.InputError, match=words):
+        hvi.check(hvi.Model(two_block_body().interface("seam", first, second), [*LOADS, *effects]))
