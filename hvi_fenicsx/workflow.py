@@ -125,7 +125,11 @@ def prepare(
     _LOG.info("%d unknowns; existence: %s%s", system.dofs, solvability.state, margin)
     with timer("assembly"):
         system.attach_free_motions(solvability.free)
-        warnings = plausibility.before_solving(system.problem, system.forces)
+        warnings = (
+            *scene.domain.implausible(domain.length),
+            *plausibility.before_solving(system.problem, system.forces),
+            *plausibility.of_existence(solvability),
+        )
     _log_warnings(warnings)
     return Preparation(
         scene=scene,

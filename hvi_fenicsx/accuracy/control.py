@@ -157,8 +157,8 @@ class _AdaptiveRun:
         """The next level, or why there is none. Collective."""
         if len(self.steps) >= self.thresholds.most_levels:
             return f"{self.thresholds.most_levels} meshes were not enough"
-        if too_much := self._unaffordable():
-            return too_much
+        if self.goal.seconds is None and (too_much := self._unaffordable()):
+            return too_much  # within a given time the best that can be had is wanted
         scene = level.solution.scene
         if self.steps:
             scene = self.balance.next_scene(scene, self.steps[-1])

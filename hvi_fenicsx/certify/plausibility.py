@@ -17,7 +17,7 @@ from ..effects import Direction
 from ..problem.contact_normals import largest_turn
 from ..problem.law_term import LawTerm
 from ..problem.problem import Problem
-from ..rigid import kernel
+from ..rigid import Solvability, kernel
 from ..runtime.mpi import largest, total
 from ..system import existence
 from .certificate import Examination
@@ -42,6 +42,23 @@ def before_solving(
         *_scales(problem, thresholds),
         *_uneven_parts(problem, thresholds),
         *_weak_laws(problem, forces, thresholds),
+    )
+
+
+def of_existence(found: Solvability, thresholds: PlausibilityThresholds = PLAUSIBILITY) -> tuple[str, ...]:
+    """What there is to warn of in the factor of the load that is borne, in sentences. Local; the same on all ranks.
+
+    Args:
+        found: whether a solution can exist.
+        thresholds: what is plausible.
+    """
+    peak, far = found.lambda_peak, thresholds.far_peak
+    if not (0.0 < peak < 1.0 / far or far < peak < np.inf):
+        return ()
+    than = "far more" if peak > 1.0 else "far less"
+    return (
+        f"the load may be multiplied by {peak:.1e} at most before no solution exists: the laws can carry {than} than "
+        "it; are loads and the laws' tractions in N/m²?",
     )
 
 

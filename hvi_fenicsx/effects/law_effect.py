@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any, ClassVar
 
+import numpy as np
 from pydantic import (
     BeforeValidator,
     PlainSerializer,
@@ -46,6 +47,12 @@ LawField = Annotated[
 """A superpotential as a field of a scene model: ``{ law = "name", ...parameters }``."""
 
 
+def _lowest_traction(law: laws.Superpotential) -> float:
+    """The smallest traction at the kinks and on the way to four times the typical displacement, N/m²."""
+    x = np.concatenate([law.kinks[law.kinks > 0.0], np.linspace(0.0, 4.0, 65)[1:] * law.length_scale])
+    return float(np.min([law.left(x), law.right(x)]))
+
+
 class LawEffect(Effect):
     """A law that acts on one displacement of a boundary part.
 
@@ -76,6 +83,17 @@ class LawEffect(Effect):
     def contribute(self, context: FormContext, where: str | None) -> Contribution:
         """The law, acting on its displacement."""
         return Contribution(laws=(BoundaryLaw(self.direction, self.law),))
+
+    @override
+    def implausible(self, largest: Evaluate, sizes: Sizes) -> tuple[str, ...]:
+        """A traction that is negative somewhere: it pushes the body on."""
+        lowest = _lowest_traction(self.law)
+        if lowest >= -1e-9 * self.law.traction_scale:
+            return ()
+        return (
+            f"the law's traction falls to {lowest:.3g} N/m² at a positive displacement, where it does not resist but "
+            "pushes the body on; is a sign wrong?",
+        )
 
     @override
     def stress_scale(self, largest: Evaluate, sizes: Sizes) -> float:

@@ -103,7 +103,7 @@ def _check_connections(gmsh: Any, path: Path, dimension: int) -> None:
         lost = np.setdiff1d(found, known)
         if len(lost):
             raise InputError(f"mesh file {path}: node {lost[0]} of an element is not there; remesh")
-        _refuse_more_than(1, found, f"mesh file {path}: the element of nodes", "is listed twice, or in two groups")
+        _refuse_two_groups(gmsh, path, found.shape[1] - 1)
     _refuse_more_than(2, facets, f"mesh file {path}: the facet of nodes", "has more than two cells")
     distinct, _ = _counted(facets)
     together, counts = _counted(np.concatenate([distinct, distinct, sides]))
@@ -126,6 +126,27 @@ def _check_folds(gmsh: Any, path: Path, dimension: int) -> None:
 def _elements(gmsh: Any, dimension: int) -> Integers:
     """Node tags of the simplices in groups, shape (n, dimension + 1), sorted in each row."""
     return np.sort(gmsh_arrays.grouped(gmsh, dimension)[0] + 1, axis=1)
+
+
+def _refuse_two_groups(gmsh: Any, path: Path, dimension: int) -> None:
+    """Refuse elements that are listed twice; where they are in two groups, with the names of both."""
+    nodes, groups = gmsh_arrays.grouped(gmsh, dimension)
+    rows = np.sort(nodes + 1, axis=1)
+    distinct, counts = _counted(rows)
+    if not np.any(counts > 1):
+        return
+    twice = distinct[np.argmax(counts > 1)]
+    named = np.unique(groups[np.all(rows == twice, axis=1)])
+    names = [_group(gmsh, dimension, int(g)) for g in named]
+    where = f"is in the groups {' and '.join(names)}; leave it in one" if len(names) > 1 else "is listed twice; remesh"
+    raise InputError(f"mesh file {path}: the element of nodes {', '.join(map(str, twice))} {where}")
+
+
+def _group(gmsh: Any, dimension: int, tag: int) -> str:
+    try:
+        return gmsh.model.getPhysicalName(dimension, tag) or str(tag)
+    except UnicodeDecodeError:
+        return str(tag)
 
 
 def _refuse_more_than(most: int, rows: Integers, what: str, fault: str) -> None:

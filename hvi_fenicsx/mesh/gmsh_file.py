@@ -98,6 +98,10 @@ def _check_length(mesh: MeshArrays, scale: float) -> None:
         raise InputError(f"domain.scale: makes the body {length:.1e} m long; allowed is {allowed}")
 
 
+_BY_GMSH = (".med", ".unv", ".bdf", ".cgns", ".mesh")
+_BY_MESHIO = (".vtu", ".vtk", ".xdmf", ".inp", ".e", ".exo", ".h5m")
+
+
 def _is_script(path: Path) -> bool:
     """Whether the file is a script, and not a mesh.
 
@@ -111,9 +115,21 @@ def _is_script(path: Path) -> bool:
         return True
     with path.open("rb") as stream:
         if stream.read(len(_HEADER)) != _HEADER:
-            text = f"is no mesh: it does not begin with {_HEADER.decode()}; save it by gmsh, or name a script .geo"
+            text = f"is no mesh: it does not begin with {_HEADER.decode()}; {_conversion(path)}"
             raise InputError(f"mesh file {path}: {text}")
     return False
+
+
+def _conversion(path: Path) -> str:
+    """How a file of another kind becomes one that can be read."""
+    if path.suffix in _BY_GMSH:
+        return f"gmsh reads it: gmsh {path.name} -save -format msh41 -o {path.stem}.msh; name its groups"
+    if path.suffix in _BY_MESHIO:
+        return (
+            f"convert it: meshio convert {path.name} {path.stem}.msh --output-format gmsh; or read it in Python by "
+            "dolfinx, and give mesh and tags to hvi.Body"
+        )
+    return "save it by gmsh, or name a script .geo"
 
 
 def _end(done: subprocess.CompletedProcess[bytes]) -> str:

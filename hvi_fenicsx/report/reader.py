@@ -85,6 +85,11 @@ class ContactPart:
         """Vertices off the obstacle; none where the part has no contact."""
         return self["contact"] == 0.0
 
+    @property
+    def largest_gap(self) -> float:
+        """The largest distance of a lifted vertex from the obstacle, m; 0 where none is lifted."""
+        return float(np.nanmax(self["gap"][self.lifted], initial=0.0))
+
 
 def _tangential(first: Array, second: Array) -> Array:
     return np.hypot(first, second) if np.isfinite(second).any() else first

@@ -25,6 +25,7 @@ from hvi_fenicsx.accuracy.cost_forecast import AdaptiveStep
 from hvi_fenicsx.accuracy.goal import AccuracyResult, Goal
 from hvi_fenicsx.accuracy.quantities import FrictionTraction
 from hvi_fenicsx.accuracy.quantity_base import Observable, contact_norm, extrapolated, prolong
+from hvi_fenicsx.accuracy.thresholds import CONTROL
 from hvi_fenicsx.certify import contact_state
 from hvi_fenicsx.mesh.refinement import Refinement
 from hvi_fenicsx.runtime import memory
@@ -288,6 +289,16 @@ def test_a_time_budget_ends_before_the_step_that_would_exceed_it(seconds: float,
     assert (reached.why is None) == (meshes > 1)
     best = control.solve_to_goal(scene, COMM, Goal(None, seconds=10.0), AdaptiveSolver(timer=Late()), lambda line: None)
     assert (len(best.steps), best.exit_code) == (1, 0)
+
+
+def test_an_accuracy_out_of_reach_leaves_the_best_that_the_time_allows() -> None:
+    """Without a budget it is refused on the first mesh."""
+    goal, few = Goal(1e-200, seconds=1e3), replace(CONTROL, most_levels=3)
+    scene = Scene.model_validate(STRONG)
+    best = control.solve_to_goal(scene, COMM, goal, AdaptiveSolver(timer=Late()), lambda line: None, few)
+    assert best.why == "3 meshes were not enough"
+    assert best.exit_code == 4
+    assert [a.error > b.error for a, b in zip(best.steps, best.steps[1:], strict=False)] == [True, True]
 
 
 def test_the_first_mesh_is_coarse() -> None:

@@ -13,6 +13,7 @@ from scenes import block, model, quadratic_linear
 from hvi_fenicsx import Scene, prepare, read_scene, solve
 from hvi_fenicsx.certify import plausibility
 from hvi_fenicsx.certify.thresholds import PlausibilityThresholds
+from hvi_fenicsx.mesh.shapes import MeshFile
 from hvi_fenicsx.workflow import finish
 
 LAW = quadratic_linear(1.0e6)
@@ -45,12 +46,25 @@ MISTAKEN = {
         lambda: model(8, friction=quadratic_linear(1e5, delta=9e-13)),
         "far beyond it nearly everywhere",
     ),
+    "a law of the wrong sign": (
+        lambda: model(friction={"law": "graph", "points": [[0, 0], [1e-5, 1e6], [2e-5, -1e6]]}),
+        "falls to -1e+06 N/m² at a positive displacement",
+    ),
+    "a load in MPa": (lambda: block(2, 1.0, friction=LAW), "the load may be multiplied by 1.0e+06 at most"),
     "a wide smoothing": (
         lambda: model(8, 6e6, friction=LAW, smoothing="quadratic", epsilon_absolute=1e3),
         "smoothing changes the traction",
     ),
 }
 HUNG = {"on": "top", "displacement": ["free", 0.0]}
+
+
+def test_a_long_body_of_a_file_without_a_scale_is_told() -> None:
+    file = ROOT / "demos" / "thermal_bar.geo"
+    (said,) = MeshFile(file=file).implausible(80.0)
+    assert "80 m long" in said
+    assert "scale = 1e-3" in said
+    assert MeshFile(file=file).implausible(0.08) == MeshFile(file=file, scale=1.0).implausible(80.0) == ()
 
 
 @pytest.mark.parametrize("case", MISTAKEN)

@@ -177,6 +177,23 @@ def test_a_name_that_is_not_in_utf_8_is_refused_with_its_line(tmp_path: Path) ->
         read(file)
 
 
+def test_an_element_in_two_groups_is_told_with_both(tmp_path: Path) -> None:
+    twice = TRIANGLE.replace('"rest") = {2, 3}', '"rest") = {1, 2, 3}')
+    with pytest.raises(
+        InputError, match=r"nodes 1, \d is in the groups bottom and rest; leave it in one"
+    ):
+        read(written(tmp_path / "twice.geo", f"{twice} Mesh.MeshSizeMax = 2;"))
+
+
+@pytest.mark.parametrize(
+    ("name", "way"),
+    [("part.vtu", "meshio convert part.vtu part.msh"), ("part.med", "gmsh part.med -save"), ("p", "save it by gmsh")],
+)
+def test_a_file_of_another_kind_is_told_how_to_convert(name: str, way: str, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=f"is no mesh: .*{way}"):
+        read(written(tmp_path / name, "<VTKFile>"))
+
+
 def test_a_file_without_a_mesh_says_so(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="neither a mesh nor a geometry"):
         read(written(tmp_path / "m.geo", "a = 1;\n"))

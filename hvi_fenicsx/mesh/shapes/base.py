@@ -156,6 +156,14 @@ class DomainShape(Table):
             thresholds: what a mesh file is taken to have.
         """
 
+    def implausible(self, length: float) -> tuple[str, ...]:
+        """What may be mistakes in its numbers, in sentences. Advice: nothing is refused.
+
+        Args:
+            length: of the body, m.
+        """
+        return ()
+
     def files(self) -> tuple[Path, ...]:
         """The files whose content the mesh depends on."""
         return ()

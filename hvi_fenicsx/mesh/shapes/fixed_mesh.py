@@ -81,6 +81,10 @@ def _written_path(path: Path, info: SerializationInfo) -> str:
     return str(path) if folder is None else os.path.relpath(path, folder)
 
 
+LONG = 20.0
+"""A body (m) from a file that is longer than this may be one in mm."""
+
+
 class MeshFile(FixedMesh):
     """A gmsh file. Its physical groups are the sides and regions that the scene can name.
 
@@ -106,6 +110,15 @@ class MeshFile(FixedMesh):
         from .. import gmsh_file
 
         return gmsh_file.read(comm, self.file, dimension, self.scale)
+
+    def implausible(self, length: float) -> tuple[str, ...]:
+        """A long body whose unit nobody has stated."""
+        if length <= LONG or "scale" in self.model_fields_set:
+            return ()
+        return (
+            f"domain.file: the body is {length:.3g} m long, and meshes are often in mm: give scale = 1e-3, or "
+            "scale = 1.0 if the file is in m",
+        )
 
     def files(self) -> tuple[Path, ...]:
         """The mesh file."""

@@ -187,7 +187,7 @@ def contact(shape: DeformedBody, geometry: PartGeometry, largest: float) -> Iter
             yield _obstacle(base + OBSTACLE * shape.body.size * outward)
         off = geometry.part.lifted[geometry.row[chain]]
         if off.any():
-            yield _lifted(shape.points[chain, :2], off, float(gap[off].max()))
+            yield _lifted(shape.points[chain, :2], off, geometry.part.largest_gap)
         yield from _profile(base, outward, pressure, largest or 1.0, shape.body.size)
 
 

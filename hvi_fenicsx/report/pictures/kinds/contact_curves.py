@@ -198,7 +198,7 @@ def _say_lifted(axes: Axes, spans: list[tuple[float, float]], part: ContactPart,
     if not spans:
         return
     start, end = max(spans, key=lambda span: span[1] - span[0])
-    gap = quantity(float(np.nanmax(part["gap"])), "m")
+    gap = quantity(part.largest_gap, "m")
     middle = (start + end) / 2 / length.size
     words = f"lifted\nup to {gap}"
     axes.text(middle, 0.93, words, transform=axes.get_xaxis_transform(), ha="center", va="top", size=12, color=INK)
