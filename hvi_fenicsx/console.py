@@ -122,6 +122,8 @@ def solver(prepared: Preparation) -> str:
 def outcome(solution: Solution) -> Iterator[str]:
     """What was found and how sure it is."""
     yield f"result: {solution.reason}"
+    if not solution.converged and solution.solvability.state in ("metastable", "escapes"):
+        yield "`hvi path SCENE` follows the load to the last state that is borne, and says its factor"
     if solution.examination is None or solution.solve_result is None:
         return
     c, counts = solution.examination.certificate, solution.solve_result.counts

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import tomllib
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from ..laws import Superpotential
 
 T = TypeVar("T")
+FAR = 10.0
+"""A body that was not certified, and moved by so many times its size, is on its way off."""
 
 
 @dataclass(frozen=True)
@@ -118,14 +120,24 @@ class Result:
 
     @cached_property
     def body(self) -> BodyMesh:
-        """The body with its fields."""
+        """The body with its fields; without them where it is carried off."""
+        if self.carried_off:
+            return body_mesh(replace(self.arrays, displacement=None, von_mises=None))
         return body_mesh(self.arrays)
 
     @cached_property
+    def carried_off(self) -> bool:
+        """Whether what was found is a body far away from where it was: no state that anyone wants to see."""
+        found = self.arrays.displacement
+        if self.certified or found is None:
+            return False
+        return bool(np.max(np.abs(found)) > FAR * np.max(np.ptp(self.arrays.points, axis=0)))
+
+    @cached_property
     def parts(self) -> tuple[ContactPart, ...]:
-        """The parts of Γc, in the order of ``contact.csv``."""
-        found = self.arrays.parts.items()
-        return tuple(ContactPart(name, part.columns, part.vertices, part.facets) for name, part in found)
+        """The parts of Γc, in the order of ``contact.csv``; none where the body is carried off."""
+        found = {} if self.carried_off else self.arrays.parts
+        return tuple(ContactPart(name, part.columns, part.vertices, part.facets) for name, part in found.items())
 
     @property
     def sides(self) -> Mapping[str, Integers]:

@@ -179,9 +179,7 @@ def test_a_name_that_is_not_in_utf_8_is_refused_with_its_line(tmp_path: Path) ->
 
 def test_an_element_in_two_groups_is_told_with_both(tmp_path: Path) -> None:
     twice = TRIANGLE.replace('"rest") = {2, 3}', '"rest") = {1, 2, 3}')
-    with pytest.raises(
-        InputError, match=r"nodes 1, \d is in the groups bottom and rest; leave it in one"
-    ):
+    with pytest.raises(InputError, match=r"nodes 1, \d is in the groups bottom and rest; leave it in one"):
         read(written(tmp_path / "twice.geo", f"{twice} Mesh.MeshSizeMax = 2;"))
 
 

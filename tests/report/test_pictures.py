@@ -220,6 +220,16 @@ def write_sides(folder: Path, body: mesh.Mesh, **on: Callable[[Array], npt.NDArr
     change(folder, sides={name: facets_on(plain(body), where(x.T)) for name, where in on.items()})
 
 
+def test_a_body_on_its_way_off_is_not_drawn(tmp_path: Path) -> None:
+    """A displacement of a hundred times its size is no state that was borne; certified it is one."""
+    folder = result(tmp_path / "r", square(), pressed)
+    write_sides(folder, square(), **ON)
+    change(folder, displacement=load(folder / FILE).displacement + 100.0)
+    assert {"body.png", "contact.png"} <= {path.name for path in draw.draw(folder)}
+    write_words(folder, 2, {"state": "metastable", "direction": None}, certificate={"passed": False})
+    assert [path.name for path in draw.draw(folder)] == ["scene.png"]
+
+
 ON = {"wall": lambda x: x[0] == 0, "pull": lambda x: x[0] == 1}
 
 

@@ -36,7 +36,8 @@ def headline(result: Result) -> dict[str, str]:
         return {"kind": "bad", "words": "No solution exists: the load carries the body away."}
     if code == ExitCode.INTERRUPTED:
         return {"kind": "bad", "words": "The run was interrupted: what is shown is not a solution."}
-    return {"kind": "bad", "words": f"No certified solution: {result.summary.get('reason')}."}
+    off = " The body is carried off; `hvi path` finds the last state that is borne." if result.carried_off else ""
+    return {"kind": "bad", "words": f"No certified solution: {result.summary.get('reason')}.{off}"}
 
 
 def _rough(result: Result) -> str:

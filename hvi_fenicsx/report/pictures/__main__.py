@@ -75,11 +75,11 @@ def draw_all(result: Result) -> list[str]:
     Raises:
         PictureError: there is nothing to draw.
     """
-    body = result.body
-    if body.displacement is None and body.escape_mode is None and not result.parts:
+    arrays = result.arrays
+    if arrays.displacement is None and arrays.escape_mode is None and not arrays.parts:
         raise PictureError(f"{result.folder}: there is nothing to draw, neither a displacement nor a part of Γc")
     context = multiprocessing.get_context("fork")
-    with XServer(wanted=body.dimension == 3) as server:
+    with XServer(wanted=result.body.dimension == 3) as server:
         from .drawings import drawings  # loads the plotting library while the server starts
 
         found = list(drawings(result))
