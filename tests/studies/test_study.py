@@ -447,6 +447,7 @@ def test_a_scene_without_a_solution_ends_a_study(tmp_path: Path) -> None:
     assert "no solution exists" in done.stderr
 
 
+@pytest.mark.long
 def test_a_point_that_hangs_is_given_up_and_run_again_with_a_longer_limit(tmp_path: Path) -> None:
     """The reference, which may take five times the limit, is not even imported within a quarter of a second."""
     file = write_scene(tmp_path / "square.toml", model(2, friction=LAW))

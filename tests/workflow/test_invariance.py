@@ -156,7 +156,9 @@ def image(file: Path, turn: Array, folder: Path) -> Path:
     return meshes.transformed(folder / "image.msh", file, [a, b, 0, 0.3, c, d, 0, -0.7, 0, 0, 1, 0])
 
 
-@pytest.mark.parametrize("kind", IMAGES)
+@pytest.mark.parametrize(
+    "kind", ["mirrored", *(pytest.param(k, marks=pytest.mark.long) for k in IMAGES if k != "mirrored")]
+)
 def test_a_mesh_may_be_turned_and_mirrored_with_its_scene(kind: str, mesh: Path, tmp_path: Path) -> None:
     for name in ("lift-off", "drop"):
         one = solved(on_file(SCENES[name], mesh))
