@@ -211,7 +211,7 @@ def history(prepared: Preparation) -> Iterator[str]:
     Args:
         prepared: the scene, assembled.
     """
-    if any(not term.law.is_linear for term in prepared.problem.terms):
+    if any(not term.is_linear for term in prepared.problem.terms):
         yield f"history: {NO_HISTORY}"
     if (wanted := prepared.scene.path) is not None:
         yield from path_wanted(wanted, wanted.scaled or loading.names(prepared.system))

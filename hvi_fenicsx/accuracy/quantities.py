@@ -135,9 +135,7 @@ class FrictionTraction(ContactField):
 
     def missing(self, level: AdaptiveLevel) -> str | None:
         """A law of the slip."""
-        from ..effects import Direction
-
-        slips = any(term.direction is Direction.SLIP for term in level.prepared.problem.terms)
+        slips = any(term.direction.tangential for term in level.prepared.problem.terms)
         return None if slips else "the scene has no friction"
 
     def read(self, level: AdaptiveLevel) -> fem.Function:
@@ -241,11 +239,9 @@ def _tangential(level: AdaptiveLevel, read: Callable[[ContactState], Array], uni
 
 def _from_true_law(level: AdaptiveLevel) -> float:
     """∫ of the distance of -σ_t from the unsmoothed law's graph over Γc, nondimensional. Collective."""
-    from ..effects import Direction
-
     found = 0.0
     for state in _states(level):
         for law in state.laws:
-            if law.term.direction is Direction.SLIP:
+            if law.term.direction.tangential:
                 found += float(np.sum(state.surface.weights * law.true_distance()))
     return float(level.comm.allreduce(found))

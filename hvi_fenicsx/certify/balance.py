@@ -138,9 +138,10 @@ def _holders(problem: Problem, state: ContactState) -> Iterator[Holder]:
         low, high = law.term.law.interval(law.argument, law.near)
         for k in range(law.allowed.shape[1]):
             least, most = -high, -low
-            if law.term.radial:
+            if (length := law.term.length) is not None:
                 stuck, given = law.argument <= law.near, -law.allowed[:, k]
-                least, most = np.where(stuck, -high, given), np.where(stuck, high, given)
+                pull, push = length.extent(k)
+                least, most = np.where(stuck, -pull * high, given), np.where(stuck, push * high, given)
             yield holder(law.term.directions[:, k], -law.allowed[:, k], least, most)
 
 

@@ -48,8 +48,10 @@ class LawState:
 
     Attributes:
         term: the law.
+        components: the displacement along its directions, (m, k).
         argument: what it acts on, (m,).
         traction: the traction it gives, (m,).
+        given: the tractions along its directions, (m, k).
         distance: how far that is from Clarke's subdifferential, (m,).
         allowed: the nearest traction along its directions that the law allows, (m, k).
         scale: what its traction is judged by, (m,).
@@ -58,8 +60,10 @@ class LawState:
     """
 
     term: LawTerm
+    components: Array
     argument: Array
     traction: Array
+    given: Array
     distance: Array
     allowed: Array
     scale: Array
@@ -69,6 +73,15 @@ class LawState:
     def true_distance(self) -> Array:
         """How far the traction is from the unsmoothed law's subdifferential, (m,)."""
         return self.term.exact.distance(self.argument, self.traction, self.near)
+
+    @property
+    def slip_share(self) -> Array:
+        """The share of the slip in the square of a length of both modes, 0 to 1, (m,); NaN where that is zero.
+
+        Along a path on which it stays the same this is the share of mode II in the work of the law.
+        """
+        assert self.term.length is not None
+        return self.term.length.slip_share(self.components, self.near)
 
     def on_convex_kink(self) -> Mask:
         """Where it is on a kink of the law's convex part, (m,)."""
@@ -129,6 +142,16 @@ class ContactState:
                 return law.term.law.branch(law.argument, law.near)
         return None
 
+    @property
+    def resists_slip(self) -> bool:
+        """Whether a law acts on the slip, alone or with an opening."""
+        return any(law.term.direction.tangential for law in self.laws)
+
+    @property
+    def of_both_modes(self) -> LawState | None:
+        """The law of opening and slip together; None where there is none."""
+        return next((law for law in self.laws if law.term.direction is Direction.SEPARATION), None)
+
 
 def forces(problem: Problem, u: fem.Function) -> Forces:
     """The forces at a displacement, reassembled from the forms. Collective.
@@ -188,14 +211,16 @@ def _law(attribution: ForceAttribution, number: int, term: LawTerm, u: Array, sc
     if len(parts) == 1:
         at, forces = attribution.shared.of_law(number, local)
         parts[0][at] = np.sum(forces * local.directions[at, 0], axis=1) / term.surface.weights[at]
-        traction, distance = parts[0], _away(parts[0], low, high)
+        traction, distance, given = parts[0], _away(parts[0], low, high), parts[0][:, None]
         allowed = np.clip(parts[0], low, high)[:, None]
     else:
-        traction, distance, allowed = _radial(attribution, number, term, argument, u)
+        traction, distance, given, allowed = _of_length(attribution, number, term, u)
     return LawState(
         term=term,
+        components=term.slip(u),
         argument=argument,
         traction=traction,
+        given=given,
         distance=distance,
         allowed=allowed,
         scale=scale,
@@ -204,27 +229,24 @@ def _law(attribution: ForceAttribution, number: int, term: LawTerm, u: Array, sc
     )
 
 
-def _radial(
-    attribution: ForceAttribution, number: int, term: LawTerm, argument: Array, u: Array
-) -> tuple[Array, Array, Array]:
-    """A law of |u_t|: the traction is a vector along the slip, at zero slip any within the kink's disc."""
-    local = attribution.terms[number]
-    dofs = [d for d, _ in shared_forces.components(local)]
-    signs = np.stack([s for _, s in shared_forces.components(local)], axis=1)
-    carried_elsewhere = np.stack([attribution.held[d] | attribution.contact[d] for d in dofs], axis=1)
-    needed = np.stack([attribution.needed[d] for d in dofs], axis=1) * signs / term.surface.weights[:, None]
-    near = attribution.near[term.surface.blocks]
-    slip, moving = term.slip(u), argument > near
-    unit = np.divide(slip, argument[:, None], out=np.zeros_like(slip), where=moving[:, None])
-    low, high = term.law.interval(argument, near)
-    needed = np.where(carried_elsewhere, unit * ((low + high) / 2)[:, None], needed)
+def _of_length(
+    attribution: ForceAttribution, number: int, term: LawTerm, u: Array
+) -> tuple[Array, Array, Array, Array]:
+    """A law of a length: its traction, how far the tractions are from what it allows, they, and the nearest allowed."""
+    local, length = attribution.terms[number], term.length
+    assert length is not None
+    blocks, d = term.surface.blocks, term.free.shape[1]
+    near, components = attribution.near[blocks], term.slip(u)
+    low, high = term.law.interval(term.argument(u), near)
+    gradient = length.gradient(components)
+    elsewhere = (attribution.held | attribution.contact).reshape(-1, d)[blocks]
+    hidden = np.any((local.directions != 0.0) & elsewhere[:, None, :], axis=2)
+    needed = np.einsum("mkd,md->mk", local.directions, attribution.needed.reshape(-1, d)[blocks])
+    given = np.where(hidden, gradient * ((low + high) / 2)[:, None], needed / term.surface.weights[:, None])
     at, forces = attribution.shared.of_law(number, local)
-    needed[at] = np.einsum("mkd,md->mk", local.directions[at], forces) / term.surface.weights[at, None]
-    along = np.where(moving, np.sum(needed * unit, axis=1), np.linalg.norm(needed, axis=1))
-    across = np.where(moving, np.linalg.norm(needed - along[:, None] * unit, axis=1), 0.0)
-    at_rest = np.divide(needed, along[:, None], out=np.zeros_like(needed), where=along[:, None] > 0)
-    allowed = np.clip(along, low, high)[:, None] * np.where(moving[:, None], unit, at_rest)
-    return along, np.hypot(_away(along, low, high), across), allowed
+    given[at] = np.einsum("mkd,md->mk", local.directions[at], forces) / term.surface.weights[at, None]
+    allowed = length.allowed(components, given, (low, high), near)
+    return length.traction(components, given, near), np.linalg.norm(given - allowed, axis=1), given, allowed
 
 
 def _away(traction: Array, low: Array, high: Array) -> Array:
@@ -269,7 +291,7 @@ def _state(
         gap=np.full(len(normal), np.inf) if bounds is None else bounds.upper - normal,
         pressure=_pressure(here, bounds, surface, traction, own),
         contact_pressure=own,
-        friction=_friction(here, surface, traction, slip),
+        friction=_friction(here, surface, traction),
         on_lower=on[0],
         on_upper=on[1],
     )
@@ -280,27 +302,19 @@ def _pressure(
 ) -> Array:
     """σ_n of what acts on the part where something does, else of the residual."""
     pressure = contact.copy() if bounds is not None else np.sum(traction * surface.normals, axis=1)
-    normal_laws = [law for law in laws if law.term.direction is not Direction.SLIP]
+    normal_laws = [law for law in laws if law.term.direction.normal]
     if normal_laws and bounds is None:
         pressure = np.zeros_like(pressure)
     for law in normal_laws:
-        pressure = pressure - np.sum(law.term.directions[:, 0] * surface.normals, axis=1) * law.traction
+        pressure = pressure - np.sum(law.term.directions[:, 0] * surface.normals, axis=1) * law.given[:, 0]
     return pressure
 
 
-def _friction(laws: Sequence[LawState], surface: Surface, traction: Array, slip: Array) -> Array:
+def _friction(laws: Sequence[LawState], surface: Surface, traction: Array) -> Array:
     """-σ_t of what acts on the part where something does, else of the residual."""
     friction = -np.einsum("mkd,md->mk", surface.tangents, traction)
     for law in laws:
-        if law.term.direction is Direction.SLIP:
+        if law.term.direction.tangential:
             alone = law.hidden if law.term.radial else np.ones(len(friction), dtype=bool)
-            friction = np.where(alone[:, None], _along(slip, law), friction)
+            friction = np.where(alone[:, None], law.given[:, -friction.shape[1] :], friction)
     return friction
-
-
-def _along(slip: Array, law: LawState) -> Array:
-    """The law's traction as a vector: along a signed slip, or in the direction of a slip vector."""
-    if slip.shape[1] == 1:
-        return law.traction[:, None]
-    moving = law.argument[:, None] > law.near[:, None]
-    return law.traction[:, None] * np.divide(slip, law.argument[:, None], out=np.zeros_like(slip), where=moving)

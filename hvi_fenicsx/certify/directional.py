@@ -1,18 +1,18 @@
 """How the energy grows to first order in the directions that supports and bounds admit, and how the laws are curved.
 
 To first order it grows by E'(u; v) = r·v + Σ w j'(x; v), r being the forces without the laws, j' their one-sided
-derivatives. That is a sum over components (in local frames), except that a law of |u_t| on a kink couples those of its
-vertex by a term c |B v|. A kink that lets the energy fall in no admissible direction spoils no minimum.
+derivatives. That is a sum over components (in local frames), except that a law of a length on a kink couples those of
+its vertex by a term c δ(B v). A kink that lets the energy fall in no admissible direction spoils no minimum.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ..laws import Superpotential
+from ..laws import Length, Superpotential
 from ..problem.law_term import LawTerm
 from ..problem.problem import Bounds
 from ..problem.references import References
@@ -95,17 +95,38 @@ def growth(
 
 @dataclass(frozen=True)
 class _Coupling:
-    """The terms c |B v| of one law of |u_t| at vertices on its kinks.
+    """The terms c δ(B v) of one law of a length at vertices on its kinks.
 
     Attributes:
         blocks: the vertices, (m,).
         factors: c, (m,).
         rows: B, (m, q, d).
+        length: δ.
     """
 
     blocks: Entities
     factors: Array
     rows: Array
+    length: Length
+
+
+@dataclass(frozen=True)
+class _Bend:
+    """One term c δ(B v) at one vertex.
+
+    Attributes:
+        factor: c.
+        rows: B, (q, d), or its columns of some components.
+        length: δ.
+    """
+
+    factor: float
+    rows: Array
+    length: Length
+
+    def value(self, v: Array) -> Array:
+        """The term at directions v (p, d), (p,)."""
+        return self.factor * self.length.of(v @ self.rows.T)
 
 
 @dataclass
@@ -119,7 +140,7 @@ class _Collector:
         d: the dimension.
         tolerance: relative traction up to which a growth is none.
         thresholds: when a vertex is on a kink or a bound.
-        couplings: of the laws of |u_t|.
+        couplings: of the laws of a length.
     """
 
     references: References
@@ -157,7 +178,7 @@ class _Collector:
         self.bent[dofs] |= np.isin(x, term.law.kinks)
 
     def enter_vector_law(self, term: LawTerm) -> None:
-        """Enter a law of |u_t|: its force along the slip, the jump of a kink, and the stiffness across the slip.
+        """Enter a law of a length: its force along the vector, the jump of a kink, and the stiffness across it.
 
         Args:
             term: the law, in local components.
@@ -166,7 +187,7 @@ class _Collector:
         x = self._on_kink(term.law, term.argument(self.u))
         moving = x > self.thresholds.near
         size = np.where(moving, x, 1.0)
-        unit = np.where(moving[:, None], slip / size[:, None], 0.0)
+        unit = np.where(moving[:, None], term.gradient(slip), 0.0)
         left, right = np.where(moving, term.law.left(x), 0.0), term.law.right(x)
         force = np.einsum("m,mk,mkd->md", w * (left + right) / 2, unit, term.directions)
         across = np.where(moving, np.minimum(left, right) / size, np.inf)
@@ -180,11 +201,13 @@ class _Collector:
         slack = self.tolerance * w * self.references.traction_scale(term)
         np.add.at(self.slack, dofs[touched], np.repeat(slack, self.d).reshape(touched.shape)[touched])
         on = np.isin(x, term.law.kinks)
-        self._couple(term, on & moving, w * (right - left) / 2, np.einsum("mk,mkd->md", unit, term.directions)[:, None])
-        self._couple(term, on & ~moving, w * right, term.directions)
+        ahead = np.einsum("mk,mkd->md", unit, term.directions)[:, None]
+        self._couple(term, on & moving, w * (right - left) / 2, ahead, Length.plain(1))
+        counting = term.directions * term.counts(self.u, self.thresholds.near)[:, :, None]
+        self._couple(term, on & ~moving, w * right, counting, term.length or Length.plain(1))
 
-    def _couple(self, term: LawTerm, on: Mask, factors: Array, rows: Array) -> None:
-        self.couplings.append(_Coupling(term.surface.blocks[on], factors[on], rows[on]))
+    def _couple(self, term: LawTerm, on: Mask, factors: Array, rows: Array, length: Length) -> None:
+        self.couplings.append(_Coupling(term.surface.blocks[on], factors[on], rows[on], length))
 
     def enter_bounds(self, bounds: Bounds) -> None:
         """Directions beyond a reached bound are not admissible.
@@ -222,16 +245,16 @@ class _Collector:
 
     def _coupled(self) -> Iterator[tuple[Integers, float, float]]:
         """For each vertex with couplings: the components that they touch, their least growth, and that of a pair."""
-        at: dict[int, list[tuple[float, Array]]] = {}
+        at: dict[int, list[_Bend]] = {}
         for one in self.couplings:
             for i, block in enumerate(one.blocks):
-                at.setdefault(int(block), []).append((float(one.factors[i]), one.rows[i]))
-        for vertex, norms in at.items():
-            moved = np.flatnonzero(np.any(np.vstack([rows for _, rows in norms]) != 0.0, axis=0))
+                at.setdefault(int(block), []).append(_Bend(float(one.factors[i]), one.rows[i], one.length))
+        for vertex, bends in at.items():
+            moved = np.flatnonzero(np.any(np.vstack([b.rows for b in bends]) != 0.0, axis=0))
             dofs = vertex * self.d + moved
-            yield dofs, *self._least(dofs, [(c, rows[:, moved]) for c, rows in norms])
+            yield dofs, *self._least(dofs, [replace(b, rows=b.rows[:, moved]) for b in bends])
 
-    def _least(self, dofs: Integers, norms: list[tuple[float, Array]]) -> tuple[float, float]:
+    def _least(self, dofs: Integers, bends: list[_Bend]) -> tuple[float, float]:
         """The least growth of coupled components over their admissible directions, and of opposite ones together."""
         up, down = self.up[dofs], self.down[dofs]
         with np.errstate(invalid="ignore"):  # both infinite: the next line
@@ -239,11 +262,11 @@ class _Collector:
         steepest = np.where(np.isfinite(up) & np.isfinite(down), middle, np.where(np.isfinite(up), -up, down))
         steepest = np.where(np.isfinite(steepest), steepest, 0.0)
         v = _admissible(np.vstack([steepest, _sphere(len(dofs))]), np.isfinite(up), np.isfinite(down))
-        bends = np.sum([c * np.linalg.norm(v @ rows.T, axis=1) for c, rows in norms], axis=0)
+        ahead, behind = (np.sum([b.value(side) for b in bends], axis=0) for side in (v, -v))
         one_way = np.where(v > 0, np.where(np.isfinite(up), up, 0.0), np.where(np.isfinite(down), down, 0.0))
         both = np.all((v == 0.0) | (np.isfinite(up) & np.isfinite(down)), axis=1)
-        rises = np.sum(one_way * np.abs(v), axis=1) + bends
-        pairs = np.abs(v) @ self.jump[dofs] + 2 * bends
+        rises = np.sum(one_way * np.abs(v), axis=1) + ahead
+        pairs = np.abs(v) @ self.jump[dofs] + ahead + behind
         return float(np.min(rises, initial=np.inf)), float(np.min(pairs[both], initial=np.inf))
 
     def _on_kink(self, law: Superpotential, x: Array) -> Array:

@@ -10,7 +10,7 @@ import ufl
 from dolfinx import fem
 from mpi4py import MPI
 
-from ..effects import Direction, Place
+from ..effects import Place
 from ..problem.contact_surface import Surface
 from ..problem.problem import Problem
 from ..problem.vectors import nodal
@@ -163,8 +163,8 @@ def traction(state: ContactState) -> Array:
     """
     found = np.zeros_like(state.surface.normals)
     tied = state.surface.tied
-    if tied or state.bounds is not None or any(law.term.direction is not Direction.SLIP for law in state.laws):
+    if tied or state.bounds is not None or any(law.term.direction.normal for law in state.laws):
         found += state.pressure[:, None] * state.surface.normals
-    if tied or any(law.term.direction is Direction.SLIP for law in state.laws):
+    if tied or state.resists_slip:
         found -= np.einsum("mk,mkd->md", state.friction, state.surface.tangents)
     return found

@@ -201,7 +201,7 @@ def _slip_and_kink(problem: Problem, law: LawState, thresholds: PlausibilityThre
     kink, reached, weights = term.exact.length_scale, np.abs(law.argument), term.surface.weights
     if term.exact.is_linear or np.any(term.exact.kinks == 0.0):
         return
-    if term.direction is not Direction.SLIP:
+    if term.direction in (Direction.OPENING, Direction.PENETRATION):
         reached = np.where(law.argument > 0, reached, 0.0)
     most = largest(comm, float(np.max(reached, initial=0.0)))
     beyond = total(comm, float(weights[reached > far * kink].sum())) / total(comm, float(weights.sum()))

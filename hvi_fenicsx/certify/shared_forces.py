@@ -1,10 +1,10 @@
-"""Forces at vertices where a law of |u_t| shares a component with other laws or with contact, at edges in space.
+"""Forces at vertices where a law of a length shares a component with other laws or with contact.
 
-Only their sum is known. Each carrier may give any force of a convex set: a law at rest a disc, any other law a segment,
-contact a half-line. Forces of these sets whose sum comes nearest to the wanted one are the projections of what each
-carrier is asked for. Some sweeps give to each in turn what the others leave; where the sum touches the boundary of what
-all can give they come nearer ever more slowly, so Newton steps on what is asked for follow. What then is left over, no
-attribution accounts for.
+Only their sum is known. Each carrier may give any force of a convex set: a law at rest a disc (of both modes half an
+ellipsoid), any other law a segment, contact a half-line. Forces of these sets whose sum comes nearest to the wanted one
+are the projections of what each carrier is asked for. Some sweeps give to each in turn what the others leave; where the
+sum touches the boundary of what all can give they come nearer ever more slowly, so Newton steps on what is asked for
+follow. What then is left over, no attribution accounts for.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..laws import Length
 from ..problem.contact_surface import component_dofs
 from ..problem.law_term import LawTerm
 from ..problem.problem import Bounds
@@ -33,6 +34,8 @@ class Carrier:
         low: the end of the segment behind, (k, 1).
         high: the end ahead, (k, 1).
         axes: of a disc of forces, (k, q, d).
+        counts: which of these count, (k, q).
+        length: whose unit ball, turned into forces, the disc is.
         radius: of the disc, (k, 1).
         at_rest: where it may give the disc instead of the segment, (k, 1).
     """
@@ -44,6 +47,8 @@ class Carrier:
     low: Array
     high: Array
     axes: Array
+    counts: Mask
+    length: Length
     radius: Array
     at_rest: Mask
 
@@ -72,14 +77,11 @@ class Carrier:
         return np.clip(size, self.low, self.high) * self.along, share[:, :, None] * _squares(shown)
 
     def _in_disc(self, wanted: Array) -> tuple[Array, Array]:
-        inside = np.einsum("mkd,md->mk", self.axes, wanted)
-        length = np.linalg.norm(inside, axis=1, keepdims=True)
-        beyond = length > self.radius
-        share = np.divide(self.radius, length, out=np.ones_like(length), where=beyond)
-        flat = np.einsum("mk,mkd->md", inside, self.axes)
-        out = np.divide(flat, length, out=np.zeros_like(flat), where=beyond)
-        plane = np.einsum("mkd,mke->mde", self.axes, self.axes)
-        return share * flat, share[:, :, None] * (plane - _squares(out))
+        inside = np.einsum("mkd,md->mk", self.axes, wanted) * self.counts
+        found, slope = self.length.nearest(inside, self.radius[:, 0])
+        slope = slope * (self.counts[:, :, None] & self.counts[:, None, :])
+        turned = np.einsum("mkd,mkl,mle->mde", self.axes, slope, self.axes)
+        return np.einsum("mk,mkd->md", found, self.axes), turned
 
 
 def _squares(vectors: Array) -> Array:
@@ -165,7 +167,7 @@ def settle(
 
 
 def _shared(terms: Sequence[LawTerm], bounds: Sequence[tuple[Bounds, Mask, Mask]], dofs: int, d: int) -> Integers:
-    """The vertices at which a component of a law of |u_t| has another carrier too."""
+    """The vertices at which a component of a law of a length has another carrier too."""
     carriers = np.zeros(dofs, dtype=np.int64)
     for term in terms:
         for own, _ in components(term):
@@ -184,9 +186,7 @@ def _of_law(term: LawTerm, row: Integers, free: Mask, u: Array, near: Array) -> 
     weights = term.surface.weights[own, None]
     low, high = (weights * end[:, None] for end in term.law.interval(argument, within))
     moving = (argument > within)[:, None] | np.full((len(own), 1), not term.radial)
-    unit: Array = np.ones((len(own), 1))
-    if term.radial:
-        unit = np.divide(term.slip(u)[own], argument[:, None], out=np.zeros((len(own), 2)), where=moving)
+    unit = np.where(moving, term.gradient(term.slip(u)[own]), 0.0)
     return Carrier(
         rows=rows,
         own=own,
@@ -195,6 +195,8 @@ def _of_law(term: LawTerm, row: Integers, free: Mask, u: Array, near: Array) -> 
         low=low,
         high=high,
         axes=term.directions[own],
+        counts=term.counts(u, near[term.surface.blocks])[own],
+        length=term.length or Length.plain(1),
         radius=np.abs(high),
         at_rest=~moving,
     )
@@ -211,6 +213,8 @@ def _of_bounds(bounds: Bounds, lower: Mask, upper: Mask, row: Integers, free: Ma
         low=np.where(lower[own], -np.inf, 0.0)[:, None],  # at the upper bound of u·n contact pushes inward
         high=np.where(upper[own], np.inf, 0.0)[:, None],
         axes=bounds.surface.normals[own, None],
+        counts=np.ones((len(own), 1), dtype=bool),
+        length=Length.plain(1),
         radius=np.zeros((len(own), 1)),
         at_rest=np.zeros((len(own), 1), dtype=bool),
     )

@@ -1,6 +1,6 @@
 """Is it the only equilibrium? What convexity of the energy proves, at the cost of one factorisation at most.
 
-Where no law drops, let c bound how steeply each falls: w (j + ½ c x²) is convex, also on |u_t|, and the energy is
+Where no law drops, let c bound how steeply each falls: w (j + ½ c x²) is convex, also on a length, and the energy is
 convex if the stiffness A less C, the sum of c w over the laws' vertices, is positive semidefinite. By Sylvester's law
 its negative pivots decide. Every equilibrium is then one of lowest energy, and two of them differ by a rigid motion
 that the supports leave. There is no other one where such motions meet a component in which the energy grows to first
@@ -98,7 +98,7 @@ def _doubt(
 
 
 def _fall(term: LawTerm) -> float:
-    """A bound of how steeply a law falls; inf where a law of |u_t| has a slope at 0 that points inwards."""
+    """A bound of how steeply a law falls; inf where a law of a length has a slope at 0 that points inwards."""
     inwards = term.radial and bool(term.law.right(np.zeros(1))[0] < 0.0)
     return np.inf if inwards else float(term.law.steepest_fall)
 
@@ -126,8 +126,9 @@ def _stiffer(system: System, modes: Sequence[Mode], falls: Sequence[float], thre
 
 
 def _rate(term: LawTerm, slope: float) -> Array:
-    """The tangent of a law with the same slope in all its directions, (m, d, d)."""
-    full = slope * np.einsum("mka,mkb->mab", term.directions, term.directions)
+    """The tangent of a law with the same slope by the argument wherever it is, (m, d, d)."""
+    factors = np.ones(1) if term.length is None else np.array(term.length.factors)
+    full = slope * np.einsum("k,mka,mkb->mab", factors**2, term.directions, term.directions)
     return np.asarray(term.free[:, :, None] * full * term.free[:, None, :])
 
 
@@ -146,7 +147,7 @@ def _left(
     allowed = max(certificate.tolerance, certificate.rounding or 0.0)
     known = references.of(problem, examination.forces.load)
     strong = growth(known, problem.relative(u.x.array), examination.forces.reaction, allowed).strong
-    springs = [term for term in system.terms if term.law.is_linear]
+    springs = [term for term in system.terms if term.is_linear]
     rows = [np.concatenate([m[strong], *(term.slip(m).ravel() for term in springs)]) for m in motions]
     gram = sum(agree(system.comm, np.array([[a @ b for a in rows] for b in rows])))
     least, most = np.linalg.eigvalsh(gram)[[0, -1]]

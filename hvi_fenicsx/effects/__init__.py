@@ -1,7 +1,7 @@
 """The effects: importing the package registers those that come with the program."""
 
 from ..class_registry import load_modules
-from . import anisotropic, contact, elasticity, friction, loads, normal_laws, thermal, total_loads
+from . import anisotropic, cohesion, contact, elasticity, friction, loads, normal_laws, thermal, total_loads
 from .base import Drive, Effect, Evaluate, FormContext, Place, SideMoments, Sizes, SurfaceLoad, load_name
 from .contribution import Averaged, BoundaryLaw, Condition, Contribution, Direction, NormalBounds
 from .formula_field import FormulaField
@@ -25,6 +25,7 @@ __all__ = [
     "Sizes",
     "SurfaceLoad",
     "anisotropic",
+    "cohesion",
     "contact",
     "elasticity",
     "friction",

@@ -6,12 +6,15 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Any
 
-from ..laws import Superpotential
+import numpy as np
+
+from ..laws import Length, Superpotential
 from ..spatial_value import SpatialValue
+from ..typing import Array
 
 
 class Direction(Enum):
-    """The scalar displacement that a law of Γc acts on."""
+    """The displacement that a law of Γc acts on."""
 
     SLIP = "slip"
     """u_t; in 3D |u_t|."""
@@ -19,6 +22,45 @@ class Direction(Enum):
     """-u·n, n outward: positive when the body lifts off."""
     PENETRATION = "penetration"
     """u·n: positive when the body is pressed into its support."""
+    SEPARATION = "separation"
+    """sqrt(⟨-u·n⟩₊² + β²|u_t|²): opening and slip together; compression does not count."""
+
+    @property
+    def tangential(self) -> bool:
+        """Whether the slip is in it."""
+        return self in (Direction.SLIP, Direction.SEPARATION)
+
+    @property
+    def normal(self) -> bool:
+        """Whether an opening or a penetration is in it."""
+        return self is not Direction.SLIP
+
+    def along(self, normals: Array, tangents: Array) -> Array:
+        """The unit vectors of the components that it is made of, (m, k, d).
+
+        Args:
+            normals: outward, (m, d).
+            tangents: (m, d-1, d).
+        """
+        opening = -normals[:, None, :]
+        found = {
+            Direction.SLIP: (tangents,),
+            Direction.OPENING: (opening,),
+            Direction.PENETRATION: (-opening,),
+            Direction.SEPARATION: (opening, tangents),
+        }
+        return np.concatenate(found[self], axis=1)
+
+    def length(self, tangents: int, slip: float) -> Length | None:
+        """The length of these components that a law acts on; None: it acts on the one component, with its sign.
+
+        Args:
+            tangents: how many there are.
+            slip: what a slip is multiplied by where it is taken together with an opening.
+        """
+        if self is Direction.SEPARATION:
+            return Length((1.0,) + (slip,) * tangents, opens=True)
+        return Length.plain(tangents) if self is Direction.SLIP and tangents > 1 else None
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,15 +95,17 @@ class NormalBounds:
 
 @dataclass(frozen=True, slots=True)
 class BoundaryLaw:
-    """A superpotential that acts on one scalar displacement of a part.
+    """A superpotential that acts on one displacement of a part.
 
     Attributes:
         direction: the displacement.
         law: the superpotential, SI.
+        slip: β, what a slip is multiplied by where it is taken together with an opening.
     """
 
     direction: Direction
     law: Superpotential
+    slip: float = 1.0
 
 
 @dataclass(frozen=True, slots=True)

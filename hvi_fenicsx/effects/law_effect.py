@@ -72,12 +72,17 @@ class LawEffect(Effect):
     @classmethod
     def _from_table(cls, data: Any) -> Any:
         law = data.get("law") if isinstance(data, dict) else None
-        made = isinstance(data, cls) or isinstance(law, laws.Superpotential)
-        return data if made else {"law": _law(data)}
+        if isinstance(data, cls) or isinstance(law, laws.Superpotential):
+            return data
+        if not isinstance(data, dict):
+            return {"law": _law(data)}
+        own = {key: data[key] for key in cls.model_fields if key != "law" and key in data}
+        return {"law": _law({key: value for key, value in data.items() if key not in own}), **own}
 
     @model_serializer(mode="wrap")
     def _as_table(self, handler: SerializerFunctionWrapHandler) -> Any:
-        return handler(self)["law"]
+        table = handler(self)
+        return {**table.pop("law"), **table}
 
     @override
     def contribute(self, context: FormContext, where: str | None) -> Contribution:

@@ -4,6 +4,7 @@ from ..class_registry import load_modules
 from .base import Superpotential
 from .catalogue import Graph, LinearSpring, QuadraticLinear, QuadraticLinearLiteral, Sawtooth, Tresca
 from .convex_parts import ConvexPart, DifferentiablePart, Directional
+from .lengths import Length
 from .polyline import PolylineLaw, PolylinePart
 from .registry import available, create, describe
 from .sampled import SampledLaw, sample_traction
@@ -17,6 +18,7 @@ __all__ = [
     "Directional",
     "Exponential",
     "Graph",
+    "Length",
     "LinearSpring",
     "PolylineLaw",
     "PolylinePart",

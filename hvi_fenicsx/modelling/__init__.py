@@ -8,6 +8,7 @@ from .model import Model
 from .placed_effects import (
     Adhesion,
     BodyForce,
+    Cohesion,
     Contact,
     Displacement,
     Friction,
@@ -28,6 +29,7 @@ __all__ = [
     "Anisotropic",
     "Body",
     "BodyForce",
+    "Cohesion",
     "Contact",
     "ContactArrays",
     "Displacement",

@@ -216,6 +216,21 @@ class Support(_Law):
 
 
 @dataclass(frozen=True)
+class Cohesion(_Law):
+    """A law of opening and slip together (see :class:`_Law`), by the effective displacement.
+
+    Attributes:
+        beta: what a slip is multiplied by beside an opening.
+    """
+
+    beta: float = 1.0
+
+    def effect(self, mesh: dmesh.Mesh) -> Effect:
+        """The law."""
+        return checked(effects.cohesion.Cohesion, law=self.law, beta=float(self.beta))
+
+
+@dataclass(frozen=True)
 class BodyForce(InRegion):
     """A force per volume.
 

@@ -131,7 +131,7 @@ def _problem(
     bounds = contact_parts.make_bounds(context, scales, surfaces, contributions, prescribed, gaps)
     contact_parts.check_bounds(context, bounds, prescribed, fixed, thresholds)
     contact_parts.check_contradictions(context, scales, bounds, thresholds)
-    part_laws.check_normal_laws(contributions)
+    part_laws.check_laws(contributions)
     terms = part_laws.make_terms(context, scales, surfaces, contributions, fixed, model.modify, gaps)
     linear, strains = (_by_name(contributions, kind) for kind in ("linear", "strains"))
     return Problem(

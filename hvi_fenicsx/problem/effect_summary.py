@@ -15,11 +15,6 @@ from .contact_surface import Surface
 from .problem import PlacedContribution, Problem
 
 _BOUNDS = ("gap", "sigma_n", "contact")
-_LAWS = {
-    Direction.SLIP: ("friction_t", "branch_t"),
-    Direction.OPENING: ("sigma_n", "branch_n"),
-    Direction.PENETRATION: ("sigma_n", "branch_n"),
-}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -108,11 +103,12 @@ def _output(effect: Effect, contribution: Contribution) -> Iterator[str]:
     if contribution.bounds:
         yield from _BOUNDS
     for law in contribution.laws:
-        yield from _LAWS[law.direction]
+        yield from ("friction_t", "branch_t") if law.direction.tangential else ()
+        yield from ("sigma_n", "branch_n") if law.direction.normal else ()
 
 
 def _solver(contribution: Contribution) -> str:
-    if any(not law.law.is_linear for law in contribution.laws):
+    if any(not law.law.is_linear or law.direction is Direction.SEPARATION for law in contribution.laws):
         return "branch iteration"
     return "bounds" if contribution.bounds else "linear"
 

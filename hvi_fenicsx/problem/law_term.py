@@ -15,8 +15,8 @@ from dolfinx.fem.petsc import assemble_vector
 from petsc4py import PETSc
 
 from ..effects import Direction
-from ..laws import Superpotential
-from ..typing import Array
+from ..laws import Length, Superpotential
+from ..typing import Array, Mask
 from .contact_surface import Surface
 
 
@@ -29,7 +29,8 @@ class LawTerm:
         direction: which displacement it acts on.
         law: the superpotential j that is solved.
         exact: the unsmoothed one (the same where nothing is smoothed).
-        directions: what the displacement is multiplied with, (m, k, d); k = 2 for |u_t| in 3D.
+        directions: unit vectors that the displacement is multiplied with, (m, k, d).
+        length: what the law acts on is this length of the k components; None: the signed component, k = 1.
         free: 1 where a component is not prescribed, (m, d).
         density: the P1 field τ.
         residual: the compiled form ∫ τ·v ds; None where no quadrature of the functions lumps it.
@@ -40,23 +41,52 @@ class LawTerm:
     law: Superpotential
     exact: Superpotential
     directions: Array
+    length: Length | None
     free: Array
     density: fem.Function
     residual: Any | None
 
     @property
     def radial(self) -> bool:
-        """Whether the law acts on the length of a slip vector (|u_t| in 3D)."""
-        return self.directions.shape[1] > 1
+        """Whether the law acts on the length of a vector: |u_t| in 3D, or both modes together."""
+        return self.length is not None
+
+    @property
+    def is_linear(self) -> bool:
+        """Whether its forces are proportional to the displacement: what opens must also close."""
+        return self.law.is_linear and not (self.length is not None and self.length.opens)
 
     def slip(self, u: Array) -> Array:
-        """The displacement along the directions, of a local array u; shape (m, k)."""
+        """The components along the directions, of a local array u; shape (m, k)."""
         return np.einsum("mkd,md->mk", self.directions, self.surface.values(u))
 
     def argument(self, u: Array) -> Array:
-        """What the law's j acts on: the signed slip, or |u_t| in 3D; shape (m,)."""
-        slip = self.slip(u)
-        return slip[:, 0] if slip.shape[1] == 1 else np.linalg.norm(slip, axis=1)
+        """What the law's j acts on: the signed component, or the length of the vector; shape (m,)."""
+        return self.argument_of(self.slip(u))
+
+    def argument_of(self, components: Array) -> Array:
+        """What the law's j acts on, (m,).
+
+        Args:
+            components: along the directions, (m, k).
+        """
+        return components[:, 0] if self.length is None else self.length.of(components)
+
+    def gradient(self, components: Array) -> Array:
+        """The derivative of the argument by the components (m, k), of the same shape; zero where a length is zero."""
+        return np.ones_like(components) if self.length is None else self.length.gradient(components)
+
+    def counts(self, u: Array, near: float | Array) -> Mask:
+        """Which components a kink at zero may hold, (m, k): an opening that is negative counts for nothing.
+
+        Args:
+            u: the displacement, a local array.
+            near: distances up to this are zero, one for all or (m,).
+        """
+        components = self.slip(u)
+        if self.length is None:
+            return np.ones(components.shape, dtype=bool)
+        return self.length.counts_at_zero(components, near)
 
     def add_force(self, out: PETSc.Vec, u: Array, derivative: Array) -> None:
         """Add the law's nodal forces to a vector, whose ghosts are to be added to their owners. Collective.
@@ -85,14 +115,7 @@ class LawTerm:
         self.density.x.scatter_forward()
 
     def _vector(self, u: Array, derivative: Array) -> Array:
-        return np.einsum("mk,mkd->md", self._unit(u) * derivative[:, None], self.directions)
-
-    def _unit(self, u: Array) -> Array:
-        slip = self.slip(u)
-        if slip.shape[1] == 1:
-            return np.ones_like(slip)
-        r = np.linalg.norm(slip, axis=1, keepdims=True)
-        return np.divide(slip, r, out=np.zeros_like(slip), where=r > 0)
+        return np.einsum("mk,mkd->md", self.gradient(self.slip(u)) * derivative[:, None], self.directions)
 
     def rate(self, u: Array, derivative: Array, second: Array) -> Array:
         """The tangent K of the law, (m, d, d).
@@ -102,13 +125,8 @@ class LawTerm:
             derivative: of the law at u, (m,).
             second: the law's second derivative at u, (m,).
         """
-        unit = self._unit(u)
-        k = unit.shape[1]
-        along = np.einsum("mi,mj->mij", unit, unit) if k > 1 else np.ones((len(unit), 1, 1))
-        local = second[:, None, None] * along
-        if k > 1:
-            r = np.linalg.norm(self.slip(u), axis=1)
-            across = np.divide(derivative, r, out=np.array(second, dtype=float), where=r > 0)
-            local = local + across[:, None, None] * (np.eye(k) - along)
+        local = second[:, None, None]
+        if self.length is not None:
+            local = self.length.hessian(self.slip(u), derivative, second)
         full = np.einsum("mka,mkl,mlb->mab", self.directions, local, self.directions)
         return np.einsum("ma,mab,mb->mab", self.free, full, self.free)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
+from itertools import combinations
 from typing import Any
 
 import numpy as np
 import ufl
 from dolfinx import fem
 
-from ..effects import BoundaryLaw, Direction
+from ..effects import BoundaryLaw
 from ..errors import InputError
 from ..laws import Superpotential
 from ..mesh import nodes
@@ -31,20 +32,21 @@ def unchanged(law: Superpotential) -> Superpotential:
     return law
 
 
-def check_normal_laws(contributions: Sequence[PlacedContribution]) -> None:
-    """Refuse two normal laws on one part: together they are one law of the opening, which the user has to state.
+def check_laws(contributions: Sequence[PlacedContribution]) -> None:
+    """Refuse two laws of one displacement on one part: together they are one law, which the user has to state.
 
     Raises:
         InputError: on all ranks alike.
     """
-    normal = [(w, e.key) for w, e, c in contributions for law in c.laws if law.direction is not Direction.SLIP]
-    for where in dict.fromkeys(w for w, _ in normal):
-        keys = sorted(key for w, key in normal if w == where)
-        if len(keys) > 1:
-            raise InputError(
-                f"boundary.{where}: {' and '.join(keys)} act on the same displacement; state them as one law of the "
-                'opening, adhesion = { law = "graph", ... }'
-            )
+    placed = [(w, e.key, law.direction) for w, e, c in contributions for law in c.laws]
+    for (one, key, first), (other, second_key, second) in combinations(placed, 2):
+        if one != other or not ((first.normal and second.normal) or (first.tangential and second.tangential)):
+            continue
+        both = first.normal and first.tangential, second.normal and second.tangential
+        mend = 'adhesion = { law = "graph", ... }' if not any(both) else "cohesion alone, or adhesion and friction"
+        raise InputError(
+            f"boundary.{one}: {key} and {second_key} act on the same displacement; state them as one law: {mend}"
+        )
 
 
 def make_terms(
@@ -89,16 +91,12 @@ def _term(
     *,
     by_rule: bool,
 ) -> LawTerm:
-    directions = {
-        Direction.SLIP: where.tangents,
-        Direction.OPENING: -where.normals[:, None, :],
-        Direction.PENETRATION: where.normals[:, None, :],
-    }[law.direction]
+    length = law.direction.length(where.tangents.shape[1], law.slip)
     solved, exact = (_scaled(j, scales, f"boundary.{where.part}.{key}") for j in (modify(law.law), law.law))
-    if directions.shape[1] > 1 and np.any(solved.convex.kinks > 0):
+    if length is not None and np.any(solved.convex.kinks > 0):
         raise InputError(
-            f'boundary.{where.part}: law = "{law.law.name}" jumps upwards at a slip > 0, which in 3D is a ring that '
-            "bounds cannot follow; smooth it: [solver] smoothing and epsilon"
+            f'boundary.{where.part}: law = "{law.law.name}" jumps upwards at a length > 0 of a vector, which is a '
+            "ring that bounds cannot follow; smooth it: [solver] smoothing and epsilon"
         )
     density = fem.Function(context.space, name="clarke_derivative")
     return LawTerm(
@@ -106,7 +104,8 @@ def _term(
         direction=law.direction,
         law=solved,
         exact=exact,
-        directions=directions,
+        directions=law.direction.along(where.normals, where.tangents),
+        length=length,
         free=(~np.isin(where.dofs, fixed)).astype(np.float64),
         density=density,
         residual=forms.compiled(_residual(context, where, density)) if by_rule else None,

@@ -191,14 +191,14 @@ class Result:
         known = [role["obstacle"] for role in self.roles(part) if role["obstacle"]]
         return np.pad(np.array(known[0], dtype=np.float64), (0, 3 - len(known[0]))) if known else None
 
-    def resists(self, part: str, direction: str) -> bool:
+    def resists(self, part: str, *directions: str) -> bool:
         """Whether a law acts on a displacement of a part.
 
         Args:
             part: the part's name.
-            direction: "slip", "opening" or "penetration".
+            *directions: any of "slip", "opening", "penetration", or "separation" for opening and slip together.
         """
-        return bool(self._laws(part, direction))
+        return any(self._laws(part, direction) for direction in directions)
 
     def law(self, part: str, direction: str = "slip") -> Superpotential | None:
         """The law of a part, not smoothed.

@@ -46,18 +46,17 @@ def columns(problem: Problem, state: ContactState) -> dict[str, Array]:
     if d == 3:
         found["z"] = state.surface.points[:, 2]
     found["u_n"] = state.normal_displacement * u
-    slips = state.branch(Direction.SLIP) is not None
     for i in range(d - 1):
         found[f"u_t{i + 1}"] = state.tangential_displacement[:, i] * u
-        if slips:  # else σ_t is a support's, at a corner
+        if state.resists_slip:  # else σ_t is a support's, at a corner
             found[f"friction_t{i + 1}"] = state.friction[:, i] * p
     if state.bounds is not None:
         found["gap"] = np.where(np.isfinite(state.gap), state.gap * u, np.nan)
         found["contact"] = state.contact.astype(float)
     found["sigma_n"] = state.pressure * p
     for name, directions in (
-        ("branch_t", (Direction.SLIP,)),
-        ("branch_n", (Direction.OPENING, Direction.PENETRATION)),
+        ("branch_t", [direction for direction in Direction if direction.tangential]),
+        ("branch_n", [direction for direction in Direction if direction.normal]),
     ):
         branch = state.branch(*directions)
         if branch is not None:

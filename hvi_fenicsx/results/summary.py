@@ -33,6 +33,7 @@ def summary(solution: Solution) -> dict[str, Any]:
             "iterations": _iterations(solution),
             "energy": examination.energy * problem.scales.energy if examination else None,
             "contact": _contact(solution),
+            "mode_mixity": _mode_mixity(solution),
             "resultants": _resultants(solution),
             "solvability": solution.solvability.summary(),
             "certificate": examination.certificate.as_dict() if examination else None,
@@ -89,6 +90,18 @@ def _contact(solution: Solution) -> dict[str, Any] | None:
         "penetration_between_nodes": None if (dip := examination.between_nodes) is None else dip * scales.displacement,
         "resultant": [float(f) * scales.force for f in resultant],
     }
+
+
+def _mode_mixity(solution: Solution) -> dict[str, float] | None:
+    """By part with a law of both modes: the share of the slip in ∫ δ² ds; null without such a law. Collective."""
+    examination, comm = solution.examination, solution.problem.domain.mesh.comm
+    found = {}
+    for state in examination.states if examination else ():
+        if (law := state.of_both_modes) is not None:
+            squares = state.surface.weights * law.argument**2
+            slip, whole = comm.allreduce(np.array([np.nansum(squares * law.slip_share), squares.sum()]))
+            found[state.surface.part] = float(slip / whole) if whole > 0.0 else math.nan
+    return found or None
 
 
 def _resultants(solution: Solution) -> dict[str, list[float]] | None:

@@ -11,7 +11,6 @@ import numpy.typing as npt
 from dolfinx import fem, la
 
 from ..certify.contact_state import ContactState
-from ..effects import Direction
 from ..mesh import nodes
 from ..problem import spaces
 from ..problem.problem import Problem
@@ -202,12 +201,13 @@ def _nodal(problem: Problem, states: Sequence[ContactState]) -> dict[str, Array]
         put("gap", state, state.gap * u)
         put("contact", state, state.contact.astype(float))
         put("normal", state, _spatial(state.surface.normals))
-        slips = state.branch(Direction.SLIP) is not None
         for i in range(problem.scales.dimension - 1):
             put(f"t{i + 1}", state, _spatial(state.surface.tangents[:, i]))
             put(f"u_t{i + 1}", state, state.tangential_displacement[:, i] * u)
-            if slips:
+            if state.resists_slip:
                 put(f"friction_t{i + 1}", state, state.friction[:, i] * p)
+        if (both := state.of_both_modes) is not None:
+            put("mode_mixity", state, both.slip_share)
         distances = [law.distance for law in state.laws]
         put("inclusion_distance", state, np.max(distances, axis=0) * p if distances else 0.0 * state.normal)
     for field in found.values():

@@ -1,7 +1,7 @@
 """The functional on the rigid motions, which limit analysis minimises, and the sets over which it does.
 
-The functional is  linear·y + Σ_p factors_p G_p(y)  with the slip integrals  G_p(y) = Σ_i |B_pi y|, y in R^k,
-k <= 6: positively homogeneous, and convex if no factor is negative.
+The functional is  linear·y + Σ_p factors_p G_p(y)  with the slip integrals  G_p(y) = Σ_i δ_p(B_pi y), y in R^k,
+k <= 6, δ_p being a length: positively homogeneous, and convex if no factor is negative.
 """
 
 from __future__ import annotations
@@ -12,29 +12,29 @@ from itertools import combinations, product
 
 import numpy as np
 
+from ..laws import Length
 from ..typing import Array
 
 
 @dataclass(frozen=True)
 class SlipIntegral:
-    """G(y) = Σ_i |B_i y|.
+    """G(y) = Σ_i δ(B_i y).
 
     Attributes:
-        rows: the B_i, each times its lumped area, (m, r, k); r = 1 or 2 slips.
+        rows: the B_i, each times its lumped area, (m, r, k); r = 1 to 3 components.
+        length: δ.
     """
 
     rows: Array
+    length: Length
 
     def value(self, y: Array) -> float:
         """The integral at y, (k,)."""
-        return float(np.linalg.norm(self.rows @ y, axis=1).sum())
+        return float(self.length.of(self.rows @ y).sum())
 
     def subgradient(self, y: Array) -> Array:
         """One subgradient at y, (k,): a vertex without slip contributes the zero of its ball."""
-        slip = self.rows @ y
-        size = np.linalg.norm(slip, axis=1, keepdims=True)
-        unit = np.divide(slip, size, out=np.zeros_like(slip), where=size > 0.0)
-        return np.asarray(np.tensordot(unit, self.rows, axes=2))
+        return np.asarray(np.tensordot(self.length.gradient(self.rows @ y), self.rows, axes=2))
 
 
 @dataclass(frozen=True)

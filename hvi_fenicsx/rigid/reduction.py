@@ -13,6 +13,7 @@ import numpy as np
 from mpi4py import MPI
 
 from ..errors import InputError
+from ..laws import Length
 from ..laws.convex_parts import Directional
 from ..typing import Array
 from .functional import Functional, SlipIntegral
@@ -58,11 +59,11 @@ class Resistance:
         points: vertices (m, 3), or the motions there.
         weights: lumped areas (m,).
         directions: (m, r, d). r = 1: the law acts on the scalar slip y·direction (in 2D the tangent; for a
-            normal law the inward normal for opening, the outward one for penetration). r = 2: on the length
-            of the slip vector.
+            normal law the inward normal for opening, the outward one for penetration). Else it acts on a length.
         growth: j^∞, the recession function, as its values at -1 and 1; tractions, +inf allowed.
         peak: ĵ = sup over x of j⁰(x; ·), likewise.
         c4: the paper's growth constant, η(-ξ) <= c4|ξ| for η in ∂j(ξ); a traction.
+        length: of the r components; None: their Euclidean length.
     """
 
     points: Places
@@ -71,6 +72,7 @@ class Resistance:
     growth: Directional
     peak: Directional
     c4: float = 0.0
+    length: Length | None = None
 
     def __post_init__(self) -> None:
         m = len(self.weights)
@@ -79,8 +81,13 @@ class Resistance:
         values = (self.growth.minus, self.growth.plus, self.peak.minus, self.peak.plus)
         if not all(value > -np.inf for value in values):  # also refuses nan
             raise InputError(f"growth and peak of a law are numbers or +inf, not {values}")
-        if self.directions.shape[1] == 2 and any(f.plus != f.minus for f in (self.growth, self.peak)):
-            raise InputError("a law of the length of the slip needs the same growth and peak on both sides")
+        if self.directions.shape[1] > 1 and any(f.plus != f.minus for f in (self.growth, self.peak)):
+            raise InputError("a law of a length needs the same growth and peak on both sides")
+
+    @property
+    def measured(self) -> Length:
+        """The length that it acts on; of one component its size."""
+        return self.length or Length.plain(self.directions.shape[1])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -112,9 +119,21 @@ class RigidProblem:
 
     def conditions(self) -> tuple[FixedDirections, ...]:
         """The fixed conditions, and those of laws whose growth is infinite both ways (linear springs)."""
-        springs = [p for p in self.resistances if np.isinf(p.growth.minus) and np.isinf(p.growth.plus)]
-        rows = [FixedDirections(p.points, p.directions[:, r]) for p in springs for r in range(p.directions.shape[1])]
+        rows = [
+            FixedDirections(p.points, p.directions[:, r])
+            for p in self._springs
+            for r in np.flatnonzero(p.measured.two_sided())
+        ]
         return (*self.fixed, *rows)
+
+    def cones(self) -> tuple[ContactCone, ...]:
+        """Unilateral contact, and that of springs which resist an opening alone."""
+        held = [p for p in self._springs if p.measured.opens]
+        return (*self.contact, *(ContactCone(p.points, p.directions[:, 0]) for p in held))
+
+    @property
+    def _springs(self) -> list[Resistance]:
+        return [p for p in self.resistances if np.isinf(p.growth.minus) and np.isinf(p.growth.plus)]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -149,7 +168,7 @@ class ReducedProblem:
             sign * self.slip_rows(p)
             for p, law in enumerate(laws)
             for sign, side in ((1.0, law.plus), (-1.0, law.minus))
-            if np.isinf(side)
+            if np.isinf(side) and not self.slips[p].length.opens
         ]
         linear = np.array([_linear_part(law) for law in laws]) @ self.moments
         return Functional(linear, np.array([_even_part(law) for law in laws]), np.vstack([self.contact, *blocked]))
@@ -174,14 +193,17 @@ def reduce(
     basis = kernel(comm, problem.body, problem.conditions(), thresholds)
     if basis.shape[1] == 0:
         return basis, None
-    normals = [_work(p.points, p.normals[:, None, :], problem.body, basis)[:, 0] for p in problem.contact]
+    normals = [_work(p.points, p.normals[:, None, :], problem.body, basis)[:, 0] for p in problem.cones()]
     local = np.unique(unit_rows(np.vstack([np.zeros((0, basis.shape[1])), *normals]), thresholds.short_row), axis=0)
     slips = [_work(p.points, p.directions, problem.body, basis) * p.weights[:, None, None] for p in problem.resistances]
     traces = [_trace(p, problem.body, basis) for p in problem.resistances]
     pieces = comm.gather((local, slips, [float(p.weights.sum()) for p in problem.resistances], traces), root=0)
     if pieces is None:
         return basis, None
-    integrals = tuple(SlipIntegral(np.concatenate([piece[1][p] for piece in pieces])) for p in range(len(slips)))
+    integrals = tuple(
+        SlipIntegral(np.concatenate([piece[1][p] for piece in pieces]), part.measured)
+        for p, part in enumerate(problem.resistances)
+    )
     moments = [g.rows[:, 0].sum(axis=0) if g.rows.shape[1] == 1 else np.zeros(basis.shape[1]) for g in integrals]
     works = {name: np.asarray(work) @ basis for name, work in problem.loads.items()}
     return basis, ReducedProblem(

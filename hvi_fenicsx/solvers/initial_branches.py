@@ -39,8 +39,7 @@ def _displaced(system: System, start: Sequence[Formula]) -> list[Array]:
     found = []
     for term in system.problem.terms:
         u = np.column_stack([f.at(term.surface.points) for f in start]) / system.problem.scales.displacement
-        slip = np.einsum("mkd,md->mk", term.directions, u)
-        found.append(slip[:, 0] if slip.shape[1] == 1 else np.linalg.norm(slip, axis=1))
+        found.append(term.argument_of(np.einsum("mkd,md->mk", term.directions, u)))
     return found
 
 

@@ -93,11 +93,19 @@ def _signed_moves(
 
 
 def _hold_stuck(term: LawTerm, cells: Cells, lower: PETSc.Vec, upper: PETSc.Vec) -> None:
-    """Keep both components of a stuck vertex's slip at zero."""
-    dofs = term.surface.dofs
-    stuck = (cells.index == 0)[:, None] & np.any(np.abs(term.directions) > 0.5, axis=1) & (term.free > 0)
-    if len(cells.kinks):
-        lower.array[dofs[stuck]] = upper.array[dofs[stuck]] = 0.0
+    """Keep the length of a stuck vertex's vector at zero: its components, but an opening only from growing."""
+    if term.length is None or not len(cells.kinks):
+        return
+    both_ways = term.length.two_sided()
+    free = (cells.index == 0)[:, None] & (term.free > 0)
+    stuck = term.surface.dofs[free & np.any(np.abs(term.directions[:, both_ways]) > 0.5, axis=1)]
+    lower.array[stuck] = upper.array[stuck] = 0.0
+    for i in np.flatnonzero(~both_ways):
+        dofs, sign = component_dofs(term.surface.blocks, term.directions[:, i])
+        closed = free[np.arange(len(dofs)), dofs % free.shape[1]]
+        above, below = dofs[closed & (sign > 0)], dofs[closed & (sign < 0)]
+        upper.array[above] = np.minimum(upper.array[above], 0.0)
+        lower.array[below] = np.maximum(lower.array[below], 0.0)
 
 
 def _slip_dofs(term: LawTerm) -> tuple[Integers, Array, Mask]:

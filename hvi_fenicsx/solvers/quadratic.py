@@ -29,7 +29,7 @@ def is_equation(system: System) -> bool:
 
 def is_quadratic(system: System) -> bool:
     """Whether the energy is quadratic: laws that are linear springs at most. The same on all ranks."""
-    return all(term.law.is_linear for term in system.terms)
+    return all(term.is_linear for term in system.terms)
 
 
 class LinearSolve(Method):

@@ -1,4 +1,4 @@
-"""When a vertex that a law of |u_t| holds begins to slip: where parts meet, several laws may hold one component."""
+"""When a vertex that a law of a length holds begins to move: where parts meet, several laws may hold one component."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..problem.law_term import LawTerm
-from ..typing import Array, Integers
+from ..typing import Array, Integers, Mask
 from .law_models import ExactLaw, Majorant
 
 
 class Shared:
-    """The forces that the kinks of all laws of |u_t| have to carry together.
+    """The forces that the kinks of all laws of a length have to carry together.
 
     Args:
         terms: all laws.
@@ -25,19 +25,19 @@ class Shared:
         self._spare = [self._spare_of(number) for number in range(len(terms))]
 
     def moves(self, number: int, argument: Array, excess: Array) -> Integers:
-        """To which cell each vertex of a term moves: a stuck one slips if the force leaves its disc, a slow one sticks.
+        """To which cell each vertex of a term moves: a stuck one goes if its kink cannot carry it, a slow one sticks.
 
         Args:
             number: of the term.
-            argument: |u_t|, (m,).
-            excess: force by which the disc may be exceeded, (m,).
+            argument: the length, (m,).
+            excess: force by which the kink may be exceeded, (m,).
         """
         term, cells = self._terms[number], self._models[number].cells
         if not len(cells.kinks):
             return np.zeros(len(argument), dtype=np.int64)
         others = sum(self._spare[:number] + self._spare[number + 1 :], np.zeros_like(self._forces))
         needed = np.sign(self._forces) * np.maximum(np.abs(self._forces) - others, 0.0)
-        go = (cells.index == 0) & (np.linalg.norm(_along(term, needed), axis=1) > self._disc(number) + excess)
+        go = (cells.index == 0) & (np.linalg.norm(_pulls(term, needed), axis=1) > self._disc(number) + excess)
         stick = (cells.index == 1) & (argument <= cells.ramp)
         return go.astype(np.int64) - stick.astype(np.int64)
 
@@ -50,13 +50,25 @@ class Shared:
         """What the kink of a term can carry of each component where it carries all of the others, (n,)."""
         spare, term, cells = np.zeros_like(self._forces), self._terms[number], self._models[number].cells
         if term.radial and len(cells.kinks):
-            squares = _along(term, self._forces) ** 2
+            squares = _pulls(term, self._forces) ** 2
             rest = self._disc(number)[:, None] ** 2 - np.sum(squares, axis=1, keepdims=True) + squares
-            room = np.sqrt(np.maximum(rest, 0.0)) * (cells.index == 0)[:, None]
+            room = np.sqrt(np.maximum(rest, 0.0)) * (cells.index == 0)[:, None] * _factors(term)
+            room[:, _opens(term)] *= squares[:, _opens(term)] > 0.0
             spare[term.surface.dofs] = np.einsum("mkd,mk->md", np.abs(term.directions), room) * term.free
         return spare
 
 
-def _along(term: LawTerm, forces: Array) -> Array:
-    """The components of forces (n,) along a law's directions, (m, k)."""
-    return np.asarray(np.einsum("mkd,md->mk", term.directions, term.surface.values(forces) * term.free))
+def _pulls(term: LawTerm, forces: Array) -> Array:
+    """The tractions that carry minus the forces (n,) along a law's components, each alone, times area, (m, k)."""
+    along = -np.einsum("mkd,md->mk", term.directions, term.surface.values(forces) * term.free) / _factors(term)
+    along[:, _opens(term)] = np.maximum(along[:, _opens(term)], 0.0)
+    return np.asarray(along)
+
+
+def _factors(term: LawTerm) -> Array:
+    return np.ones(term.directions.shape[1]) if term.length is None else np.array(term.length.factors)
+
+
+def _opens(term: LawTerm) -> Mask:
+    """Which components are openings, that nothing holds the other way, (k,)."""
+    return np.zeros(term.directions.shape[1], dtype=bool) if term.length is None else ~term.length.two_sided()

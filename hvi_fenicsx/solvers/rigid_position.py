@@ -88,11 +88,9 @@ class _LawEnergy:
 
     def _of_term(self, term: LawTerm, law: Superpotential, p: int, amplitudes: Array) -> tuple[float, Array]:
         slip = self._slips[p] + self._moves[p] @ amplitudes
-        argument = np.linalg.norm(slip, axis=1) if term.radial else slip[:, 0]
-        along = np.divide(slip, argument[:, None], out=np.zeros_like(slip), where=argument[:, None] != 0.0)
+        argument = term.argument_of(slip)
         xi, weights = law.concave.left(np.zeros_like(argument)), term.surface.weights
-        along = along if term.radial else np.ones_like(slip)
-        force = (weights * (law.convex.right(argument) - xi))[:, None] * along
+        force = (weights * (law.convex.right(argument) - xi))[:, None] * term.gradient(slip)
         energy = weights @ (law.convex.value(argument) - xi * argument)
         return float(energy), np.einsum("mr,mrk->k", force, self._moves[p])
 
@@ -137,7 +135,8 @@ def at_kinks(system: System, laws: Sequence[Superpotential], x: PETSc.Vec, near:
             continue
         nearest = kinks[np.argmin(np.abs(argument[:, None] - kinks), axis=1)]
         on = np.abs(argument - nearest) <= near * np.maximum(1.0, np.abs(nearest))
-        touched = np.any(term.directions != 0.0, axis=1) & (term.free > 0) & on[:, None]
+        kept = term.counts(x.array_r, near)
+        touched = np.any((term.directions != 0.0) & kept[:, :, None], axis=1) & (term.free > 0) & on[:, None]
         along = np.einsum("md,m->md", np.sum(term.directions, axis=1), nearest)
         x.array[term.surface.dofs[touched]] = along[touched]
         found.append(term.surface.dofs[touched])

@@ -206,4 +206,5 @@ def _resistance(problem: Problem, body: AnyBody, term: LawTerm) -> Resistance:
         growth=law.growth,
         peak=law.peak,
         c4=law.c4,
+        length=term.length,
     )

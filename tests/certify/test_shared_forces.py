@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
 from hvi_fenicsx.certify.shared_forces import Carrier, nearest_sum
+from hvi_fenicsx.laws import Length
 from hvi_fenicsx.typing import Array
 
 VERTICES = 40
@@ -14,8 +17,18 @@ PLANES = {"floor": (0, 1), "wall": (0, 2), "end": (1, 2)}
 
 def disc(plane: str, radius: float) -> Carrier:
     """A law of |u_t| at rest."""
-    axes = np.tile(np.eye(3)[list(PLANES[plane])], (VERTICES, 1, 1))
-    return _carrier(axes=axes, radius=np.full((VERTICES, 1), radius), at_rest=np.ones((VERTICES, 1), dtype=bool))
+    return _at_rest(PLANES[plane], radius, Length.plain(2))
+
+
+def bond(radius: float, beta: float) -> Carrier:
+    """A law of opening (upward) and slip at rest."""
+    return _at_rest((2, 0, 1), radius, Length((1.0, beta, beta), opens=True))
+
+
+def _at_rest(axes: tuple[int, ...], radius: float, length: Length) -> Carrier:
+    rows = np.tile(np.eye(3)[list(axes)], (VERTICES, 1, 1))
+    disc = {"axes": rows, "counts": np.ones(rows.shape[:2], dtype=bool), "length": length}
+    return _carrier(**disc, radius=np.full((VERTICES, 1), radius), at_rest=np.ones((VERTICES, 1), dtype=bool))
 
 
 def contact(axis: int) -> Carrier:
@@ -24,9 +37,10 @@ def contact(axis: int) -> Carrier:
     return _carrier(along=along, low=np.full((VERTICES, 1), -np.inf))
 
 
-def _carrier(**given: Array) -> Carrier:
+def _carrier(**given: Any) -> Carrier:
     rows, zero = np.arange(VERTICES), np.zeros((VERTICES, 1))
-    plain = {"along": np.zeros((VERTICES, 3)), "low": zero, "high": zero, "axes": np.zeros((VERTICES, 2, 3))}
+    plain: dict[str, Any] = {"along": np.zeros((VERTICES, 3)), "low": zero, "high": zero}
+    plain |= {"axes": np.zeros((VERTICES, 2, 3)), "counts": np.ones((VERTICES, 2), bool), "length": Length.plain(2)}
     plain |= {"radius": zero, "at_rest": zero > 0, "visible": np.ones((VERTICES, 3), dtype=bool)}
     return Carrier(rows=rows, own=rows, **(plain | given))
 
@@ -35,9 +49,11 @@ def farthest(carriers: list[Carrier], outward: Array) -> Array:
     """The sum of the forces that reach farthest along unit vectors: the only point of the boundary with that normal."""
     total = np.zeros_like(outward)
     for c in carriers:
-        flat = np.einsum("mkd,mke,me->md", c.axes, c.axes, outward)
-        length = np.linalg.norm(flat, axis=1, keepdims=True)
-        total += c.radius * np.divide(flat, length, out=np.zeros_like(flat), where=length > 0)
+        along = np.einsum("mke,me->mk", c.axes, outward) * np.array(c.length.factors)
+        along[:, 0] = np.maximum(along[:, 0], 0.0) if c.length.opens else along[:, 0]
+        length = np.linalg.norm(along, axis=1, keepdims=True)
+        unit = np.divide(along, length, out=np.zeros_like(along), where=length > 0) * np.array(c.length.factors)
+        total += c.radius * np.einsum("mk,mkd->md", unit, c.axes)
     return total
 
 
@@ -50,15 +66,24 @@ def directions(*, upward: bool = False) -> Array:
 
 def within(carriers: list[Carrier], forces: list[Array]) -> bool:
     """Whether no law gives more than it can, and no contact pulls."""
-    laws = [np.linalg.norm(f, axis=1) <= c.radius[:, 0] + 1e-14 for c, f in zip(carriers, forces, strict=True)]
+    laws = [_gauge(c, f) <= c.radius[:, 0] + 1e-14 for c, f in zip(carriers, forces, strict=True)]
     contacts = [np.all(f == np.minimum(f, 0.0)) for c, f in zip(carriers, forces, strict=True) if not np.any(c.at_rest)]
     return all(np.all(w) for c, w in zip(carriers, laws, strict=True) if np.any(c.at_rest)) and all(contacts)
+
+
+def _gauge(carrier: Carrier, forces: Array) -> Array:
+    """The least traction that can give the forces; infinite if none can."""
+    along = np.einsum("mkd,md->mk", carrier.axes, forces) / np.array(carrier.length.factors)
+    pushes = carrier.length.opens & (along[:, 0] < 0.0)
+    return np.asarray(np.where(pushes, np.inf, np.linalg.norm(along, axis=1)))
 
 
 SUMS = [
     ([disc("floor", 1.0), disc("wall", 0.1)], False),
     ([disc("floor", 1.0), disc("wall", 1e-3), contact(2)], True),
     ([disc("floor", 1.0), disc("wall", 0.5), disc("end", 2.0)], False),
+    ([bond(1.0, 0.5)], True),
+    ([bond(1.0, 3.0), disc("wall", 0.5)], True),
 ]
 
 

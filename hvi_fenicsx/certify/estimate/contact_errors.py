@@ -11,7 +11,6 @@ from dataclasses import dataclass
 import numpy as np
 from dolfinx import fem, la
 
-from ...effects import Direction
 from ...runtime.mpi import total
 from ...system.levels import Levels
 from ...system.system import System
@@ -66,7 +65,7 @@ def estimate_contact_errors(
         _friction(traces, state, law, error, uncertain)
         for state in examination.states
         for law in state.laws
-        if law.term.direction is Direction.SLIP
+        if law.term.direction.tangential
     ]
     comm = system.comm
     apart, whole = (total(comm, sum(pair[i] for pair in slips)) for i in (0, 1))
@@ -110,9 +109,8 @@ def _drops(traces: LawTraces, state: ContactState, law: LawState) -> tuple[Trace
     points = traces.part(state.surface, law.term.directions)
     height = coupled_errors.heights(points, law, law.term.exact)
     slip = points.linear(traces.u)
-    length = np.linalg.norm(slip, axis=2, keepdims=True)
-    unit = np.divide(slip, length, out=np.zeros_like(slip), where=length > 0)
-    return points, _PLACE * height[:, None, None] * unit
+    along = law.term.gradient(slip.reshape(-1, slip.shape[2])).reshape(slip.shape) if law.term.radial else np.sign(slip)
+    return points, _PLACE * height[:, None, None] * along
 
 
 def _slip(traces: LawTraces, state: ContactState, error: ErrorField, uncertain: fem.Function) -> tuple[float, float]:
@@ -133,7 +131,8 @@ def _friction(
     found = traces.of_law(state, law, error)
     other = traces.of_law(state, law, ErrorField(further, error.edges))
     fields = found.traction - found.nodal, other.traction - found.traction, found.nodal
+    tangents = state.slip.shape[1]
     known, unknown, carried = (
-        float(np.sum(found.points.weights * np.linalg.norm(values, axis=2))) for values in fields
+        float(np.sum(found.points.weights * np.linalg.norm(values[:, :, -tangents:], axis=2))) for values in fields
     )
     return known, unknown, carried

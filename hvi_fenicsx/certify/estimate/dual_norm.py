@@ -26,7 +26,7 @@ from ..certificate import Examination
 from ..contact_state import ContactState
 from ..force_attribution import on_kink, touches
 from ..shared_forces import components
-from .law_traces import nearest, tractions
+from .law_traces import nearest
 from .thresholds import DEFAULT, Thresholds
 
 
@@ -107,8 +107,8 @@ def _held(system: System, x: PETSc.Vec, near: float) -> Entities:
         dofs, sign = bounds.component()
         found.append(dofs[touches(bounds, sign * u[dofs], near)])
     for term in system.terms:
-        stuck = on_kink(term.law.convex, term.argument(u), near)
-        found.extend(dofs[stuck] for dofs, _ in components(term))
+        stuck = on_kink(term.law.convex, term.argument(u), near)[:, None] & term.counts(u, near)
+        found.extend(dofs[stuck[:, i]] for i, (dofs, _) in enumerate(components(term)))
     return np.setdiff1d(np.unique(np.concatenate(found)), system.problem.fixed).astype(np.int32)
 
 
@@ -176,9 +176,9 @@ def _law_forces(problem: Problem, states: Sequence[ContactState], near: float, *
     forces = np.zeros((problem.space.dofmap.index_map.size_local, d))
     for state in states:
         for law in state.laws:
-            term, given = law.term, tractions(state, law)
-            slip = state.slip if term.radial else law.argument[:, None]
-            away = given - nearest(term.exact if exact else term.law, slip, given, near)
+            term = law.term
+            asked = term.exact if exact else term.law
+            away = law.given - nearest(asked, term.length, law.components, law.given, near)
             away[law.hidden] = 0.0
             vectors = np.einsum("mk,mkd->md", away * state.surface.weights[:, None], term.directions)
             np.add.at(forces, state.surface.blocks, vectors)

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from dolfinx import fem, la
 
-from ...laws import Superpotential
+from ...laws import Length, Superpotential
 from ...problem.contact_surface import Surface
 from ...problem.problem import Problem
 from ...typing import Array
@@ -27,26 +27,20 @@ Trace = PartTrace | InterfaceTrace
 """The facets of a part, or of two bodies that meet, between their vertices."""
 
 
-def nearest(law: Superpotential, slip: Array, traction: Array, near: float) -> Array:
+def nearest(law: Superpotential, length: Length | None, slip: Array, traction: Array, near: float) -> Array:
     """The admissible tractions of a law nearest to given ones, (m, k).
 
     Args:
         law: its superpotential j.
-        slip: (m, k); a signed slip has k = 1, else the law acts on the length of the vector.
+        length: the length that it acts on; None: the signed slip, k = 1.
+        slip: the components of what it acts on, (m, k).
         traction: the given ones, (m, k).
         near: distance from a kink that counts as being on it.
     """
-    if slip.shape[1] == 1:
-        low, high = law.interval(slip[:, 0], near)
-        return np.asarray(np.clip(traction[:, 0], low, high)[:, None])
-    length = np.linalg.norm(slip, axis=1)
-    low, high = law.interval(length, near)
-    moving = (length > near)[:, None]
-    along = np.divide(slip, length[:, None], out=np.zeros_like(slip), where=moving)
-    sliding = np.clip(np.sum(traction * along, axis=1), low, high)[:, None] * along
-    size = np.linalg.norm(traction, axis=1)
-    inside = np.divide(np.minimum(size, high), size, out=np.zeros_like(size), where=size > 0)
-    return np.where(moving, sliding, inside[:, None] * traction)
+    ends = law.interval(slip[:, 0] if length is None else length.of(slip), near)
+    if length is None:
+        return np.asarray(np.clip(traction[:, 0], *ends)[:, None])
+    return length.allowed(slip, traction, ends, near)
 
 
 def stopped(law: Superpotential, before: Array, after: Array) -> Array:
@@ -66,16 +60,6 @@ def stopped(law: Superpotential, before: Array, after: Array) -> Array:
     for kink in law.convex.kinks:
         after = np.where((before - kink) * (after - kink) < 0, kink, after)
     return after
-
-
-def tractions(state: ContactState, law: LawState) -> Array:
-    """The nodal tractions of one of a part's laws along its directions, (m, k).
-
-    Args:
-        state: the contact state of the part.
-        law: the state of the law.
-    """
-    return state.friction if law.term.radial else law.traction[:, None]
 
 
 @dataclass(frozen=True)
@@ -149,14 +133,14 @@ class LawTraces:
         """
         term = law.term
         points = self.part(state.surface, term.directions)
-        nodal, slip = points.interpolated(tractions(state, law)), points.linear(self.u)
+        nodal, slip = points.interpolated(law.given), points.linear(self.u)
         if error is not None:
             sticks = points.interpolated(law.on_convex_kink()[:, None].astype(float))
             added = points.linear(error.vertices) + points.quadratic(error.edges)
             added = np.where(sticks > 1 - self.thresholds.near, 0.0, added)
             slip = stopped(term.exact, slip, slip + added)
         k, asked = slip.shape[2], term.law if error is None else term.exact
-        traction = nearest(asked, slip.reshape(-1, k), nodal.reshape(-1, k), self.thresholds.near)
+        traction = nearest(asked, term.length, slip.reshape(-1, k), nodal.reshape(-1, k), self.thresholds.near)
         return LawTrace(points, nodal, traction.reshape(slip.shape))
 
     def tested(self, error: ErrorField | None = None) -> tuple[Array, Array]:
@@ -172,7 +156,7 @@ class LawTraces:
             for law in state.laws:
                 trace = self.of_law(state, law, error)
                 at_edges, at_vertices = trace.points.tested(trace.traction)
-                nodal = tractions(state, law) * state.surface.weights[:, None]
+                nodal = law.given * state.surface.weights[:, None]
                 edges += at_edges
                 vertices -= at_vertices
                 np.add.at(vertices, state.surface.blocks, np.einsum("mk,mkd->md", nodal, law.term.directions))

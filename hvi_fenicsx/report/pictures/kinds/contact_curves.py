@@ -77,9 +77,9 @@ def _panels(result: Result, part: ContactPart, length: Unit) -> Iterator[Callabl
         )
 
     yield displacement(part.slip, "slip $u_t$", "slip")
-    if result.resists(part.name, "slip"):
+    if result.resists(part.name, "slip", "separation"):
         yield partial(_friction, part=part, result=result, length=length)
-    if result.resists(part.name, "opening"):
+    if result.resists(part.name, "opening", "separation"):
         yield displacement(-part["u_n"], "opening $-u_n$", "opening")
     if result.resists(part.name, "penetration"):
         yield displacement(part["u_n"], "penetration $u_n$", "penetration")

@@ -61,7 +61,7 @@ def draw(result: Result, part: ContactPart) -> Figure:
     rows: list[tuple[str, str, Array, Array | None, Colormap | None]] = [
         ("slip", "m", part.slip, _vectors(part, flat, normal, "u_t"), shades(BLUE))
     ]
-    if result.resists(part.name, "slip"):
+    if result.resists(part.name, "slip", "separation"):
         rows.append(("friction", "Pa", part.friction, _vectors(part, flat, normal, "friction_t"), shades(GREEN)))
     rows.append(("contact pressure", "Pa", part.pressure, None, None))
     width, height = _map_size(flat)

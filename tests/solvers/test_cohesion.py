@@ -1,0 +1,201 @@
+"""Opening and slip in one law: against laws of one mode, areas under the law, statics by hand, another optimiser."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from scenes import Table, solved
+
+from hvi_fenicsx import InputError, Scene, Solution, solve, workflow
+from hvi_fenicsx.certify.contact_state import ContactState
+from hvi_fenicsx.laws import Length
+
+Array = npt.NDArray[np.float64]
+E, PEAK, FIRST, LAST = 2.0e11, 2.0e6, 1.0e-6, 5.0e-6
+ENERGY = PEAK * LAST / 2
+BOND = [[0.0, 0.0], [FIRST, PEAK], [LAST, 0.0]]
+RIGID = [[0.0, PEAK], [LAST, 0.0]]
+BRITTLE = [[0.0, 0.0], [FIRST, PEAK], [FIRST, 0.4 * PEAK]]
+
+
+def law(points: Any, **more: Any) -> Table:
+    return {"law": "graph", "points": points, **more}
+
+
+def square(floor: Table, top: Table, cells: int = 3, dimension: int = 2, **solver: Any) -> Table:
+    """A unit square or cube; its bottom is the part that is glued."""
+    shape = {2: "rectangle", 3: "box"}[dimension]
+    material = {"youngs_modulus": E, "poisson_ratio": 0.3}
+    material["model"] = {2: "plane_stress", 3: "three_dimensional"}[dimension]
+    return {
+        "domain": {"shape": shape, "size": [1.0] * dimension, "cells": [cells] * dimension},
+        "material": material,
+        "boundary": {"top": {"on": "top", **top}, "glue": {"on": "bottom", **floor}},
+        "solver": solver,
+    }
+
+
+def glue(found: Solution) -> ContactState:
+    assert found.exit_code == 0, found.reason
+    assert found.examination is not None
+    return next(state for state in found.examination.states if state.surface.part == "glue")
+
+
+def scaled(slip: float, points: Any) -> list[list[float]]:
+    """The law of the slip alone that beta makes of a law of both modes."""
+    return [[x / slip, traction * slip] for x, traction in points]
+
+
+ONE_MODE = {
+    "opening": ([0.0, "free"], lambda points: {"adhesion": law(points, one_sided=True)}, [0.0, 4.0e-6]),
+    "slip": (["free", 0.0], lambda points: {"friction": law(scaled(0.5, points))}, [9.0e-6, 0.0]),
+}
+
+
+@pytest.mark.parametrize("points", [BOND, RIGID, BRITTLE], ids=["softening", "rigid", "brittle"])
+@pytest.mark.parametrize("mode", ONE_MODE)
+def test_one_mode_alone_is_the_law_of_that_mode(mode: str, points: Any) -> None:
+    """The other component is prescribed on the part."""
+    held, alone, pull = ONE_MODE[mode]
+    top = {"displacement": pull}
+    together = solved(square({"displacement": held, "cohesion": law(points, beta=0.5)}, top))
+    separate = solved(square({"displacement": held, **alone(points)}, top))
+    one, other = glue(together), glue(separate)
+    assert np.allclose(one.values, other.values, rtol=0.0, atol=1e-10 * np.abs(other.values).max())
+    mine, its = (getattr(state, {"opening": "pressure", "slip": "friction"}[mode]) for state in (one, other))
+    assert np.allclose(mine, its, rtol=0.0, atol=1e-10 * np.abs(its).max())
+
+
+@pytest.mark.parametrize("mode", ["slip", "both"])
+def test_in_space_it_is_friction_where_nothing_opens(mode: str) -> None:
+    held = ["free", "free", 0.0]
+    top = {"displacement": [9.0e-6, 3.0e-6, 0.0]}
+    if mode == "both":
+        top = {"displacement": [9.0e-6, "free", 0.0]}
+    together = solved(square({"displacement": held, "cohesion": law(BOND, beta=0.5)}, top, 2, 3))
+    separate = solved(square({"displacement": held, "friction": law(scaled(0.5, BOND))}, top, 2, 3))
+    one, other = glue(together), glue(separate)
+    assert np.allclose(one.values, other.values, rtol=0.0, atol=1e-9 * np.abs(other.values).max())
+
+
+@pytest.mark.parametrize("angle", [0.0, 30.0, 60.0, 90.0])
+def test_each_mode_dissipates_its_share_of_the_area_under_the_law(angle: float) -> None:
+    """The separation is prescribed along a ray, where both tractions are piecewise linear."""
+    beta, opening, slip = 0.5, np.cos(np.radians(angle)), np.sin(np.radians(angle))
+    rate = float(np.hypot(opening, beta * slip))
+    states = []
+    for delta in (FIRST, LAST, 1.2 * LAST):
+        way = {"displacement": [slip * delta / rate, opening * delta / rate]}
+        found = solved(square({**way, "cohesion": law(BOND, beta=beta)}, {"traction": [0.0, 0.0]}, 1))
+        state, u, p = glue(found), found.problem.scales.displacement, found.problem.scales.stress
+        states.append([state.normal * u, state.pressure * p, state.slip[:, 0] * u, state.friction[:, 0] * p])
+        assert state.of_both_modes is not None
+        assert state.of_both_modes.slip_share == pytest.approx((beta * slip / rate) ** 2, abs=1e-12)
+    down, pulls, along, drags = np.moveaxis(np.array([np.zeros_like(states[0]), *states]), 1, 0)
+    assert np.trapezoid(pulls, -down, axis=0) == pytest.approx(ENERGY * (opening / rate) ** 2, rel=1e-8, abs=1e-12)
+    assert np.trapezoid(drags, along, axis=0) == pytest.approx(ENERGY * (beta * slip / rate) ** 2, rel=1e-8, abs=1e-12)
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_the_forces_are_the_derivative_of_the_energy(dimension: int) -> None:
+    """At random separations, some of them closed."""
+    table = square({"cohesion": law(BOND, beta=0.7)}, {"traction": [1.0e6] * dimension}, 1, dimension)
+    system = workflow.prepare(Scene.model_validate(table)).system
+    (term,) = system.terms
+    rng, n = np.random.default_rng(1), system.load.local_size
+    u = rng.normal(size=n) * 2 * term.law.length_scale
+
+    def energy(v: Array) -> float:
+        return float(term.surface.weights @ term.law.value(term.argument(v)))
+
+    def force(v: Array) -> Array:
+        out = system.load.duplicate()
+        out.set(0.0)
+        x = term.argument(v)
+        term.add_force(out, v, (term.law.left(x) + term.law.right(x)) / 2)
+        return np.array(out.array_r)
+
+    argument = term.argument(u)
+    rates = term.rate(u, term.law.right(argument), term.law.convex.second(argument) - term.law.concave.second(argument))
+    for _ in range(4):
+        v, h = rng.normal(size=n), 1e-6
+        assert (energy(u + h * v) - energy(u - h * v)) / (2 * h) == pytest.approx(float(force(u) @ v), rel=1e-6)
+        change = (force(u + h * v) - force(u - h * v)) / (2 * h)
+        w, at = term.surface.weights, term.surface.values
+        product = np.einsum("m,mab,mb->ma", w, rates, at(v))
+        assert np.allclose(at(change), product, rtol=1e-5, atol=1e-6 * np.abs(product).max())
+
+
+@pytest.mark.parametrize("beta", [0.5, 2.0])
+def test_the_strength_under_an_inclined_pull_is_that_of_an_ellipse(beta: float) -> None:
+    """A pull without moment about the middle of the floor, in shares of the strength in tension."""
+    for tension, shear in ((0.6, 0.3), (0.2, -0.5), (0.0, 0.4)):
+        along, up = shear * PEAK, tension * PEAK
+        top = {"traction": [along, f"{up} + {12 * along}*(x - 0.5)"]}
+        found = workflow.prepare(
+            Scene.model_validate(square({"cohesion": law(BRITTLE, beta=beta)}, top, 4))
+        ).solvability
+        strength = 1.0 / np.hypot(tension, shear / beta)
+        assert found.lambda_peak <= strength * (1 + 1e-9)
+        assert found.lambda_held == pytest.approx(0.4 * found.lambda_peak, rel=1e-9)
+
+
+def test_a_wide_block_takes_all_of_its_strength() -> None:
+    """With contact under it and a moment that vanishes, nothing turns: the translation decides."""
+    floor = {"contact": {"gap": 0.0}, "cohesion": law(BRITTLE, beta=0.5)}
+    table = square(floor, {"traction": [0.3 * PEAK, 0.4 * PEAK]}, 4)
+    table["domain"]["size"] = [40.0, 1.0]
+    found = workflow.prepare(Scene.model_validate(table)).solvability
+    assert found.lambda_peak == pytest.approx(1.0 / np.hypot(0.4, 0.6), rel=2e-3)
+    assert found.state == "metastable"
+
+
+def test_a_body_that_only_cohesion_holds_is_not_held_against_pressure() -> None:
+    found = solved(square({"cohesion": law(BOND)}, {"traction": [0.0, -1.0e6]}))
+    assert found.exit_code == 3
+    assert "translation along -y" in str(found.solvability.direction)
+
+
+def test_beside_contact_the_law_carries_the_shear_of_what_is_pressed() -> None:
+    floor = {"contact": {"gap": 0.0}, "cohesion": law(RIGID, beta=0.5)}
+    found = solved(square(floor, {"traction": [0.2 * PEAK, -PEAK]}, 4))
+    state, stress = glue(found), found.problem.scales.stress
+    assert found.solvability.state == "metastable"
+    assert np.sum(state.surface.weights * state.friction[:, 0]) * stress == pytest.approx(0.2 * PEAK, rel=1e-9)
+    assert np.sum(state.surface.weights * state.pressure) * stress == pytest.approx(-PEAK, rel=1e-9)
+
+
+REFUSED = [
+    ({"cohesion": law(BOND, beta=0.0)}, "greater than 0"),
+    ({"cohesion": law(BOND, one_sided=True)}, "leave one_sided out"),
+    ({"cohesion": law([[0, 0], [1e-6, 1e6], [2e-6, -1e6], [3e-6, 0]])}, "push the sides apart"),
+    ({"cohesion": law(BOND), "friction": law(BOND)}, "cohesion alone, or adhesion and friction"),
+    ({"cohesion": law(BOND), "adhesion": law(BOND)}, "cohesion alone, or adhesion and friction"),
+    ({"cohesion": law([[0, 0], [1e-6, 1e6], [1e-6, 2e6]])}, "smooth it"),
+]
+
+
+@pytest.mark.parametrize(("floor", "words"), REFUSED)
+def test_what_makes_no_sense_is_refused_with_the_mend(floor: Table, words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        solve(Scene(**square(floor, {"traction": [0.0, 1.0e6]}, 1)))
+
+
+def test_the_forces_of_a_kink_at_zero_are_the_nearest_of_half_an_ellipsoid() -> None:
+    """Against the best of many points of its boundary, and finite differences of the projection."""
+    length, rng = Length((1.0, 0.5, 2.0), opens=True), np.random.default_rng(2)
+    wanted = rng.normal(size=(30, 3)) * 3
+    found, slope = length.nearest(wanted, np.ones(30))
+    ball = rng.normal(size=(40_000, 3))
+    ball[:, 0] = np.abs(ball[:, 0])
+    points = ball / np.linalg.norm(ball, axis=1)[:, None] * np.array(length.factors)
+    for i, (f, w) in enumerate(zip(found, wanted, strict=True)):
+        inside = w[0] >= 0.0 and np.linalg.norm(w / length.factors) <= 1.0
+        assert np.linalg.norm(w - f) <= (0.0 if inside else np.linalg.norm(w - points, axis=1).min()) + 1e-12
+        assert np.linalg.norm(np.maximum(f, [0.0, -np.inf, -np.inf]) / length.factors) <= 1.0 + 1e-12
+        step = 1e-6 * rng.normal(size=3)
+        moved = length.nearest((w + step)[None], np.ones(1))[0][0] - length.nearest((w - step)[None], np.ones(1))[0][0]
+        assert np.allclose(moved / 2, slope[i] @ step, atol=1e-11)
