@@ -59,13 +59,13 @@ class Length:
         whole = weights[:, :, None] * np.eye(len(self.factors))
         return np.asarray(second[:, None, None] * along + across[:, None, None] * (whole - along))
 
-    def traction(self, c: Array, forces: Array, near: Array) -> Array:
+    def traction(self, c: Array, forces: Array, near: float | Array) -> Array:
         """The traction of the law, by which ∇δ makes forces per area; at δ = 0 the least that can give them, (m,).
 
         Args:
             c: the vectors, (m, k).
             forces: along the components, (m, k).
-            near: lengths up to this are zero, (m,).
+            near: lengths up to this are zero, one for all or (m,).
         """
         unit = self.gradient(c)
         squares = np.sum(unit**2, axis=1)
@@ -95,14 +95,14 @@ class Length:
         normal = np.divide(turned, np.sqrt(scale), out=np.zeros_like(axes), where=edge)
         return found, slope - normal[:, :, None] * normal[:, None, :]
 
-    def allowed(self, c: Array, forces: Array, ends: tuple[Array, Array], near: Array) -> Array:
+    def allowed(self, c: Array, forces: Array, ends: tuple[Array, Array], near: float | Array) -> Array:
         """The forces per area nearest to given ones that a law of δ allows, (m, k).
 
         Args:
             c: the vectors, (m, k).
             forces: along the components, (m, k).
             ends: Clarke's subdifferential of the law at δ(c), (m,) each.
-            near: lengths up to this are zero, (m,).
+            near: lengths up to this are zero, one for all or (m,).
         """
         sizes = np.clip(self.traction(c, forces, near), *ends)
         at_rest, _ = self.nearest(np.where(self.counts_at_zero(c, near), forces, 0.0), np.maximum(ends[1], 0.0))
@@ -113,7 +113,7 @@ class Length:
 
         Args:
             c: the vectors, (m, k).
-            near: lengths up to this are zero, (m,).
+            near: lengths up to this are zero, one for all or (m,).
         """
         felt, size = self._felt(c), self.of(c)
         slip = np.linalg.norm(felt[:, 1:], axis=1)

@@ -49,8 +49,15 @@ def make(system: System, interior: Interior, prescribed: Array) -> CondensedLaws
         prescribed: prescribed displacements, constant and scaled, (local unknowns, 2).
 
     Raises:
-        InputError: on all ranks alike: a law on |u_t| where one component has a prescribed value that is not zero.
+        InputError: on all ranks alike: a law on |u_t| where one component has a prescribed value that is not zero, or a
+            law of opening and slip together.
     """
+    for term in system.terms:
+        if term.length is not None and term.length.opens:
+            raise InputError(
+                f"boundary.{term.surface.part}: cohesion acts on opening and slip together, which `hvi path` and "
+                "`hvi equilibria` do not follow. `hvi run` solves one load at a time; or give adhesion and friction"
+            )
     number = np.full(system.load.local_size, -1)
     number[interior.kept] = interior.first + np.arange(len(interior.kept))
     found = [_Term(system, term, number, prescribed) for term in system.terms]

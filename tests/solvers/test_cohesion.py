@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from scenes import Table, solved
+from scipy.optimize import minimize
 
 from hvi_fenicsx import InputError, Scene, Solution, solve, workflow
 from hvi_fenicsx.certify.contact_state import ContactState
@@ -151,6 +152,54 @@ def test_a_wide_block_takes_all_of_its_strength() -> None:
     found = workflow.prepare(Scene.model_validate(table)).solvability
     assert found.lambda_peak == pytest.approx(1.0 / np.hypot(0.4, 0.6), rel=2e-3)
     assert found.state == "metastable"
+
+
+def work(delta: Array) -> Array:
+    """∫ of the graph of BOND up to lengths, written down once more."""
+    rising, left = np.minimum(delta, FIRST), np.maximum(LAST - delta, 0.0)
+    falling = (LAST - FIRST) * PEAK / 2 - PEAK * np.minimum(left, LAST - FIRST) ** 2 / (2 * (LAST - FIRST))
+    return np.asarray(PEAK * rising**2 / (2 * FIRST) + falling)
+
+
+@pytest.mark.parametrize("contact", [False, True])
+def test_another_optimiser_ends_where_the_program_does(contact: bool) -> None:
+    """L-BFGS with bounds on all unknowns, from the solution shaken by parts of the softening's length."""
+    floor = {"cohesion": law(BOND, beta=0.6)} | ({"contact": {"gap": 0.0}} if contact else {})
+    table = square(floor, {"displacement": [2.4e-6, 1.6e-6]}, 3)
+    found = solved(table)
+    state, scales = glue(found), found.problem.scales
+    system = workflow.prepare(Scene.model_validate(table)).system
+    stiffness = system.jacobian.matrix.copy()
+    stiffness.convert("dense")
+    matrix, load = stiffness.getDenseArray(), system.load.array_r
+    normal, along = state.surface.blocks * 2 + 1, state.surface.blocks * 2
+    unit = scales.displacement
+
+    def energy(u: Array) -> tuple[float, Array]:
+        opening, slip = np.maximum(u[normal], 0.0), 0.6 * u[along]
+        delta = np.hypot(opening, slip)
+        tractions = np.interp(delta * unit, [0.0, FIRST, LAST], [0.0, PEAK, 0.0]) / scales.stress
+        rate = np.divide(tractions, delta, out=np.zeros_like(delta), where=delta > 0.0) * state.surface.weights
+        force = matrix @ u - load
+        total = 0.5 * float(u @ (force - load)) + float(state.surface.weights @ work(delta * unit)) / (
+            scales.stress * unit
+        )
+        np.add.at(force, normal, rate * opening)
+        np.add.at(force, along, 0.6 * rate * slip)
+        return total, force
+
+    assert found.solve_result is not None
+    solution, rng = found.solve_result.u.x.array.copy(), np.random.default_rng(5)
+    bounds = np.tile([-np.inf, np.inf], (len(solution), 1))
+    if contact:
+        bounds[normal, 0] = 0.0
+    lowest = energy(solution)[0]
+    for shaken in (0.1, 0.5):
+        start = solution + shaken * LAST / unit * rng.normal(size=len(solution))
+        options = {"maxiter": 20_000, "maxfun": 100_000, "ftol": 1e-16, "gtol": 1e-10}
+        end = minimize(energy, start, jac=True, method="L-BFGS-B", bounds=bounds, options=options)
+        assert end.fun == pytest.approx(lowest, rel=1e-8)
+        assert np.allclose(end.x, solution, rtol=0.0, atol=1e-4 * np.abs(solution).max())
 
 
 def test_a_body_that_only_cohesion_holds_is_not_held_against_pressure() -> None:

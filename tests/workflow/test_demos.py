@@ -231,6 +231,20 @@ def test_the_fault_slips_as_a_crack_does() -> None:
     assert fault.friction[:, 0] * found.problem.scales.stress == pytest.approx(2e7, rel=1e-9)
 
 
+def test_the_scarf_joint_has_the_strength_and_the_mixity_of_its_header() -> None:
+    """The stress is uniform: the ellipse of the law decides."""
+    found = demo("scarf_joint")
+    glue, stress = state(found, "glue"), found.problem.scales.stress
+    normal, along = 4.0e7 * np.sin(np.pi / 6) ** 2, 4.0e7 * np.sin(np.pi / 6) * np.cos(np.pi / 6)
+    assert found.exit_code == 0
+    assert found.solvability.lambda_peak == pytest.approx(3.0e7 / np.hypot(normal, along / 0.7), rel=1e-8)
+    assert glue.pressure * stress == pytest.approx(normal, rel=1e-6)
+    assert np.abs(glue.friction[:, 0]) * stress == pytest.approx(along, rel=1e-6)
+    assert glue.of_both_modes is not None
+    share = (along / 0.7) ** 2 / (normal**2 + (along / 0.7) ** 2)
+    assert glue.of_both_modes.slip_share == pytest.approx(share, abs=1e-6)
+
+
 def test_two_cylinders_meet_with_the_pressure_of_hertz() -> None:
     found = demo("two_cylinders")
     met, scales = state(found, "contact"), found.problem.scales
