@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 import pytest
+from runs import contact, run_all, summary
 from scenes import Table, solved
 from scipy.optimize import minimize
 
@@ -161,10 +163,10 @@ def work(delta: Array) -> Array:
     return np.asarray(PEAK * rising**2 / (2 * FIRST) + falling)
 
 
-@pytest.mark.parametrize("contact", [False, True])
-def test_another_optimiser_ends_where_the_program_does(contact: bool) -> None:
+@pytest.mark.parametrize("closes", [False, True])
+def test_another_optimiser_ends_where_the_program_does(closes: bool) -> None:
     """L-BFGS with bounds on all unknowns, from the solution shaken by parts of the softening's length."""
-    floor = {"cohesion": law(BOND, beta=0.6)} | ({"contact": {"gap": 0.0}} if contact else {})
+    floor = {"cohesion": law(BOND, beta=0.6)} | ({"contact": {"gap": 0.0}} if closes else {})
     table = square(floor, {"displacement": [2.4e-6, 1.6e-6]}, 3)
     found = solved(table)
     state, scales = glue(found), found.problem.scales
@@ -191,7 +193,7 @@ def test_another_optimiser_ends_where_the_program_does(contact: bool) -> None:
     assert found.solve_result is not None
     solution, rng = found.solve_result.u.x.array.copy(), np.random.default_rng(5)
     bounds = np.tile([-np.inf, np.inf], (len(solution), 1))
-    if contact:
+    if closes:
         bounds[normal, 0] = 0.0
     lowest = energy(solution)[0]
     for shaken in (0.1, 0.5):
@@ -248,3 +250,44 @@ def test_the_forces_of_a_kink_at_zero_are_the_nearest_of_half_an_ellipsoid() -> 
         step = 1e-6 * rng.normal(size=3)
         moved = length.nearest((w + step)[None], np.ones(1))[0][0] - length.nearest((w - step)[None], np.ones(1))[0][0]
         assert np.allclose(moved / 2, slope[i] @ step, atol=1e-11)
+
+
+def cubes() -> Table:
+    """Two blocks that do not match, glued; the upper one is pulled askew and pushed."""
+    lower = {"shape": "box", "size": [1.0, 1.0, 0.5], "cells": [4, 3, 2]}
+    upper = {"shape": "box", "size": [0.8, 0.9, 0.4], "cells": [3, 4, 2], "origin": [0.1, 0.05, 0.5]}
+    return {
+        "domain": {"lower": lower, "upper": upper},
+        "material": {"model": "three_dimensional", "youngs_modulus": E, "poisson_ratio": 0.3},
+        "boundary": {
+            "base": {"on": "lower.bottom", "displacement": [0.0, 0.0, 0.0]},
+            "pull": {"on": "upper.top", "displacement": [9.0e-6, 3.0e-6, "1.2e-5*(x - 0.3)"]},
+        },
+        "interface": {
+            "glue": {
+                "between": ["upper.bottom", "lower.top"],
+                "contact": {"gap": 0.0},
+                "cohesion": law([[0.0, 0.0], [FIRST, PEAK], [30 * FIRST, 0.0]], beta=0.5),
+            }
+        },
+        "solver": {"tolerance": 1e-12},
+    }
+
+
+@pytest.mark.long
+def test_several_ranks_find_what_one_finds_in_space(tmp_path: Path) -> None:
+    """Stuck and softening vertices beside closed ones; on one body, and between two."""
+    floor = {"contact": {"gap": 0.0}, "cohesion": law(RIGID, beta=0.5)}
+    pull = {"displacement": [1.0e-5, 0.5e-5, "7.5e-6*(x - 0.4)"]}
+    scenes = {"cube": square(floor, pull, 3, 3, tolerance=1e-12), "cubes": cubes()}
+    for ranks in (1, 2, 3):
+        run_all(tmp_path, scenes, ranks)
+    for name in scenes:
+        one = contact(tmp_path / f"{name}-1")
+        assert one["branch_n"].max() == {"cube": 0.0, "cubes": 1.0}[name]
+        for ranks in (2, 3):
+            other = contact(tmp_path / f"{name}-{ranks}")
+            assert summary(tmp_path / f"{name}-{ranks}")["exit_code"] == 0
+            for column in ("u_n", "u_t1", "u_t2", "sigma_n", "friction_t1", "friction_t2", "contact", "branch_t"):
+                size = np.abs(one[column]).max()
+                assert np.allclose(other[column], one[column], rtol=0.0, atol=1e-10 * size), (name, ranks, column)
