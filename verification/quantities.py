@@ -1,0 +1,170 @@
+"""What is read from a finished result folder, to be compared with what others found.
+
+A quantity is a class named by the table `quantity` of `cases.toml`; the other keys of that table are its fields.
+"""
+
+from __future__ import annotations
+
+import csv
+import json
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from functools import reduce
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+Rows = list[dict[str, str]]
+EXPECTATION = frozenset({"quantity", "unit", "value", "tolerance", "from", "miss"})
+"""Keys of a table that belong to the expectation, not to the quantity."""
+
+
+def rows_of(path: Path) -> Rows:
+    with path.open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def column(rows: Rows, name: str) -> Array:
+    return np.array([float(row[name] or "nan") for row in rows])
+
+
+@dataclass(frozen=True, kw_only=True)
+class Quantity(ABC):
+    """One number of a result folder, in the unit of the source (``scale`` times SI)."""
+
+    kinds: ClassVar[dict[str, type[Quantity]]] = {}
+    scale: float = 1.0
+
+    def __init_subclass__(cls, *, name: str = "") -> None:
+        if name:
+            cls.kinds[name] = cls
+
+    @abstractmethod
+    def in_si(self, folder: Path) -> float:
+        """The number, SI."""
+
+    def read(self, folder: Path) -> float:
+        return self.scale * self.in_si(folder)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Summary(Quantity, name="summary"):
+    """An entry of ``summary.json``, its key with dots."""
+
+    key: str
+
+    def in_si(self, folder: Path) -> float:
+        content = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+        return float(reduce(lambda table, key: table[key], self.key.split("."), content))
+
+
+@dataclass(frozen=True, kw_only=True)
+class PeakFactor(Summary, name="peak_factor"):
+    """The largest factor that a path bears."""
+
+    key: str = "path.peak_factor"
+
+
+@dataclass(frozen=True, kw_only=True)
+class OnPath(Quantity):
+    """Force and displacement of a part along a path."""
+
+    part: str
+    axis: str
+
+    def curve(self, folder: Path) -> tuple[Array, Array]:
+        """Displacement (m) and force (N or N/m), a state each."""
+        rows = rows_of(folder / "path.csv")
+        return column(rows, f"{self.part}.u{self.axis}"), column(rows, f"{self.part}.f{self.axis}")
+
+
+@dataclass(frozen=True, kw_only=True)
+class PeakForce(OnPath, name="peak_force"):
+    """The largest force on the part."""
+
+    def in_si(self, folder: Path) -> float:
+        return float(self.curve(folder)[1].max())
+
+
+@dataclass(frozen=True, kw_only=True)
+class DisplacementAtPeak(OnPath, name="displacement_at_peak"):
+    """The part's mean displacement where the force is largest."""
+
+    def in_si(self, folder: Path) -> float:
+        moved, force = self.curve(folder)
+        return float(moved[force.argmax()])
+
+
+@dataclass(frozen=True, kw_only=True)
+class ForceAt(OnPath, name="force_at"):
+    """The force at a displacement (m) that rises along the path; linear between two states."""
+
+    displacement: float
+
+    def in_si(self, folder: Path) -> float:
+        moved, force = self.curve(folder)
+        after = int(np.argmax(moved >= self.displacement))
+        around = slice(after - 1, after + 1)
+        return float(np.interp(self.displacement, moved[around], force[around]))
+
+
+@dataclass(frozen=True, kw_only=True)
+class OnContact(Quantity):
+    """A column of ``contact.csv`` on one part."""
+
+    part: str
+    column: str = "sigma_n"
+
+    def values(self, folder: Path) -> Array:
+        return column([row for row in rows_of(folder / "contact.csv") if row["part"] == self.part], self.column)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Largest(OnContact, name="largest"):
+    """The largest absolute value."""
+
+    def in_si(self, folder: Path) -> float:
+        return float(np.nanmax(np.abs(self.values(folder))))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Median(OnContact, name="median"):
+    """The median: what stands along a part, whatever happens at its ends."""
+
+    def in_si(self, folder: Path) -> float:
+        return float(np.nanmedian(self.values(folder)))
+
+
+@dataclass(frozen=True, kw_only=True)
+class PeakOverLineContact(OnContact, name="peak_over_line_contact"):
+    """The largest pressure over that of Hertz's line contact, √(P E*/(π R*)), P being the resultant of the run."""
+
+    modulus: float
+    radius: float
+
+    def in_si(self, folder: Path) -> float:
+        force = json.loads((folder / "summary.json").read_text(encoding="utf-8"))["resultants"][self.part]
+        wanted = np.sqrt(abs(force[1]) * self.modulus / (np.pi * self.radius))
+        return float(np.nanmax(np.abs(self.values(folder))) / wanted)
+
+
+@dataclass(frozen=True, kw_only=True)
+class TipOfLowest(Quantity, name="tip_of_lowest"):
+    """The largest displacement of a part in the equilibrium of the lowest energy."""
+
+    part: str
+    axis: str
+
+    def in_si(self, folder: Path) -> float:
+        lowest = folder / rows_of(folder / "equilibria.csv")[0]["folder"]
+        rows = [row for row in rows_of(lowest / "boundary.csv") if row["part"] == self.part]
+        return float(column(rows, f"u_{self.axis}").max())
+
+
+def made(table: dict[str, Any]) -> Quantity:
+    """The quantity of a table of `cases.toml`."""
+    keys = {key: value for key, value in table.items() if key not in EXPECTATION}
+    return Quantity.kinds[table["quantity"]](**keys)
