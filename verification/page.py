@@ -7,22 +7,21 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import matplotlib as mpl
-from outcomes import Comparison, Outcome
-
 import quantities
+from outcomes import Comparison, Outcome
 
 mpl.use("Agg")
 from matplotlib import pyplot as plt
 
+COLUMNS = ("case", "quantity", "expected", "found", "difference", "tolerance", "", "expected from")
 HEAD = """# Do the results of others come out?
 
     ./hvi exec python3 verification/verify.py
 
-This page and its pictures are written by that command. The cases are in `verification/cases.toml`: a command, a source, and for each number the value
-and the tolerance that were written down before the case first ran here. A miss stays in the table.
+This page and its pictures are written by that command. The cases are in `verification/cases.toml`: a command, a source,
+and for each number the value and the tolerance that were written down before the case first ran here. A miss stays in
+the table, with its explanation.
 
-| case | quantity | expected | found | difference | tolerance | | expected from |
-|---|---|---|---|---|---|---|---|
 """
 
 
@@ -39,10 +38,14 @@ def row(title: str, comparison: Comparison) -> str:
     unit = f" {expected['unit']}".rstrip()
     shown = "none" if found is None else f"{found:.5g}{unit}"
     off = "" if found is None or not expected["value"] else f"{100 * (found / expected['value'] - 1):+.2f} %"
-    verdict = "agrees" if comparison.agrees else "**misses**"
+    verdict = "agrees" if comparison.agrees else f"**misses**: {expected.get('miss', 'not explained')}"
     name = expected["quantity"].replace("_", " ") + (f" {expected['key']}" if "key" in expected else "")
     allowed = f"{100 * expected['tolerance']:g} %"
-    return f"| {title} | {name} | {expected['value']:.6g}{unit} | {shown} | {off} | {allowed} | {verdict} | {expected['from']} |"
+    return line(title, name, f"{expected['value']:.6g}{unit}", shown, off, allowed, verdict, expected["from"])
+
+
+def line(*cells: str) -> str:
+    return f"| {' | '.join(cells)} |"
 
 
 def section(outcome: Outcome, images: Path) -> str:
@@ -52,7 +55,7 @@ def section(outcome: Outcome, images: Path) -> str:
     lines = [
         f'<a id="{case["name"]}"></a>\n\n## {case["title"]}\n',
         f"Source: {case['source']}.\n",
-        f"    {' '.join(words)}\n",
+        f"Command: `{' '.join(words)}`\n",
     ]
     if "remark" in case:
         lines.append(f"{case['remark']}\n")
@@ -85,6 +88,6 @@ def write(outcomes: Sequence[Outcome], docs: Path) -> None:
     """``docs/verification.md`` and its pictures."""
     images = docs / "images" / "verification"
     images.mkdir(parents=True, exist_ok=True)
-    table = "\n".join(line for outcome in outcomes for line in rows(outcome))
+    table = "\n".join([line(*COLUMNS), line(*("---" for _ in COLUMNS)), *(text for o in outcomes for text in rows(o))])
     sections = "\n".join(section(outcome, images) for outcome in outcomes)
     (docs / "verification.md").write_text(f"{HEAD}{table}\n\n{sections}", encoding="utf-8")

@@ -131,6 +131,18 @@ class Largest(OnContact, name="largest"):
 
 
 @dataclass(frozen=True, kw_only=True)
+class PointContactPeak(OnContact, name="point_contact_peak"):
+    """The peak p of p √(1 - r²/a²), fitted to the nodal pressures at the distances r < a from the origin."""
+
+    radius: float
+
+    def in_si(self, folder: Path) -> float:
+        rows = [row for row in rows_of(folder / "contact.csv") if row["part"] == self.part]
+        shape = np.sqrt(np.clip(1 - (column(rows, "x") ** 2 + column(rows, "y") ** 2) / self.radius**2, 0, None))
+        return float(shape @ -column(rows, self.column) / (shape @ shape))
+
+
+@dataclass(frozen=True, kw_only=True)
 class Median(OnContact, name="median"):
     """The median: what stands along a part, whatever happens at its ends."""
 

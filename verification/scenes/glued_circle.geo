@@ -21,3 +21,9 @@ Physical Surface("front") = {3};
 Physical Surface("left") = {4};
 Physical Surface("top") = {7};
 Physical Volume("block") = {1};
+Field[1] = Distance;  // fine below the edge of the circle too, not on its surface alone
+Field[1].CurvesList = {2}; Field[1].Sampling = 200;
+Field[2] = Threshold;
+Field[2].InField = 1; Field[2].SizeMin = h; Field[2].SizeMax = 0.02; Field[2].DistMin = 4*h; Field[2].DistMax = 0.08;
+Background Field = 2;
+Mesh.MeshSizeExtendFromBoundary = 0;

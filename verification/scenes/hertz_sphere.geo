@@ -22,3 +22,7 @@ Physical Surface("front") = {3};
 Physical Surface("left") = {4};
 Physical Surface("top") = {7};
 Physical Volume("block") = {1};
+Field[1] = Ball;      // fine below the contact too, not on its surface alone
+Field[1].Radius = r; Field[1].Thickness = 10*a; Field[1].VIn = h; Field[1].VOut = 0.003;
+Background Field = 1;
+Mesh.MeshSizeExtendFromBoundary = 0;
