@@ -11,6 +11,8 @@ from runs import ROOT
 from hvi_fenicsx import read_scene
 
 sys.path.insert(0, str(ROOT / "verification"))
+import itertools
+
 import quantities
 import verify
 
@@ -20,7 +22,7 @@ QUICK = ("glued_bar_short", "hertz_plane", "inclined_crack")
 @pytest.mark.parametrize("case", verify.cases(), ids=lambda case: case["name"])
 def test_a_case_reads_a_scene_and_known_quantities(case: dict[str, object]) -> None:
     command = case["command"]
-    assert read_scene(ROOT / command[1], [w for o, w in zip(command, command[1:], strict=False) if o == "--set"])
+    assert read_scene(ROOT / command[1], [w for o, w in itertools.pairwise(command) if o == "--set"])
     assert all(quantities.made(table) for table in case["expected"])
     assert case["source"]
 
