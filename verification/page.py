@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shlex
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -27,10 +28,14 @@ the table, with its explanation. The seconds are those of a busy machine of two 
 
 def rows(outcome: Outcome) -> Iterator[str]:
     """The lines of the table for one case."""
-    title = f"[{outcome.case['title']}](#{outcome.case['name']})"
+    title = f"[{outcome.case['title']}](#{anchor(outcome.case['title'])})"
     for comparison in outcome.comparisons():
         yield row(title, comparison)
         title = ""
+
+
+def anchor(title: str) -> str:
+    return re.sub(r"[^\w -]", "", title.lower()).replace(" ", "-")
 
 
 def row(title: str, comparison: Comparison) -> str:
@@ -53,7 +58,7 @@ def section(outcome: Outcome, images: Path) -> str:
     case = outcome.case
     words = ["./hvi", *(shlex.quote(word) for word in case["command"])]
     lines = [
-        f'<a id="{case["name"]}"></a>\n\n## {case["title"]}\n',
+        f"## {case['title']}\n",
         f"Source: {case['source']}.\n",
         f"Command: `{' '.join(words)}`\n",
     ]
