@@ -1,6 +1,6 @@
 """Estimated against true errors, scene by scene and on uniformly refined meshes.
 
-    ./hvi exec python3 benchmarks/effectivity.py [--levels 4] [--scenes NAME ...] [--picture FILE.png]
+    ./hvi exec python3 benchmarks/effectivity.py [--degree 2] [--levels 4] [--scenes NAME ...] [--picture FILE.png]
 
 The true error is the distance in the energy norm from the solution on a mesh four times finer than the finest one
 listed, solved without smoothing. That reference has an error too: on the finest mesh the true one comes out up to 3 %
@@ -20,18 +20,16 @@ import numpy as np
 import ufl
 from dolfinx import fem
 from mpi4py import MPI
-from petsc4py import PETSc
 
 from hvi_fenicsx import Scene, read_scene
 from hvi_fenicsx.certify.certificate import examine
 from hvi_fenicsx.certify.estimate.estimator import Estimate, estimate
-from hvi_fenicsx.mesh import refinement
-from hvi_fenicsx.problem.problem import Problem
+from hvi_fenicsx.mesh import nodes, refinement
+from hvi_fenicsx.problem.spaces import displacement_space
 from hvi_fenicsx.runtime.timing import Timer
 from hvi_fenicsx.solvers.context import RunControl
-from hvi_fenicsx.solvers.nested_iteration import CoarseStart, LevelSolution, solve, solve_from_coarser
+from hvi_fenicsx.solvers.nested_iteration import CoarseStart, LevelSolution, refined_levels, solve, solve_from_coarser
 from hvi_fenicsx.system.assemble import assemble
-from hvi_fenicsx.system.levels import Level, prolongation
 from hvi_fenicsx.system.system import System
 from hvi_fenicsx.workflow import prepare
 
@@ -65,8 +63,7 @@ def steps(scene: Scene, count: int) -> list[Step]:
         coarse = found[-1].solved
         refined = refinement.uniform(coarse.system.problem.domain)
         system = assemble(refined.domain, model, Timer())
-        lift = prolongation(system, coarse.system, refined.transfer)
-        levels = (Level(system, coarse.system, lift), *coarse.levels)
+        lift, levels = refined_levels(model, system, coarse.system, coarse.levels, refined.transfer, control)
         start = CoarseStart(system=coarse.system, result=coarse.result, prolongation=lift, levels=levels)
         found.append(Step(solve_from_coarser(system, start, verdict, options, control), refined))
     return found
@@ -85,30 +82,30 @@ def distance(step: Step, finer: Sequence[Step]) -> float:
         strict=True,
     )
     for part, coarse, exact in pressures:
-        exact.x.array[:] -= _on_finest(_padded(step.system.problem, coarse), step, finer).x.array[
-            :: fine.scales.dimension
-        ]
+        exact.x.array[:] -= _on_finest(_padded(coarse), step, finer).x.array[:: fine.scales.dimension]
         (scalar,) = part.volume.arguments()
         force += fem.assemble_scalar(fem.form(ufl.replace(part.volume, {scalar: exact * exact}))) / part.modulus
     return float(np.sqrt(MPI.COMM_WORLD.allreduce(force)))
 
 
-def _padded(problem: Problem, scalar: fem.Function) -> fem.Function:
+def _padded(scalar: fem.Function) -> fem.Function:
     """A P1 scalar as the first component of a P1 vector field."""
-    field = fem.Function(problem.space)
-    field.x.array[:: problem.scales.dimension] = scalar.x.array
+    mesh = scalar.function_space.mesh
+    field = fem.Function(displacement_space(mesh, 1))
+    field.x.array[:: mesh.geometry.dim] = scalar.x.array
     return field
 
 
 def _on_finest(u: fem.Function, step: Step, finer: Sequence[Step]) -> fem.Function:
-    """A P1 field on the last of the finer meshes."""
-    x: PETSc.Vec = u.x.petsc_vec
-    coarse = step
+    """A field of P1, or of the displacements' degree, on the last of the finer meshes."""
+    x, coarse = u.x.petsc_vec, u.function_space
     for fine_step in finer:
         assert fine_step.refined is not None
-        x = fine_step.refined.transfer.prolongation(fine_step.system.problem.space, coarse.system.problem.space) * x
-        coarse = fine_step
-    result = fem.Function(finer[-1].system.problem.space)
+        mesh, degree = fine_step.system.problem.domain.mesh, nodes.degree(coarse)
+        fine = displacement_space(mesh, degree)
+        x = fine_step.refined.transfer.prolongation(fine, coarse) * x
+        coarse = fine
+    result = fem.Function(coarse)
     result.x.array[: x.local_size] = x.array_r
     result.x.scatter_forward()
     return result
@@ -262,8 +259,8 @@ def scenes() -> dict[str, Scene]:
 
 def _affordable(scene: Scene) -> int:
     """How many levels fit beside their reference, which is two refinements finer."""
-    cells = math.prod(getattr(scene.domain, "cells", [1]))
-    return 4 if scene.dimension == 2 else 2 if cells >= 32 else 3
+    cells, degree = math.prod(getattr(scene.domain, "cells", [1])), scene.solver.degree or 1
+    return 5 - degree if scene.dimension == 2 else (3 if cells < 32 else 2 if cells * degree < 100 else 1)
 
 
 def lines(name: str, found: Sequence[Row]) -> Iterator[str]:
@@ -298,13 +295,14 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--levels", type=int, default=4)
     parser.add_argument("--scenes", nargs="*", default=list(scenes()))
+    parser.add_argument("--degree", type=int, default=1, choices=(1, 2))
     parser.add_argument("--picture", type=Path)
     options = parser.parse_args()
     print("| scene | unknowns | true / % | estimated / % | of it smoothing / % | index | order |")
     print("|---|---|---|---|---|---|---|", flush=True)
     found: dict[str, list[Row]] = {}
     for name in options.scenes:
-        scene = scenes()[name]
+        scene = scenes()[name].with_solver(degree=options.degree)
         found[name] = rows(scene, min(options.levels, _affordable(scene)))
         print("\n".join(lines(name, found[name])), flush=True)
     if options.picture is not None:

@@ -140,8 +140,6 @@ def outcome(solution: Solution) -> Iterator[str]:
         yield f"smoothing: -σ_t is up to {away:.3g} N/m² from what the unsmoothed law gives there"
     if solution.estimate is not None:
         yield error(solution.estimate)
-    elif solution.converged and solution.scene.solver.degree != 1:
-        yield "no error estimate: there is none at degree 2 yet"
     energy = solution.examination.energy * solution.problem.scales.energy
     unit = "J/m" if solution.problem.scales.dimension == 2 else "J"
     yield (
@@ -176,8 +174,8 @@ def accuracy(reached: AccuracyResult) -> Iterator[str]:
     what = quantities.find(goal.quantity).description
     epsilon = "" if last.epsilon is None else f", ε {last.epsilon:.2g}"
     yield (
-        f"accuracy: {percent(last.error)}{asked} of {what}, by {len(steps)} meshes up to {last.dofs:,} "
-        f"unknowns, tolerance {last.tolerance:.0e}{epsilon}, {sum(s.seconds for s in steps):.1f} s"
+        f"accuracy: {percent(last.error)}{asked} of {what}, at degree {reached.degree} by {len(steps)} meshes up to "
+        f"{last.dofs:,} unknowns, tolerance {last.tolerance:.0e}{epsilon}, {sum(s.seconds for s in steps):.1f} s"
     )
     if reached.more is not None:
         more = reached.more

@@ -22,7 +22,7 @@ def model_of(scene: Scene) -> Model:
         [(placed.where, placed.effect) for placed in scene.effects()],
         _modification(scene.solver),
         {name: Sides(first=i.between[0], second=i.between[1], tied=i.tied) for name, i in scene.interface.items()},
-        scene.solver.degree,
+        scene.solver.degree or 1,
     )
 
 

@@ -208,8 +208,7 @@ def finish_with_levels(
     solved = _solved(prepared, control, start)
     examination, warnings = _examined(prepared, solved.result)
     errors = None
-    known = prepared.model.degree == 1
-    if estimating and examination.certificate.passed and known:
+    if estimating and examination.certificate.passed:
         with prepared.timer("estimate"):
             errors = estimate(prepared.system, solved.levels, solved.result.u, examination)
         warnings += plausibility.of_estimate(errors)

@@ -22,9 +22,9 @@ from ..runtime.mpi import agree, total
 from ..runtime.timing import Timer
 from ..scene import Scene
 from ..solution import Solution
-from ..solvers.context import Progress, never
-from ..solvers.nested_iteration import CoarseStart
-from ..system.levels import Level, Levels, prolongation, with_coarser_system
+from ..solvers.context import Progress, RunControl, never
+from ..solvers.nested_iteration import CoarseStart, refined_levels
+from ..system.levels import Level, Levels
 from ..typing import Entities
 from ..workflow import DEFAULT, Preparation, Thresholds, finish_with_levels, prepare
 from . import first_mesh
@@ -127,8 +127,10 @@ class AdaptiveSolver:
         """
         prepared, coarse = self._prepared(level, scene, refined.domain), level.prepared.system
         with self.timer("setup"):
-            step = prolongation(prepared.system, coarse, refined.transfer)
-            levels = with_coarser_system(prepared.system, coarse, level.levels, step)
+            found = refined_levels(
+                prepared.model, prepared.system, coarse, level.levels, refined.transfer, RunControl(timer=self.timer)
+            )
+        step, levels = found
         return self._solved(level, prepared, levels, step, ahead)
 
     def again(self, level: AdaptiveLevel, scene: Scene) -> AdaptiveLevel:

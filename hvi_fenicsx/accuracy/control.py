@@ -1,31 +1,19 @@
-"""Solve to a given accuracy, or within a given time: mesh, ε and tolerances follow from the estimated error.
-
-The mesh is refined adaptively until the estimate is small enough (:mod:`.error_balance`), or memory or time end.
-"""
+"""Solve to a given accuracy, or within a given time: degree, mesh, ε and tolerances follow from the estimated error."""
 
 from __future__ import annotations
 
-import math
-import time
+import functools
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 from mpi4py import MPI
 
-from ..errors import InputError
-from ..mesh.refinement import Refinement
-from ..runtime import memory
-from ..runtime.mpi import largest
 from ..scene import Scene
-from . import adaptive, cost_forecast, quantities
-from .adaptive import AdaptiveLevel, AdaptiveSolver
-from .cost_forecast import AdaptiveStep, Cost
-from .error_balance import ErrorBalance, with_tolerance
+from . import degree_choice
+from .adaptive import AdaptiveSolver
+from .adaptive_run import AdaptiveRun
 from .goal import AccuracyResult, Goal
 from .thresholds import CONTROL, ControlThresholds
-
-_LARGEST = 2**31 - 1
-"""Unknowns that PETSc's default integers can number."""
 
 
 def solve_to_goal(
@@ -36,7 +24,7 @@ def solve_to_goal(
     report: Callable[[str], None],
     thresholds: ControlThresholds = CONTROL,
 ) -> AccuracyResult:
-    """Refine until the goal is reached, or cannot be. Collective.
+    """Refine until the goal is reached, or cannot be; at the cheaper degree where the scene states none. Collective.
 
     Args:
         scene: what to solve; its mesh sets where to begin (:func:`.adaptive.coarsest`), its ε is the largest.
@@ -49,174 +37,35 @@ def solve_to_goal(
     Raises:
         InputError: on all ranks alike: the scene has no such quantity, or does not fit its mesh.
     """
-    if scene.solver.degree != 1:
-        raise InputError(
-            "solver.degree: an accuracy or a time budget needs the error estimate, which there is at degree 1 only; "
-            "leave out solver.degree, or the accuracy and the time budget"
-        )
-    return _AdaptiveRun(scene, comm, goal, solver, report, thresholds).run()
+    begun = functools.partial(_begun, scene, comm, goal, solver, report, thresholds)
+    choice, run = None, begun(scene.solver.degree or 1)
+    if scene.solver.degree is None and not scene.interface and degree_choice.worthwhile(run):
+        other = begun(2)
+        choice = degree_choice.between(run, other)
+        report(str(choice))
+        run = other if choice.degree == 2 else run
+        del other
+    found = run.finish()
+    return replace(found, solution=replace(found.solution, scene=scene), choice=choice)
 
 
-@dataclass
-class _AdaptiveRun:
-    """One run to a goal. Everything it decides on is the same on all ranks."""
-
-    scene: Scene
-    comm: MPI.Comm
-    goal: Goal
-    solver: AdaptiveSolver
-    report: Callable[[str], None]
-    thresholds: ControlThresholds
-    steps: list[AdaptiveStep] = field(default_factory=list)
-    failures: int = 0
-
-    def run(self) -> AccuracyResult:
-        self.base, self.room = memory.peak(self.comm), memory.room(self.comm) * self.thresholds.usable_memory
-        self.quantity = quantities.find(self.goal.quantity)()
-        self.solver = replace(self.solver, existence=self.quantity.needs_existence)
-        self.balance = ErrorBalance(
-            accuracy=self.goal.accuracy,
-            quantity=self.quantity,
-            dimension=self.scene.dimension,
-            thresholds=self.thresholds,
-        )
-        start = time.perf_counter()
-        level = self._first()
-        why = self._record(level, start)
-        while why is None and not self._done():
-            start = time.perf_counter()
-            found = self._next(level)
-            if isinstance(found, str):
-                why = found
-            else:
-                level = found
-                why = self._record(level, start)
-        return self._result(level, why)
-
-    def _first(self) -> AdaptiveLevel:
-        """The coarsest mesh that sees the data, solved to a loose tolerance. Collective."""
-        scene = adaptive.coarsest(self.scene)
-        tolerance = min(self.thresholds.coarsest_tolerance, scene.solver.tolerance * 1e3)
-        return self.solver.begin_resolved(with_tolerance(scene, tolerance), self.comm, self.thresholds)
-
-    def _result(self, level: AdaptiveLevel, why: str | None) -> AccuracyResult:
-        return AccuracyResult(
-            goal=self.goal,
-            level=level,
-            solution=replace(level.solution, scene=self.scene),
-            steps=tuple(self.steps),
-            why=None if self.goal.accuracy is None and self.steps else why,
-            more=self._cost_of_more(),
-        )
-
-    def _cost_of_more(self) -> Cost | None:
-        """What a tenth of the error would cost."""
-        if not self.steps or not math.isfinite(self.steps[-1].error) or self.steps[-1].error <= 0:
-            return None
-        wanted = (self.goal.accuracy or self.steps[-1].error) / 10
-        needed = cost_forecast.cost(self.steps, wanted, self.scene.dimension, self.base)
-        return needed if math.isfinite(needed.dofs) else None
-
-    def _record(self, level: AdaptiveLevel, start: float) -> str | None:
-        """Record a level; why to stop at it, or None. Collective."""
-        solution = level.solution
-        if solution.solve_result is None or solution.solve_result.interrupted:
-            return solution.reason
-        self.quantity.add(level)
-        if solution.estimate is None:
-            self.failures += 1
-            self.report(f"{level.dofs:,} unknowns: {solution.reason}")
-            return solution.reason if self.failures >= self.thresholds.failures else None
-        self.failures = 0
-        self.steps.append(self._step(level, largest(self.comm, time.perf_counter() - start)))
-        self.report(_line(len(self.steps), self.steps[-1], self.solver.timer.total))
-        return None
-
-    def _step(self, level: AdaptiveLevel, seconds: float) -> AdaptiveStep:
-        estimate = level.solution.estimate
-        assert estimate is not None
-        norm, smoothing = estimate.energy_norm or 1.0, self.quantity.smoothing()
-        return AdaptiveStep(
-            dofs=level.dofs,
-            error=self.quantity.error(),
-            discretisation=estimate.discretisation / norm,
-            smoothing=smoothing,
-            algebraic=estimate.algebraic / norm,
-            epsilon=level.solution.epsilon,
-            tolerance=level.solution.scene.solver.tolerance,
-            seconds=seconds,
-            memory=memory.peak(self.comm),
-        )
-
-    def _done(self) -> bool:
-        if not self.steps or self.failures:
-            return False
-        return self.steps[-1].error <= (self.goal.accuracy or 0.0)
-
-    def _next(self, level: AdaptiveLevel) -> AdaptiveLevel | str:
-        """The next level, or why there is none. Collective."""
-        if len(self.steps) >= self.thresholds.most_levels:
-            return f"{self.thresholds.most_levels} meshes were not enough"
-        if self.goal.seconds is None and (too_much := self._unaffordable()):
-            return too_much  # within a given time the best that can be had is wanted
-        scene = level.solution.scene
-        if self.steps:
-            scene = self.balance.next_scene(scene, self.steps[-1])
-        tighter = self.thresholds.tighter * scene.solver.tolerance
-        if self.failures == 1 and tighter >= self.thresholds.finest_tolerance:
-            return self.solver.again(level, with_tolerance(scene, tighter))
-        if self._known and self.balance.mesh_suffices(self.steps):
-            return self.solver.again(level, scene)
-        refined = self._refined(level)
-        return self._unaffordable_step(refined) or self.solver.refine(level, refined, scene, self.quantity.ahead())
-
-    @property
-    def _known(self) -> bool:
-        """Whether the last mesh has an error."""
-        return bool(self.steps) and not self.failures
-
-    def _refined(self, level: AdaptiveLevel) -> Refinement:
-        """The refined mesh of the next step. Collective."""
-        most = self.balance.largest_bulk
-        bulk = self.balance.bulk(self.steps[-1]) if self._known else most
-        if bulk == most:
-            return adaptive.refined(level, bulk)
-        return adaptive.refined_with_neighbours(level, bulk, self.thresholds)
-
-    def _unaffordable(self) -> str | None:
-        """Why the accuracy needs more memory than there is, before it is tried; None where it does not."""
-        known = [step for step in self.steps if math.isfinite(step.error)]
-        fewest = 1 if self.quantity.in_energy_norm else self.thresholds.meshes_before_forecast
-        if len(known) < fewest or self.goal.accuracy is None:
-            return None
-        needed = cost_forecast.cost(self.steps, self.goal.accuracy, self.scene.dimension, self.base)
-        if needed.dofs <= _LARGEST and needed.memory <= self.room:
-            return None
-        if not math.isfinite(needed.dofs):
-            return f"{self.goal.accuracy:g} is beyond any number of unknowns"
-        return (
-            f"{self.goal.accuracy:g} would need about {needed.dofs:.1e} unknowns and {needed.memory / 1024:.3g} GB; "
-            f"{self.room / 1024:.3g} GB can be used"
-        )
-
-    def _unaffordable_step(self, refined: Refinement) -> str | None:
-        """Why the next step would exceed the time or the memory; None where it does not. Collective."""
-        mesh, d = refined.domain.mesh, refined.domain.dimension
-        dofs = d * int(mesh.topology.index_map(0).size_global)
-        if not self.steps:
-            return None
-        if (needed := cost_forecast.memory(self.steps, dofs, d, self.base)) > self.room:
-            return f"the next mesh of {dofs:,} unknowns would need {needed / 1024:.3g} GB"
-        expected = largest(self.comm, self.solver.timer.total) + cost_forecast.seconds(self.steps, dofs)
-        if self.goal.seconds is not None and expected > self.goal.seconds:
-            return f"the next mesh of {dofs:,} unknowns would end after {expected:.0f} s"
-        return None
-
-
-def _line(level: int, step: AdaptiveStep, elapsed: float) -> str:
-    width = "" if step.epsilon is None else f", ε {step.epsilon:.2g}"
-    error = f"error {step.error:.2e}" if math.isfinite(step.error) else "no error yet"
-    return (
-        f"mesh {level}: {step.dofs:,} unknowns, {error} (energy norm: mesh {step.discretisation:.1e}, smoothing "
-        f"{step.smoothing:.1e}, solver {step.algebraic:.1e}), tolerance {step.tolerance:.0e}{width}, {elapsed:.1f} s"
+def _begun(
+    scene: Scene,
+    comm: MPI.Comm,
+    goal: Goal,
+    solver: AdaptiveSolver,
+    report: Callable[[str], None],
+    thresholds: ControlThresholds,
+    degree: int,
+) -> AdaptiveRun:
+    """A run at a degree, on its first mesh. Collective."""
+    run = AdaptiveRun(
+        scene=scene.with_solver(degree=degree),
+        comm=comm,
+        goal=goal,
+        solver=solver,
+        report=report,
+        thresholds=thresholds,
     )
+    run.begin()
+    return run

@@ -64,16 +64,39 @@ class Cost:
         return asdict(self)
 
 
-def rate(steps: Sequence[AdaptiveStep], dimension: int, thresholds: ForecastThresholds = FORECAST) -> float:
-    """The observed r in error = C dofs^-r; the optimal 1/d of P1 as long as too few steps say otherwise.
+@dataclass(frozen=True, kw_only=True)
+class Elements:
+    """What elements are refined.
+
+    Attributes:
+        dimension: d, 2 or 3.
+        degree: p, 1 or 2.
+    """
+
+    dimension: int
+    degree: int = 1
+
+    @property
+    def rate(self) -> float:
+        """The optimal r in error = C unknowns^-r, in the energy norm."""
+        return self.degree / self.dimension
+
+    @property
+    def memory(self) -> float:
+        """What an unknown takes, about, MB."""
+        return DEFAULT.adaptive[self.dimension] * DEFAULT.of_degree[self.degree] / 1024
+
+
+def rate(steps: Sequence[AdaptiveStep], elements: Elements, thresholds: ForecastThresholds = FORECAST) -> float:
+    """The observed r in error = C dofs^-r; the optimal one as long as too few steps say otherwise.
 
     Args:
         steps: so far.
-        dimension: d.
+        elements: that are refined.
         thresholds: when it is believed.
     """
     known = [s for s in steps if math.isfinite(s.error) and s.error > 0][-thresholds.fitted :]
-    best = 1.0 / dimension
+    best = elements.rate
     if len(known) < 3 or known[-1].dofs == known[0].dofs:
         return best
     slope = np.polyfit(np.log([s.dofs for s in known]), np.log([s.error for s in known]), 1)[0]
@@ -84,7 +107,7 @@ def rate(steps: Sequence[AdaptiveStep], dimension: int, thresholds: ForecastThre
 def cost(
     steps: Sequence[AdaptiveStep],
     accuracy: float,
-    dimension: int,
+    elements: Elements,
     base: float,
     thresholds: ForecastThresholds = FORECAST,
 ) -> Cost:
@@ -93,14 +116,14 @@ def cost(
     Args:
         steps: so far.
         accuracy: relative.
-        dimension: 2 or 3.
+        elements: that are refined.
         base: memory of the program without a mesh, MB.
         thresholds: of the forecast.
     """
     last = steps[-1]
-    growth = _power(max(1.0, last.error / accuracy), 1.0 / rate(steps, dimension, thresholds))
+    growth = _power(max(1.0, last.error / accuracy), 1.0 / rate(steps, elements, thresholds))
     ahead = _duration(steps, last.dofs, last.dofs * growth)
-    needed = memory(steps, last.dofs * growth, dimension, base, thresholds)
+    needed = memory(steps, last.dofs * growth, elements, base, thresholds)
     return Cost(accuracy, last.dofs * growth, sum(s.seconds for s in steps) + ahead, needed)
 
 
@@ -129,7 +152,7 @@ def _seconds(steps: Sequence[AdaptiveStep]) -> tuple[float, float]:
 def memory(
     steps: Sequence[AdaptiveStep],
     dofs: float,
-    dimension: int,
+    elements: Elements,
     base: float,
     thresholds: ForecastThresholds = FORECAST,
 ) -> float:
@@ -138,12 +161,12 @@ def memory(
     Args:
         steps: so far.
         dofs: its unknowns.
-        dimension: 2 or 3.
+        elements: that are refined.
         base: memory of the program without a mesh, MB.
         thresholds: of the forecast.
     """
     last = steps[-1]
-    each = DEFAULT.adaptive[dimension] / 1024
+    each = elements.memory
     if last.dofs >= thresholds.measurable:
         each = (last.memory - base) / last.dofs
     return base + each * dofs

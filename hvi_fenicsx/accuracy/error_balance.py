@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from ..scene import Scene
-from .cost_forecast import AdaptiveStep
+from .cost_forecast import AdaptiveStep, Elements
 from .quantity_base import Quantity
 from .thresholds import ControlThresholds
 
@@ -21,13 +21,13 @@ class ErrorBalance:
     Attributes:
         accuracy: what is asked for, relative; None: as small as the time allows.
         quantity: the target quantity.
-        dimension: 2 or 3.
+        elements: that are refined.
         thresholds: how the parts are balanced.
     """
 
     accuracy: float | None
     quantity: Quantity
-    dimension: int
+    elements: Elements
     thresholds: ControlThresholds
 
     @property
@@ -35,7 +35,7 @@ class ErrorBalance:
         """Part of the squared error that a step refines, unless it is the last one."""
         if self.quantity.known_from_one_mesh and not self.quantity.in_energy_norm:
             return self.thresholds.bulk_on_contact
-        return self.thresholds.bulk_2d if self.dimension == 2 else self.thresholds.bulk_3d
+        return self.thresholds.bulk_2d if self.elements.dimension == 2 else self.thresholds.bulk_3d
 
     def bulk(self, last: AdaptiveStep) -> float:
         """Part of the squared error to refine: no more than the aim needs.
@@ -47,8 +47,8 @@ class ErrorBalance:
             return self.largest_bulk
         mesh, smoothing, _ = self.quantity.parts(last)
         left = self._beside(smoothing) / mesh if mesh > 0 else 1.0
-        # On Γc errors fall as the square of the energy norm's. Halving the edges of marked cells leaves a quarter.
-        needed = (1 - (left**2 if self.quantity.in_energy_norm else left)) / 0.75
+        # On Γc errors fall as the square of the energy norm's. Halving the edges of marked cells leaves 4^-p of it.
+        needed = (1 - (left**2 if self.quantity.in_energy_norm else left)) / (1 - 0.25**self.elements.degree)
         return min(self.largest_bulk, max(self.thresholds.smallest_bulk, needed))
 
     def _beside(self, part: float) -> float:

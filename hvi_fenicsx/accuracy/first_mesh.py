@@ -8,8 +8,9 @@ from __future__ import annotations
 import numpy as np
 from mpi4py import MPI
 
-from ..certify.estimate import boundary_data, edge_bubbles
+from ..certify.estimate import boundary_data, bubbles
 from ..certify.estimate.thresholds import DEFAULT as SAMPLING
+from ..mesh import nodes
 from ..problem.problem import Problem
 from ..runtime.mpi import total
 from ..typing import Array, Entities
@@ -25,10 +26,13 @@ def unresolved(problem: Problem, thresholds: ControlThresholds = CONTROL) -> Ent
         problem: the data and the mesh.
         thresholds: which deviation is too much.
     """
-    bubbles, found = edge_bubbles.space(problem.domain.mesh), list[Entities]([np.empty(0, dtype=np.int32)])
+    space, found = (
+        bubbles.space(problem.domain.mesh, nodes.degree(problem.space)),
+        list[Entities]([np.empty(0, dtype=np.int32)]),
+    )
     for facets, value in boundary_data.everything(problem):
-        at = boundary_data.sample(problem, bubbles, facets, SAMPLING)
-        squares, area = at.beyond_linear(value) ** 2 @ at.weights, at.facets.areas
+        at = boundary_data.sample(problem, space, facets, SAMPLING)
+        squares, area = at.beyond_nodes(value) ** 2 @ at.weights, at.facets.areas
         allowed = _allowed(problem.domain.mesh.comm, at.of(value), thresholds) ** 2
         whole, deviation = (total(problem.domain.mesh.comm, float(np.sum(x))) for x in (area, area * squares))
         if deviation > allowed * whole:

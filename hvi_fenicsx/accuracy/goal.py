@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -31,6 +32,23 @@ class Goal:
 
 
 @dataclass(frozen=True, kw_only=True)
+class DegreeChoice:
+    """The degree that was chosen, and why.
+
+    Attributes:
+        degree: 1 or 2.
+        unknowns: that each degree is forecast to need.
+    """
+
+    degree: int
+    unknowns: Mapping[int, float]
+
+    def __str__(self) -> str:
+        needed = ", ".join(f"degree {degree} about {count:.1e}" for degree, count in self.unknowns.items())
+        return f"degree {self.degree} is chosen; unknowns needed, by the first mesh: {needed}"
+
+
+@dataclass(frozen=True, kw_only=True)
 class AccuracyResult:
     """The result of a run to a goal.
 
@@ -38,17 +56,21 @@ class AccuracyResult:
         goal: what was asked for.
         level: the last mesh and its solution.
         solution: the same solution, as that of the scene.
+        degree: of the elements.
         steps: all adaptive steps.
         why: why it ended without reaching the goal; None where it was reached.
         more: what a tenth of the error would cost; None where no error is known.
+        choice: how the degree was chosen; None where the scene states it, or there was no choice.
     """
 
     goal: Goal
     level: AdaptiveLevel
     solution: Solution
+    degree: int
     steps: tuple[AdaptiveStep, ...]
     why: str | None
     more: Cost | None
+    choice: DegreeChoice | None = None
 
     @property
     def exit_code(self) -> int:
@@ -64,6 +86,8 @@ class AccuracyResult:
             "estimated": last.error if last else None,
             "reached": self.why is None,
             "why": self.why,
+            "degree": self.degree,
+            "unknowns_needed": self.choice and {f"degree_{p}": count for p, count in self.choice.unknowns.items()},
             "tolerance": last.tolerance if last else None,
             "epsilon": last.epsilon if last else None,
             "ten_times_more": self.more.as_dict() if self.more else None,

@@ -93,6 +93,20 @@ class ControlThresholds:
     corrections: int = 2
 
 
+@dataclass(frozen=True, kw_only=True)
+class ChoiceThresholds:
+    """How the degree is chosen.
+
+    Attributes:
+        price: how many times as much an unknown of degree 2 costs as one of degree 1.
+        budget: part of a time budget by which degree 2 must have been solved on the first mesh.
+    """
+
+    price: float = 2.0
+    budget: float = 0.5
+
+
+CHOICE = ChoiceThresholds()
 CONTROL = ControlThresholds()
 EXTRAPOLATION = ExtrapolationThresholds()
 FORECAST = ForecastThresholds()

@@ -7,10 +7,11 @@ at most quadratic.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 
 import numpy as np
-from dolfinx import la
+from dolfinx import fem, la
 
 from ..mesh import nodes
 from ..problem import spaces
@@ -48,20 +49,11 @@ def _largest(problem: Problem, state: ContactState, beyond: Array) -> float:
     everywhere.scatter_forward()
     local = everywhere.array[nodes.facet_nodes(problem.space, state.surface.facets)]
     local = local[np.all(np.isfinite(local), axis=1)]
-    return float(np.max(local @ _functions(problem.scales.dimension, spaces.edge_share(problem.space)), initial=0.0))
+    return float(np.max(local @ _functions(problem.space), initial=0.0))
 
 
-def _functions(dimension: int, share: float) -> Array:
+def _functions(space: fem.FunctionSpace) -> Array:
     """The basis functions of a facet on a lattice of points, (nodes, points)."""
-    steps = np.arange(_STEPS + 1) / _STEPS
-    if dimension == 2:
-        corners, pairs = np.stack([1 - steps, steps]), [(0, 1)]
-    else:
-        x, y = (grid.ravel() for grid in np.meshgrid(steps, steps))
-        inside = x + y <= 1 + 1e-12
-        corners, pairs = np.stack([1 - x - y, x, y])[:, inside], [(1, 2), (0, 2), (0, 1)]
-    vertices = corners * (2 * corners - 1)
-    edges = np.stack([4 * corners[a] * corners[b] for a, b in pairs])
-    for number, ends in enumerate(pairs):
-        vertices[list(ends)] += share * edges[number]
-    return np.vstack([vertices, (1 - 2 * share) * edges])
+    steps = itertools.product(range(_STEPS + 1), repeat=space.mesh.geometry.dim)
+    lattice = np.array([step for step in steps if sum(step) == _STEPS]) / _STEPS
+    return spaces.facet_functions(nodes.degree(space), lattice, spaces.edge_share(space)).T

@@ -11,6 +11,7 @@ from typing import Any
 import basix
 import numpy as np
 from dolfinx import fem
+from dolfinx import mesh as dmesh
 
 from .. import compat
 from ..typing import Array, Entities
@@ -37,6 +38,17 @@ def degree(space: fem.FunctionSpace) -> int:
     return 1 if space.dofmap.list.shape[1] == space.mesh.topology.dim + 1 else 2
 
 
+def count(mesh: dmesh.Mesh, degree: int) -> int:
+    """The number of nodes on all ranks. Collective.
+
+    Args:
+        mesh: of simplices.
+        degree: 1 or 2.
+    """
+    mesh.topology.create_entities(1)
+    return sum(int(mesh.topology.index_map(dimension).size_global) for dimension in range(degree))
+
+
 def points(space: fem.FunctionSpace) -> Array:
     """The local nodes (owned and ghost), m, (n, 3).
 
@@ -54,6 +66,13 @@ def points(space: fem.FunctionSpace) -> Array:
     for number, (a, b) in enumerate(edges(space) if dofs.shape[1] > vertices else ()):
         found[dofs[:, vertices + number]] = (x[corners[:, a]] + x[corners[:, b]]) / 2
     return found
+
+
+def reference_points(space: fem.FunctionSpace) -> Array:
+    """The nodes of a cell by their barycentric coordinates, in the order of its dofs, (nodes, d+1)."""
+    corners = np.eye(space.mesh.topology.dim + 1)
+    middles = [corners[list(ends)].mean(axis=0) for ends in (edges(space) if degree(space) == 2 else ())]
+    return np.vstack([corners, *middles])
 
 
 def dof_of_node(space: fem.FunctionSpace) -> Entities:
@@ -110,6 +129,22 @@ def linear_facets(space: fem.FunctionSpace, facets: Entities) -> Entities:
     own = facet_nodes(space, facets)
     kind = {2: "interval", 3: "triangle"}[space.mesh.geometry.dim]
     return own if degree(space) == 1 else _split(own, kind)
+
+
+def hats(degree: int, barycentric: Array) -> Array:
+    """The functions that are 1 at a node of a facet and linear in its parts, at points, (q, nodes).
+
+    Args:
+        degree: 1 or 2.
+        barycentric: the points, (q, corners).
+    """
+    if degree == 1:
+        return barycentric
+    corners = np.maximum(2 * barycentric - 1, 0.0)
+    pairs = basix.topology(basix.CellType[{2: "interval", 3: "triangle"}[barycentric.shape[1]]])[1]
+    ends = [2 * barycentric[:, pair] for pair in pairs]
+    edges = [np.minimum(both.min(axis=1), both.sum(axis=1) - 1) for both in ends]
+    return np.column_stack([corners, *(np.maximum(edge, 0.0) for edge in edges)])
 
 
 def facet_nodes(space: fem.FunctionSpace, facets: Entities) -> Entities:

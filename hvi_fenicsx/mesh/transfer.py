@@ -1,4 +1,4 @@
-"""The transfer from a level of a mesh hierarchy to the next finer one: P1 prolongation.
+"""The transfer from a level of a mesh hierarchy to the next finer one: prolongation.
 
 Where the meshes are nested, each vertex of the finer one is a vertex of the coarser one or the midpoint of an edge:
 between a mesh and its refinement, and between built-in blocks of which one has half the cells each way,
@@ -24,6 +24,8 @@ Numbers = npt.NDArray[np.integer]
 Halves = npt.NDArray[np.int8]
 Rows = tuple[Numbers, Numbers, Array]
 """Compressed rows of a sparse matrix: where each begins, columns, values."""
+_ROUNDING = 1e-14
+"""Weights up to this are zero."""
 
 
 class Transfer(ABC):
@@ -75,8 +77,28 @@ class ParentCellTransfer(Transfer):
     halves: Halves
 
     def rows(self, fine: fem.FunctionSpace, coarse: fem.FunctionSpace, points: tuple[Array, Array]) -> Rows:
-        """Each fine vertex is the mean of two vertices of its parent cell. Local."""
-        return _mean_rows(self._parent_vertices(fine, coarse), fine.dofmap.index_map_bs)
+        """Each fine vertex is the mean of two vertices of its parent cell; at degree 2, its function there. Local."""
+        if nodes.degree(coarse) == 1:
+            return _mean_rows(self._parent_vertices(fine, coarse), fine.dofmap.index_map_bs)
+        return self._function_rows(fine, coarse)
+
+    def _function_rows(self, fine: fem.FunctionSpace, coarse: fem.FunctionSpace) -> Rows:
+        """The rows of the functions of the parent cells, in the bases of the two spaces."""
+        kinds, kind = np.unique(self.halves, axis=0, return_inverse=True)
+        near, far = (space.ufl_element().sub_elements[0] for space in (fine, coarse))
+        places = nodes.reference_points(fine)
+        inside = 0.5 * np.einsum("nv,kvc->knc", places, kinds)[:, :, 1:]
+        values = far.tabulate(0, inside.reshape(-1, inside.shape[2]))[0].reshape(*inside.shape[:2], -1)
+        weights = np.linalg.solve(near.tabulate(0, places[:, 1:])[0], values)
+        weights[np.abs(weights) < _ROUNDING] = 0.0
+        own, owned = fine.dofmap.list[: len(self.parents)], fine.dofmap.index_map.size_local
+        cell, number = np.empty(owned, dtype=np.int64), np.empty(owned, dtype=np.int64)
+        for k, column in enumerate(own.T):
+            here = np.flatnonzero(column < owned)
+            cell[column[here]], number[column[here]] = here, k
+        numbers = coarse.dofmap.index_map.local_to_global(coarse.dofmap.list[self.parents[cell]].ravel())
+        shape = (owned, values.shape[2])
+        return _weighted_rows(numbers.reshape(shape), weights[kind.ravel()[cell], number], fine.dofmap.index_map_bs)
 
     def _parent_vertices(self, fine: fem.FunctionSpace, coarse: fem.FunctionSpace) -> Numbers:
         """The two coarse vertices (global) whose mean each owned fine vertex is; one twice for a coarse one."""
@@ -152,12 +174,16 @@ class InterpolationTransfer(Transfer):
     def rows(self, fine: fem.FunctionSpace, coarse: fem.FunctionSpace, points: tuple[Array, Array]) -> Rows:
         """Each fine vertex has barycentric weights in the coarse cell that holds it. Collective."""
         corners, weights = point_location.interpolation_weights(points[0], coarse, points[1])
-        d = fine.dofmap.index_map_bs
-        order = np.argsort(corners, axis=1)
-        columns = np.take_along_axis(corners, order, axis=1)[:, None, :] * d + np.arange(d)[None, :, None]
-        start = np.arange(0, columns.size + 1, corners.shape[1])
-        values = np.broadcast_to(np.take_along_axis(weights, order, axis=1)[:, None, :], columns.shape).ravel()
-        return start.astype(PETSc.IntType), columns.ravel().astype(PETSc.IntType), values
+        return _weighted_rows(corners, weights, fine.dofmap.index_map_bs)
+
+
+def _weighted_rows(numbers: Numbers, weights: Array, d: int) -> Rows:
+    """Compressed rows of weights (n, k) of block columns (n, k), component by component."""
+    order = np.argsort(numbers, axis=1)
+    columns = np.take_along_axis(numbers, order, axis=1)[:, None, :] * d + np.arange(d)[None, :, None]
+    start = np.arange(0, columns.size + 1, numbers.shape[1])
+    values = np.broadcast_to(np.take_along_axis(weights, order, axis=1)[:, None, :], columns.shape).ravel()
+    return start.astype(PETSc.IntType), columns.ravel().astype(PETSc.IntType), values
 
 
 def _mean_rows(pairs: Numbers, d: int) -> Rows:

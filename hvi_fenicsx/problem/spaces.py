@@ -94,6 +94,25 @@ def facet_weights(space: fem.FunctionSpace, sizes: Array) -> Array:
     return np.asarray(sizes[:, None] * np.array(shares, dtype=np.float64))
 
 
+def facet_functions(degree: int, barycentric: Array, share: float = 0.0) -> Array:
+    """The basis functions of a facet's nodes (:func:`.nodes.facet_nodes`) at points of it, (q, nodes).
+
+    Args:
+        degree: 1 or 2.
+        barycentric: the points, (q, corners).
+        share: of an edge's function that goes to each of its ends (:func:`edge_share`); by default Lagrange's basis.
+    """
+    if degree == 1:
+        return barycentric
+    kind = basix.CellType[{2: "interval", 3: "triangle"}[barycentric.shape[1]]]
+    pairs: list[list[int]] = basix.topology(kind)[1]
+    corners = barycentric * (2 * barycentric - 1)
+    edges = np.stack([4 * barycentric[:, a] * barycentric[:, b] for a, b in pairs], axis=1)
+    for number, ends in enumerate(pairs):
+        corners[:, ends] += share * edges[:, [number]]
+    return np.hstack([corners, (1 - 2 * share) * edges])
+
+
 @functools.cache
 def _transformed(cell: str) -> Any:
     """The transformed element of degree 2, a scalar one.

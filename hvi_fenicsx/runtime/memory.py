@@ -26,10 +26,12 @@ class Thresholds:
     Attributes:
         least: KB by dimension, on a mesh refined uniformly, by multigrid or GAMG; a direct solver takes more.
         adaptive: KB by dimension, about, on a mesh refined where the error is: all coarser ones are kept, too.
+        of_degree: how many times that an unknown of a degree takes.
     """
 
     least: Mapping[int, float] = field(default_factory=lambda: {2: 1.3, 3: 2.6})
     adaptive: Mapping[int, float] = field(default_factory=lambda: {2: 3.0, 3: 6.0})
+    of_degree: Mapping[int, float] = field(default_factory=lambda: {1: 1.0, 2: 2.0})
 
 
 DEFAULT = Thresholds()

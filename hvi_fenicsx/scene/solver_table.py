@@ -66,8 +66,9 @@ Start = Annotated[
 class SolverTable(Table):
     """How the problem is solved. Without `smoothing` and `epsilon` the law itself is solved, not a smoothed one."""
 
-    degree: Literal[1, 2] = 1
-    """the degree of the elements: 1, or 2, which needs far fewer unknowns for the same accuracy"""
+    degree: Literal[1, 2] | None = None
+    """the degree of the elements: 1, or 2, which needs far fewer unknowns for the same accuracy; without it 1, but with
+    `--accuracy` or `--time-budget` the cheaper one"""
     method: str = "auto"
     """the method: auto chooses linear, convex or branch by the effects; branch solves the exact law; condensed is the
     procedure of the paper; snes_vi, tao and ssls are for comparison; or the name of your own method"""

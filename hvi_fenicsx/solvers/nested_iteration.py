@@ -19,7 +19,7 @@ from ..rigid import Solvability
 from ..runtime.log import logger
 from ..system.assemble import assemble
 from ..system.held_solver import LinearSettings
-from ..system.levels import Level, Levels, prolongation
+from ..system.levels import Level, Levels, prolongation, with_coarser_system
 from ..system.system import System
 from . import registry
 from .context import RunControl, SolveContext
@@ -211,7 +211,7 @@ def _coarser_system(model: Model, system: System, control: RunControl) -> tuple[
     """
     domain = system.problem.domain
     if nodes.degree(system.problem.space) > 1:
-        return assemble(domain, replace(model, degree=1), control.timer, system.thresholds), DegreeTransfer()
+        return _of_degree_one(model, system, control), DegreeTransfer()
     with control.timer("mesh"):
         coarser = domain.coarser()
     assert coarser is not None
@@ -222,6 +222,36 @@ def _coarser_system(model: Model, system: System, control: RunControl) -> tuple[
         if all(part.where is None for part in model.parts.values()):
             raise
         return None
+
+
+def _of_degree_one(model: Model, system: System, control: RunControl) -> System:
+    """The system of degree 1 on the same mesh. Collective."""
+    return assemble(system.problem.domain, replace(model, degree=1), control.timer, system.thresholds)
+
+
+def refined_levels(
+    model: Model, system: System, coarse: System, below: Levels, transfer: Transfer, control: RunControl
+) -> tuple[PETSc.Mat, Levels]:
+    """The way to a system from the one on the mesh that was refined, and the system's coarser levels. Collective.
+
+    At degree 2 these are degree 1 on the same mesh and then on the coarser ones.
+
+    Args:
+        model: what is solved.
+        system: assembled on the refined mesh.
+        coarse: on the mesh that was refined.
+        below: the coarser levels of that one.
+        transfer: from that mesh.
+        control: where time goes.
+    """
+    step = prolongation(system, coarse, transfer)
+    if nodes.degree(system.problem.space) == 1:
+        return step, with_coarser_system(system, coarse, below, step)
+    linear = _of_degree_one(model, system, control)
+    linear.attach_free_motions(system.free_motions.modes if system.free_motions else ())
+    coarser = below[0].system if below else _of_degree_one(model, coarse, control)
+    levels = with_coarser_system(linear, coarser, below[1:], prolongation(linear, coarser, transfer))
+    return step, (Level(system, linear, prolongation(system, linear, DegreeTransfer())), *levels)
 
 
 def _with_coarse_tolerance(options: SolverOptions) -> SolverOptions:

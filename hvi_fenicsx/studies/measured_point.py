@@ -75,7 +75,8 @@ class MeasuredPoint:
         if self.accuracy is None:
             return finish(prepare(self.scene, self.comm, timer))
         solver = AdaptiveSolver(timer=timer)
-        found = solve_to_goal(self.scene, self.comm, Goal(self.accuracy), solver, lambda line: None).solution
+        scene = self.scene.with_solver(degree=1)  # solutions are compared linearly
+        found = solve_to_goal(scene, self.comm, Goal(self.accuracy), solver, lambda line: None).solution
         timer.seconds["solve"] += timer.seconds["estimate"]  # which steers the refinement: part of what it costs
         return found
 

@@ -67,7 +67,7 @@ def make(scene: Scene, axes: Sequence[AxisValues], thresholds: Thresholds = DEFA
 
 
 def _check(scene: Scene, axes: Sequence[AxisValues]) -> None:
-    if scene.solver.degree != 1:
+    if scene.solver.degree == 2:
         raise InputError(
             "solver.degree: a study compares solutions of degree 1 only; leave out solver.degree, or compare the "
             "energies in summary.json of runs of your own"

@@ -21,7 +21,7 @@ from scenes import STEEL, model, quadratic_linear
 from hvi_fenicsx import Scene, read_scene
 from hvi_fenicsx.accuracy import adaptive, control, cost_forecast, quantities
 from hvi_fenicsx.accuracy.adaptive import AdaptiveLevel, AdaptiveSolver
-from hvi_fenicsx.accuracy.cost_forecast import AdaptiveStep
+from hvi_fenicsx.accuracy.cost_forecast import AdaptiveStep, Elements
 from hvi_fenicsx.accuracy.goal import AccuracyResult, Goal
 from hvi_fenicsx.accuracy.quantities import FrictionTraction
 from hvi_fenicsx.accuracy.quantity_base import Observable, contact_norm, extrapolated, prolong
@@ -36,7 +36,8 @@ DEMOS = Path(__file__).parents[2] / "demos"
 STRONG = model(64, 3e6, friction=quadratic_linear(1e6))
 
 
-def reach(scene: Scene, goal: Goal) -> AccuracyResult:
+def reach(scene: Scene, goal: Goal, degree: int | None = 1) -> AccuracyResult:
+    scene = scene if degree is None else scene.with_solver(degree=degree)
     return control.solve_to_goal(scene, COMM, goal, AdaptiveSolver(timer=Timer()), lambda line: None)
 
 
@@ -64,9 +65,20 @@ def far_in_energy(levels: list[AdaptiveLevel]) -> float:
     return float(norms[0] / norms[1])
 
 
-@pytest.mark.parametrize(("table", "requested"), [(STRONG, 3e-2), (model(16, 6e6, 1e6, quadratic_linear(3e6)), 3e-2)])
-def test_what_is_asked_for_is_kept_and_not_overdone(table: dict[str, Any], requested: float) -> None:
-    reached = reach(Scene.model_validate(table), Goal(requested))
+LIFTED = model(16, 6e6, 1e6, quadratic_linear(3e6))
+
+
+@pytest.mark.parametrize(
+    ("table", "requested", "degree"),
+    [
+        (STRONG, 3e-2, 1),
+        (LIFTED, 3e-2, 1),
+        pytest.param(STRONG, 5e-3, 2, marks=pytest.mark.long),
+        (LIFTED, 1e-2, 2),
+    ],
+)
+def test_what_is_asked_for_is_kept_and_not_overdone(table: dict[str, Any], requested: float, degree: int) -> None:
+    reached = reach(Scene.model_validate(table), Goal(requested), degree)
     assert reached.exit_code == 0
     assert reached.steps[-1].error <= requested
     assert requested / 5 < far_in_energy(finer(reached.level, 2)) < requested
@@ -133,7 +145,7 @@ class _Hasty(AdaptiveSolver):
 
 def test_a_mesh_without_a_solution_at_a_loose_tolerance_is_not_refined_for_that() -> None:
     lines: list[str] = []
-    scene = read_scene(DEMOS / "peeling.toml")
+    scene = read_scene(DEMOS / "peeling.toml", ["solver.degree=1"])
     reached = control.solve_to_goal(scene, COMM, Goal(0.17), _Hasty(timer=Timer()), lines.append)
     assert any("not certified" in line for line in lines)
     assert reached.why is None
@@ -175,9 +187,9 @@ def l_shape() -> Scene:
     )
 
 
-def slope(bulk: float, most: int) -> float:
+def slope(bulk: float, most: int, degree: int = 1) -> float:
     """Observed order in unknowns of the estimated error, over the last factor of about ten."""
-    level, points = AdaptiveSolver(timer=Timer()).begin(l_shape(), COMM), []
+    level, points = AdaptiveSolver(timer=Timer()).begin(l_shape().with_solver(degree=degree), COMM), []
     while level.dofs < most:
         level = AdaptiveSolver(timer=Timer()).refine(level, adaptive.refined(level, bulk), level.solution.scene)
         points.append((level.dofs, level.solution.estimate.relative))  # type: ignore[union-attr]
@@ -189,6 +201,29 @@ def test_adaptive_refinement_is_optimal_at_a_corner() -> None:
     """P1 in 2D: -1/2 in unknowns; uniformly refined, less than half the singularity's λ = 0.54 and that of the ends."""
     assert slope(0.75, 15_000) == pytest.approx(-0.5, abs=0.05)
     assert slope(1.0, 15_000) > -0.42
+
+
+def test_adaptive_refinement_at_degree_two_is_optimal_at_a_corner() -> None:
+    """-1 in unknowns; uniformly refined no better than degree 1, by the corners."""
+    assert slope(0.75, 6_000, degree=2) == pytest.approx(-1.0, abs=0.12)
+
+
+@pytest.mark.parametrize(("asked", "degree"), [(0.07, 1), (0.01, 2)])
+def test_the_degree_is_the_cheaper_one(asked: float, degree: int) -> None:
+    """A little more than the first mesh has at degree 1 does not pay for degree 2; an eighth does. One degree a run."""
+    scene = Scene.model_validate(STRONG)
+    reached = reach(scene, Goal(asked), None)
+    alone = [reach(scene, Goal(asked), p) for p in (1, 2)]
+    assert reached.choice is not None
+    assert (reached.degree, reached.choice.degree) == (degree, degree)
+    assert [s.dofs for s in reached.steps] == [s.dofs for s in alone[degree - 1].steps]
+    price = [alone[0].steps[-1].dofs, 2 * alone[1].steps[-1].dofs]
+    assert price[degree - 1] == min(price)
+
+
+def test_where_the_first_mesh_suffices_degree_two_is_not_tried() -> None:
+    reached = reach(Scene.model_validate(STRONG), Goal(0.5), None)
+    assert (reached.degree, reached.choice, len(reached.steps)) == (1, None, 1)
 
 
 @pytest.mark.parametrize("bulk", [0.2, 0.5, 0.9])
@@ -246,7 +281,7 @@ def hierarchy(rate: float, count: int) -> list[AdaptiveStep]:
 def test_a_forecast_holds_where_the_steps_go_on_as_they_did() -> None:
     steps = hierarchy(0.4, 9)
     known = steps[:7]
-    found = cost_forecast.cost(known, steps[-1].error, 2, 150.0)
+    found = cost_forecast.cost(known, steps[-1].error, Elements(dimension=2), 150.0)
     assert found.dofs == pytest.approx(steps[-1].dofs, rel=1e-6)
     assert found.seconds == pytest.approx(sum(s.seconds for s in steps), rel=0.1)
     assert found.memory == pytest.approx(steps[-1].memory, rel=0.1)
@@ -281,7 +316,7 @@ class Late(Timer):
 @pytest.mark.parametrize(("seconds", "meshes"), [(10.0, 1), (1e3, 3)])
 def test_a_time_budget_ends_before_the_step_that_would_exceed_it(seconds: float, meshes: int) -> None:
     """With the accuracy at which three meshes are enough."""
-    scene = Scene.model_validate(STRONG)
+    scene = Scene.model_validate(STRONG).with_solver(degree=1)
     reached = control.solve_to_goal(
         scene, COMM, Goal(4e-2, seconds=seconds), AdaptiveSolver(timer=Late()), lambda line: None
     )

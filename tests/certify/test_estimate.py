@@ -19,8 +19,9 @@ from scenes import Table, block, model, quadratic_linear, solved, solved_system
 
 from hvi_fenicsx import Scene, Solution, prepare
 from hvi_fenicsx.certify.certificate import examine
+from hvi_fenicsx.certify.estimate.bubble_stiffness import BubbleStiffness, diagonal
+from hvi_fenicsx.certify.estimate.bubbles import space
 from hvi_fenicsx.certify.estimate.contact_errors import estimate_contact_errors
-from hvi_fenicsx.certify.estimate.edge_bubbles import BubbleStiffness, diagonal, space
 from hvi_fenicsx.certify.estimate.estimator import Estimate, estimate
 from hvi_fenicsx.problem.problem import Problem
 from hvi_fenicsx.workflow import finish
@@ -164,10 +165,20 @@ def test_data_that_the_mesh_does_not_see(name: str) -> None:
 # --- its parts
 
 
-@pytest.mark.parametrize("name", CASES)
-def test_the_bubbles_stiffness_is_dolfinx_own_matrix(name: str) -> None:
-    problem = prepare(Scene.model_validate(CASES[name])).problem
-    bubbles = space(problem.domain.mesh)
+QUICK = ("strong law", "lift-off")
+
+
+@pytest.mark.parametrize("name", [n if n in QUICK else pytest.param(n, marks=pytest.mark.long) for n in CASES])
+def test_degree_two_against_a_mesh_four_times_finer(name: str) -> None:
+    scene = Scene.model_validate(CASES[name]).with_solver(degree=2)
+    (row,) = rows(scene, levels=1, extra=2 if scene.dimension == 2 else 1)
+    assert 0.75 < row.index < 1.3
+
+
+@pytest.mark.parametrize(("name", "degree"), [*((n, 1) for n in CASES), ("l-shape", 2), ("block in space", 2)])
+def test_the_bubbles_stiffness_is_dolfinx_own_matrix(name: str, degree: int) -> None:
+    problem = prepare(Scene.model_validate(CASES[name]).with_solver(degree=degree)).problem
+    bubbles = space(problem.domain.mesh, degree)
     form = problem.bulk.between(ufl.TrialFunction(bubbles), ufl.TestFunction(bubbles))
     matrix = fem.assemble_matrix(fem.form(form)).to_scipy()
     found = diagonal(problem, bubbles)

@@ -8,16 +8,17 @@ from dataclasses import dataclass
 import numpy as np
 from dolfinx import fem
 
+from ...problem import spaces
 from ...problem.problem import Bounds, Problem
 from ...spatial_value import SpatialValue
 from ...typing import Array, Entities
+from .bubbles import quadrature
 from .contact_facets import ContactFacets, contact_facets
-from .edge_bubbles import quadrature
 from .thresholds import Thresholds
 
 
 def varies(value: SpatialValue | None) -> bool:
-    """Whether a value varies in space and is known between vertices."""
+    """Whether a value varies in space and is known between nodes."""
     return value is not None and value.everywhere and not value.is_number
 
 
@@ -59,29 +60,35 @@ class FacetSamples:
 
     Attributes:
         facets: whose cells this rank owns.
-        corners: their vertices, m, (f, d, 3).
+        nodes: their nodes, corners first, m, (f, n, 3).
         barycentric: the sample points in barycentric coordinates, (q, d).
         weights: of the points; their sum is 1, (q,).
     """
 
     facets: ContactFacets
-    corners: Array
+    nodes: Array
     barycentric: Array
     weights: Array
 
-    def linear(self, at_corners: Array) -> Array:
-        """Values at the corners (f, d), interpolated; (f, q)."""
-        return np.asarray(at_corners @ self.barycentric.T)
+    @property
+    def corners(self) -> Array:
+        """The vertices, m, (f, d, 3)."""
+        return self.nodes[:, : self.facets.dimension]
 
-    def of(self, value: SpatialValue) -> Array:
-        """A value at the sample points, SI, (f, q)."""
-        points = np.einsum("qv,fvi->fqi", self.barycentric, self.corners)
+    def interpolated(self, at_nodes: Array, at: Array | None = None) -> Array:
+        """Values at the nodes (f, n), interpolated at the sample points or at others (q, d); (f, q)."""
+        points = self.barycentric if at is None else at
+        return np.asarray(at_nodes @ spaces.facet_functions(self.facets.degree, points).T)
+
+    def of(self, value: SpatialValue, at: Array | None = None) -> Array:
+        """A value at the sample points or at others (q, d), SI, (f, q)."""
+        points = np.einsum("qv,fvi->fqi", self.barycentric if at is None else at, self.corners)
         return value.at(points.reshape(-1, 3)).reshape(points.shape[:2])
 
-    def beyond_linear(self, value: SpatialValue) -> Array:
-        """What linear interpolation leaves of a value at the sample points, SI, (f, q)."""
-        at_corners = value.at(self.corners.reshape(-1, 3)).reshape(self.corners.shape[:2])
-        return np.asarray(self.of(value) - self.linear(at_corners))
+    def beyond_nodes(self, value: SpatialValue, at: Array | None = None) -> Array:
+        """What interpolation between the nodes leaves of a value at the sample points or at others, SI, (f, q)."""
+        at_nodes = value.at(self.nodes.reshape(-1, 3)).reshape(self.nodes.shape[:2])
+        return np.asarray(self.of(value, at) - self.interpolated(at_nodes, at))
 
 
 def sample(problem: Problem, bubbles: fem.FunctionSpace, facets: Entities, thresholds: Thresholds) -> FacetSamples:
@@ -89,10 +96,10 @@ def sample(problem: Problem, bubbles: fem.FunctionSpace, facets: Entities, thres
 
     Args:
         problem: the mesh.
-        bubbles: the space of edge bubbles.
+        bubbles: the space of bubbles.
         facets: the local facets.
         thresholds: the degree of the modes.
     """
     found, d = contact_facets(problem, bubbles, facets), problem.scales.dimension
     barycentric, weights = quadrature("interval" if d == 2 else "triangle", 2 * thresholds.data_degree[d])
-    return FacetSamples(found, problem.points[found.vertices], barycentric, weights)
+    return FacetSamples(found, problem.points[found.nodes], barycentric, weights)

@@ -1,7 +1,7 @@
-"""The estimated errors of the slip and of -σ_t on Γc: the defect's influence on the vertices, by the system's inverse.
+"""The estimated errors of the slip and of -σ_t on Γc: the defect's influence on the nodes, by the system's inverse.
 
-The bubbles e of the defect say what a finer mesh would add between the vertices. Tested with P1 functions, they and the
-laws between the vertices leave a force on u_h; the displacement that it causes is the error at the vertices.
+The bubbles e of the defect say what a finer mesh would add between the nodes. Tested with the functions of u_h's space,
+they and the laws between the nodes leave a force on u_h; the displacement that it causes is the error at the nodes.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from .law_traces import ErrorField, LawTraces, Trace
 from .thresholds import DEFAULT, Thresholds
 
 _PLACE = 1 / (2 * np.sqrt(12))
-"""Standard deviation, over the facet's length, of the place of a drop that may be anywhere in half of the facet."""
+"""Standard deviation, over the distance of two nodes, of the place of a drop that may be anywhere in half of it."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class ContactErrors:
     Attributes:
         slip: of the slip in L2.
         friction: of -σ_t in L1; 0 without a law along Γc.
-        corrected: u_h with its estimated error at the vertices, nondimensional.
+        corrected: u_h with its estimated error at the nodes, nondimensional.
     """
 
     slip: float
@@ -71,8 +71,8 @@ def estimate_contact_errors(
     apart, whole = (total(comm, sum(pair[i] for pair in slips)) for i in (0, 1))
     known, unknown, carried = (total(comm, sum(sizes[i] for sizes in frictions)) for i in (0, 1, 2))
     away = float(np.hypot(known, unknown))
-    error.vertices.x.array[:] += u.x.array
-    return ContactErrors(float(np.sqrt(ratio(apart, whole))), ratio(away, carried), error.vertices)
+    error.nodes.x.array[:] += u.x.array
+    return ContactErrors(float(np.sqrt(ratio(apart, whole))), ratio(away, carried), error.nodes)
 
 
 def ratio(part: float, whole: float) -> float:
@@ -86,7 +86,7 @@ def ratio(part: float, whole: float) -> float:
 
 
 def _uncertainty(traces: LawTraces, inverse: DualNorm) -> fem.Function:
-    """What the vertices may move because bubbles do not see where in half an edge a drop lies, P1. Collective.
+    """What the nodes may move because bubbles do not see where between two nodes a drop lies. Collective.
 
     The facets' places are independent of each other, so n of them add up to a root of n times the effect of one.
     """
@@ -108,16 +108,16 @@ def _drops(traces: LawTraces, state: ContactState, law: LawState) -> tuple[Trace
     """A law's drops on the facets within which they lie, spread over their uncertain share of them, (f, q, k)."""
     points = traces.part(state.surface, law.term.directions)
     height = coupled_errors.heights(points, law, law.term.exact)
-    slip = points.linear(traces.u)
+    slip = points.of_field(traces.u)
     along = law.term.gradient(slip.reshape(-1, slip.shape[2])).reshape(slip.shape) if law.term.radial else np.sign(slip)
-    return points, _PLACE * height[:, None, None] * along
+    return points, _PLACE / traces.degree * height[:, None, None] * along
 
 
 def _slip(traces: LawTraces, state: ContactState, error: ErrorField, uncertain: fem.Function) -> tuple[float, float]:
     """∫ of the squares of the slip's error and of the slip over this rank's share of a part. Collective."""
     points = traces.part(state.surface, state.surface.tangents)
-    added, slip = points.linear(error.vertices) + points.quadratic(error.edges), points.linear(traces.u)
-    fields = added, points.linear(uncertain), slip
+    added, slip = points.of_field(error.nodes) + points.of_bubbles(error.bubbles), points.of_field(traces.u)
+    fields = added, points.of_field(uncertain), slip
     squares = [float(np.sum(points.weights * np.sum(values**2, axis=2))) for values in fields]
     return squares[0] + squares[1], squares[2]
 
@@ -127,9 +127,9 @@ def _friction(
 ) -> tuple[float, float, float]:
     """∫ of the law's change against the interpolated nodal tractions, of its uncertainty, of those. Collective."""
     further = fem.Function(traces.problem.space)
-    further.x.array[:] = error.vertices.x.array + uncertain.x.array
+    further.x.array[:] = error.nodes.x.array + uncertain.x.array
     found = traces.of_law(state, law, error)
-    other = traces.of_law(state, law, ErrorField(further, error.edges))
+    other = traces.of_law(state, law, ErrorField(further, error.bubbles))
     fields = found.traction - found.nodal, other.traction - found.traction, found.nodal
     tangents = state.slip.shape[1]
     known, unknown, carried = (

@@ -1,46 +1,56 @@
-"""The facets of Γc between their vertices: displacements at quadrature points, and tractions tested there."""
+"""The facets of Γc between their nodes: displacements at quadrature points, and tractions tested there."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 
-import basix
 import numpy as np
 from dolfinx import fem
 
-from ...mesh import facet_sizes
+from ...mesh import facet_sizes, nodes
+from ...problem import spaces
 from ...problem.contact_surface import Surface
 from ...problem.problem import Problem
 from ...typing import Array, Entities
-from .edge_bubbles import quadrature
+from . import bubbles
 
 
 @dataclass(frozen=True)
 class ContactFacets:
-    """Facets of Γc (f of them), each with its d vertices and its k edges between them.
+    """Facets of Γc (f of them), each with its n nodes, corners first, and its k bubbles (:func:`.bubbles.of_facet`).
 
     Attributes:
-        vertices: their P1 blocks, (f, d).
-        edges: the blocks of their edges' bubbles, (f, k).
-        pairs: positions of each edge's ends in ``vertices``.
+        degree: of the solution.
+        nodes: their blocks, (f, n).
+        bubbles: the blocks of their bubbles, (f, k).
         areas: over L^(d-1), (f,).
         cells: the cells, (f,).
     """
 
-    vertices: Entities
-    edges: Entities
-    pairs: Sequence[tuple[int, int]]
+    degree: int
+    nodes: Entities
+    bubbles: Entities
     areas: Array
     cells: Entities
 
+    @property
+    def dimension(self) -> int:
+        """Of space: the number of a facet's corners."""
+        return self.nodes.shape[1] if self.degree == 1 else {3: 2, 6: 3}[self.nodes.shape[1]]
 
-def contact_facets(problem: Problem, bubbles: fem.FunctionSpace, local: Entities) -> ContactFacets:
-    """The vertices and edges of boundary facets whose cell this rank owns.
+    @property
+    def corners(self) -> Entities:
+        """The blocks of the corners, (f, d)."""
+        return self.nodes[:, : self.dimension]
+
+
+def contact_facets(problem: Problem, space: fem.FunctionSpace, local: Entities) -> ContactFacets:
+    """The nodes and bubbles of boundary facets whose cell this rank owns.
 
     Args:
-        problem: the mesh and its P1 vectors.
-        bubbles: the space of edge bubbles.
+        problem: the mesh and its displacements.
+        space: of bubbles.
         local: the local facets.
     """
     topology, d = problem.domain.mesh.topology, problem.scales.dimension
@@ -51,17 +61,19 @@ def contact_facets(problem: Problem, bubbles: fem.FunctionSpace, local: Entities
     owned = cells < topology.index_map(d).size_local
     cells, local = cells[owned], local[owned]
     number = np.argmax(of_cell.array.reshape(-1, d + 1)[cells] == local[:, None], axis=1)
-    vertices = np.empty((len(local), d), dtype=np.int32)
-    pairs = [(a, b) for a in range(d) for b in range(a + 1, d)]
-    edges = np.empty((len(local), len(pairs)), dtype=np.int32)
-    cell_edges = [tuple(e) for e in basix.topology(basix.CellType[topology.cell_name()])[1]]
-    for i in range(d + 1):
-        here, corners = number == i, [v for v in range(d + 1) if v != i]
-        vertices[here] = problem.space.dofmap.list[cells[here]][:, corners]
-        numbers = [cell_edges.index((corners[a], corners[b])) for a, b in pairs]
-        edges[here] = bubbles.dofmap.list[cells[here]][:, numbers]
-    points = np.asarray(problem.points[vertices] / problem.scales.length)
-    return ContactFacets(vertices, edges, pairs, facet_sizes.areas(points), cells)
+    degree, on = nodes.degree(problem.space), nodes.facet_nodes(problem.space, local)
+    table = np.array(_numbers_in_cell(degree, topology.cell_name()), dtype=np.int32)
+    found = np.take_along_axis(space.dofmap.list[cells], table[number], axis=1)
+    points = np.asarray(problem.points[on[:, :d]] / problem.scales.length)
+    return ContactFacets(degree, on, found, facet_sizes.areas(points), cells)
+
+
+def _numbers_in_cell(degree: int, cell: str) -> list[list[int]]:
+    """The numbers in the cell of the bubbles of each of its facets, which lies opposite to the corner of its number."""
+    everywhere = bubbles.of_cell(degree, cell)
+    d = len(everywhere[0]) - 1
+    within = bubbles.of_facet(degree, d)
+    return [[everywhere.index((*index[:i], 0, *index[i:])) for index in within] for i in range(d + 1)]
 
 
 class PartTrace:
@@ -72,65 +84,88 @@ class PartTrace:
     """
 
     def __init__(
-        self, problem: Problem, bubbles: fem.FunctionSpace, surface: Surface, directions: Array, degree: int
+        self, problem: Problem, space: fem.FunctionSpace, surface: Surface, directions: Array, degree: int
     ) -> None:
-        self._problem, self._bubbles, self._surface = problem, bubbles, surface
+        self._problem, self._bubbles, self._surface = problem, space, surface
         d = problem.scales.dimension
-        self._facets = contact_facets(problem, bubbles, surface.facets)
-        each = [self._at_local_vertices(directions[:, i]) for i in range(directions.shape[1])]
-        self._vectors = np.stack([n[self._facets.vertices] for n in each], axis=2)  # (f, v, k, d)
-        self._barycentric, weights = quadrature("interval" if d == 2 else "triangle", degree)
+        self._facets = contact_facets(problem, space, surface.facets)
+        each = [self._at_local_nodes(directions[:, i]) for i in range(directions.shape[1])]
+        self._vectors = np.stack([n[self._facets.nodes] for n in each], axis=2)  # (f, n, k, d)
+        self._barycentric, weights = bubbles.quadrature("interval" if d == 2 else "triangle", degree)
+        self._functions = self._functions_at(self._barycentric)
         self.weights: Array = self._facets.areas[:, None] * weights
 
-    def _at_local_vertices(self, values: Array) -> Array:
-        """Values at the part's owned vertices (m, k), k ≤ d, at all local vertices (n, k). Collective."""
+    def _functions_at(self, barycentric: Array) -> Array:
+        """The displacements' basis functions at points of a facet, (q, n)."""
+        return spaces.facet_functions(self._facets.degree, barycentric, spaces.edge_share(self._problem.space))
+
+    def _at_local_nodes(self, values: Array) -> Array:
+        """Values at the part's owned nodes (m, k), k ≤ d, at all local nodes (n, k). Collective."""
         field = fem.Function(self._problem.space)
         d = self._problem.scales.dimension
         field.x.array.reshape(-1, d)[self._surface.blocks, : values.shape[1]] = values
         field.x.scatter_forward()
         return np.asarray(field.x.array.reshape(-1, d)[:, : values.shape[1]])
 
-    def at_vertices(self, values: Array) -> Array:
-        """Values at the part's owned vertices (m, k) by facet, (f, d, k). Collective."""
-        return np.asarray(self._at_local_vertices(values)[self._facets.vertices])
+    def at_nodes(self, values: Array) -> Array:
+        """Values at the part's owned nodes (m, k) by facet, (f, n, k). Collective."""
+        return np.asarray(self._at_local_nodes(values)[self._facets.nodes])
 
     def interpolated(self, values: Array) -> Array:
-        """Linear interpolation of values at the part's owned vertices (m, k); (f, q, k). Collective."""
-        return self._linear(self.at_vertices(values))
+        """The function with coefficients at the part's owned nodes (m, k); (f, q, k). Collective."""
+        return self._combined(self._functions, self.at_nodes(values))
 
-    def linear(self, u: fem.Function) -> Array:
-        """The values of a P1 field, (f, q, k)."""
-        blocks = u.x.array.reshape(-1, self._problem.scales.dimension)
-        return self._linear(np.einsum("fvkd,fvd->fvk", self._vectors, blocks[self._facets.vertices]))
+    def from_node_to_node(self, values: Array) -> Array:
+        """Values at the part's owned nodes (m, k), linear from node to node; (f, q, k). Collective."""
+        return self._combined(self._hats, self.at_nodes(values))
 
-    def quadratic(self, e: fem.Function) -> Array:
-        """The values of edge bubbles, (f, q, k)."""
+    def of_field(self, u: fem.Function) -> Array:
+        """The values of a displacement of the problem's space, (f, q, k)."""
+        return self._combined(self._functions, self._along(u))
+
+    def of_field_from_node_to_node(self, u: fem.Function) -> Array:
+        """The coefficients of a displacement of the problem's space, linear from node to node; (f, q, k)."""
+        return self._combined(self._hats, self._along(u))
+
+    def of_bubbles(self, e: fem.Function) -> Array:
+        """The values of bubbles, (f, q, k)."""
         blocks, result = e.x.array.reshape(-1, self._problem.scales.dimension), 0.0
-        for i, shape, middle in self._bubbles_of_edges():
-            at = np.einsum("fkd,fd->fk", middle, blocks[self._facets.edges[:, i]])
+        for i, shape, middle in self._bubbles_of_facet():
+            at = np.einsum("fkd,fd->fk", middle, blocks[self._facets.bubbles[:, i]])
             result = result + at[:, None, :] * shape[None, :, None]
         return np.asarray(result)
 
     def tested(self, tau: Array) -> tuple[Array, Array]:
-        """∫ τ·v ds of tractions (f, q, k) over this rank's facets: at edges and at vertices, local blocks (n, d)."""
+        """∫ τ·v ds of tractions (f, q, k) over this rank's facets: with bubbles and at nodes, local blocks (n, d)."""
         d, scaled = self._problem.scales.dimension, self.weights[:, :, None] * tau
-        edges, vertices = np.zeros((local_blocks(self._bubbles), d)), np.zeros((local_blocks(self._problem.space), d))
-        for i in range(d):
-            share = np.einsum("fqk,q->fk", scaled, self._barycentric[:, i])
-            np.add.at(vertices, self._facets.vertices[:, i], np.einsum("fk,fkd->fd", share, self._vectors[:, i]))
-        for i, shape, middle in self._bubbles_of_edges():
+        found, at_nodes = np.zeros((local_blocks(self._bubbles), d)), np.zeros((local_blocks(self._problem.space), d))
+        for i in range(self._functions.shape[1]):
+            share = np.einsum("fqk,q->fk", scaled, self._functions[:, i])
+            np.add.at(at_nodes, self._facets.nodes[:, i], np.einsum("fk,fkd->fd", share, self._vectors[:, i]))
+        for i, shape, middle in self._bubbles_of_facet():
             share = np.einsum("fqk,q->fk", scaled, shape)
-            np.add.at(edges, self._facets.edges[:, i], np.einsum("fk,fkd->fd", share, middle))
-        return edges, vertices
+            np.add.at(found, self._facets.bubbles[:, i], np.einsum("fk,fkd->fd", share, middle))
+        return found, at_nodes
 
-    def _linear(self, values: Array) -> Array:
-        return np.asarray(np.einsum("qv,fvk->fqk", self._barycentric, values))
+    def _along(self, u: fem.Function) -> Array:
+        """The coefficients of a displacement along the directions by facet, (f, n, k)."""
+        blocks = u.x.array.reshape(-1, self._problem.scales.dimension)
+        return np.asarray(np.einsum("fnkd,fnd->fnk", self._vectors, blocks[self._facets.nodes]))
 
-    def _bubbles_of_edges(self) -> Iterator[tuple[int, Array, Array]]:
-        """For each edge of a facet its number, its bubble at the points (q,), its directions (f, k, d)."""
-        for i, (a, b) in enumerate(self._facets.pairs):
-            shape = 4 * self._barycentric[:, a] * self._barycentric[:, b]
-            yield i, shape, (self._vectors[:, a] + self._vectors[:, b]) / 2
+    @staticmethod
+    def _combined(functions: Array, values: Array) -> Array:
+        return np.asarray(np.einsum("qn,fnk->fqk", functions, values))
+
+    @property
+    def _hats(self) -> Array:
+        """At the points, the functions that are linear from node to node, (q, n)."""
+        return nodes.hats(self._facets.degree, self._barycentric)
+
+    def _bubbles_of_facet(self) -> Iterator[tuple[int, Array, Array]]:
+        """For each bubble of a facet its number, its values at the points (q,), its directions (f, k, d)."""
+        for i, index in enumerate(bubbles.of_facet(self._facets.degree, self._facets.dimension)):
+            at = self._functions_at(np.array([index]) / sum(index))[0]
+            yield i, bubbles.shape(index, self._barycentric), np.einsum("n,fnkd->fkd", at, self._vectors)
 
 
 def local_blocks(space: fem.FunctionSpace) -> int:

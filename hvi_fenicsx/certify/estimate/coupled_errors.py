@@ -1,9 +1,9 @@
-"""The error that bubbles, vertices and laws make together.
+"""The error that bubbles, nodes and laws make together.
 
-The bubbles alone, on vertices that stay, see too little of it on a mesh that is too coarse for the bending of a body.
+The bubbles alone, on nodes that stay, see too little of it on a mesh that is too coarse for the bending of a body.
 And a law that drops ties them together:
-what drops within an edge leaves a force on the vertices. They move, the place of the drop moves with them, and
-the force with that place. On one mesh several neighbouring vertices may be the last before the drop, each of them in
+what drops within an edge leaves a force on the nodes. They move, the place of the drop moves with them, and
+the force with that place. On one mesh several neighbouring nodes may be the last before the drop, each of them in
 equilibrium, so the place is wrong by several edges: more than the bubbles of one edge see.
 """
 
@@ -19,13 +19,13 @@ from ...runtime.mpi import total
 from ...typing import Array
 from ..contact_state import LawState
 from . import defect
+from .bubble_stiffness import BubbleStiffness
 from .dual_norm import DualNorm
-from .edge_bubbles import BubbleStiffness
 from .law_traces import ErrorField, LawTraces, Trace
 
 
 def within_facets(traces: LawTraces) -> bool:
-    """Whether a law, as it is solved, drops between the vertices of a facet. Collective."""
+    """Whether a law, as it is solved, drops between the nodes of a facet. Collective."""
     found = [
         bool(np.any(heights(traces.part(state.surface, law.term.directions), law, law.term.law)))
         for state in traces.states
@@ -42,7 +42,7 @@ def heights(points: Trace, law: LawState, of: Superpotential) -> Array:
         law: its state.
         of: the law, as it is or as it is solved.
     """
-    ends = points.at_vertices(law.argument[:, None])[:, :, 0]
+    ends = points.at_nodes(law.argument[:, None])[:, :, 0]
     low, high = ends.min(axis=1, initial=np.inf), ends.max(axis=1, initial=-np.inf)
     height = np.zeros(len(ends))
     for kink, jump in zip(of.concave.kinks, of.concave.jumps, strict=True):
@@ -51,21 +51,21 @@ def heights(points: Trace, law: LawState, of: Superpotential) -> Array:
 
 
 def of_solution(traces: LawTraces, inverse: DualNorm) -> ErrorField:
-    """Bubbles and vertices in turns, each under the influence of the other, until their energy settles. Collective.
+    """Bubbles and nodes in turns, each under the influence of the other, until their energy settles. Collective.
 
     Args:
-        traces: the laws between the vertices.
+        traces: the laws between the nodes.
         inverse: of the system.
     """
     problem, thresholds, error, size = traces.problem, traces.thresholds, None, 0.0
-    vertices, stiffness = fem.Function(problem.space), BubbleStiffness(problem, traces.bubbles)
+    at_nodes, stiffness = fem.Function(problem.space), BubbleStiffness(problem, traces.bubbles)
     residual = problem.bulk.residual_in(traces.bubbles, traces.u, problem.linear.values())
     for _ in range(thresholds.coupled_rounds):
-        edges, _ = traces.tested(error)
-        load = residual - edges - problem.bulk.force_in(traces.bubbles, vertices)
-        error = ErrorField(vertices, defect.least_energy(stiffness, traces.u, load, thresholds))
-        _move_vertices(traces, inverse, error)
-        inverse.keep_within_bounds(error.vertices)
+        between, _ = traces.tested(error)
+        load = residual - between - problem.bulk.force_in(traces.bubbles, at_nodes)
+        error = ErrorField(at_nodes, defect.least_energy(stiffness, traces.u, load, thresholds))
+        _move_nodes(traces, inverse, error)
+        inverse.keep_within_bounds(error.nodes)
         before, size = size, float(np.sqrt(total(stiffness.comm, float(squares(problem, error).sum()))))
         if abs(size - before) <= thresholds.coupled_change * size:
             break
@@ -80,18 +80,18 @@ def squares(problem: Problem, error: ErrorField) -> Array:
         problem: what was solved.
         error: its estimated error.
     """
-    return problem.bulk.energy_by_cell(error.vertices + error.edges)
+    return problem.bulk.energy_by_cell(error.nodes + error.bubbles)
 
 
-def _move_vertices(traces: LawTraces, inverse: DualNorm, error: ErrorField) -> None:
-    """Move the vertices as the bubbles ask; the laws answer that, so it takes a few rounds. Collective."""
+def _move_nodes(traces: LawTraces, inverse: DualNorm, error: ErrorField) -> None:
+    """Move the nodes as the bubbles ask; the laws answer that, so it takes a few rounds. Collective."""
     problem, thresholds = traces.problem, traces.thresholds
-    size, bubbling = 0.0, problem.bulk.force_in(problem.space, error.edges)
+    size, bubbling = 0.0, problem.bulk.force_in(problem.space, error.bubbles)
     for _ in range(thresholds.answer_rounds):
         _, laws = traces.tested(error)
-        internal = problem.bulk.force_in(problem.space, error.vertices) + bubbling
+        internal = problem.bulk.force_in(problem.space, error.nodes) + bubbling
         step, length = inverse.solve(laws - problem.combined(internal))
-        error.vertices.x.array[:] += step.x.array
+        error.nodes.x.array[:] += step.x.array
         size = max(size, length)
         if length <= thresholds.answer_change * size:
             break

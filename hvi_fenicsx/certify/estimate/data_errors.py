@@ -1,10 +1,10 @@
 """What the mesh does not see of the data on the boundary: tractions, prescribed displacements and gaps within facets.
 
-A traction that varies within a facet moves the body within the depth of a cell, where neither P1 nor bubbles follow;
-the energy is that of the displacement that it causes (:mod:`.facet_modes`), and of higher order where the mesh resolves
-the traction. Of a prescribed displacement the bubbles take the quadratic part. A gap is known to the discrete problem
-at the vertices only. Within a facet its own variation moves the pressure to where the gap is smallest; the pressure
-that solves this contact problem of one facet is found.
+A traction that varies within a facet moves the body within the depth of a cell, where neither the solution nor the
+bubbles follow; the energy is that of the displacement that it causes (:mod:`.facet_modes`), in modes from the degree of
+the solution on, and of higher order where the mesh resolves the traction. Of a prescribed displacement the bubbles take
+what twice the degree holds. A gap is known to the discrete problem at the nodes only. Within a facet its own variation
+moves the pressure to where the gap is smallest; the pressure that solves this contact problem of one facet is found.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from ...runtime.mpi import total
 from ...typing import Array, Entities
 from ..contact_state import ContactState
 from . import boundary_data
+from .bubbles import of_facet, shape
 from .contact_facets import PartTrace
 from .facet_modes import FacetModes, facet_modes
 from .facet_pressure import redistributed
@@ -38,7 +39,7 @@ def squares(
 
     Args:
         problem: what was solved.
-        bubbles: the space of edge bubbles.
+        bubbles: the space of bubbles.
         states: of the parts of Γc at the solution.
         thresholds: how finely the data are sampled.
     """
@@ -49,7 +50,9 @@ def squares(
 
     for facets, axis, value in boundary_data.tractions(problem):
         on = modes(facets)
-        rest = on.energies(np.asarray(on.of(value) / problem.scales.stress), on.compliance[:, axis], lowest=1)
+        rest = on.energies(
+            np.asarray(on.of(value) / problem.scales.stress), on.compliance[:, axis], lowest=on.facets.degree
+        )
         np.add.at(found, on.facets.cells, rest)
     for part in problem.prescribed:
         if boundary_data.varies(part.value):
@@ -61,12 +64,11 @@ def squares(
 
 
 def _unprescribed(problem: Problem, on: FacetModes, part: PrescribedComponent) -> Array:
-    """Energies of what quadratic interpolation leaves of a prescribed displacement, (f,)."""
-    corners, rest = on.corners, on.beyond_linear(part.value)
-    for a, b in on.facets.pairs:
-        ends = (part.value.at(corners[:, a]) + part.value.at(corners[:, b])) / 2
-        middle = part.value.at((corners[:, a] + corners[:, b]) / 2) - ends
-        rest -= middle[:, None] * (4 * on.barycentric[:, a] * on.barycentric[:, b])
+    """Energies of what interpolation of twice the degree leaves of a prescribed displacement, (f,)."""
+    rest = on.beyond_nodes(part.value)
+    for index in of_facet(on.facets.degree, problem.scales.dimension):
+        there = on.beyond_nodes(part.value, np.array([index]) / sum(index))
+        rest -= there * shape(index, on.barycentric)
     rest /= problem.scales.displacement
     return on.energies_of_displacements(rest, on.compliance[:, part.component])
 
@@ -77,9 +79,9 @@ class _Obstacle:
 
     Attributes:
         bounds: of the part.
-        push: pressure of the body against it at the vertices, (m,).
-        gap: distance from it at the vertices, (m,).
-        within: what linear interpolation leaves of the gap at the sample points, (f, q).
+        push: pressure of the body against it at the nodes, (m,).
+        gap: distance from it at the nodes, (m,).
+        within: what interpolation between the nodes leaves of the gap at the sample points, (f, q).
         on: the facets of the part.
     """
 
@@ -100,7 +102,7 @@ def _obstacles(
             if value is None:
                 continue
             on = modes(bounds.surface.facets)
-            within = np.asarray(-sign * on.beyond_linear(value) / problem.scales.displacement)
+            within = np.asarray(-sign * on.beyond_nodes(value) / problem.scales.displacement)
             if problem.domain.mesh.comm.allreduce(float(np.max(np.abs(within), initial=0.0)), op=MPI.MAX) > rounding:
                 push, gap = sign * state.contact_pressure, bound + sign * state.normal
                 yield _Obstacle(bounds, np.maximum(push, 0.0), np.maximum(gap, 0.0), within, on)
@@ -110,9 +112,9 @@ def _moved_pressure(problem: Problem, bubbles: fem.FunctionSpace, obstacle: _Obs
     """Energies of what a gap's variation within the facets changes of the contact pressure, (f,). Collective."""
     surface, on = obstacle.bounds.surface, obstacle.on
     trace = PartTrace(problem, bubbles, surface, surface.normals[:, None, :], 1)
-    normals = trace.at_vertices(surface.normals).mean(axis=1)
+    normals = trace.at_nodes(surface.normals).mean(axis=1)
     compliance = np.sum(normals**2 * on.compliance, axis=1) / np.sum(normals**2, axis=1)
-    pushes, gaps = (on.linear(trace.at_vertices(v[:, None])[:, :, 0]) for v in (obstacle.push, obstacle.gap))
+    pushes, gaps = (on.interpolated(trace.at_nodes(v[:, None])[:, :, 0]) for v in (obstacle.push, obstacle.gap))
     solve = functools.partial(
         redistributed,
         comm=problem.domain.mesh.comm,

@@ -1,7 +1,7 @@
-"""The defect of u_h in the edge bubbles: minimise ½a(e, e) - ρ(e) among the bubbles that the constraints admit.
+"""The defect of u_h in the bubbles: minimise ½a(e, e) - ρ(e) among the bubbles that the constraints admit.
 
-ρ is the residual with all that the body feels pointwise: loads, thermal strain, the laws between the vertices. The
-constraints are those of the inequality at the midpoints of the edges (Kornhuber 1996; Zou, Veeser, Kornhuber and
+ρ is the residual with all that the body feels pointwise: loads, thermal strain, the laws between the nodes. The
+constraints are those of the inequality at the points of the bubbles (Kornhuber 1996; Zou, Veeser, Kornhuber and
 Gräser 2011).
 """
 
@@ -16,9 +16,10 @@ import numpy.typing as npt
 from dolfinx import fem
 from mpi4py import MPI
 
+from ...mesh import nodes
 from ...problem.problem import Bounds, Problem
 from ...typing import Array, Entities, Mask
-from .edge_bubbles import BubbleStiffness
+from .bubble_stiffness import BubbleStiffness
 from .thresholds import DEFAULT, Thresholds
 
 _FAR = 1e30
@@ -26,11 +27,11 @@ _FAR = 1e30
 
 
 @dataclass(frozen=True)
-class EdgeBounds:
-    """Bounds at the midpoints of a part's edges (k of them): lower ≤ e·n ≤ upper.
+class BubbleBounds:
+    """Bounds at the points of a part's bubbles (k of them): lower ≤ e·n ≤ upper.
 
     Attributes:
-        blocks: the edges' owned blocks, (k,).
+        blocks: the bubbles' owned blocks, (k,).
         normals: outward unit normals, (k, d).
         lower: lower bounds, (k,).
         upper: upper bounds, (k,).
@@ -44,10 +45,10 @@ class EdgeBounds:
     side: npt.NDArray[np.int8]
 
     def component(self, e: Array) -> Array:
-        """The normal component e·n at the edges, (k,)."""
+        """The normal component e·n at the points, (k,)."""
         return np.asarray(np.sum(e[self.blocks] * self.normals, axis=1))
 
-    def updated(self, e: Array, force: Array) -> EdgeBounds:
+    def updated(self, e: Array, force: Array) -> BubbleBounds:
         """Held where e leaves the bounds, let go where a force draws away from the bound that holds.
 
         Args:
@@ -76,8 +77,8 @@ def prescribed(problem: Problem, u: fem.Function, space: fem.FunctionSpace) -> t
 
     Args:
         problem: the prescribed displacements.
-        u: the P1 solution, nondimensional.
-        space: the edge bubbles.
+        u: the solution, nondimensional.
+        space: the bubbles.
     """
     d, owned = problem.scales.dimension, space.dofmap.index_map.size_local
     free, value = np.ones((owned, d), dtype=np.bool_), np.zeros((owned, d))
@@ -92,14 +93,14 @@ def prescribed(problem: Problem, u: fem.Function, space: fem.FunctionSpace) -> t
     return free, value
 
 
-def edge_bounds(problem: Problem, u: fem.Function, bounds: Bounds, space: fem.FunctionSpace) -> EdgeBounds:
-    """The bounds of a part at the midpoints of its edges, means of those at their ends. Collective.
+def bubble_bounds(problem: Problem, u: fem.Function, bounds: Bounds, space: fem.FunctionSpace) -> BubbleBounds:
+    """The bounds of a part at the points of its bubbles, interpolated between those at the nodes. Collective.
 
     Args:
         problem: what was solved.
-        u: the P1 solution, nondimensional.
-        bounds: at the vertices of the part.
-        space: the edge bubbles.
+        u: the solution, nondimensional.
+        bounds: at the nodes of the part.
+        space: the bubbles.
     """
     d = problem.scales.dimension
     blocks = _on(space, bounds.surface.facets)
@@ -116,7 +117,9 @@ def edge_bounds(problem: Problem, u: fem.Function, bounds: Bounds, space: fem.Fu
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     normal = np.sum(bounds.surface.values(u.x.array) * bounds.surface.normals, axis=1)
     lower, upper = (middle((b - normal)[:, None])[:, 0] for b in (bounds.lower, bounds.upper))
-    return EdgeBounds(blocks, normals, np.minimum(lower, 0.0), np.maximum(upper, 0.0), np.zeros(len(blocks), np.int8))
+    if nodes.degree(problem.space) == 1:  # what is beyond them is rounding; a quadratic function dips
+        lower, upper = np.minimum(lower, 0.0), np.maximum(upper, 0.0)
+    return BubbleBounds(blocks, normals, lower, upper, np.zeros(len(blocks), np.int8))
 
 
 def _on(space: fem.FunctionSpace, facets: Entities) -> Entities:
@@ -132,13 +135,13 @@ def least_energy(
 
     Args:
         stiffness: a(e, e).
-        u: the P1 solution, nondimensional.
+        u: the solution, nondimensional.
         load: ρ, (n, d).
         thresholds: how accurately.
     """
     problem, space = stiffness.problem, stiffness.space
     free, value = prescribed(problem, u, space)
-    bounds = [edge_bounds(problem, u, b, space) for b in problem.bounds if problem.interface_of(b.surface) is None]
+    bounds = [bubble_bounds(problem, u, b, space) for b in problem.bounds if problem.interface_of(b.surface) is None]
     solve(stiffness, load, free, value, bounds, thresholds)
     e = fem.Function(space)
     e.x.array[: value.size] = value.ravel()
@@ -151,7 +154,7 @@ def solve(
     load: Array,
     free: Mask,
     e: Array,
-    parts: Sequence[EdgeBounds],
+    parts: Sequence[BubbleBounds],
     thresholds: Thresholds = DEFAULT,
 ) -> None:
     """The admissible bubbles of least energy, an active set method, a few rounds. Collective.
@@ -180,7 +183,7 @@ def solve(
             break
 
 
-def _project(free: Mask, parts: Sequence[EdgeBounds], r: Array) -> None:
+def _project(free: Mask, parts: Sequence[BubbleBounds], r: Array) -> None:
     """Take out of r (n, d) what is prescribed and what the bounds hold."""
     r *= free
     for part in parts:

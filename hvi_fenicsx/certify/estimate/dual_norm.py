@@ -1,4 +1,4 @@
-"""Dual energy norms of functionals on P1: sqrt(r·A⁻¹r), A the stiffness with what contact and sticking hold left out.
+"""Dual energy norms on u_h's space: sqrt(r·A⁻¹r), A the stiffness without what contact or sticking holds.
 
 Two functionals are measured so: what smoothing changes of the law, and what the solver left over.
 """
@@ -68,7 +68,7 @@ class DualNorm:
         """Put u + an error on the bounds that it leaves, in place; from then on it is held there. Collective.
 
         Args:
-            error: a P1 field, nondimensional.
+            error: a field of u_h's space, nondimensional.
         """
         x = self.system.unknowns(self._u)
         at, before = x.array_r.copy(), self.held
@@ -156,7 +156,7 @@ def _impossible_pressure(state: ContactState) -> Array:
 
 
 def penetration_energy(problem: Problem, states: Sequence[ContactState]) -> float:
-    """Σ force times penetration over the vertices with bounds. Collective.
+    """Σ force times penetration over the nodes with bounds. Collective.
 
     Args:
         problem: what was solved.

@@ -1,8 +1,8 @@
 """A posteriori error estimation: how far u_h is from the solution of the inequality, by cause and by cell.
 
 Errors are of the energy norm |||v||| = a(v, v)^½, which no rigid motion changes. Discretisation: the defect in the
-edge bubbles that complete P1 to P2, under the inequality's own constraints (docs/estimator.md). Smoothing, algebraic:
-dual norms of what the smoothed law and the solver leave in the discrete equations.
+bubbles that complete the space to twice its degree, under the inequality's own constraints (docs/estimator.md).
+Smoothing, algebraic: dual norms of what the smoothed law and the solver leave in the discrete equations.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ from ...system.system import System
 from ...typing import Array
 from ..certificate import Examination
 from . import coupled_errors, data_errors, defect, dual_norm, nearly_incompressible
+from .bubble_stiffness import BubbleStiffness
 from .contact_errors import ratio
-from .edge_bubbles import BubbleStiffness
 from .law_traces import LawTraces
 from .thresholds import DEFAULT, Thresholds
 
@@ -45,7 +45,7 @@ class Estimate:
 
     @property
     def total(self) -> float:
-        """All three; the last two are errors within P1, to which the first is orthogonal."""
+        """All three; the last two are errors within the space, to which the first is orthogonal."""
         return float(np.sqrt(self.discretisation**2 + self.smoothing**2 + self.algebraic**2))
 
     @property
@@ -109,20 +109,21 @@ def _discretisation(traces: LawTraces, inverse: dual_norm.DualNorm, energy: floa
     """η_K² of the owned cells, for a solution of the energy a(u_h, u_h). Collective."""
     if traces.problem.bulk.averages_dilatation:
         return nearly_incompressible.squares(traces, inverse)
-    if not coupled_errors.within_facets(traces):
-        cells = _between_vertices(traces, inverse)
-        if total(traces.problem.domain.mesh.comm, float(cells.sum())) <= traces.thresholds.coupled**2 * energy:
+    limit = traces.thresholds.coupled[traces.degree]
+    if limit and not coupled_errors.within_facets(traces):
+        cells = _between_nodes(traces, inverse)
+        if total(traces.problem.domain.mesh.comm, float(cells.sum())) <= limit**2 * energy:
             return cells
     return coupled_errors.squares(traces.problem, coupled_errors.of_solution(traces, inverse))
 
 
-def _between_vertices(traces: LawTraces, inverse: dual_norm.DualNorm) -> Array:
-    """η_K² of the owned cells: of the bubbles, and of the nodal forces that P1 takes the laws' for. Collective."""
+def _between_nodes(traces: LawTraces, inverse: dual_norm.DualNorm) -> Array:
+    """η_K² of the owned cells: of the bubbles, and of the nodal forces that the laws are taken for. Collective."""
     problem, u = traces.problem, traces.u
-    edges, unmet = traces.tested()
-    edges *= -1.0
-    edges += problem.bulk.residual_in(traces.bubbles, u, problem.linear.values())
-    bubbles = defect.least_energy(BubbleStiffness(problem, traces.bubbles), u, edges, traces.thresholds)
+    load, unmet = traces.tested()
+    load *= -1.0
+    load += problem.bulk.residual_in(traces.bubbles, u, problem.linear.values())
+    bubbles = defect.least_energy(BubbleStiffness(problem, traces.bubbles), u, load, traces.thresholds)
     cells = problem.bulk.energy_by_cell(bubbles)
     if problem.terms:
         cells += problem.bulk.energy_by_cell(inverse.solve(unmet)[0])

@@ -67,7 +67,7 @@ def facet_modes(problem: Problem, bubbles: fem.FunctionSpace, facets: Entities, 
 
     Args:
         problem: the mesh.
-        bubbles: the space of edge bubbles.
+        bubbles: the space of bubbles.
         facets: the local facets.
         thresholds: how many modes.
     """
@@ -79,4 +79,4 @@ def facet_modes(problem: Problem, bubbles: fem.FunctionSpace, facets: Entities, 
     material = half_space.elasticity(problem, at.facets.cells)
     size = (math.factorial(d - 1) * at.facets.areas) ** (1 / (d - 1))  # in space, a leg of a right triangle
     compliance = size[:, None] / math.pi * half_space.compliance(material, at.corners)
-    return FacetModes(at.facets, at.corners, at.barycentric, at.weights, values, degrees, compliance)
+    return FacetModes(at.facets, at.nodes, at.barycentric, at.weights, values, degrees, compliance)

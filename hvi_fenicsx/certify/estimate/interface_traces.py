@@ -21,8 +21,8 @@ from ...problem.facet_overlaps import Facets
 from ...problem.interfaces import Interface
 from ...problem.problem import Problem
 from ...typing import Array, Integers
+from .bubbles import quadrature
 from .contact_facets import contact_facets, local_blocks
-from .edge_bubbles import quadrature
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,7 +47,7 @@ def _edges(problem: Problem, bubbles: fem.FunctionSpace, facets: Facets, side: s
     size, comm = problem.space.dofmap.index_map.size_global, problem.domain.mesh.comm
     known, of_facet = np.unique(_keys(facets.vertices, size), return_inverse=True)
     local = contact_facets(problem, bubbles, problem.domain.facets([side]))
-    numbers = problem.space.dofmap.index_map.local_to_global(local.vertices.ravel()).reshape(local.vertices.shape)
+    numbers = problem.space.dofmap.index_map.local_to_global(local.nodes.ravel()).reshape(local.nodes.shape)
     here = np.searchsorted(known, _keys(numbers.astype(np.int64), size).ravel())
     here, first = np.unique(here, return_index=True)
     ranks = np.zeros(len(known), dtype=np.int64)
@@ -55,7 +55,7 @@ def _edges(problem: Problem, bubbles: fem.FunctionSpace, facets: Facets, side: s
     return _SideEdges(
         of_facet=of_facet.reshape(len(facets.vertices), -1),
         here=here,
-        blocks=local.edges.ravel()[first].astype(np.int64),
+        blocks=local.bubbles.ravel()[first].astype(np.int64),
         ranks=comm.allreduce(ranks),
     )
 
@@ -75,7 +75,7 @@ class InterfacePoints:
 
     Args:
         problem: what was solved.
-        bubbles: the space of edge bubbles.
+        bubbles: the space of bubbles.
         interface: one of the problem's.
         degree: of the quadrature.
 
@@ -109,7 +109,7 @@ class InterfaceTrace:
 
     Args:
         problem: what was solved.
-        bubbles: the space of edge bubbles.
+        bubbles: the space of bubbles.
         points: of the interface.
         surface: the vertices of its first side.
         directions: at these, (m, k, d).
@@ -130,7 +130,7 @@ class InterfaceTrace:
         """Values at the owned vertices (m, k) at the points, (f, q, k). Collective."""
         return np.asarray(self._points.places[0] @ self._points.spread.at_corners(values)[self._points.facets[0]])
 
-    def at_vertices(self, values: Array) -> Array:
+    def at_nodes(self, values: Array) -> Array:
         """Values at the owned vertices (m, k) at the corners of the intersections, (f, d, k). Collective."""
         return np.asarray(self._points.corners @ self._points.spread.at_corners(values)[self._points.facets[0]])
 
@@ -138,12 +138,20 @@ class InterfaceTrace:
         """Linear interpolation of values at the owned vertices (m, k); (f, q, k). Collective."""
         return self._interpolated(values)
 
-    def linear(self, u: fem.Function) -> Array:
+    def from_node_to_node(self, values: Array) -> Array:
+        """The same: interfaces are of degree 1. Collective."""
+        return self._interpolated(values)
+
+    def of_field(self, u: fem.Function) -> Array:
         """The relative values of a P1 field, (f, q, k). Collective."""
         there = self._surface.values(self._problem.relative(u.x.array))
         return self._interpolated(np.einsum("mkd,md->mk", self._directions, there))
 
-    def quadratic(self, e: fem.Function) -> Array:
+    def of_field_from_node_to_node(self, u: fem.Function) -> Array:
+        """The same: interfaces are of degree 1. Collective."""
+        return self.of_field(u)
+
+    def of_bubbles(self, e: fem.Function) -> Array:
         """The relative values of edge bubbles, (f, q, k). Collective."""
         found = np.zeros((*self.weights.shape, self._problem.scales.dimension))
         blocks = e.x.array.reshape(-1, found.shape[2])

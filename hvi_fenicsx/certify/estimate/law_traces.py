@@ -1,7 +1,7 @@
-"""The laws between the vertices: what they give pointwise along Γc, tested with edge bubbles and with P1 functions.
+"""The laws between the nodes: what they give pointwise along Γc, tested with bubbles and with the functions of u_h.
 
-The discrete problem knows a law at the vertices only (trapezoidal rule). Between them the slip of u_h is linear, the
-nodal tractions are interpolated linearly to τ_h, and the law wants τ ∈ ∂j(u_t): here the nearest such τ to τ_h.
+The discrete problem knows a law at the nodes only (trapezoidal rule, Simpson's). Between them the nodal tractions are
+interpolated to τ_h, and the law wants τ ∈ ∂j(u_t): here the nearest such τ to τ_h.
 """
 
 from __future__ import annotations
@@ -13,18 +13,19 @@ import numpy as np
 from dolfinx import fem, la
 
 from ...laws import Length, Superpotential
+from ...mesh import nodes
 from ...problem.contact_surface import Surface
 from ...problem.problem import Problem
-from ...typing import Array
+from ...typing import Array, Mask
 from ..contact_state import ContactState, LawState
 from ..placed_forces import traction
-from . import edge_bubbles
+from . import bubbles
 from .contact_facets import PartTrace, local_blocks
 from .interface_traces import InterfacePoints, InterfaceTrace
 from .thresholds import DEFAULT, Thresholds
 
 Trace = PartTrace | InterfaceTrace
-"""The facets of a part, or of two bodies that meet, between their vertices."""
+"""The facets of a part, or of two bodies that meet, between their nodes."""
 
 
 def nearest(law: Superpotential, length: Length | None, slip: Array, traction: Array, near: float) -> Array:
@@ -67,17 +68,17 @@ class ErrorField:
     """An estimated error of u_h.
 
     Attributes:
-        vertices: its values at the vertices, a P1 field.
-        edges: what it adds between them, edge bubbles.
+        nodes: its part in the space of u_h.
+        bubbles: what it adds between the nodes.
     """
 
-    vertices: fem.Function
-    edges: fem.Function
+    nodes: fem.Function
+    bubbles: fem.Function
 
 
 @dataclass(frozen=True)
 class LawTrace:
-    """One law between the vertices, at the quadrature points of its part, (f, q, k) each.
+    """One law between the nodes, at the quadrature points of its part, (f, q, k) each.
 
     Attributes:
         points: the quadrature points.
@@ -91,21 +92,23 @@ class LawTrace:
 
 
 class LawTraces:
-    """The laws between the vertices at a displacement. Creation is collective.
+    """The laws between the nodes at a displacement. Creation is collective.
 
     Attributes:
         problem: what was solved.
         u: its solution u_h, nondimensional, ghosts updated.
         states: of the parts of Γc at u_h.
         thresholds: of the quadrature and of kinks.
-        bubbles: the space of edge bubbles.
+        degree: of the solution.
+        bubbles: the space of bubbles.
     """
 
     def __init__(
         self, problem: Problem, u: fem.Function, states: Sequence[ContactState], thresholds: Thresholds = DEFAULT
     ) -> None:
         self.problem, self.u, self.states, self.thresholds = problem, u, states, thresholds
-        self.bubbles = edge_bubbles.space(problem.domain.mesh)
+        self.degree = nodes.degree(problem.space)
+        self.bubbles = bubbles.space(problem.domain.mesh, self.degree)
         self._interfaces: dict[str, InterfacePoints] = {}
 
     def part(self, surface: Surface, directions: Array) -> Trace:
@@ -115,54 +118,64 @@ class LawTraces:
             surface: the part.
             directions: along which displacements are looked at, (m, k, d).
         """
-        problem, bubbles, degree = self.problem, self.bubbles, self.thresholds.interface_degree
+        problem, space, degree = self.problem, self.bubbles, self.thresholds.interface_degree
         if (interface := problem.interface_of(surface)) is None:
-            return PartTrace(problem, bubbles, surface, directions, self.thresholds.facet_degree)
+            return PartTrace(problem, space, surface, directions, self.thresholds.facet_degree[self.degree])
         if interface.name not in self._interfaces:
-            self._interfaces[interface.name] = InterfacePoints(problem, bubbles, interface, degree)
-        return InterfaceTrace(problem, bubbles, self._interfaces[interface.name], surface, directions)
+            self._interfaces[interface.name] = InterfacePoints(problem, space, interface, degree)
+        return InterfaceTrace(problem, space, self._interfaces[interface.name], surface, directions)
 
     def of_law(self, state: ContactState, law: LawState, error: ErrorField | None = None) -> LawTrace:
-        """One law between the vertices. Collective.
+        """One law between the nodes. Collective.
 
         Args:
             state: of its part.
             law: one of the part's.
             error: added to u_h before the law, the unsmoothed one then, is evaluated; nothing is added where a whole
-                facet sticks (its vertices on a convex kink), and elsewhere no slip passes a convex kink.
+                part of a facet sticks (its nodes on a convex kink), and elsewhere no slip passes a convex kink.
         """
         term = law.term
         points = self.part(state.surface, term.directions)
-        nodal, slip = points.interpolated(law.given), points.linear(self.u)
+        nodal, sticks = points.interpolated(law.given), self._sticks(points, law)
+        asked = term.law if error is None else term.exact
+        slip = self._slip(points, asked, sticks)
         if error is not None:
-            sticks = points.interpolated(law.on_convex_kink()[:, None].astype(float))
-            added = points.linear(error.vertices) + points.quadratic(error.edges)
-            added = np.where(sticks > 1 - self.thresholds.near, 0.0, added)
-            slip = stopped(term.exact, slip, slip + added)
-        k, asked = slip.shape[2], term.law if error is None else term.exact
+            added = points.of_field(error.nodes) + points.of_bubbles(error.bubbles)
+            slip = stopped(asked, slip, slip + np.where(sticks, 0.0, added))
+        k = slip.shape[2]
         traction = nearest(asked, term.length, slip.reshape(-1, k), nodal.reshape(-1, k), self.thresholds.near)
         return LawTrace(points, nodal, traction.reshape(slip.shape))
 
+    def _sticks(self, points: Trace, law: LawState) -> Mask:
+        """Whether all nodes around a point are on a convex kink, (f, q, 1). Collective."""
+        on_kink = points.from_node_to_node(law.on_convex_kink()[:, None].astype(float))
+        return np.asarray(on_kink > 1 - self.thresholds.near)
+
+    def _slip(self, points: Trace, law: Superpotential, sticks: Mask) -> Array:
+        """The slip of u_h, (f, q, k): where the nodes around do not pass a convex kink it does not dip beyond that."""
+        nodewise = points.of_field_from_node_to_node(self.u)
+        return np.where(sticks, nodewise, stopped(law, nodewise, points.of_field(self.u)))
+
     def tested(self, error: ErrorField | None = None) -> tuple[Array, Array]:
-        """∫ τ·v ds of all laws tested with edge bubbles; the nodal forces minus that with P1; each (n, d). Collective.
+        """∫ τ·v ds of all laws tested with bubbles; the nodal forces minus that with u_h's; each (n, d). Collective.
 
         ``error`` is added to u_h as in :meth:`of_law`. The bubbles of two bodies that meet feel what contact or glue
         carries, too.
         """
         d = self.problem.scales.dimension
-        edges = np.zeros((local_blocks(self.bubbles), d))
-        vertices = np.zeros((local_blocks(self.problem.space), d))
+        between = np.zeros((local_blocks(self.bubbles), d))
+        at_nodes = np.zeros((local_blocks(self.problem.space), d))
         for state in self.states:
             for law in state.laws:
                 trace = self.of_law(state, law, error)
-                at_edges, at_vertices = trace.points.tested(trace.traction)
+                with_bubbles, with_nodes = trace.points.tested(trace.traction)
                 nodal = law.given * state.surface.weights[:, None]
-                edges += at_edges
-                vertices -= at_vertices
-                np.add.at(vertices, state.surface.blocks, np.einsum("mk,mkd->md", nodal, law.term.directions))
+                between += with_bubbles
+                at_nodes -= with_nodes
+                np.add.at(at_nodes, state.surface.blocks, np.einsum("mk,mkd->md", nodal, law.term.directions))
             if self.problem.interface_of(state.surface) is not None:
-                edges += self._carried(state)
-        return _gathered(self.bubbles, edges), _gathered(self.problem.space, vertices)
+                between += self._carried(state)
+        return _gathered(self.bubbles, between), _gathered(self.problem.space, at_nodes)
 
     def _carried(self, state: ContactState) -> Array:
         """∫ τ·v ds of what bodies that meet put on each other without a law, tested with edge bubbles. Collective."""

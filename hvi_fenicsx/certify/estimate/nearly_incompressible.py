@@ -1,8 +1,9 @@
 """The defect of a nearly incompressible body, whose elements average the volumetric strain by vertex.
 
-Bubbles on vertices that stay cannot keep the volume around each vertex: with the volumetric energy they are far too
-stiff, without it far too soft. Bubbles and vertices together are quadratic displacements over linear pressures (Taylor
-and Hood), which lock nowhere. So the vertices are eliminated: each bubble moves with what the vertices answer to it.
+Bubbles on nodes that stay cannot keep the volume around each vertex: with the volumetric energy they are far too stiff,
+without it far too soft. Bubbles and nodes together are displacements of twice the degree over linear pressures (at
+degree 1 Taylor and Hood's), which lock nowhere. So the nodes are eliminated: each bubble moves with what the nodes
+answer to it.
 """
 
 from __future__ import annotations
@@ -15,42 +16,42 @@ from ...problem.problem import Problem
 from ...runtime import forms
 from ...typing import Array
 from . import defect
+from .bubble_stiffness import BubbleStiffness
 from .dual_norm import DualNorm
-from .edge_bubbles import BubbleStiffness
 from .law_traces import LawTraces
 from .thresholds import Thresholds
 
 
 class CondensedStiffness(BubbleStiffness):
-    """The bubbles' stiffness with the vertices that follow them and the averaged volumetric energy of both.
+    """The bubbles' stiffness with the nodes that follow them and the averaged volumetric energy of both.
 
     The diagonal is that of the shear alone: a preconditioner. Creation is collective.
 
     Args:
         problem: whose elastic operator it is.
-        bubbles: the space of edge bubbles.
-        inverse: of the system, for the vertices.
+        bubbles: the space of bubbles.
+        inverse: of the system, for the nodes.
         thresholds: how accurately.
 
     Attributes:
-        vertices: the vertices' displacement, as :meth:`follow` found it last.
-        pressures: the averaged volumetric stress of bubbles and vertices, by region.
+        at_nodes: the nodes' displacement, as :meth:`follow` found it last.
+        pressures: the averaged volumetric stress of bubbles and nodes, by region.
     """
 
     def __init__(self, problem: Problem, bubbles: fem.FunctionSpace, inverse: DualNorm, thresholds: Thresholds) -> None:
         super().__init__(problem, bubbles)
-        self._vertex_inverse, self._tolerance = inverse, thresholds.vertex_tolerance
-        self.vertices = fem.Function(problem.space)
-        bulk, moved = problem.bulk, self._in + self.vertices
-        self.pressures = bulk.pressures(self.vertices)
+        self._node_inverse, self._tolerance = inverse, thresholds.vertex_tolerance
+        self.at_nodes = fem.Function(problem.space)
+        bulk, moved = problem.bulk, self._in + self.at_nodes
+        self.pressures = bulk.pressures(self.at_nodes)
         self._dilated = [forms.compiled(form) for form in bulk.dilated(moved)]
         tests = ufl.TestFunction(problem.space), ufl.TestFunction(bubbles)
-        self._at_vertices, self._action = (
+        self._on_nodes, self._action = (
             forms.compiled(bulk.between(moved, v) + bulk.pressed(self.pressures, v)) for v in tests
         )
 
     def times(self, e: Array) -> Array:
-        """The force on the bubbles by owned values, the vertices following. Collective.
+        """The force on the bubbles by owned values, the nodes following. Collective.
 
         Args:
             e: the bubbles, (n, d).
@@ -59,24 +60,24 @@ class CondensedStiffness(BubbleStiffness):
         return super().times(e)
 
     def follow(self, e: Array, unmet: Array | None = None) -> None:
-        """Let the vertices follow the bubbles and a force, and the pressures both. Collective.
+        """Let the nodes follow the bubbles and a force, and the pressures both. Collective.
 
         Args:
             e: the bubbles, (n, d).
-            unmet: the force on the vertices, (n, d).
+            unmet: the force on the nodes, (n, d).
         """
         self._in.x.array[: e.size] = e.ravel()
         self._in.x.scatter_forward()
-        self.vertices.x.array[:] = 0.0
+        self.at_nodes.x.array[:] = 0.0
         self._press()
-        force = -self.problem.combined(_assembled(self._at_vertices, self.vertices))
+        force = -self.problem.combined(_assembled(self._on_nodes, self.at_nodes))
         if unmet is not None:
             force += unmet
-        self.vertices.x.array[:] = self._vertex_inverse.solve(force, self._tolerance)[0].x.array
+        self.at_nodes.x.array[:] = self._node_inverse.solve(force, self._tolerance)[0].x.array
         self._press()
 
     def _press(self) -> None:
-        """The pressures of the bubbles and the vertices as they are. Collective."""
+        """The pressures of the bubbles and the nodes as they are. Collective."""
         for pressure, dilated, rate in zip(
             self.pressures, self._dilated, self.problem.bulk.volumetric_rates(), strict=True
         ):
@@ -85,10 +86,10 @@ class CondensedStiffness(BubbleStiffness):
             pressure.x.scatter_forward()
 
     def on_bubbles(self, unmet: Array) -> Array:
-        """What a force at the vertices leaves at the bubbles through the vertices, (n, d). Collective.
+        """What a force at the nodes leaves at the bubbles through the nodes, (n, d). Collective.
 
         Args:
-            unmet: the force on the vertices, (n, d).
+            unmet: the force on the nodes, (n, d).
         """
         none = np.zeros((self.space.dofmap.index_map.size_local, unmet.shape[1]))
         self.follow(none, unmet)
@@ -105,19 +106,19 @@ def _assembled(form: fem.Form, like: fem.Function) -> Array:
 
 
 def squares(traces: LawTraces, inverse: DualNorm) -> Array:
-    """η_K² of the owned cells: shear and volumetric energy of bubbles and vertices. Collective.
+    """η_K² of the owned cells: shear and volumetric energy of bubbles and nodes. Collective.
 
     Args:
-        traces: the laws between the vertices.
+        traces: the laws between the nodes.
         inverse: of the system.
     """
     problem, u = traces.problem, traces.u
     stiffness = CondensedStiffness(problem, traces.bubbles, inverse, traces.thresholds)
-    edges, unmet = traces.tested()
-    load = problem.bulk.residual_in(traces.bubbles, u, problem.linear.values()) - edges
+    between, unmet = traces.tested()
+    load = problem.bulk.residual_in(traces.bubbles, u, problem.linear.values()) - between
     if problem.terms:
         load -= stiffness.on_bubbles(unmet)
     bubbles = defect.least_energy(stiffness, u, load, traces.thresholds)
-    stiffness.follow(bubbles.x.array.reshape(-1, unmet.shape[1])[: len(edges)], unmet)
-    shear = problem.bulk.energy_by_cell(bubbles + stiffness.vertices)
+    stiffness.follow(bubbles.x.array.reshape(-1, unmet.shape[1])[: len(between)], unmet)
+    shear = problem.bulk.energy_by_cell(bubbles + stiffness.at_nodes)
     return shear + problem.bulk.pressure_energy(stiffness.pressures) + problem.bulk.dilatation_error(u)

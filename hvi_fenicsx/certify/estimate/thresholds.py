@@ -14,29 +14,30 @@ class Thresholds:
 
     Attributes:
         near: distance (of u0) from a kink or a bound that counts as being on it; variation of a gap that is rounding.
-        facet_degree: of the quadrature of the laws on a facet: a drop within an edge is met to a fourteenth of its
-            length.
+        facet_degree: of the quadrature of the laws on a facet, by the degree of the solution: a drop within an edge is
+            met to a fourteenth of its length at degree 1, to a thirty-second at degree 2, whose edges are longer.
         interface_degree: the same on the intersections of the facets of two bodies, which are smaller.
         bubble_tolerance: of a solve for bubbles, in the energy norm: their energy is right to about its square.
         bubble_steps: conjugate gradient steps at most of such a solve.
-        bubble_rounds: of the active set of the bounds at midpoints, at most.
+        bubble_rounds: of the active set of the bounds between the nodes, at most.
         dual_tolerance: of a solve with the system's matrix, relative residual: the energy is right to about its square.
-        vertex_tolerance: the same, where conjugate gradients on the bubbles solve for the vertices at each step.
+        vertex_tolerance: the same, where conjugate gradients on the bubbles solve for the nodes at each step.
         data_degree: of the modes by which the data on a facet are sampled, by dimension.
         gap_shifts: bisections of the body's motion along a normal, where a gap varies within facets.
         gap_sweeps: sweeps over a facet's points in each of them.
         rounding: nondimensional norms up to this are rounding: a body that meets no force has no error, not 100 % of
             nothing.
-        coupled: error of the bubbles alone, relative to |||u_h|||, from which the vertices are found with them.
-        coupled_rounds: times at most that bubbles and vertices are solved for in turns.
+        coupled: error of the bubbles alone, relative to |||u_h|||, from which the nodes are found with them, by the
+            degree of the solution: at degree 2 always, or up to 40 % of the error is not seen.
+        coupled_rounds: times at most that bubbles and nodes are solved for in turns.
         coupled_change: relative change in energy norm of both up to which no further round is needed.
-        answer_rounds: times at most that the vertices' answer to the bubbles is corrected by the laws'.
+        answer_rounds: times at most that the nodes' answer to the bubbles is corrected by the laws'.
         answer_change: relative change in energy norm of that answer up to which no further round is needed.
         coarse: the mesh's error over the norm of the solution, above which the numbers are rough.
     """
 
     near: float = thresholds.DEFAULT.near
-    facet_degree: int = 12
+    facet_degree: Mapping[int, int] = field(default_factory=lambda: {1: 12, 2: 30})
     interface_degree: int = 6
     bubble_tolerance: float = 0.1
     bubble_steps: int = 30
@@ -47,7 +48,7 @@ class Thresholds:
     gap_shifts: int = 20
     gap_sweeps: int = 12
     rounding: float = 1e-12
-    coupled: float = 0.3
+    coupled: Mapping[int, float] = field(default_factory=lambda: {1: 0.3, 2: 0.0})
     coupled_rounds: int = 12
     coupled_change: float = 0.02
     answer_rounds: int = 4

@@ -1,84 +1,37 @@
-"""The hierarchical complement of P1 in P2: one quadratic bubble 4 λ_a λ_b for every edge, and its stiffness.
+"""The stiffness of the bubbles: its products, its diagonal, and a solve with it.
 
-Its degrees of freedom are the values at the midpoints of the edges. The stiffness is spectrally equivalent to its
-diagonal, whatever the mesh width, so a handful of conjugate gradient steps solve with it (Bank and Smith 1993).
+It is spectrally equivalent to its diagonal, whatever the mesh width, so a handful of conjugate gradient steps solve it
+(Bank and Smith 1993).
 """
 
 from __future__ import annotations
 
 import functools
-import math
+import itertools
 from collections.abc import Callable
-from typing import Any
 
-import basix
-import basix.ufl
 import numpy as np
 import ufl
 from dolfinx import fem, la
 from dolfinx import mesh as dmesh
 from mpi4py import MPI
 
+from ...mesh import nodes
 from ...problem.problem import Problem
 from ...runtime import forms
 from ...typing import Array
-
-
-def quadrature(cell: str, degree: int) -> tuple[Array, Array]:
-    """Barycentric points (q, corners) and weights (q,), whose sum is 1, of a simplex.
-
-    Args:
-        cell: its name, such as "triangle".
-        degree: of the polynomials that are integrated exactly.
-    """
-    made: tuple[Any, Any] = basix.make_quadrature(basix.CellType[cell], degree)
-    points, weights = made
-    return np.column_stack([1 - points.sum(axis=1), points]), weights / weights.sum()
-
-
-@functools.cache
-def element(cell: str) -> Any:
-    """The edge bubbles of a triangle or tetrahedron, a scalar element."""
-    kind = basix.CellType[cell]
-    topology, corners = basix.topology(kind), np.asarray(basix.geometry(kind), dtype=np.float64)
-    d = len(topology) - 1
-    where: list[list[Any]] = [[np.zeros((0, d)) for _ in entities] for entities in topology] + [[]] * (3 - d)
-    what: list[list[Any]] = [[np.zeros((0, 1, 0, 1)) for _ in entities] for entities in topology] + [[]] * (3 - d)
-    where[1] = [corners[list(edge)].mean(axis=0)[None, :] for edge in topology[1]]
-    what[1] = [np.ones((1, 1, 1, 1)) for _ in topology[1]]
-    none = -1  # no Lagrange space is contained
-    smooth, standard = basix.SobolevSpace.H1, basix.PolysetType.standard
-    return basix.ufl.custom_element(
-        kind, [], _coefficients(cell), where, what, 0, basix.MapType.identity, smooth, False, none, 2, standard
-    )
-
-
-def _coefficients(cell: str) -> Array:
-    """The bubbles in the orthonormal polynomials of degree 2, (bubbles, polynomials)."""
-    barycentric, weights = quadrature(cell, 4)
-    kind = basix.CellType[cell]
-    legendre: Any = basix.tabulate_polynomials(basix.PolynomialType.legendre, kind, 2, barycentric[:, 1:])
-    values = [4 * barycentric[:, a] * barycentric[:, b] for a, b in basix.topology(kind)[1]]
-    volume = 1.0 / math.factorial(barycentric.shape[1] - 1)
-    return np.asarray(np.einsum("iq,q,jq->ij", np.array(values), volume * weights, legendre))
-
-
-def space(mesh: dmesh.Mesh) -> fem.FunctionSpace:
-    """Vector-valued edge bubbles. Collective."""
-    mesh.topology.create_entities(1)
-    scalar = element(mesh.topology.cell_name())
-    return fem.functionspace(mesh, basix.ufl.blocked_element(scalar, shape=(mesh.geometry.dim,)))
+from .bubbles import Index, of_cell, quadrature, slope
 
 
 class BubbleStiffness:
     """The elastic stiffness of the bubbles, nondimensional: its products and its diagonal. Creation is collective.
 
-    It is not stored. In space it would take 9 kB a vertex, more than all else of a run, and take longer to assemble
-    than the few products that are wanted of it.
+    It is not stored. In space it would take 9 kB a vertex at degree 1, more than all else of a run, and take longer to
+    assemble than the few products that are wanted of it.
 
     Attributes:
         problem: whose elastic operator it is.
-        space: the edge bubbles.
+        space: the bubbles.
         comm: the ranks.
     """
 
@@ -146,24 +99,47 @@ class BubbleStiffness:
 def diagonal(problem: Problem, bubbles: fem.FunctionSpace) -> Array:
     """The diagonal of the bubbles' stiffness at the blocks that this rank owns, (n, d). Collective.
 
-    On a cell in which the material is constant, E being the energy of an affine function,
-    a(4 λ_a λ_b) = 16 (E(λ_a) + E(λ_b) + E(λ_a + λ_b)) / ((d + 1)(d + 2)).
+    On a cell in which the material is constant it is a sum of the energies of the affine functions λ_a and λ_a + λ_b
+    (:func:`energy_shares`).
 
     Args:
         problem: whose elastic operator it is.
-        bubbles: the space of edge bubbles.
+        bubbles: the space of bubbles.
     """
     affine, d = _Affine(problem), problem.scales.dimension
     hats = np.vstack([-np.ones(d), np.eye(d)])
-    own = [affine.energies(hat) for hat in hats]
-    edges, values = bubbles.dofmap.list[: len(own[0])], fem.Function(bubbles)
-    blocks = values.x.array.reshape(-1, d)
-    for k, (a, b) in enumerate(basix.topology(basix.CellType[bubbles.mesh.topology.cell_name()])[1]):
-        energies = own[a] + own[b] + affine.energies(hats[a] + hats[b])
+    energies = [affine.energies(hat) for hat in hats]
+    energies += [affine.energies(hats[a] + hats[b]) for a, b in itertools.combinations(range(d + 1), 2)]
+    cells, values = bubbles.dofmap.list[: len(energies[0])], fem.Function(bubbles)
+    blocks, cell = values.x.array.reshape(-1, d), bubbles.mesh.topology.cell_name()
+    for k, index in enumerate(of_cell(nodes.degree(problem.space), cell)):
+        shares = energy_shares(index, cell)
+        own = functools.reduce(np.add, (share * energies[i] for i, share in shares))
         for i in range(d):
-            blocks[:, i] += np.bincount(edges[:, k], energies[:, i], minlength=len(blocks))
+            blocks[:, i] += np.bincount(cells[:, k], own[:, i], minlength=len(blocks))
     values.x.scatter_reverse(la.InsertMode.add)
     return np.array(blocks[: bubbles.dofmap.index_map.size_local]) * 16 / ((d + 1) * (d + 2))
+
+
+def energy_shares(index: Index, cell: str) -> list[tuple[int, float]]:
+    """The energy of a bubble as a sum of those of affine functions: numbers and shares, times (d + 1)(d + 2)/16.
+
+    The gradient is Σ ∂φ/∂λ_a ∇λ_a, so a(φ, φ) = Σ G_ab a(λ_a, λ_b), G_ab being the mean of ∂φ/∂λ_a ∂φ/∂λ_b.
+
+    Args:
+        index: of the bubble.
+        cell: the name of the cell's shape.
+
+    Returns:
+        First of λ_a by a, then of λ_a + λ_b by pairs a < b; those that are zero are left out.
+    """
+    barycentric, weights = quadrature(cell, 4 * sum(index))
+    slopes = [slope(index, corner, barycentric) for corner in range(len(index))]
+    mean = np.array([[np.sum(weights * a * b) for b in slopes] for a in slopes])
+    pairs = itertools.combinations(range(len(index)), 2)
+    shares = [2 * mean[a, a] - mean[a].sum() for a in range(len(index))] + [mean[a, b] for a, b in pairs]
+    rounded = np.round(np.array(shares) * len(index) * (len(index) + 1) / 16, 12)
+    return [(number, float(share)) for number, share in enumerate(rounded) if share]
 
 
 class _Affine:
