@@ -76,17 +76,32 @@ class FacetSamples:
         return self.nodes[:, : self.facets.dimension]
 
     def interpolated(self, at_nodes: Array, at: Array | None = None) -> Array:
-        """Values at the nodes (f, n), interpolated at the sample points or at others (q, d); (f, q)."""
+        """Values at the nodes, interpolated at points, (f, q).
+
+        Args:
+            at_nodes: the values, (f, n).
+            at: the points in barycentric coordinates, (q, d); by default the sample points.
+        """
         points = self.barycentric if at is None else at
         return np.asarray(at_nodes @ spaces.facet_functions(self.facets.degree, points).T)
 
     def of(self, value: SpatialValue, at: Array | None = None) -> Array:
-        """A value at the sample points or at others (q, d), SI, (f, q)."""
+        """A value at points, SI, (f, q).
+
+        Args:
+            value: on the boundary.
+            at: the points in barycentric coordinates, (q, d); by default the sample points.
+        """
         points = np.einsum("qv,fvi->fqi", self.barycentric if at is None else at, self.corners)
         return value.at(points.reshape(-1, 3)).reshape(points.shape[:2])
 
     def beyond_nodes(self, value: SpatialValue, at: Array | None = None) -> Array:
-        """What interpolation between the nodes leaves of a value at the sample points or at others, SI, (f, q)."""
+        """What interpolation between the nodes leaves of a value at points, SI, (f, q).
+
+        Args:
+            value: on the boundary.
+            at: the points in barycentric coordinates, (q, d); by default the sample points.
+        """
         at_nodes = value.at(self.nodes.reshape(-1, 3)).reshape(self.nodes.shape[:2])
         return np.asarray(self.of(value, at) - self.interpolated(at_nodes, at))
 

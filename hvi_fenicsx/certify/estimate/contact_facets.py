@@ -36,7 +36,7 @@ class ContactFacets:
 
     @property
     def dimension(self) -> int:
-        """Of space: the number of a facet's corners."""
+        """The dimension of space, which is the number of a facet's corners."""
         return self.nodes.shape[1] if self.degree == 1 else {3: 2, 6: 3}[self.nodes.shape[1]]
 
     @property
