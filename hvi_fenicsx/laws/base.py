@@ -115,6 +115,11 @@ class Superpotential(ABC):
         """Positions (k,), ascending, of all kinks of j."""
         return np.union1d(self.convex.kinks, self.concave.kinks)
 
+    @property
+    def breaks(self) -> Array:
+        """Positions (k,), ascending, 0 among them, between which the traction is smooth."""
+        return np.union1d(self.kinks, np.zeros(1))
+
     def interval(self, x: Array, atol: float | Array = 0.0) -> tuple[Array, Array]:
         """Clarke's subdifferential [lo, hi] of j, N/m², each (m,).
 
@@ -277,6 +282,11 @@ class ScaledLaw(Superpotential, register=False):
     @property
     def is_linear(self) -> bool:
         return self.law.is_linear
+
+    @override
+    @property
+    def breaks(self) -> Array:
+        return quotient(self.law.breaks, self.length)
 
     @override
     @property

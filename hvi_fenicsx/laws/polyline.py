@@ -97,6 +97,11 @@ class PolylineLaw(Superpotential):
     def kinks(self) -> Array:
         return np.asarray(self.graph.breaks[self.graph.jumps != 0.0])
 
+    @property
+    @override
+    def breaks(self) -> Array:
+        return self.graph.breaks
+
     def piece(self, x: Array) -> Integers:
         """Number (m,) of breaks between 0 and x: the index of the segment, counted from 0 by |x|."""
         g = self.graph

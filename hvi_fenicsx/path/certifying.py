@@ -6,6 +6,7 @@ from the factorised body. The certificate of the whole body (:mod:`.certify`) re
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,9 +15,6 @@ from ..certify import certificate
 from ..problem.factored_problem import FactoredProblem
 from ..system.condensation import Condensation
 from ..system.system import System
-from ..typing import Array
-from .bonds import BondTable
-from .segments import Segment
 from .state import Event, PathState
 
 ALWAYS = frozenset({Event.START, Event.JUMP, Event.TURN, Event.END})
@@ -46,7 +44,7 @@ class Certifier:
         condensation: its condensation.
         factored: its problem at any factor.
         tolerance: relative.
-        remember: numbers of the problem's bonds that remember.
+        distance: how far a state is from the graphs of Γc, relative to the forces.
     """
 
     def __init__(
@@ -55,14 +53,10 @@ class Certifier:
         condensation: Condensation,
         factored: FactoredProblem,
         tolerance: float,
-        remember: range,
+        distance: Callable[[PathState], float],
     ) -> None:
         self._system, self._condensation, self._factored = system, condensation, factored
-        self._tolerance, self._bonds = tolerance, BondTable(condensation.problem, remember)
-        self._rows: list[list[int]] = [[] for _ in range(condensation.problem.size)]
-        for row, bond in enumerate(self._bonds.bonds):
-            self._rows[bond.unknown].append(row)
-        self._chains: dict[tuple[int, bytes], tuple[Segment, ...]] = {}
+        self._tolerance, self._distance = tolerance, distance
 
     def verdict(self, state: PathState, number: int) -> Verdict:
         """What a state is found to be. Collective.
@@ -74,29 +68,6 @@ class Certifier:
         on_surface = self._distance(state) <= self._tolerance
         whole = _plain(state) and (state.event in ALWAYS or is_examined(number))
         return Verdict(certified=on_surface and (not whole or self._examined(state)), whole=whole)
-
-    def _distance(self, state: PathState) -> float:
-        """How far the state is from the graphs, relative to the forces."""
-        problem = self._condensation.problem
-        elastic, load = problem.stiffness @ state.x, problem.load(state.factor)
-        force, diagonal = load - elastic, np.diag(problem.stiffness)
-        size = max(float(np.max(np.abs(f), initial=0.0)) for f in (elastic, load, problem.force_rate)) or 1.0
-        chains = self._all_chains(state.memory)
-        values = zip(chains, *(map(float, v) for v in (state.x, force, diagonal)), strict=True)
-        away = (min(segment.distance(x, f, k) for segment in chain) for chain, x, f, k in values)
-        return max(away, default=0.0) / size
-
-    def _all_chains(self, memory: Array | None) -> list[tuple[Segment, ...]]:
-        """The graphs of all unknowns; those with an equal memory are made once."""
-        if memory is not None:
-            self._bonds.restore(memory)
-        return [self._chain(i, memory) for i in range(self._condensation.problem.size)]
-
-    def _chain(self, unknown: int, memory: Array | None) -> tuple[Segment, ...]:
-        key = unknown, b"" if memory is None else memory[self._rows[unknown]].tobytes()
-        if key not in self._chains:
-            self._chains[key] = self._bonds.chain(unknown)
-        return self._chains[key]
 
     def _examined(self, state: PathState) -> bool:
         """Whether the certificate of the whole body passes. Collective."""

@@ -63,7 +63,7 @@ class ExactFollower:
         self.reason = ""
         self._unstable = 0
         self._moved, self._direction = 0, 1
-        self._peak, self._floats = 0.0, _is_singular(problem.stiffness)
+        self._peak, self._floats = 0.0, is_singular(problem.stiffness)
         self.tracer: Tracer
 
     def states(self) -> Iterator[PathState]:
@@ -290,7 +290,11 @@ class ExactFollower:
         return Place(part=part, unknown=i, point=problem.points[i])
 
 
-def _is_singular(stiffness: Array) -> bool:
-    """Whether bounds and laws alone hold the body."""
+def is_singular(stiffness: Array) -> bool:
+    """Whether bounds and laws alone hold the body.
+
+    Args:
+        stiffness: S, (n, n).
+    """
     values = np.linalg.eigvalsh(stiffness) if len(stiffness) else np.ones(1)
     return bool(values[0] <= 1e-11 * values[-1])

@@ -20,10 +20,10 @@ from ..typing import Array
 from ..workflow import Preparation
 from . import records
 from .certifying import Certifier, Verdict
-from .exact import ExactFollower
 from .journal import Record
+from .kinds import kind_of
 from .measures import Measures
-from .state import End, Event, Follow, PathOptions, PathState
+from .state import End, Event, Follow, Follower, PathOptions, PathState
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,7 +59,6 @@ class PathRun:
     """
 
     def __init__(self, prepared: Preparation, wanted: PathTable) -> None:
-        _refuse_smoothing(prepared)
         self.prepared, self.wanted = prepared, wanted
         system = prepared.system
         known = loading.names(system)
@@ -71,9 +70,10 @@ class PathRun:
             self._measures = Measures(system, self._condensation, self.scaled)
         self._remember = range(len(self._condensation.problem.bonds) if wanted.memory else 0)
         self._factored = FactoredProblem(system.problem, self.scaled)
-        self._certifier = Certifier(
-            system, self._condensation, self._factored, prepared.options.tolerance, self._remember
-        )
+        problem = self._condensation.problem
+        self._kind = kind_of(problem)
+        distance = self._kind.distances(problem, self._remember)
+        self._certifier = Certifier(system, self._condensation, self._factored, prepared.options.tolerance, distance)
         self.states: list[PathState] = []
         self._verdicts: list[Verdict] = []
         self._extremes: list[tuple[float, float]] = []
@@ -111,10 +111,10 @@ class PathRun:
             examined=sum(verdict.whole for verdict in self._verdicts),
         )
 
-    def _follower(self, control: Control) -> ExactFollower:
+    def _follower(self, control: Control) -> Follower:
         options = PathOptions(programme=self.wanted.to, follow=Follow(self.wanted.follow), remember=self._remember)
         resume = self.states[-1] if self.states else None
-        return ExactFollower(self._condensation.problem, options, resume, control.interrupted)
+        return self._kind.follower(self._condensation.problem, options, resume, control.interrupted)
 
     def _take(self, state: PathState, verdict: Verdict) -> None:
         self.states.append(state)
@@ -184,11 +184,3 @@ class PathRun:
 def _finite(states: Iterator[PathState]) -> Iterator[PathState]:
     """The states up to the first that is no number."""
     return itertools.takewhile(lambda state: np.isfinite(state.factor) and bool(np.all(np.isfinite(state.x))), states)
-
-
-def _refuse_smoothing(prepared: Preparation) -> None:
-    if prepared.scene.solver.smoothing is not None:
-        raise InputError(
-            "solver.smoothing: a load path is followed with the laws themselves, kinks and jumps; leave smoothing and "
-            "epsilon out"
-        )

@@ -24,6 +24,8 @@ class Event(StrEnum):
     """The body has jumped to the next stable equilibrium."""
     TURN = "turn"
     """The programme turns."""
+    STEP = "step"
+    """Nothing happens; on a curve that is not straight the states between two events."""
     END = "end"
 
 
@@ -69,7 +71,9 @@ class Position:
         numbers: of the segments on which the unknowns are, (n,).
         driver: the variable that drives.
         heading: its direction, 1 or -1.
-        small: parts of the order ε of the coordinates, which say who comes first where several come at once, (n,).
+        small: parts of the order ε of the coordinates, which say who comes first where several come at once, (n,);
+            on a curve that is not straight its coordinates.
+        step: length of the next step on such a curve.
     """
 
     leg: int
@@ -77,6 +81,7 @@ class Position:
     driver: int
     heading: int
     small: Array
+    step: float = 0.0
 
 
 @dataclass(frozen=True, kw_only=True)

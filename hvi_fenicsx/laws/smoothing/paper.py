@@ -71,8 +71,14 @@ class PaperSmoothedLaw(SmoothedLaw, register=False):
 
     @cached_property
     @override
-    def concave(self) -> ConvexPart:
+    def concave(self) -> _PaperConcave:
         return _PaperConcave(self)
+
+    @property
+    @override
+    def breaks(self) -> Array:
+        ends = [band.kink + end for band in self.concave.bands for end in (band.low, band.high)]
+        return np.union1d(ends, np.negative(ends))
 
     @property
     def slope(self) -> float:
@@ -130,7 +136,7 @@ class _PaperConcave(DifferentiablePart):
     law: PaperSmoothedLaw
 
     @cached_property
-    def _bands(self) -> tuple[_Band, _Band]:
+    def bands(self) -> tuple[_Band, _Band]:
         """Around 0 (its half y ≥ 0) and around δ. |y - δ/2| runs from w1 to w2 where |d| ≤ ε/2."""
         middle, width = 0.5 * self.law.law.delta, self.law.epsilon_absolute / self.law.slope
         w1, w2 = sqrt(max(middle * middle - width, 0.0)), sqrt(middle * middle + width)
@@ -142,7 +148,7 @@ class _PaperConcave(DifferentiablePart):
 
     def _integrals(self, x: Array) -> tuple[Array, Array]:
         factor = self.law.slope * (self.law.slope / self.law.epsilon_absolute)
-        near, far = (band.integrals(np.abs(x)) for band in self._bands)
+        near, far = (band.integrals(np.abs(x)) for band in self.bands)
         return factor * (near[0] + far[0]), factor * (near[1] + far[1])
 
     @override

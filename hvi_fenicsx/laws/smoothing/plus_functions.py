@@ -22,6 +22,7 @@ class Quadratic(PlusFunction):
 
     name = "quadratic"
     kappa = 1.0 / 8.0
+    bands = (0.5,)
 
     @override
     def profile(self, z: Array) -> tuple[Array, Array, Array]:
@@ -56,6 +57,7 @@ class LogExp(PlusFunction):
 
     name = "log_exp"
     kappa = math.log(2.0)
+    bands = (2.0, 8.0, 32.0)
 
     @override
     def profile(self, z: Array) -> tuple[Array, Array, Array]:

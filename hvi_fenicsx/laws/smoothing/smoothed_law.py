@@ -33,9 +33,11 @@ class PlusFunction(Smoothing):
 
     Class attributes:
         kappa: the constant of |p(t; e) - max(t, 0)| ≤ κ e; it is attained at t = 0.
+        bands: distances |t|/e between which D changes little in shape; beyond the last one it is next to nothing.
     """
 
     kappa: ClassVar[float]
+    bands: ClassVar[tuple[float, ...]] = (1.0, 4.0, 16.0, 64.0)
 
     @abstractmethod
     def profile(self, z: Array) -> tuple[Array, Array, Array]:
@@ -153,6 +155,16 @@ class PlusSmoothedLaw(SmoothedLaw, register=False):
         """
         kinks = max(self.law.convex.kinks.size, self.law.concave.kinks.size)
         return self.plus.kappa * self.epsilon_absolute * kinks
+
+    @property
+    @override
+    def breaks(self) -> Array:
+        ends = self.law.breaks
+        for part in (self.law.convex, self.law.concave):
+            widths = np.outer(self.epsilon_absolute / part.jumps, self.plus.bands)
+            places = part.kinks[:, None]
+            ends = np.union1d(ends, np.concatenate([places - widths, places + widths, places], axis=1))
+        return ends
 
     @override
     def value(self, x: Array) -> Array:

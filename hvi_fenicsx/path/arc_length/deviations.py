@@ -1,0 +1,141 @@
+"""Where curved laws differ from the chords that stand for them in the graphs, for all vertices at once."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...laws import Superpotential
+from ...typing import Array, Integers, Mask
+from ..segments import Segment
+from .vertex_laws import VertexLaw
+
+_REACH = 0.25
+"""A step changes the argument of a curved law by this part of its length scale and of the argument at most."""
+
+
+@dataclass(kw_only=True)
+class _Group:
+    """One law at r vertices.
+
+    Attributes:
+        law: j.
+        sites: numbers, (r,).
+        signs: the law's argument is that times the displacement, (r,).
+        weights: lumped areas, (r,).
+        rows: the vertices' laws.
+        live: whether the law is on its curve, (r,).
+        chords: x, traction and slope of the present chord, (r, 3).
+        ends: of the present piece, (r, 2).
+    """
+
+    law: Superpotential
+    sites: Integers
+    signs: Array
+    weights: Array
+    rows: list[VertexLaw]
+    live: Mask
+    chords: Array
+    ends: Array
+
+
+class Deviations:
+    """The curved laws of all sites.
+
+    Args:
+        laws: of each site.
+    """
+
+    def __init__(self, laws: Sequence[Sequence[VertexLaw]]) -> None:
+        self._m = len(laws)
+        curved = [(k, law) for k, several in enumerate(laws) for law in several if law.curved]
+        numbers = sorted({law.group for _, law in curved})
+        self._groups = [_group([(k, law) for k, law in curved if law.group == number]) for number in numbers]
+        self._at: dict[int, list[tuple[_Group, int]]] = {}
+        for group in self._groups:
+            for row, k in enumerate(group.sites):
+                self._at.setdefault(int(k), []).append((group, row))
+
+    def enter(self, k: int, segment: Segment) -> bool:
+        """Note the segment on which a site is; whether a law is curved there.
+
+        Args:
+            k: the site.
+            segment: the segment.
+        """
+        for group, row in self._at.get(k, []):
+            law, low, high = group.rows[row], segment.x + segment.low, segment.x + segment.high
+            middle = between(low, high)
+            passed = (0.0, 0.0) if law.passed is None else law.passed.displacements
+            group.live[row] = not segment.rise and not passed[0] < middle < passed[1]
+            if group.live[row]:
+                graph, at = law.graph(), np.array([middle])
+                slope = float(graph.slopes[np.searchsorted(graph.breaks, middle)])
+                group.chords[row] = middle, float(graph.traction(at, "right")[0]), slope
+                group.ends[row] = low, high
+        return any(bool(group.live[row]) for group, row in self._at.get(k, []))
+
+    def values(self, x: Array) -> tuple[Array, Array]:
+        """What the chords lack, and its slope, by site, (m,) each; beyond a piece continued along its tangent.
+
+        Args:
+            x: the displacements of the sites, (m,).
+        """
+        found, slopes = np.zeros(self._m), np.zeros(self._m)
+        for group in self._groups:
+            rows = np.flatnonzero(group.live)
+            if not rows.size:
+                continue
+            sites, (low, high) = group.sites[rows], group.ends[rows].T
+            inset = 1e-12 * np.where(np.isfinite(high - low), high - low, 1.0 + np.abs(x[sites]))
+            inside = np.clip(x[sites], low + inset, high - inset)
+            sign, (at, start, chord) = group.signs[rows], group.chords[rows].T
+            argument = sign * inside
+            slope = group.law.convex.second(argument) - group.law.concave.second(argument)
+            value = sign * 0.5 * (group.law.left(argument) + group.law.right(argument)) + slope * (x[sites] - inside)
+            lacking = value - start - chord * (x[sites] - at)
+            np.add.at(found, sites, group.weights[rows] * lacking)
+            np.add.at(slopes, sites, group.weights[rows] * (slope - chord))
+        return found, slopes
+
+    def reach(self, x: Array) -> Array:
+        """How far the sites may move in one step, (m,).
+
+        Args:
+            x: the displacements of the sites, (m,).
+        """
+        found = np.full(self._m, np.inf)
+        for group in self._groups:
+            sites = group.sites[group.live]
+            np.minimum.at(found, sites, _REACH * (group.law.length_scale + np.abs(x[sites])))
+        return found
+
+
+def between(low: float, high: float) -> float:
+    """A displacement inside an interval.
+
+    Args:
+        low: its low end, or -inf.
+        high: its high end, or inf.
+    """
+    if np.isfinite(low) and np.isfinite(high):
+        return 0.5 * (low + high)
+    if np.isfinite(low):
+        return low + 1.0 + abs(low)
+    return high - 1.0 - abs(high) if np.isfinite(high) else 0.0
+
+
+def _group(rows: list[tuple[int, VertexLaw]]) -> _Group:
+    laws = [law for _, law in rows]
+    return _Group(
+        law=laws[0].law,
+        sites=np.array([k for k, _ in rows]),
+        signs=np.array([law.sign for law in laws]),
+        weights=np.array([law.weight for law in laws]),
+        rows=laws,
+        live=np.zeros(len(rows), dtype=bool),
+        chords=np.zeros((len(rows), 3)),
+        ends=np.zeros((len(rows), 2)),
+    )

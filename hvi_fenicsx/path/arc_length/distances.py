@@ -1,0 +1,78 @@
+"""How far a state is from the graphs of its laws and bounds: what certifies it on Γc, apart from how it was found."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+
+import numpy as np
+
+from ...system.condensed_problem import CondensedProblem
+from ...typing import Array
+from ..state import PathState
+from .vertex_laws import VertexLaw, vertex_laws
+
+_ROUNDING = 1e-10
+"""A displacement this near to a break of a law, or to a bound, may be there, relative to itself and to lengths."""
+
+
+class CurvedDistances:
+    """The distances of the states of one path.
+
+    Args:
+        problem: the problem.
+        remember: numbers of the problem's bonds that remember.
+    """
+
+    def __init__(self, problem: CondensedProblem, remember: Collection[int]) -> None:
+        self._problem, self._laws = problem, vertex_laws(problem, remember)
+
+    def __call__(self, state: PathState) -> float:
+        """The largest distance, relative to the forces.
+
+        Args:
+            state: the state.
+        """
+        if state.memory is not None:
+            for row, law in enumerate(self._laws):
+                law.restore(state.memory[row, :])
+        problem, x = self._problem, state.x
+        elastic, load = problem.stiffness @ x, problem.load(state.factor)
+        size = max(float(np.max(np.abs(f), initial=0.0)) for f in (elastic, load, problem.force_rate)) or 1.0
+        return self._largest(x, load - elastic) / size
+
+    def _largest(self, x: Array, force: Array) -> float:
+        """The largest distance of a force that laws and bounds should give."""
+        low, high, worst = np.zeros(len(x)), np.zeros(len(x)), 0.0
+        rest = force.copy()
+        for law in self._laws:
+            if len(law.unknowns) == 2:
+                pair = list(law.unknowns)
+                worst, rest[pair] = max(worst, _off(law, x[pair], force[pair])), 0.0
+            else:
+                least, most = _interval(law, float(x[law.unknowns[0]]))
+                low[law.unknowns[0]] += least
+                high[law.unknowns[0]] += most
+        problem = self._problem
+        allowed = _ROUNDING * float(np.max(np.abs(x), initial=0.0))
+        low[x <= problem.lower + allowed], high[x >= problem.upper - allowed] = -np.inf, np.inf
+        beyond = np.maximum(np.maximum(problem.lower - x, x - problem.upper), 0.0) * np.diag(problem.stiffness)
+        away = np.maximum(np.maximum(low - rest, rest - high), 0.0) + beyond
+        return max(worst, float(np.max(away, initial=0.0)))
+
+
+def _interval(law: VertexLaw, x: float) -> tuple[float, float]:
+    """The least and the greatest force at a coordinate, but for its rounding."""
+    near = _ROUNDING * (abs(x) + law.law.length_scale)
+    ends = [float(law.traction(np.array([x + s * near]), side)[0]) for s, side in ((-1.0, "left"), (1.0, "right"))]
+    return law.weight * min(ends), law.weight * max(ends)
+
+
+def _off(law: VertexLaw, u: Array, force: Array) -> float:
+    """How far a force is from those that a law on |u| gives: along u, of a size of its graph."""
+    length = float(np.hypot(*u))
+    least, most = _interval(law, length)
+    if length <= _ROUNDING * law.law.length_scale:
+        return max(float(np.hypot(*force)) - max(abs(least), abs(most)), 0.0)
+    along = float(force @ u) / length
+    across = float(force @ np.array([-u[1], u[0]])) / length
+    return max(least - along, along - most, 0.0) + abs(across)

@@ -1,0 +1,172 @@
+"""The energies along a curve that is not straight: work by quadrature, what is stored and lost from the laws."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...system.condensed_problem import CondensedProblem
+from ...typing import Array
+from .curve import Move
+from .equations import Place
+from .sites import Sites, Values
+
+_POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(4)
+_AGREED = 3e-10
+"""By how much the work along a step may miss what the energies say, relative to the energies."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Stored:
+    """The energies of one state.
+
+    Attributes:
+        energy: ½ a(u, u) - <g, u> + what the bonds would give back.
+        potential: <g, u>.
+        dissipated: lost in bonds with memory.
+        size: of the terms.
+    """
+
+    energy: float
+    potential: float
+    dissipated: float
+    size: float
+
+
+class Balance:
+    """Work and dissipation, added up from state to state.
+
+    Args:
+        problem: the problem.
+        sites: its sites.
+        work: done before.
+
+    Attributes:
+        work: done by the loads and by what moves prescribed displacements.
+        stored: the energies of the last state.
+    """
+
+    def __init__(self, problem: CondensedProblem, sites: Sites, work: float = 0.0) -> None:
+        self._problem, self._sites, self.work = problem, sites, work
+        self._size = sum(float(b.weights.sum()) * b.law.energy_scale for b in problem.bonds)
+        self._remembers = {law.group for several in sites.laws for law in several if law.passed is not None}
+        self.stored = Stored(energy=0.0, potential=0.0, dissipated=0.0, size=0.0)
+
+    def at(self, values: Values, factor: float) -> Stored:
+        """The energies of a state.
+
+        Args:
+            values: of the sites.
+            factor: λ.
+        """
+        problem, x = self._problem, values.x
+        elastic, load = 0.5 * float(x @ (problem.stiffness @ x)), float(problem.load(factor) @ x)
+        constant = problem.constant_at(factor)
+        plain = sum(b.energy(x) for n, b in enumerate(problem.bonds) if n not in self._remembers)
+        back, lost = self._bonds(values)
+        return Stored(
+            energy=elastic - load + constant + plain + back,
+            potential=problem.potential(x, factor),
+            dissipated=lost,
+            size=abs(elastic) + abs(load) + abs(constant) + abs(plain) + abs(back) + lost,
+        )
+
+    def _bonds(self, values: Values) -> tuple[float, float]:
+        """What bonds with memory give back, and what they have lost."""
+        back = lost = 0.0
+        for k, laws in enumerate(self._sites.laws):
+            if all(law.passed is None for law in laws):
+                continue
+            x = float(values.lengths[k])
+            shares = self._sites.shares(k, x, self._sites.bond_force(k, values))
+            for law, share in zip(laws, shares, strict=True):
+                if law.passed is not None:
+                    back += law.recoverable(x, share)
+                    lost += law.dissipated(x, share)
+        return back, lost
+
+    def begin(self, values: Values, factor: float) -> None:
+        """Start at a state.
+
+        Args:
+            values: of the sites.
+            factor: λ.
+        """
+        self.stored = self.at(values, factor)
+
+    def go(self, move: Move, unit: float) -> None:
+        """Along a step.
+
+        Args:
+            move: the step.
+            unit: of the factor.
+        """
+        after = self.at(move.after.values, float(move.after.y[-1]) * unit)
+        self.work += after.potential - self.stored.potential + self._moved(move, unit)
+        self._size = max(self._size, after.size)
+        self.stored = after
+
+    def leap(self, values: Values, factor: float) -> float:
+        """To another state at the same factor; returns the energy that is released.
+
+        Args:
+            values: of the sites.
+            factor: λ.
+        """
+        before, self.stored = self.stored, self.at(values, factor)
+        self.work += self.stored.potential - before.potential
+        return before.energy + before.dissipated - self.stored.energy - self.stored.dissipated
+
+    def disagreement(self, move: Move, unit: float) -> float:
+        """By how much the work along a step misses what the energies say, 1 for all that is allowed.
+
+        Args:
+            move: the step.
+            unit: of the factor.
+        """
+        ends = [self.at(place.values, float(place.y[-1]) * unit) for place in (move.before, move.after)]
+        change = sum(sign * (e.energy + e.dissipated) for sign, e in zip((-1.0, 1.0), ends, strict=True))
+        size = max(self._size, *(e.size for e in ends))
+        return abs(change - self._moved(move, unit)) / (_AGREED * size or 1.0)
+
+    def _moved(self, move: Move, unit: float) -> float:
+        """The change of the energy's constant less ∫ f1ᵀx dλ."""
+        start, end = (float(place.y[-1]) * unit for place in (move.before, move.after))
+        problem = self._problem
+        change = problem.constant_at(end) - problem.constant_at(start)
+        return change - self._product(move, unit)
+
+    def _product(self, move: Move, unit: float) -> float:
+        """∫ f1ᵀx dλ, both as cubic polynomials of the arc length."""
+        length = float(np.linalg.norm(move.after.y - move.before.y))
+        rate = self._problem.force_rate
+        driven, factors = [], []
+        for place in (move.before, move.after):
+            driven += [float(rate @ place.values.x), length * float(rate @ displacement_rate(self._sites, place))]
+            factors += [float(place.y[-1]) * unit, length * unit * float(place.tangent[-1])]
+        t = 0.5 * (1.0 + _POINTS)
+        return float(0.5 * _WEIGHTS @ (_cubic(t, driven) * _cubic_rate(t, factors)))
+
+
+def displacement_rate(sites: Sites, place: Place) -> Array:
+    """How the displacements change along the tangent at a place of the present cell, (n,).
+
+    Args:
+        sites: the sites.
+        place: the place.
+    """
+    return sites.displacement_rate(place.values, place.tangent[:-1])
+
+
+def _cubic(t: Array, ends: list[float]) -> Array:
+    """The cubic polynomial with value and derivative at 0 and at 1."""
+    a, da, b, db = ends
+    return np.asarray(
+        (1 + 2 * t) * (1 - t) ** 2 * a + t * (1 - t) ** 2 * da + t**2 * (3 - 2 * t) * b + t**2 * (t - 1) * db
+    )
+
+
+def _cubic_rate(t: Array, ends: list[float]) -> Array:
+    a, da, b, db = ends
+    return np.asarray(6 * t * (1 - t) * (b - a) + (1 - t) * (1 - 3 * t) * da + t * (3 * t - 2) * db)

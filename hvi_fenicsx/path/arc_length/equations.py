@@ -1,0 +1,193 @@
+"""The equations of a curve of equilibria in coordinates and factor: tangent, and points that satisfy a condition."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import lu_factor, lu_solve
+
+from ...typing import Array
+from .sites import Sites, Values
+
+ROUNDING = 1e-10
+"""A coordinate this near to the end of its segment is there; a rate this small beside the largest is none."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Place:
+    """A point of the curve.
+
+    Attributes:
+        y: coordinates, and the factor in its unit, (n + 1,).
+        tangent: of length 1, (n + 1,).
+        values: of the sites.
+    """
+
+    y: Array
+    tangent: Array
+    values: Values
+
+
+Condition = tuple[Callable[[Array], float], Callable[[Array], Array]]
+"""What a corrected point satisfies beside the equations: a value that is zero there, and its gradient."""
+
+
+class Refused(Exception):
+    """A step that is too long."""
+
+
+class Equations:
+    """S x + r = f0 + λ f1 in coordinates along the graphs, at one point of the curve and around it.
+
+    Args:
+        constant: the load at the factor 0, (n,).
+        rate: how it grows with the factor, (n,).
+        sites: where all sites are.
+        z: their coordinates, (n,).
+        factor: λ.
+
+    Attributes:
+        sites: where all sites are.
+        here: the present point.
+        unit: of the factor; a power of 2, so that no factor is rounded.
+    """
+
+    def __init__(self, constant: Array, rate: Array, sites: Sites, z: Array, factor: float) -> None:
+        self._constant, self._rate, self.sites, self._most = constant, rate, sites, 0.0
+        largest = float(np.max(np.abs(rate) / sites.forces, initial=0.0))
+        self.unit = 2.0 ** -round(np.log2(largest)) if largest else 1.0
+        y = np.append(z, factor / self.unit)
+        self.here = Place(y=y, tangent=np.zeros_like(y), values=sites.values(z))
+
+    @property
+    def factor(self) -> float:
+        """λ."""
+        return float(self.here.y[-1]) * self.unit
+
+    @property
+    def factor_rate(self) -> float:
+        """How it changes along the curve, in its unit; 0 where that is rounding."""
+        rate, tangent = float(self.here.tangent[-1]), self.here.tangent
+        return rate if abs(rate) > ROUNDING * float(np.max(np.abs(tangent))) else 0.0
+
+    def at_rest(self, small: float) -> bool:
+        """Whether no law or bound carries a force any more.
+
+        Args:
+            small: a factor that is zero.
+        """
+        values = self.here.values
+        size = float(np.max(np.abs(self.sites.stiffness @ values.x), initial=0.0))
+        self._most = max(self._most, size, float(np.max(np.abs(values.force), initial=0.0)))
+        return abs(self.factor) <= small and bool(np.all(np.abs(values.force) <= 1e-9 * self._most))
+
+    def residual(self, y: Array, values: Values) -> Array:
+        """What is left of the forces, in their units, (n,).
+
+        Args:
+            y: coordinates and factor, (n + 1,).
+            values: of the sites there.
+        """
+        load = self._constant + y[-1] * self.unit * self._rate
+        return np.asarray((self.sites.stiffness @ values.x + values.force - load) / self.sites.forces)
+
+    def _matrix(self, values: Values, row: Array) -> Array:
+        n = len(values.x)
+        found = np.empty((n + 1, n + 1))
+        found[:n, :n] = self.sites.jacobian(values) / self.sites.forces[:, None]
+        found[:n, n] = -self.unit * self._rate / self.sites.forces
+        found[n] = row
+        return found
+
+    def tangent(self, values: Values, row: Array, sign: float = 1.0) -> Array:
+        """The direction of the curve in which a linear function grows, of length 1, (n + 1,).
+
+        Args:
+            values: at the point.
+            row: the function, (n + 1,).
+            sign: -1: in which it falls.
+
+        Raises:
+            numpy.linalg.LinAlgError: the function stands along the curve.
+        """
+        right = np.zeros(len(row))
+        right[-1] = sign
+        with np.errstate(all="ignore"):
+            found = np.linalg.solve(self._matrix(values, row), right)
+        if not np.all(np.isfinite(found)):
+            raise np.linalg.LinAlgError("the equations have no tangent here")
+        return np.asarray(found / np.linalg.norm(found))
+
+    def correct(self, y: Array, condition: Condition) -> Array:
+        """The point of the curve that satisfies a condition, by Newton's method.
+
+        Args:
+            y: near it, (n + 1,).
+            condition: the condition.
+
+        Raises:
+            Refused: the method does not converge.
+        """
+        value, gradient = condition
+        size, last = 1.0 + float(np.max(np.abs(y))), np.inf
+        for _ in range(10):
+            values = self.sites.values(y[:-1])
+            right = np.append(self.residual(y, values), value(y))
+            with np.errstate(all="ignore"):
+                step = lu_solve(
+                    lu_factor(self._matrix(values, gradient(y)), check_finite=False), right, check_finite=False
+                )
+            change = float(np.max(np.abs(step)))
+            if not np.isfinite(change) or (change > 2.0 * last and change > 1e-9 * size):
+                break
+            y = y - step
+            if change <= 1e-14 * size or (change <= 1e-10 * size and change >= 0.1 * last):
+                return y
+            last = change
+        if last <= 1e-10 * size:
+            return y
+        raise Refused
+
+    def plane(self, length: float) -> Condition:
+        """The plane across the present tangent at a distance."""
+        start, tangent = self.here.y, self.here.tangent
+        return lambda y: float(tangent @ (y - start)) - length, lambda y: tangent
+
+    def at_end(self, k: int, end: float) -> Condition:
+        """A site at an end of its segment.
+
+        Args:
+            k: the site.
+            end: the s of that end.
+        """
+        unit = np.eye(1, len(self.sites), k)[0]
+        return lambda y: float(self.sites.s(y[:-1])[k]) - end, lambda y: np.append(self._gradient(y, k, unit), 0.0)
+
+    def _gradient(self, y: Array, k: int, unit: Array) -> Array:
+        sites, found, m1 = self.sites, np.zeros(len(y) - 1), len(self.sites.one)
+        if k < m1:
+            found[sites.one[k]] = unit[k]
+        else:
+            found[sites.two[k - m1]] = sites.directions(y[:-1])[k - m1]
+        return found
+
+    def row(self, k: int) -> Array:
+        """What the s of a site is as a linear function of the variables, (n + 1,)."""
+        return np.append(self._gradient(self.here.y, k, np.eye(1, len(self.sites), k)[0]), 0.0)
+
+    def at_factor(self, aim: float) -> Condition:
+        """A wanted factor."""
+        last = np.zeros(len(self.here.y))
+        last[-1] = 1.0
+        return lambda y: float(y[-1]) - aim / self.unit, lambda y: last
+
+    def place(self, y: Array, tangent: Array) -> None:
+        """Go to a point.
+
+        Args:
+            y: coordinates and factor, (n + 1,).
+            tangent: of length 1, (n + 1,).
+        """
+        self.here = Place(y=y, tangent=tangent, values=self.sites.values(y[:-1]))

@@ -1,0 +1,295 @@
+"""Load paths that are not piecewise linear, from event to event, in steps between them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ...system.condensed_problem import CondensedProblem
+from ...typing import Array
+from ..exact import is_singular, never
+from ..state import End, Event, Follow, PathOptions, PathState, Place, Position
+from .curve import Curve, Move, Outcome
+from .energies import Balance, displacement_rate
+from .equations import Refused
+from .jump import jump
+from .passage import Crossing, Passage, order
+from .rest import Rest, at_rest, is_held
+from .sites import Sites
+from .vertex_laws import vertex_laws
+
+
+class ArcLengthFollower:
+    """The path of a problem by predictor and corrector. A :class:`..Follower`.
+
+    Args:
+        problem: the problem.
+        options: what path is wanted.
+        resume: the state after which to go on; by default the path begins at factor 0.
+        interrupted: whether to stop, asked at each state.
+        fineness: of the steps; 0.1 for a tenth of their length.
+
+    Attributes:
+        end: how the path ended; None before.
+        reason: that in a sentence.
+
+    Raises:
+        InputError: a law on |u_t| shares an unknown with another law or a bound.
+    """
+
+    def __init__(
+        self,
+        problem: CondensedProblem,
+        options: PathOptions,
+        resume: PathState | None = None,
+        interrupted: Callable[[], bool] = never,
+        fineness: float = 1.0,
+    ) -> None:
+        self._problem, self._options, self._resume = problem, options, resume
+        self._interrupted, self._fineness = interrupted, fineness
+        self._laws = vertex_laws(problem, options.remember)
+        self._sites = Sites(problem, self._laws)
+        firsts = [int(i) for i in self._sites.one] + [int(pair[0]) for pair in self._sites.two]
+        self._lag = order(problem, firsts)
+        self._remembers = any(law.passed is not None for law in self._laws)
+        self._floats = is_singular(problem.stiffness)
+        self._leg, self._events, self._unstable, self._peak = 0, 0, 0, 0.0
+        self.end: End | None = None
+        self.reason = ""
+        self._last: PathState | None = None
+        self._curve: Curve
+
+    def states(self) -> Iterator[PathState]:
+        """The states from start to end; the first one of a path that is resumed is the next one."""
+        yield from self._begun() if self._resume is None else self._resumed(self._resume)
+        programme = list(self._options.programme)
+        while self.end is None and self._leg < len(programme):
+            yield from self._towards(programme[self._leg])
+            self._leg += 1
+            if self.end is None:
+                last = self._leg == len(programme)
+                if last:
+                    self._finish(End.REACHED, "the programme is done")
+                yield self._state(Event.END if last else Event.TURN)
+
+    # -- beginning
+
+    def _begun(self) -> Iterator[PathState]:
+        rest = at_rest(self._problem, self._sites)
+        z = self._loaded(rest)
+        if z is None:
+            self._finish(End.ESCAPES, self.reason or "nothing holds the body at rest")
+            return
+        self._follow_from(z, 0.0)
+        self._balance = Balance(self._problem, self._sites)
+        self._begin(self._curve)
+        self._unstable = self._sites.unstable_directions(self._curve.here.values)
+        yield self._state(Event.START)
+
+    def _loaded(self, rest: Rest) -> Array | None:
+        """From rest to the constant loads, as stable as it goes; where the sites are then."""
+        if rest.z is None or rest.constant is None:
+            return rest.z
+        follower = ArcLengthFollower(rest.constant, PathOptions(remember=self._options.remember))
+        for _ in follower.states():
+            pass
+        if follower.end is not End.REACHED:
+            self.reason = f"under the constant loads alone: {follower.reason}"
+            return None
+        self._sites, self._laws = follower._sites, follower._laws
+        return follower._curve.here.y[:-1]
+
+    def _follow_from(self, z: Array, factor: float) -> None:
+        problem = self._problem
+        self._curve = Curve(problem.force, problem.force_rate, self._sites, z, factor, self._fineness)
+
+    def _begin(self, curve: Curve) -> None:
+        self._balance.begin(curve.here.values, curve.factor)
+        curve.disagreement = lambda move: self._balance.disagreement(move, curve.unit)
+
+    def _resumed(self, state: PathState) -> Iterator[PathState]:
+        position, sites = state.position, self._sites
+        if state.memory is not None:
+            for number, law in enumerate(self._laws):
+                law.restore(state.memory[number, :])
+        for k in range(len(sites)):
+            sites.rebuild(k)
+            sites.enter(k, int(position.numbers[k]))
+        self._follow_from(position.small.copy(), state.factor)
+        self._unstable, self._leg = state.unstable, position.leg
+        self._balance = Balance(self._problem, sites, state.work)
+        self._begin(self._curve)
+        if state.event not in (Event.START, Event.TURN):
+            row = np.eye(1, self._problem.size + 1, position.driver)[0]
+            self._head(row, position.heading)
+            self._curve.length = position.step
+        yield from ()
+
+    # -- one leg of the programme
+
+    def _towards(self, aim: float) -> Iterator[PathState]:
+        """From event to event until the factor reaches its aim or the path ends."""
+        self._orient(aim)
+        while self.end is None and self._curve.factor != aim:
+            if self._options.follow is Follow.STABLE and self._unstable > 0:
+                yield from self._jump(aim)
+                continue
+            move = self._curve.advance(aim)
+            if move.outcome in (Outcome.AWAY, Outcome.STUCK):
+                self._ended(move.outcome)
+                yield self._state(Event.END)
+                return
+            self._balance.go(move, self._curve.unit)
+            if move.outcome is not Outcome.FACTOR:
+                yield self._noted(move)
+            self._watch()
+            if self.end is not None:
+                yield self._state(Event.END)
+
+    def _orient(self, aim: float) -> None:
+        """Set out towards a factor; a path that is resumed on its way goes on as it went."""
+        resumed, self._resume = self._resume, None
+        if resumed is not None and resumed.event not in (Event.START, Event.TURN):
+            return
+        row = np.eye(1, self._problem.size + 1, self._problem.size)[0]
+        self._head(row, 1 if aim > self._curve.factor else -1)
+        self._crossed()
+        self._trend()
+
+    def _crossed(self, arrived: int | None = None, *, turned: bool = False) -> list[Passage]:
+        """The passages at the present point; where there is no end of them, the path is lost."""
+        crossing = Crossing(self._curve, self._lag)
+        try:
+            return crossing.run(arrived, turned=turned)
+        except (Refused, np.linalg.LinAlgError):
+            where = f"at the factor {self._curve.factor:.6g} several bonds are at ends of their pieces"
+            self._finish(End.LOST, f"{where}, and each way on leads from one of them to the other")
+            return crossing.passages
+
+    def _head(self, row: Array, sign: float) -> None:
+        curve = self._curve
+        curve.place(curve.here.y, curve.tangent(curve.here.values, row, sign))
+        self._trend()
+
+    def _trend(self) -> None:
+        rate = self._curve.factor_rate
+        self._curve.trend = int(np.sign(rate)) if rate else self._curve.trend
+
+    def _noted(self, move: Move) -> PathState:
+        """The state after a step, and what happens there."""
+        if move.outcome is Outcome.FOLD:
+            self._curve.trend = -self._curve.trend
+            self._unstable = self._beyond(move)
+            return self._state(Event.FOLD)
+        if move.outcome is Outcome.STEP:
+            self._unstable = self._sites.unstable_directions(self._curve.here.values)
+            return self._state(Event.STEP)
+        before = self._curve.trend
+        passages = self._crossed(move.site, turned=move.outcome is Outcome.TURNED)
+        self._trend()
+        self._unstable = self._sites.unstable_directions(self._curve.here.values)
+        return self._state(_event(passages, folds=before * self._curve.trend < 0), passages)
+
+    def _beyond(self, move: Move) -> int:
+        """The number of unstable directions after a fold: vᵀH v = λ' f1ᵀv along the curve changes its sign there."""
+        motion = displacement_rate(self._sites, move.before)
+        held = self._curve.trend * float(self._problem.force_rate @ motion)
+        return max(self._unstable + (1 if held < 0.0 else -1), 0)
+
+    def _ended(self, outcome: Outcome) -> None:
+        curve, shown = self._curve, f"{self._curve.factor:.6g}"
+        if outcome is Outcome.STUCK:
+            self._finish(End.LOST, f"at the factor {shown} no step is short enough to stay on the path")
+        elif abs(curve.factor_rate) <= 1e-6:
+            self._finish(End.ESCAPES, f"at the factor {shown} a body comes off")
+        else:
+            self._finish(End.LOST, "the path leads away from the wanted factor for ever")
+
+    def _watch(self) -> None:
+        self._events, curve = self._events + 1, self._curve
+        self._peak = max(self._peak, abs(curve.factor))
+        if self._floats and curve.at_rest(1e-9 * self._peak) and not self._held():
+            self._finish(End.ESCAPES, "the load is back at zero, and nothing holds the body any more")
+        elif self._interrupted():
+            self._finish(End.INTERRUPTED, "interrupted")
+        elif self._events > self._options.most_events:
+            self._finish(End.LOST, f"no end after {self._options.most_events} events")
+
+    def _held(self) -> bool:
+        return is_held(self._problem, self._sites, self._curve.here.y[:-1])
+
+    def _jump(self, aim: float) -> Iterator[PathState]:
+        """On to the next stable equilibrium at the same factor, or off."""
+        factor, problem = self._curve.factor, self._problem
+        landing = jump(problem, self._sites, self._curve.here, problem.load(factor), self._lag)
+        if landing is None:
+            self._finish(End.LOST, f"no stable equilibrium found at the factor {factor:.6g}")
+            yield self._state(Event.END)
+        elif landing.z is None:
+            self._finish(End.ESCAPES, f"at the factor {factor:.6g} no equilibrium is left: a body comes off")
+            assert self._last is not None
+            yield replace(self._last, event=Event.END, place=None, released=0.0)
+        else:
+            self._follow_from(landing.z, factor)
+            released = self._balance.leap(self._curve.here.values, factor)
+            curve = self._curve
+            curve.disagreement = lambda move: self._balance.disagreement(move, curve.unit)
+            self._unstable = 0
+            self._orient(aim)
+            yield replace(self._state(Event.JUMP), released=released)
+
+    # -- reports
+
+    def _finish(self, end: End, reason: str) -> None:
+        self.end, self.reason = end, reason
+
+    def _state(self, event: Event, passages: Sequence[Passage] = ()) -> PathState:
+        curve, stored = self._curve, self._balance.stored
+        self._last = PathState(
+            factor=curve.factor,
+            event=event,
+            place=self._place(passages[0]) if passages else None,
+            x=curve.here.values.x,
+            energy=stored.energy,
+            work=self._balance.work,
+            dissipated=stored.dissipated,
+            unstable=self._unstable,
+            memory=self._memory() if self._remembers else None,
+            bifurcation=event is Event.FOLD and len(passages) > 1,
+            position=self._position(),
+        )
+        return self._last
+
+    def _memory(self) -> Array:
+        return np.array([law.memory() for law in self._laws]).reshape(-1, 4)
+
+    def _position(self) -> Position:
+        tangent = self._curve.here.tangent
+        driver = int(np.argmax(np.abs(tangent)))
+        return Position(
+            leg=self._leg,
+            numbers=self._sites.numbers.copy(),
+            driver=driver,
+            heading=1 if tangent[driver] > 0.0 else -1,
+            small=self._curve.here.y[:-1].copy(),
+            step=self._curve.length,
+        )
+
+    def _place(self, passage: Passage) -> Place:
+        sites, problem, k = self._sites, self._problem, passage.site
+        m1 = len(sites.one)
+        i = int(sites.one[k] if k < m1 else sites.two[k - m1, 0])
+        laws = sites.laws[k]
+        at_bound = passage.closes or passage.opens
+        part = problem.bonds[laws[0].group].part if laws and not at_bound else problem.parts[i]
+        return Place(part=part, unknown=i, point=problem.points[i])
+
+
+def _event(passages: Sequence[Passage], *, folds: bool) -> Event:
+    if folds:
+        return Event.FOLD
+    if any(p.closes for p in passages):
+        return Event.CONTACT
+    return Event.RELEASE if any(p.opens for p in passages) else Event.KINK

@@ -1,0 +1,180 @@
+"""From a state that is not stable to the next stable equilibrium at the same loads.
+
+As on an exact path (:mod:`..snap`): a force t c holds the body back while it goes; the loads f(λ) + t c, t < 0, give a
+curve of equilibria along which the energy falls, and where t is 0 again is an equilibrium of the loads alone. Where no
+such curve leads to an end soon, the body moves as an overdamped one (:mod:`.relaxation`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...system.condensed_problem import CondensedProblem
+from ...typing import Array, Integers
+from .curve import Curve, Outcome
+from .energies import displacement_rate
+from .equations import Place, Refused
+from .passage import Crossing
+from .relaxation import Relaxation
+from .sites import Sites
+
+_BEYOND = 1e-2
+"""A step along the path, in units of s."""
+_MOST = 40
+"""Steps of such a curve at most."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Landing:
+    """Where a body went.
+
+    Attributes:
+        z: the coordinates of a stable equilibrium, (n,); None: the body comes off.
+    """
+
+    z: Array | None
+
+
+def jump(problem: CondensedProblem, sites: Sites, here: Place, load: Array, lag: Array) -> Landing | None:
+    """The landing, with the sites there; None where none was found, with the sites where they were.
+
+    Args:
+        problem: the problem.
+        sites: where they are.
+        here: the state, and where its curve goes on.
+        load: f, (n,).
+        lag: an order of the sites, (m,).
+    """
+    kept = sites.kept()
+    for restraint in _restraints(problem, sites, here):
+        for row in _starts(here):
+            found = _followed(problem, sites, here, load, restraint, row, lag)
+            if found is not None:
+                return found
+            sites.restore(kept)
+    start = here.y[:-1] if sites.on_drops() else _beyond(problem, sites, here)
+    relaxation = Relaxation(problem, sites, start, load, lag)
+    if relaxation.run(sites.rates(here.y[:-1], here.tangent[:-1])):
+        return Landing(z=None if relaxation.escapes else relaxation.z)
+    sites.restore(kept)
+    return None
+
+
+def _beyond(problem: CondensedProblem, sites: Sites, here: Place) -> Array:
+    """A little farther along the path, where the loads are smaller than those that act."""
+    curve = Curve(problem.force, problem.force_rate, sites, here.y[:-1].copy(), 0.0)
+    curve.place(here.y.copy(), here.tangent)
+    curve.length = _BEYOND
+    return curve.advance(np.inf).after.y[:-1]
+
+
+def _starts(here: Place) -> Iterator[Array]:
+    """Linear functions that grow on the way: along the curve, or against the restraint."""
+    along = here.tangent.copy()
+    along[-1] = 0.0
+    yield along
+    against = np.zeros_like(along)
+    against[-1] = -1.0
+    yield against
+
+
+def _restraints(problem: CondensedProblem, sites: Sites, here: Place) -> Iterator[Array]:
+    """Forces against the motion: of equal size on all bonds that move, as the motion is, on one site."""
+    path, groups = displacement_rate(sites, here), sites.unknowns()
+    for motion in _motions(problem, sites, here, path):
+        yield _evened(sites, motion)
+        yield motion
+        sizes = [float(np.max(np.abs(motion[group]))) for group in groups]
+        for k in sites.on_drops() or [int(np.argmax(sizes))]:
+            yield _alone(groups[k], motion)
+
+
+def _alone(unknowns: Integers, motion: Array) -> Array:
+    """The motion of some unknowns alone, of size 1."""
+    found = np.zeros_like(motion)
+    found[unknowns] = motion[unknowns]
+    return np.asarray(found / (np.max(np.abs(found)) or 1.0))
+
+
+def _motions(problem: CondensedProblem, sites: Sites, here: Place, path: Array) -> Iterator[Array]:
+    """Motions in which the energy falls, of size 1."""
+    drops = sites.on_drops()
+    found = [_after_drops(problem, sites, here, drops)] if drops else []
+    lowest = None if drops else _lowest(problem, sites, here)
+    if lowest is not None:
+        found += [lowest * (np.sign(float(lowest @ path)) or 1.0)]
+    for motion in (*found, path):
+        size = float(np.max(np.abs(motion), initial=0.0))
+        if size:
+            yield np.asarray(motion / size)
+
+
+def _after_drops(problem: CondensedProblem, sites: Sites, here: Place, drops: list[int]) -> Array:
+    """How a body moves when sites on drops go on: these outwards, all others follow."""
+    motion, groups = np.zeros(problem.size), sites.unknowns()
+    rates = sites.rates(here.y[:-1], here.tangent[:-1])
+    for k in drops:
+        p = k - len(sites.one)
+        motion[groups[k]] = (np.sign(rates[k]) or 1.0) * (1.0 if p < 0 else here.values.directions[p])
+    basis, slopes = sites.motions(here.values)
+    if basis.shape[1]:
+        matrix = basis.T @ problem.stiffness @ basis + np.diag(slopes)
+        motion -= basis @ np.linalg.lstsq(matrix, basis.T @ (problem.stiffness @ motion))[0]
+    return motion
+
+
+def _lowest(problem: CondensedProblem, sites: Sites, here: Place) -> Array | None:
+    """The motion in which the energy falls most."""
+    basis, slopes = sites.motions(here.values)
+    if not len(slopes):
+        return None
+    _, vectors = np.linalg.eigh(basis.T @ problem.stiffness @ basis + np.diag(slopes))
+    found = basis @ vectors[:, 0]
+    return np.asarray(found / np.max(np.abs(found)))
+
+
+def _evened(sites: Sites, motion: Array) -> Array:
+    """Forces in the direction of a motion, of the size of each site's area."""
+    found = np.zeros_like(motion)
+    for several, unknowns in zip(sites.laws, sites.unknowns(), strict=True):
+        size = float(np.linalg.norm(motion[unknowns]))
+        if size > 1e-6:
+            found[unknowns] = sum(law.weight for law in several) * motion[unknowns] / size
+    largest = float(np.max(np.abs(found), initial=0.0))
+    return np.asarray(found / largest) if largest else motion
+
+
+def _followed(
+    problem: CondensedProblem, sites: Sites, here: Place, load: Array, restraint: Array, row: Array, lag: Array
+) -> Landing | None:
+    """Along the curve of one restraint; None where it leads to no end."""
+    curve = Curve(load, restraint * float(np.mean(sites.forces)), sites, here.y[:-1].copy(), 0.0)
+    try:
+        curve.place(curve.here.y, curve.tangent(curve.here.values, row))
+        if curve.factor_rate > 1e-7:
+            return None
+        Crossing(curve, lag).run()
+        return _to_its_end(curve, lag)
+    except (Refused, np.linalg.LinAlgError):
+        return None
+
+
+def _to_its_end(curve: Curve, lag: Array) -> Landing | None:
+    start = curve.here.y
+    for _ in range(_MOST):
+        move = curve.advance(0.0)
+        if move.outcome is Outcome.FACTOR:
+            stable = curve.sites.unstable_directions(curve.here.values) == 0
+            moved = float(np.max(np.abs(curve.here.y - start), initial=0.0))
+            return Landing(z=curve.here.y[:-1]) if stable and moved > 1e-9 else None
+        if move.outcome is Outcome.AWAY:
+            slow = abs(curve.factor_rate) <= 1e-6
+            return Landing(z=None) if curve.here.y[-1] < 0.0 and slow else None
+        if move.outcome is Outcome.STUCK or curve.here.y[-1] > 1e-9:
+            return None
+        if move.outcome in (Outcome.END, Outcome.TURNED):
+            Crossing(curve, lag).run(move.site, turned=move.outcome is Outcome.TURNED)
+    return None

@@ -1,0 +1,171 @@
+"""Sites pass from one segment of their graphs to the next, one or several at one point of the curve.
+
+At such a point the equations are piecewise linear to first order. Where several sites are at ends of their segments,
+the load is imagined to be perturbed by ε q with ε infinitesimal: each site then comes to its end at a way of its own of
+the order ε, one after the other, until the curve leads away from all ends (as for the exact path, :mod:`..tracer`). The
+site that passes goes on along its graph, and that gives the direction in which the curve goes on. The order of the
+sites comes from where they are, so that it is the same on any number of ranks.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...system.condensed_problem import CondensedProblem
+from ...typing import Array, Mask
+from ..segments import Kind, Segment
+from .curve import Curve
+from .equations import ROUNDING, Refused
+
+_SLOW = 1e-6
+"""A rate at which a site stands, but for rounding, beside the largest."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Passage:
+    """A site has passed.
+
+    Attributes:
+        site: which.
+        before: the segment that it left.
+        after: the one on which it goes on.
+    """
+
+    site: int
+    before: Segment
+    after: Segment
+
+    @property
+    def closes(self) -> bool:
+        """Whether a contact closes."""
+        return self.after.kind is Kind.BOUND
+
+    @property
+    def opens(self) -> bool:
+        """Whether a contact opens."""
+        return self.before.kind is Kind.BOUND
+
+
+def order(problem: CondensedProblem, sites: list[int]) -> Array:
+    """Numbers from 0.5 to 1.5 that look like random ones, from the vertices of unknowns, (m,).
+
+    Args:
+        problem: the problem.
+        sites: the first unknown of each site.
+    """
+    scale = float(np.max(np.abs(problem.points), initial=0.0)) or 1.0
+    points = np.round(problem.points[sites] / scale, 6)
+    seen: dict[bytes, int] = {}
+    found = np.empty(len(sites))
+    for k in range(len(sites)):
+        place = (points[k, :] + 0.0).tobytes()
+        number = seen[place] = seen.get(place, 0) + 1
+        mixed = np.sin(float(np.dot(points[k], (12.9898, 78.233, 37.719))) + 4.1 * number) * 43_758.5453
+        found[k] = 0.5 + mixed - np.floor(mixed)
+    return found
+
+
+class Crossing:
+    """The passages at the present point of a curve.
+
+    Args:
+        curve: the curve; its direction and cell are changed.
+        lag: the ways, of the order ε, of the sites to their ends, (m,).
+    """
+
+    def __init__(self, curve: Curve, lag: Array) -> None:
+        self._curve, self._sites = curve, curve.sites
+        self._lag, self._left = lag, lag.copy()
+        self.passages: list[Passage] = []
+
+    def run(self, arrived: int | None = None, *, turned: bool = False) -> list[Passage]:
+        """Let all sites pass that have to, those that arrived first.
+
+        Args:
+            arrived: the site that is at its end already, or that turned back.
+            turned: whether it turned back.
+
+        Raises:
+            Refused: there is no end of passing.
+        """
+        if arrived is not None:
+            self._left[arrived] = 0.0
+            rates = self._rates()
+            if turned:
+                rates[arrived] = -1e-9 * self._sites.outward[arrived]
+            self._pass(arrived, rates)
+        for _ in range(50 + 20 * len(self._sites)):
+            rates = self._rates()
+            ways = self._ways(rates)
+            k = int(np.argmin(ways)) if len(ways) else 0
+            if not len(ways) or not np.isfinite(ways[k]):
+                return self.passages
+            self._go(rates, float(ways[k]))
+            self._left[k] = 0.0
+            self._pass(k, rates)
+        raise Refused
+
+    def _rates(self) -> Array:
+        here = self._curve.here
+        rates = self._sites.rates(here.y[:-1], here.tangent[:-1])
+        rates[np.abs(rates) <= ROUNDING * np.max(np.abs(here.tangent))] = 0.0
+        return rates
+
+    def _near(self) -> tuple[Mask, Mask]:
+        """Which sites are at the low end, and which at the high end of their segments."""
+        sites, s = self._sites, self._curve.here.values.s
+        allowed = ROUNDING * (1.0 + np.abs(s))
+        return s <= sites.low + allowed, s >= sites.high - allowed
+
+    def _ways(self, rates: Array) -> Array:
+        """The ways to the ends that the sites approach; infinite where they approach none, (m,)."""
+        low, high = self._near()
+        comes = ((rates < 0.0) & low) | ((rates > 0.0) & high) | (rates * self._sites.outward < 0.0)
+        found = np.full(len(rates), np.inf)
+        found[comes] = self._left[comes] / np.abs(rates[comes])
+        return found
+
+    def _go(self, rates: Array, way: float) -> None:
+        low, high = self._near()
+        loads = rates * self._sites.outward > 0.0
+        comes = ((rates < 0.0) & low) | ((rates > 0.0) & high) | (rates * self._sites.outward < 0.0)
+        change = way * np.abs(rates)
+        self._left = np.where(comes, self._left - change, self._left + np.where(low | high, change, 0.0))
+        self._left = np.where(loads & ~comes, self._lag, np.maximum(self._left, 0.0))
+
+    def _pass(self, k: int, rates: Array) -> None:
+        """Into the next segment, and on in the same direction along the graph."""
+        sites, curve, before = self._sites, self._curve, self._sites.segment(k)
+        forward = bool(rates[k] > 0.0)
+        if forward * 2.0 - 1.0 == -sites.outward[k] and not self._unmoved(k):
+            self._turn_back(k, forward=forward)
+        else:
+            sites.enter(k, int(sites.numbers[k]) + (1 if forward else -1))
+        curve.place(curve.here.y, curve.here.tangent)
+        slow = abs(rates[k]) <= _SLOW * float(np.max(np.abs(curve.here.tangent)))
+        row = curve.here.tangent if slow else curve.row(k)
+        sign = 1.0 if slow or forward else -1.0
+        curve.place(curve.here.y, curve.tangent(curve.here.values, row, sign))
+        self.passages.append(Passage(site=k, before=before, after=sites.segment(k)))
+
+    def _unmoved(self, k: int) -> bool:
+        """Whether the site has not left 0 but for rounding: there is nothing to remember."""
+        return abs(float(self._curve.here.values.lengths[k])) <= ROUNDING * self._sites.length
+
+    def _turn_back(self, k: int, *, forward: bool) -> None:
+        """On to the secant of where the bonds have been."""
+        sites, curve, values = self._sites, self._curve, self._curve.here.values
+        x, force = float(values.lengths[k]), float(values.tractions[k])
+        sites.remember(k, x, force)
+        near = [n for n, s in enumerate(sites.chain(k)) if not s.rise and _contains(s, x)]
+        sites.enter(k, near[-1] if forward else near[0])
+        y = curve.here.y.copy()
+        sites.set(y, k, sites.coordinate(k, x, force))
+        curve.place(y, curve.here.tangent)
+
+
+def _contains(piece: Segment, x: float) -> bool:
+    """Whether a displacement is on a piece or, but for rounding, at an end of it."""
+    return abs(piece.displacement(piece.coordinate(x, 0.0)) - x) <= 1e-11 * abs(x)

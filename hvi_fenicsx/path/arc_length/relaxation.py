@@ -1,0 +1,121 @@
+"""From a state that is not stable down to a stable one as an overdamped body moves: θ D x' = f - S x - r.
+
+Implicit steps in time, each followed from event to event like a path: what is left of the forces is applied little by
+little while a stiffness θ D holds back. A law that drops does so at once, and θ falls from step to step, so that the
+energy falls all the way until equilibrium is reached or a body is out of all reach. Bonds remember on the way.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...system.condensed_problem import CondensedProblem
+from ...typing import Array
+from .curve import Curve, Outcome
+from .equations import Refused
+from .passage import Crossing
+from .sites import Sites
+
+_FAR = 1e4
+"""A displacement that is infinite, in units of s where the motion began."""
+_SLOWER, _FASTER = 8.0, 0.4
+"""Factors of θ after a step that failed, and after one that did not."""
+
+
+class Relaxation:
+    """The motion at constant loads.
+
+    Args:
+        problem: the problem.
+        sites: where they are; changed.
+        z: their coordinates, (n,).
+        load: f, (n,).
+        lag: an order of the sites, (m,).
+
+    Attributes:
+        z: the coordinates now, (n,).
+        escapes: whether a body is out of reach.
+    """
+
+    def __init__(self, problem: CondensedProblem, sites: Sites, z: Array, load: Array, lag: Array) -> None:
+        self._problem, self._sites, self._load, self._lag = problem, sites, load, lag
+        self._damping = np.diag(sites.forces / sites.length)
+        self.z, self.escapes, self._theta = z.copy(), False, 1.0
+        self._size = 1.0 + float(np.max(np.abs(sites.s(z)), initial=0.0))
+
+    def run(self, directions: Array) -> bool:
+        """Move to equilibrium; whether one was found, or the body escapes.
+
+        Args:
+            directions: in which sites that are on a drop go on, (m,).
+        """
+        stiffness = self._sites.stiffness
+        try:
+            self._leave_drops(directions)
+            return self._moved()
+        except (Refused, np.linalg.LinAlgError):
+            return False
+        finally:
+            self._sites.stiffness = stiffness
+
+    def _moved(self) -> bool:
+        for _ in range(200 + 20 * len(self._sites)):
+            if self._at_rest():
+                return self._settled()
+            if float(np.max(self._sites.s(self.z), initial=0.0)) > _FAR * self._size:
+                self.escapes = True
+                return True
+            self._theta *= _FASTER if self._stepped() else _SLOWER
+            if self._theta > 1e12:
+                return False
+        return False
+
+    def _left(self) -> Array:
+        """What is left of the forces, (n,)."""
+        values = self._sites.values(self.z)
+        return np.asarray(self._load - self._problem.stiffness @ values.x - values.force)
+
+    def _at_rest(self) -> bool:
+        left = np.abs(self._left() / self._sites.forces)
+        return bool(np.max(left, initial=0.0) <= 1e-9 * (1.0 + float(np.max(np.abs(self._load / self._sites.forces)))))
+
+    def _settled(self) -> bool:
+        """The equilibrium itself, from where the motion is slow; whether it is stable."""
+        self._sites.stiffness = self._problem.stiffness
+        curve = Curve(self._load, np.zeros_like(self._load), self._sites, self.z, 0.0)
+        self.z = curve.correct(curve.here.y, curve.at_factor(0.0))[:-1]
+        return self._sites.unstable_directions(self._sites.values(self.z)) == 0
+
+    def _stepped(self) -> bool:
+        """One step in time, up to the first drop; whether it went well."""
+        sites, left, values = self._sites, self._left(), self._sites.values(self.z)
+        sites.stiffness = self._problem.stiffness + self._theta * self._damping
+        held = sites.stiffness @ values.x + values.force
+        curve = Curve(held, left, sites, self.z, 0.0)
+        row = np.eye(1, len(self.z) + 1, len(self.z))[0]
+        curve.place(curve.here.y, curve.tangent(curve.here.values, row))
+        Crossing(curve, self._lag).run()
+        for _ in range(50 + 4 * len(sites)):
+            if curve.here.tangent[-1] < 0.0 or sites.on_drops():
+                break
+            move = curve.advance(1.0)
+            self.z = curve.here.y[:-1].copy()
+            if move.outcome is Outcome.FACTOR:
+                return True
+            if move.outcome in (Outcome.AWAY, Outcome.STUCK):
+                return False
+            if move.outcome in (Outcome.END, Outcome.TURNED):
+                Crossing(curve, self._lag).run(move.site, turned=move.outcome is Outcome.TURNED)
+        self.z = curve.here.y[:-1].copy()
+        dropped = bool(sites.on_drops())
+        self._leave_drops(sites.rates(curve.here.y[:-1], curve.here.tangent[:-1]))
+        return dropped
+
+    def _leave_drops(self, directions: Array) -> None:
+        """Let the laws that drop do so."""
+        sites = self._sites
+        for k in sites.on_drops():
+            forward = directions[k] >= 0.0
+            end = float(sites.high[k] if forward else sites.low[k])
+            sites.enter(k, int(sites.numbers[k]) + (1 if forward else -1))
+            sites.set(self.z, k, end)

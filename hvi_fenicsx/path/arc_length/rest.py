@@ -1,0 +1,86 @@
+"""Where a path begins: at rest, before constant loads act; these are applied along a path of their own."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...system.condensed_problem import CondensedProblem
+from ...typing import Array
+from ..segments import Kind, Segment
+from .sites import Sites
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rest:
+    """The first state.
+
+    Attributes:
+        z: the coordinates of the sites; None: nothing holds the body.
+        constant: the path from there to the constant loads, its factor from 0 to 1; None where there are none.
+    """
+
+    z: Array | None
+    constant: CondensedProblem | None = None
+
+
+def at_rest(problem: CondensedProblem, sites: Sites) -> Rest:
+    """The state before any load acts; the sites are put there.
+
+    Args:
+        problem: the problem.
+        sites: its sites.
+    """
+    x = np.clip(np.zeros(problem.size), problem.lower, problem.upper)
+    z, force = np.zeros(problem.size), np.zeros(problem.size)
+    free = problem.force - problem.stiffness @ x
+    for k in range(len(sites)):
+        i = int(sites.one[k]) if k < len(sites.one) else None
+        at, wanted = (0.0, 0.0) if i is None else (float(x[i]), float(free[i]))
+        number, s_force = _standing(sites.chain(k), at, wanted)
+        sites.enter(k, number)
+        if i is not None:
+            z[i], force[i] = sites.coordinate(k, at, s_force), s_force
+    held = problem.stiffness @ x + force
+    away = problem.force - held
+    size = float(np.max(np.abs(held), initial=0.0)) + float(np.max(np.abs(problem.force), initial=0.0))
+    if not is_held(problem, sites, z):
+        return Rest(z=None)
+    if np.max(np.abs(away), initial=0.0) <= 1e-14 * size:
+        return Rest(z=z)
+    return Rest(z=z, constant=replace(problem, force=held, force_rate=away))
+
+
+def _standing(chain: tuple[Segment, ...], x: float, wanted: float) -> tuple[int, float]:
+    """The segment of a displacement that holds best, and its least force; of a fixed unknown the wanted one."""
+    if len(chain) == 1 and chain[0].kind is Kind.BOUND:
+        return 0, wanted
+    there = [n for n, s in enumerate(chain) if s.displacement(s.coordinate(x, s.force)) == x]
+    forces = {n: chain[n].force + (chain[n].rise or chain[n].slope) * chain[n].coordinate(x, 0.0) for n in there}
+    least = min(abs(f) for f in forces.values())
+    best = max((n for n in there if abs(forces[n]) == least), key=lambda n: _hold(chain[n]))
+    return best, forces[best]
+
+
+def _hold(segment: Segment) -> tuple[int, float]:
+    if segment.kind is Kind.PIECE:
+        return 0, segment.slope
+    if segment.kind is Kind.BOUND:
+        return 2, 0.0
+    return (1, 0.0) if segment.rise > 0.0 else (-1, 0.0)
+
+
+def is_held(problem: CondensedProblem, sites: Sites, z: Array) -> bool:
+    """Whether the tangent holds the body.
+
+    Args:
+        problem: the problem.
+        sites: where its sites are.
+        z: their coordinates, (n,).
+    """
+    basis, slopes = sites.motions(sites.values(z))
+    if not len(slopes):
+        return True
+    values = np.linalg.eigvalsh(basis.T @ problem.stiffness @ basis + np.diag(slopes))
+    return bool(values[0] > 1e-11 * values[-1])

@@ -1,0 +1,192 @@
+"""The laws of a condensed problem, vertex by vertex: on one unknown or the length of two, with what each remembers."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...laws import Superpotential, TractionGraph
+from ...system.condensed_problem import Bonds, CondensedProblem
+from ...typing import Array
+from ..graphs import Passed, graph_of, remembering, turned
+
+
+@dataclass(slots=True, kw_only=True)
+class VertexLaw:
+    """A law at one vertex. Its coordinate is its unknown, or the length of its two unknowns.
+
+    Attributes:
+        group: number of its :class:`.Bonds`.
+        unknowns: what it acts on, one or two.
+        sign: the law's argument is that times the coordinate.
+        law: j.
+        polyline: the traction graph of the law; None where it is curved.
+        weight: lumped area.
+        passed: what it remembers, along its coordinate; None without memory.
+    """
+
+    group: int
+    unknowns: tuple[int, ...]
+    sign: float
+    law: Superpotential
+    polyline: TractionGraph | None
+    weight: float
+    passed: Passed | None
+
+    @property
+    def curved(self) -> bool:
+        """Whether its traction is not piecewise linear."""
+        return self.polyline is None
+
+    def graph(self) -> TractionGraph:
+        """Traction over the coordinate, with memory; of a curved law the chords between its breaks."""
+        plain = self.polyline if self.polyline is not None else chords(self.law, self.sign * self._ends)
+        graph = plain if self.sign > 0.0 else turned(plain)
+        return graph if self.passed is None else remembering(graph, self.passed)
+
+    @property
+    def _ends(self) -> Array:
+        return np.zeros(0) if self.passed is None else np.array(self.passed.displacements)
+
+    def traction(self, x: Array, side: str) -> Array:
+        """The limit of the traction along the coordinate, with memory, (m,).
+
+        Args:
+            x: coordinates, (m,).
+            side: "left" or "right".
+        """
+        return self.graph().traction(x, side) if not self.curved else self._curved_traction(x, side)
+
+    def _curved_traction(self, x: Array, side: str) -> Array:
+        same = (side == "right") == (self.sign > 0.0)
+        limit = self.law.right if same else self.law.left
+        found = self.sign * limit(self.sign * x)
+        inside = self._inside(x, side)
+        return np.where(inside, self.graph().traction(x, side), found)
+
+    def _inside(self, x: Array, side: str) -> Array:
+        """Whether the limit is taken where the bond has been."""
+        if self.passed is None or not np.any(self._ends):
+            return np.zeros(np.shape(x), dtype=bool)
+        low, high = self.passed.displacements
+        if side == "left":
+            return np.asarray((x > low) & (x <= high))
+        return np.asarray((x >= low) & (x < high))
+
+    def remember(self, x: float, traction: float) -> None:
+        """Note a coordinate and its traction.
+
+        Args:
+            x: the coordinate.
+            traction: along it.
+        """
+        if self.passed is not None:
+            self.passed = self._reached(x, traction)
+
+    def _reached(self, x: float, traction: float) -> Passed:
+        assert self.passed is not None
+        near = self.sign * self.law.breaks
+        x = next((float(b) for b in near if abs(b - x) <= 1e-11 * abs(x)), x)
+        return self.passed.reached(x, traction, even=self.law.even)
+
+    def recoverable(self, x: float, traction: float) -> float:
+        """What it gives back on the way to zero: w j, or the triangle under the secant of one with memory.
+
+        Args:
+            x: the coordinate.
+            traction: along it.
+        """
+        if self.passed is not None:
+            return 0.5 * self.weight * x * traction
+        return self.weight * float(self.law.value(np.array([self.sign * x]))[0])
+
+    def dissipated(self, x: float, traction: float) -> float:
+        """The energy that is lost for good once it has been at x, or where it was before.
+
+        Args:
+            x: the coordinate.
+            traction: along it.
+        """
+        if self.passed is None:
+            return 0.0
+        passed = self._reached(x, traction)
+        ends, tractions = np.array(passed.displacements), np.array(passed.tractions)
+        lost = self.law.value(self.sign * ends) - 0.5 * ends * tractions
+        return self.weight * float(lost[1] if self.law.even else lost.sum())
+
+    def memory(self) -> list[float]:
+        """What it remembers: least and greatest coordinate, and the tractions there; zeros without memory."""
+        kept = self.passed or Passed()
+        return [*kept.displacements, *kept.tractions]
+
+    def restore(self, memory: Array) -> None:
+        """Take over what it remembered.
+
+        Args:
+            memory: as :meth:`memory`, (4,).
+        """
+        if self.passed is not None:
+            low, high, low_traction, high_traction = map(float, memory)
+            self.passed = Passed(displacements=(low, high), tractions=(low_traction, high_traction))
+
+
+def chords(law: Superpotential, more: Array) -> TractionGraph:
+    """The traction graph of a curved law with chords between its breaks, and zero slopes outside.
+
+    Args:
+        law: the law.
+        more: displacements that are breaks as well.
+    """
+    breaks = np.union1d(law.breaks, more)
+    left, right = law.left(breaks), law.right(breaks)
+    slopes = (left[1:] - right[:-1]) / np.diff(breaks)
+    return TractionGraph(breaks, left, right, np.concatenate([[0.0], slopes, [0.0]]))
+
+
+def vertex_laws(problem: CondensedProblem, remember: Collection[int]) -> list[VertexLaw]:
+    """The laws of a problem at all vertices, in the order of its bonds.
+
+    Args:
+        problem: the problem.
+        remember: numbers of the problem's bonds (groups) that remember; those of linear laws have nothing to remember.
+    """
+    return [
+        law
+        for number, group in enumerate(problem.bonds)
+        for law in _of_group(number, group, remembers=number in remember and not group.law.is_linear)
+    ]
+
+
+def _of_group(number: int, group: Bonds, *, remembers: bool) -> Iterator[VertexLaw]:
+    graph = graph_of(group.law)
+    for row, weight in enumerate(group.weights):
+        unknowns, sign = tuple(int(i) for i in group.unknowns[row, :]), float(np.sign(group.signs[row, 0]))
+        yield VertexLaw(
+            group=number,
+            unknowns=unknowns,
+            sign=sign if len(unknowns) == 1 else 1.0,
+            law=group.law,
+            polyline=graph,
+            weight=float(weight),
+            passed=Passed() if remembers else None,
+        )
+
+
+def shares(laws: Sequence[VertexLaw], x: float, force: float) -> list[float]:
+    """The tractions of laws on one coordinate that give a force together.
+
+    Args:
+        laws: the laws.
+        x: their coordinate.
+        force: of all of them.
+    """
+    if len(laws) == 1:
+        return [force / laws[0].weight]
+    at = np.array([x])
+    left, right = (np.array([float(law.traction(at, side)[0]) for law in laws]) for side in ("left", "right"))
+    weights = np.array([law.weight for law in laws])
+    jump = float(weights @ (right - left))
+    share = 0.0 if jump == 0.0 else min(max((force - float(weights @ left)) / jump, 0.0), 1.0)
+    return [float(t) for t in left + share * (right - left)]

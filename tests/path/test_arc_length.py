@@ -1,0 +1,210 @@
+"""Paths by predictor and corrector: against exact ones, closed forms, isotropy, finer steps, energies and resume."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from condensed import bonds, chain, graph, problem
+from test_exact_paths import SOFTENING, bar, largest_imbalance, random_problem, spring
+
+from hvi_fenicsx.effects import Direction
+from hvi_fenicsx.errors import InputError
+from hvi_fenicsx.laws import Exponential, Superpotential
+from hvi_fenicsx.laws.smoothing import create
+from hvi_fenicsx.path.arc_length.distances import CurvedDistances
+from hvi_fenicsx.path.arc_length.follower import ArcLengthFollower
+from hvi_fenicsx.path.exact import ExactFollower
+from hvi_fenicsx.path.kinds import ArcLengthKind, ExactKind, kind_of
+from hvi_fenicsx.path.state import End, Event, Follow, Follower, PathOptions, PathState
+from hvi_fenicsx.system.condensed_problem import Bonds, CondensedProblem
+
+Array = npt.NDArray[np.float64]
+DROP = [(0, 0), (1, 1), (1, 0.4)]
+
+
+def path(
+    given: CondensedProblem, resume: PathState | None = None, fineness: float = 1.0, **options: Any
+) -> tuple[ArcLengthFollower, list[PathState]]:
+    follower = ArcLengthFollower(given, PathOptions(**options), resume, fineness=fineness)
+    return follower, list(follower.states())
+
+
+def lengths(law: Superpotential, count: int, weights: Any = 1.0) -> Bonds:
+    """A law on the length of each pair of unknowns."""
+    return Bonds(
+        law=law,
+        unknowns=np.arange(2 * count).reshape(-1, 2),
+        signs=np.ones((count, 2)),
+        weights=np.broadcast_to(np.asarray(weights, dtype=float), (count,)).copy(),
+        part="glue",
+        direction=Direction.SLIP,
+        points=np.zeros((count, 3)),
+    )
+
+
+def plate(law: Superpotential, n: int, angle: float, *others: Bonds) -> CondensedProblem:
+    """A chain of points whose springs are the same in all directions of the plane, pulled in one."""
+    pull = np.kron(np.eye(1, n, n - 1)[0], [np.cos(angle), np.sin(angle)])
+    weights = np.r_[0.5, np.ones(n - 2), 0.5]
+    return problem(np.kron(chain(n, 2.0), np.eye(2)), pull, lengths(law, n, weights), *others)
+
+
+def line(law: Superpotential, n: int) -> CondensedProblem:
+    """The same chain with one component."""
+    return problem(chain(n, 2.0), np.eye(1, n, n - 1)[0], bonds(law, np.arange(n), np.r_[0.5, np.ones(n - 2), 0.5]))
+
+
+def oblique(law: Superpotential) -> CondensedProblem:
+    """Three points with springs that differ by direction, so that slips turn on the way."""
+    generator = np.random.default_rng(3)
+    root = generator.standard_normal((6, 6))
+    return problem(0.3 * root @ root.T + 0.05 * np.eye(6), generator.standard_normal(6), lengths(law, 3))
+
+
+def largest_distance(given: CondensedProblem, states: Sequence[PathState], remember: Sequence[int] = ()) -> float:
+    distance = CurvedDistances(given, remember)
+    return max(distance(state) for state in states)
+
+
+def peak(states: Sequence[PathState]) -> float:
+    return max(state.factor for state in states)
+
+
+def test_each_kind_of_problem_has_its_follower() -> None:
+    assert isinstance(kind_of(spring()), ExactKind)
+    assert isinstance(kind_of(plate(graph(DROP), 3, 0.0)), ArcLengthKind)
+    assert isinstance(kind_of(line(Exponential(1.0, 0.2, 0.5), 3)), ArcLengthKind)
+
+
+@pytest.mark.parametrize("follow", Follow)
+def test_piecewise_linear_paths_are_the_exact_ones(follow: Follow) -> None:
+    for given, aim in ((spring(), 3.0), (bar(50.0, 12), 400.0), (random_problem(2), 5.0)):
+        exact = ExactFollower(given, PathOptions(programme=(aim,), follow=follow))
+        wanted = list(exact.states())
+        follower, states = path(given, programme=(aim,), follow=follow)
+        assert follower.end is exact.end
+        assert peak(states) == pytest.approx(peak(wanted), rel=1e-12)
+        assert states[-1].work == pytest.approx(wanted[-1].work, rel=1e-9)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("seed", range(40))
+def test_peaks_of_random_paths_are_the_exact_ones(seed: int) -> None:
+    """To the first jump: which of several stable states a body jumps to is not the same for both."""
+    given = random_problem(seed)
+    exact = ExactFollower(given, PathOptions(programme=(5.0,), follow=Follow.EXACT))
+    wanted = list(exact.states())
+    if not wanted:
+        pytest.skip("nothing holds the body under its constant loads")
+    follower, states = path(given, programme=(5.0,), follow=Follow.EXACT)
+    assert follower.end is exact.end, follower.reason
+    assert peak(states) == pytest.approx(peak(wanted), rel=1e-9)
+    assert states[-1].x == pytest.approx(wanted[-1].x, abs=1e-8)
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.7])
+def test_a_block_on_friction_bears_the_same_in_each_direction(angle: float) -> None:
+    """Symmetric in the plane: along an axis and oblique it is the chain of one component, which is exact."""
+    law = graph(DROP)
+    wanted = list(ExactFollower(line(law, 5), PathOptions(programme=(9.0,))).states())
+    follower, states = path(plate(law, 5, angle), programme=(9.0,))
+    assert follower.end is End.ESCAPES
+    assert peak(states) == pytest.approx(peak(wanted), rel=1e-9)
+    given = plate(law, 5, angle)
+    assert largest_distance(given, states) < 1e-9
+
+
+def test_a_rough_floor_holds_up_to_its_strength_in_each_direction() -> None:
+    """Tresca friction on |u_t|: four vertices at rest, then sliding one after the other; the sum is the strength."""
+    follower, states = path(plate(graph([(0, 0.2)]), 5, 0.7), programme=(2.0,))
+    assert follower.end is End.ESCAPES
+    assert peak(states) == pytest.approx(0.8, rel=1e-12)
+
+
+def test_a_curved_law_softens_as_its_closed_form_says() -> None:
+    """One vertex on a spring k, moved by λ: k (λ - x) = exp(-x/δ); it snaps where that slope is k: x = -δ log(kδ)."""
+    given = problem(0.5, 0.5, bonds(Exponential(1.0, 0.0, 1.0), 0))
+    follower, states = path(given, programme=(3.0, 0.1), follow=Follow.EXACT)
+    at = -np.log(0.5)
+    assert follower.end is End.REACHED
+    fold = next(s for s in states if s.event is Event.FOLD and s.factor < 1.9)
+    assert float(fold.x[0]) == pytest.approx(at, rel=1e-5)
+    assert fold.factor == pytest.approx(at + 2.0 * np.exp(-at), rel=1e-10)
+    assert largest_imbalance(given, states) < 1e-8
+
+
+def test_smoothed_laws_tend_to_the_law() -> None:
+    """The quadratic smoothing of a drop of height c rounds its corner off within ε/c: the peak falls with ε."""
+    options = PathOptions(programme=(9.0,), follow=Follow.EXACT)
+    wanted = first_fold(ExactFollower(line(graph(DROP), 4), options))
+    smoothed = [line(create("quadratic", graph(DROP), epsilon=epsilon), 4) for epsilon in (1e-1, 1e-2, 1e-3)]
+    off = [abs(first_fold(ArcLengthFollower(given, options)) - wanted) / wanted for given in smoothed]
+    assert off[1] < 0.2 * off[0]
+    assert off[2] < 0.2 * off[1]
+    assert off[2] < 1e-3
+
+
+def first_fold(follower: Follower) -> float:
+    return next(s.factor for s in follower.states() if s.event is Event.FOLD)
+
+
+@pytest.mark.parametrize(
+    "law", [graph(SOFTENING), graph(DROP), pytest.param(Exponential(1.0, 0.1, 0.4), marks=pytest.mark.long)]
+)
+def test_loading_and_unloading_in_the_plane_with_memory(law: Superpotential) -> None:
+    """Slips turn; energies balance, nothing is dissipated twice, unloading is along the secant: |F| < the law's."""
+    given = oblique(law)
+    follower, states = path(given, programme=(0.6, 0.0, 0.6, 1.2), remember=(0,))
+    assert follower.end is not End.LOST, follower.reason
+    assert largest_imbalance(given, states) < 1e-8
+    assert largest_distance(given, states, (0,)) < 1e-8
+    lost = np.array([s.dissipated for s in states])
+    assert np.all(np.diff(lost) >= -1e-12 * (1.0 + lost[-1]))
+    turns = [s for s in states if s.event is Event.TURN]
+    if len(turns) == 3:
+        assert turns[1].dissipated == pytest.approx(turns[0].dissipated, rel=1e-9)
+        assert turns[2].x == pytest.approx(turns[0].x, abs=1e-8)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    "law", [graph(SOFTENING), graph(DROP), graph([(0, 0.3), (0.5, 0.1)]), Exponential(1.0, 0.1, 0.4)]
+)
+def test_a_tenth_of_the_step_is_the_same_branch(law: Superpotential) -> None:
+    given = oblique(law)
+    _, states = path(given, programme=(1.5,), follow=Follow.EXACT)
+    _, finer = path(given, programme=(1.5,), follow=Follow.EXACT, fineness=0.1)
+    assert len(finer) >= len(states)
+    assert events(finer) == events(states)
+    for one, other in zip(folds(states), folds(finer), strict=True):
+        assert one == pytest.approx(other, rel=1e-8)
+    assert states[-1].x == pytest.approx(finer[-1].x, abs=1e-8)
+
+
+def events(states: Sequence[PathState]) -> list[Event]:
+    return [s.event for s in states if s.event is not Event.STEP]
+
+
+def folds(states: Sequence[PathState]) -> list[float]:
+    return [s.factor for s in states if s.event is Event.FOLD]
+
+
+def test_a_path_goes_on_from_any_of_its_states() -> None:
+    given = oblique(graph(SOFTENING))
+    options: dict[str, Any] = {"programme": (0.6, 0.2, 0.8), "remember": (0,)}
+    _, whole = path(given, **options)
+    for at in range(0, len(whole) - 1, 7):
+        _, rest = path(given, whole[at], **options)
+        assert [s.event for s in rest] == [s.event for s in whole[at + 1 :]]
+        assert [s.factor for s in rest] == pytest.approx([s.factor for s in whole[at + 1 :]], rel=1e-9)
+        assert rest[-1].work == pytest.approx(whole[-1].work, rel=1e-9)
+
+
+def test_an_edge_where_a_law_on_a_length_meets_another_is_refused() -> None:
+    given = plate(graph(DROP), 3, 0.0, bonds(graph(DROP), 1))
+    with pytest.raises(InputError, match=r"\|u_t\|"):
+        ArcLengthFollower(given, PathOptions())
