@@ -203,7 +203,7 @@ class Curve(Equations):
         return self._turning(move)
 
     def _shares(self, move: Move) -> Array:
-        """Of the step, the part after which each site passed an end; 1 where it did not, (m,)."""
+        """The part of the step after which each site passed an end; 1 where it did not, (m,)."""
         sites, s0, s1 = self.sites, move.before.values.s, move.after.values.s
         found, way = np.ones(len(sites)), np.where(s1 != s0, s1 - s0, 1.0)
         allowed = ROUNDING * (1.0 + np.abs(s1))
