@@ -18,9 +18,12 @@ from pathlib import Path
 
 import tomli_w
 from generator.kinds import Drawn, draw
-from judge import CONTRADICTS, UNDECIDED, Verdict, judge
+from judge import CONTRADICTS, MISSED, UNDECIDED, Verdict, judge
 from program import Answer, run
 from referee.meshes import write_msh
+
+FINDS = (CONTRADICTS, MISSED)
+"""The verdicts for which an attack is made: a false statement, a solution that was not found."""
 
 
 def write(drawn: Drawn, folder: Path, stem: str) -> Path:
@@ -52,7 +55,7 @@ def _arguments(words: list[str]) -> argparse.Namespace:
     parser.add_argument("--scenes", type=int, default=100)
     parser.add_argument("--number", type=int, help="this scene of the seed only")
     parser.add_argument("--first", type=int, default=0)
-    parser.add_argument("--out", type=Path, help="where contradictions are kept")
+    parser.add_argument("--out", type=Path, help="where scenes are kept that were contradicted or missed")
     parser.add_argument("--limit", type=float, default=30.0, help="seconds of processor time for one solve")
     parser.add_argument("--verbose", action="store_true")
     return parser.parse_args(words)
@@ -73,7 +76,7 @@ class Counts:
 
 
 def series(seed: int, numbers: Iterable[int], out: Path, limit: float = 30.0, *, verbose: bool = False) -> Counts:
-    """Attack with some scenes of a seed; what contradicts is printed and kept in a folder.
+    """Attack with some scenes of a seed; what is contradicted or missed is printed and kept in a folder.
 
     Args:
         seed: of the scenes.
@@ -89,10 +92,10 @@ def series(seed: int, numbers: Iterable[int], out: Path, limit: float = 30.0, *,
             drawn, answer, verdict = attack(seed, number, Path(scratch), limit)
         counts.words[verdict.word] += 1
         counts.codes[answer.code] += 1
-        if verbose or verdict.word == CONTRADICTS or "referee" in verdict.why:
+        if verbose or verdict.word in FINDS or "referee" in verdict.why:
             line = f"{number} {drawn.kind} exit {answer.code} {answer.state} {answer.seconds:.1f} s: "
             print(f"{line}{verdict.word}: {verdict.why}", flush=True)
-        if verdict.word == CONTRADICTS:
+        if verdict.word in FINDS:
             _keep(drawn, verdict, out, f"seed{seed}_{number}")
     return counts
 
@@ -104,7 +107,7 @@ def _keep(drawn: Drawn, verdict: Verdict, out: Path, stem: str) -> None:
 
 
 def main(words: list[str]) -> int:
-    """Run an attack; 1 if the program was contradicted."""
+    """Run an attack; 1 if it found anything."""
     logging.disable(logging.WARNING)
     given = _arguments(words)
     out = given.out or Path(f"attack_{given.seed}")
@@ -112,7 +115,7 @@ def main(words: list[str]) -> int:
     numbers = [given.number] if one else range(given.first, given.first + given.scenes)
     counts = series(given.seed, numbers, out, given.limit, verbose=given.verbose or one)
     print(counts)
-    return int(counts.words[CONTRADICTS] > 0)
+    return int(any(counts.words[word] for word in FINDS))
 
 
 if __name__ == "__main__":

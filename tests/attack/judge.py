@@ -1,4 +1,4 @@
-"""The verdict on one scene: agrees, contradicts or undecided, with one line that says why."""
+"""The verdict on one scene: agrees, contradicts, missed or undecided, with one line that says why."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from referee.meshes import Array, Mesh, block, boundary
 from referee.minimality import examine, sampled_descent
 from referee.solution import EPS, Check
 
-AGREES, CONTRADICTS, UNDECIDED = "agrees", "contradicts", "undecided"
+AGREES, CONTRADICTS, MISSED, UNDECIDED = "agrees", "contradicts", "missed", "undecided"
 Table = dict[str, Any]
 SHARP, LOST = 1e-7, 1e-3
 """Where rounding moves tractions by less than the first a point can be judged; from the second on it says nothing."""
@@ -106,17 +106,16 @@ def judge(scene: Table, drawn: Mesh | None, answer: Answer, seed: int = 0) -> Ve
         word = AGREES if answer.code == 0 else CONTRADICTS
         return Verdict(word, "nothing drives, so u = 0 is a solution")
     truth = programmes.verdict(problem)
-    wrong = _existence(problem, truth, answer)
+    wrong, missed = _existence(problem, truth, answer), list[str]()
     if answer.code == 0:
         more, note = _solution(problem, answer, seed)
         wrong += more
     elif answer.code == 4:
-        more, note = _unsolved(problem, truth, answer, seed, scene["solver"].get("method", "auto"))
-        wrong += more
+        missed, note = _unsolved(problem, truth, answer, seed, scene["solver"].get("method", "auto"))
     else:
         note = "no solution exists"
-    if wrong:
-        return Verdict(CONTRADICTS, "; ".join(wrong))
+    if wrong or missed:
+        return Verdict(CONTRADICTS if wrong else MISSED, "; ".join(wrong + missed))
     sure = truth.state != "unclear" or answer.code == 0
     return Verdict(UNDECIDED if note.startswith("?") or not sure else AGREES, f"{truth.state}: {note}")
 
@@ -191,7 +190,7 @@ def _energy(problem: Problem, u: Array, answer: Answer) -> list[str]:
 def _unsolved(
     problem: Problem, truth: programmes.Verdict, answer: Answer, seed: int, method: str
 ) -> tuple[list[str], str]:
-    """Exit code 4: is there a solution?"""
+    """Exit code 4: is there a solution? It says that none was found, so nothing false is said where one exists."""
     if method not in ("auto", "branch"):
         return [], f"? not solved by {method}, which is there for comparison"
     u = displacement(problem.mesh, answer)

@@ -13,7 +13,7 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parent))
 
 from generator.kinds import draw
-from judge import CONTRADICTS, blurred, judge
+from judge import CONTRADICTS, MISSED, blurred, judge
 from program import Answer
 from referee.assembly import assemble
 from referee.coordinates import Floor
@@ -80,7 +80,6 @@ def test_a_moved_vertex_is_found(vertex: int, component: int) -> None:
         {"state": "metastable"},
         {"energy": -5.9},
         {"factors": (2.0, np.inf)},
-        {"code": 4, "text": "not certified"},
         {"certificate": {"second_order": "not a minimiser"}},
         {"margin": -0.1},
     ],
@@ -89,6 +88,13 @@ def test_a_false_claim_is_found(claim: dict[str, Any]) -> None:
     table = scene()
     u = closed_form(block([1.0, 1.0], [2, 2]).points)
     assert judge(table, None, answer_of(table, u, **claim)).word == CONTRADICTS
+
+
+def test_a_solution_that_is_not_found_is_missed() -> None:
+    table = scene()
+    u = closed_form(block([1.0, 1.0], [2, 2]).points)
+    for moved in (0.0, 1e-2):
+        assert judge(table, None, answer_of(table, u * (1 + moved), code=4, text="not certified")).word == MISSED
 
 
 def test_states_have_their_closed_forms() -> None:
