@@ -112,7 +112,7 @@ class FormCache:
             return self._in_temporary_folder(entry, error)
 
     def _current(self) -> Path:
-        return self._folder or Path(options()["cache_dir"]) / "hvi_fenicsx"
+        return self._folder or _cache_folder() / "hvi_fenicsx"
 
     def _found(self, entry: _Entry) -> fem.Form:
         """The form as it is kept, or compiled now. Collective."""
@@ -208,6 +208,12 @@ def compiled(form: Any) -> fem.Form:
         CompilationError: it cannot be compiled, on all ranks alike.
     """
     return _CACHE.compiled(form)
+
+
+def _cache_folder() -> Path:
+    """The folder that dolfinx keeps forms in; where that is relative or empty, the default, as XDG wants it."""
+    folder = Path(options()["cache_dir"])
+    return folder if folder.is_absolute() else Path.home() / ".cache" / "fenics"
 
 
 @cache

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import importlib.util
 import os
 import sys
@@ -59,7 +60,8 @@ def _execute(module: str, path: Path) -> None:
     sys.modules[module] = plugin  # dataclasses and pydantic look their own module up
     _LOG.warning("plugin %s: its code is run", path)
     try:
-        spec.loader.exec_module(plugin)
+        with contextlib.chdir(os.curdir):  # a plugin may leave it; results belong where the user asked for them
+            spec.loader.exec_module(plugin)
     except KeyboardInterrupt:
         raise
     except BaseException as error:

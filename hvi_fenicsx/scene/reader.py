@@ -126,12 +126,14 @@ class _Source:
 
 
 def _large_numbers(value: Any, place: _Place) -> Iterator[_Place]:
-    """Where whole numbers stand that TOML does not have."""
-    if isinstance(value, int) and not -(2**63) <= value < 2**63:
-        yield place
-    entries = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
-    for key, entry in entries:
-        yield from _large_numbers(entry, (*place, key))
+    """Where whole numbers stand that TOML does not have, however deep."""
+    waiting = [(value, place)]
+    while waiting:
+        found, where = waiting.pop()
+        if isinstance(found, int) and not -(2**63) <= found < 2**63:
+            yield where
+        entries = found.items() if isinstance(found, dict) else enumerate(found) if isinstance(found, list) else ()
+        waiting += [(entry, (*where, key)) for key, entry in entries]
 
 
 def _effects_by_region(body: Any) -> dict[str, _Place]:

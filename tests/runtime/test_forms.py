@@ -156,3 +156,10 @@ def test_a_run_killed_while_forms_compile_does_not_stop_the_next(
     done = process(*run)
     assert (done.returncode, done.stderr) == (0, "")
     assert summary(tmp_path / "r")["converged"]
+
+
+def test_a_cache_in_the_current_folder_is_not_made(monkeypatch: pytest.MonkeyPatch) -> None:
+    """XDG: a relative or an empty XDG_CACHE_HOME is ignored."""
+    for given, wanted in (("fenics", Path.home() / ".cache" / "fenics"), ("/kept", Path("/kept"))):
+        monkeypatch.setattr(forms, "options", lambda given=given: {"cache_dir": given})
+        assert FormCache()._current() == wanted / "hvi_fenicsx"

@@ -17,7 +17,7 @@ import pytest
 from runs import hvi, process, write_scene
 from scenes import STEEL, model, quadratic_linear
 
-from hvi_fenicsx import InputError, Scene, prepare
+from hvi_fenicsx import InputError, Scene, prepare, read_scene
 
 LAW = quadratic_linear(1e3)
 TABLE: dict[str, tuple[str, str]] = {
@@ -297,3 +297,11 @@ def test_a_region_that_the_mesh_does_not_have_is_told(tmp_path: Path) -> None:
     table["material"] = {"a": STEEL | {"region": "soft"}, "b": STEEL | {"region": "hart"}}
     with pytest.raises(InputError, match="'hart'; it has hard, soft"):
         prepare(Scene.model_validate(table))
+
+
+@pytest.mark.parametrize("depth", range(300, 800, 50))
+def test_a_table_that_is_nested_deep_is_told_in_words(tmp_path: Path, depth: int) -> None:
+    file = tmp_path / "deep.toml"
+    file.write_text("study = " + "[" * depth + "]" * depth, encoding="utf-8")
+    with pytest.raises(InputError, match=r"unknown key|nested too deep"):
+        read_scene(file)

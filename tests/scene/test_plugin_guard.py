@@ -136,3 +136,11 @@ def test_control_characters_do_not_reach_the_terminal(tmp_path: Path) -> None:
     assert done.returncode == 2
     assert "\x1b" not in done.stderr
     assert done.stderr.count(r"\u001b[31m") >= 2
+
+
+def test_a_plugin_that_leaves_the_current_folder_takes_no_result_along(tmp_path: Path) -> None:
+    before, file = Path.cwd(), scene(tmp_path)
+    plugin = next(tmp_path.glob("*.py"))
+    plugin.write_text(plugin.read_text(encoding="utf-8") + "\nimport os\nos.chdir('/')\n", encoding="utf-8")
+    read_scene(file)
+    assert Path.cwd() == before
