@@ -110,8 +110,6 @@ def _scales(problem: Problem, thresholds: PlausibilityThresholds) -> Iterator[st
             f"the load (or prescribed displacement, or thermal strain) is {strain:.3g} of Young's modulus, where small "
             "strains are assumed; are loads and modulus in N/m², displacements in m?"
         )
-    if scales.length > thresholds.largest_body:
-        yield f"the body is {scales.length:.4g} m long; is it in m? (for a mesh file in mm: scale = 1e-3)"
 
 
 def _uneven_parts(problem: Problem, thresholds: PlausibilityThresholds) -> Iterator[str]:

@@ -46,7 +46,6 @@ class PlausibilityThresholds:
         largest_strain: small strains are assumed everywhere.
         softest: smallest plausible Young's modulus, N/m²: softer than a gel.
         stiffest: largest plausible Young's modulus, N/m²: stiffer than diamond.
-        largest_body: m.
         far_peak: a factor of the load that is borne is suspicious above it, and below its inverse.
         weak_law: a law's largest force over the load, below which it cannot matter.
         unrelated: ratio of two lengths that have nothing to do with each other.
@@ -62,7 +61,6 @@ class PlausibilityThresholds:
     largest_strain: float = 0.1
     softest: float = 1e3
     stiffest: float = 2e12
-    largest_body: float = 200.0
     far_peak: float = 1e4
     weak_law: float = 0.01
     unrelated: float = 100.0

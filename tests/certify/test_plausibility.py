@@ -123,8 +123,8 @@ def test_the_limits_can_be_chosen() -> None:
     prepared = prepare(Scene.model_validate(model(8)))
     problem, forces = prepared.problem, prepared.system.forces
     assert plausibility.before_solving(problem, forces) == prepared.warnings == ()
-    (warning,) = plausibility.before_solving(problem, forces, PlausibilityThresholds(largest_body=0.5))
-    assert "the body is 1 m long" in warning
+    (warning,) = plausibility.before_solving(problem, forces, PlausibilityThresholds(stiffest=1e11))
+    assert "Young's modulus is 2.15e+11" in warning
 
 
 def test_the_papers_own_data_are_warned_of_twice() -> None:

@@ -42,6 +42,8 @@ class Thresholds:
 
 
 DEFAULT = Thresholds()
+LARGEST_BODY = 200.0
+"""A longer body (m) may be one in mm."""
 
 
 class DomainShape(Table):
@@ -162,7 +164,7 @@ class DomainShape(Table):
         Args:
             length: of the body, m.
         """
-        return ()
+        return (f"the body is {length:.4g} m long; is it in m?",) if length > LARGEST_BODY else ()
 
     def files(self) -> tuple[Path, ...]:
         """The files whose content the mesh depends on."""
