@@ -55,7 +55,7 @@ def at_rest(problem: CondensedProblem, remember: Collection[int], aim: float) ->
     size = float(np.max(np.abs(held), initial=0.0)) + float(np.max(np.abs(problem.force), initial=0.0))
     rate = away if np.max(np.abs(away), initial=0.0) > 1e-14 * size else aim * problem.force_rate
     cells = place(problem.stiffness, chains, x, force)
-    if not _regular(cells):
+    if not is_held(cells):
         settled = _settled(bonds, replace(problem, force=held, force_rate=rate))
         if settled is None:
             return Beginning(cells=None, memory=bonds.memory, reason="nothing holds the body at rest")
@@ -76,8 +76,22 @@ def _nearest(bonds: BondTable, x: Array, wanted: Array) -> Array:
     return np.where((problem.lower == problem.upper), wanted, found)
 
 
-def _regular(cells: Cells) -> bool:
-    """Whether the tangent holds the body."""
+def is_singular(stiffness: Array) -> bool:
+    """Whether bounds and laws alone hold the body.
+
+    Args:
+        stiffness: S, (n, n).
+    """
+    values = np.linalg.eigvalsh(stiffness) if len(stiffness) else np.ones(1)
+    return bool(values[0] <= 1e-11 * values[-1])
+
+
+def is_held(cells: Cells) -> bool:
+    """Whether the tangent holds the body.
+
+    Args:
+        cells: where the unknowns are.
+    """
     matrix, free = cells.tangent()
     if not free.size:
         return True

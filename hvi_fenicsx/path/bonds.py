@@ -11,7 +11,7 @@ from ..errors import InputError
 from ..laws import TractionGraph
 from ..system.condensed_problem import Bonds, CondensedProblem
 from ..typing import Array
-from .graphs import Passed, graph_of, remembering, turned
+from .graphs import Passed, graph_of, on_corner, remembering, turned
 from .segments import Component, Segment, chain
 
 
@@ -56,7 +56,7 @@ class Bond:
             traction: along the unknown.
         """
         if self.passed is not None:
-            self.passed = self.passed.reached(x, traction, even=self.even)
+            self.passed = self.passed.reached(*on_corner(self.graph, x, traction), even=self.even)
             self.present = remembering(self.graph, self.passed)
 
     def dissipated(self, x: float, traction: float) -> float:

@@ -9,23 +9,19 @@ import numpy as np
 
 from ..system.condensed_problem import CondensedProblem
 from ..typing import Array, Integers
-from .beginning import Beginning, at_rest
+from .beginning import Beginning, at_rest, is_held, is_singular
 from .bonds import BondTable
 from .books import EnergyBalance
 from .cells import Cells
 from .descent import Descent, Landing
-from .passing import Passing, classify, go_on
+from .onward import chosen, ways_on
+from .passing import Passing, classify, go_on, place_of
 from .placing import place
-from .rounds import Rounds
+from .rounds import Round, Rounds
 from .snap import snap
 from .state import End, Event, Follow, PathOptions, PathState, Place, Position
 from .step import FACTOR
 from .tracer import Tracer
-
-
-def never() -> bool:
-    """Nobody interrupts."""
-    return False
 
 
 class ExactFollower:
@@ -52,7 +48,7 @@ class ExactFollower:
         problem: CondensedProblem,
         options: PathOptions,
         resume: PathState | None = None,
-        interrupted: Callable[[], bool] = never,
+        interrupted: Callable[[], bool] = lambda: False,
         beginning: Beginning | None = None,
     ) -> None:
         self._problem, self._options, self._interrupted = problem, options, interrupted
@@ -63,7 +59,7 @@ class ExactFollower:
         self.reason = ""
         self._unstable = 0
         self._moved, self._direction = 0, 1
-        self._peak, self._floats = 0.0, is_singular(problem.stiffness)
+        self._peak, self._floats, self._blocked = 0.0, is_singular(problem.stiffness), False
         self.tracer: Tracer
 
     def states(self) -> Iterator[PathState]:
@@ -123,7 +119,7 @@ class ExactFollower:
         chains = [self._bonds.chain(i) for i in range(problem.size)]
         return place(problem.stiffness, chains, x, problem.load(factor) - problem.stiffness @ x, numbers)
 
-    def _follow_from(self, cells: Cells, factor: float, position: Position | None = None) -> None:
+    def _follow_from(self, cells: Cells, factor: float, position: Position | None = None, heading: int = 1) -> None:
         given, problem = position, self._problem
         self.tracer = Tracer(
             problem.stiffness,
@@ -132,7 +128,7 @@ class ExactFollower:
             cells,
             factor,
             driver=FACTOR if given is None else given.driver,
-            heading=1 if given is None else given.heading,
+            heading=heading if given is None else given.heading,
             small=None if given is None else given.small,
         )
 
@@ -145,7 +141,7 @@ class ExactFollower:
     def _towards(self, aim: float) -> Iterator[PathState]:
         """From event to event until the factor reaches its aim or the path ends."""
         self._orient(aim)
-        self._rounds = Rounds()
+        self._rounds = Rounds(self.tracer.cells.x)
         while self.end is None and self.tracer.factor != aim:
             if self._must_jump(aim):
                 yield from self._jump(aim)
@@ -158,7 +154,7 @@ class ExactFollower:
                 return
             self._balance.go(cells.x, cells.bond_force, self.tracer.factor)
             if step.variable != FACTOR:
-                yield self._noted(self._pass(go_on(self.tracer, self._bonds, step)))
+                yield self._noted(self._pass(go_on(self.tracer, self._bonds, step)), aim)
             self._watch()
             if self.end is not None:
                 yield self._state(Event.END)
@@ -175,20 +171,33 @@ class ExactFollower:
         self._peak = max(self._peak, abs(self.tracer.factor))
         if self.end is not None:
             return
-        if self._floats and self._peak > 0.0 and self.tracer.at_rest(self._peak):
+        if self._floats and self._peak > 0.0 and self.tracer.at_rest(self._peak) and not is_held(self.tracer.cells):
             self._finish(End.ESCAPES, "the load is back at zero, and nothing holds the body any more")
         elif self._interrupted():
             self._finish(End.INTERRUPTED, "interrupted")
         elif self._events > self._options.most_events:
             self._finish(End.LOST, f"no end after {self._options.most_events} events")
 
-    def _noted(self, state: PathState) -> PathState:
-        """The state after an event; the path ends where it comes back to one."""
+    def _noted(self, state: PathState, aim: float) -> PathState:
+        """The state after an event; where the path comes back to one, another way is taken, or the path ends."""
         found = self._rounds.note(state)
+        if found is Round.BLOCKED and self._takes_another_way(aim):
+            return self._state(state.event, state.place, bifurcation=True)
         if found is not None:
             where = f"at the factor {state.factor:.6g} the path comes back to where it was"
             self._finish(End.LOST, f"{where}: {found.value}")
         return state
+
+    def _takes_another_way(self, aim: float) -> bool:
+        """On by another of all ways; a stable path that has none jumps."""
+        tracer, stable = self.tracer, self._options.follow is Follow.STABLE
+        ways = ways_on(self._problem, self._bonds, tracer.cells, tracer.sizes())
+        way = chosen(ways, self._rounds.came, float(np.sign(aim - tracer.factor)), stable=stable)
+        if way is not None:
+            self._follow_from(way.cells, tracer.factor, heading=way.heading)
+            self._unstable, (self._moved, self._direction) = way.unstable, way.leader
+        self._blocked = stable and (way is None or way.unstable > 0)
+        return way is not None or stable
 
     def _pass(self, passing: Passing) -> PathState:
         """The state after an event."""
@@ -197,7 +206,8 @@ class ExactFollower:
             self._moved, self._direction = passing.unknown, passing.direction
         if passing.neutral:
             self._unstable = self.tracer.cells.unstable_directions()
-        return self._state(classify(passing), passing)
+        place = place_of(passing, self._problem, self._bonds)
+        return self._state(classify(passing), place, bifurcation=passing.bifurcation)
 
     def _endless(self) -> None:
         """Nothing stops the curve: at a factor that stands a body escapes."""
@@ -209,19 +219,22 @@ class ExactFollower:
     # -- jumps
 
     def _must_jump(self, aim: float) -> bool:
+        if self._blocked:
+            return True
         if self._options.follow is Follow.EXACT or self._unstable == 0:
             return False
         return not self.tracer.at_end(aim)
 
     def _jump(self, aim: float) -> Iterator[PathState]:
         """On to the next stable equilibrium at the same factor, or off."""
-        cells, factor = self.tracer.cells, self.tracer.factor
+        cells, factor, memory = self.tracer.cells, self.tracer.factor, self._bonds.memory
         found = snap(self._bonds, self._problem.load(factor), cells, self._moved, self._direction)
         if found is not None and found.cells is not None:
             yield self._landed(found.cells, aim)
             return
         landing = self._descended() if found is None else Landing(x=cells.x, escapes=True, found=False, steps=0)
         if landing.escapes:
+            self._bonds.restore(memory)
             self._finish(End.ESCAPES, f"at the factor {factor:.6g} no equilibrium is left: a body comes off")
             yield self._state(Event.END)
         elif not landing.found:
@@ -238,6 +251,7 @@ class ExactFollower:
         return descent.land(descent.pushed(cells, rates), cells.x)
 
     def _landed(self, cells: Cells, aim: float) -> PathState:
+        self._blocked = False
         self._follow_from(cells, self.tracer.factor)
         self._unstable = self.tracer.cells.unstable_directions()
         cells = self.tracer.cells
@@ -261,19 +275,19 @@ class ExactFollower:
     def _finish(self, end: End, reason: str) -> None:
         self.end, self.reason = end, reason
 
-    def _state(self, event: Event, passing: Passing | None = None) -> PathState:
+    def _state(self, event: Event, place: Place | None = None, *, bifurcation: bool = False) -> PathState:
         tracer, balance = self.tracer, self._balance
         return PathState(
             factor=tracer.factor,
             event=event,
-            place=None if passing is None else self._place(passing),
+            place=place,
             x=tracer.cells.x,
             energy=balance.energy,
             work=balance.work,
             dissipated=balance.dissipated,
             unstable=self._unstable,
             memory=self._bonds.memory if self._bonds.remembers else None,
-            bifurcation=passing is not None and passing.bifurcation,
+            bifurcation=bifurcation,
             position=Position(
                 leg=self._leg,
                 numbers=tracer.cells.numbers.copy(),
@@ -282,19 +296,3 @@ class ExactFollower:
                 small=tracer.small.copy(),
             ),
         )
-
-    def _place(self, passing: Passing) -> Place:
-        i, problem = passing.unknown, self._problem
-        bonds = self._bonds.at(i)
-        part = problem.bonds[bonds[0].group].part if bonds and not passing.at_bound else problem.parts[i]
-        return Place(part=part, unknown=i, point=problem.points[i])
-
-
-def is_singular(stiffness: Array) -> bool:
-    """Whether bounds and laws alone hold the body.
-
-    Args:
-        stiffness: S, (n, n).
-    """
-    values = np.linalg.eigvalsh(stiffness) if len(stiffness) else np.ones(1)
-    return bool(values[0] <= 1e-11 * values[-1])

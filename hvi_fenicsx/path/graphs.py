@@ -59,6 +59,23 @@ class Passed:
         return Passed(displacements=(ends[0], ends[1]), tractions=(tractions[0], tractions[1]))
 
 
+def on_corner(graph: TractionGraph, x: float, traction: float, rounding: float = 1e-12) -> tuple[float, float]:
+    """A point of a graph; where it is an end of a piece or jump but for rounding, that end.
+
+    Args:
+        graph: the graph.
+        x: displacement.
+        traction: there.
+        rounding: relative.
+    """
+    nearest = float(graph.breaks[np.argmin(np.abs(graph.breaks - x))])
+    if abs(nearest - x) > rounding * abs(x):
+        return x, traction
+    ends = (_limit(graph, nearest, "left"), _limit(graph, nearest, "right"))
+    size = max(abs(end) for end in ends)
+    return nearest, next((end for end in ends if abs(end - traction) <= rounding * size), traction)
+
+
 def remembering(graph: TractionGraph, passed: Passed) -> TractionGraph:
     """The graph of a bond that has been so far: secants up to there, the law beyond.
 

@@ -14,15 +14,22 @@ class Round(Enum):
     """How a path came back."""
 
     CLOSED = "its equilibria form a closed curve, which it has gone round: none of them has the wanted factor"
-    BLOCKED = "several bonds are at ends of their pieces at once, and each way on leads from one of them to the other"
+    BLOCKED = "several bonds are at ends of their pieces at once, and no combination of their directions leads on"
 
 
 class Rounds:
-    """The events of one leg of a programme, by cell and direction. Positions are kept as numbers of 64 bits."""
+    """The events of one leg of a programme, by cell and direction. Positions are kept as numbers of 64 bits.
 
-    def __init__(self) -> None:
+    Args:
+        x: the displacements where the leg begins, (n,).
+
+    Attributes:
+        came: the last change of the displacements, (n,).
+    """
+
+    def __init__(self, x: Array) -> None:
         self._known: dict[int, tuple[float, float]] = {}
-        self._x: Array = np.empty(0)
+        self._x, self.came = x, np.zeros_like(x)
         self._way = 0.0
 
     def note(self, state: PathState) -> Round | None:
@@ -31,14 +38,16 @@ class Rounds:
         Args:
             state: of an event.
         """
-        if self._x.size:
-            self._way += float(np.max(np.abs(state.x - self._x), initial=0.0))
+        step, size = state.x - self._x, float(np.max(np.abs(state.x), initial=0.0))
+        length = float(np.max(np.abs(step), initial=0.0))
+        if length > 1e-9 * size:
+            self.came = step
+        self._way += length
         self._x, key = state.x, _key(state)
         factor, way = self._known.get(key, (np.inf, 0.0))
         self._known[key] = state.factor, self._way
         if abs(factor - state.factor) > 1e-9 * (1.0 + abs(state.factor)):
             return None
-        size = float(np.max(np.abs(state.x), initial=0.0))
         return Round.CLOSED if self._way - way > 1e-9 * size else Round.BLOCKED
 
 

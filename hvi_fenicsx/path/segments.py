@@ -17,6 +17,10 @@ import numpy as np
 from ..laws.traction_graph import TractionGraph
 from ..typing import Array
 
+_SIDES = ("left", "right")
+_ROUNDING = 1e-12
+"""A jump so small beside the forces there is none."""
+
 
 class Kind(Enum):
     """What moves on a segment."""
@@ -191,8 +195,8 @@ def _changes(component: Component, at: float) -> bool:
 
 
 def _jump(components: Sequence[Component], at: float) -> Segment | None:
-    left, right = (_forces(components, at, side) for side in ("left", "right"))
-    if left == right:
+    left, right = (_forces(components, at, side) for side in _SIDES)
+    if abs(right - left) <= _ROUNDING * sum(abs(_forces([c], at, side)) for c in components for side in _SIDES):
         return None
     fresh = any(c.fresh(at) for c in components)
     rise = math.copysign(1.0, right - left)
@@ -211,8 +215,7 @@ def _piece(components: Sequence[Component], start: float, end: float) -> Segment
     middle = _between(start, end)
     slopes = [c.slope(middle) for c in components]
     fresh = any(c.fresh(middle, slope) for c, slope in zip(components, slopes, strict=True))
-    anchor, side = (start, "right") if math.isfinite(start) else (end, "left")
-    anchor = anchor if math.isfinite(anchor) else 0.0
+    anchor, side = _anchor(start, end)
     return Segment(
         kind=Kind.PIECE,
         x=anchor,
@@ -222,6 +225,13 @@ def _piece(components: Sequence[Component], start: float, end: float) -> Segment
         high=end - anchor,
         outward=int(np.sign(middle)) if fresh else 0,
     )
+
+
+def _anchor(start: float, end: float) -> tuple[float, str]:
+    """Where a piece has τ = 0, and from which side: at 0 where that is on it, so that rest is exact."""
+    if start < 0.0 < end:
+        return 0.0, "right"
+    return (start, "right") if math.isfinite(start) else (end, "left")
 
 
 def _between(start: float, end: float) -> float:

@@ -22,6 +22,9 @@ from .placing import place
 from .step import FACTOR
 from .tracer import Tracer
 
+_STANDING = 20
+"""So many events at one place, and four for each unknown, lead nowhere."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Snap:
@@ -82,7 +85,7 @@ def _followed(bonds: BondTable, load: Array, cells: Cells, restraint: Array, pas
     if size == 0.0:
         return None
     c = np.asarray(restraint / size, dtype=np.float64)
-    chains = [bonds.chain(i) for i in range(len(cells))]
+    chains = [cells.chain(i) for i in range(len(cells))]
     problem = bonds.problem
     here = place(problem.stiffness, chains, cells.x, load - problem.stiffness @ cells.x, cells.numbers)
     try:
@@ -96,10 +99,13 @@ def _followed(bonds: BondTable, load: Array, cells: Cells, restraint: Array, pas
 
 
 def _to_its_end(tracer: Tracer, bonds: BondTable, load: Array, c: Array) -> Snap | None:
-    fall, turnover = 0.0, 1e-3 * float(np.abs(tracer.cells.x) @ np.abs(load))
+    fall, turnover, standing = 0.0, 1e-3 * float(np.abs(tracer.cells.x) @ np.abs(load)), 0
     for _ in range(1_000 + 100 * len(tracer.cells)):
         t, x = tracer.factor, tracer.cells.x
         step = tracer.advance(0.0)
+        standing = standing + 1 if np.allclose(tracer.cells.x, x, rtol=1e-12, atol=0.0) else 0
+        if standing > _STANDING + 4 * len(x):
+            return None
         if step.variable is None:
             free = tracer.factor < 0.0 and tracer.stands
             return Snap(cells=None, fall=np.inf) if free else None

@@ -149,11 +149,20 @@ class Tracer:
         self.worst = max(self.worst, left)
         if left > allowed:
             self._factorise()
-        correction = self._inverse @ residual
+        self._find_direction()
+        self._correct(self._inverse @ residual)
+
+    def _correct(self, change: Array) -> None:
+        """Take a change off: of all points of the curve the nearest, since the driving variable may be the slowest."""
         if self.driver != FACTOR:
-            self.factor -= float(correction[self.driver])
-            correction[self.driver] = 0.0
-        self.cells.tau -= correction
+            along = np.where(self.cells.moving, self.rates, 0.0)
+            scale = float(np.max(np.abs(along), initial=0.0)) or 1.0
+            along, rate, own = along / scale, self.factor_rate / scale, float(change[self.driver])
+            change[self.driver] = 0.0
+            way = float(along @ change) / (float(along @ along) or 1.0)
+            change -= way * self.rates / scale
+            self.factor -= own - way * rate
+        self.cells.tau -= change
 
     # -- events
 
@@ -203,24 +212,29 @@ class Tracer:
         return bool((aim - self.factor) * self.factor_rate > 0.0) and not self.stands
 
     def _ends(self) -> tuple[Integers, Array, Array, Array, Array]:
-        """The variables that approach an end: numbers, distances, distances of the order ε, speeds, roundings."""
+        """The variables that approach an end: numbers, distances, those of the order ε, speeds, what may be passed."""
         cells, rates = self.cells, self.rates
-        speed, size = np.abs(rates), self._sizes()
+        speed, size = np.abs(rates), self.sizes()
         inward = cells.outward * rates < 0.0
         distance = np.where(rates > 0.0, cells.high - cells.tau, cells.tau - cells.low)
         small = np.where(rates > 0.0, -self.small, self.small)
         distance, small = np.where(inward, 0.0, distance), np.where(inward, self._behind, small)
         moves = speed > 1e-11 * self._fastest(speed)
         at = np.flatnonzero(moves & np.isfinite(distance))
-        return at, np.maximum(distance[at], 0.0), small[at], speed[at], 1e-11 * size[at]
+        slack, beyond = np.maximum(distance[at], 0.0), np.maximum(-distance[at], 0.0)
+        return at, slack, small[at], speed[at], np.maximum(1e-11 * size[at] - beyond, 0.0)
 
     def _fastest(self, speed: Array) -> Array:
-        """The greatest speed of the same kind, of displacements or of forces, (n,)."""
+        """The greatest speed of the same kind, of displacements or of forces, (n,).
+
+        Where a body moves as a whole, the forces' speeds are what rounding leaves of stiffness times displacement.
+        """
         moving = self.cells.moving
         kinds = [float(np.max(speed[kind], initial=0.0)) for kind in (moving, ~moving)]
-        return np.asarray(np.where(moving, kinds[0], kinds[1]))
+        elastic = 0.1 * float(np.max(np.diag(self._stiffness), initial=0.0)) * kinds[0]
+        return np.asarray(np.where(moving, kinds[0], max(kinds[1], elastic)))
 
-    def _sizes(self) -> Array:
+    def sizes(self) -> Array:
         """What coordinates are measured by: displacements or forces, (n,)."""
         cells = self.cells
         moving = cells.moving
@@ -251,7 +265,6 @@ class Tracer:
         self.small[i] = 0.0
         self._behind[i] = self._lag[i]
         self.refine()
-        self._find_direction()
 
     def _factor_stands(self) -> bool:
         """Whether the factor stands still, but for rounding, while unknowns move."""
@@ -268,10 +281,8 @@ class Tracer:
             aim: the factor at which to stop.
         """
         chosen = self._first_end(aim)
-        if chosen is None or chosen[0] == FACTOR:
-            return False
         numbers, slack, _, _, allowed = self._ends()
-        return bool(np.any(slack[numbers == chosen[0]] <= allowed[numbers == chosen[0]]))
+        return chosen is not None and bool(np.any((slack <= allowed)[numbers == chosen[0]]))
 
     def at_rest(self, peak: float) -> bool:
         """Whether loads and forces have gone back to nothing: where nothing else holds a body, it is free.

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...system.condensed_problem import CondensedProblem
 from ...typing import Array
-from ..exact import is_singular, never
+from ..beginning import is_singular
 from ..state import End, Event, Follow, PathOptions, PathState, Place, Position
 from .curve import Curve, Move, Outcome
 from .energies import Balance, displacement_rate
@@ -44,7 +44,7 @@ class ArcLengthFollower:
         problem: CondensedProblem,
         options: PathOptions,
         resume: PathState | None = None,
-        interrupted: Callable[[], bool] = never,
+        interrupted: Callable[[], bool] = lambda: False,
         fineness: float = 1.0,
     ) -> None:
         self._problem, self._options, self._resume = problem, options, resume

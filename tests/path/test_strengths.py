@@ -1,0 +1,59 @@
+"""Strengths that statics or energy alone give, whatever the form of the law."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from runs import ROOT
+
+import hvi_fenicsx as hvi
+
+PUSH = 6e5
+GLUES = ("[[0,0],[4e-6,5e6],[2e-5,0]]", "[[0,0],[2e-6,1.25e7],[8e-6,0]]")
+"""Two laws whose area is 50 J/m²."""
+
+
+def block(press: float, modulus: float) -> hvi.Scene:
+    """The demo with another press and modulus; only the push is scaled."""
+    changes = [
+        f"boundary.press.traction=[0.0,{-press!r}]",
+        f"material.youngs_modulus={modulus!r}",
+        "domain.cells=[4,4]",
+    ]
+    changes += ["path.to=3.0", 'path.scaled=["push.traction"]']
+    return hvi.read_scene(ROOT / "demos" / "pushed_block.toml", changes)
+
+
+def test_a_block_tips_where_the_moments_about_its_edge_say() -> None:
+    """P H²/2 = Q L²/2 at H = L: the factor Q/P, however it slips and whatever of its floor has opened before."""
+    path = hvi.follow(block(press=4e5, modulus=2.15e11))
+    assert path.converged
+    assert path.end == "escapes"
+    assert path.peak_factor == pytest.approx(4e5 / PUSH, rel=1e-9)
+    assert path.events.count("release") >= 3
+
+
+@pytest.mark.parametrize(("modulus", "least"), [(2.15e15, 0.9999), (2.15e11, 0.75)])
+def test_a_stiff_block_slides_at_the_peak_of_its_floor_and_an_elastic_one_below(modulus: float, least: float) -> None:
+    path = hvi.follow(block(press=4e6, modulus=modulus))
+    assert path.converged
+    assert path.end == "escapes"
+    assert least < path.peak_factor * PUSH / 1e6 < 1.0 + 1e-9
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("points", GLUES)
+def test_a_strip_is_peeled_off_by_the_moment_that_the_area_of_the_law_gives(points: str) -> None:
+    """M²/(2 E' I) = Gc: the factor of the jump that releases most; what is done before is done at that moment too."""
+    scene = hvi.read_scene(ROOT / "demos" / "peeling_moment.toml", [f"boundary.glue.adhesion.points={points}"])
+    path = hvi.follow(scene)
+    bending = 7e10 / (1 - 0.3**2) * 0.005**3 / 12
+    assert path.converged
+    assert jumped(path) * 200.0 == pytest.approx(np.sqrt(2 * bending * 50.0), rel=6e-3)
+
+
+def jumped(path: Any) -> float:
+    """The factor at which most energy is released."""
+    return float(max((path.rows[n] for n in path.jumps), key=lambda row: row.released).factor)
