@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from ..mesh import nodes
 from ..runtime.mpi import largest
 from . import cost_forecast
@@ -52,4 +54,5 @@ def between(one: AdaptiveRun, other: AdaptiveRun, thresholds: ChoiceThresholds =
 def _needed(run: AdaptiveRun, error: float, wanted: float) -> float:
     """The unknowns that an error takes. Errors on Γc fall as the square of those in the energy norm."""
     rate = run.elements.rate * (1 if run.quantity.in_energy_norm else 2)
-    return float(run.level.dofs * max(1.0, error / wanted) ** (1.0 / rate))
+    with np.errstate(over="ignore"):
+        return float(run.level.dofs * np.maximum(1.0, np.float64(error) / wanted) ** (1.0 / rate))

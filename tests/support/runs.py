@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import contextlib
+import fcntl
 import io
 import json
 import signal
 import subprocess
 import sys
+import tempfile
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -46,19 +49,31 @@ def hvi(*words: object, ranks: int = 1, cwd: Path = ROOT) -> subprocess.Complete
     return subprocess.CompletedProcess(words, code, out.getvalue(), err.getvalue())
 
 
+@contextlib.contextmanager
+def cores(ranks: int) -> Iterator[None]:
+    """Several ranks run while no other test's do: on shared cores they take ten times as long."""
+    if ranks == 1:
+        yield
+        return
+    with (Path(tempfile.gettempdir()) / "hvi-tests-ranks.lock").open("w") as file:
+        fcntl.flock(file, fcntl.LOCK_EX)
+        yield
+
+
 def process(*words: object, ranks: int = 1, cwd: Path = ROOT) -> subprocess.CompletedProcess[str]:
     """A command to its end, in a process of its own or in several: slower by a second of imports."""
-    return subprocess.run(
-        command(*words, ranks=ranks), cwd=cwd, capture_output=True, text=True, check=False, timeout=300
-    )
+    with cores(ranks):
+        return subprocess.run(
+            command(*words, ranks=ranks), cwd=cwd, capture_output=True, text=True, check=False, timeout=300
+        )
 
 
 def on_ranks(ranks: int, script: str, *words: object) -> Any:
     """What a script under mpirun prints in its last line, as JSON."""
     python = [sys.executable, "-m", "mpi4py", script, *map(str, words)]
-    done = subprocess.run(
-        ["mpirun", "-n", str(ranks), *python], cwd=ROOT, capture_output=True, text=True, check=False, timeout=300
-    )
+    words = ["mpirun", "-n", str(ranks), *python]
+    with cores(ranks):
+        done = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=False, timeout=300)
     assert done.returncode == 0, done.stderr
     return json.loads(done.stdout.splitlines()[-1])
 
@@ -81,7 +96,8 @@ def run_all(folder: Path, scenes: dict[str, dict[str, Any]], ranks: int) -> None
             hvi("run", folder / f"{name}.toml", "--out", folder / f"{name}-1", "--no-pictures")
         return
     python = [sys.executable, "-m", "mpi4py", "-c", _RUN_ALL, str(folder), str(ranks), *scenes]
-    subprocess.run(["mpirun", "-n", str(ranks), *python], check=True, capture_output=True, timeout=300)
+    with cores(ranks):
+        subprocess.run(["mpirun", "-n", str(ranks), *python], check=True, capture_output=True, timeout=300)
 
 
 def write_scene(path: Path, table: dict[str, Any]) -> Path:

@@ -5,6 +5,7 @@ All that whole runs on several ranks are asked for is here, since starting MPI t
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -12,12 +13,11 @@ import meshes
 import numpy as np
 import numpy.typing as npt
 import pytest
-from runs import ROOT, contact, run_all, summary, table
+from runs import RANKS, ROOT, contact, run_all, summary, table
 from scenes import STEEL, Table, block, model, quadratic_linear, two_blocks
 
 from hvi_fenicsx import read_scene
 
-RANKS = (1, 2, 3)
 PAPER = quadratic_linear(1.0e3)
 HELD_BELOW = model(4)
 HELD_BELOW["boundary"]["floor"] = {"on": "bottom", "displacement": ["free", 0.0]}
@@ -54,27 +54,46 @@ for lifted in METHODS.values():
     lifted["boundary"]["press"] = LIFTING
 DEMOS: dict[str, list[str]] = {"hertz": [], "thermal_bar": [], "strong_law": ["domain.cells=[12, 12]"]}
 """A shape that gmsh meshes on rank 0, a heated bar of two materials, a field of stresses; at their own tolerances."""
+LATE = {"exact", "tresca", "gamg", "metastable", "degree-2", "joined", "thermal_bar", "tao", "ssls"}
+"""Scenes of the long tests: each has another like it among the fast ones."""
+
+
+class Results:
+    """Folders NAME-RANKS; all scenes of one number of ranks run when the first of them is asked for."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder, self.done = folder, set[tuple[int, bool]]()
+        tables = {name: table | {"solver": {**table["solver"], "tolerance": 1e-12}} for name, table in SCENES.items()}
+        file = meshes.make(folder / "square.msh", meshes.GOOD)
+        tables["of-a-mesh-file"]["domain"] = {"shape": "file", "file": str(file)}
+        for name, changes in DEMOS.items():
+            tables[name] = read_scene(ROOT / "demos" / f"{name}.toml", changes).model_dump()
+        self.tables = tables | METHODS
+
+    def of(self, name: str, ranks: int) -> Path:
+        """The folder of one run."""
+        late = name in LATE
+        if (ranks, late) not in self.done:
+            run_all(self.folder, {n: t for n, t in self.tables.items() if (n in LATE) == late}, ranks)
+            self.done.add((ranks, late))
+        return self.folder / f"{name}-{ranks}"
 
 
 @pytest.fixture(scope="module")
-def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with NAME-RANKS for all scenes."""
-    folder = tmp_path_factory.mktemp("ranks")
-    tables = {name: table | {"solver": {**table["solver"], "tolerance": 1e-12}} for name, table in SCENES.items()}
-    file = meshes.make(folder / "square.msh", meshes.GOOD)
-    tables["of-a-mesh-file"]["domain"] = {"shape": "file", "file": str(file)}
-    tables |= METHODS
-    for name, changes in DEMOS.items():
-        tables[name] = read_scene(ROOT / "demos" / f"{name}.toml", changes).model_dump()
-    for ranks in RANKS:
-        run_all(folder, tables, ranks)
-    return folder
+def results(tmp_path_factory: pytest.TempPathFactory) -> Results:
+    """The runs of all scenes."""
+    return Results(tmp_path_factory.mktemp("ranks"))
+
+
+def scenes(names: Iterable[str]) -> list[Any]:
+    """Names as parameters; some scenes run with the long tests only."""
+    return [pytest.param(name, marks=pytest.mark.long if name in LATE else ()) for name in names]
 
 
 @pytest.mark.parametrize("ranks", RANKS[1:])
-@pytest.mark.parametrize("name", SCENES)
-def test_several_ranks_tell_what_one_tells(name: str, ranks: int, results: Path) -> None:
-    one, other = results / f"{name}-1", results / f"{name}-{ranks}"
+@pytest.mark.parametrize("name", scenes(SCENES))
+def test_several_ranks_tell_what_one_tells(name: str, ranks: int, results: Results) -> None:
+    one, other = results.of(name, 1), results.of(name, ranks)
     assert summary(other)["ranks"] == ranks
     assert summary(other)["energy"] == pytest.approx(summary(one)["energy"], rel=1e-10)
     assert same_summary(summary(one), summary(other))
@@ -83,10 +102,10 @@ def test_several_ranks_tell_what_one_tells(name: str, ranks: int, results: Path)
 
 
 @pytest.mark.parametrize("ranks", RANKS)
-@pytest.mark.parametrize("name", SCENES)
-def test_each_of_them_is_certified(name: str, ranks: int, results: Path) -> None:
+@pytest.mark.parametrize("name", scenes(SCENES))
+def test_each_of_them_is_certified(name: str, ranks: int, results: Results) -> None:
     """The law of the paper's own data is a thousandth of the load: there rounding leaves 1e-11 of its traction."""
-    record = summary(results / f"{name}-{ranks}")
+    record = summary(results.of(name, ranks))
     certificate, weak = record["certificate"], name in ("paper", "exact")
     assert record["exit_code"] == 0
     assert (certificate["rounding"] or 0.0) < (1e-10 if weak else 1e-11)
@@ -95,33 +114,33 @@ def test_each_of_them_is_certified(name: str, ranks: int, results: Path) -> None
 
 
 @pytest.mark.parametrize("ranks", RANKS[1:])
-@pytest.mark.parametrize("name", ["lift-off", "tresca", "of-a-mesh-file", "joined", "joined-in-space"])
-def test_the_error_is_estimated_alike(name: str, ranks: int, results: Path) -> None:
-    one, other = (summary(results / f"{name}-{n}")["estimate"] for n in (1, ranks))
+@pytest.mark.parametrize("name", scenes(["lift-off", "tresca", "of-a-mesh-file", "joined", "joined-in-space"]))
+def test_the_error_is_estimated_alike(name: str, ranks: int, results: Results) -> None:
+    one, other = (summary(results.of(name, n))["estimate"] for n in (1, ranks))
     for entry in ("relative", "discretisation", "energy_norm"):
         assert other[entry] == pytest.approx(one[entry], rel=1e-10), entry
 
 
 @pytest.mark.parametrize("ranks", RANKS[1:])
-@pytest.mark.parametrize("name", [*DEMOS, *METHODS])
-def test_several_ranks_find_what_one_finds(name: str, ranks: int, results: Path) -> None:
-    one, other = (summary(results / f"{name}-{n}") for n in (1, ranks))
+@pytest.mark.parametrize("name", scenes([*DEMOS, *METHODS]))
+def test_several_ranks_find_what_one_finds(name: str, ranks: int, results: Results) -> None:
+    one, other = (summary(results.of(name, n)) for n in (1, ranks))
     assert other["exit_code"] == 0
     assert other["energy"] == pytest.approx(one["energy"], rel=1e-8 if name in METHODS else 1e-9)
     assert same_summary(one, other)
 
 
 @pytest.mark.parametrize("ranks", RANKS[1:])
-def test_several_ranks_write_the_stress_of_one(ranks: int, results: Path) -> None:
-    one, other = (stresses(results / f"strong_law-{n}") for n in (1, ranks))
+def test_several_ranks_write_the_stress_of_one(ranks: int, results: Results) -> None:
+    one, other = (stresses(results.of("strong_law", n)) for n in (1, ranks))
     assert np.ptp(one) > 0.1 * one.max()
     np.testing.assert_allclose(other, one, rtol=1e-6)
 
 
 @pytest.mark.parametrize("ranks", RANKS[1:])
 @pytest.mark.parametrize("name", ["lift-off", "of-a-mesh-file", "fewer-cells-than-ranks"])
-def test_several_ranks_write_the_forces_of_one(name: str, ranks: int, results: Path) -> None:
-    one, other = results / f"{name}-1", results / f"{name}-{ranks}"
+def test_several_ranks_write_the_forces_of_one(name: str, ranks: int, results: Results) -> None:
+    one, other = results.of(name, 1), results.of(name, ranks)
     assert_same_table(table(one / "boundary.csv"), table(other / "boundary.csv"))
     forces, largest = summary(one)["resultants"], 6e6
     assert list(forces) == list(summary(other)["resultants"])
