@@ -22,6 +22,9 @@ from .cells import Cells
 from .segments import Segment
 from .step import FACTOR, Step
 
+_SLOW = 1e-6
+"""A variable that moves by so little of the fastest one fixes no point of the curve."""
+
 
 class Tracer:
     """The curve from one of its points on.
@@ -153,13 +156,14 @@ class Tracer:
         self._correct(self._inverse @ residual)
 
     def _correct(self, change: Array) -> None:
-        """Take a change off: of all points of the curve the nearest, since the driving variable may be the slowest."""
+        """Take a change off, the driving variable held; if that is a slow one, to the nearest point of the curve."""
         if self.driver != FACTOR:
             along = np.where(self.cells.moving, self.rates, 0.0)
             scale = float(np.max(np.abs(along), initial=0.0)) or 1.0
             along, rate, own = along / scale, self.factor_rate / scale, float(change[self.driver])
             change[self.driver] = 0.0
-            way = float(along @ change) / (float(along @ along) or 1.0)
+            slow = abs(self.rates[self.driver]) < _SLOW * scale
+            way = float(along @ change) / (float(along @ along) or 1.0) if slow else 0.0
             change -= way * self.rates / scale
             self.factor -= own - way * rate
         self.cells.tau -= change

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from documents import DOCUMENTS, ROOT, Block, blocks, commands
 
-LEFT_OUT = re.compile(r"^(\./hvi (test\b|exec python3 (benchmarks|tests)/)|pip |docker |time )")
+LEFT_OUT = re.compile(r"^(\./hvi (test\b|exec python3 (benchmarks|tests|verification)/)|pip |docker |time )")
 """The tests themselves, what takes minutes to hours on a quiet machine, and what changes the machine."""
 READER = ("hvi", "demos", "benchmarks", "docs", "hvi_fenicsx")
 """What a command may name, relative to the root of the repository."""
