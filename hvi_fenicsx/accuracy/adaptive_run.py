@@ -103,12 +103,15 @@ class AdaptiveRun:
         tolerance = min(self.thresholds.coarsest_tolerance, scene.solver.tolerance * 1e3)
         return self.solver.begin_resolved(with_tolerance(scene, tolerance), self.comm, self.thresholds)
 
+    def _cost(self, accuracy: float) -> Cost:
+        return cost_forecast.cost(self.steps, accuracy, self.elements, self.base, self.quantity.power_of_energy)
+
     def _cost_of_more(self) -> Cost | None:
         """What a tenth of the error would cost."""
         if not self.steps or not math.isfinite(self.steps[-1].error) or self.steps[-1].error <= 0:
             return None
         wanted = (self.goal.accuracy or self.steps[-1].error) / 10
-        needed = cost_forecast.cost(self.steps, wanted, self.elements, self.base)
+        needed = self._cost(wanted)
         return needed if math.isfinite(needed.dofs) else None
 
     def _record(self, level: AdaptiveLevel, start: float) -> str | None:
@@ -183,7 +186,7 @@ class AdaptiveRun:
         fewest = 1 if self.quantity.in_energy_norm else self.thresholds.meshes_before_forecast
         if len(known) < fewest or self.goal.accuracy is None:
             return None
-        needed = cost_forecast.cost(self.steps, self.goal.accuracy, self.elements, self.base)
+        needed = self._cost(self.goal.accuracy)
         if needed.dofs <= _LARGEST and needed.memory <= self.room:
             return None
         if not math.isfinite(needed.dofs):

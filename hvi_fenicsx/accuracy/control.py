@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -37,7 +36,19 @@ def solve_to_goal(
     Raises:
         InputError: on all ranks alike: the scene has no such quantity, or does not fit its mesh.
     """
-    begun = functools.partial(_begun, scene, comm, goal, solver, report, thresholds)
+
+    def begun(degree: int) -> AdaptiveRun:
+        run = AdaptiveRun(
+            scene=scene.with_solver(degree=degree),
+            comm=comm,
+            goal=goal,
+            solver=solver,
+            report=report,
+            thresholds=thresholds,
+        )
+        run.begin()
+        return run
+
     choice, run = None, begun(scene.solver.degree or 1)
     if scene.solver.degree is None and not scene.interface and degree_choice.worthwhile(run):
         other = begun(2)
@@ -47,25 +58,3 @@ def solve_to_goal(
         del other
     found = run.finish()
     return replace(found, solution=replace(found.solution, scene=scene), choice=choice)
-
-
-def _begun(
-    scene: Scene,
-    comm: MPI.Comm,
-    goal: Goal,
-    solver: AdaptiveSolver,
-    report: Callable[[str], None],
-    thresholds: ControlThresholds,
-    degree: int,
-) -> AdaptiveRun:
-    """A run at a degree, on its first mesh. Collective."""
-    run = AdaptiveRun(
-        scene=scene.with_solver(degree=degree),
-        comm=comm,
-        goal=goal,
-        solver=solver,
-        report=report,
-        thresholds=thresholds,
-    )
-    run.begin()
-    return run

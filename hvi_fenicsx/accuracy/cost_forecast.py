@@ -87,20 +87,23 @@ class Elements:
         return DEFAULT.adaptive[self.dimension] * DEFAULT.of_degree[self.degree] / 1024
 
 
-def rate(steps: Sequence[AdaptiveStep], elements: Elements, thresholds: ForecastThresholds = FORECAST) -> float:
+def rate(
+    steps: Sequence[AdaptiveStep], elements: Elements, power: int = 1, thresholds: ForecastThresholds = FORECAST
+) -> float:
     """The observed r in error = C dofs^-r; the optimal one as long as too few steps say otherwise.
 
     Args:
         steps: so far.
         elements: that are refined.
+        power: of the error in the energy norm with which this error falls at best, 1 or 2.
         thresholds: when it is believed.
     """
     known = [s for s in steps if math.isfinite(s.error) and s.error > 0][-thresholds.fitted :]
-    best = elements.rate
+    best = power * elements.rate
     if len(known) < 3 or known[-1].dofs == known[0].dofs:
         return best
     slope = np.polyfit(np.log([s.dofs for s in known]), np.log([s.error for s in known]), 1)[0]
-    observed = max(float(-slope), thresholds.slowest * best)
+    observed = max(float(-slope), thresholds.slowest * elements.rate)
     return observed if len(steps) >= thresholds.trusted else max(observed, best)
 
 
@@ -109,6 +112,7 @@ def cost(
     accuracy: float,
     elements: Elements,
     base: float,
+    power: int = 1,
     thresholds: ForecastThresholds = FORECAST,
 ) -> Cost:
     """What an accuracy will take by the observed rate.
@@ -118,10 +122,11 @@ def cost(
         accuracy: relative.
         elements: that are refined.
         base: memory of the program without a mesh, MB.
+        power: of the error in the energy norm with which this error falls at best, 1 or 2.
         thresholds: of the forecast.
     """
     last = steps[-1]
-    growth = _power(max(1.0, last.error / accuracy), 1.0 / rate(steps, elements, thresholds))
+    growth = _power(max(1.0, last.error / accuracy), 1.0 / rate(steps, elements, power, thresholds))
     ahead = _duration(steps, last.dofs, last.dofs * growth)
     needed = memory(steps, last.dofs * growth, elements, base, thresholds)
     return Cost(accuracy, last.dofs * growth, sum(s.seconds for s in steps) + ahead, needed)

@@ -52,7 +52,7 @@ def between(one: AdaptiveRun, other: AdaptiveRun, thresholds: ChoiceThresholds =
 
 
 def _needed(run: AdaptiveRun, error: float, wanted: float) -> float:
-    """The unknowns that an error takes. Errors on Γc fall as the square of those in the energy norm."""
-    rate = run.elements.rate * (1 if run.quantity.in_energy_norm else 2)
+    """The unknowns that an error takes."""
+    rate = run.elements.rate * run.quantity.power_of_energy
     with np.errstate(over="ignore"):
         return float(run.level.dofs * np.maximum(1.0, np.float64(error) / wanted) ** (1.0 / rate))

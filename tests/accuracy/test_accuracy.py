@@ -288,6 +288,13 @@ def test_a_forecast_holds_where_the_steps_go_on_as_they_did() -> None:
     assert cost_forecast.seconds(known, steps[7].dofs) == pytest.approx(steps[7].seconds, rel=0.1)
 
 
+def test_of_few_meshes_a_slow_start_does_not_forecast_what_contact_fields_take() -> None:
+    """Their errors fall as the square of the energy norm's once the mesh sees them."""
+    known = hierarchy(0.5, 4)
+    found = cost_forecast.cost(known, known[-1].error / 10, Elements(dimension=2), 150.0, power=2)
+    assert found.dofs == pytest.approx(10 * known[-1].dofs)
+
+
 def test_an_accuracy_beyond_all_numbers_is_refused_in_words() -> None:
     reached = reach(Scene.model_validate(STRONG), Goal(1e-200))
     assert reached.why == "1e-200 is beyond any number of unknowns"

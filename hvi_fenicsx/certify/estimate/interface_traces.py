@@ -123,29 +123,25 @@ class InterfaceTrace:
     ) -> None:
         self._problem, self._bubbles, self._points = problem, bubbles, points
         self._surface, self._directions, self.weights = surface, directions, points.weights
-        vectors = self._interpolated(directions.reshape(len(directions), -1))
+        vectors = self.interpolated(directions.reshape(len(directions), -1))
         self._vectors = vectors.reshape(*self.weights.shape, *directions.shape[1:])
 
-    def _interpolated(self, values: Array) -> Array:
-        """Values at the owned vertices (m, k) at the points, (f, q, k). Collective."""
+    def interpolated(self, values: Array) -> Array:
+        """Values at the owned vertices (m, k) at the points, linear between them, (f, q, k). Collective."""
         return np.asarray(self._points.places[0] @ self._points.spread.at_corners(values)[self._points.facets[0]])
 
     def at_nodes(self, values: Array) -> Array:
         """Values at the owned vertices (m, k) at the corners of the intersections, (f, d, k). Collective."""
         return np.asarray(self._points.corners @ self._points.spread.at_corners(values)[self._points.facets[0]])
 
-    def interpolated(self, values: Array) -> Array:
-        """Linear interpolation of values at the owned vertices (m, k); (f, q, k). Collective."""
-        return self._interpolated(values)
-
     def from_node_to_node(self, values: Array) -> Array:
         """The same: interfaces are of degree 1. Collective."""
-        return self._interpolated(values)
+        return self.interpolated(values)
 
     def of_field(self, u: fem.Function) -> Array:
         """The relative values of a P1 field, (f, q, k). Collective."""
         there = self._surface.values(self._problem.relative(u.x.array))
-        return self._interpolated(np.einsum("mkd,md->mk", self._directions, there))
+        return self.interpolated(np.einsum("mkd,md->mk", self._directions, there))
 
     def of_field_from_node_to_node(self, u: fem.Function) -> Array:
         """The same: interfaces are of degree 1. Collective."""
