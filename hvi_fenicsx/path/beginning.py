@@ -14,6 +14,7 @@ from .cells import Cells
 from .descent import Descent
 from .passing import go_on
 from .placing import place
+from .spectrum import is_singular
 from .step import FACTOR
 from .tracer import Tracer
 
@@ -55,7 +56,7 @@ def at_rest(problem: CondensedProblem, remember: Collection[int], aim: float) ->
     size = float(np.max(np.abs(held), initial=0.0)) + float(np.max(np.abs(problem.force), initial=0.0))
     rate = away if np.max(np.abs(away), initial=0.0) > 1e-14 * size else aim * problem.force_rate
     cells = place(problem.stiffness, chains, x, force)
-    if not is_held(cells):
+    if is_singular(cells.tangent()[0]):
         settled = _settled(bonds, replace(problem, force=held, force_rate=rate))
         if settled is None:
             return Beginning(cells=None, memory=bonds.memory, reason="nothing holds the body at rest")
@@ -70,33 +71,9 @@ def _nearest(bonds: BondTable, x: Array, wanted: Array) -> Array:
     """The forces of laws and bounds at given displacements, as near to wanted ones as they can be, (n,)."""
     problem, found = bonds.problem, np.zeros_like(x)
     for i in range(len(x)):
-        standing = [s for s in bonds.chain(i) if s.displacement(s.coordinate(float(x[i]), s.force)) == x[i]]
-        options = [s.force + (s.rise or s.slope) * s.coordinate(float(x[i]), 0.0) for s in standing]
-        found[i] = min(options, key=abs) if options else 0.0
+        forces = [s.force_at(float(x[i])) for s in bonds.chain(i) if s.stands_at(float(x[i]))]
+        found[i] = min(forces, key=abs) if forces else 0.0
     return np.where((problem.lower == problem.upper), wanted, found)
-
-
-def is_singular(stiffness: Array) -> bool:
-    """Whether bounds and laws alone hold the body.
-
-    Args:
-        stiffness: S, (n, n).
-    """
-    values = np.linalg.eigvalsh(stiffness) if len(stiffness) else np.ones(1)
-    return bool(values[0] <= 1e-11 * values[-1])
-
-
-def is_held(cells: Cells) -> bool:
-    """Whether the tangent holds the body.
-
-    Args:
-        cells: where the unknowns are.
-    """
-    matrix, free = cells.tangent()
-    if not free.size:
-        return True
-    values = np.linalg.eigvalsh(matrix)
-    return bool(values[0] > 1e-11 * values[-1])
 
 
 def _settled(bonds: BondTable, problem: CondensedProblem) -> Cells | None:

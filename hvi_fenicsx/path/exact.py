@@ -6,25 +6,28 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 import numpy as np
+from typing_extensions import override
 
 from ..system.condensed_problem import CondensedProblem
 from ..typing import Array, Integers
-from .beginning import Beginning, at_rest, is_held, is_singular
+from .beginning import Beginning, at_rest
 from .bonds import BondTable
 from .books import EnergyBalance
 from .cells import Cells
 from .descent import Descent, Landing
 from .onward import chosen, ways_on
-from .passing import Passing, classify, go_on, place_of
+from .passing import Passing, classify, go_on
 from .placing import place
+from .programme import ProgrammeFollower
 from .rounds import Round, Rounds
 from .snap import snap
-from .state import End, Event, Follow, PathOptions, PathState, Place, Position
+from .spectrum import is_singular
+from .state import End, Event, Follow, PathOptions, PathState, Place, Position, place_of
 from .step import FACTOR
 from .tracer import Tracer
 
 
-class ExactFollower:
+class ExactFollower(ProgrammeFollower):
     """The path of a problem. A :class:`.Follower`.
 
     Args:
@@ -51,33 +54,19 @@ class ExactFollower:
         interrupted: Callable[[], bool] = lambda: False,
         beginning: Beginning | None = None,
     ) -> None:
-        self._problem, self._options, self._interrupted = problem, options, interrupted
-        self._beginning = beginning
-        self._bonds = BondTable(problem, options.remember)
-        self._resume, self._events, self._leg = resume, 0, 0
-        self.end: End | None = None
-        self.reason = ""
-        self._unstable = 0
-        self._moved, self._direction = 0, 1
-        self._peak, self._floats, self._blocked = 0.0, is_singular(problem.stiffness), False
+        super().__init__(problem, options, resume, interrupted)
+        self._beginning, self._bonds = beginning, BondTable(problem, options.remember)
+        self._moved, self._direction, self._blocked = 0, 1, False
         self.tracer: Tracer
 
-    def states(self) -> Iterator[PathState]:
-        """The states from start to end; the first one of a path that is resumed is the next one."""
-        begin = self._begun() if self._resume is None else self._resumed(self._resume)
-        yield from begin
-        programme = list(self._options.programme)
-        while self.end is None and self._leg < len(programme):
-            yield from self._towards(programme[self._leg])
-            self._leg += 1
-            if self.end is None:
-                last = self._leg == len(programme)
-                if last:
-                    self._finish(End.REACHED, "the programme is done")
-                yield self._state(Event.END if last else Event.TURN)
+    @property
+    @override
+    def factor(self) -> float:
+        return self.tracer.factor
 
     # -- beginning
 
+    @override
     def _begun(self) -> Iterator[PathState]:
         programme, remember = self._options.programme, self._options.remember
         start = self._beginning or at_rest(self._problem, remember, programme[0])
@@ -104,14 +93,14 @@ class ExactFollower:
             return Beginning(cells=None, memory=follower.memory, reason=reason)
         return Beginning(cells=follower.tracer.cells, memory=follower.memory)
 
-    def _resumed(self, state: PathState) -> Iterator[PathState]:
+    @override
+    def _restore(self, state: PathState) -> None:
         if state.memory is not None:
             self._bonds.restore(state.memory)
         self._balance = EnergyBalance(self._problem, self._bonds, state.work, state.dissipated)
         self._unstable, self._leg = state.unstable, state.position.leg
         self._follow_from(self._placed(state.x, state.factor, state.position.numbers), state.factor, state.position)
         self._begin_balance(anew=False)
-        yield from ()
 
     def _placed(self, x: Array, factor: float, numbers: Integers | None = None) -> Cells:
         """The cell of an equilibrium."""
@@ -138,8 +127,8 @@ class ExactFollower:
 
     # -- one leg of the programme
 
+    @override
     def _towards(self, aim: float) -> Iterator[PathState]:
-        """From event to event until the factor reaches its aim or the path ends."""
         self._orient(aim)
         self._rounds = Rounds(self.tracer.cells.x)
         while self.end is None and self.tracer.factor != aim:
@@ -155,7 +144,8 @@ class ExactFollower:
             self._balance.go(cells.x, cells.bond_force, self.tracer.factor)
             if step.variable != FACTOR:
                 yield self._noted(self._pass(go_on(self.tracer, self._bonds, step)), aim)
-            self._watch()
+            if self.end is None:
+                self._watch()
             if self.end is not None:
                 yield self._state(Event.END)
 
@@ -166,17 +156,10 @@ class ExactFollower:
         if not under_way and self.tracer.factor_rate * wanted < 0.0:
             self.tracer.turn()
 
-    def _watch(self) -> None:
-        self._events += 1
-        self._peak = max(self._peak, abs(self.tracer.factor))
-        if self.end is not None:
-            return
-        if self._floats and self._peak > 0.0 and self.tracer.at_rest(self._peak) and not is_held(self.tracer.cells):
-            self._finish(End.ESCAPES, "the load is back at zero, and nothing holds the body any more")
-        elif self._interrupted():
-            self._finish(End.INTERRUPTED, "interrupted")
-        elif self._events > self._options.most_events:
-            self._finish(End.LOST, f"no end after {self._options.most_events} events")
+    @override
+    def _is_off(self) -> bool:
+        tracer = self.tracer
+        return self._peak > 0.0 and tracer.at_rest(self._peak) and is_singular(tracer.cells.tangent()[0])
 
     def _noted(self, state: PathState, aim: float) -> PathState:
         """The state after an event; where the path comes back to one, another way is taken, or the path ends."""
@@ -206,7 +189,9 @@ class ExactFollower:
             self._moved, self._direction = passing.unknown, passing.direction
         if passing.neutral:
             self._unstable = self.tracer.cells.unstable_directions()
-        place = place_of(passing, self._problem, self._bonds)
+        here = self._bonds.at(passing.unknown)
+        group = here[0].group if here and not passing.at_bound else None
+        place = place_of(self._problem, passing.unknown, group)
         return self._state(classify(passing), place, bifurcation=passing.bifurcation)
 
     def _endless(self) -> None:
@@ -272,9 +257,7 @@ class ExactFollower:
 
     # -- reports
 
-    def _finish(self, end: End, reason: str) -> None:
-        self.end, self.reason = end, reason
-
+    @override
     def _state(self, event: Event, place: Place | None = None, *, bifurcation: bool = False) -> PathState:
         tracer, balance = self.tracer, self._balance
         return PathState(

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Collection
+from collections.abc import Collection
+from typing import Protocol
 
 from typing_extensions import override
 
@@ -12,17 +13,36 @@ from .arc_length.distances import CurvedDistances
 from .arc_length.follower import ArcLengthFollower
 from .bonds import is_piecewise_linear
 from .exact import ExactFollower
-from .state import Follower, PathOptions, PathState
+from .programme import ProgrammeFollower
+from .state import PathState
 from .straight_distances import StraightDistances
 
-Distance = Callable[[PathState], float]
-"""How far a state is from the graphs of its laws and bounds, relative to the forces."""
+
+class Distances(Protocol):
+    """How far states are from the graphs of their laws and bounds, relative to the forces.
+
+    Args:
+        problem: the problem.
+        remember: numbers of the problem's bonds that remember.
+    """
+
+    def __init__(self, problem: CondensedProblem, remember: Collection[int]) -> None: ...
+
+    def __call__(self, state: PathState) -> float:
+        """The distance of a state."""
 
 
 class FollowerKind(ABC):
-    """A kind of follower, and how its states are certified on Γc. Subclasses are tried in the order of their making."""
+    """A kind of follower, and how its states are certified on Γc. Subclasses are tried in the order of their making.
+
+    Attributes:
+        follower: makes a follower.
+        distances: makes the distances of its states.
+    """
 
     made: list[FollowerKind] = []  # noqa: RUF012
+    follower: type[ProgrammeFollower]
+    distances: type[Distances]
 
     def __init_subclass__(cls) -> None:
         FollowerKind.made.append(cls())
@@ -31,75 +51,27 @@ class FollowerKind(ABC):
     def follows(self, problem: CondensedProblem) -> bool:
         """Whether it can follow the paths of a problem."""
 
-    @abstractmethod
-    def follower(
-        self,
-        problem: CondensedProblem,
-        options: PathOptions,
-        resume: PathState | None,
-        interrupted: Callable[[], bool],
-    ) -> Follower:
-        """A follower.
-
-        Args:
-            problem: the problem.
-            options: what path is wanted.
-            resume: the state after which to go on; None: from the factor 0.
-            interrupted: whether to stop, asked at each state.
-        """
-
-    @abstractmethod
-    def distances(self, problem: CondensedProblem, remember: Collection[int]) -> Distance:
-        """How far states are from the graphs.
-
-        Args:
-            problem: the problem.
-            remember: numbers of the problem's bonds that remember.
-        """
-
 
 class ExactKind(FollowerKind):
     """Piecewise linear laws of one component each: exactly, from event to event."""
+
+    follower = ExactFollower
+    distances = StraightDistances
 
     @override
     def follows(self, problem: CondensedProblem) -> bool:
         return is_piecewise_linear(problem)
 
-    @override
-    def follower(
-        self,
-        problem: CondensedProblem,
-        options: PathOptions,
-        resume: PathState | None,
-        interrupted: Callable[[], bool],
-    ) -> Follower:
-        return ExactFollower(problem, options, resume, interrupted)
-
-    @override
-    def distances(self, problem: CondensedProblem, remember: Collection[int]) -> Distance:
-        return StraightDistances(problem, remember)
-
 
 class ArcLengthKind(FollowerKind):
     """Any other laws: predictor and corrector."""
 
+    follower = ArcLengthFollower
+    distances = CurvedDistances
+
     @override
     def follows(self, problem: CondensedProblem) -> bool:
         return True
-
-    @override
-    def follower(
-        self,
-        problem: CondensedProblem,
-        options: PathOptions,
-        resume: PathState | None,
-        interrupted: Callable[[], bool],
-    ) -> Follower:
-        return ArcLengthFollower(problem, options, resume, interrupted)
-
-    @override
-    def distances(self, problem: CondensedProblem, remember: Collection[int]) -> Distance:
-        return CurvedDistances(problem, remember)
 
 
 def kind_of(problem: CondensedProblem) -> FollowerKind:

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..system.condensed_problem import CondensedProblem
 from .bonds import BondTable
 from .segments import Kind, Segment
-from .state import Event, Place
+from .state import Event
 from .step import Step
 from .tracer import Tracer
 
@@ -109,17 +108,3 @@ def classify(passing: Passing) -> Event:
     if passing.after.kind is Kind.BOUND:
         return Event.CONTACT
     return Event.RELEASE if passing.before.kind is Kind.BOUND else Event.KINK
-
-
-def place_of(passing: Passing, problem: CondensedProblem, bonds: BondTable) -> Place:
-    """Where a passage happened: at the part of its law or, where a contact closes or opens, of the contact.
-
-    Args:
-        passing: the passage.
-        problem: the problem.
-        bonds: its bonds.
-    """
-    i = passing.unknown
-    here = bonds.at(i)
-    part = problem.bonds[here[0].group].part if here and not passing.at_bound else problem.parts[i]
-    return Place(part=part, unknown=i, point=problem.points[i])

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..typing import Array, Integers
 from .cells import Cells
-from .segments import Kind, Segment
+from .segments import Segment
 
 
 def place(
@@ -42,16 +42,7 @@ def place(
 def _best(chain: Sequence[Segment], x: float, force: float, stiffness: float, allowed: float) -> int:
     far = [segment.distance(x, force, stiffness) for segment in chain]
     near = [i for i, distance in enumerate(far) if distance <= max(allowed, min(far))]
-    return max(near, key=lambda i: _hold(chain[i]))
-
-
-def _hold(segment: Segment) -> tuple[int, float]:
-    """How well a segment holds: bounds, rising jumps, pieces by their slope, drops."""
-    if segment.kind is Kind.PIECE:
-        return 0, segment.slope
-    if segment.kind is Kind.BOUND:
-        return 2, 0.0
-    return (1, 0.0) if segment.rise > 0.0 else (-1, 0.0)
+    return max(near, key=lambda i: chain[i].hold)
 
 
 def _snapped(segment: Segment, x: float, force: float) -> float:

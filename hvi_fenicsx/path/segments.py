@@ -86,6 +86,23 @@ class Segment:
         wanted = (force - self.force) / self.rise if self.rise else x - self.x
         return min(max(wanted, self.low), self.high)
 
+    def stands_at(self, x: float) -> bool:
+        """Whether a displacement is on the segment, to the last digit."""
+        return self.displacement(self.coordinate(x, self.force)) == x
+
+    def force_at(self, x: float) -> float:
+        """The force at a displacement on the segment; where it stands, the one nearest to zero."""
+        return self.force + (self.rise or self.slope) * self.coordinate(x, 0.0)
+
+    @property
+    def hold(self) -> tuple[int, float]:
+        """How well a segment holds, for comparison: bounds, rising jumps, pieces by their slope, drops."""
+        if self.kind is Kind.PIECE:
+            return 0, self.slope
+        if self.kind is Kind.BOUND:
+            return 2, 0.0
+        return (1, 0.0) if self.rise > 0.0 else (-1, 0.0)
+
     def distance(self, x: float, force: float, stiffness: float) -> float:
         """How far a point is from the segment, in units of force.
 

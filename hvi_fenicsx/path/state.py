@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Protocol
 
+from ..system.condensed_problem import CondensedProblem
 from ..typing import Array, Integers
 
 
@@ -60,6 +61,18 @@ class Place:
     part: str
     unknown: int
     point: Array
+
+
+def place_of(problem: CondensedProblem, unknown: int, group: int | None) -> Place:
+    """Where an event happened at an unknown: at the part of a law or, where a contact closes or opens, of the contact.
+
+    Args:
+        problem: the problem.
+        unknown: its number.
+        group: number of the problem's bonds; None: a contact.
+    """
+    part = problem.parts[unknown] if group is None else problem.bonds[group].part
+    return Place(part=part, unknown=unknown, point=problem.points[unknown])
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -6,11 +6,12 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
+from typing_extensions import override
 
 from ...system.condensed_problem import CondensedProblem
 from ...typing import Array
-from ..beginning import is_singular
-from ..state import End, Event, Follow, PathOptions, PathState, Place, Position
+from ..programme import ProgrammeFollower
+from ..state import End, Event, Follow, PathOptions, PathState, Place, Position, place_of
 from .curve import Curve, Move, Outcome
 from .energies import Balance, displacement_rate
 from .equations import Refused
@@ -21,7 +22,7 @@ from .sites import Sites
 from .vertex_laws import vertex_laws
 
 
-class ArcLengthFollower:
+class ArcLengthFollower(ProgrammeFollower):
     """The path of a problem by predictor and corrector. A :class:`..Follower`.
 
     Args:
@@ -47,35 +48,23 @@ class ArcLengthFollower:
         interrupted: Callable[[], bool] = lambda: False,
         fineness: float = 1.0,
     ) -> None:
-        self._problem, self._options, self._resume = problem, options, resume
-        self._interrupted, self._fineness = interrupted, fineness
+        super().__init__(problem, options, resume, interrupted)
+        self._fineness = fineness
         self._laws = vertex_laws(problem, options.remember)
         self._sites = Sites(problem, self._laws)
-        firsts = [int(i) for i in self._sites.one] + [int(pair[0]) for pair in self._sites.two]
-        self._lag = order(problem, firsts)
+        self._lag = order(problem, [int(group[0]) for group in self._sites.unknowns()])
         self._remembers = any(law.passed is not None for law in self._laws)
-        self._floats = is_singular(problem.stiffness)
-        self._leg, self._events, self._unstable, self._peak = 0, 0, 0, 0.0
-        self.end: End | None = None
-        self.reason = ""
         self._last: PathState | None = None
         self._curve: Curve
 
-    def states(self) -> Iterator[PathState]:
-        """The states from start to end; the first one of a path that is resumed is the next one."""
-        yield from self._begun() if self._resume is None else self._resumed(self._resume)
-        programme = list(self._options.programme)
-        while self.end is None and self._leg < len(programme):
-            yield from self._towards(programme[self._leg])
-            self._leg += 1
-            if self.end is None:
-                last = self._leg == len(programme)
-                if last:
-                    self._finish(End.REACHED, "the programme is done")
-                yield self._state(Event.END if last else Event.TURN)
+    @property
+    @override
+    def factor(self) -> float:
+        return self._curve.factor
 
     # -- beginning
 
+    @override
     def _begun(self) -> Iterator[PathState]:
         rest = at_rest(self._problem, self._sites)
         z = self._loaded(rest)
@@ -84,7 +73,7 @@ class ArcLengthFollower:
             return
         self._follow_from(z, 0.0)
         self._balance = Balance(self._problem, self._sites)
-        self._begin(self._curve)
+        self._balance.begin(self._curve.here.values, self._curve.factor)
         self._unstable = self._sites.unstable_directions(self._curve.here.values)
         yield self._state(Event.START)
 
@@ -104,12 +93,11 @@ class ArcLengthFollower:
     def _follow_from(self, z: Array, factor: float) -> None:
         problem = self._problem
         self._curve = Curve(problem.force, problem.force_rate, self._sites, z, factor, self._fineness)
-
-    def _begin(self, curve: Curve) -> None:
-        self._balance.begin(curve.here.values, curve.factor)
+        curve = self._curve
         curve.disagreement = lambda move: self._balance.disagreement(move, curve.unit)
 
-    def _resumed(self, state: PathState) -> Iterator[PathState]:
+    @override
+    def _restore(self, state: PathState) -> None:
         position, sites = state.position, self._sites
         if state.memory is not None:
             for number, law in enumerate(self._laws):
@@ -120,17 +108,16 @@ class ArcLengthFollower:
         self._follow_from(position.small.copy(), state.factor)
         self._unstable, self._leg = state.unstable, position.leg
         self._balance = Balance(self._problem, sites, state.work)
-        self._begin(self._curve)
+        self._balance.begin(self._curve.here.values, self._curve.factor)
         if state.event not in (Event.START, Event.TURN):
             row = np.eye(1, self._problem.size + 1, position.driver)[0]
             self._head(row, position.heading)
             self._curve.length = position.step
-        yield from ()
 
     # -- one leg of the programme
 
+    @override
     def _towards(self, aim: float) -> Iterator[PathState]:
-        """From event to event until the factor reaches its aim or the path ends."""
         self._orient(aim)
         while self.end is None and self._curve.factor != aim:
             if self._options.follow is Follow.STABLE and self._unstable > 0:
@@ -207,18 +194,10 @@ class ArcLengthFollower:
         else:
             self._finish(End.LOST, "the path leads away from the wanted factor for ever")
 
-    def _watch(self) -> None:
-        self._events, curve = self._events + 1, self._curve
-        self._peak = max(self._peak, abs(curve.factor))
-        if self._floats and curve.at_rest(1e-9 * self._peak) and not self._held():
-            self._finish(End.ESCAPES, "the load is back at zero, and nothing holds the body any more")
-        elif self._interrupted():
-            self._finish(End.INTERRUPTED, "interrupted")
-        elif self._events > self._options.most_events:
-            self._finish(End.LOST, f"no end after {self._options.most_events} events")
-
-    def _held(self) -> bool:
-        return is_held(self._problem, self._sites, self._curve.here.y[:-1])
+    @override
+    def _is_off(self) -> bool:
+        curve = self._curve
+        return curve.at_rest(1e-9 * self._peak) and not is_held(self._problem, self._sites, curve.here.y[:-1])
 
     def _jump(self, aim: float) -> Iterator[PathState]:
         """On to the next stable equilibrium at the same factor, or off."""
@@ -234,17 +213,13 @@ class ArcLengthFollower:
         else:
             self._follow_from(landing.z, factor)
             released = self._balance.leap(self._curve.here.values, factor)
-            curve = self._curve
-            curve.disagreement = lambda move: self._balance.disagreement(move, curve.unit)
             self._unstable = 0
             self._orient(aim)
             yield replace(self._state(Event.JUMP), released=released)
 
     # -- reports
 
-    def _finish(self, end: End, reason: str) -> None:
-        self.end, self.reason = end, reason
-
+    @override
     def _state(self, event: Event, passages: Sequence[Passage] = ()) -> PathState:
         curve, stored = self._curve, self._balance.stored
         self._last = PathState(
@@ -278,13 +253,9 @@ class ArcLengthFollower:
         )
 
     def _place(self, passage: Passage) -> Place:
-        sites, problem, k = self._sites, self._problem, passage.site
-        m1 = len(sites.one)
-        i = int(sites.one[k] if k < m1 else sites.two[k - m1, 0])
-        laws = sites.laws[k]
-        at_bound = passage.closes or passage.opens
-        part = problem.bonds[laws[0].group].part if laws and not at_bound else problem.parts[i]
-        return Place(part=part, unknown=i, point=problem.points[i])
+        laws = self._sites.laws[passage.site]
+        group = laws[0].group if laws and not (passage.closes or passage.opens) else None
+        return place_of(self._problem, int(self._sites.unknowns()[passage.site][0]), group)
 
 
 def _event(passages: Sequence[Passage], *, folds: bool) -> Event:

@@ -9,6 +9,7 @@ import numpy as np
 from ...system.condensed_problem import CondensedProblem
 from ...typing import Array
 from ..segments import Kind, Segment
+from ..spectrum import is_singular
 from .sites import Sites
 
 
@@ -56,19 +57,10 @@ def _standing(chain: tuple[Segment, ...], x: float, wanted: float) -> tuple[int,
     """The segment of a displacement that holds best, and its least force; of a fixed unknown the wanted one."""
     if len(chain) == 1 and chain[0].kind is Kind.BOUND:
         return 0, wanted
-    there = [n for n, s in enumerate(chain) if s.displacement(s.coordinate(x, s.force)) == x]
-    forces = {n: chain[n].force + (chain[n].rise or chain[n].slope) * chain[n].coordinate(x, 0.0) for n in there}
+    forces = {n: segment.force_at(x) for n, segment in enumerate(chain) if segment.stands_at(x)}
     least = min(abs(f) for f in forces.values())
-    best = max((n for n in there if abs(forces[n]) == least), key=lambda n: _hold(chain[n]))
+    best = max((n for n in forces if abs(forces[n]) == least), key=lambda n: chain[n].hold)
     return best, forces[best]
-
-
-def _hold(segment: Segment) -> tuple[int, float]:
-    if segment.kind is Kind.PIECE:
-        return 0, segment.slope
-    if segment.kind is Kind.BOUND:
-        return 2, 0.0
-    return (1, 0.0) if segment.rise > 0.0 else (-1, 0.0)
 
 
 def is_held(problem: CondensedProblem, sites: Sites, z: Array) -> bool:
@@ -80,7 +72,4 @@ def is_held(problem: CondensedProblem, sites: Sites, z: Array) -> bool:
         z: their coordinates, (n,).
     """
     basis, slopes = sites.motions(sites.values(z))
-    if not len(slopes):
-        return True
-    values = np.linalg.eigvalsh(basis.T @ problem.stiffness @ basis + np.diag(slopes))
-    return bool(values[0] > 1e-11 * values[-1])
+    return not is_singular(basis.T @ problem.stiffness @ basis + np.diag(slopes))

@@ -1,0 +1,97 @@
+"""What all followers share: a programme of factors, gone to one after the other, and reasons for which a path ends."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator, Sequence
+
+from ..system.condensed_problem import CondensedProblem
+from .spectrum import is_singular
+from .state import End, Event, PathOptions, PathState
+
+
+class ProgrammeFollower(ABC):
+    """Follows the path of a problem through a programme.
+
+    Args:
+        problem: the problem.
+        options: what path is wanted.
+        resume: the state after which to go on; by default the path begins at factor 0.
+        interrupted: whether to stop, asked at each state.
+
+    Attributes:
+        end: how the path ended; None before.
+        reason: that in a sentence.
+    """
+
+    def __init__(
+        self,
+        problem: CondensedProblem,
+        options: PathOptions,
+        resume: PathState | None = None,
+        interrupted: Callable[[], bool] = lambda: False,
+    ) -> None:
+        self._problem, self._options = problem, options
+        self._resume, self._interrupted = resume, interrupted
+        self._leg, self._events, self._unstable, self._peak = 0, 0, 0, 0.0
+        self._floats = is_singular(problem.stiffness)
+        self.end: End | None = None
+        self.reason = ""
+
+    def states(self) -> Iterator[PathState]:
+        """The states from start to end; the first one of a path that is resumed is the next one."""
+        if self._resume is None:
+            yield from self._begun()
+        else:
+            self._restore(self._resume)
+        programme = self._options.programme
+        while self.end is None and self._leg < len(programme):
+            yield from self._towards(programme[self._leg])
+            self._leg += 1
+            if self.end is None:
+                yield self._after_leg(programme)
+
+    def _after_leg(self, programme: Sequence[float]) -> PathState:
+        if self._leg < len(programme):
+            return self._state(Event.TURN)
+        self._finish(End.REACHED, "the programme is done")
+        return self._state(Event.END)
+
+    @property
+    @abstractmethod
+    def factor(self) -> float:
+        """λ."""
+
+    @abstractmethod
+    def _begun(self) -> Iterator[PathState]:
+        """The first state; none where the path ends before."""
+
+    @abstractmethod
+    def _restore(self, state: PathState) -> None:
+        """Go on after a state."""
+
+    @abstractmethod
+    def _towards(self, aim: float) -> Iterator[PathState]:
+        """From event to event until the factor reaches its aim or the path ends."""
+
+    @abstractmethod
+    def _state(self, event: Event) -> PathState:
+        """The present state."""
+
+    @abstractmethod
+    def _is_off(self) -> bool:
+        """Whether no load, law or bound acts any more, and nothing would hold a body that floats."""
+
+    def _watch(self) -> None:
+        """Count an event; end the path where it has a reason to."""
+        self._events += 1
+        self._peak = max(self._peak, abs(self.factor))
+        if self._floats and self._is_off():
+            self._finish(End.ESCAPES, "the load is back at zero, and nothing holds the body any more")
+        elif self._interrupted():
+            self._finish(End.INTERRUPTED, "interrupted")
+        elif self._events > self._options.most_events:
+            self._finish(End.LOST, f"no end after {self._options.most_events} events")
+
+    def _finish(self, end: End, reason: str) -> None:
+        self.end, self.reason = end, reason
