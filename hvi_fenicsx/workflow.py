@@ -23,7 +23,7 @@ from .runtime.timing import Timer
 from .scene import Scene
 from .scene_model import model_of, options_of
 from .solution import Solution
-from .solvers import nested_iteration
+from .solvers import frozen_mixity, nested_iteration
 from .solvers.context import Progress, RunControl, never
 from .solvers.nested_iteration import CoarseStart, LevelSolution
 from .solvers.options import SolverOptions
@@ -208,7 +208,7 @@ def finish_with_levels(
     solved = _solved(prepared, control, start)
     examination, warnings = _examined(prepared, solved.result)
     errors = None
-    if estimating and examination.certificate.passed:
+    if estimating and examination.certificate.passed and prepared.problem.has_potential:
         with prepared.timer("estimate"):
             errors = estimate(prepared.system, solved.levels, solved.result.u, examination)
         warnings += plausibility.of_estimate(errors)
@@ -301,6 +301,7 @@ def _solved(prepared: Preparation, control: RunControl, start: CoarseStart | fem
             found = nested_iteration.solve_from_displacement(model, system, start, solvability, options, control)
         else:
             found = nested_iteration.solve(model, system, solvability, options, control)
+        found = frozen_mixity.settled(model, found, solvability, options, control)
         if system.free_motions is not None:
             free_motions.remove_free_motions(prepared.problem, solvability.free, found.result.u)
         return found

@@ -120,6 +120,8 @@ class AdaptiveRun:
         if solution.solve_result is None or solution.solve_result.interrupted:
             return solution.reason
         self.quantity.add(level)
+        if solution.estimate is None and solution.converged:
+            return "the error of a law whose energy of separation depends on the mode is not estimated"
         if solution.estimate is None:
             self._failures += 1
             self.report(f"{level.dofs:,} unknowns: {solution.reason}")

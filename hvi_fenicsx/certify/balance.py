@@ -126,14 +126,14 @@ def _with_noise(references: References, acting: ActingForces, u: fem.Function, t
 
 def _holders(problem: Problem, state: ContactState) -> Iterator[Holder]:
     """What contact and laws of a part give, as far as they may, and what else they might give."""
-    surface, weights = state.surface, state.surface.weights
+    surface = state.surface
 
-    def holder(direction: Array, *tractions: Array) -> Holder:
+    def holder(direction: Array, weights: Array, *tractions: Array) -> Holder:
         forces = (spread(problem, surface, (weights * t)[:, None])[:, 0] for t in tractions)
         return Holder(spread(problem, surface, direction), *forces)
 
     if state.bounds is not None:
-        yield holder(surface.normals, allowed_pressure(state), *_pressures(state))
+        yield holder(surface.normals, surface.weights, allowed_pressure(state), *_pressures(state))
     for law in state.laws:
         low, high = law.term.law.interval(law.argument, law.near)
         for k in range(law.allowed.shape[1]):
@@ -142,7 +142,7 @@ def _holders(problem: Problem, state: ContactState) -> Iterator[Holder]:
                 stuck, given = law.argument <= law.near, -law.allowed[:, k]
                 pull, push = length.extent(k)
                 least, most = np.where(stuck, -pull * high, given), np.where(stuck, push * high, given)
-            yield holder(law.term.directions[:, k], -law.allowed[:, k], least, most)
+            yield holder(law.term.directions[:, k], law.term.weights, -law.allowed[:, k], least, most)
 
 
 def _pressures(state: ContactState) -> tuple[Array, Array]:

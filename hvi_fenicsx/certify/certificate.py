@@ -11,6 +11,7 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 from dolfinx import fem
+from mpi4py import MPI
 
 from ..problem import references
 from ..problem.problem import Problem
@@ -41,6 +42,8 @@ class Certificate:
             to first order) or ``undecided`` (a law softens, unless the inertia of the Hessian was asked for).
         tolerance: what was asked for.
         passed: whether all entries but ``inclusion_true`` are within the tolerance.
+        mixity: largest relative change of an energy of separation if it was frozen anew at the mode mixity of u; None
+            where no law's energy depends on the mode.
         rounding: None where all are; else by how much rounding alone moves the entries at this u: what is no larger
             passes, since no displacement in double precision can do better; ``net_force`` has no such excuse.
     """
@@ -55,6 +58,7 @@ class Certificate:
     second_order: str
     tolerance: float
     passed: bool
+    mixity: float | None = None
     rounding: float | None = None
 
     def as_dict(self) -> dict[str, float | str | bool | None]:
@@ -121,7 +125,8 @@ def examine(
     if not passed and _within(entries, thresholds.largest_rounding):
         floors = thresholds.rounding_safety * deviations.rounding(known, u, forces, states)
         passed, rounding = _within(entries, np.maximum(tolerance, floors)), float(np.max(floors))
-    passed = passed and _within(net, tolerance)
+    mixity = _mixity(comm, states)
+    passed = passed and _within(net, tolerance) and (mixity or 0.0) <= tolerance
     true, error = (largest(comm, value) for value in _inclusion_true(states))
     allowed = max(tolerance, rounding or 0.0)
     second_order = stability.status(known, u, forces.reaction, allowed, inertia=inertia and passed)
@@ -131,6 +136,7 @@ def examine(
         second_order=second_order,
         tolerance=tolerance,
         passed=passed,
+        mixity=mixity,
         rounding=rounding,
     )
     dip = between_nodes.largest_penetration(problem, states)
@@ -146,11 +152,15 @@ def _energy(problem: Problem, u: fem.Function, forces: Forces, states: Sequence[
     values = problem.relative(u.x.array)[: forces.load.size]
     elastic = 0.5 * float(values @ (forces.reaction - forces.load).ravel())
     laws = sum(
-        float(np.sum(state.surface.weights * law.term.law.value(law.argument)))
-        for state in states
-        for law in state.laws
+        float(np.sum(law.term.weights * law.term.law.value(law.argument))) for state in states for law in state.laws
     )
     return total(problem.domain.mesh.comm, elastic + laws)
+
+
+def _mixity(comm: MPI.Comm, states: Sequence[ContactState]) -> float | None:
+    """By how much the mode mixity does not stand yet. Collective."""
+    laws = [law for state in states for law in state.laws if law.term.mixity is not None]
+    return largest(comm, max(law.unsettled for law in laws)) if laws else None
 
 
 def _inclusion_true(states: Sequence[ContactState]) -> tuple[float, float]:

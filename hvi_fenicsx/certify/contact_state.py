@@ -50,7 +50,7 @@ class LawState:
         term: the law.
         components: the displacement along its directions, (m, k).
         argument: what it acts on, (m,).
-        traction: the traction it gives, (m,).
+        traction: the traction it gives, (m,); this and the following over the energies of the term.
         given: the tractions along its directions, (m, k).
         distance: how far that is from Clarke's subdifferential, (m,).
         allowed: the nearest traction along its directions that the law allows, (m, k).
@@ -73,6 +73,12 @@ class LawState:
     def true_distance(self) -> Array:
         """How far the traction is from the unsmoothed law's subdifferential, (m,)."""
         return self.term.exact.distance(self.argument, self.traction, self.near)
+
+    @property
+    def unsettled(self) -> float:
+        """The largest relative change of the energies of the term if they were frozen anew."""
+        found = self.term.energies_of(self.components, self.near)
+        return float(np.max(np.abs(found / self.term.energies - 1.0), initial=0.0))
 
     @property
     def slip_share(self) -> Array:
@@ -210,7 +216,7 @@ def _law(attribution: ForceAttribution, number: int, term: LawTerm, u: Array, sc
         hidden |= attribution.held[dofs]
     if len(parts) == 1:
         at, forces = attribution.shared.of_law(number, local)
-        parts[0][at] = np.sum(forces * local.directions[at, 0], axis=1) / term.surface.weights[at]
+        parts[0][at] = np.sum(forces * local.directions[at, 0], axis=1) / term.weights[at]
         traction, distance, given = parts[0], _away(parts[0], low, high), parts[0][:, None]
         allowed = np.clip(parts[0], low, high)[:, None]
     else:
@@ -242,9 +248,9 @@ def _of_length(
     elsewhere = (attribution.held | attribution.contact).reshape(-1, d)[blocks]
     hidden = np.any((local.directions != 0.0) & elsewhere[:, None, :], axis=2)
     needed = np.einsum("mkd,md->mk", local.directions, attribution.needed.reshape(-1, d)[blocks])
-    given = np.where(hidden, gradient * ((low + high) / 2)[:, None], needed / term.surface.weights[:, None])
+    given = np.where(hidden, gradient * ((low + high) / 2)[:, None], needed / term.weights[:, None])
     at, forces = attribution.shared.of_law(number, local)
-    given[at] = np.einsum("mkd,md->mk", local.directions[at], forces) / term.surface.weights[at, None]
+    given[at] = np.einsum("mkd,md->mk", local.directions[at], forces) / term.weights[at, None]
     allowed = length.allowed(components, given, (low, high), near)
     return length.traction(components, given, near), np.linalg.norm(given - allowed, axis=1), given, allowed
 
@@ -306,7 +312,8 @@ def _pressure(
     if normal_laws and bounds is None:
         pressure = np.zeros_like(pressure)
     for law in normal_laws:
-        pressure = pressure - np.sum(law.term.directions[:, 0] * surface.normals, axis=1) * law.given[:, 0]
+        pulled = law.term.energies * law.given[:, 0]
+        pressure = pressure - np.sum(law.term.directions[:, 0] * surface.normals, axis=1) * pulled
     return pressure
 
 
@@ -316,5 +323,6 @@ def _friction(laws: Sequence[LawState], surface: Surface, traction: Array) -> Ar
     for law in laws:
         if law.term.direction.tangential:
             alone = law.hidden if law.term.radial else np.ones(len(friction), dtype=bool)
-            friction = np.where(alone[:, None], law.given[:, -friction.shape[1] :], friction)
+            given = law.term.energies[:, None] * law.given[:, -friction.shape[1] :]
+            friction = np.where(alone[:, None], given, friction)
     return friction

@@ -164,7 +164,7 @@ class _Collector:
         Args:
             term: the law, in local components.
         """
-        (dofs, sign), w = next(shared_forces.components(term)), term.surface.weights
+        (dofs, sign), w = next(shared_forces.components(term)), term.weights
         x = self._on_kink(term.law, term.argument(self.u))
         left, right = w * term.law.left(x), w * term.law.right(x)
         before, after = (w * c for c in self._curvatures(term.law, x))
@@ -183,7 +183,7 @@ class _Collector:
         Args:
             term: the law, in local components.
         """
-        w, slip = term.surface.weights, term.slip(self.u)
+        w, slip = term.weights, term.slip(self.u)
         x = self._on_kink(term.law, term.argument(self.u))
         moving = x > self.thresholds.near
         size = np.where(moving, x, 1.0)

@@ -82,10 +82,10 @@ class ForceAttribution:
         """
         low, high = term.law.interval(term.argument(u), self.near[term.surface.blocks])
         for dofs, sign in shared_forces.components(term):
-            ends = np.stack([sign * low, sign * high]) * term.surface.weights
+            ends = np.stack([sign * low, sign * high]) * term.weights
             np.add.at(self.low, dofs, ends.min(axis=0))
             np.add.at(self.high, dofs, ends.max(axis=0))
-            np.add.at(self.weight, dofs, term.surface.weights)
+            np.add.at(self.weight, dofs, term.weights)
 
     def enter_bounds(self, bounds: Bounds, u: Array) -> None:
         """Enter which bounds are reached.

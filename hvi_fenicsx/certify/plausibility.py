@@ -130,7 +130,7 @@ def _weak_laws(problem: Problem, forces: Mapping[str, PETSc.Vec], thresholds: Pl
     load = total(comm, sum(float(np.abs(force.array_r).sum()) for force in forces.values()))
     for term in problem.terms:
         peak = max(term.exact.peak.minus, term.exact.peak.plus)
-        most = peak * total(comm, float(term.surface.weights.sum()))
+        most = peak * total(comm, float(term.weights.sum()))
         if most < thresholds.weak_law * load and not _holds(problem, forces, term, thresholds.rounding):
             unit = "N" if problem.scales.dimension == 3 else "N/m"
             yield (
@@ -196,7 +196,7 @@ def _distant_obstacle(
 def _slip_and_kink(problem: Problem, law: LawState, thresholds: PlausibilityThresholds) -> Iterator[str]:
     """A law whose kinks are of another order than what the solution does to it."""
     comm, term, far = problem.domain.mesh.comm, law.term, thresholds.unrelated
-    kink, reached, weights = term.exact.length_scale, np.abs(law.argument), term.surface.weights
+    kink, reached, weights = term.exact.length_scale, np.abs(law.argument), term.weights
     if term.exact.is_linear or np.any(term.exact.kinks == 0.0):
         return
     if term.direction in (Direction.OPENING, Direction.PENETRATION):
@@ -222,7 +222,7 @@ def _wide_smoothing(problem: Problem, law: LawState, thresholds: PlausibilityThr
     if term.law is term.exact:
         return
     peak = max(term.exact.peak.minus, term.exact.peak.plus)
-    away, weights, limit = law.true_distance(), term.surface.weights, thresholds.smoothing_change
+    away, weights, limit = law.true_distance(), term.weights, thresholds.smoothing_change
     share = total(comm, float(weights[away > limit * peak].sum())) / total(comm, float(weights.sum()))
     if share > thresholds.smoothing_share:
         most = largest(comm, float(np.max(away, initial=0.0)))

@@ -183,7 +183,7 @@ def _of_law(term: LawTerm, row: Integers, free: Mask, u: Array, near: Array) -> 
     own = np.flatnonzero(rows >= 0)
     rows = rows[own]
     argument, within = term.argument(u)[own], near[term.surface.blocks][own]
-    weights = term.surface.weights[own, None]
+    weights = term.weights[own, None]
     low, high = (weights * end[:, None] for end in term.law.interval(argument, within))
     moving = (argument > within)[:, None] | np.full((len(own), 1), not term.radial)
     unit = np.where(moving, term.gradient(term.slip(u)[own]), 0.0)

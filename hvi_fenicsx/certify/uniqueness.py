@@ -98,13 +98,17 @@ def _doubt(
 
 
 def _fall(term: LawTerm) -> float:
-    """A bound of how steeply a law falls; inf where a law of a length has a slope at 0 that points inwards."""
+    """A bound of how steeply a law falls; inf where a law of a length has a slope at 0 that points inwards, or none."""
+    if term.mixity is not None:
+        return np.inf
     inwards = term.radial and bool(term.law.right(np.zeros(1))[0] < 0.0)
     return np.inf if inwards else float(term.law.steepest_fall)
 
 
 def _steepness(term: LawTerm) -> str:
     """Why there is no bound of how steeply a law falls."""
+    if term.mixity is not None:
+        return "the energy of separation depends on the mode, and the law has no potential"
     if term.exact.concave.kinks.size:
         return "the law's traction drops"
     return "how steeply the law's traction falls is not known"

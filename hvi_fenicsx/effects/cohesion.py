@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Annotated, ClassVar
+from typing import Annotated, ClassVar, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 from typing_extensions import override
 
 from ..errors import InputError
+from ..laws import Mixity, mixities
+from ..schema import OneOf, Positive, refusal
 from .base import FormContext
 from .contribution import BoundaryLaw, Contribution, Direction
 from .law_effect import LawEffect
@@ -23,11 +25,31 @@ class Cohesion(LawEffect):
     beta: Annotated[float, Field(gt=0.0, allow_inf_nan=False)] = 1.0
     """what a slip is multiplied by beside an opening: the strength in shear is beta times that in tension, and both
     modes take the same energy"""
+    mixity: Annotated[str | None, OneOf(mixities)] = None
+    """the criterion by which the energy of separation depends on the mode; by default it does not"""
+    energy_ratio: Positive | None = None
+    """with mixity: the energy of slip alone over that of opening alone; the strength in shear is beta energy_ratio
+    times that in tension"""
+    exponent: Positive | None = None
+    """with mixity: the exponent of the criterion"""
+
+    @model_validator(mode="after")
+    def _whole(self) -> Self:
+        given = [self.mixity, self.energy_ratio, self.exponent]
+        if any(g is None for g in given) and any(g is not None for g in given):
+            raise refusal("mixity, energy_ratio and exponent belong together: state all three of them, or none")
+        return self
+
+    @property
+    def _criterion(self) -> Mixity | None:
+        if self.mixity is None or self.energy_ratio is None or self.exponent is None:
+            return None
+        return mixities()[self.mixity](energy_ratio=self.energy_ratio, exponent=self.exponent)
 
     @override
     def contribute(self, context: FormContext, where: str | None) -> Contribution:
         """The law, acting on the effective displacement."""
-        return Contribution(laws=(BoundaryLaw(self.direction, self.law, self.beta),))
+        return Contribution(laws=(BoundaryLaw(self.direction, self.law, self.beta, self._criterion),))
 
     @override
     def check(self, dimension: int) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..laws import Length, Superpotential
+from ..laws import Length, Mixity, Superpotential
 from ..spatial_value import SpatialValue
 from ..typing import Array
 
@@ -101,11 +101,13 @@ class BoundaryLaw:
         direction: the displacement.
         law: the superpotential, SI.
         slip: β, what a slip is multiplied by where it is taken together with an opening.
+        mixity: how the energy of separation depends on the mode; None: it does not.
     """
 
     direction: Direction
     law: Superpotential
     slip: float = 1.0
+    mixity: Mixity | None = None
 
 
 @dataclass(frozen=True, slots=True)

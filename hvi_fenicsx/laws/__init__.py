@@ -5,6 +5,7 @@ from .base import Superpotential
 from .catalogue import Graph, LinearSpring, QuadraticLinear, QuadraticLinearLiteral, Sawtooth, Tresca
 from .convex_parts import ConvexPart, DifferentiablePart, Directional
 from .lengths import Length
+from .mixity import BenzeggaghKenane, Mixity, PowerLaw, mixities
 from .polyline import PolylineLaw, PolylinePart
 from .registry import available, create, describe
 from .sampled import SampledLaw, sample_traction
@@ -13,6 +14,7 @@ from .traction_graph import TractionGraph
 from .weakening import Exponential, WeakeningLaw
 
 __all__ = [
+    "BenzeggaghKenane",
     "ConvexPart",
     "DifferentiablePart",
     "Directional",
@@ -20,8 +22,10 @@ __all__ = [
     "Graph",
     "Length",
     "LinearSpring",
+    "Mixity",
     "PolylineLaw",
     "PolylinePart",
+    "PowerLaw",
     "QuadraticLinear",
     "QuadraticLinearLiteral",
     "SampledLaw",
@@ -34,6 +38,7 @@ __all__ = [
     "available",
     "create",
     "describe",
+    "mixities",
     "sample_traction",
 ]
 

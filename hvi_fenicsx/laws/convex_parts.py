@@ -35,6 +35,10 @@ class Directional:
     minus: float
     plus: float
 
+    def times(self, factor: float) -> Directional:
+        """The function multiplied by a positive number."""
+        return Directional(self.minus * factor, self.plus * factor)
+
 
 class ConvexPart(ABC):
     """A convex function on the line; H or G of a law's split j = H - G. Arrays in and out have shape (m,)."""

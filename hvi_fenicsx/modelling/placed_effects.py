@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 from dolfinx import mesh as dmesh
@@ -13,7 +13,7 @@ from pydantic import ValidationError
 from .. import effects
 from ..effects import Effect
 from ..errors import InputError
-from ..laws import Superpotential
+from ..laws import Mixity, Superpotential
 from ..mesh.domain import Domain
 from ..schema import input_error
 from . import values
@@ -221,13 +221,19 @@ class Cohesion(_Law):
 
     Attributes:
         beta: what a slip is multiplied by beside an opening.
+        mixity: how the energy of separation depends on the mode, a criterion of ``hvi_fenicsx.laws.mixities()``; None:
+            it does not.
     """
 
     beta: float = 1.0
+    mixity: Mixity | None = None
 
     def effect(self, mesh: dmesh.Mesh) -> Effect:
         """The law."""
-        return checked(effects.cohesion.Cohesion, law=self.law, beta=float(self.beta))
+        keys: dict[str, Any] = {}
+        if self.mixity is not None:
+            keys = {"mixity": self.mixity.name, **asdict(self.mixity)}
+        return checked(effects.cohesion.Cohesion, law=self.law, beta=float(self.beta), **keys)
 
 
 @dataclass(frozen=True)

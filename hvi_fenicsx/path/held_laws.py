@@ -79,7 +79,7 @@ def find(problem: Problem, parts: Mapping[int, int], prescribed: Array) -> tuple
         main = dofs[here, np.argmax(np.abs(direction[here]), axis=1)]
         entries = (
             np.array([parts.get(int(dof), -1) for dof in main], dtype=np.int64),
-            direction[here] * term.surface.weights[here, None],
+            direction[here] * term.weights[here, None],
             np.einsum("md,mdc->mc", direction[here], prescribed[dofs[here]]),
         )
         numbers, forces, arguments = (np.concatenate(agree(problem.domain.mesh.comm, e)) for e in entries)

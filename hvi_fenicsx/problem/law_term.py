@@ -15,7 +15,7 @@ from dolfinx.fem.petsc import assemble_vector
 from petsc4py import PETSc
 
 from ..effects import Direction
-from ..laws import Length, Superpotential
+from ..laws import Length, Mixity, Superpotential
 from ..typing import Array, Mask
 from .contact_surface import Surface
 
@@ -34,6 +34,8 @@ class LawTerm:
         free: 1 where a component is not prescribed, (m, d).
         density: the P1 field τ.
         residual: the compiled form ∫ τ·v ds; None where no quadrature of the functions lumps it.
+        mixity: how the energy of separation depends on the mode; None: it does not.
+        energies: by what the law is multiplied where it does, frozen at a state: changed by :meth:`freeze`, (m,).
     """
 
     surface: Surface
@@ -45,6 +47,33 @@ class LawTerm:
     free: Array
     density: fem.Function
     residual: Any | None
+    mixity: Mixity | None
+    energies: Array
+
+    @property
+    def weights(self) -> Array:
+        """The lumped areas, each times the energy of separation at its mode mixity, (m,)."""
+        return self.surface.weights * self.energies
+
+    def energies_of(self, components: Array, near: Array) -> Array:
+        """By what the law is multiplied at the mode mixity of a displacement, (m,); where δ is zero, as it is frozen.
+
+        Args:
+            components: of the displacement, (m, k).
+            near: lengths up to this are zero, (m,).
+        """
+        if self.mixity is None or self.length is None:
+            return self.energies
+        share = self.length.slip_share(components, near)
+        return np.where(np.isnan(share), self.energies, self.mixity.energy(np.nan_to_num(share)))
+
+    def freeze(self, energies: Array) -> None:
+        """Multiply the law by others from now on.
+
+        Args:
+            energies: by vertex, (m,).
+        """
+        self.energies[:] = energies
 
     @property
     def radial(self) -> bool:
@@ -100,7 +129,7 @@ class LawTerm:
             self.set_traction(u, derivative)
             assemble_vector(out, self.residual)
             return
-        force = self.surface.weights[:, None] * self._vector(u, derivative) * self.free
+        force = self.weights[:, None] * self._vector(u, derivative) * self.free
         out.array.reshape(-1, force.shape[1])[self.surface.blocks] += force
 
     def set_traction(self, u: Array, derivative: Array) -> None:

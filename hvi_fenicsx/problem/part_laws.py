@@ -108,7 +108,9 @@ def _term(
         length=length,
         free=(~np.isin(where.dofs, fixed)).astype(np.float64),
         density=density,
-        residual=forms.compiled(_residual(context, where, density)) if by_rule else None,
+        residual=forms.compiled(_residual(context, where, density)) if by_rule and law.mixity is None else None,
+        mixity=law.mixity,
+        energies=np.ones(len(where.weights)),
     )
 
 

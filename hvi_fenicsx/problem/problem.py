@@ -129,6 +129,11 @@ class Problem:
         """The scalar dofs that are prescribed and that this rank owns."""
         return self.fixed[self.fixed < self.space.dofmap.index_map.size_local * self.space.dofmap.index_map_bs]
 
+    @property
+    def has_potential(self) -> bool:
+        """Whether the laws are derivatives of an energy; else their energies of separation depend on the mode."""
+        return all(term.mixity is None for term in self.terms)
+
     @functools.cached_property
     def bodies(self) -> MeshBodies:
         """The bodies, those that meet in an interface together. Collective when first used."""

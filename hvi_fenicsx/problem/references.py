@@ -141,7 +141,7 @@ def _moved(problem: Problem) -> Array:
     force, demanded = np.zeros((2, len(problem.bodies.bodies)))
     for term in problem.terms:
         rest = np.zeros(len(term.surface.blocks))
-        push = term.surface.weights * _outside(rest, *term.law.interval(rest))
+        push = term.weights * _outside(rest, *term.law.interval(rest))
         np.add.at(force, problem.bodies.labels[term.surface.blocks], push)
     for bounds in problem.bounds:
         away = _outside(np.zeros_like(bounds.lower), bounds.lower, bounds.upper)

@@ -16,10 +16,11 @@ from pydantic.fields import FieldInfo
 from ..effects import Effect, Place
 from ..laws.base import registered
 from ..mesh.shapes import DomainShape, PlacedShape
+from ..schema import OneOf
 from .effect_tables import DEFAULT_ELASTICITY, BodyTable, BoundaryTable, InterfaceTable, MaterialTable
 from .path_table import PathTable
 from .scene import Scene
-from .solver_table import OneOf, SolverTable
+from .solver_table import SolverTable
 
 T = TypeVar("T")
 

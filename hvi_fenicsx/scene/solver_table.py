@@ -2,38 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import BeforeValidator, Field, GetCoreSchemaHandler, PlainSerializer, model_validator
-from pydantic_core import CoreSchema, core_schema
+from pydantic import BeforeValidator, Field, PlainSerializer, model_validator
 
 from ..errors import InputError
 from ..formula import Formula
 from ..laws.smoothing import registered as smoothings
-from ..schema import Count, Mistake, Positive, Table, refusal, shown, unknown, validation_error
-
-
-@dataclass(frozen=True)
-class OneOf:
-    """Marks a field whose value is the name of a registered class; plugins may have registered more.
-
-    Attributes:
-        registered: the classes by their names, asked for whenever a scene is read.
-    """
-
-    registered: Callable[[], Mapping[str, type]]
-
-    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        return core_schema.no_info_before_validator_function(self._check, handler(source))
-
-    def _check(self, value: Any) -> Any:
-        names = tuple(self.registered())
-        if value is not None and value not in names:
-            raise refusal(unknown("value", value, names))
-        return value
-
+from ..schema import Count, Mistake, OneOf, Positive, Table, refusal, shown, validation_error
 
 _STARTS = ("unbroken", "resting", "broken")
 

@@ -3,7 +3,7 @@
 Light: it loads pydantic and nothing heavier, and knows no particular table.
 """
 
-from .fields import LONGEST, SHORTEST, Count, Length, Names, Positive, vector
+from .fields import LONGEST, SHORTEST, Count, Length, Names, OneOf, Positive, vector
 from .messages import refusal, shown, unknown
 from .tables import Key, Mistake, Table, choose, input_error, located_error, mistakes_of, validation_error
 
@@ -15,6 +15,7 @@ __all__ = [
     "Length",
     "Mistake",
     "Names",
+    "OneOf",
     "Positive",
     "Table",
     "choose",

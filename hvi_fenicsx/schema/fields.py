@@ -2,11 +2,34 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from typing import Annotated, Any
 
-from pydantic import BeforeValidator, Field, PlainSerializer
+from pydantic import BeforeValidator, Field, GetCoreSchemaHandler, PlainSerializer
+from pydantic_core import CoreSchema, core_schema
 
-from .messages import refusal, shown
+from .messages import refusal, shown, unknown
+
+
+@dataclass(frozen=True)
+class OneOf:
+    """Marks a field whose value is the name of a registered class; plugins may have registered more.
+
+    Attributes:
+        registered: the classes by their names, asked for whenever a scene is read.
+    """
+
+    registered: Callable[[], Mapping[str, type]]
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        return core_schema.no_info_before_validator_function(self._check, handler(source))
+
+    def _check(self, value: Any) -> Any:
+        names = tuple(self.registered())
+        if value is not None and value not in names:
+            raise refusal(unknown("value", value, names))
+        return value
 
 
 def vector(length: int) -> BeforeValidator:

@@ -176,6 +176,6 @@ def traction_limits(system: System) -> Array:
     for term in system.terms:
         dofs = term.surface.dofs
         touched = np.any(term.directions != 0, axis=1)
-        limit = references.traction_scale(term) * term.surface.weights
+        limit = references.traction_scale(term) * term.weights
         limits[dofs[touched]] = np.minimum(limits[dofs], limit[:, None])[touched]
     return limits

@@ -58,7 +58,7 @@ def overloaded(
     """
     moves, shared = [], radial_kinks.Shared(system.terms, models, _left_to_radial(system, x, residual, models))
     for number, (term, model) in enumerate(zip(system.terms, models, strict=True)):
-        excess = slack * system.references.traction_scale(term) * term.surface.weights
+        excess = slack * system.references.traction_scale(term) * term.weights
         argument = term.argument(x.array_r)
         if term.radial:
             moves.append(shared.moves(number, argument, excess))
@@ -84,7 +84,7 @@ def _signed_moves(
     term: LawTerm, model: Majorant | ExactLaw, argument: Array, residual: PETSc.Vec, excess: Array
 ) -> Integers:
     """The moves for a law of a signed slip."""
-    c, part, weight = model.cells, model.law.convex, term.surface.weights
+    c, part, weight = model.cells, model.law.convex, term.weights
     force = np.einsum("md,md->m", term.directions[:, 0, :], term.surface.values(residual.array_r))
     _, _, free = _slip_dofs(term)
     down = free & (argument <= c.lower) & (force - weight * _jump(part, c.lower) > excess)

@@ -43,7 +43,7 @@ class Shared:
 
     def _disc(self, number: int) -> Array:
         """The largest force that the kink of a term carries, (m,)."""
-        weights = self._terms[number].surface.weights
+        weights = self._terms[number].weights
         return np.asarray(weights * self._models[number].law.convex.right(np.zeros_like(weights)))
 
     def _spare_of(self, number: int) -> Array:

@@ -89,7 +89,7 @@ class _LawEnergy:
     def _of_term(self, term: LawTerm, law: Superpotential, p: int, amplitudes: Array) -> tuple[float, Array]:
         slip = self._slips[p] + self._moves[p] @ amplitudes
         argument = term.argument_of(slip)
-        xi, weights = law.concave.left(np.zeros_like(argument)), term.surface.weights
+        xi, weights = law.concave.left(np.zeros_like(argument)), term.weights
         force = (weights * (law.convex.right(argument) - xi))[:, None] * term.gradient(slip)
         energy = weights @ (law.convex.value(argument) - xi * argument)
         return float(energy), np.einsum("mr,mrk->k", force, self._moves[p])

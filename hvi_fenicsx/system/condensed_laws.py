@@ -110,7 +110,7 @@ class _Term:
     def prescribed_bonds(self) -> Sequence[PrescribedBonds]:
         """The vertices where no component is free, and the argument is not always zero, of all ranks. Collective."""
         here = (self._components == 0) & np.any(self._arguments != 0.0, axis=0)
-        weights = np.concatenate(agree(self._comm, self._term.surface.weights[here]))
+        weights = np.concatenate(agree(self._comm, self._term.weights[here]))
         arguments = np.concatenate(agree(self._comm, self._arguments[:, here]), axis=1)
         if not len(weights):
             return []

@@ -58,7 +58,7 @@ class ContactRows:
         self.tangent[:] = 0.0
         for term, k in zip(terms, rates, strict=True):
             at = np.searchsorted(self._local, term.surface.blocks)
-            np.add.at(self.tangent, at, term.surface.weights[:, None, None] * k)
+            np.add.at(self.tangent, at, term.weights[:, None, None] * k)
 
     def write(self, matrix: PETSc.Mat, held: npt.NDArray[np.integer]) -> None:
         """Write the diagonal blocks of J. Collective.

@@ -197,14 +197,15 @@ def acts_on(problem: Problem, body: AnyBody, term: LawTerm) -> bool:
 
 
 def _resistance(problem: Problem, body: AnyBody, term: LawTerm) -> Resistance:
-    surface, law = term.surface, term.exact
+    surface, law, mixity = term.surface, term.exact, term.mixity
+    least, greatest = (1.0, 1.0) if mixity is None else (mixity.least, mixity.greatest)
     mine = inside(problem, body, surface.blocks)
     return Resistance(
         points=MotionFields(problem.motions_at(surface.blocks[mine], body)),
         weights=surface.weights[mine],
         directions=term.directions[mine],
-        growth=law.growth,
-        peak=law.peak,
+        growth=law.growth.times(least),
+        peak=law.peak.times(greatest),
         c4=law.c4,
         length=term.length,
     )

@@ -90,7 +90,7 @@ class Jacobian:
     def drift(self, rates: Sequence[Array]) -> float:
         """Largest nodal stiffness (an elastic one is about 1) by which this rank's K differs from ``rates``."""
         changes = (
-            float(np.max(np.abs(new - old) * term.surface.weights[:, None, None], initial=0.0))
+            float(np.max(np.abs(new - old) * term.weights[:, None, None], initial=0.0))
             for term, new, old in zip(self._terms, self._rates, rates, strict=True)
         )
         return max(changes, default=0.0)

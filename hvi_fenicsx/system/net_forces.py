@@ -146,7 +146,7 @@ def capable(problem: Problem) -> list[Array]:
     """Forces of the laws' own size along each of their directions, (vertices, d) each."""
     found = []
     for term in problem.terms:
-        size = term.surface.weights[:, None] * term.exact.traction_scale
+        size = term.weights[:, None] * term.exact.traction_scale
         found += [spread(problem, term.surface, size * along) for along in np.moveaxis(term.directions, 1, 0)]
     return found
 

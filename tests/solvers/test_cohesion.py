@@ -291,3 +291,56 @@ def test_several_ranks_find_what_one_finds_in_space(tmp_path: Path) -> None:
             for column in ("u_n", "u_t1", "u_t2", "sigma_n", "friction_t1", "friction_t2", "contact", "branch_t"):
                 size = np.abs(one[column]).max()
                 assert np.allclose(other[column], one[column], rtol=0.0, atol=1e-10 * size), (name, ranks, column)
+
+
+CRITERIA = {
+    "benzeggagh_kenane": lambda b, ratio, exponent: 1.0 + (ratio - 1.0) * b**exponent,
+    "power_law": lambda b, ratio, exponent: ((1.0 - b) ** exponent + (b / ratio) ** exponent) ** (-1.0 / exponent),
+}
+
+
+@pytest.mark.parametrize("criterion", CRITERIA)
+@pytest.mark.parametrize("angle", [0.0, 40.0, 90.0])
+def test_each_mode_dissipates_its_share_of_the_energy_at_its_mixity(criterion: str, angle: float) -> None:
+    """The separation is prescribed along a ray, so the share B of the slip stays, and all of G(B) is dissipated."""
+    beta, ratio, exponent = 0.5, 3.0, 2.1
+    opening, slip = np.cos(np.radians(angle)), np.sin(np.radians(angle))
+    rate = float(np.hypot(opening, beta * slip))
+    share = (beta * slip / rate) ** 2
+    mixed = {"beta": beta, "mixity": criterion, "energy_ratio": ratio, "exponent": exponent}
+    states = []
+    for delta in (FIRST, LAST, 1.2 * LAST):
+        way = {"displacement": [slip * delta / rate, opening * delta / rate]}
+        found = solved(square({**way, "cohesion": law(BOND, **mixed)}, {"traction": [0.0, 0.0]}, 1))
+        state, u, p = glue(found), found.problem.scales.displacement, found.problem.scales.stress
+        states.append([state.normal * u, state.pressure * p, state.slip[:, 0] * u, state.friction[:, 0] * p])
+        assert found.examination is not None
+        assert found.examination.certificate.mixity == pytest.approx(0.0, abs=1e-8)
+    down, pulls, along, drags = np.moveaxis(np.array([np.zeros_like(states[0]), *states]), 1, 0)
+    energy = ENERGY * CRITERIA[criterion](share, ratio, exponent)
+    assert np.trapezoid(pulls, -down, axis=0) == pytest.approx(energy * (1.0 - share), rel=1e-8, abs=1e-12)
+    assert np.trapezoid(drags, along, axis=0) == pytest.approx(energy * share, rel=1e-8, abs=1e-12)
+
+
+@pytest.mark.parametrize("criterion", CRITERIA)
+def test_a_mixity_that_stands_is_that_of_the_law_with_the_energies_it_asks_for(criterion: str) -> None:
+    """The forces at the glue, from the displacements and the definition of the law alone."""
+    ratio, exponent, beta = 2.0, 1.5, 0.6
+    mixed = {"beta": beta, "mixity": criterion, "energy_ratio": ratio, "exponent": exponent}
+    found = solved(square({"cohesion": law(BOND, **mixed)}, {"displacement": [2.4e-6, "1.6e-6*(1 + x)"]}, 3))
+    state, scales = glue(found), found.problem.scales
+    assert found.examination is not None
+    assert found.examination.certificate.mixity is not None
+    assert found.examination.certificate.mixity <= 1e-8
+    opening, slip = -state.normal * scales.displacement, state.slip[:, 0] * scales.displacement
+    delta = np.hypot(opening, beta * slip)
+    share = (beta * slip / delta) ** 2
+    assert np.ptp(share) > 0.1
+    traction = np.interp(delta, [0.0, FIRST, LAST], [0.0, PEAK, 0.0]) * CRITERIA[criterion](share, ratio, exponent)
+    assert np.allclose(-state.pressure * scales.stress, -traction * opening / delta, rtol=0.0, atol=1e-6 * PEAK)
+    assert np.allclose(
+        state.friction[:, 0] * scales.stress, traction * beta**2 * slip / delta, rtol=0.0, atol=1e-6 * PEAK
+    )
+    assert found.estimate is None
+    assert found.uniqueness is not None
+    assert "no potential" in found.uniqueness.why

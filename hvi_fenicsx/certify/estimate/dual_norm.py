@@ -180,6 +180,6 @@ def _law_forces(problem: Problem, states: Sequence[ContactState], near: float, *
             asked = term.exact if exact else term.law
             away = law.given - nearest(asked, term.length, law.components, law.given, near)
             away[law.hidden] = 0.0
-            vectors = np.einsum("mk,mkd->md", away * state.surface.weights[:, None], term.directions)
+            vectors = np.einsum("mk,mkd->md", away * term.weights[:, None], term.directions)
             np.add.at(forces, state.surface.blocks, vectors)
     return forces

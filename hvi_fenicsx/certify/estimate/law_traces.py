@@ -169,7 +169,7 @@ class LawTraces:
             for law in state.laws:
                 trace = self.of_law(state, law, error)
                 with_bubbles, with_nodes = trace.points.tested(trace.traction)
-                nodal = law.given * state.surface.weights[:, None]
+                nodal = law.given * law.term.weights[:, None]
                 between += with_bubbles
                 at_nodes -= with_nodes
                 np.add.at(at_nodes, state.surface.blocks, np.einsum("mk,mkd->md", nodal, law.term.directions))

@@ -1,0 +1,85 @@
+"""Laws whose energy of separation depends on the mode: the mixity is frozen, solved, and taken anew until it stands.
+
+With the mixity frozen such a law has a potential (:mod:`..laws.mixity`), which any method solves. The certificate says
+by how much the mixity of the last state differs from the frozen one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from dolfinx import fem
+
+from ..problem.compose import Model
+from ..rigid import Solvability
+from ..runtime.log import logger
+from ..runtime.mpi import largest
+from ..system.system import System
+from ..typing import Array
+from . import nested_iteration
+from .context import RunControl
+from .nested_iteration import LevelSolution
+from .options import SolverOptions
+from .result import Counts
+
+_LOG = logger("solvers")
+_ROUNDS = 60
+"""Solves at most; the certificate tells where they do not end."""
+_STANDS = 0.1
+"""The change of the energies at which they stand, in tolerances of the solve."""
+_NEAR = 1e-12
+"""A length that has no mode, relative to the largest."""
+
+
+def settled(
+    model: Model, found: LevelSolution, solvability: Solvability, options: SolverOptions, control: RunControl
+) -> LevelSolution:
+    """A solution whose mode mixity is the frozen one; the same where no law asks for it. Collective.
+
+    Args:
+        model: what is solved.
+        found: a solution with any mixity.
+        solvability: whether a solution can exist.
+        options: method, tolerance, limits.
+        control: timer, progress and interruption.
+
+    Raises:
+        SolverError: a convex step raised the energy.
+    """
+    if found.system.problem.has_potential:
+        return found
+    counts = Counts()
+    counts.add(found.result.counts)
+    for _ in range(_ROUNDS):
+        if not found.result.converged or found.result.interrupted:
+            break
+        anew = _energies(found.system, found.result.u)
+        change = _change(found.system, anew)
+        _LOG.info("the energies of separation change by %.1e with the mode mixity", change)
+        if change <= _STANDS * options.tolerance:
+            break
+        for term, energies in zip(found.system.terms, anew, strict=True):
+            term.freeze(energies)
+        start = fem.Function(found.result.u.function_space)
+        start.x.array[:] = found.result.u.x.array * found.system.problem.scales.displacement
+        found = nested_iteration.solve_from_displacement(model, found.system, start, solvability, options, control)
+        counts.add(found.result.counts)
+    return replace(found, result=replace(found.result, counts=counts))
+
+
+def _energies(system: System, u: fem.Function) -> list[Array]:
+    """The energies of separation at the mode mixity of a displacement, by term, (m,) each. Collective."""
+    found, values = [], system.problem.relative(u.x.array)
+    for term in system.problem.terms:
+        components = term.slip(values)
+        size = largest(system.comm, float(np.max(np.abs(components), initial=0.0)))
+        found.append(term.energies_of(components, np.full(len(components), _NEAR * size)))
+    return found
+
+
+def _change(system: System, energies: Sequence[Array]) -> float:
+    """The largest relative change of the energies of separation. Collective."""
+    changes = (np.max(np.abs(e / t.energies - 1.0), initial=0.0) for t, e in zip(system.terms, energies, strict=True))
+    return largest(system.comm, float(max(changes, default=0.0)))
