@@ -56,4 +56,4 @@ def _functions(space: fem.FunctionSpace) -> Array:
     """The basis functions of a facet on a lattice of points, (nodes, points)."""
     steps = itertools.product(range(_STEPS + 1), repeat=space.mesh.geometry.dim)
     lattice = np.array([step for step in steps if sum(step) == _STEPS]) / _STEPS
-    return spaces.facet_functions(nodes.degree(space), lattice, spaces.edge_share(space)).T
+    return spaces.simplex_functions(nodes.degree(space), lattice, spaces.edge_share(space)).T

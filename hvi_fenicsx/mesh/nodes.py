@@ -10,6 +10,7 @@ from typing import Any
 
 import basix
 import numpy as np
+import numpy.typing as npt
 from dolfinx import fem
 from dolfinx import mesh as dmesh
 
@@ -31,6 +32,8 @@ _SPLIT: dict[str, tuple[tuple[int, ...], ...]] = {
     ),
 }
 """The parts of a simplex by its nodes, corners first, then the midpoints of the edges in the order of basix."""
+_BY_NODES = {3: "interval", 6: "triangle", 10: "tetrahedron"}
+_BY_CORNERS = {2: "interval", 3: "triangle", 4: "tetrahedron"}
 
 
 def degree(space: fem.FunctionSpace) -> int:
@@ -111,7 +114,7 @@ def linear_cells(space: fem.FunctionSpace) -> Entities:
     """The parts of the cells that this rank owns, by their nodes, (c, d+1); those of a cell follow one another."""
     topology = space.mesh.topology
     own = space.dofmap.list[: topology.index_map(topology.dim).size_local]
-    return own if degree(space) == 1 else _split(own, _name(space))
+    return own if degree(space) == 1 else parts(own)
 
 
 def parts_of_cell(space: fem.FunctionSpace) -> int:
@@ -127,8 +130,7 @@ def linear_facets(space: fem.FunctionSpace, facets: Entities) -> Entities:
         facets: local facets.
     """
     own = facet_nodes(space, facets)
-    kind = {2: "interval", 3: "triangle"}[space.mesh.geometry.dim]
-    return own if degree(space) == 1 else _split(own, kind)
+    return own if degree(space) == 1 else parts(own)
 
 
 def hats(degree: int, barycentric: Array) -> Array:
@@ -165,9 +167,22 @@ def facet_nodes(space: fem.FunctionSpace, facets: Entities) -> Entities:
     return np.take_along_axis(space.dofmap.list[cells], table[local], axis=1)
 
 
-def _split(nodes: Entities, kind: str) -> Entities:
-    table = np.array(_SPLIT[kind])
-    return np.ascontiguousarray(nodes[:, table].reshape(-1, table.shape[1]))
+def parts(cells: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    """The parts (k, corners) of cells or facets of degree 2; those of one follow one another.
+
+    Args:
+        cells: by their nodes, corners first, then midpoints of edges in the order of basix, (c, nodes).
+    """
+    table = np.array(_SPLIT[_BY_NODES[cells.shape[1]]])
+    return np.ascontiguousarray(cells[:, table].reshape(-1, table.shape[1]))
+
+
+def joined(found: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    """The cells or facets of degree 2 by their nodes (c, nodes), of which :func:`parts` gives these (k, corners)."""
+    table = np.array(_SPLIT[_BY_CORNERS[found.shape[1]]])
+    grouped = found.reshape(-1, *table.shape)
+    first = [np.argwhere(table == node)[0] for node in range(table.max() + 1)]
+    return np.stack([grouped[:, row, column] for row, column in first], axis=1)
 
 
 def _name(space: fem.FunctionSpace) -> str:

@@ -94,8 +94,8 @@ def facet_weights(space: fem.FunctionSpace, sizes: Array) -> Array:
     return np.asarray(sizes[:, None] * np.array(shares, dtype=np.float64))
 
 
-def facet_functions(degree: int, barycentric: Array, share: float = 0.0) -> Array:
-    """The basis functions of a facet's nodes (:func:`.nodes.facet_nodes`) at points of it, (q, nodes).
+def simplex_functions(degree: int, barycentric: Array, share: float = 0.0) -> Array:
+    """The basis functions of the nodes of a facet or a cell, corners first, at points of it, (q, nodes).
 
     Args:
         degree: 1 or 2.
@@ -104,7 +104,7 @@ def facet_functions(degree: int, barycentric: Array, share: float = 0.0) -> Arra
     """
     if degree == 1:
         return barycentric
-    kind = basix.CellType[{2: "interval", 3: "triangle"}[barycentric.shape[1]]]
+    kind = basix.CellType[{2: "interval", 3: "triangle", 4: "tetrahedron"}[barycentric.shape[1]]]
     pairs: list[list[int]] = basix.topology(kind)[1]
     corners = barycentric * (2 * barycentric - 1)
     edges = np.stack([4 * barycentric[:, a] * barycentric[:, b] for a, b in pairs], axis=1)

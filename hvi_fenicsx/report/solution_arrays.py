@@ -5,6 +5,8 @@ This module alone knows the keys of the file. With n vertices and c cells in d d
 - ``points`` (n, d) in m; ``cells`` (c, d+1), the vertices of each cell
 - ``displacement`` (n, d) in m, or ``escape_mode`` (n, d) where no solution exists
 - ``von_mises`` (c,) in N/m²
+- ``degree`` of the elements; at degree 2 the vertices are the nodes, and the parts of each cell of the mesh follow one
+  another
 - ``region:NAME`` (k,), the cells of a region of the mesh
 - ``side:NAME`` (k, d), the vertices of each facet of a boundary table of the scene
 - ``load:NAME:KEY``, a load there that no formula of the scene tells, at m vertices: ``vertices`` (m,), ``traction``
@@ -32,6 +34,8 @@ from .errors import ResultError
 Singles = npt.NDArray[np.float32]
 """Real numbers in single precision, whose seven digits are enough for a stress."""
 FILE = "solution.npz"
+_PARTS = {(1, 2): 1, (1, 3): 1, (2, 2): 4, (2, 3): 8}
+"""Parts of a cell by degree and dimension."""
 _SIDE, _REGION, _LOAD, _PART = "side:", "region:", "load:", "part:"
 
 
@@ -78,7 +82,8 @@ class SolutionArrays:
 
     Attributes:
         points: the vertices, m, (n, d).
-        cells: the vertices of each cell, (c, d+1).
+        cells: the vertices of each cell, (c, d+1); at degree 2 the parts of a cell follow one another.
+        degree: of the elements, 1 or 2.
         displacement: m, (n, d); None where nothing was solved.
         escape_mode: the rigid motion along which the body escapes, (n, d); None where it does not.
         von_mises: the von Mises stress of each cell, N/m², (c,); None where it was not computed.
@@ -90,6 +95,7 @@ class SolutionArrays:
 
     points: Array
     cells: Integers
+    degree: int = 1
     displacement: Array | None = None
     escape_mode: Array | None = None
     von_mises: Singles | None = None
@@ -151,8 +157,9 @@ def load(path: Path) -> SolutionArrays:
 
 
 def _arrays(members: Mapping[str, Any]) -> SolutionArrays:
+    plain = {key: value for key, value in members.items() if ":" not in key}
     return SolutionArrays(
-        **{key: value for key, value in members.items() if ":" not in key},
+        **plain | {"degree": int(members["degree"])},
         sides=_named(members, _SIDE),
         regions=_named(members, _REGION),
         loads={name: LoadArrays(**own) for name, own in _grouped(members, _LOAD).items()},
@@ -179,7 +186,9 @@ def _part(members: dict[str, Any]) -> PartArrays:
 
 def _check(arrays: SolutionArrays) -> None:
     """Refuse arrays that do not belong together."""
-    n = len(arrays.points)
+    n, parts = len(arrays.points), _PARTS[arrays.degree, arrays.points.shape[1]]
+    if len(arrays.cells) % parts:
+        raise ValueError("its cells are no parts of cells of degree 2")
     numbers = [arrays.cells, *arrays.sides.values()]
     numbers += [values for part in arrays.parts.values() for values in (part.vertices, part.facets)]
     numbers += [load.vertices for load in arrays.loads.values()]

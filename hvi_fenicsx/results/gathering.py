@@ -48,7 +48,11 @@ def solution_arrays(solution: Solution, von_mises: Singles | None = None) -> Sol
     sides = {name: _facets(problem, facets) for name, facets in problem.part_facets.items()}
     loads, regions = _loads(problem), _regions(problem)
     parts = part_arrays(problem, () if solution.examination is None else solution.examination.states)
-    return None if comm.rank else SolutionArrays(**gathered, sides=sides, regions=regions, loads=loads, parts=parts)
+    if comm.rank:
+        return None
+    return SolutionArrays(
+        **gathered, degree=nodes.degree(problem.space), sides=sides, regions=regions, loads=loads, parts=parts
+    )
 
 
 def _by_node(problem: Problem, u: fem.Function) -> Array:

@@ -28,6 +28,7 @@ class Axis:
         needs_law: whether the scene must have a law that can be smoothed.
         excludes: the axes that cannot be given beside it.
         combined: whether its values are combined with those of the other axes; else :meth:`setting` is asked.
+        of_elements: whether its values are combined with those of the axes that are not combined, too.
     """
 
     registry: ClassVar[dict[str, Axis]] = {}
@@ -37,6 +38,7 @@ class Axis:
     needs_law: ClassVar[bool] = False
     excludes: ClassVar[tuple[str, ...]] = ()
     combined: ClassVar[bool] = True
+    of_elements: ClassVar[bool] = False
 
     def __init_subclass__(cls) -> None:
         if "name" in vars(cls):
@@ -152,6 +154,21 @@ class SmoothingAxis(_Choice):
         """See the base class."""
         exact = not smooths(tables) and any(width in beside for width in WIDTHS)
         return tables if exact else super().apply(tables, value, beside)
+
+
+class DegreeAxis(_Choice):
+    """The degree of the elements."""
+
+    name = "degree"
+    of_elements = True
+
+    def allowed(self) -> Sequence[str]:
+        """See the base class."""
+        return ("1", "2")
+
+    def apply(self, tables: Tables, value: str, beside: Collection[str]) -> Tables:
+        """See the base class."""
+        return with_solver(tables, degree=int(value))
 
 
 class MethodAxis(_Choice):

@@ -1,17 +1,20 @@
-"""P1 fields from one mesh onto the vertices of another, in the body and along Γc: exact where the meshes are nested.
+"""Fields from one mesh onto the nodes of another, in the body and along Γc: exact where the meshes are nested.
 
-Where they are not (curved boundaries, meshes made anew), a vertex outside of all cells takes its nearest cell's field,
-continued linearly.
+Where they are not (curved boundaries, meshes made anew), a node outside of all cells takes its nearest cell's field,
+continued.
 """
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 from mpi4py import MPI
 from scipy import sparse
 
 from .. import compat
-from ..mesh import point_location
+from ..mesh import nodes, point_location
+from ..problem import spaces
 from ..typing import Array, Integers
 from .solution_fields import PartFields, SolutionFields
 
@@ -20,37 +23,71 @@ _PAIRS = 4_000_000
 
 
 def body(source: SolutionFields, points: Array) -> sparse.csr_array:
-    """The matrix (m, n) from values at the vertices of a body to those at points. On this process alone.
+    """The matrix (m, n) from values at the nodes of a body to those at points. On this process alone.
 
     Args:
-        source: with n vertices.
+        source: with n nodes.
         points: m, (m, d).
     """
     d = source.points.shape[1]
-    mesh = compat.simplex_mesh(MPI.COMM_SELF, source.cells, source.points, {2: "triangle", 3: "tetrahedron"}[d])
+    kept, corners = np.unique(source.corners, return_inverse=True)
+    corners = corners.reshape(source.corners.shape)
+    kind = {2: "triangle", 3: "tetrahedron"}[d]
+    mesh = compat.simplex_mesh(MPI.COMM_SELF, corners, source.points[kept], kind)
     found = mesh.topology.original_cell_index[
         point_location.containing_cells(mesh, np.pad(points, ((0, 0), (0, 3 - d))))
     ]
-    corners = source.cells[found]
-    return _rows(corners, point_location.barycentric_weights(source.points[corners], points), len(source.points))
+    weights = point_location.barycentric_weights(source.points[source.corners[found]], points)
+    degree = 1 if source.cells.shape[1] == d + 1 else 2
+    return _rows(source.cells[found], spaces.simplex_functions(degree, weights), len(source.points))
 
 
-def surface(source: PartFields, points: Array) -> sparse.csr_array:
-    """The matrix (m, n) from values at the vertices of a part to those at points on it.
+@dataclass(frozen=True)
+class SurfaceTransfer:
+    """From the nodes of a part (n) to points on it (m).
+
+    Attributes:
+        linear: of what is linear between neighbouring nodes, as tractions are, (m, n).
+        of_degree: of displacements, which have the degree of the elements, (m, n).
+    """
+
+    linear: sparse.csr_array
+    of_degree: sparse.csr_array
+
+
+def surface(source: PartFields, points: Array) -> SurfaceTransfer:
+    """From the nodes of a part to points on it.
 
     Args:
-        source: with n vertices.
+        source: the part.
         points: m, (m, d).
     """
+    facets = _facets_near(source, points)
+    linear = source.facets[facets], _weights(source.points[source.facets[facets]], points)
+    transfer = _rows(*linear, len(source.points))
+    if not len(source.quadratic):
+        return SurfaceTransfer(transfer, transfer)
+    parts = len(nodes.parts(source.quadratic[:1]))
+    there = np.flatnonzero(facets < parts * len(source.quadratic))
+    whole = source.quadratic[facets[there] // parts]
+    pad = ((0, 0), (0, whole.shape[1] - points.shape[1]))
+    columns, weights = np.pad(linear[0], pad), np.pad(linear[1], pad)
+    columns[there] = whole
+    corners = source.points[whole[:, : points.shape[1]]]
+    weights[there] = spaces.simplex_functions(2, _weights(corners, points[there]))
+    return SurfaceTransfer(transfer, _rows(columns, weights, len(source.points)))
+
+
+def _facets_near(source: PartFields, points: Array) -> Integers:
+    """The facet nearest to each point."""
     corners = source.points[source.facets]
     chunk = max(1, _PAIRS // len(corners))
     nearest = [_nearest(corners, points[i : i + chunk]) for i in range(0, len(points), chunk)]
-    facets = np.concatenate(nearest) if nearest else np.empty(0, dtype=np.int64)
-    return _rows(
-        source.facets[facets],
-        point_location.clipped(point_location.barycentric_weights(corners[facets], points)),
-        len(source.points),
-    )
+    return np.concatenate(nearest) if nearest else np.empty(0, dtype=np.int64)
+
+
+def _weights(corners: Array, points: Array) -> Array:
+    return point_location.clipped(point_location.barycentric_weights(corners, points))
 
 
 def _nearest(corners: Array, points: Array) -> Integers:

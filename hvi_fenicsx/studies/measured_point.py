@@ -25,7 +25,7 @@ from ..solution import Solution
 from ..workflow import finish, prepare
 from . import cost
 from .errors import NotStoredError
-from .solution_fields import width
+from .solution_fields import fields, width
 from .stiffness import stiffness
 from .store import write_json
 
@@ -75,8 +75,7 @@ class MeasuredPoint:
         if self.accuracy is None:
             return finish(prepare(self.scene, self.comm, timer))
         solver = AdaptiveSolver(timer=timer)
-        scene = self.scene.with_solver(degree=1)  # solutions are compared linearly
-        found = solve_to_goal(scene, self.comm, Goal(self.accuracy), solver, lambda line: None).solution
+        found = solve_to_goal(self.scene, self.comm, Goal(self.accuracy), solver, lambda line: None).solution
         timer.seconds["solve"] += timer.seconds["estimate"]  # which steers the refinement: part of what it costs
         return found
 
@@ -85,7 +84,7 @@ class MeasuredPoint:
         found = solution_arrays(solution)
         matrix = stiffness(solution) if self.stiffness else None
         if found is not None:
-            record["h"] = width(found.points, found.cells)
+            record["h"] = width(found.points, fields(found).corners)
         self._store(lambda: _save(result, found, matrix))
 
     def _store(self, write: Callable[[], None]) -> None:

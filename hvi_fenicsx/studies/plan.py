@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from ..errors import InputError
 from ..laws import smoothing
@@ -50,28 +50,35 @@ def make(scene: Scene, axes: Sequence[AxisValues], thresholds: Thresholds = DEFA
         InputError: an axis that the scene has not, or named twice; or none of the combinations is a scene.
     """
     _check(scene, axes)
+    scene = scene.with_solver(degree=scene.solver.degree or 1)
     tables = tables_of(scene)
     left_out: list[str] = []
     combined = [a for a in axes if a.axis.combined]
     wanted = list(_product(tables, combined, left_out) if axes else _default(scene, tables, thresholds, left_out))
     if not wanted:
         raise InputError("--axis: no combination of these is a scene:\n" + "\n".join(left_out))
-    others = [a for a in axes if not a.axis.combined] if axes else _default_goals(scene, thresholds)
-    alone = [a.axis.setting(scene, value) for a in others for value in a.values]
+    alone = list(_goals(tables, axes or _default_goals(scene, thresholds), left_out))
     own, exact = Setting(scene), setting_of(unsmoothed(tables))
-    exact_on_each = [replace(s, scene=exact.scene.changed(domain=s.scene.domain)) for s in wanted]
+    exact_on_each = [exact_like(exact, s) for s in wanted]
     points = sorted(_distinct([*wanted, own, exact, *exact_on_each, *alone]), key=lambda s: s.unknowns)
-    finest = max([*wanted, own], key=lambda s: s.unknowns)
-    reference = tuple(_reference(finest.scene, thresholds))
+    finest = max([*wanted, own], key=lambda s: s.scene.domain.unknowns(scene.dimension))
+    highest = max(s.degree for s in (*wanted, own, *alone))
+    reference = tuple(_reference(finest.scene.with_solver(degree=highest), thresholds))
     return Plan(own, exact, tuple(points), reference, tuple(dict.fromkeys(left_out)))
 
 
+def exact_like(exact: Setting, setting: Setting) -> Setting:
+    """The exact law on the mesh and at the degree of a setting.
+
+    Args:
+        exact: the exact law on the scene's own mesh.
+        setting: any.
+    """
+    scene = exact.scene.changed(domain=setting.scene.domain).with_solver(degree=setting.degree)
+    return Setting(scene)
+
+
 def _check(scene: Scene, axes: Sequence[AxisValues]) -> None:
-    if scene.solver.degree == 2:
-        raise InputError(
-            "solver.degree: a study compares solutions of degree 1 only; leave out solver.degree, or compare the "
-            "energies in summary.json of runs of your own"
-        )
     names = [a.name for a in axes]
     for a in axes:
         if names.count(a.name) > 1:
@@ -96,6 +103,13 @@ def _product(tables: Tables, axes: Sequence[AxisValues], left_out: list[str]) ->
             left_out.append(f"{', '.join(f'{n} {v}' for n, v in pairs.items() if n != 'mesh')}: {error}")
 
 
+def _goals(tables: Tables, axes: Sequence[AxisValues], left_out: list[str]) -> Iterator[Setting]:
+    """What is solved for the values of axes that are not combined with all others."""
+    others = [a for a in axes if not a.axis.combined]
+    for base in _product(tables, [a for a in axes if a.axis.of_elements], left_out) if others else ():
+        yield from (a.axis.setting(base.scene, value) for a in others for value in a.values)
+
+
 def _in_order(axes: Sequence[AxisValues]) -> list[AxisValues]:
     """The axes in the order in which they are applied."""
     order = list(Axis.registry)
@@ -112,6 +126,8 @@ def _default(scene: Scene, tables: Tables, thresholds: Thresholds, left_out: lis
     for level in default_meshes(tables, thresholds):
         yield from _product(level, [few] if laws(scene) else [], left_out)
         yield setting_of(level)
+    for level in default_meshes(with_solver(unsmoothed(tables), degree=2), thresholds) if not scene.interface else ():
+        yield setting_of(level)
     if laws(scene):
         yield from _product(tables, [values_of("epsilon", thresholds.widths)], left_out)
         yield from _product(tables, [few, values_of("smoothing", smoothing.available())], left_out)
@@ -123,7 +139,8 @@ def _default(scene: Scene, tables: Tables, thresholds: Thresholds, left_out: lis
 
 
 def _default_goals(scene: Scene, thresholds: Thresholds) -> list[AxisValues]:
-    return [values_of("accuracy", thresholds.accuracies)] if can_be_refined(scene.domain) else []
+    axes = [values_of("accuracy", thresholds.accuracies), values_of("degree", thresholds.degrees)]
+    return axes if can_be_refined(scene.domain) else []
 
 
 def _reference(finest: Scene, thresholds: Thresholds) -> Iterator[Setting]:

@@ -21,8 +21,9 @@ from ..report.pictures.style import (
     figure,
     titled,
 )
-from .sentences import headlines, main_quantity
+from .sentences import degrees, headlines, main_quantity
 from .study import Study
+from .table import Row
 
 PANEL, GAP, FOOT = 2.6, 0.6, 0.85
 """Inches: a panel, the room for its title, the axis below the last."""
@@ -57,6 +58,13 @@ def colour(smoothing: str | None) -> str:
     return _SMOOTHINGS.get(smoothing, _OTHER_SMOOTHING)
 
 
+def marker(found: Row) -> str:
+    """The marker of a point: round at degree 1, square at degree 2, a diamond by another method."""
+    if found.method != "auto":
+        return "D"
+    return "o" if found.degree == 1 else "s"
+
+
 Kind = tuple[str, str, str]
 """Marker, colour and name of a kind of points."""
 
@@ -66,6 +74,8 @@ def kinds(study: Study) -> list[Kind]:
     there = {r.smoothing for r in study.rows if r.converged}
     ordered = [*(s for s in _SMOOTHINGS if s in there), *sorted(s for s in there if s and s not in _SMOOTHINGS)]
     found = [("o", colour(s), "exact law" if s is None else s) for s in ordered]
+    if len(degrees(study.rows)) > 1:
+        found.append(("s", GREY, "degree 2"))
     if any(r.method != "auto" for r in study.rows if r.converged):
         found.append(("D", GREY, "another method"))
     return [*found, ("*", INK, "the scene's own")]

@@ -26,7 +26,7 @@ from ..report.pictures.style import (
 )
 from .cost import PHASES
 from .plot_axes import LEAST, apart, error_axis, plain_log, span, time_axis
-from .plot_page import FOOT, Kind, colour, kinds, legend, page, quantities
+from .plot_page import FOOT, Kind, colour, kinds, legend, marker, page, quantities
 from .sentences import order, over_h, seconds
 from .study import Study
 from .table import Row, front
@@ -106,7 +106,7 @@ def _work_precision(study: Study) -> Figure | None:
 def _cost_panel(axes: Axes, study: Study, quantity: str) -> None:
     known = [(r.seconds, e, r) for r in study.rows if (e := r.error(quantity)) is not None and r.seconds]
     for s, e, r in known:
-        here = "o" if r.method == "auto" else "D"
+        here = marker(r)
         axes.plot(s, max(e, LEAST), here, color=colour(r.smoothing), ms=6.5, alpha=0.85, mec="white", mew=0.6)
     own = study.own
     if (error := own.error(quantity)) is not None and own.seconds:
@@ -131,7 +131,8 @@ def _front_line(axes: Axes, best: Sequence[Row], quantity: str) -> None:
 
 
 def _short(found: Row) -> str:
-    return f"{found.mesh.removesuffix(' cells')}, {found.law.replace('exact law', 'exact')}"
+    degree = "degree 2, " if found.degree == 2 else ""
+    return f"{found.mesh.removesuffix(' cells')}, {degree}{found.law.replace('exact law', 'exact')}"
 
 
 @study_picture("error_h", caption="Error against the mesh width.")
@@ -160,23 +161,29 @@ End = tuple[float, float, str, str]
 
 def _lines_over_h(axes: Axes, study: Study, quantity: str) -> tuple[list[float], list[End]]:
     """The exact law, then each smoothing by its width, bolder where it is narrower; the errors drawn, and the ends."""
-    smoothed = {r.law: r for r in study.rows if r.smoothing and r.converged}
-    ordered = sorted(smoothed.values(), key=lambda r: (r.smoothing or "", -(r.epsilon or 0.0)))
+    curves = _curves(study)
     ends: list[End] = []
     values: list[float] = []
-    for i, like in enumerate([None, *ordered]):
-        points = over_h(study.rows, study.own, quantity, like=like)
+    for i, like in enumerate(curves):
+        points = over_h(study.rows, study.own, quantity, law=like.law, degree=like.degree)
         if len(points) < 2:
             continue
         xs, ys = zip(*points, strict=True)
-        shade = colour(like.smoothing if like else None)
         shown = [max(y, LEAST) for y in ys]
-        thin: dict[str, Any] = {"lw": 1.5, "alpha": 0.35 + 0.6 * i / (len(ordered) or 1)}
-        style = thin if like is not None else {"lw": 2.6, "zorder": 5}
-        axes.plot(xs, shown, "o-", color=shade, ms=5, **style)
-        ends.append((xs[-1], shown[-1], "exact law" if like is None else like.law, shade))
+        thin: dict[str, Any] = {"lw": 1.5, "alpha": 0.35 + 0.6 * i / len(curves)}
+        style = thin if like.smoothing else {"lw": 2.6, "zorder": 5}
+        axes.plot(xs, shown, marker(like) + "-", color=colour(like.smoothing), ms=5, **style)
+        degree = f", degree {like.degree}" if like.degree != study.own.degree else ""
+        ends.append((xs[-1], shown[-1], like.law + degree, colour(like.smoothing)))
         values += shown
     return values, ends
+
+
+def _curves(study: Study) -> list[Row]:
+    """One row of each law and degree: the exact law, then each smoothing by its width."""
+    own = [r for r in study.rows if r.converged and r.method == study.own.method]
+    found = {(r.law, r.degree): r for r in own}
+    return sorted(found.values(), key=lambda r: (r.smoothing or "", -(r.epsilon or 0.0), r.degree))
 
 
 def _name_lines(axes: Axes, ends: Sequence[End]) -> None:
@@ -188,7 +195,7 @@ def _name_lines(axes: Axes, ends: Sequence[End]) -> None:
         else:
             groups.append([end])
     for group in groups:
-        exact = next((e for e in group if e[2] == "exact law"), group[0])
+        exact = next((e for e in group if e[2].startswith("exact law")), group[0])
         words = exact[2] if len(group) == 1 else f"{exact[2]} and {len(group) - 1} more"
         axes.annotate(words, exact[:2], (8, 0), textcoords="offset points", size=10, color=exact[3], va="center")
 
@@ -229,7 +236,8 @@ def _over_epsilon(study: Study, quantity: str) -> list[tuple[str, str, list[tupl
         points = {
             r.epsilon: e
             for r in study.rows
-            if (r.smoothing, r.mesh, r.method, r.tolerance) == (kind, own.mesh, own.method, own.tolerance)
+            if (r.smoothing, r.degree, r.mesh) == (kind, own.degree, own.mesh)
+            and (r.method, r.tolerance) == (own.method, own.tolerance)
             and r.epsilon is not None
             and (e := r.error(quantity)) is not None
         }

@@ -1,7 +1,7 @@
-"""The reference solution that others are measured against, on its own vertices.
+"""The reference solution that others are measured against, on its own nodes.
 
-Every solution is first brought onto the reference's vertices (:mod:`.interpolation`), where the energy norm is that of
-the reference's stiffness and integrals over Γc are sums over its lumped areas.
+Every solution is first brought onto the reference's nodes (:mod:`.interpolation`), where the energy norm is that of the
+reference's stiffness and integrals over Γc are sums over its lumped areas.
 """
 
 from __future__ import annotations
@@ -16,16 +16,17 @@ from scipy import sparse
 
 from ..typing import Array, Mask
 from . import interpolation
+from .interpolation import SurfaceTransfer
 from .solution_fields import PartFields, SolutionFields
 from .thresholds import DEFAULT, Thresholds
 
-_COLUMNS = ("slip", "friction", "pressure", "contact")
-"""The fields of a part that are brought onto the reference's vertices."""
+_COLUMNS = {"slip": True, "friction": False, "pressure": False, "contact": False}
+"""The fields of a part that are brought onto the reference's nodes, and whether they are displacements."""
 
 
 @dataclass(frozen=True)
 class TransferredSolution:
-    """A solution on the reference's n vertices.
+    """A solution on the reference's n nodes.
 
     Attributes:
         u: the displacement, m, (n, d).
@@ -53,16 +54,13 @@ class ReferenceSolution:
         self.own = self.transfer(fields)
 
     def transfer(self, found: SolutionFields) -> TransferredSolution:
-        """A solution on the reference's vertices. The transfer from a mesh is found once."""
+        """A solution on the reference's nodes. The transfer from a mesh is found once."""
         key = (found.points.tobytes(), found.cells.tobytes())
         if key not in self._transfers:
             parts = {n: interpolation.surface(found.parts[n], p.points) for n, p in self.fields.parts.items()}
             self._transfers = {key: (interpolation.body(found, self.fields.points), parts)}
         matrix, by_part = self._transfers[key]
-        columns = {
-            name: {column: along @ getattr(found.parts[name], column) for column in _COLUMNS}
-            for name, along in by_part.items()
-        }
+        columns = {name: _on_nodes(found.parts[name], along) for name, along in by_part.items()}
         return TransferredSolution(matrix @ found.u, columns, {name: _width(p) for name, p in found.parts.items()})
 
     def energy(self, u: Array) -> float:
@@ -89,6 +87,12 @@ class ReferenceSolution:
         parts = self.fields.parts
         out = sum(float(p.weights[self.near_jump(name, found)].sum()) for name, p in parts.items())
         return out / (sum(float(p.weights.sum()) for p in parts.values()) or 1.0)
+
+
+def _on_nodes(part: PartFields, along: SurfaceTransfer) -> dict[str, Array]:
+    """The fields of a part on the reference's nodes."""
+    ways = {column: along.of_degree if moves else along.linear for column, moves in _COLUMNS.items()}
+    return {column: way @ getattr(part, column) for column, way in ways.items()}
 
 
 def _width(part: PartFields) -> float:

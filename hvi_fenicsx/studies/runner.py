@@ -64,7 +64,8 @@ class PointRun:
     def text(self) -> str:
         """The setting in words."""
         role = "reference: " if self.stiffness else ""
-        return f"{role}{self.setting.mesh}, {self.setting.law}, {self.setting.scene.solver.method}"
+        setting = self.setting
+        return f"{role}{setting.mesh}, degree {setting.degree}, {setting.law}, {setting.scene.solver.method}"
 
 
 @dataclass

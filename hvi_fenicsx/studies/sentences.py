@@ -142,27 +142,36 @@ def slope(points: Sequence[tuple[float, float]]) -> float | None:
     return math.log(y1 / y0) / math.log(x1 / x0)
 
 
-def over_h(rows: Sequence[Row], own: Row, quantity: str, *, like: Row | None = None) -> list[tuple[float, float]]:
+def over_h(
+    rows: Sequence[Row], own: Row, quantity: str, *, law: str = "exact law", degree: int | None = None
+) -> list[tuple[float, float]]:
     """(h, error) of the points with the scene's own method, coarse to fine.
 
     Args:
         rows: all points.
         own: the scene's own setting.
         quantity: key of the error norm.
-        like: whose law the points have; without it, the exact law.
+        law: that the points have.
+        degree: that they have; without it, the scene's own.
     """
-    law = like.law if like else "exact law"
     found: dict[float, float] = {}
     for r in rows:
         error = r.error(quantity)
         same = (r.method, r.tolerance, r.linear_solver) == (own.method, own.tolerance, own.linear_solver)
-        if same and r.law == law and r.h is not None and error is not None:
+        alike = (r.law, r.degree) == (law, degree or own.degree)
+        if same and alike and r.h is not None and error is not None:
             found[r.h] = error
     return sorted(found.items(), reverse=True)
 
 
 def order(
-    rows: Sequence[Row], own: Row, quantity: str, certain: Certain, thresholds: Thresholds = DEFAULT
+    rows: Sequence[Row],
+    own: Row,
+    quantity: str,
+    certain: Certain,
+    thresholds: Thresholds = DEFAULT,
+    *,
+    degree: int | None = None,
 ) -> float | None:
     """The order in h of the exact law's error, from the two finest meshes whose error the reference resolves.
 
@@ -172,19 +181,28 @@ def order(
         quantity: key of the error norm.
         certain: how well the reference is known, by quantity.
         thresholds: which errors it resolves.
+        degree: of the elements; without it, the scene's own.
     """
     least = thresholds.resolved * (certain[quantity].error or 0.0)
-    return slope([(h, error) for h, error in over_h(rows, own, quantity) if error >= least])
+    return slope([(h, error) for h, error in over_h(rows, own, quantity, degree=degree) if error >= least])
 
 
 def _orders(
     rows: Sequence[Row], own: Row, quantities: Sequence[str], certain: Certain, thresholds: Thresholds
 ) -> Iterator[str]:
-    found = [(q, order(rows, own, q, certain, thresholds)) for q in quantities]
-    parts = [f"h^{value:.2f} in {ERROR_NORMS[q].name}" for q, value in found if value is not None]
-    if parts:
-        which = "two finest meshes whose errors the reference resolves"
-        yield f"With the exact law the error falls as {', '.join(parts)} ({which})."
+    which = "two finest meshes whose errors the reference resolves"
+    there = degrees(rows)
+    for degree in there:
+        found = [(q, order(rows, own, q, certain, thresholds, degree=degree)) for q in quantities]
+        parts = [f"h^{value:.2f} in {ERROR_NORMS[q].name}" for q, value in found if value is not None]
+        at = f" at degree {degree}" if len(there) > 1 else ""
+        if parts:
+            yield f"With the exact law the error{at} falls as {', '.join(parts)} ({which})."
+
+
+def degrees(rows: Sequence[Row]) -> list[int]:
+    """The degrees of the certified points, ascending."""
+    return sorted({r.degree for r in rows if r.converged})
 
 
 def adaptive_meshes(rows: Sequence[Row], certain: Certain) -> Iterator[str]:
@@ -199,12 +217,17 @@ def adaptive_meshes(rows: Sequence[Row], certain: Certain) -> Iterator[str]:
     found = sorted(((e, r) for e, r in known if r.adaptive), key=lambda pair: -pair[0])
     if not found:
         return
-    parts = [f"{percent(e)} with {r.dofs:,} unknowns ({seconds(r.seconds)})" for e, r in found]
+    parts = [f"{percent(e)} with {_unknowns(r)}" for e, r in found]
     best = found[-1][0]
-    uniform = [(r.dofs or 0, r) for e, r in known if not r.adaptive and e <= best]
-    fewest = min(uniform, key=lambda pair: (pair[0], pair[1].seconds or 0.0), default=None)
-    like = f"{fewest[0]:,} ({seconds(fewest[1].seconds)})" if fewest else "more than any measured here has"
+    uniform = [r for e, r in known if not r.adaptive and e <= best]
+    fewest = min(uniform, key=lambda r: (r.dofs or 0, r.seconds or 0.0), default=None)
+    like = _unknowns(fewest) if fewest else "more unknowns than any measured here has"
     yield f"Adaptive meshes: {', '.join(parts)} in the energy norm; a uniform mesh needs {like} for {percent(best)}."
+
+
+def _unknowns(found: Row) -> str:
+    degree = "degree 2, " if found.degree == 2 else ""
+    return f"{found.dofs:,} unknowns ({degree}{seconds(found.seconds)})"
 
 
 def methods(rows: Sequence[Row], own: Row) -> Iterator[str]:
@@ -216,7 +239,7 @@ def methods(rows: Sequence[Row], own: Row) -> Iterator[str]:
     """
 
     def rest(r: Row) -> tuple[object, ...]:
-        return (r.mesh, r.law, r.tolerance, r.linear_solver)
+        return (r.mesh, r.degree, r.law, r.tolerance, r.linear_solver)
 
     same = [r for r in rows if rest(r) == rest(own)]
     if len({r.method for r in same}) > 1:

@@ -40,4 +40,10 @@ class Setting:
     @property
     def unknowns(self) -> float:
         """About how many there are; of a mesh file, which is not opened for it, a guess."""
-        return self.scene.domain.unknowns(self.scene.dimension)
+        times = 1.0 if self.degree == 1 else 2.0**self.scene.dimension
+        return times * self.scene.domain.unknowns(self.scene.dimension)
+
+    @property
+    def degree(self) -> int:
+        """The degree of the elements."""
+        return self.scene.solver.degree or 1

@@ -6,20 +6,23 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+import basix
 import numpy as np
 
+from ..mesh import nodes
 from ..report import solution_arrays
 from ..report.solution_arrays import PartArrays, SolutionArrays
-from ..typing import Array, Integers
+from ..typing import Array, Integers, Mask
 
 
 @dataclass(frozen=True, kw_only=True)
 class PartFields:
-    """A part of Γc with m vertices, in d dimensions.
+    """A part of Γc with m nodes, in d dimensions.
 
     Attributes:
-        facets: segments or triangles by their vertices, counted from 0 within the part, (k, d).
-        points: the vertices, m, (m, d).
+        facets: segments or triangles by their nodes, counted from 0 within the part, (k, d).
+        quadratic: the facets of degree 2 by their nodes, corners first, (q, nodes); their parts begin ``facets``.
+        points: the nodes, m, (m, d).
         weights: lumped lengths or areas, m or m², (m,).
         normals: outward unit normals, (m, d).
         slip: u_t, m, (m, d-1).
@@ -31,6 +34,7 @@ class PartFields:
     """
 
     facets: Integers
+    quadratic: Integers
     points: Array
     weights: Array
     normals: Array
@@ -44,11 +48,11 @@ class PartFields:
 
 @dataclass(frozen=True)
 class SolutionFields:
-    """A solution with n vertices, in d dimensions.
+    """A solution with n nodes, in d dimensions.
 
     Attributes:
-        points: the vertices, m, (n, d).
-        cells: the vertices of each cell, (c, d+1).
+        points: the nodes, m, (n, d).
+        cells: the nodes of each cell, corners first, (c, nodes).
         u: the displacement, m, (n, d).
         parts: the parts of Γc by name.
     """
@@ -58,12 +62,28 @@ class SolutionFields:
     u: Array
     parts: Mapping[str, PartFields]
 
+    @property
+    def corners(self) -> Integers:
+        """The vertices of each cell, (c, d+1)."""
+        return self.cells[:, : self.points.shape[1] + 1]
+
 
 def fields(arrays: SolutionArrays) -> SolutionFields:
     """What is compared of a solution, which must have a displacement."""
     assert arrays.displacement is not None
-    parts = {name: _part(part, arrays.points) for name, part in arrays.parts.items()}
-    return SolutionFields(arrays.points, arrays.cells, arrays.displacement, parts)
+    cells = arrays.cells if arrays.degree == 1 else nodes.joined(arrays.cells)
+    ends = _edge_ends(cells, *arrays.points.shape)
+    parts = {name: _part(part, arrays.points, ends) for name, part in arrays.parts.items()}
+    return SolutionFields(arrays.points, cells, arrays.displacement, parts)
+
+
+def _edge_ends(cells: Integers, count: int, d: int) -> Integers:
+    """The vertices whose middle each node is, (n, 2); a vertex is named twice."""
+    found = np.repeat(np.arange(count)[:, None], 2, axis=1)
+    edges = basix.topology(basix.CellType[{2: "triangle", 3: "tetrahedron"}[d]])[1]
+    for node, ends in zip(cells.T[d + 1 :], edges, strict=False):
+        found[node] = cells[:, list(ends)]
+    return found
 
 
 def load(path: Path) -> SolutionFields:
@@ -75,13 +95,15 @@ def load(path: Path) -> SolutionFields:
     return fields(solution_arrays.load(path))
 
 
-def _part(part: PartArrays, points: Array) -> PartFields:
-    """A part in the order of the body's vertices."""
+def _part(part: PartArrays, points: Array, ends: Integers) -> PartFields:
+    """A part in the order of the body's nodes."""
     order = np.argsort(part.vertices)
+    facets, quadratic = _in_order(part.facets, ends)
     columns = {name: values[order] for name, values in part.columns.items()}
     bounded, slip = "contact" in columns, _tangential(columns, "u_t")
     return PartFields(
-        facets=np.searchsorted(part.vertices[order], part.facets),
+        facets=np.searchsorted(part.vertices[order], facets),
+        quadratic=np.searchsorted(part.vertices[order], quadratic),
         points=points[part.vertices[order]],
         weights=part.weights[order],
         normals=part.normals[order],
@@ -92,6 +114,48 @@ def _part(part: PartArrays, points: Array) -> PartFields:
         drops=part.drops,
         bounded=bounded,
     )
+
+
+def _in_order(facets: Integers, ends: Integers) -> tuple[Integers, Integers]:
+    """Facets with the parts of those of degree 2 first; and these by their nodes, where all their parts are there.
+
+    Args:
+        facets: by their nodes in the body, (k, d).
+        ends: the vertices whose middle each node is, (n, 2).
+    """
+    middle = ends[:, 0] != ends[:, 1]
+    candidates = _around(facets, ends, middle)
+    if not len(candidates):
+        return facets, candidates
+    count = len(middle)
+    there = _keys(facets, count)
+    each = nodes.parts(candidates)
+    whole = np.isin(_keys(each, count), there).reshape(len(candidates), -1).all(axis=1)
+    of_whole = nodes.parts(candidates[whole])
+    rest = facets[~np.isin(there, _keys(of_whole, count))]
+    return np.vstack([of_whole, rest]), candidates[whole]
+
+
+def _around(facets: Integers, ends: Integers, middle: Mask) -> Integers:
+    """The facets of degree 2 about the midpoints in these facets, by their nodes, (q, nodes)."""
+    if facets.shape[1] == 2:
+        own = np.unique(facets)
+        own = own[middle[own]]
+        return np.column_stack([ends[own], own])
+    centres = facets[middle[facets].all(axis=1)]
+    corners = [_common(ends[centres[:, i]], ends[centres[:, j]]) for i, j in ((1, 2), (0, 2), (0, 1))]
+    return np.column_stack([*corners, centres])
+
+
+def _common(one: Integers, other: Integers) -> Integers:
+    """The number that each pair shares with the other's, (k,)."""
+    shared = (one[:, 0] == other[:, 0]) | (one[:, 0] == other[:, 1])
+    return np.where(shared, one[:, 0], one[:, 1])
+
+
+def _keys(facets: Integers, count: int) -> Integers:
+    """A number for each facet, whatever the order of its nodes, (k,)."""
+    return np.asarray(np.sort(facets, axis=1) @ count ** np.arange(facets.shape[1]))
 
 
 def _tangential(columns: Mapping[str, Array], name: str) -> Array:

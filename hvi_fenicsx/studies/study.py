@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from scipy import sparse
 
@@ -11,7 +11,7 @@ from ..scene import Scene
 from . import solution_fields
 from .certainty import Certainty, certainty
 from .error_norms import Errors, errors
-from .plan import Plan
+from .plan import Plan, exact_like
 from .reference_solution import ReferenceSolution, TransferredSolution
 from .setting import Setting
 from .store import Store
@@ -86,7 +86,7 @@ def _transferred(reference: ReferenceSolution, store: Store, setting: Setting) -
 def _rows(plan: Plan, store: Store, reference: ReferenceSolution, certain: Mapping[str, Certainty]) -> Iterator[Row]:
     partner: tuple[Setting | None, TransferredSolution | None] = (None, None)
     for setting in plan.points:
-        alone = replace(setting, accuracy=None, scene=plan.exact.scene.changed(domain=setting.scene.domain))
+        alone = exact_like(plan.exact, setting)
         if partner[0] != alone:
             partner = (alone, _transferred(reference, store, alone))
         found = _transferred(reference, store, setting)

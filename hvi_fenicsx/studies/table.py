@@ -22,6 +22,7 @@ class Row:
     Attributes:
         point: its name in the folder ``points``.
         mesh: as people name it.
+        degree: of the elements.
         h: the mesh width, m; None of an adaptive mesh.
         smoothing: kind of the smoothing; None for the exact law.
         epsilon: width of the smoothing, relative; None for the exact law.
@@ -48,6 +49,7 @@ class Row:
 
     point: str
     mesh: str
+    degree: int
     h: float | None
     smoothing: str | None
     epsilon: float | None
@@ -88,7 +90,7 @@ class Row:
     @property
     def text(self) -> str:
         """The setting in words; what is as the program chooses is left out."""
-        parts = [self.mesh, self.law]
+        parts = [self.mesh, *(["degree 2"] if self.degree == 2 else []), self.law]
         parts += [self.method] if self.method != "auto" else []
         parts += [f"tolerance {self.tolerance:g}"] if self.tolerance != 1e-8 else []
         parts += [self.linear_solver] if self.linear_solver != "auto" else []
@@ -124,6 +126,7 @@ def row(
     return Row(
         point=point,
         mesh=setting.mesh,
+        degree=setting.degree,
         h=None if setting.accuracy is not None else setting.scene.domain.width() or record.get("h"),
         smoothing=wanted.smoothing,
         epsilon=record.get("epsilon", wanted.epsilon) if wanted.smoothing else None,

@@ -20,6 +20,7 @@ class Thresholds:
         methods: that the default plan compares.
         largest_comparison: unknowns up to which the default plan compares methods: some of them are slow.
         tolerances: that the default plan tries.
+        degrees: at which the default plan asks for these.
         accuracies: that the default plan asks of adaptive meshes, in the energy norm.
         reference_tolerance: relative residual at which the reference's iteration ends.
         steady: standard error of the median cost, relative, below which it is steady.
@@ -49,6 +50,7 @@ class Thresholds:
     largest_comparison: int = 20_000
     tolerances: tuple[str, ...] = ("1e-4", "1e-10")
     accuracies: tuple[str, ...] = ("0.1", "0.03")
+    degrees: tuple[str, ...] = ("1", "2")
     reference_tolerance: float = 1e-10
     steady: float = 0.05
     fewest_runs: int = 3

@@ -96,6 +96,7 @@ def test_a_surface_in_space_is_interpolated_linearly_and_its_facets_are_found() 
     nothing = np.zeros(len(corners))
     part = PartFields(
         facets=facets,
+        quadratic=np.empty((0, 6), dtype=np.int64),
         points=corners,
         weights=nothing,
         normals=corners,
@@ -107,7 +108,7 @@ def test_a_surface_in_space_is_interpolated_linearly_and_its_facets_are_found() 
         bounded=True,
     )
     points = np.array([[0.3, 0.1, 0.0], [0.2, 0.7, 0.0], [0.0, 0.6, 0.2], [0.0, 0.1, 0.9]])
-    np.testing.assert_allclose(interpolation.surface(part, points) @ corners, points, atol=1e-14)
+    np.testing.assert_allclose(interpolation.surface(part, points).linear @ corners, points, atol=1e-14)
 
 
 def test_the_closed_form_is_met_on_every_mesh() -> None:
@@ -252,9 +253,9 @@ def test_adaptive_meshes_are_set_beside_the_uniform_one_that_does_as_well() -> N
     certain = dict.fromkeys(ERROR_NORMS, Certainty(1e-4, None))
     (words,) = sentences.adaptive_meshes(rows, certain)
     assert "0.8 % with 90 unknowns (0.5 s)" in words
-    assert "more than any" in words
+    assert "more unknowns than any" in words
     (words,) = sentences.adaptive_meshes([rows[0], replace(rows[1], errors=rows[2].errors), rows[2]], certain)
-    assert "a uniform mesh needs 900 (0.2 s) for 0.8 %" in words
+    assert "a uniform mesh needs 900 unknowns (0.2 s) for 0.8 %" in words
     (words,) = sentences.adaptive_meshes(rows, dict.fromkeys(ERROR_NORMS, Certainty(0.02, None)))
     assert "2 % with 90 unknowns" in words
 

@@ -83,7 +83,7 @@ class FacetSamples:
             at: the points in barycentric coordinates, (q, d); by default the sample points.
         """
         points = self.barycentric if at is None else at
-        return np.asarray(at_nodes @ spaces.facet_functions(self.facets.degree, points).T)
+        return np.asarray(at_nodes @ spaces.simplex_functions(self.facets.degree, points).T)
 
     def of(self, value: SpatialValue, at: Array | None = None) -> Array:
         """A value at points, SI, (f, q).

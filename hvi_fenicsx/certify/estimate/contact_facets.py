@@ -97,7 +97,7 @@ class PartTrace:
 
     def _functions_at(self, barycentric: Array) -> Array:
         """The displacements' basis functions at points of a facet, (q, n)."""
-        return spaces.facet_functions(self._facets.degree, barycentric, spaces.edge_share(self._problem.space))
+        return spaces.simplex_functions(self._facets.degree, barycentric, spaces.edge_share(self._problem.space))
 
     def _at_local_nodes(self, values: Array) -> Array:
         """Values at the part's owned nodes (m, k), k ≤ d, at all local nodes (n, k). Collective."""
