@@ -12,10 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..certify import certificate
+from ..equilibrium_paths.state import Event, PathState
 from ..problem.factored_problem import FactoredProblem
 from ..system.condensation import Condensation
 from ..system.system import System
-from .state import Event, PathState
 
 ALWAYS = frozenset({Event.START, Event.JUMP, Event.TURN, Event.END})
 """The events whose states are examined with the whole body."""

@@ -9,6 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 from dolfinx import fem
 
+from ..equilibrium_paths.kinds import kind_of
+from ..equilibrium_paths.programme import Follower
+from ..equilibrium_paths.state import End, Event, Follow, PathOptions, PathState
 from ..errors import InputError
 from ..load_path import LoadPath, PathRow
 from ..problem.factored_problem import FactoredProblem
@@ -21,9 +24,7 @@ from ..workflow import Preparation
 from . import records
 from .certifying import Certifier, Verdict
 from .journal import Record
-from .kinds import kind_of
 from .measures import Measures
-from .state import End, Event, Follow, Follower, PathOptions, PathState
 
 
 @dataclass(frozen=True, kw_only=True)

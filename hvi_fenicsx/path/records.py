@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from ..equilibrium_paths.state import Event, PathState, Place, Position
 from .certifying import Verdict
 from .journal import Record
-from .state import Event, PathState, Place, Position
 
 
 def record(state: PathState, verdict: Verdict) -> Record:

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Protocol
 
 from ..system.condensed_problem import CondensedProblem
 from ..typing import Array, Integers
@@ -150,18 +149,3 @@ class PathOptions:
     follow: Follow = Follow.STABLE
     remember: Collection[int] = ()
     most_events: int = 1_000_000
-
-
-class Follower(Protocol):
-    """Something that follows a path.
-
-    Attributes:
-        end: how the path ended; None before.
-        reason: that in a sentence.
-    """
-
-    end: End | None
-    reason: str
-
-    def states(self) -> Iterator[PathState]:
-        """The states from start to end."""

@@ -10,7 +10,7 @@ from typing_extensions import override
 
 from ...system.condensed_problem import CondensedProblem
 from ...typing import Array
-from ..programme import ProgrammeFollower
+from ..programme import Follower
 from ..state import End, Event, Follow, PathOptions, PathState, Place, Position, place_of
 from .curve import Curve, Move, Outcome
 from .energies import Balance, displacement_rate
@@ -22,8 +22,8 @@ from .sites import Sites
 from .vertex_laws import vertex_laws
 
 
-class ArcLengthFollower(ProgrammeFollower):
-    """The path of a problem by predictor and corrector. A :class:`..Follower`.
+class ArcLengthFollower(Follower):
+    """The path of a problem by predictor and corrector.
 
     Args:
         problem: the problem.

@@ -10,7 +10,7 @@ from .spectrum import is_singular
 from .state import End, Event, PathOptions, PathState
 
 
-class ProgrammeFollower(ABC):
+class Follower(ABC):
     """Follows the path of a problem through a programme.
 
     Args:

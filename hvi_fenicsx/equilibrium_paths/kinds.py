@@ -13,7 +13,7 @@ from .arc_length.distances import CurvedDistances
 from .arc_length.follower import ArcLengthFollower
 from .bonds import is_piecewise_linear
 from .exact import ExactFollower
-from .programme import ProgrammeFollower
+from .programme import Follower
 from .state import PathState
 from .straight_distances import StraightDistances
 
@@ -41,7 +41,7 @@ class FollowerKind(ABC):
     """
 
     made: list[FollowerKind] = []  # noqa: RUF012
-    follower: type[ProgrammeFollower]
+    follower: type[Follower]
     distances: type[Distances]
 
     def __init_subclass__(cls) -> None:

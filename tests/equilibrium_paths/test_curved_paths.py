@@ -12,14 +12,15 @@ from condensed import bonds, chain, graph, problem
 from test_exact_paths import SOFTENING, bar, largest_imbalance, random_problem, spring
 
 from hvi_fenicsx.effects import Direction
+from hvi_fenicsx.equilibrium_paths.arc_length.distances import CurvedDistances
+from hvi_fenicsx.equilibrium_paths.arc_length.follower import ArcLengthFollower
+from hvi_fenicsx.equilibrium_paths.exact import ExactFollower
+from hvi_fenicsx.equilibrium_paths.kinds import ArcLengthKind, ExactKind, kind_of
+from hvi_fenicsx.equilibrium_paths.programme import Follower
+from hvi_fenicsx.equilibrium_paths.state import End, Event, Follow, PathOptions, PathState
 from hvi_fenicsx.errors import InputError
 from hvi_fenicsx.laws import Exponential, Superpotential
 from hvi_fenicsx.laws.smoothing import create
-from hvi_fenicsx.path.arc_length.distances import CurvedDistances
-from hvi_fenicsx.path.arc_length.follower import ArcLengthFollower
-from hvi_fenicsx.path.exact import ExactFollower
-from hvi_fenicsx.path.kinds import ArcLengthKind, ExactKind, kind_of
-from hvi_fenicsx.path.state import End, Event, Follow, Follower, PathOptions, PathState
 from hvi_fenicsx.system.condensed_problem import Bonds, CondensedProblem
 
 Array = npt.NDArray[np.float64]

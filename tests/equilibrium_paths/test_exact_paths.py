@@ -15,11 +15,11 @@ from mpi4py import MPI
 from scenes import DELTA, model, quadratic_linear
 
 from hvi_fenicsx import Scene, prepare
+from hvi_fenicsx.equilibrium_paths.bonds import BondTable
+from hvi_fenicsx.equilibrium_paths.exact import ExactFollower
+from hvi_fenicsx.equilibrium_paths.segments import Segment
+from hvi_fenicsx.equilibrium_paths.state import End, Event, Follow, PathOptions, PathState
 from hvi_fenicsx.errors import InputError
-from hvi_fenicsx.path.bonds import BondTable
-from hvi_fenicsx.path.exact import ExactFollower
-from hvi_fenicsx.path.segments import Segment
-from hvi_fenicsx.path.state import End, Event, Follow, PathOptions, PathState
 from hvi_fenicsx.system.condensation import Condensation
 from hvi_fenicsx.system.condensed_problem import CondensedProblem
 

@@ -18,7 +18,7 @@ from .descent import Descent, Landing
 from .onward import chosen, ways_on
 from .passing import Passing, classify, go_on
 from .placing import place
-from .programme import ProgrammeFollower
+from .programme import Follower
 from .rounds import Round, Rounds
 from .snap import snap
 from .spectrum import is_singular
@@ -27,8 +27,8 @@ from .step import FACTOR
 from .tracer import Tracer
 
 
-class ExactFollower(ProgrammeFollower):
-    """The path of a problem. A :class:`.Follower`.
+class ExactFollower(Follower):
+    """The path of a problem whose laws are piecewise linear.
 
     Args:
         problem: the problem.
