@@ -21,7 +21,7 @@ from referee.equilibria import find
 from referee.laws import exact_law, law_of
 from referee.meshes import block
 from referee.minimality import examine, sampled_descent
-from referee.programmes import verdict
+from referee.programmes import Body, verdict
 from referee.solution import Check
 
 STEEL = {"model": "plane_stress", "youngs_modulus": 2.15e11, "poisson_ratio": 0.29}
@@ -215,3 +215,16 @@ def test_energies_are_integrals_of_tractions(table: dict[str, Any], smoothing: s
 def test_scenes_repeat() -> None:
     for number in range(40):
         assert draw(5, number).table == draw(5, number).table
+
+
+def test_bilateral_contact_along_uneven_normals_is_a_wedge():
+    table = scene(wall=False)
+    table["boundary"]["floor"] = {"on": "bottom", "contact": {"lower": 0.0, "upper": 0.0}}
+    mesh = block([1.0, 1.0], [4, 4])
+    tilted = mesh.points.copy()
+    for slope in (1e-3, 1e-5):
+        raised = (mesh.points[:, 0] == 0.25) & (mesh.points[:, 1] == 0.0)
+        tilted[raised, 1] = 0.25 * slope
+        problem = assemble(table, replace(mesh, points=tilted))
+        needed = Body(problem, 0).amplification()
+        assert 0.1 / slope < needed < 10.0 / slope

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from scipy.linalg import null_space
 from scipy.optimize import linprog
 
 from referee.assembly import LawPoint, Problem
@@ -85,9 +86,15 @@ class Body:
         return np.hstack([np.eye(3), turn])
 
     @cached_property
-    def _fixed_rows(self) -> Array:
+    def _prescribed(self) -> Array:
         d, p = self.problem.d, self.problem
         rows = [self.fields(int(i) // d)[int(i) % d] for i in p.fixed if int(i) // d in self.mine]
+        return np.array(rows).reshape(-1, 3 if d == 2 else 6)
+
+    @cached_property
+    def _fixed_rows(self) -> Array:
+        d, p = self.problem.d, self.problem
+        rows = list(self._prescribed)
         rows += [
             b.normal @ self.fields(b.vertex)
             for b in p.bounds
@@ -124,9 +131,14 @@ class Body:
     def work(self) -> Array:
         """<g, y> of the basis."""
         assert self.basis is not None
+        return self._total @ self.basis
+
+    @cached_property
+    def _total(self) -> Array:
+        """<g, y> of all rigid motions."""
         g = self.problem.load.reshape(-1, self.problem.d)
         total = sum((g[v] @ self.fields(int(v)) for v in self.vertices), np.zeros(self._fixed_rows.shape[1]))
-        return self.factor * np.asarray(total @ self.basis)
+        return self.factor * np.asarray(total)
 
     @cached_property
     def loads(self) -> float:
@@ -206,21 +218,32 @@ class Body:
         return min((float(-self.work @ v / self.size + sum(r.value(v) for r in rows)) for v in y), default=np.inf)
 
     def amplification(self) -> float:
-        """The least possible sum of contact forces over that of the loads: a wedge of slope s needs 1/s."""
-        one_way = [b for b in self.problem.bounds if b.vertex in self.mine]
-        if not one_way or self.basis is None or not self.basis.shape[1] or not self.loads:
+        """The least possible sum of contact forces over that of the loads: a wedge of slope s needs 1/s.
+
+        All motions that prescribed values leave count: bilateral contact along uneven normals is a wedge too.
+        """
+        contact = [b for b in self.problem.bounds if b.vertex in self.mine]
+        if not contact or not self.loads:
             return 0.0
-        columns = [b.normal @ self.fields(b.vertex) @ self.basis for b in one_way]
-        limits = [(0.0 if np.isinf(b.lower) else None, None) for b in one_way]
-        cost = [float(np.isinf(b.lower)) for b in one_way]
+        rows = self._prescribed
+        free = null_space(rows, rcond=1e-9) if len(rows) else np.eye(rows.shape[1])
+        columns, limits, cost = [], [], []
+        for b in contact:
+            for sign in (1.0, -1.0):
+                if np.isfinite(b.upper if sign > 0 else b.lower):
+                    columns.append(sign * b.normal @ self.fields(b.vertex) @ free)
+                    limits.append((0.0, None))
+                    cost.append(1.0)
         for p in self._laws:
             minus, plus = (p.law.exact or p.law).peak()
             for row in p.directions:
-                columns.append(row @ self.fields(p.vertex) @ self.basis)
+                columns.append(row @ self.fields(p.vertex) @ free)
                 ends = p.weight * np.array([-minus, plus]) / self.loads
                 limits.append((ends[0] if np.isfinite(ends[0]) else None, ends[1] if np.isfinite(ends[1]) else None))
                 cost.append(0.0)
-        found = linprog(cost, A_eq=np.array(columns).T, b_eq=self.work / self.loads, bounds=limits)
+        if not free.shape[1]:
+            return 0.0
+        found = linprog(cost, A_eq=np.array(columns).T, b_eq=self._total @ free / self.loads, bounds=limits)
         return float(found.fun) if found.x is not None else 0.0
 
     def verdict(self) -> Verdict:
