@@ -218,33 +218,34 @@ class Body:
         return min((float(-self.work @ v / self.size + sum(r.value(v) for r in rows)) for v in y), default=np.inf)
 
     def amplification(self) -> float:
-        """The least possible sum of contact forces over that of the loads: a wedge of slope s needs 1/s.
+        """The least possible sum of forces over that of the loads: a wedge of slope s needs 1/s.
 
-        All motions that prescribed values leave count: bilateral contact along uneven normals is a wedge too.
+        Forces of contact and of laws without a peak (springs) count. All motions that prescribed values leave count:
+        bilateral contact along uneven normals is a wedge too, and so are springs along a tilted floor.
         """
-        contact = [b for b in self.problem.bounds if b.vertex in self.mine]
-        if not contact or not self.loads:
-            return 0.0
         rows = self._prescribed
         free = null_space(rows, rcond=1e-9) if len(rows) else np.eye(rows.shape[1])
-        columns, limits, cost = [], [], []
-        for b in contact:
-            for sign in (1.0, -1.0):
-                if np.isfinite(b.upper if sign > 0 else b.lower):
-                    columns.append(sign * b.normal @ self.fields(b.vertex) @ free)
-                    limits.append((0.0, None))
-                    cost.append(1.0)
-        for p in self._laws:
-            minus, plus = (p.law.exact or p.law).peak()
-            for row in p.directions:
-                columns.append(row @ self.fields(p.vertex) @ free)
-                ends = p.weight * np.array([-minus, plus]) / self.loads
-                limits.append((ends[0] if np.isfinite(ends[0]) else None, ends[1] if np.isfinite(ends[1]) else None))
-                cost.append(0.0)
-        if not free.shape[1]:
+        forces = self._one_way_forces()
+        if not forces or not self.loads or not free.shape[1]:
             return 0.0
-        found = linprog(cost, A_eq=np.array(columns).T, b_eq=self._total @ free / self.loads, bounds=limits)
+        columns = np.array([column for column, _ in forces]) @ free
+        limits = [(0.0, most / self.loads if np.isfinite(most) else None) for _, most in forces]
+        cost = [float(np.isinf(most)) for _, most in forces]
+        found = linprog(cost, A_eq=columns.T, b_eq=self._total @ free / self.loads, bounds=limits)
         return float(found.fun) if found.x is not None else 0.0
+
+    def _one_way_forces(self) -> list[tuple[Array, float]]:
+        """What contact and laws can carry: works on the rigid motions per force, and the largest force."""
+        found = []
+        for b in self.problem.bounds:
+            if b.vertex in self.mine:
+                work = b.normal @ self.fields(b.vertex)
+                found += [(s * work, np.inf) for s, end in ((1.0, b.upper), (-1.0, b.lower)) if np.isfinite(end)]
+        for p in self._laws:
+            ends = p.weight * np.array((p.law.exact or p.law).peak())
+            works = p.directions @ self.fields(p.vertex)
+            found += [(s * w, max(0.0, float(end))) for w in works for s, end in ((-1.0, ends[0]), (1.0, ends[1]))]
+        return found
 
     def verdict(self) -> Verdict:
         """The state of this body."""
