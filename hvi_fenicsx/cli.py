@@ -28,12 +28,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _run_command(words: Sequence[str]) -> int:
+    stopped = processes.raise_on_stop()
     try:
         with log.Handlers(log.WarningDisplay()):
             return _told(lambda: _dispatch(_parsed(words), words))
     except KeyboardInterrupt:
-        _print_error("hvi: interrupted; nothing was written")
-        return ExitCode.INTERRUPTED
+        pass
+    except Exception:
+        if not stopped():
+            raise
+    _print_error("hvi: interrupted; nothing was written")
+    return ExitCode.INTERRUPTED
 
 
 def _told(command: Callable[[], int]) -> int:
@@ -116,8 +121,8 @@ def _placed(options: argparse.Namespace) -> Iterator[None]:
 
 @contextmanager
 def _interrupts_held() -> Iterator[None]:
-    """Let Ctrl-C wait for the end of an import, which it would end with a library's own traceback."""
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    """Let a stop wait for the end of an import, which it would end with a library's own traceback."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, processes.STOP)
     try:
         yield
     finally:

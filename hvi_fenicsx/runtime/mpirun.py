@@ -41,18 +41,27 @@ def run(ranks: int, words: Sequence[str]) -> int:
     """
     command = [*processes.launcher(ranks), "-m", "hvi_fenicsx", *without_ranks(words)]
     signalled: list[int] = []
+    held: list[str] = []
 
     def pass_on(number: int, frame: FrameType | None) -> None:
         signalled.append(number)
         process.send_signal(signal.SIGUSR1 if len(signalled) == 1 else signal.SIGTERM)
 
+    def complain(line: str) -> None:
+        (held.append if signalled else terminal.complain)(line)
+
     with _code_file() as file:
         process: subprocess.Popen[str] = _started(command, file)
         processes.catch(processes.STOP, pass_on)
-        writers = [_writer(process.stdout, terminal.say), _writer(process.stderr, terminal.complain)]
-        code = process.wait() or int(file.read_text(encoding="ascii") or 0)
+        writers = [_writer(process.stdout, terminal.say), _writer(process.stderr, complain)]
+        ended, agreed = process.wait(), file.read_text(encoding="ascii")
         for writer in writers:
             writer.join(_LAST_LINES)
+    if signalled and ended and not agreed:  # before the ranks could catch it; mpirun's notice of that helps nobody
+        raise KeyboardInterrupt
+    for line in held:
+        terminal.complain(line)
+    code = ended or int(agreed or 0)
     return ExitCode.INTERRUPTED if signalled and code else code
 
 

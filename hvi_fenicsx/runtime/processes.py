@@ -65,6 +65,22 @@ def catch(numbers: Iterable[signal.Signals], handler: Callable[[int, FrameType |
             signal.signal(number, handler)
 
 
+def raise_on_stop() -> Callable[[], bool]:
+    """Have the signals of a stop raise KeyboardInterrupt, until a command catches them itself.
+
+    Returns:
+        Whether one has raised it: a library that it passes through may make another error of it.
+    """
+    raised: list[int] = []
+
+    def stop(number: int, frame: FrameType | None) -> None:
+        raised.append(number)
+        raise KeyboardInterrupt
+
+    catch(STOP, stop)
+    return lambda: bool(raised)
+
+
 def launcher(ranks: int) -> list[str]:
     """The command that starts Python on so many ranks; `-m mpi4py` ends all ranks when one fails.
 

@@ -22,7 +22,8 @@ import pytest
 from runs import command, contact, hvi, process, summary, write_scene
 from scenes import block, model, quadratic_linear
 
-from hvi_fenicsx import read_scene
+from hvi_fenicsx import cli, read_scene
+from hvi_fenicsx.runtime import processes
 
 LAW = quadratic_linear(1.0e3)
 COLUMNS = "part,s,x,y,z,u_n,u_t1,u_t2,gap,sigma_n,friction_t1,friction_t2,contact,branch_t,branch_n"
@@ -279,6 +280,26 @@ def test_an_interrupted_run_writes_what_it_has_and_says_so(
     assert (record["converged"], record["exit_code"]) == (False, 130)
     assert "interrupted" in record["reason"]
     assert len(contact(tmp_path / "r")) == 201
+
+
+def test_a_stop_that_a_library_turns_into_an_error_of_its_own_is_an_interruption(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def library(*_: object) -> int:
+        try:
+            signal.raise_signal(signal.SIGTERM)
+        except KeyboardInterrupt:
+            raise ValueError("a callback failed") from None
+        return 0
+
+    before = {number: signal.getsignal(number) for number in processes.STOP}
+    monkeypatch.setattr(cli, "_dispatch", library)
+    try:
+        assert cli.main(["version"]) == 130
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+    assert "interrupted; nothing was written" in capsys.readouterr().err
 
 
 def test_values_are_overridden_in_order_and_wrong_ones_are_named(scene: Path, tmp_path: Path) -> None:
