@@ -109,7 +109,7 @@ def _steepness(term: LawTerm) -> str:
     """Why there is no bound of how steeply a law falls."""
     if term.mixity is not None:
         return "the energy of separation depends on the mode, and the law has no potential"
-    if term.exact.concave.kinks.size:
+    if term.law.concave.kinks.size:
         return "the law's traction drops"
     return "how steeply the law's traction falls is not known"
 

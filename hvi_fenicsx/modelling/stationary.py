@@ -53,7 +53,7 @@ def equilibria(
     """All equilibria of a model or a scene, or the lowest with a proof. Collective.
 
     Args:
-        model: what to search; its laws are polylines, unsmoothed.
+        model: what to search; for all equilibria the tractions of its laws are polylines.
         comm: the ranks; by default those of the body, for a scene all.
         lowest: the lowest energy with a proof, instead of all equilibria.
         gap: what that proof may leave open, relative to the energy.

@@ -20,7 +20,7 @@ from . import monotone_radius, stationarity
 from .arcs import on_interval
 from .convex_programme import minimise
 from .linear_test import LinearTest
-from .lowest import FAR, fresh_box, problem_size
+from .lowest import fresh_box
 from .relaxation import Box, Relaxation, envelopes
 from .scalar_problem import ScalarProblem
 from .stationarity import Kind
@@ -77,7 +77,7 @@ class Enumeration:
 
     def start(self) -> None:
         """Begin with a cell that is far larger than the problem's displacements."""
-        problem, far = self.problem, FAR * problem_size(self.problem)
+        problem, far = self.problem, self.problem.far
         low, high = np.maximum(problem.lower, -far), np.minimum(problem.upper, far)
         cell = self._tightened(fresh_box(low, high, np.zeros(problem.size)))
         if cell is None:

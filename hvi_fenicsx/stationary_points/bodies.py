@@ -3,18 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
-from ..errors import SolverError
+from ..errors import InputError, SolverError
 from ..solution import Solution
 from ..solvers.result import SolveResult
 from ..system.condensation import Condensation
-from ..workflow import Preparation, certified
+from ..workflow import Preparation, certified, finish
 from .all_points import StationaryPoint
 from .condensed_form import scalar_problem
 from .scalar_problem import ScalarProblem
-from .search import Found, Saved, Wanted, find
+from .search import Found, Saved, Wanted, begun, find
+
+COARSE_GAP = 1e-3
+"""Gap of the first search where laws are curved, from which the error of their polylines is chosen."""
+ERROR_SHARE = 0.05
+"""Share of the gap that this error may take."""
 
 NONE = Found(points=(), complete=True, lower_bound=None, proven=True, nodes=0, reason="no solution exists")
 """What is found where the load moves a body away."""
@@ -60,13 +66,31 @@ class Equilibria:
             saved: what an earlier search left.
 
         Raises:
-            InputError: an earlier search was for something else.
+            InputError: an earlier search was for something else, or all are wanted and a law is curved.
         """
         if self.problem is None:
             return NONE
         wanted = Wanted(lowest=lowest, gap=gap, bounded=self._prepared.solvability.state == "held")
         with self._prepared.timer("solve"):
+            if self.problem.error:
+                wanted = self._refined(self.problem, wanted, stop, report)
             return find(self.problem, wanted, stop, report, saved)
+
+    def _refined(
+        self, coarse: ScalarProblem, wanted: Wanted, stop: Callable[[], bool], report: Callable[[str], None]
+    ) -> Wanted:
+        """Polylines of curved laws as near as the gap needs, and a point of low energy to begin at. Collective."""
+        if not wanted.lowest:
+            raise InputError(
+                "a law's traction is curved: all equilibria are found where tractions are polylines, also with "
+                'smoothing = "quadratic". `--lowest` proves the lowest energy of curved laws too'
+            )
+        start = begun(coarse, COARSE_GAP, stop, report)
+        if start is None:
+            return wanted
+        size = max(abs(start.energy), 1e-6 * coarse.energy_size(start.x))
+        self.problem = scalar_problem(self._condensation.problem, tolerance=ERROR_SHARE * wanted.gap * size)
+        return replace(wanted, start=start)
 
     def solution(self, point: StationaryPoint) -> Solution:
         """The whole bodies at a stationary point, certified. Collective.
@@ -81,5 +105,8 @@ class Equilibria:
         if not np.allclose(comm.bcast(point.x), point.x, rtol=1e-9, atol=1e-12):
             raise SolverError("the ranks found different equilibria; run on one")
         u = self._prepared.system.displacement(self._condensation.expand(point.x))
+        if self.problem is not None and self.problem.error:  # the point is that of polylines near the laws
+            u.x.array[:] *= self._prepared.problem.scales.displacement
+            return finish(self._prepared, start=u, estimating=False)
         found = SolveResult(u=u, method="stationary points of the condensed problem", converged=True, reason=point.kind)
         return certified(self._prepared, found)

@@ -24,8 +24,6 @@ from .relaxation import Box, Relaxation
 from .scalar_problem import ScalarProblem
 from .tightening import ForceIntervals
 
-FAR = 1e6
-"""Ends of the first box, relative to the problem's displacements; what is found must stay off them."""
 PARTS = (0.9, 0.999)
 """Shares of the largest curvature, in turn: the first leaves convexity to tighten with, the second bounds best."""
 MOST_ROUNDS = 6
@@ -90,7 +88,7 @@ class LowestSearch:
             SolverError: the energy is not bounded from below, or this cannot be shown.
         """
         problem = self.problem
-        far = FAR * problem_size(problem)
+        far = problem.far
         low, high = np.maximum(problem.lower, -far), np.minimum(problem.upper, far)
         self.x = np.clip(np.zeros(problem.size), low, high)
         self._low, self._high = low, high
@@ -101,7 +99,7 @@ class LowestSearch:
         if self._far(first.x):
             raise SolverError("no lowest energy: it falls without limit, or only a limit far away was found")
         self._try(first.x)
-        low, high = level_set(problem, first, curvature, self.upper)
+        low, high = level_set(problem, first, curvature, self.upper + 2.0 * problem.error)
         self._low, self._high = low, high
         self._enter(fresh_box(low, high, first.x))
 
@@ -116,8 +114,14 @@ class LowestSearch:
         listed = list(boxes)
         self._low = np.min([b[0] for b in listed], axis=0, initial=np.inf)
         self._high = np.max([b[1] for b in listed], axis=0, initial=-np.inf)
+        self._try(point)
         for low, high, weights in listed:
             self._enter(replace(fresh_box(low, high, point), weights=weights))
+
+    @property
+    def region(self) -> tuple[Array, Array]:
+        """The ends of a box with all points that are lower than the lowest found, also of the laws themselves."""
+        return self._low, self._high
 
     def open_boxes(self) -> Iterator[tuple[Array, Array, Array]]:
         """Low, high and weights of the boxes that wait."""
@@ -245,12 +249,3 @@ def fresh_box(low: Array, high: Array, x: Array) -> Box:
         chord_low=low,
         chord_high=high,
     )
-
-
-def problem_size(problem: ScalarProblem) -> float:
-    """The largest displacement of a joint, at least 1.
-
-    Args:
-        problem: the problem.
-    """
-    return max([1.0, *(abs(e) for c in problem.chains for a in c for e in (a.low, a.high) if math.isfinite(e))])

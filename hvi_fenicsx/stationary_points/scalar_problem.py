@@ -11,6 +11,9 @@ import numpy as np
 from ..typing import Array, Integers, Mask
 from .arcs import FREE, INF, Arc, Chain
 
+FAR = 1e6
+"""Ends of the first box, relative to the problem's displacements; what is found must stay off them."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class ScalarProblem:
@@ -23,6 +26,8 @@ class ScalarProblem:
         upper: bounds, inf where there is none, (n,).
         chains: φ, one of each unknown, over the whole line.
         constant: a part of the energy that x does not change.
+        error: the energy of the laws differs from that of the chains by this at most; 0 where these are exact.
+        farthest: displacements up to which this is known.
     """
 
     stiffness: Array
@@ -31,6 +36,14 @@ class ScalarProblem:
     upper: Array
     chains: tuple[Chain, ...]
     constant: float = 0.0
+    error: float = 0.0
+    farthest: float = INF
+
+    @property
+    def far(self) -> float:
+        """A displacement far beyond all joints of the chains: the end of what is searched."""
+        ends = (abs(e) for c in self.chains for a in c for e in (a.low, a.high))
+        return min(FAR * max([1.0, *(e for e in ends if e < INF)]), self.farthest)
 
     @property
     def size(self) -> int:

@@ -14,8 +14,28 @@ from .all_points import Enumeration, StationaryPoint
 from .lowest import LowestSearch, fresh_box
 from .scalar_problem import ScalarProblem
 
+OWN_GAP = 0.85
+"""Share of the gap that a search may leave where the laws are curved; the rest is for what their polylines differ."""
+
 Saved = Mapping[str, Array]
 """What is left of an unfinished search: arrays, by name."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Start:
+    """What an earlier search of nearly the same problem knows of its lowest point.
+
+    Attributes:
+        x: a point of low energy, (n,).
+        energy: there.
+        low: of a box that holds all points of lower energy, (n,).
+        high: of that box, (n,).
+    """
+
+    x: Array
+    energy: float
+    low: Array
+    high: Array
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -26,11 +46,13 @@ class Wanted:
         lowest: the lowest energy with a proof; else all equilibria.
         gap: relative gap that the proof of the lowest may leave.
         bounded: whether the energy is known to be bounded from below.
+        start: where the lowest is, as far as that is known.
     """
 
     lowest: bool = False
     gap: float = 1e-8
     bounded: bool = True
+    start: Start | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -104,10 +126,10 @@ def find(
 
 def _lowest(task: _Task) -> Found:
     problem, saved = task.problem, task.saved
-    search = LowestSearch(problem=problem, gap=task.wanted.gap)
+    search = LowestSearch(problem=problem, gap=task.wanted.gap * (OWN_GAP if problem.error else 1.0))
     try:
         if saved is None:
-            search.start()
+            _begin(search, task.wanted.start)
         else:
             search.resume(zip(saved["low"], saved["high"], saved["weights"], strict=True), saved["x"][0])
     except SolverError as error:
@@ -117,20 +139,57 @@ def _lowest(task: _Task) -> Found:
         now = search.progress()
         task.report(f"lowest: gap {now.gap:.1e}, {now.boxes} boxes, {now.waiting} open")
 
-    proven = search.run(task.stop, tell)
-    now = search.progress()
-    kind = stationarity.kind(problem, search.x)
-    point = StationaryPoint(x=search.x, energy=search.upper, kind=kind, isolated=True)
+    search.run(task.stop, tell)
+    return _proof(search, task.wanted.gap)
+
+
+def _begin(search: LowestSearch, known: Start | None) -> None:
+    if known is None:
+        search.start()
+    else:
+        search.resume([(known.low, known.high, np.zeros(search.problem.size))], known.x)
+
+
+def begun(problem: ScalarProblem, gap: float, stop: Callable[[], bool], report: Callable[[str], None]) -> Start | None:
+    """A first search; None where there is no lowest energy.
+
+    Args:
+        problem: of polylines near the laws.
+        gap: relative gap that the search may leave.
+        stop: asked before each box.
+        report: told how far it is, in words.
+    """
+    search = LowestSearch(problem=problem, gap=gap)
+    try:
+        search.start()
+    except SolverError:
+        return None
+    search.run(stop, lambda now: report(f"first search: gap {now.gap:.1e}, {now.boxes} boxes"))
+    low, high = search.region
+    return Start(x=search.x, energy=search.upper, low=low, high=high)
+
+
+def _proof(search: LowestSearch, wanted: float) -> Found:
+    """What a search for the lowest energy knows; curved laws are worse by what their polylines may differ."""
+    problem, now = search.problem, search.progress()
+    point = StationaryPoint(
+        x=search.x,
+        energy=search.upper + problem.error,
+        kind=stationarity.kind(problem, search.x),
+        isolated=True,
+    )
+    lower = now.lower - problem.error
+    proven = search.proven and (not problem.error or point.energy - lower <= wanted * abs(point.energy))
     listed = list(search.open_boxes())
-    left = {} if proven else {"lowest": np.array(True), "x": search.x[None], **_stacked(listed)}
-    reason = "the lowest energy, proven" if proven else f"a gap of {now.gap:.1e} is open in {now.waiting} boxes"
+    left = {} if search.proven else {"lowest": np.array(True), "x": search.x[None], **_stacked(listed)}
+    open_gap = max(point.energy - lower, 0.0) / (abs(point.energy) or 1.0)
     return Found(
         points=(point,),
         complete=False,
-        lower_bound=now.lower,
+        lower_bound=lower,
         proven=proven,
         nodes=now.boxes,
-        reason=reason,
+        reason=("the lowest energy, proven" if proven else f"a gap of {open_gap:.1e} is open in {now.waiting} boxes"),
         left=left,
     )
 

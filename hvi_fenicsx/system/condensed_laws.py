@@ -108,8 +108,9 @@ class _Term:
         return [found]
 
     def prescribed_bonds(self) -> Sequence[PrescribedBonds]:
-        """The vertices where no component is free, and the argument is not always zero, of all ranks. Collective."""
-        here = (self._components == 0) & np.any(self._arguments != 0.0, axis=0)
+        """The vertices where no component is free, and the energy is not always zero, of all ranks. Collective."""
+        at_rest = float(self._term.law.value(np.zeros(1))[0])
+        here = (self._components == 0) & (np.any(self._arguments != 0.0, axis=0) | (at_rest != 0.0))
         weights = np.concatenate(agree(self._comm, self._term.weights[here]))
         arguments = np.concatenate(agree(self._comm, self._arguments[:, here]), axis=1)
         if not len(weights):

@@ -13,7 +13,7 @@ from enumeration import Floor, polyline
 from scenes import DELTA, block, model
 
 from hvi_fenicsx import Scene, prepare
-from hvi_fenicsx.errors import InputError, SolverError
+from hvi_fenicsx.errors import SolverError
 from hvi_fenicsx.laws.traction_graph import TractionGraph
 from hvi_fenicsx.stationary_points.all_points import Enumeration
 from hvi_fenicsx.stationary_points.arcs import FREE, chain, energy, envelope, total
@@ -206,10 +206,3 @@ def test_no_point_of_a_box_is_below_its_bound(seed: int) -> None:
         bound = Relaxation(problem).solve(fresh_box(low, high, low), part)[0].bound
         samples = random.uniform(low, high, (300, n))
         assert min(problem.energy(x) for x in samples) >= bound
-
-
-def test_a_smoothed_law_is_refused_in_words() -> None:
-    law = {"law": "quadratic_linear", "gamma1": 3e6, "gamma2": 1.5e6, "delta": DELTA}
-    scene = Scene.model_validate(model(2, 6e6, 1e6, law, smoothing="quadratic", epsilon=0.1))
-    with pytest.raises(InputError, match="leave smoothing and epsilon away"):
-        scalar_problem(Condensation(prepare(scene).system).problem)

@@ -23,6 +23,7 @@ class Quadratic(PlusFunction):
     name = "quadratic"
     kappa = 1.0 / 8.0
     bands = (0.5,)
+    parabolic = True
 
     @override
     def profile(self, z: Array) -> tuple[Array, Array, Array]:

@@ -22,6 +22,8 @@ from typing_extensions import override
 from ...typing import Array
 from ..base import Superpotential
 from ..convex_parts import ConvexPart, DifferentiablePart
+from ..polyline import PolylineLaw
+from ..traction_graph import TractionGraph
 from .base import SmoothedLaw, Smoothing
 
 _LARGEST = float(np.finfo(np.float64).max)
@@ -34,10 +36,12 @@ class PlusFunction(Smoothing):
     Class attributes:
         kappa: the constant of |p(t; e) - max(t, 0)| ≤ κ e; it is attained at t = 0.
         bands: distances |t|/e between which D changes little in shape; beyond the last one it is next to nothing.
+        parabolic: whether D is a parabola up to the only band, and zero beyond it.
     """
 
     kappa: ClassVar[float]
     bands: ClassVar[tuple[float, ...]] = (1.0, 4.0, 16.0, 64.0)
+    parabolic: ClassVar[bool] = False
 
     @abstractmethod
     def profile(self, z: Array) -> tuple[Array, Array, Array]:
@@ -181,9 +185,21 @@ class PlusSmoothedLaw(SmoothedLaw, register=False):
     def concave(self) -> ConvexPart:
         return self._smooth_concave
 
+    @cached_property
+    def graph(self) -> TractionGraph | None:
+        """The graph of the smoothed law's traction where that is piecewise linear; else None."""
+        if not (self.plus.parabolic and isinstance(self.law, PolylineLaw)):
+            return None
+        ends, tails = self.breaks, self.law.graph.slopes[[0, -1]]
+        left, right = self.left(ends), self.right(ends)
+        inner = (left[1:] - right[:-1]) / np.diff(ends)
+        return TractionGraph(ends, left, right, np.concatenate([tails[:1], inner, tails[1:]]))
+
     @property
     @override
     def steepest_fall(self) -> float:
+        if self.graph is not None:
+            return max(0.0, -float(np.min(self.graph.slopes)))
         return self.law.steepest_fall  # what smooths an upward jump rises; a drop leaves inf
 
     @cached_property
