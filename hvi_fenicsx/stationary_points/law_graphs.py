@@ -96,7 +96,7 @@ def _middle_tractions(law: Superpotential, begin: Array, end: Array) -> Array:
 
 def _errors(law: Superpotential, begin: Array, end: Array) -> Array:
     """Bounds of the difference of the energies on intervals, (n,)."""
-    share = np.linspace(0.0, 1.0, SAMPLES + 1)
+    share: Array = np.linspace(0.0, 1.0, SAMPLES + 1, dtype=np.float64)
     x = begin[:, None] + (end - begin)[:, None] * share
     x[:, -1] = end
     energy, traction = _polyline(law, begin, end, share)
