@@ -92,6 +92,7 @@ def _add_run_options(run: argparse.ArgumentParser) -> None:
     run.add_argument(
         "--time-budget", type=_seconds, metavar="S", help="find the most accurate solution within S seconds"
     )
+    run.add_argument("--no-report", action="store_true", help="write no report.html")
     _add_solve_options(
         run, "result; else results/SCENE", resume="keep a finished result of the same scene, else run it"
     )

@@ -125,12 +125,7 @@ def prepare(
     _LOG.info("%d unknowns; existence: %s%s", system.dofs, solvability.state, margin)
     with timer("assembly"):
         system.attach_free_motions(solvability.free)
-        warnings = (
-            *scene.domain.implausible(domain.length),
-            *plausibility.before_solving(system.problem, system.forces),
-            *plausibility.of_existence(solvability),
-        )
-    _log_warnings(warnings)
+        warnings = _warnings(scene, system, solvability)
     return Preparation(
         scene=scene,
         model=model,
@@ -140,6 +135,17 @@ def prepare(
         timer=timer,
         warnings=warnings,
     )
+
+
+def _warnings(scene: Scene, system: System, solvability: Solvability) -> tuple[str, ...]:
+    """Warnings about numbers that may be mistakes, logged. Collective."""
+    found = (
+        *scene.domain.implausible(system.problem.domain.length),
+        *plausibility.before_solving(system.problem, system.forces),
+        *plausibility.of_existence(solvability),
+    )
+    _log_warnings(found)
+    return found
 
 
 def solve(

@@ -13,7 +13,7 @@ from .. import console, results
 from ..errors import ExitCode
 from ..report.pictures import equilibria as picture
 from ..results.output_folder import Existing
-from ..results.whole import write_whole
+from ..results.whole import Wanted, write_whole
 from ..runtime import log
 from ..runtime.mpi import on_root
 from ..runtime.signals import Interrupt
@@ -136,8 +136,8 @@ def _written(request: Request, bodies: Equilibria, found: Found, i: int) -> file
     name = f"equilibrium-{i + 1:0{len(str(len(found.points)))}d}"
     with results.ResultFolder(COMM, folder.work / name) as own:
         given = {"command": request.options.given, "petsc": request.options.petsc}
-        draw = not request.options.no_pictures and i < MOST_DRAWN
-        write_whole(own, solution, request.prepared.timer, given, telling.LOG.info, draw=draw)
+        wanted = Wanted(pictures=not request.options.no_pictures and i < MOST_DRAWN)
+        write_whole(own, solution, request.prepared.timer, given, telling.LOG.info, wanted)
         own.commit(request.prepared.scene)
     return files.row(i + 1, bodies, found.points[i], solution, name)
 

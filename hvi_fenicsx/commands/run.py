@@ -14,7 +14,7 @@ from ..accuracy.goal import AccuracyResult, Goal
 from ..errors import ExitCode, InputError
 from ..report.html import render
 from ..results.output_folder import Existing
-from ..results.whole import write_whole
+from ..results.whole import Wanted, write_whole
 from ..runtime import log, terminal
 from ..runtime.mpi import on_root
 from ..runtime.signals import Interrupt
@@ -37,7 +37,7 @@ class RunRequest:
         folder: where the result goes.
         timer: where time goes.
         given: the command line and PETSc's options, for ``summary.json``.
-        draw: whether to make pictures.
+        wanted: what is made from the other files.
     """
 
     scene: Scene
@@ -45,7 +45,7 @@ class RunRequest:
     folder: results.ResultFolder
     timer: Timer
     given: dict[str, str]
-    draw: bool
+    wanted: Wanted
 
 
 def execute(options: argparse.Namespace) -> int:
@@ -65,9 +65,9 @@ def execute(options: argparse.Namespace) -> int:
         return code
     existing: Existing = "replace" if options.force or options.resume else "refuse"
     given = {"command": options.given, "petsc": options.petsc}
-    draw = not options.no_pictures
+    wanted = Wanted(pictures=not options.no_pictures, report=not options.no_report)
     with results.ResultFolder(COMM, target, existing, inputs=[options.scene]) as folder:
-        return _run(RunRequest(scene=scene, goal=goal, folder=folder, timer=timer, given=given, draw=draw))
+        return _run(RunRequest(scene=scene, goal=goal, folder=folder, timer=timer, given=given, wanted=wanted))
 
 
 def _goal(options: argparse.Namespace) -> Goal | None:
@@ -88,7 +88,7 @@ def _run(request: RunRequest) -> int:
         with log.Handlers(*run_logs):
             solution, reached = _solve(request, interrupt)
             given = {**request.given, **(_accuracy(reached) if reached else {})}
-            record = write_whole(folder, solution, request.timer, given, telling.LOG.info, draw=request.draw)
+            record = write_whole(folder, solution, request.timer, given, telling.LOG.info, request.wanted)
         on_root(COMM, lambda: telling.finish(run_logs))
         folder.commit(request.scene)
         telling.say([*(f"warning: {text}" for text in folder.kept), on_root(COMM, lambda: _where(request))])

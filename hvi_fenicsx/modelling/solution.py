@@ -16,7 +16,7 @@ from ..certify.certificate import Certificate, Examination
 from ..errors import InputError
 from ..results import ResultFolder, gathering
 from ..results.output_folder import Existing
-from ..results.whole import write_whole
+from ..results.whole import Wanted, write_whole
 from ..runtime import log
 from ..solution import Solution
 from ..solvers.result import SolveResult
@@ -25,6 +25,8 @@ from . import plotting
 from .contact_arrays import ContactArrays
 
 _LOG = log.logger("modelling")
+_GIVEN = {"command": None, "petsc": None}
+"""A program has no command line."""
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -141,7 +143,7 @@ class ModelSolution(Solution):
         """
         existing: Existing = "replace" if force else "refuse"
         with ResultFolder(self.problem.domain.mesh.comm, Path(folder), existing) as target:
-            write_whole(target, self, self.timer, {"command": None, "petsc": None}, _LOG.warning, draw=pictures)
+            write_whole(target, self, self.timer, _GIVEN, _LOG.warning, Wanted(pictures=pictures))
             target.commit(self.scene)
 
     @property

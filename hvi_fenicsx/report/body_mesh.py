@@ -40,6 +40,17 @@ class BodyMesh:
         return float(np.max(np.ptp(self.points, axis=0)))
 
     @property
+    def volumes(self) -> Array:
+        """Area (m²) or volume (m³) of each cell, (c,)."""
+        first, *others = self.cells.T
+        d = self.dimension
+        sides = [[self.points[:, i][other] - self.points[:, i][first] for i in range(d)] for other in others]
+        if d == 2:
+            (a, b), (c, e) = sides
+            return np.asarray(np.abs(a * e - b * c) / 2)
+        return np.asarray(np.abs(np.sum(np.cross(sides[0], sides[1], axis=0) * sides[2], axis=0)) / 6)
+
+    @property
     def boundary(self) -> Integers:
         """Facets of one cell only (k, 2|3); counterclockwise seen from outside, in the plane the body on their left."""
         return self._skin[0]
@@ -53,8 +64,7 @@ class BodyMesh:
     def _skin(self) -> tuple[Integers, Integers]:
         d = self.dimension
         facets = np.concatenate([np.delete(self.cells, i, axis=1) for i in range(d + 1)])
-        _, first, count = np.unique(_keys(facets, len(self.points)), return_index=True, return_counts=True)
-        alone = np.sort(first[count == 1])
+        alone = _alone(_keys(facets, len(self.points)))
         opposite = self.cells.T.ravel()[alone]
         return _outward(self.points, facets[alone], opposite), alone % len(self.cells)
 
@@ -104,10 +114,23 @@ def _outward(points: Array, facets: Integers, opposite: Integers) -> Integers:
     return np.where(inward[:, None], facets[:, ::-1], facets)
 
 
+def _alone(keys: Integers) -> Integers:
+    """The places of the keys that no other equals, ascending; found by value, since argsort takes twice as long."""
+    ordered = np.sort(keys)
+    differs = np.ones(len(keys) + 1, dtype=np.bool_)
+    differs[1:-1] = ordered[1:] != ordered[:-1]
+    single = ordered[differs[1:] & differs[:-1]]
+    near = np.minimum(np.searchsorted(single, keys), len(single) - 1)
+    return np.flatnonzero(single[near] == keys)
+
+
 def _keys(facets: Integers, count: int) -> Integers:
-    """One number for each set of corners."""
-    ordered = np.sort(facets, axis=1)
-    key = ordered[:, 0]
-    for column in ordered.T[1:]:
+    """One number for each set of corners, (k,); by columns, since numpy sorts many short rows slowly."""
+    columns = [facets[:, i] for i in range(facets.shape[1])]
+    for last in range(len(columns) - 1, 0, -1):
+        for i in range(last):
+            columns[i], columns[i + 1] = np.minimum(*columns[i : i + 2]), np.maximum(*columns[i : i + 2])
+    key = columns[0]
+    for column in columns[1:]:
         key = key * count + column
     return key

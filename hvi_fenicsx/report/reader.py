@@ -57,11 +57,6 @@ class ContactPart:
         return np.nan_to_num(np.column_stack([self["x"], self["y"], self["z"]]))
 
     @property
-    def spatial(self) -> bool:
-        """Whether it is a surface in space rather than a line in the plane."""
-        return self.has("z")
-
-    @property
     def slip(self) -> Array:
         """Signed slip in the plane, length of the slip in space."""
         return _tangential(self["u_t1"], self["u_t2"])

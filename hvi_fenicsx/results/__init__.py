@@ -4,6 +4,5 @@ from . import finished
 from .folder import ResultFolder
 from .output_folder import resolved
 from .summary import plain
-from .write import write
 
-__all__ = ["ResultFolder", "finished", "plain", "resolved", "write"]
+__all__ = ["ResultFolder", "finished", "plain", "resolved"]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
@@ -71,10 +72,23 @@ def _strain(problem: Problem, u: Array) -> Array:
         values = values * (4 / (d + 1) - 1)
         for number, ends in enumerate(nodes.edges(problem.space)):
             values[:, ends] += 4 / (d + 1) * u[cells[:, [d + 1 + number]]]
-    gradient = np.linalg.solve(points[:, 1:] - points[:, :1], values[:, 1:] - values[:, :1])
+    slopes = _slopes(points.transpose(1, 2, 0))
+    rises = (values[:, 1:] - values[:, :1]).transpose(1, 2, 0)
     strain = np.zeros((len(cells), 3, 3))
-    strain[:, :d, :d] = (gradient + gradient.transpose(0, 2, 1)) / 2
+    for i, j in itertools.combinations_with_replacement(range(d), 2):
+        products = [rises[k, i] * slopes[k, j] + rises[k, j] * slopes[k, i] for k in range(d)]
+        strain[:, i, j] = strain[:, j, i] = np.sum(products, axis=0) / 2
     return strain
+
+
+def _slopes(corners: Array) -> Array:
+    """The gradients of the barycentric coordinates after the first of cells by their corners (d+1, d, c), (d, d, c)."""
+    sides = corners[1:] - corners[0]
+    if len(sides) == 2:
+        (a, b), (c, e) = sides
+        return np.array([[e, -c], [-b, a]]) / (a * e - b * c)
+    crossed = [np.cross(sides[i - 2], sides[i - 1], axis=0) for i in range(3)]
+    return np.array(crossed) / np.sum(sides[0] * crossed[0], axis=0)
 
 
 def _owned_cells(problem: Problem) -> Integers:
@@ -136,11 +150,17 @@ def _spatial(vectors: Array) -> Array:
 
 
 def _rounded(values: Array, digits: int) -> Array:
-    """Values with so many digits beside the largest entry of their row, (c, ...), so that rounding is no value."""
-    largest = np.abs(values).max(axis=tuple(range(1, values.ndim)), initial=0.0, keepdims=True)
-    size = np.where(largest > 0.0, largest, 1.0)
-    unit = 10.0 ** (digits - 1 - np.floor(np.log10(size)))
-    return np.asarray(np.round(values * unit) / unit)
+    """Values with so many digits beside the largest entry of their row, (c, ...), so that rounding is no value.
+
+    The digits are binary, which takes half the time.
+    """
+    rows = np.abs(values).reshape(len(values), math.prod(values.shape[1:]))
+    largest = np.zeros(len(values))
+    for column in rows.T:
+        np.maximum(largest, column, out=largest)
+    size = np.where(largest > 0.0, largest, 1.0).reshape(-1, *[1] * (values.ndim - 1))
+    unit = np.ldexp(1.0, math.ceil(digits * math.log2(10)) - np.frexp(size)[1])
+    return np.asarray(np.rint(values * unit) / unit)
 
 
 def write_escape(path: Path, problem: Problem, mode: Mode) -> None:

@@ -2,18 +2,37 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import contextlib
+import functools
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from ..errors import HviError
 from ..report.html import render
-from ..report.pictures import draw as pictures
+from ..report.pictures.draw import drawing
 from ..runtime.mpi import on_root
 from ..runtime.timing import Timer
 from ..solution import Solution
 from .folder import ResultFolder
-from .write import write, write_record
+from .write import write_basis, write_fields, write_record
+
+_PATIENCE = 120.0
+"""Seconds that pictures may take after all else is written."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Wanted:
+    """What is made from the other files.
+
+    Attributes:
+        pictures: whether pictures are drawn.
+        report: whether the page is written.
+    """
+
+    pictures: bool = True
+    report: bool = True
 
 
 def write_whole(
@@ -22,12 +41,12 @@ def write_whole(
     timer: Timer,
     given: Mapping[str, Any],
     tell: Callable[[str], None],
-    *,
-    draw: bool,
+    wanted: Wanted,
 ) -> dict[str, Any]:
     """Write all files of a result but ``run.log``. Collective.
 
-    Pictures and report are made from the other files; one that fails costs a line, not the run.
+    Pictures and report are made from the other files; one that fails costs a line, not the run. A process of its own
+    draws, while the fields are written.
 
     Args:
         folder: being written.
@@ -35,29 +54,43 @@ def write_whole(
         timer: where time goes.
         given: further entries of the summary.
         tell: is given that line, on rank 0.
-        draw: whether to make pictures.
+        wanted: what is made from the other files.
 
     Returns:
         The summary, on all ranks.
     """
-    work, comm = folder.work, folder.comm
+    work, comm, solved = folder.work, folder.comm, solution.solve_result
     with timer("output"):
-        record = {**write(work, solution, folder.target), **given}
-        if draw:
-            on_root(comm, lambda: _from_files("pictures", pictures.draw, work, record, tell))
+        sigma = None if solved is None else solution.problem.bulk.stress(solved.u)
+        record = {**write_basis(work, solution, folder.target, sigma), **given}
+        on_root(comm, lambda: write_record(work, record))
+        with _drawn(work, tell, wanted=wanted.pictures and comm.rank == 0):
+            write_fields(work, solution, sigma)
     with timer("output"):
         record["time"] = timer.report()
-        on_root(comm, lambda: _from_files("report", render.write, work, record, tell))
+        on_root(comm, lambda: write_record(work, record))
+        if wanted.report:
+            on_root(comm, lambda: _told("report", tell, lambda: render.write(work)))
     record["time"] = timer.report()
     on_root(comm, lambda: write_record(work, record))
     return record
 
 
-def _from_files(
-    what: str, make: Callable[[Path], object], folder: Path, record: dict[str, Any], tell: Callable[[str], None]
-) -> None:
-    write_record(folder, record)
+@contextlib.contextmanager
+def _drawn(folder: Path, tell: Callable[[str], None], *, wanted: bool) -> Iterator[None]:
+    """Draw pictures during a block, and wait for them at its end."""
+    with contextlib.ExitStack() as stack:
+        begun: list[Callable[[float], object]] = []
+        if wanted:
+            _told("pictures", tell, lambda: begun.append(stack.enter_context(drawing(folder))))
+        yield
+        for finish in begun:
+            _told("pictures", tell, functools.partial(finish, _PATIENCE))
+
+
+def _told(what: str, tell: Callable[[str], None], make: Callable[[], object]) -> None:
+    """Make something from the other files; a line says why it failed."""
     try:
-        make(folder)
+        make()
     except HviError as error:
         tell(f"{what}: {error}")

@@ -1,4 +1,4 @@
-"""All files of a run, into a folder that is being written."""
+"""The files of a solution, into a folder that is being written: first what pictures are made from, then the rest."""
 
 from __future__ import annotations
 
@@ -13,41 +13,51 @@ from ..report.solution_arrays import FILE, SolutionArrays, save
 from ..runtime.mpi import on_root
 from ..scene import dump_scene
 from ..solution import Solution
+from ..typing import Array
 from . import boundary_table, contact_table, gathering, vtk_fields
 from .summary import summary
 
 
-def write(folder: Path, solution: Solution, target: Path) -> dict[str, Any]:
-    """Write the fields (all ranks), the tables and the arrays (rank 0). Collective.
+def write_basis(folder: Path, solution: Solution, target: Path, sigma: Array | None) -> dict[str, Any]:
+    """Write the arrays, ``contact.csv`` and the scene, from which pictures and page are made. Collective.
 
-    ``summary.json`` is written by :func:`write_record`, once the pictures are there too.
+    ``summary.json`` is written by :func:`write_record`.
 
     Args:
         folder: where to.
         solution: what was found.
         target: the folder that the files will be in, from which the scene's paths are given.
+        sigma: the stress of the cells that this rank owns, N/m², (c, 3, 3); None where nothing was solved.
 
     Returns:
         The summary, on all ranks.
     """
-    problem, examination, solved = solution.problem, solution.examination, solution.solve_result
-    comm = problem.domain.mesh.comm
-    states = () if examination is None else examination.states
-    stress = None
-    if solved is not None:
-        sigma = problem.bulk.stress(solved.u)
-        stress = von_mises(sigma).astype(np.float32)
-        vtk_fields.write_body(folder / "displacement.pvd", solution, sigma)
-    elif solution.solvability.direction is not None:
-        vtk_fields.write_escape(folder / "displacement.pvd", problem, solution.solvability.direction)
-    if states:
-        vtk_fields.write_contact(folder / "contact.pvd", problem, states)
-    rows = boundary_table.rows(solution)
-    on_root(comm, lambda: boundary_table.write_csv(folder / "boundary.csv", rows))
+    comm = solution.problem.domain.mesh.comm
+    stress = None if sigma is None else von_mises(sigma).astype(np.float32)
     arrays = gathering.solution_arrays(solution, stress)
     on_root(comm, lambda: _write_arrays(folder, arrays))
     on_root(comm, lambda: _text(folder / "scene.toml", dump_scene(solution.scene, target)))
     return summary(solution)
+
+
+def write_fields(folder: Path, solution: Solution, sigma: Array | None) -> None:
+    """Write the fields for ParaView (all ranks) and ``boundary.csv`` (rank 0). Collective.
+
+    Args:
+        folder: where to.
+        solution: what was found.
+        sigma: as for :func:`write_basis`.
+    """
+    problem, mode = solution.problem, solution.solvability.direction
+    states = () if solution.examination is None else solution.examination.states
+    if sigma is not None:
+        vtk_fields.write_body(folder / "displacement.pvd", solution, sigma)
+    elif mode is not None:
+        vtk_fields.write_escape(folder / "displacement.pvd", problem, mode)
+    if states:
+        vtk_fields.write_contact(folder / "contact.pvd", problem, states)
+    rows = boundary_table.rows(solution)
+    on_root(problem.domain.mesh.comm, lambda: boundary_table.write_csv(folder / "boundary.csv", rows))
 
 
 def _write_arrays(folder: Path, arrays: SolutionArrays | None) -> None:

@@ -359,7 +359,9 @@ def test_the_pieces_of_several_ranks_are_one_body(tmp_path: Path) -> None:
     """The model problem without friction, whose displacement is known."""
     scene = write_scene(tmp_path / "s.toml", model(8))
     for ranks in (1, 3):
-        assert hvi("run", scene, "--out", tmp_path / str(ranks), "--no-pictures", ranks=ranks).returncode == 0
+        words = ("--out", tmp_path / str(ranks), "--no-pictures", "--no-report")
+        assert hvi("run", scene, *words, ranks=ranks).returncode == 0
+        assert not [*(tmp_path / str(ranks)).glob("*.html"), *(tmp_path / str(ranks)).glob("*.png")]
     one, three = (reader.read(tmp_path / str(ranks)) for ranks in (1, 3))
     body = three.body
     assert body.points.shape == (81, 3)
@@ -412,6 +414,13 @@ def test_the_surface_of_a_body_in_space_looks_outwards() -> None:
     body = body_mesh(plain(box()))
     a, b, c = (body.points[body.boundary[:, i]] for i in range(3))
     assert np.isclose(np.einsum("ki,ki->", a, np.cross(b, c)) / 6, 0.24)
+
+
+@pytest.mark.parametrize(("body", "size"), [(square, 1.0), (box, 0.24)], ids=["plane", "space"])
+def test_the_cells_fill_the_body(body: Callable[[], mesh.Mesh], size: float) -> None:
+    found = body_mesh(plain(body())).volumes
+    assert found.min() > 0
+    assert found.sum() == pytest.approx(size)
 
 
 @pytest.mark.parametrize("cells", [1, 7, 150])

@@ -83,6 +83,7 @@ def draw_all(result: Result) -> list[str]:
         from .drawings import drawings  # loads the plotting library while the server starts
 
         found = list(drawings(result))
+        _ = result.body.boundary  # which all pictures need, before they are drawn in processes of their own
         server.wait()
         running = [_started(drawing, context) for drawing in found]
         failures = [_ended(one) for one in running]

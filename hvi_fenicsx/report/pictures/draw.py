@@ -7,10 +7,13 @@ picture, never a run. Nothing here imports a plotting library; the child does.
 from __future__ import annotations
 
 import contextlib
+import functools
 import os
+import shlex
 import subprocess
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 from ...runtime import manifest, processes
 from ..errors import PictureError
@@ -36,31 +39,49 @@ def draw(folder: Path, *, timeout: float = 120) -> list[Path]:
     Raises:
         PictureError: the child failed; its message says which picture and why.
     """
+    with drawing(folder) as finish:
+        return finish(timeout)
+
+
+@contextlib.contextmanager
+def drawing(folder: Path) -> Iterator[Callable[[float], list[Path]]]:
+    """Draw while the caller does something else; for rank 0 alone.
+
+    Args:
+        folder: a finished result.
+
+    Yields:
+        Waits for the pictures so many seconds, and returns or raises what :func:`draw` does.
+
+    Raises:
+        PictureError: there is no process for them.
+    """
     command = [*processes.PYTHON, "-m", __package__, os.path.abspath(folder)]
     # One thread for linear algebra: the child forks, and what it draws needs none.
     alone = {**processes.environment(), "OMP_NUM_THREADS": "1"}
     # In the result's folder: in the current one matplotlib would read a file of settings.
-    child = subprocess.Popen(
-        command,
-        env=alone,
-        cwd=folder,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        start_new_session=True,
-    )
+    pipes: dict[str, Any] = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    try:
+        child = subprocess.Popen(command, env=alone, cwd=folder, start_new_session=True, **pipes)
+    except OSError as error:
+        raise PictureError(f"no process draws: {error.strerror or error}") from None
     with _ended(child, Path(folder)):
-        try:
-            names, errors = child.communicate(timeout=timeout)
-        except subprocess.TimeoutExpired:
-            raise PictureError(f"not drawn within {timeout:g} s; {' '.join(command)} tries again") from None
+        yield functools.partial(_pictures, child, Path(folder), shlex.join(command))
+
+
+def _pictures(child: subprocess.Popen[str], folder: Path, command: str, timeout: float) -> list[Path]:
+    """What the child has drawn."""
+    try:
+        names, errors = child.communicate(timeout=timeout)
+    except subprocess.TimeoutExpired:
+        raise PictureError(f"not drawn within {timeout:g} s; {command} tries again") from None
     if child.returncode != 0:
         raise PictureError(_message(errors, child.returncode))
     try:
-        manifest.add(Path(folder), names.splitlines())
+        manifest.add(folder, names.splitlines())
     except OSError as error:
         raise PictureError(f"{folder}/{manifest.NAME}: cannot be written: {error.strerror or error}") from None
-    return [Path(folder) / name for name in names.splitlines()]
+    return [folder / name for name in names.splitlines()]
 
 
 @contextlib.contextmanager

@@ -65,7 +65,7 @@ def paint(
         (closed_path(body.points, loops), {"ec": GREY, "ls": (0, (5, 4)), "lw": 1.3, "zorder": 3}),
         (outline, {"ec": INK, "lw": 1.6, "zorder": 4}),
     ):
-        axes.add_patch(PathPatch(patch, fc="none", joinstyle="round", **style))
+        axes.add_artist(PathPatch(patch, fc="none", joinstyle="round", **style))
     if _pixels_between_lines(axes, body) >= FEWEST_PIXELS:
         sides = np.unique(np.sort(np.concatenate([body.cells[:, c] for c in ((0, 1), (1, 2), (2, 0))]), axis=1), axis=0)
         axes.add_collection(LineCollection(list(points[sides, :2]), colors="white", lw=0.6, alpha=0.5, zorder=2))

@@ -6,7 +6,8 @@ as for few large ones.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+import functools
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
@@ -32,18 +33,27 @@ def shade(points: Array, triangles: Integers, values: Array, shape: tuple[int, i
         An array of this shape, its first row the lowest, NaN where there is no triangle.
     """
     image = np.full(shape, np.nan)
-    corners = points[triangles] - 0.5  # pixel centres at whole numbers
-    low = np.maximum(np.ceil(corners.min(axis=1) - _EDGE), 0).astype(np.int64)
-    high = np.minimum(np.floor(corners.max(axis=1) + _EDGE), np.array(shape)[::-1] - 1).astype(np.int64)
+    columns = [points[:, axis] - 0.5 for axis in range(2)]  # pixel centres at whole numbers
+    sizes = zip(columns, shape[::-1], strict=True)
+    boxes = [_box([column[corner] for corner in triangles.T], pixels) for column, pixels in sizes]
+    low, high = (np.column_stack(ends) for ends in zip(*boxes, strict=True))
     for chosen, box in _by_box(high - low + 1):
-        _fill(image, corners[chosen], values[triangles[chosen]], low[chosen], box)
+        corners = np.stack([column[triangles[chosen]] for column in columns], axis=2)
+        _fill(image, corners, values[triangles[chosen]], low[chosen], box)
     return image
+
+
+def _box(corners: Sequence[Array], pixels: int) -> tuple[Integers, Integers]:
+    """The first and the last pixel of each triangle along an axis, from its three corners there, (k,) each."""
+    low = np.ceil(functools.reduce(np.minimum, corners) - _EDGE)
+    high = np.floor(functools.reduce(np.maximum, corners) + _EDGE)
+    return np.maximum(low, 0).astype(np.int64), np.minimum(high, pixels - 1).astype(np.int64)
 
 
 def _by_box(sizes: Integers) -> Iterator[tuple[Integers, tuple[int, int]]]:
     """Triangles grouped by the width and height of their boxes, in portions; those that hold no pixel left out."""
     full = np.flatnonzero((sizes > 0).all(axis=1))
-    width, height = _coarser(sizes[full]).T
+    width, height = (_coarser(column[full]) for column in sizes.T)
     box = width * _LARGEST + height
     for key in np.unique(box):
         group, (w, h) = full[box == key], divmod(int(key), _LARGEST)
@@ -54,7 +64,7 @@ def _by_box(sizes: Integers) -> Iterator[tuple[Integers, tuple[int, int]]]:
 
 def _coarser(sizes: Integers) -> Integers:
     """Sizes rounded up, so that there are few groups: to 1, 2, 3, 4, 6, 8, 12, 16, ..."""
-    power = 2 ** np.floor(np.log2(sizes)).astype(np.int64)
+    power = np.left_shift(1, np.frexp(sizes)[1].astype(np.int64) - 1)
     half = np.maximum(power // 2, 1)
     return power + half * -((power - sizes) // half)
 

@@ -42,8 +42,7 @@ def scale_of(body: BodyMesh, values: Array) -> StressScale:
         body: the body.
         values: the stress of its cells, N/m², (c,).
     """
-    sides = body.points[body.cells[:, 1:]] - body.points[body.cells[:, :1]]
-    volume = np.sqrt(np.linalg.det(sides @ sides.transpose(0, 2, 1)))
+    volume = body.volumes
     order = np.argsort(values)
     share = np.cumsum(volume[order]) / volume.sum()
     end, largest = float(values[order][np.searchsorted(share, 1.0 - PEAK)]), float(values.max())
