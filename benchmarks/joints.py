@@ -1,6 +1,6 @@
 """Whether meshes of two bodies that do not match cost an order of convergence.
 
-    ./hvi exec python3 benchmarks/joints.py [--levels 2]
+    ./hvi exec python3 benchmarks/joints.py [--levels 2] [--degree 2]
 
 A block is glued to another one and bent; the error in the energy norm against a mesh four times finer than the finest
 one listed, for meshes that match and for meshes that do not.
@@ -38,11 +38,13 @@ def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--levels", type=int, default=2)
+    parser.add_argument("--degree", type=int, default=1, choices=(1, 2))
     options = parser.parse_args()
     print("| meshes | unknowns | true / % | estimated / % | of it smoothing / % | index | order |")
     print("|---|---|---|---|---|---|---|", flush=True)
     for name, upper in (("match", [8, 4]), ("do not match", [7, 4]), ("do not match, coarser above", [5, 3])):
-        print("\n".join(lines(name, rows(blocks([8, 4], upper), options.levels))), flush=True)
+        scene = blocks([8, 4], upper).with_solver(degree=options.degree)
+        print("\n".join(lines(name, rows(scene, options.levels))), flush=True)
 
 
 if __name__ == "__main__":

@@ -50,7 +50,7 @@ def solve_to_goal(
         return run
 
     choice, run = None, begun(scene.solver.degree or 1)
-    if scene.solver.degree is None and not scene.interface and degree_choice.worthwhile(run):
+    if scene.solver.degree is None and degree_choice.worthwhile(run):
         other = begun(2)
         choice = degree_choice.between(run, other)
         report(str(choice))

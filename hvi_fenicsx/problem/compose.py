@@ -62,11 +62,6 @@ def compose(domain: Domain, model: Model, thresholds: Thresholds = DEFAULT) -> P
             that excludes a prescribed displacement.
     """
     effects = model.effects
-    if model.interfaces and model.degree != 1:
-        raise InputError(
-            f"solver.degree: interface.{next(iter(model.interfaces))} joins bodies, which degree 1 alone can; "
-            "leave out solver.degree"
-        )
     facets = part_facets.find(domain, model.parts, effects)
     sizes, evaluate = scaling.sizes(domain.length, effects), functools.partial(_evaluation, domain, facets)
     scales = scaling.choose(sizes, domain.dimension, effects, evaluate, thresholds)

@@ -24,7 +24,7 @@ class Coupling:
     """The way between displacements u and unknowns û, both in Cartesian components.
 
     Attributes:
-        space: P1 vectors.
+        space: of the displacements.
         matrix: T.
         inverse: T⁻¹.
     """
@@ -62,8 +62,8 @@ def of(space: fem.FunctionSpace, interfaces: Sequence[Interface]) -> Coupling | 
     """The coupling of interfaces; None where there are none. Collective.
 
     Args:
-        space: P1 vectors.
-        interfaces: none of whose vertices with weights is combined by another.
+        space: of the displacements.
+        interfaces: none of whose nodes with weights is combined by another.
     """
     if not interfaces:
         return None

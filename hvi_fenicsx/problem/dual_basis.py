@@ -1,12 +1,12 @@
-"""The relative displacement of two sides at the vertices of the first, by a dual basis (Wohlmuth 2000).
+"""The relative displacement of two sides at the nodes of the first, by a dual basis (Wohlmuth 2000).
 
-For the vertices i that carry contact and laws there are functions ψ_i of the first side's facets with
+For the nodes i that carry contact and laws there are functions ψ_i of the first side's facets with
 ∫ψ_i φ_j = δ_ij ∫φ_j for all such j, and Σψ_i = 1 wherever the second side is. The relative displacement at i is
 
     w_i = (∫ψ_i u_first - ∫ψ_i u_second) / ∫ψ_i,
 
-its weight ∫ψ_i. A vertex that carries nothing (beyond the end of the second side, prescribed, on another part) leaves
-its share to its neighbours (Cichosz and Bischoff 2011), and a facet of none but such vertices to the nearest one that
+its weight ∫ψ_i. A node that carries nothing (beyond the end of the second side, prescribed, on another part) leaves
+its share to its neighbours (Cichosz and Bischoff 2011), and a facet of none but such nodes to the nearest one that
 carries. So affine fields are reproduced, and the forces of both sides balance, whatever the meshes, and wherever the
 second side ends.
 """
@@ -24,10 +24,10 @@ from .facet_overlaps import Facets, OverlapPoints, Overlaps
 
 @dataclass(frozen=True, kw_only=True)
 class RelativeRows:
-    """Rows over all N vertices of the mesh: one for each vertex of the first side that carries something.
+    """Rows over all N nodes of the mesh: one for each node of the first side that carries something.
 
     Attributes:
-        weights: ∫ψ_i, by vertex of the mesh, 0 for all others, m^(d-1), (N,).
+        weights: ∫ψ_i, by node of the mesh, 0 for all others, m^(d-1), (N,).
         first: ∫ψ_i φ_j on the first side, (N, N).
         second: ∫ψ_i φ_k on the second, (N, N).
     """
@@ -44,45 +44,46 @@ def relative_rows(first: Facets, second: Facets, overlaps: Overlaps, kept: Mask,
         first: the side that carries contact and laws.
         second: the other one.
         overlaps: of their facets.
-        kept: whether a vertex of the first side's facets carries anything, (f, d).
+        kept: whether a node of the first side's facets carries anything, (f, n).
         size: N.
     """
-    points = overlaps.points()
-    basis, carriers = _coefficients(points, kept), first.vertices.copy()
-    for facet, vertex in adopted(first, overlaps, kept).items():
-        basis[facet, 0], carriers[facet, 0] = 1.0, vertex
-    values = np.einsum("pik,pk->pi", basis[points.first], points.on_first)  # ψ at the points
+    points = overlaps.points(first.degree)
+    functions = first.functions(points.on_first)
+    basis, carriers = _coefficients(points, functions, kept), first.nodes.copy()
+    for facet, node in adopted(first, overlaps, kept).items():
+        basis[facet, 0], carriers[facet, 0] = 1.0, node
+    values = np.einsum("pik,pk->pi", basis[points.first], functions)  # ψ at the points
     values *= points.weights[:, None]
     rows = carriers[points.first]
     weights = np.bincount(rows.ravel(), weights=values.ravel(), minlength=size).astype(np.float64)
     return RelativeRows(
         weights=weights,
-        first=_matrix(rows, rows, values, points.on_first, size),
-        second=_matrix(rows, second.vertices[points.second], values, points.on_second, size),
+        first=_matrix(rows, rows, values, functions, size),
+        second=_matrix(rows, second.nodes[points.second], values, second.functions(points.on_second), size),
     )
 
 
 def adopted(first: Facets, overlaps: Overlaps, kept: Mask) -> dict[int, int]:
-    """The facets without a vertex of their own that carries something, and the nearest such vertex of a neighbour.
+    """The facets without a node of their own that carries something, and the nearest such node of a neighbour.
 
-    Its ψ is 1 there: it stays orthogonal to the functions of all vertices that carry something.
+    Its ψ is 1 there: it stays orthogonal to the functions of all nodes that carry something.
 
     Args:
         first: the side that carries contact and laws.
         overlaps: of its facets.
-        kept: whether a vertex of its facets carries anything, (f, d).
+        kept: whether a node of its facets carries anything, (f, n).
     """
     found = {}
     for facet in np.setdiff1d(overlaps.first, np.flatnonzero(kept.any(axis=1))):
-        near = kept & np.any(np.isin(first.vertices, first.vertices[facet]), axis=1, keepdims=True)
+        near = kept & np.any(np.isin(first.nodes, first.nodes[facet]), axis=1, keepdims=True)
         if near.any():
-            away = np.linalg.norm(first.corners[near] - first.corners[facet].mean(axis=0), axis=1)
-            found[int(facet)] = int(first.vertices[near][np.argmin(np.round(away / away.max(), 9))])
+            away = np.linalg.norm(first.points[near] - first.corners[facet].mean(axis=0), axis=1)
+            found[int(facet)] = int(first.nodes[near][np.argmin(np.round(away / away.max(), 9))])
     return found
 
 
 def _matrix(rows: Integers, columns: Integers, values: Array, functions: Array, size: int) -> csr_array:
-    """Sums of values (p, d) times functions (p, d) at rows and columns."""
+    """Sums of values (p, n) times functions (p, n) at rows and columns."""
     shape = (*values.shape, functions.shape[1])
     entries = np.einsum("pi,pk->pik", values, functions)
     at = np.broadcast_to(rows[:, :, None], shape), np.broadcast_to(columns[:, None, :], shape)
@@ -91,19 +92,19 @@ def _matrix(rows: Integers, columns: Integers, values: Array, functions: Array, 
     return csr_array(coo_array((entries[nonzero], pairs), shape=(size, size)))
 
 
-def _coefficients(points: OverlapPoints, kept: Mask) -> Array:
-    """ψ_i = Σ_k basis_ik φ_k on each facet, zero rows where a vertex carries nothing, (f, d, d)."""
-    count, d = kept.shape
-    mass = np.zeros((count, d, d))
-    products = np.einsum("p,pk,pj->pkj", points.weights, points.on_first, points.on_first)
+def _coefficients(points: OverlapPoints, functions: Array, kept: Mask) -> Array:
+    """ψ_i = Σ_k basis_ik φ_k on each facet, zero rows where a node carries nothing, (f, n, n)."""
+    count, each = kept.shape
+    mass = np.zeros((count, each, each))
+    products = np.einsum("p,pk,pj->pkj", points.weights, functions, functions)
     np.add.at(mass, points.first, products)
-    basis = np.zeros((count, d, d))
+    basis = np.zeros((count, each, each))
     covered = np.zeros(count, dtype=bool)
     covered[points.first] = True
     for pattern in np.unique(kept[covered], axis=0):
         here, own = np.flatnonzero(covered & np.all(kept == pattern, axis=1)), np.flatnonzero(pattern)
         if len(own):
-            spread = _shared(pattern)[own]  # φ of the kept vertices, with the shares of the others
+            spread = _shared(pattern)[own]  # φ of the kept nodes, with the shares of the others
             gram = spread @ mass[here][:, :, own]
             areas = mass[here].sum(axis=1)[:, own]
             basis[np.ix_(here, own)] = areas[:, :, None] * np.linalg.solve(
@@ -113,7 +114,7 @@ def _coefficients(points: OverlapPoints, kept: Mask) -> Array:
 
 
 def _shared(pattern: Mask) -> Array:
-    """Functions that sum up to 1: those of kept vertices take equal shares of the others', (d, d)."""
+    """Functions that sum up to 1: those of kept nodes take equal shares of the others', (n, n)."""
     spread = np.eye(len(pattern))
     spread[:, ~pattern] = 1.0 / max(int(np.count_nonzero(pattern)), 1)
     return spread

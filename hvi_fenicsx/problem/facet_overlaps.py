@@ -1,16 +1,18 @@
 """Where the facets of two sides that face each other lie over each other: intervals in the plane.
 
 A point of the second side belongs to the point of the first that it is projected onto along the first facet's normal.
-All products of linear functions of both sides are integrated exactly over the intersections of facets.
+All products of the basis functions of both sides are integrated exactly over the intersections of facets.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
+import basix
 import numpy as np
 
 from ..typing import Array, Integers, Mask
+from . import spaces
 from .thresholds import DEFAULT, Thresholds
 
 
@@ -19,14 +21,46 @@ class Facets:
     """The facets of one side, the same on all ranks (f of them).
 
     Attributes:
-        vertices: global numbers of their vertices, (f, d).
-        corners: these vertices, m, (f, d, d).
+        nodes: global numbers of their nodes, corners first, (f, n).
+        points: these nodes, those of curved sides on their curves, m, (f, n, d).
         normals: outward unit normals, (f, d).
+        share: of an edge's function that goes to each of its ends (:func:`.spaces.edge_share`).
     """
 
-    vertices: Integers
-    corners: Array
+    nodes: Integers
+    points: Array
     normals: Array
+    share: float = 0.0
+
+    @property
+    def degree(self) -> int:
+        """Of the elements."""
+        return 1 if self.points.shape[1] == self.points.shape[2] else 2
+
+    @property
+    def corners(self) -> Array:
+        """The vertices, m, (f, d, d)."""
+        return self.points[:, : self.points.shape[2]]
+
+    @property
+    def edges(self) -> list[list[int]]:
+        """The ends of the edges whose midpoints are nodes, in their order."""
+        kind = basix.CellType[_KINDS[self.points.shape[2]]]
+        found: list[list[int]] = basix.topology(kind)[1]
+        return found if self.degree == 2 else []
+
+    @property
+    def positions(self) -> Array:
+        """The coefficients of the positions of the nodes, m, (f, n, d)."""
+        found = self.points.copy()
+        for node, ends in enumerate(self.edges, found.shape[2]):
+            found[:, node] = (found[:, node] - self.share * found[:, ends].sum(axis=1)) / (1 - 2 * self.share)
+        return found
+
+    def functions(self, barycentric: Array) -> Array:
+        """The basis functions of the nodes at points (..., d) of a facet, (..., n)."""
+        flat = spaces.simplex_functions(self.degree, barycentric.reshape(-1, barycentric.shape[-1]), self.share)
+        return flat.reshape(*barycentric.shape[:-1], -1)
 
     @property
     def areas(self) -> Array:
@@ -79,21 +113,26 @@ class Overlaps:
     on_second: Array
     covered: Mask
 
-    def points(self) -> OverlapPoints:
-        """The points of a rule that is exact for products of two linear functions."""
+    def points(self, degree: int) -> OverlapPoints:
+        """The points of a rule that is exact for products of two functions.
+
+        Args:
+            degree: of the functions.
+        """
         d = self.on_first.shape[1]
-        rule = np.full((d, d), _OFF[d]) + np.eye(d) * (1.0 - d * _OFF[d])
+        made: tuple[Array, Array] = basix.make_quadrature(basix.CellType[_KINDS[d]], 2 * degree)
+        rule = np.column_stack([1.0 - made[0].sum(axis=1), made[0]])
         return OverlapPoints(
-            first=np.repeat(self.first, d),
-            second=np.repeat(self.second, d),
-            weights=np.repeat(self.areas / d, d),
+            first=np.repeat(self.first, len(rule)),
+            second=np.repeat(self.second, len(rule)),
+            weights=np.outer(self.areas, made[1] / made[1].sum()).ravel(),
             on_first=(rule @ self.on_first).reshape(-1, d),
             on_second=(rule @ self.on_second).reshape(-1, d),
         )
 
 
-_OFF = {2: 0.5 - np.sqrt(3.0) / 6.0, 3: 1.0 / 6.0}
-"""The smaller barycentric coordinates of the d points with equal weights, by dimension."""
+_KINDS = {2: "interval", 3: "triangle"}
+"""Facets by dimension."""
 
 
 def in_plane(first: Facets, second: Facets, thresholds: Thresholds = DEFAULT) -> Overlaps:
@@ -105,8 +144,8 @@ def in_plane(first: Facets, second: Facets, thresholds: Thresholds = DEFAULT) ->
         thresholds: which facets face each other, and what is rounding.
     """
     pieces = [np.empty((0, 6))]
-    covered = np.zeros((len(first.vertices), 2), dtype=bool)
-    for number in range(len(first.vertices)):
+    covered = np.zeros((len(first.nodes), 2), dtype=bool)
+    for number in range(len(first.nodes)):
         found = _nearest(_intervals(first, second, number, thresholds))
         pieces.append(np.column_stack([np.full(len(found), number), found]))
         begin, end = found[:, 1].min(initial=np.inf), found[:, 2].max(initial=-np.inf)

@@ -40,7 +40,7 @@ def in_space(first: Facets, second: Facets, thresholds: Thresholds = DEFAULT) ->
     pieces, of_pair = pieces[solid], of_pair[solid]
     near = _nearest(pieces, number[of_pair], distance[of_pair])
     pieces, of_pair = pieces[near], of_pair[near]
-    covered = _covered(pieces, number[of_pair], len(first.vertices), thresholds)
+    covered = _covered(pieces, number[of_pair], len(first.nodes), thresholds)
     return _triangles(first, pieces, (number[of_pair], other[of_pair]), triangles[of_pair], covered)
 
 

@@ -1,6 +1,6 @@
-"""Interfaces: where two bodies meet. The vertices of the first side carry laws of the relative displacement.
+"""Interfaces: where two bodies meet. The nodes of the first side carry laws of the relative displacement.
 
-What carries nothing leaves its share to its neighbours (:mod:`.dual_basis`): vertices beyond the end of the second
+What carries nothing leaves its share to its neighbours (:mod:`.dual_basis`): nodes beyond the end of the second
 side, and those that are prescribed, on another part with contact or laws, or on another interface.
 """
 
@@ -14,10 +14,11 @@ from dolfinx import fem
 from scipy.sparse import csr_array
 
 from ..errors import InputError
+from ..mesh import nodes
 from ..mesh.refinement import cell_facets
 from ..runtime.mpi import agree
 from ..typing import Array, Entities, Integers, Mask
-from . import dual_basis, facet_overlaps
+from . import dual_basis, facet_overlaps, spaces
 from .contact_surface import Surface, tangents
 from .domain_forms import DomainForms
 from .dual_basis import RelativeRows
@@ -105,7 +106,7 @@ def _pair(context: DomainForms, name: str, sides: Sides) -> _Pair:
     found = []
     for side in (sides.first, sides.second):
         facets = _gathered(context, context.domain.facets([side]))
-        if not len(facets.vertices):
+        if not len(facets.nodes):
             raise InputError(f"interface.{name}.between: no facet lies on {side!r}")
         found.append(facets)
     return _Pair(sides, *found)
@@ -120,19 +121,22 @@ def _gathered(context: DomainForms, local: Entities) -> Facets:
     cells = connected.array[connected.offsets[local]]
     owned = cells < topology.index_map(d).size_local
     local, cells = local[owned], cells[owned]
-    opposite = of_cell[cells] == local[:, None]
-    dofs = space.dofmap.list[cells]
-    blocks, inner = dofs[~opposite].reshape(-1, d), dofs[opposite]
-    corners = context.points[blocks][:, :, :d]
+    blocks = nodes.facet_nodes(space, local)
+    inner = space.dofmap.list[cells][:, : d + 1][of_cell[cells] == local[:, None]]
     parts = [
-        space.dofmap.index_map.local_to_global(blocks.ravel().astype(np.int32)).reshape(-1, d),
-        corners,
-        _outward(corners, context.points[inner][:, :d]),
+        space.dofmap.index_map.local_to_global(np.ascontiguousarray(blocks.ravel())).reshape(blocks.shape),
+        context.points_on_curves[blocks][:, :, :d],
+        _outward(context.points[blocks[:, :d]][:, :, :d], context.points[inner][:, :d]),
     ]
     every = agree(context.domain.mesh.comm, parts)
-    vertices, corners, normals = (np.concatenate([part[i] for part in every]) for i in range(3))
-    order = np.lexsort(np.round(corners.mean(axis=1) / context.length, 12).T)
-    return Facets(vertices=vertices[order].astype(np.int64), corners=corners[order], normals=normals[order])
+    numbers, points, normals = (np.concatenate([part[i] for part in every]) for i in range(3))
+    order = np.lexsort(np.round(points[:, :d].mean(axis=1) / context.length, 12).T)
+    return Facets(
+        nodes=numbers[order].astype(np.int64),
+        points=points[order],
+        normals=normals[order],
+        share=spaces.edge_share(space),
+    )
 
 
 def _outward(corners: Array, inner: Array) -> Array:
@@ -154,11 +158,11 @@ def _interface(
             f'interface.{name}.between: "{pair.sides.first}" and "{pair.sides.second}" do not face each other: nowhere '
             "does a normal of the first meet a facet of the second; name sides that lie over each other"
         )
-    others = [taken, np.unique(pair.second.vertices)]
-    others += [np.unique([*p.first.vertices.flat, *p.second.vertices.flat]) for n, p in pairs.items() if n != name]
-    busy = np.isin(pair.first.vertices, np.concatenate(others))
-    kept = _kept(pair.first, overlaps, busy)
-    _check_pieces(context, name, pair, overlaps, kept, overlaps.covered & busy)
+    others = [taken, np.unique(pair.second.nodes)]
+    others += [np.unique([*p.first.nodes.flat, *p.second.nodes.flat]) for n, p in pairs.items() if n != name]
+    busy, covered = np.isin(pair.first.nodes, np.concatenate(others)), _covered(pair.first, overlaps)
+    kept = ~np.isin(pair.first.nodes, np.unique(pair.first.nodes[~covered | busy]))
+    _check_pieces(context, name, pair, overlaps, kept, covered & busy)
     size = context.space.dofmap.index_map.size_global
     rows = dual_basis.relative_rows(pair.first, pair.second, overlaps, kept, size)
     surface = _surface(context, name, pair, rows)
@@ -181,17 +185,17 @@ def _interface(
 
 def _overlaps(pair: _Pair, thresholds: Thresholds) -> Overlaps:
     """The intersections of the facets of both sides."""
-    if pair.first.vertices.shape[1] == 2:
+    if pair.first.points.shape[2] == 2:
         return facet_overlaps.in_plane(pair.first, pair.second, thresholds)
     from . import facet_polygons  # shapely, which plane bodies do not need
 
     return facet_polygons.in_space(pair.first, pair.second, thresholds)
 
 
-def _kept(first: Facets, overlaps: Overlaps, busy: Mask) -> Mask:
-    """Which vertices carry something: those over the second side in all of their facets, (f, d)."""
-    left_out = np.unique(first.vertices[~overlaps.covered | busy])
-    return np.asarray(~np.isin(first.vertices, left_out))
+def _covered(first: Facets, overlaps: Overlaps) -> Mask:
+    """Whether each node of facets lies over the second side, a midpoint with both ends of its edge, (f, n)."""
+    middles = [overlaps.covered[:, ends].all(axis=1) for ends in first.edges]
+    return np.column_stack([overlaps.covered, *middles])
 
 
 def _check_pieces(context: DomainForms, name: str, pair: _Pair, overlaps: Overlaps, kept: Mask, busy: Mask) -> None:
@@ -222,8 +226,8 @@ def _surface(context: DomainForms, name: str, pair: _Pair, rows: RelativeRows) -
     d, start = context.dimension, context.space.dofmap.index_map.local_range[0]
     blocks = _own(context, rows)
     sums = np.zeros((len(rows.weights), d))
-    for corner in range(d):
-        np.add.at(sums, pair.first.vertices[:, corner], pair.first.areas[:, None] * pair.first.normals)
+    for node in range(pair.first.nodes.shape[1]):
+        np.add.at(sums, pair.first.nodes[:, node], pair.first.areas[:, None] * pair.first.normals)
     mean = sums[start + blocks]
     normals = mean / np.linalg.norm(mean, axis=1, keepdims=True)
     normals = np.where(np.abs(normals) < DEFAULT.rounding * 10, 0.0, normals)
@@ -246,7 +250,7 @@ def _gaps(context: DomainForms, surface: Surface, pair: _Pair, rows: RelativeRow
     d, own = context.dimension, context.space.dofmap.index_map.local_range[0] + surface.blocks
     places = np.zeros((len(rows.weights), d))
     for side in (pair.first, pair.second):
-        places[side.vertices.ravel()] = side.corners.reshape(-1, d)
+        places[side.nodes.ravel()] = side.positions.reshape(-1, d)
     apart = (rows.second[own] @ places - rows.first[own] @ places) / rows.weights[own, None]
     return np.asarray(np.sum(apart * surface.normals, axis=1))
 
@@ -280,7 +284,7 @@ def _dofs(context: DomainForms, surface: Surface) -> Entities:
 def _members(context: DomainForms, pair: _Pair) -> Entities:
     """Local vertices (owned) of both sides."""
     start, end = context.space.dofmap.index_map.local_range
-    both = np.unique(np.concatenate([pair.first.vertices.ravel(), pair.second.vertices.ravel()]))
+    both = np.unique(np.concatenate([pair.first.nodes.ravel(), pair.second.nodes.ravel()]))
     return np.asarray(both[(both >= start) & (both < end)] - start, dtype=np.int32)
 
 

@@ -126,7 +126,7 @@ def _default(scene: Scene, tables: Tables, thresholds: Thresholds, left_out: lis
     for level in default_meshes(tables, thresholds):
         yield from _product(level, [few] if laws(scene) else [], left_out)
         yield setting_of(level)
-    for level in default_meshes(with_solver(unsmoothed(tables), degree=2), thresholds) if not scene.interface else ():
+    for level in default_meshes(with_solver(unsmoothed(tables), degree=2), thresholds):
         yield setting_of(level)
     if laws(scene):
         yield from _product(tables, [values_of("epsilon", thresholds.widths)], left_out)

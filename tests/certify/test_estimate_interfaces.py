@@ -20,7 +20,7 @@ from effectivity import rows, scenes
 BLOCKS = two_blocks("rectangle", [1.0], [[9, 4], [7, 3]], "plane_stress", tolerance=1e-10)
 
 
-def uniform(between: Table, stress: list[list[float]], upper: tuple[float, float]) -> Scene:
+def uniform(between: Table, stress: list[list[float]], upper: tuple[float, float], degree: int) -> Scene:
     """Two blocks on meshes that do not match, under a uniform stress; upper: where the upper one begins, its width."""
     normals = {"left": (-1, 0), "right": (1, 0), "bottom": (0, -1), "top": (0, 1)}
     sides = [f"lower.{s}" for s in ("left", "right", "bottom")] + [f"upper.{s}" for s in ("left", "right", "top")]
@@ -33,7 +33,7 @@ def uniform(between: Table, stress: list[list[float]], upper: tuple[float, float
             "material": STEEL,
             "boundary": {s.replace(".", "_"): {"on": s, "traction": t} for s, t in loads.items()},
             "interface": {"seam": {"between": ["upper.bottom", "lower.top"], **between}},
-            "solver": {"tolerance": 1e-11},
+            "solver": {"tolerance": 1e-11, "degree": degree},
         }
     )
 
@@ -46,8 +46,9 @@ def uniform(between: Table, stress: list[list[float]], upper: tuple[float, float
         ({"adhesion": {"law": "graph", "points": [[0, 0], [1e-6, 4e6]]}}, [[0.0, 0.0], [0.0, 1e6]]),
     ],
 )
-def test_a_uniform_stress_has_no_error(between: Table, stress: list[list[float]]) -> None:
-    found = solve(uniform(between, stress, (0.0, 1.0)))
+@pytest.mark.parametrize("degree", [1, 2])
+def test_a_uniform_stress_has_no_error(between: Table, stress: list[list[float]], degree: int) -> None:
+    found = solve(uniform(between, stress, (0.0, 1.0), degree))
     assert found.exit_code == 0
     assert found.estimate is not None
     assert found.estimate.discretisation < 1e-10 * found.estimate.energy_norm
@@ -55,9 +56,10 @@ def test_a_uniform_stress_has_no_error(between: Table, stress: list[list[float]]
 
 
 @pytest.mark.long
+@pytest.mark.parametrize("degree", [1, 2])
 @pytest.mark.parametrize("name", ["single_lap", "two_cylinders"])
-def test_the_estimate_is_near_the_error_of_demos(name: str) -> None:
-    for row in rows(scenes()[name], 2):
+def test_the_estimate_is_near_the_error_of_demos(name: str, degree: int) -> None:
+    for row in rows(scenes()[name].with_solver(degree=degree), 2):
         assert row.certified
         assert row.index == pytest.approx(1.0, abs=0.2)
 

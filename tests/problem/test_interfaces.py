@@ -74,30 +74,35 @@ def away_from_affine(found: Solution) -> float:
     return worst / float(np.abs(u).max())
 
 
-@pytest.mark.parametrize("angle", [0.0, 25.0])
+AT = pytest.mark.parametrize(("angle", "degree"), [(0.0, 1), (25.0, 1), (25.0, 2)])
+BOTH = pytest.mark.parametrize("degree", [1, 2])
+
+
+@AT
 @pytest.mark.parametrize("between", [CONTACT, {"tied": True}])
-def test_uniform_pressure_crosses_meshes_that_do_not_match(angle: float, between: Table) -> None:
-    found = solve(stacked(pulled(angle, np.diag([0.0, -1e6])), between, angle))
+def test_uniform_pressure_crosses_meshes_that_do_not_match(angle: float, degree: int, between: Table) -> None:
+    found = solve(stacked(pulled(angle, np.diag([0.0, -1e6])), between, angle, degree=degree))
     assert found.exit_code == 0
     assert seam(found).pressure * found.problem.scales.stress == pytest.approx(-1e6, rel=1e-10)
     assert away_from_affine(found) < 1e-10
 
 
-@pytest.mark.parametrize("angle", [0.0, 25.0])
-def test_uniform_shear_crosses_a_glued_seam(angle: float) -> None:
-    found = solve(stacked(pulled(angle, np.array([[0.0, 1e6], [1e6, 0.0]])), {"tied": True}, angle))
+@AT
+def test_uniform_shear_crosses_a_glued_seam(angle: float, degree: int) -> None:
+    found = solve(stacked(pulled(angle, np.array([[0.0, 1e6], [1e6, 0.0]])), {"tied": True}, angle, degree=degree))
     assert seam(found).friction * found.problem.scales.stress == pytest.approx(1e6, rel=1e-10)
     assert away_from_affine(found) < 1e-10
 
 
-def held(angle: float, upper: tuple[float, float], **extra: Any) -> Problem:
-    base = {"base": {"on": "lower.bottom", "displacement": [0.0, 0.0]}, **extra}
-    return prepare(stacked(base, CONTACT, angle, upper)).problem
+def held(angle: float, upper: tuple[float, float], degree: int = 1) -> Problem:
+    base = {"base": {"on": "lower.bottom", "displacement": [0.0, 0.0]}}
+    return prepare(stacked(base, CONTACT, angle, upper, degree=degree)).problem
 
 
+@BOTH
 @pytest.mark.parametrize("upper", [(0.0, 1.0), (0.23, 0.5), (-0.31, 1.7), (0.4, 1.1)])
-def test_affine_fields_do_not_open_a_flat_seam(upper: tuple[float, float]) -> None:
-    problem = held(25.0, upper)
+def test_affine_fields_do_not_open_a_flat_seam(upper: tuple[float, float], degree: int) -> None:
+    problem = held(25.0, upper, degree)
     x = problem.points[:, :2]
     for field in (np.ones_like(x), x @ np.array([[0.0, 1.0], [-1.0, 0.0]]), x @ np.array([[1.3, -0.2], [0.7, 2.1]])):
         opened = problem.relative(np.ascontiguousarray(field).ravel())
@@ -125,27 +130,47 @@ def test_a_uniform_pressure_loads_both_sides_alike_where_they_cover_each_other(u
     assert abs(nodal @ x) < 1e-14
 
 
-def test_what_is_prescribed_leaves_its_share_to_its_neighbour() -> None:
+@pytest.mark.parametrize("upper", [(0.0, 1.0), (0.23, 0.5), (-0.31, 1.7), (0.4, 1.1)])
+def test_a_uniform_pressure_has_force_moment_and_second_moment_on_both_sides(upper: tuple[float, float]) -> None:
+    """At degree 2, whose functions hold x²: exactly on the first side; on the second the projection's rule is exact."""
+    problem = held(0.0, upper, 2)
+    surface = problem.surfaces[0]
+    forces = np.zeros((len(problem.points), 2))
+    forces[surface.blocks] = surface.weights[:, None] * surface.normals
+    nodal = problem.on_bodies(forces)[:, 1] * problem.scales.length
+    begin, end = max(upper[0], 0.0), min(sum(upper), 1.0)
+    names = [body.name for body in problem.bodies.single()]
+    for sign, name in ((-1.0, 'body "upper"'), (1.0, 'body "lower"')):
+        mine = problem.bodies.members == names.index(name)
+        moments = [nodal[mine] @ problem.points[mine, 0] ** k for k in range(3)]
+        expected = [sign * (end ** (k + 1) - begin ** (k + 1)) / (k + 1) for k in range(3)]
+        assert moments == pytest.approx(expected, abs=1e-13)
+
+
+@BOTH
+def test_what_is_prescribed_leaves_its_share_to_its_neighbour(degree: int) -> None:
     walls = {"wall": {"on": ["lower.left", "upper.left"], "displacement": [0.0, "free"]}}
     press = {"press": {"on": "upper.top", "traction": [0.0, -1e6]}}
-    found = solve(stacked({**walls, **press, "base": {"on": "lower.bottom", "displacement": ["free", 0.0]}}, CONTACT))
-    assert len(seam(found).surface.blocks) == 5
+    base = {"base": {"on": "lower.bottom", "displacement": ["free", 0.0]}}
+    found = solve(stacked({**walls, **press, **base}, CONTACT, degree=degree))
+    assert len(seam(found).surface.blocks) == 5 * degree
     assert seam(found).surface.weights.sum() * found.problem.scales.length == pytest.approx(1.0, rel=1e-14)
     assert seam(found).pressure * found.problem.scales.stress == pytest.approx(-1e6, rel=1e-10)
     assert away_from_affine(found) < 1e-10
 
 
-def pushed(push: float, **between: Any) -> Scene:
+def pushed(push: float, degree: int = 1, **between: Any) -> Scene:
     boundary = {
         "base": {"on": "lower.bottom", "displacement": [0.0, 0.0]},
         "press": {"on": "upper.top", "traction": [0.0, -1e6]},
         "push": {"on": "upper.left", "traction": [push, 0.0]},
     }
-    return stacked(boundary, {**CONTACT, **between}, upper=(0.2, 0.6))
+    return stacked(boundary, {**CONTACT, **between}, upper=(0.2, 0.6), degree=degree)
 
 
-def test_both_sides_carry_opposite_forces() -> None:
-    found = solve(pushed(3e5, friction=quadratic_linear(1e6, 1e-6)))
+@BOTH
+def test_both_sides_carry_opposite_forces(degree: int) -> None:
+    found = solve(pushed(3e5, degree, friction=quadratic_linear(1e6, 1e-6)))
     assert found.forces is not None
     forces = found.forces.resultants(found.problem.domain.mesh.comm)
     unit = found.problem.scales.force
@@ -153,20 +178,22 @@ def test_both_sides_carry_opposite_forces() -> None:
     assert forces["seam"] + forces[f"seam{placed_forces.SECOND}"] == pytest.approx([0.0, 0.0], abs=1e-12)
 
 
-def test_a_block_slides_off_the_other_at_the_load_of_statics() -> None:
+@BOTH
+def test_a_block_slides_off_the_other_at_the_load_of_statics(degree: int) -> None:
     friction = {"law": "graph", "points": [[0, 0], [1e-6, 8e5], [1e-6, 5e5]]}
-    factors = prepare(pushed(1e6, friction=friction)).load_factors("push")
+    factors = prepare(pushed(1e6, degree, friction=friction)).load_factors("push")
     assert factors.held == pytest.approx(5e5 * 0.6 / (1e6 * 0.4), rel=1e-9)
     assert factors.peak == pytest.approx(8e5 * 0.6 / (1e6 * 0.4), rel=1e-9)
-    escaped = solve(pushed(1.3e6, friction=friction))
+    escaped = solve(pushed(1.3e6, degree, friction=friction))
     assert escaped.solvability.state == "escapes"
     assert escaped.solvability.direction is not None
     assert escaped.solvability.direction.name == 'translation along +x of body "upper"'
 
 
-def test_a_block_tips_over_on_the_other_at_the_load_of_statics() -> None:
+@BOTH
+def test_a_block_tips_over_on_the_other_at_the_load_of_statics(degree: int) -> None:
     stuck = {"law": "graph", "points": [[0, 0], [1e-6, 1e9]]}
-    factors = prepare(pushed(1e6, friction=stuck)).load_factors("push")
+    factors = prepare(pushed(1e6, degree, friction=stuck)).load_factors("push")
     assert factors.held == pytest.approx(1e6 * 0.6 * 0.3 / (1e6 * 0.4 * 0.2), rel=1e-9)
 
 
@@ -185,10 +212,10 @@ def test_bodies_that_only_hold_each_other_separate_or_not() -> None:
     assert solve(stacked(apart, CONTACT)).solvability.state == "escapes"
 
 
-@pytest.mark.parametrize("push", [2e5, 6e5])
-def test_a_stiff_partner_is_a_rigid_floor(push: float) -> None:
+@pytest.mark.parametrize(("push", "degree"), [(2e5, 1), (6e5, 1), pytest.param(6e5, 2, marks=pytest.mark.long)])
+def test_a_stiff_partner_is_a_rigid_floor(push: float, degree: int) -> None:
     friction = quadratic_linear(2e6, 1e-6)
-    table = pushed(push, friction=friction).model_dump()
+    table = pushed(push, degree, friction=friction).model_dump()
     table["material"] = {
         "soft": {**MATERIAL, "region": "upper"},
         "stiff": {**MATERIAL, "region": "lower", "youngs_modulus": 1e6 * E},
@@ -204,7 +231,7 @@ def test_a_stiff_partner_is_a_rigid_floor(push: float) -> None:
                     "push": table["boundary"]["push"],
                     "seam": {"on": "upper.bottom", **CONTACT, "friction": friction},
                 },
-                "solver": {"tolerance": 1e-10},
+                "solver": {"tolerance": 1e-10, "degree": degree},
             }
         )
     )
@@ -218,10 +245,11 @@ def test_a_stiff_partner_is_a_rigid_floor(push: float) -> None:
         assert np.abs(values[0] - values[1]).max() < 1e-5 * np.abs(values[1]).max()
 
 
-def test_multigrid_on_levels_with_their_own_seams_finds_the_same() -> None:
+@pytest.mark.parametrize("degree", [1, pytest.param(2, marks=pytest.mark.long)])
+def test_multigrid_on_levels_with_their_own_seams_finds_the_same(degree: int) -> None:
     table = pushed(6e5, friction=quadratic_linear(1e6, 2e-6)).model_dump()
     table["domain"]["lower"]["cells"], table["domain"]["upper"]["cells"] = [32, 32], [48, 32]
-    table["solver"] = {"tolerance": 1e-10}
+    table["solver"] = {"tolerance": 1e-10, "degree": degree}
     scene = Scene.model_validate(table)
     levels, direct = solve(scene, thresholds=NESTED), solve(scene.with_solver(linear_solver="lu"))
     assert levels.solve_result is not None

@@ -245,8 +245,9 @@ def test_the_scarf_joint_has_the_strength_and_the_mixity_of_its_header() -> None
     assert glue.of_both_modes.slip_share == pytest.approx(share, abs=1e-6)
 
 
-def test_two_cylinders_meet_with_the_pressure_of_hertz() -> None:
-    found = demo("two_cylinders")
+@pytest.mark.parametrize("degree", [1, 2])
+def test_two_cylinders_meet_with_the_pressure_of_hertz(degree: int) -> None:
+    found = demo("two_cylinders", f"solver.degree={degree}")
     met, scales = state(found, "contact"), found.problem.scales
     force = float(met.surface.weights @ (met.pressure * met.surface.normals[:, 1])) * scales.force
     modulus, radius = 2.1e11 / (2 * (1 - 0.3**2)), 0.05

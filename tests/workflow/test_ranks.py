@@ -46,6 +46,7 @@ SCENES: dict[str, Table] = {
     "degree-2": model(6, 6e6, 1e6, quadratic_linear(3e6), degree=2),
     "degree-2-in-space": CUBE,
     "joined": two_blocks("rectangle", [1.0], [[9, 4], [7, 3]], "plane_stress"),
+    "joined-degree-2": two_blocks("rectangle", [1.0], [[9, 4], [7, 3]], "plane_stress", degree=2),
     "joined-in-space": two_blocks("box", [1.0, 1.0], [[4, 3, 2], [3, 4, 2]], "three_dimensional"),
 }
 LIFTING = {"on": "top", "traction": [0.0, "-1e6*(1 - 1.8*x)"]}
@@ -54,7 +55,7 @@ for lifted in METHODS.values():
     lifted["boundary"]["press"] = LIFTING
 DEMOS: dict[str, list[str]] = {"hertz": [], "thermal_bar": [], "strong_law": ["domain.cells=[12, 12]"]}
 """A shape that gmsh meshes on rank 0, a heated bar of two materials, a field of stresses; at their own tolerances."""
-LATE = {"exact", "tresca", "gamg", "metastable", "degree-2", "joined", "thermal_bar", "tao", "ssls"}
+LATE = {"exact", "tresca", "gamg", "metastable", "degree-2", "joined", "joined-degree-2", "thermal_bar", "tao", "ssls"}
 """Scenes of the long tests: each has another like it among the fast ones."""
 
 

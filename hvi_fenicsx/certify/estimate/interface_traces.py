@@ -1,73 +1,68 @@
-"""Interfaces between the vertices of both sides: relative displacements at quadrature points, tractions tested there.
+"""Interfaces between the nodes of both sides: relative displacements at quadrature points, tractions tested there.
 
 It is for an interface what :class:`.contact_facets.PartTrace` is for a part of the boundary. What the first side's
-vertices carry is linear on its facets; a vertex that carries nothing has the mean of its neighbours. The intersections
-of facets are spread over the ranks; what they say of edges and vertices is summed over all of them.
+nodes carry is a function of the elements' degree on its facets; a node that carries nothing has the mean of its
+neighbours. The intersections of facets are spread over the ranks; what they say of bubbles and nodes is summed.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import combinations
 
 import numpy as np
 from dolfinx import fem
 from mpi4py import MPI
 
+from ...mesh import nodes
 from ...problem import dual_basis
 from ...problem.contact_surface import Surface
 from ...problem.facet_overlaps import Facets
 from ...problem.interfaces import Interface
 from ...problem.problem import Problem
-from ...typing import Array, Integers
-from .bubbles import quadrature
+from ...runtime.mpi import agree
+from ...typing import Array, Entities, Integers
+from .bubbles import of_facet, quadrature, shape
 from .contact_facets import contact_facets, local_blocks
 
 
 @dataclass(frozen=True, kw_only=True)
-class _SideEdges:
-    """The bubbles on the edges (n) of one side, the same numbers on all ranks.
+class _SideBubbles:
+    """The bubbles (n) of one side's facets, the same numbers on all ranks.
 
     Attributes:
-        of_facet: the edges of each facet, (f, pairs).
-        here: edges that this rank has, (k,).
-        blocks: their local bubbles, (k,).
-        ranks: how many ranks have each edge, (n,).
+        of_facet: the bubbles of each facet (:func:`.bubbles.of_facet`), (f, k).
+        count: n.
+        owned: those that this rank owns, (m,).
+        blocks: their local blocks, (m,).
     """
 
     of_facet: Integers
-    here: Integers
+    count: int
+    owned: Integers
     blocks: Integers
-    ranks: Integers
 
 
-def _edges(problem: Problem, bubbles: fem.FunctionSpace, facets: Facets, side: str) -> _SideEdges:
-    """The edges of a side. Collective."""
-    size, comm = problem.space.dofmap.index_map.size_global, problem.domain.mesh.comm
-    known, of_facet = np.unique(_keys(facets.vertices, size), return_inverse=True)
-    local = contact_facets(problem, bubbles, problem.domain.facets([side]))
-    numbers = problem.space.dofmap.index_map.local_to_global(local.nodes.ravel()).reshape(local.nodes.shape)
-    here = np.searchsorted(known, _keys(numbers.astype(np.int64), size).ravel())
-    here, first = np.unique(here, return_index=True)
-    ranks = np.zeros(len(known), dtype=np.int64)
-    ranks[here] = 1
-    return _SideEdges(
-        of_facet=of_facet.reshape(len(facets.vertices), -1),
-        here=here,
-        blocks=local.bubbles.ravel()[first].astype(np.int64),
-        ranks=comm.allreduce(ranks),
+def _bubbles_of(problem: Problem, space: fem.FunctionSpace, facets: Facets, side: str) -> _SideBubbles:
+    """The bubbles of a side. Collective."""
+    local = contact_facets(problem, space, problem.domain.facets([side]))
+    own = [_numbers(problem.space, local.nodes), _numbers(space, local.bubbles)]
+    nodes_of, found = (np.concatenate(parts) for parts in zip(*agree(problem.domain.mesh.comm, own), strict=True))
+    order, wanted = np.lexsort(nodes_of.T), np.lexsort(facets.nodes.T)
+    of_facet = np.empty((len(wanted), found.shape[1]), dtype=np.int64)
+    of_facet[wanted] = found[order]
+    known, numbers = np.unique(of_facet, return_inverse=True)
+    start, end = space.dofmap.index_map.local_range
+    owned = np.flatnonzero((known >= start) & (known < end))
+    return _SideBubbles(
+        of_facet=numbers.reshape(of_facet.shape), count=len(known), owned=owned, blocks=known[owned] - start
     )
 
 
-def _keys(vertices: Integers, size: int) -> Integers:
-    """A number for each edge of facets with these vertices (f, d), (f, pairs)."""
-    ends = [np.sort(vertices[:, pair], axis=1) for pair in _pairs(vertices.shape[1])]
-    return np.stack([end[:, 0] * size + end[:, 1] for end in ends], axis=1)
-
-
-def _pairs(corners: int) -> list[list[int]]:
-    return [list(pair) for pair in combinations(range(corners), 2)]
+def _numbers(space: fem.FunctionSpace, blocks: Entities) -> Integers:
+    """Local blocks by their global numbers."""
+    found = space.dofmap.index_map.local_to_global(np.ascontiguousarray(blocks.ravel()))
+    return np.asarray(found, dtype=np.int64).reshape(blocks.shape)
 
 
 class InterfacePoints:
@@ -80,12 +75,15 @@ class InterfacePoints:
         degree: of the quadrature.
 
     Attributes:
+        degree: of the elements.
         weights: of the points, over L^(d-1), (f, q).
         facets: of the first side and of the second, (f,) each.
         places: barycentric coordinates of the points in these, (f, q, d) each.
-        corners: of the intersections in the first side's facets, (f, d, d).
-        sides: the edges of both sides.
-        spread: what the first side's vertices carry, on its facets.
+        functions: the basis functions of the first side's nodes at the points, (f, q, n).
+        hats: the functions that are linear from node to node, (f, q, n).
+        at_ends: the basis functions at the corners of the intersections, (f, d, n).
+        sides: the bubbles of both sides.
+        spread: what the first side's nodes carry, on its facets.
     """
 
     def __init__(self, problem: Problem, bubbles: fem.FunctionSpace, interface: Interface, degree: int) -> None:
@@ -96,10 +94,13 @@ class InterfacePoints:
         self.weights: Array = overlaps.areas[own, None] / problem.scales.length ** (d - 1) * weights
         self.facets = overlaps.first[own], overlaps.second[own]
         self.places = rule @ overlaps.on_first[own], rule @ overlaps.on_second[own]
-        self.corners = overlaps.on_first[own]
+        first = interface.first
+        self.degree, flat = first.degree, self.places[0].reshape(-1, d)
+        self.functions, self.at_ends = first.functions(self.places[0]), first.functions(overlaps.on_first[own])
+        self.hats = nodes.hats(self.degree, flat).reshape(self.functions.shape)
         self.sides = (
-            _edges(problem, bubbles, interface.first, names.first),
-            _edges(problem, bubbles, interface.second, names.second),
+            _bubbles_of(problem, bubbles, first, names.first),
+            _bubbles_of(problem, bubbles, interface.second, names.second),
         )
         self.spread = _Spread(problem, interface)
 
@@ -111,7 +112,7 @@ class InterfaceTrace:
         problem: what was solved.
         bubbles: the space of bubbles.
         points: of the interface.
-        surface: the vertices of its first side.
+        surface: the nodes of its first side.
         directions: at these, (m, k, d).
 
     Attributes:
@@ -127,39 +128,47 @@ class InterfaceTrace:
         self._vectors = vectors.reshape(*self.weights.shape, *directions.shape[1:])
 
     def interpolated(self, values: Array) -> Array:
-        """Values at the owned vertices (m, k) at the points, linear between them, (f, q, k). Collective."""
-        return np.asarray(self._points.places[0] @ self._points.spread.at_corners(values)[self._points.facets[0]])
+        """The function with coefficients at the owned nodes (m, k) at the points, (f, q, k). Collective."""
+        return self._combined(self._points.functions, values)
 
     def at_nodes(self, values: Array) -> Array:
-        """Values at the owned vertices (m, k) at the corners of the intersections, (f, d, k). Collective."""
-        return np.asarray(self._points.corners @ self._points.spread.at_corners(values)[self._points.facets[0]])
+        """The same at the corners of the intersections, (f, d, k). Collective."""
+        return self._combined(self._points.at_ends, values)
 
     def from_node_to_node(self, values: Array) -> Array:
-        """The same: interfaces are of degree 1. Collective."""
-        return self.interpolated(values)
+        """Values at the owned nodes (m, k), linear from node to node; (f, q, k). Collective."""
+        return self._combined(self._points.hats, values)
 
     def of_field(self, u: fem.Function) -> Array:
-        """The relative values of a P1 field, (f, q, k). Collective."""
-        there = self._surface.values(self._problem.relative(u.x.array))
-        return self.interpolated(np.einsum("mkd,md->mk", self._directions, there))
+        """The relative values of a displacement of the problem's space, (f, q, k). Collective."""
+        return self.interpolated(self._along(u))
 
     def of_field_from_node_to_node(self, u: fem.Function) -> Array:
-        """The same: interfaces are of degree 1. Collective."""
-        return self.of_field(u)
+        """Its coefficients, linear from node to node, (f, q, k). Collective."""
+        return self.from_node_to_node(self._along(u))
+
+    def _along(self, u: fem.Function) -> Array:
+        """The relative coefficients of a displacement along the directions at the owned nodes, (m, k). Collective."""
+        there = self._surface.values(self._problem.relative(u.x.array))
+        return np.asarray(np.einsum("mkd,md->mk", self._directions, there))
+
+    def _combined(self, functions: Array, values: Array) -> Array:
+        return np.asarray(functions @ self._points.spread.on_facets(values)[self._points.facets[0]])
 
     def of_bubbles(self, e: fem.Function) -> Array:
-        """The relative values of edge bubbles, (f, q, k). Collective."""
+        """The relative values of bubbles, (f, q, k). Collective."""
         found = np.zeros((*self.weights.shape, self._problem.scales.dimension))
         blocks = e.x.array.reshape(-1, found.shape[2])
-        for sign, side, edges, shape in self._bubbles_of_edges():
-            known = np.zeros((len(side.ranks), found.shape[2]))
-            known[side.here] = blocks[side.blocks]
-            known = self._problem.domain.mesh.comm.allreduce(known) / side.ranks[:, None]
-            found += sign * shape[:, :, None] * known[edges][:, None]
+        for sign, side, facet, at in self._sides():
+            known = np.zeros((side.count, found.shape[2]))
+            known[side.owned] = blocks[side.blocks]
+            known = self._problem.domain.mesh.comm.allreduce(known)
+            for i, values in self._shapes(at):
+                found += sign * values[:, :, None] * known[side.of_facet[facet, i]][:, None]
         return np.asarray(np.einsum("fqkd,fqd->fqk", self._vectors, found))
 
     def tested(self, tau: Array) -> tuple[Array, Array]:
-        """∫ τ·w ds of tractions (f, q, k): at the edges of both sides and at vertices, local blocks (n, d). Collective.
+        """∫ τ·w ds of tractions (f, q, k): with both sides' bubbles and at nodes, local blocks (n, d). Collective.
 
         Args:
             tau: against the motion of the first side.
@@ -167,31 +176,35 @@ class InterfaceTrace:
         d = self._problem.scales.dimension
         scaled = self.weights[:, :, None] * tau
         vectors = np.einsum("fqk,fqkd->fqd", scaled, self._vectors)
-        edges, vertices = np.zeros((local_blocks(self._bubbles), d)), np.zeros((local_blocks(self._problem.space), d))
-        for sign, side, numbers, shape in self._bubbles_of_edges():
-            sums = np.zeros((len(side.ranks), d))
-            np.add.at(sums, numbers, sign * np.einsum("fq,fqd->fd", shape, vectors))
-            sums = self._problem.domain.mesh.comm.allreduce(sums) / side.ranks[:, None]
-            np.add.at(edges, side.blocks, sums[side.here])
-        corners = np.zeros((len(self._points.spread.carriers), d, scaled.shape[2]))
-        np.add.at(corners, self._points.facets[0], np.einsum("fqk,fqv->fvk", scaled, self._points.places[0]))
-        at = self._points.spread.summed(corners)
-        vertices[self._surface.blocks] = np.einsum("mk,mkd->md", at, self._directions)
-        return edges, vertices
+        found, at_nodes = (np.zeros((local_blocks(s), d)) for s in (self._bubbles, self._problem.space))
+        for sign, side, facet, at in self._sides():
+            sums = np.zeros((side.count, d))
+            for i, values in self._shapes(at):
+                np.add.at(sums, side.of_facet[facet, i], sign * np.einsum("fq,fqd->fd", values, vectors))
+            found[side.blocks] += self._problem.domain.mesh.comm.allreduce(sums)[side.owned]
+        on_facets = np.zeros((*self._points.spread.carriers.shape[:2], scaled.shape[2]))
+        np.add.at(on_facets, self._points.facets[0], np.einsum("fqk,fqn->fnk", scaled, self._points.functions))
+        sums = self._points.spread.summed(on_facets)
+        at_nodes[self._surface.blocks] = np.einsum("mk,mkd->md", sums, self._directions)
+        return found, at_nodes
 
-    def _bubbles_of_edges(self) -> Iterator[tuple[float, _SideEdges, Integers, Array]]:
-        """By side and edge: the sign, the side, the edge's number by facet (f,), its bubbles at the points (f, q)."""
+    def _sides(self) -> Iterator[tuple[float, _SideBubbles, Integers, Array]]:
+        """By side: its sign, its bubbles, the facet of each intersection (f,), the points therein (f, q, d)."""
         points = self._points
-        for sign, side, facet, at in zip((1.0, -1.0), points.sides, points.facets, points.places, strict=True):
-            for i, (a, b) in enumerate(_pairs(at.shape[2])):
-                yield sign, side, side.of_facet[facet, i], 4 * at[:, :, a] * at[:, :, b]
+        yield from zip((1.0, -1.0), points.sides, points.facets, points.places, strict=True)
+
+    def _shapes(self, at: Array) -> Iterator[tuple[int, Array]]:
+        """The number of each bubble of a facet, and its values at points (f, q, d), (f, q)."""
+        d = at.shape[2]
+        for i, index in enumerate(of_facet(self._points.degree, d)):
+            yield i, shape(index, at.reshape(-1, d)).reshape(at.shape[:2])
 
 
 class _Spread:
-    """Values at the vertices that carry something as values at the corners of the first side's facets.
+    """Values at the nodes that carry something as values at the nodes of the first side's facets.
 
     Attributes:
-        carriers: which vertices (numbered through) the value at each corner is the mean of, rows of weights.
+        carriers: which nodes (numbered through) the value at each node is the mean of, rows of weights, (f, n, n).
     """
 
     def __init__(self, problem: Problem, interface: Interface) -> None:
@@ -201,26 +214,26 @@ class _Spread:
         own = start + interface.surface.blocks.astype(np.int64)
         known = np.flatnonzero(weights > 0.0)
         self._count, self._own = len(known), np.searchsorted(known, own)
-        kept = weights[first.vertices] > 0.0
-        at = np.searchsorted(known, first.vertices).clip(max=len(known) - 1)
-        d = kept.shape[1]
-        self.carriers = np.zeros((len(kept), d, d))
+        kept = weights[first.nodes] > 0.0
+        at = np.searchsorted(known, first.nodes).clip(max=len(known) - 1)
+        count = kept.shape[1]
+        self.carriers = np.zeros((len(kept), count, count))
         self._at = np.where(kept, at, 0)
-        for corner in range(d):
-            alone = kept[:, corner]
+        for number in range(count):
+            alone = kept[:, number]
             shares = kept / np.maximum(kept.sum(axis=1, keepdims=True), 1)
-            self.carriers[:, corner] = np.where(alone[:, None], np.eye(d)[corner], shares)
-        for facet, vertex in dual_basis.adopted(first, interface.overlaps, kept).items():
-            self._at[facet, 0], self.carriers[facet, :, 0] = np.searchsorted(known, vertex), 1.0
+            self.carriers[:, number] = np.where(alone[:, None], np.eye(count)[number], shares)
+        for facet, node in dual_basis.adopted(first, interface.overlaps, kept).items():
+            self._at[facet, 0], self.carriers[facet, :, 0] = np.searchsorted(known, node), 1.0
 
-    def at_corners(self, values: Array) -> Array:
-        """Values at the owned vertices (m, k) at the corners of all facets, (facets, d, k). Collective."""
+    def on_facets(self, values: Array) -> Array:
+        """Values at the owned nodes (m, k) at the nodes of all facets, (facets, n, k). Collective."""
         every = np.zeros((self._count, values.shape[1]))
         every[self._own] = values
         return np.asarray(self.carriers @ self._comm.allreduce(every)[self._at])
 
-    def summed(self, corners: Array) -> Array:
-        """Values at the corners of facets (facets, d, k) summed at the owned vertices, (m, k). Collective."""
-        every = np.zeros((self._count, corners.shape[2]))
-        np.add.at(every, self._at, self.carriers.transpose(0, 2, 1) @ corners)
+    def summed(self, values: Array) -> Array:
+        """Values at the nodes of facets (facets, n, k) summed at the owned nodes, (m, k). Collective."""
+        every = np.zeros((self._count, values.shape[2]))
+        np.add.at(every, self._at, self.carriers.transpose(0, 2, 1) @ values)
         return np.asarray(self._comm.allreduce(every)[self._own])

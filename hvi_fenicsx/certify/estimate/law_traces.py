@@ -118,7 +118,7 @@ class LawTraces:
             surface: the part.
             directions: along which displacements are looked at, (m, k, d).
         """
-        problem, space, degree = self.problem, self.bubbles, self.thresholds.interface_degree
+        problem, space, degree = self.problem, self.bubbles, self.thresholds.interface_degree[self.degree]
         if (interface := problem.interface_of(surface)) is None:
             return PartTrace(problem, space, surface, directions, self.thresholds.facet_degree[self.degree])
         if interface.name not in self._interfaces:
@@ -178,7 +178,7 @@ class LawTraces:
         return _gathered(self.bubbles, between), _gathered(self.problem.space, at_nodes)
 
     def _carried(self, state: ContactState) -> Array:
-        """∫ τ·v ds of what bodies that meet put on each other without a law, tested with edge bubbles. Collective."""
+        """∫ τ·v ds of what bodies that meet put on each other without a law, tested with bubbles. Collective."""
         force = -traction(state)
         for law in state.laws:
             force -= np.einsum("mk,mkd->md", law.given, law.term.directions)

@@ -38,7 +38,7 @@ class Thresholds:
 
     near: float = thresholds.DEFAULT.near
     facet_degree: Mapping[int, int] = field(default_factory=lambda: {1: 12, 2: 30})
-    interface_degree: int = 6
+    interface_degree: Mapping[int, int] = field(default_factory=lambda: {1: 6, 2: 15})
     bubble_tolerance: float = 0.1
     bubble_steps: int = 30
     bubble_rounds: int = 4
