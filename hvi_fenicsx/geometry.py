@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
@@ -11,6 +12,21 @@ from .typing import Array, Integers
 
 Point = tuple[float, float]
 """Coordinates, m."""
+
+
+class Curve(Protocol):
+    """What a side that is not straight lies on, in d dimensions."""
+
+    def nearest(self, x: Array) -> Array:
+        """The points of the curve nearest to the points x, both of shape (n, d), m."""
+
+    def moved(self, origin: Array, rotation: Array) -> Curve:
+        """The curve turned about the origin of coordinates, and then moved.
+
+        Args:
+            origin: where the origin of coordinates comes to lie, m, (d,).
+            rotation: (d, d).
+        """
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,6 +45,16 @@ class Arc:
         """The points of the circle nearest to the points x, both of shape (n, 2), m."""
         away = x - np.asarray(self.centre)
         return np.asarray(self.centre + self.radius * away / np.linalg.norm(away, axis=1, keepdims=True))
+
+    def moved(self, origin: Array, rotation: Array) -> Arc:
+        """The circle turned about the origin of coordinates, and then moved.
+
+        Args:
+            origin: where the origin of coordinates comes to lie, m, (2,).
+            rotation: (2, 2).
+        """
+        x, y = rotation @ np.asarray(self.centre) + origin
+        return Arc((float(x), float(y)), self.radius)
 
 
 def _swept(p: Point, q: Point, centre: Point | None) -> float:

@@ -11,7 +11,7 @@ from dolfinx import mesh as dmesh
 from mpi4py import MPI
 
 from ..errors import InputError
-from ..geometry import Arc
+from ..geometry import Curve
 from ..runtime import memory
 from ..runtime.mpi import agree
 from ..typing import Array, Entities
@@ -29,7 +29,7 @@ class Domain:
         lower: lower corner of the bounding box, m, shape (d,), the same on all ranks.
         upper: upper corner, likewise.
         curves: the true curve of a side by its name, where it is known and not straight; the facets of all other
-            sides, those of mesh files among them, are taken for the geometry itself.
+            sides are taken for the geometry itself.
         one_piece: whether the mesh is known to be connected; else :mod:`.bodies` finds out.
         coarsening: makes the next coarser domain of the mesh hierarchy; None where there is none.
         shared: what several problems on this mesh have in common, by name; None where one problem is all.
@@ -40,7 +40,7 @@ class Domain:
     regions: Mapping[str, Entities]
     lower: Array
     upper: Array
-    curves: Mapping[str, Arc] = field(default_factory=dict)
+    curves: Mapping[str, Curve] = field(default_factory=dict)
     one_piece: bool = False
     coarsening: Coarsening | None = None
     shared: dict[str, Any] | None = field(default=None, compare=False, repr=False)
@@ -51,7 +51,7 @@ class Domain:
         mesh: dmesh.Mesh,
         sides: Mapping[str, Entities],
         regions: Mapping[str, Entities] | None = None,
-        curves: Mapping[str, Arc] | None = None,
+        curves: Mapping[str, Curve] | None = None,
         *,
         one_piece: bool = False,
     ) -> Domain:

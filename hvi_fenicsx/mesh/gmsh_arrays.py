@@ -20,6 +20,9 @@ class MeshArrays:
         cell_tags: physical group of each cell, (c,).
         facets: nodes of the facets in physical groups, (f, d).
         facet_tags: physical group of each facet, (f,).
+        curved: the nodes of facets of second order, corners first, then midpoints of edges in the order of basix; of
+            groups some of whose facets are curved, (k, n, 3).
+        curved_tags: physical group of each of these, (k,).
     """
 
     points: Array
@@ -27,11 +30,13 @@ class MeshArrays:
     cell_tags: Entities
     facets: Integers
     facet_tags: Entities
+    curved: Array
+    curved_tags: Entities
 
     @classmethod
     def empty(cls, dimension: int) -> MeshArrays:
         """What the ranks have that gmsh does not run on."""
-        return cls(np.empty((0, 3)), *_joined([], dimension), *_joined([], dimension - 1))
+        return cls(np.empty((0, 3)), *_joined([], dimension), *_joined([], dimension - 1), *no_curves(dimension))
 
 
 def start(gmsh: Any) -> None:
@@ -40,16 +45,34 @@ def start(gmsh: Any) -> None:
     gmsh.option.setNumber("General.Terminal", 0)
 
 
-def extract(gmsh: Any, dimension: int) -> MeshArrays:
+def close_gaps(gmsh: Any) -> None:
+    """Number the nodes without gaps."""
+    tags = gmsh.model.mesh.getNodes()[0]
+    if len(tags) and np.max(tags) != len(tags):
+        gmsh.model.mesh.renumberNodes()
+
+
+def no_curves(dimension: int) -> tuple[Array, Entities]:
+    """The curved facets and their groups of a mesh that has none.
+
+    Args:
+        dimension: of the cells.
+    """
+    return np.empty((0, {2: 3, 3: 6}[dimension], 3)), np.empty(0, dtype=np.int32)
+
+
+def extract(gmsh: Any, dimension: int, curves: tuple[Array, Entities] | None = None) -> MeshArrays:
     """The mesh that is open in gmsh; its nodes are numbered without gaps.
 
     Args:
         gmsh: the module.
         dimension: of the cells.
+        curves: curved facets and their groups, if there are any.
     """
     tags, points, _ = gmsh.model.mesh.getNodes()
     ordered = points.reshape(-1, 3)[np.argsort(tags)]
-    return MeshArrays(ordered, *grouped(gmsh, dimension), *grouped(gmsh, dimension - 1))
+    groups = *grouped(gmsh, dimension), *grouped(gmsh, dimension - 1)
+    return MeshArrays(ordered, *groups, *(curves or no_curves(dimension)))
 
 
 def grouped(gmsh: Any, dimension: int) -> tuple[Integers, Entities]:

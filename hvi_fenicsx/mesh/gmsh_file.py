@@ -6,6 +6,7 @@ import io
 import json
 import signal
 import subprocess
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,7 @@ from ..runtime import helper_process, memory
 from ..runtime.mpi import on_root
 from ..schema import LONGEST, SHORTEST
 from . import gmsh_checks, gmsh_model, gmsh_script
+from .curved_facets import CurvedFacets
 from .domain import Domain, check_affordable
 from .gmsh_arrays import MeshArrays
 from .gmsh_reader import Request
@@ -38,15 +40,24 @@ def read(comm: MPI.Comm, path: Path, dimension: int, scale: float = 1.0, thresho
 
     Raises:
         InputError: on all ranks alike: not readable, no mesh nor harmless script, no named groups, wrong dimension, no
-            linear simplices, inverted or degenerate cells.
+            simplices of order 1 or 2, inverted or degenerate cells.
         Interrupted: on all ranks alike: a signal came.
     """
     found: list[MeshArrays] = []
     names, nodes = on_root(comm, lambda: _read(path, dimension, scale, found, thresholds.gmsh_file_seconds))
     check_affordable(comm, dimension * nodes, dimension, "file", "mesh the body coarser")
-    mesh, sides, regions = gmsh_model.distribute(comm, found.pop() if found else None, dimension, names)
+    arrays = found.pop() if found else None
+    curves = on_root(comm, lambda: {} if arrays is None else _curves(arrays, names[dimension - 1], scale, dimension))
+    mesh, sides, regions = gmsh_model.distribute(comm, arrays, dimension, names)
     mesh.geometry.x[:] *= scale
-    return Domain.from_mesh(mesh, sides, regions)
+    return Domain.from_mesh(mesh, sides, regions, curves)
+
+
+def _curves(found: MeshArrays, names: Mapping[str, int], scale: float, dimension: int) -> dict[str, CurvedFacets]:
+    """The curves of sides of second order, by name, m. Rank 0 only."""
+    points = scale * found.curved[:, :, :dimension]
+    curved = {name: points[found.curved_tags == tag] for name, tag in names.items()}
+    return {name: CurvedFacets(facets) for name, facets in curved.items() if len(facets)}
 
 
 def _read(

@@ -22,7 +22,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..runtime import confinement, processes
-from . import gmsh_arrays, gmsh_checks
+from . import gmsh_arrays, gmsh_checks, gmsh_curves
 
 _LINKED = "mesh.msh"
 
@@ -93,9 +93,10 @@ def _read(request: Request) -> dict[str, Any]:
         # gmsh raises bare Exceptions, whatever is wrong with a file
         reason = str(error).replace(str(opened), str(path))
         raise InputError(f"mesh file {path}: gmsh cannot read it: {reason}") from None
+    curves = gmsh_curves.straightened(gmsh, path, dimension)
     gmsh_checks.check(gmsh, path, dimension, request.thresholds)
     names = {d: _names(gmsh, path, d) for d in (dimension - 1, dimension)}
-    found = gmsh_arrays.extract(gmsh, dimension)
+    found = gmsh_arrays.extract(gmsh, dimension, curves)
     return {**{name: getattr(found, name) for name in found.__annotations__}, "names": np.array(json.dumps(names))}
 
 
@@ -111,9 +112,7 @@ def _open(gmsh: Any, path: Path, dimension: int) -> None:
         gmsh.model.mesh.generate(dimension)
     if gmsh.model.getNumberOfPartitions():
         gmsh.model.mesh.unpartition()  # the ranks are shared out anew
-    tags = gmsh.model.mesh.getNodes()[0]
-    if len(tags) and np.max(tags) != len(tags):
-        gmsh.model.mesh.renumberNodes()  # a file may have lost some with their cells
+    gmsh_arrays.close_gaps(gmsh)  # a file may have lost some nodes with their cells
 
 
 def _names(gmsh: Any, path: Path, dimension: int) -> dict[str, int]:

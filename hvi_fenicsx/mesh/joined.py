@@ -16,7 +16,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from .. import compat
-from ..geometry import Arc
+from ..geometry import Curve
 from ..runtime.mpi import agree
 from ..typing import Array, Entities, Integers
 from . import nodes
@@ -44,13 +44,10 @@ class PlacedBody:
         """Points of the body's own coordinates (n, d) in their place, m, (n, d)."""
         return np.asarray(points @ self.rotation.T + self.origin)
 
-    def arcs(self) -> dict[str, Arc]:
+    def curves(self) -> dict[str, Curve]:
         """The curves of its sides in their place."""
-        found = {}
-        for side, arc in self.domain.curves.items():
-            x, y = self.at(np.array([arc.centre]))[0]
-            found[f"{self.name}.{side}"] = Arc((float(x), float(y)), arc.radius)
-        return found
+        known = self.domain.curves.items()
+        return {f"{self.name}.{side}": curve.moved(self.origin, self.rotation) for side, curve in known}
 
 
 def joined(comm: MPI.Comm, bodies: Sequence[PlacedBody]) -> Domain:
@@ -73,7 +70,7 @@ def joined(comm: MPI.Comm, bodies: Sequence[PlacedBody]) -> Domain:
     sides: dict[str, Entities] = {}
     for body, known in zip(bodies, numbers, strict=True):
         sides |= {f"{body.name}.{side}": _facets(mesh, body, known, f) for side, f in body.domain.sides.items()}
-    curves = {name: arc for body in bodies for name, arc in body.arcs().items()}
+    curves = {name: curve for body in bodies for name, curve in body.curves().items()}
     domain = Domain.from_mesh(mesh, sides, _regions(mesh, bodies), curves)
     if all(body.domain.coarsening is None for body in bodies):
         return domain

@@ -15,7 +15,7 @@ from dolfinx import la
 from dolfinx import mesh as dmesh
 
 from .. import compat
-from ..geometry import Arc
+from ..geometry import Curve
 from ..typing import Array, Entities
 from .domain import Domain, check_affordable
 from .thresholds import DEFAULT, Thresholds
@@ -156,18 +156,19 @@ def _sides(domain: Domain, fine: dmesh.Mesh, parents: Entities, halves: Halves) 
     return found
 
 
-def _bend(mesh: dmesh.Mesh, sides: Mapping[str, Entities], curves: Mapping[str, Arc]) -> None:
+def _bend(mesh: dmesh.Mesh, sides: Mapping[str, Entities], curves: Mapping[str, Curve]) -> None:
     """Move the vertices of curved sides onto their curves, on all ranks that have them. Collective."""
+    d = mesh.geometry.dim
     for name, curve in curves.items():
         nodes = np.empty(0, dtype=np.int32)
         if len(sides[name]):  # dolfinx divides by their number
             nodes = np.unique(dmesh.entities_to_geometry(mesh, mesh.topology.dim - 1, sides[name]))
-        x = mesh.geometry.x[nodes, :2]
+        x = mesh.geometry.x[nodes, :d]
         shifts = np.column_stack([curve.nearest(x) - x, np.ones(len(nodes))])
-        shared = la.vector(mesh.geometry.index_map(), 3)
+        shared = la.vector(mesh.geometry.index_map(), d + 1)
         shared.array[:] = 0.0
-        shared.array.reshape(-1, 3)[nodes] = shifts
+        shared.array.reshape(-1, d + 1)[nodes] = shifts
         shared.scatter_reverse(la.InsertMode.add)
         shared.scatter_forward()
-        total = shared.array.reshape(-1, 3)
-        mesh.geometry.x[:, :2] += total[:, :2] / np.maximum(total[:, 2:], 1.0)
+        total = shared.array.reshape(-1, d + 1)
+        mesh.geometry.x[:, :d] += total[:, :d] / np.maximum(total[:, d:], 1.0)

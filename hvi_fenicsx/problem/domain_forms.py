@@ -50,10 +50,10 @@ class DomainForms:
     @functools.cached_property
     def points_on_curves(self) -> Array:
         """The local nodes, those of curved sides on their curves and off their facets, m, (n, 3)."""
-        found = self.points.copy()
+        found, d = self.points.copy(), self.dimension
         for name, curve in self.domain.curves.items():
             on = np.unique(nodes.facet_nodes(self.space, self.domain.sides[name]))
-            found[on, :2] = curve.nearest(found[on, :2])
+            found[on, :d] = curve.nearest(found[on, :d])
         return found
 
     @functools.cached_property

@@ -227,7 +227,7 @@ def file_scene(file: Path, **boundary: Any) -> dict[str, Any]:
 
 
 WORDS = {
-    "second order": "linear triangles only",
+    "third order": "linear triangles only",
     "quadrilaterals": "linear triangles only",
     "lines only": "dimension",
     "a solid": "its cells have dimension 3",
@@ -277,7 +277,7 @@ def test_a_mesh_that_has_lost_cells_but_not_their_nodes_is_read(tmp_path: Path) 
 
 
 def _on_a_damaged_mesh(folder: Path) -> Path:
-    file = meshes.make(folder / "damaged.msh", meshes.BAD["second order"])
+    file = meshes.make(folder / "damaged.msh", meshes.BAD["third order"])
     return write_scene(folder / "damaged.toml", file_scene(file))
 
 

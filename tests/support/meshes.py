@@ -47,7 +47,7 @@ for name, at in (("soft", 0.0), ("hard", 0.5)):
 mesh.generate(2)
 """
 BAD = {
-    "second order": "square(0.3)\nmesh.generate(2)\nmesh.setOrder(2)",
+    "third order": "square(0.3)\nmesh.generate(2)\nmesh.setOrder(3)",
     "quadrilaterals": "square(0.3)\nmesh.generate(2)\nmesh.recombine()",
     "lines only": "occ.addLine(occ.addPoint(0, 0, 0), occ.addPoint(1, 0, 0))\nocc.synchronize()\n"
     'gmsh.model.addPhysicalGroup(1, [1], name="bottom")\nmesh.generate(1)',
