@@ -7,6 +7,7 @@ All products of the basis functions of both sides are integrated exactly over th
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import basix
 import numpy as np
@@ -120,7 +121,7 @@ class Overlaps:
             degree: of the functions.
         """
         d = self.on_first.shape[1]
-        made: tuple[Array, Array] = basix.make_quadrature(basix.CellType[_KINDS[d]], 2 * degree)
+        made: tuple[Any, Any] = basix.make_quadrature(basix.CellType[_KINDS[d]], 2 * degree)
         rule = np.column_stack([1.0 - made[0].sum(axis=1), made[0]])
         return OverlapPoints(
             first=np.repeat(self.first, len(rule)),

@@ -184,8 +184,8 @@ class InterfaceTrace:
             found[side.blocks] += self._problem.domain.mesh.comm.allreduce(sums)[side.owned]
         on_facets = np.zeros((*self._points.spread.carriers.shape[:2], scaled.shape[2]))
         np.add.at(on_facets, self._points.facets[0], np.einsum("fqk,fqn->fnk", scaled, self._points.functions))
-        sums = self._points.spread.summed(on_facets)
-        at_nodes[self._surface.blocks] = np.einsum("mk,mkd->md", sums, self._directions)
+        carried = self._points.spread.summed(on_facets)
+        at_nodes[self._surface.blocks] = np.einsum("mk,mkd->md", carried, self._directions)
         return found, at_nodes
 
     def _sides(self) -> Iterator[tuple[float, _SideBubbles, Integers, Array]]:
