@@ -73,7 +73,8 @@ class BubbleStiffness:
         z = load.copy()
         project(z)
         goal = tolerance**2 * self._dot(z, self.diagonal_solve(z))
-        r = load - self.times(e)
+        moved = self.comm.allreduce(bool(e.any()), op=MPI.LOR)
+        r = load - self.times(e) if moved else load.copy()
         p, rho = np.zeros_like(r), 0.0
         for _ in range(max_steps):
             np.copyto(z, r)
@@ -100,7 +101,7 @@ def diagonal(problem: Problem, bubbles: fem.FunctionSpace) -> Array:
     """The diagonal of the bubbles' stiffness at the blocks that this rank owns, (n, d). Collective.
 
     On a cell in which the material is constant it is a sum of the energies of the affine functions λ_a and λ_a + λ_b
-    (:func:`energy_shares`).
+    (:func:`energy_shares`). Those of λ_a + λ_b and of the others' sum are one, since all together are constant.
 
     Args:
         problem: whose elastic operator it is.
@@ -108,8 +109,10 @@ def diagonal(problem: Problem, bubbles: fem.FunctionSpace) -> Array:
     """
     affine, d = _Affine(problem), problem.scales.dimension
     hats = np.vstack([-np.ones(d), np.eye(d)])
-    energies = [affine.energies(hat) for hat in hats]
-    energies += [affine.energies(hats[a] + hats[b]) for a, b in itertools.combinations(range(d + 1), 2)]
+    slopes = [*hats, *(hats[a] + hats[b] for a, b in itertools.combinations(range(d + 1), 2))]
+    upward = [tuple((slope * np.sign(slope[np.flatnonzero(slope)[0]])).tolist()) for slope in slopes]
+    known = {slope: affine.energies(np.array(slope)) for slope in dict.fromkeys(upward)}
+    energies = [known[slope] for slope in upward]
     cells, values = bubbles.dofmap.list[: len(energies[0])], fem.Function(bubbles)
     blocks, cell = values.x.array.reshape(-1, d), bubbles.mesh.topology.cell_name()
     for k, index in enumerate(of_cell(nodes.degree(problem.space), cell)):

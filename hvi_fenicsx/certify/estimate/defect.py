@@ -82,15 +82,23 @@ def prescribed(problem: Problem, u: fem.Function, space: fem.FunctionSpace) -> t
     """
     d, owned = problem.scales.dimension, space.dofmap.index_map.size_local
     free, value = np.ones((owned, d), dtype=np.bool_), np.zeros((owned, d))
-    middle = fem.Function(space)
-    middle.interpolate(u)
     points = space.tabulate_dof_coordinates()
     for part in problem.prescribed:
         blocks = _on(space, part.facets)
         free[blocks, part.component] = False
         wanted = part.value.at(points[blocks]) / problem.scales.displacement
-        value[blocks, part.component] = wanted - middle.x.array.reshape(-1, d)[blocks, part.component]
+        value[blocks, part.component] = wanted - _at(space, blocks, u)[:, part.component]
     return free, value
+
+
+def _at(space: fem.FunctionSpace, blocks: Entities, u: fem.Function) -> Array:
+    """The values (k, d) at some points of the bubbles of a function of another space, from the cells around them."""
+    chosen = np.zeros(space.dofmap.index_map.size_local + space.dofmap.index_map.num_ghosts, dtype=np.bool_)
+    chosen[blocks] = True
+    cells = np.flatnonzero(chosen[space.dofmap.list].any(axis=1)).astype(np.int32)
+    found = fem.Function(space)
+    found.interpolate(u, cells, cells)
+    return np.asarray(found.x.array.reshape(len(chosen), -1)[blocks])
 
 
 def bubble_bounds(problem: Problem, u: fem.Function, bounds: Bounds, space: fem.FunctionSpace) -> BubbleBounds:
@@ -106,12 +114,11 @@ def bubble_bounds(problem: Problem, u: fem.Function, bounds: Bounds, space: fem.
     blocks = _on(space, bounds.surface.facets)
 
     def middle(values: Array) -> Array:
-        field, result = fem.Function(problem.space), fem.Function(space)
+        field = fem.Function(problem.space)
         spread = np.clip(values, -_FAR, _FAR)
         field.x.array.reshape(-1, d)[bounds.surface.blocks] = spread
         field.x.scatter_forward()
-        result.interpolate(field)
-        return np.asarray(result.x.array.reshape(-1, d)[blocks])
+        return _at(space, blocks, field)
 
     normals = middle(bounds.surface.normals)
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
