@@ -7,7 +7,8 @@ from typing import Any
 import dolfinx
 import numpy as np
 import numpy.typing as npt
-from dolfinx import fem, graph
+from dolfinx import common, fem, graph
+from dolfinx import cpp as _cpp
 from dolfinx import mesh as _mesh
 from petsc4py import PETSc
 
@@ -87,6 +88,39 @@ def simplex_mesh(comm: Any, cells: npt.NDArray[Any], points: Array, kind: str, *
     # with one rank and no partitioner, dolfinx does not even distribute
     partitioner = stay if comm.size > 1 and not spread else None
     return _mesh.create_mesh(comm, cells=cells, x=points, e=element, partitioner=partitioner)
+
+
+def mesh_of_entities(comm: Any, points: Array, cells: Entities, facets: Entities, sides: Entities) -> _mesh.Mesh | None:
+    """The mesh of one rank whose facets are known: dolfinx would reorder the cells, and look for the facets.
+
+    Args:
+        comm: of one rank.
+        points: (n, d).
+        cells: simplices by their vertices, (c, d+1), ascending.
+        facets: by their vertices, (f, d), ascending.
+        sides: the facets of each cell, (c, d+1), facet i being opposite to vertex i.
+
+    Returns:
+        The mesh; None where this dolfinx takes no topology that is made elsewhere.
+    """
+    import basix.ufl
+    import ufl
+
+    if not hasattr(_cpp.mesh.Topology, "set_index_map"):
+        return None
+    (n, d), kind = points.shape, {2: _mesh.CellType.triangle, 3: _mesh.CellType.tetrahedron}[points.shape[1]]
+    topology = _cpp.mesh.Topology(comm, kind)
+    maps = {dim: common.IndexMap(comm, size) for dim, size in ((0, n), (d - 1, len(facets)), (d, len(cells)))}
+    for dim, index_map in maps.items():
+        topology.set_index_map(dim, index_map)
+    vertices = np.arange(n, dtype=np.int32)[:, None]
+    for links, start, end in ((vertices, 0, 0), (facets, d - 1, 0), (cells, d, 0), (sides, d, d - 1)):
+        found = graph.adjacencylist(links)
+        topology.set_connectivity(getattr(found, "_cpp_object", found), start, end)
+    element = basix.ufl.element("Lagrange", kind.name, 1, shape=(d,))
+    shape = fem.coordinate_element(element.basix_element)._cpp_object
+    geometry = _cpp.mesh.Geometry_float64(maps[0], cells, shape, points, np.arange(n, dtype=np.int64))
+    return _mesh.Mesh(_cpp.mesh.Mesh_float64(comm, topology, geometry), ufl.Mesh(element))
 
 
 def comm_of(form: Any) -> Any:

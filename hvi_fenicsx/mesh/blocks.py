@@ -10,6 +10,7 @@ between levels; a graph partitioner would have to run on each level, and would c
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -18,6 +19,7 @@ from mpi4py import MPI
 
 from .. import compat
 from ..typing import Array, Entities, Integers
+from . import grid_facets
 from .domain import Domain
 from .thresholds import DEFAULT, Thresholds
 from .transfer import GridTransfer, Transfer
@@ -62,8 +64,14 @@ def mesh(comm: MPI.Comm, size: Sequence[float], cells: Sequence[int]) -> dmesh.M
         cells: cells each way, (d,), each cut into triangles or tetrahedra.
     """
     lower, upper = part_of_rank(cells, comm.size, comm.rank)
-    kind = {2: "triangle", 3: "tetrahedron"}[len(cells)]
-    return compat.simplex_mesh(comm, _simplices(lower, upper, cells), _points(comm, size, cells), kind)
+    kind, points = {2: "triangle", 3: "tetrahedron"}[len(cells)], _points(comm, size, cells)
+    simplices = _simplices(lower, upper, cells)
+    if comm.size == 1:
+        facets, sides = grid_facets.facets(simplices, _steps(cells), len(points))
+        whole = compat.mesh_of_entities(comm, points, simplices.astype(np.int32), facets, sides)
+        if whole is not None:
+            return whole
+    return compat.simplex_mesh(comm, simplices, points, kind)
 
 
 def part_of_rank(cells: Sequence[int], ranks: int, rank: int) -> tuple[Integers, Integers]:
@@ -94,12 +102,16 @@ def part_of_rank(cells: Sequence[int], ranks: int, rank: int) -> tuple[Integers,
 
 def _simplices(lower: Integers, upper: Integers, cells: Sequence[int]) -> Integers:
     """The simplices of a part of the grid, (n, d+1), as numbers of the grid's vertices, x running fastest."""
-    steps = np.cumprod([1, *(n + 1 for n in cells[:-1])], dtype=np.int64)
-    corners = np.zeros(1, np.int64)
+    steps, corners = _steps(cells), np.zeros(1, np.int64)
     for begin, end, step in zip(lower, upper, steps, strict=True):
         corners = np.add.outer(np.arange(begin, end) * step, corners).ravel()
     paths = np.array([np.cumsum([0, *path]) for path in itertools.permutations(steps)])
     return np.asarray((corners[:, None, None] + paths).reshape(-1, len(cells) + 1))
+
+
+def _steps(cells: Sequence[int]) -> list[int]:
+    """From a vertex of the grid to the next one along each axis."""
+    return [math.prod(n + 1 for n in cells[:axis]) for axis in range(len(cells))]
 
 
 def _points(comm: MPI.Comm, size: Sequence[float], cells: Sequence[int]) -> Array:

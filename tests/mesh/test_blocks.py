@@ -7,6 +7,8 @@ from collections.abc import Sequence
 
 import numpy as np
 import pytest
+import ufl
+from dolfinx import fem
 from dolfinx import mesh as dmesh
 from mpi4py import MPI
 from runs import on_ranks
@@ -30,6 +32,41 @@ def simplices(mesh: dmesh.Mesh) -> set[frozenset[tuple[float, ...]]]:
     """The cells as sets of their corners."""
     corners = np.round(mesh.geometry.x[compat.geometry_dofmap(mesh)], 12)
     return {frozenset(tuple(map(float, x)) for x in cell) for cell in corners}
+
+
+@pytest.mark.parametrize("cells", GRIDS)
+def test_its_facets_are_those_that_dolfinx_finds(cells: list[int]) -> None:
+    """And a form with edges, facets, orientations and interior facets has the same values."""
+    d, size = len(cells), [1.0, 2.0, 0.7][: len(cells)]
+    own = blocks.mesh(MPI.COMM_SELF, size, cells)
+    corners, kind = own.geometry.x[:, :d].copy(), "triangle" if d == 2 else "tetrahedron"
+    found = compat.simplex_mesh(MPI.COMM_SELF, compat.geometry_dofmap(own), corners, kind)
+    for dimension, outer in ((d - 1, False), (d - 1, True), (1, False)):
+        assert entities(own, dimension, outer=outer) == entities(found, dimension, outer=outer)
+    assert np.allclose(energies(own), energies(found), rtol=1e-12)
+
+
+def entities(mesh: dmesh.Mesh, dimension: int, *, outer: bool = False) -> set[frozenset[tuple[float, ...]]]:
+    """Entities as sets of their corners; of the facets only the exterior ones, if so wanted."""
+    mesh.topology.create_entities(dimension)
+    chosen = np.arange(mesh.topology.index_map(dimension).size_local, dtype=np.int32)
+    if outer:
+        mesh.topology.create_connectivity(dimension, mesh.topology.dim)
+        chosen = dmesh.exterior_facet_indices(mesh.topology)
+    mesh.topology.create_connectivity(dimension, mesh.topology.dim)
+    places = mesh.geometry.x[dmesh.entities_to_geometry(mesh, dimension, chosen, False)]
+    return {frozenset(tuple(map(float, np.round(x, 12))) for x in place) for place in places}
+
+
+def energies(mesh: dmesh.Mesh) -> list[float]:
+    """Of a cubic function in a space of that degree: of its gradient, on the boundary, and across the facets."""
+    f, n = fem.Function(fem.functionspace(mesh, ("Lagrange", 3))), ufl.FacetNormal(mesh)
+    f.interpolate(lambda x: x[0] ** 3 - 2 * x[0] * x[1] ** 2 + x[2] * x[1])
+    broken = fem.Function(fem.functionspace(mesh, ("Discontinuous Lagrange", 1)))
+    broken.interpolate(lambda x: np.sin(9 * x[0]) + x[1] ** 2)
+    forms = [ufl.inner(ufl.grad(f), ufl.grad(f)) * ufl.dx, f * ufl.dot(ufl.grad(f), n) * ufl.ds]
+    forms.append(ufl.jump(broken) ** 2 * ufl.dS + ufl.jump(ufl.grad(f), n) ** 2 * ufl.dS)
+    return [float(fem.assemble_scalar(fem.form(form))) for form in forms]
 
 
 @pytest.mark.parametrize(("cells", "ranks"), itertools.product(GRIDS, [1, 2, 3, 4, 7, 40]))
