@@ -161,9 +161,7 @@ class Effect(BaseModel):
         on_interfaces: whether it may act between two bodies, on their relative displacement.
     """
 
-    model_config = ConfigDict(
-        extra="forbid", frozen=True, strict=True, arbitrary_types_allowed=True, use_attribute_docstrings=True
-    )
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, arbitrary_types_allowed=True)
 
     key: ClassVar[str]
     place: ClassVar[Place]

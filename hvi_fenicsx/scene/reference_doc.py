@@ -16,7 +16,7 @@ from pydantic.fields import FieldInfo
 from ..effects import Effect, Place
 from ..laws.base import registered
 from ..mesh.shapes import DomainShape, PlacedShape
-from ..schema import OneOf
+from ..schema import OneOf, descriptions
 from .effect_tables import DEFAULT_ELASTICITY, BodyTable, BoundaryTable, InterfaceTable, MaterialTable
 from .path_table import PathTable
 from .scene import Scene
@@ -77,17 +77,17 @@ def _document() -> Iterator[str]:
 def _table(title: str, model: type[BaseModel], only: Iterable[str] | None = None) -> Iterator[str]:
     yield from (f"## {title}", "", _summary(model), "", "| key | value | default |", "|---|---|---|")
     for name in only or model.model_fields:
-        yield _row(name, model.model_fields[name])
+        yield _row(model, name)
     yield ""
 
 
 def _effects(place: Place, title: str) -> Iterator[str]:
     for key, kind in _provided(Effect.registry[place]).items():
         yield from (f"### {title.format(key=key)}", "", f"{_summary(kind)} Adds `{kind.term}`.", "")
-        fields = {n: f for n, f in kind.model_fields.items() if f.description}
+        fields = descriptions(kind)
         if fields:
             yield from ("| key | value | default |", "|---|---|---|")
-            yield from (_row(name, field) for name, field in fields.items())
+            yield from (_row(kind, name) for name in fields)
             yield ""
 
 
@@ -104,8 +104,9 @@ def _parameter(parameter: inspect.Parameter) -> str:
     return f"`{parameter.name}`{default}"
 
 
-def _row(name: str, field: FieldInfo) -> str:
-    value = ", ".join(filter(None, [_escaped(field.description or ""), _limits(field), _choices(field)]))
+def _row(model: type[BaseModel], name: str) -> str:
+    field, text = model.model_fields[name], descriptions(model).get(name, "")
+    value = ", ".join(filter(None, [_escaped(text), _limits(field), _choices(field)]))
     default = _toml(field.get_default(call_default_factory=True)) if not field.is_required() else "required"
     default = _toml(DEFAULT_ELASTICITY) if field.annotation is Effect else default
     return f"| `{name}` | {value} | {default} |"

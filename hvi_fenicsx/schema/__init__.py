@@ -3,6 +3,7 @@
 Light: it loads pydantic and nothing heavier, and knows no particular table.
 """
 
+from .descriptions import descriptions
 from .fields import LONGEST, SHORTEST, Count, Length, Names, OneOf, Positive, vector
 from .messages import refusal, shown, unknown
 from .tables import Key, Mistake, Table, choose, input_error, located_error, mistakes_of, validation_error
@@ -19,6 +20,7 @@ __all__ = [
     "Positive",
     "Table",
     "choose",
+    "descriptions",
     "input_error",
     "located_error",
     "mistakes_of",

@@ -11,6 +11,8 @@ from typing import Any, get_args
 from pydantic import BaseModel
 from pydantic_core import ErrorDetails, PydanticCustomError
 
+from .descriptions import descriptions
+
 _LONGEST = 60
 """Characters of a value that a message shows."""
 
@@ -136,8 +138,8 @@ def _mend(kind: str, value: Any) -> str:
 
 def _described(model: type[BaseModel] | None, loc: tuple[str | int, ...]) -> str:
     field = model_at(model, loc[:-1])
-    known = field.model_fields.get(str(loc[-1])) if field else None
-    return f": {known.description}" if known and known.description else ""
+    known = descriptions(field).get(str(loc[-1])) if field else None
+    return f": {known}" if known else ""
 
 
 def _keys(model: type[BaseModel] | None, loc: tuple[str | int, ...]) -> list[str]:

@@ -74,7 +74,7 @@ def located_error(error: ValidationError, model: type[BaseModel] | None = None) 
 class Table(BaseModel):
     """A table of the scene file: frozen, no unknown keys, no silent conversions."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, use_attribute_docstrings=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
 
     @model_validator(mode="wrap")
     @classmethod

@@ -10,7 +10,17 @@ from typing import Annotated, Any, Literal
 import pytest
 from pydantic import ValidationError, model_validator
 
-from hvi_fenicsx.schema import Count, Length, Mistake, Table, choose, mistakes_of, validation_error, vector
+from hvi_fenicsx.schema import (
+    Count,
+    Length,
+    Mistake,
+    Table,
+    choose,
+    descriptions,
+    mistakes_of,
+    validation_error,
+    vector,
+)
 
 
 class Plate(Table):
@@ -77,3 +87,19 @@ def test_the_room_loads_nothing_heavy() -> None:
     heavy = ("dolfinx", "ufl", "petsc4py", "mpi4py", "numpy")
     code = f"import sys, hvi_fenicsx.schema; sys.exit(any(m in sys.modules for m in {heavy}))"
     assert subprocess.run([sys.executable, "-c", code], cwd=Path(__file__).parents[2]).returncode == 0
+
+
+class Sheet(Plate):
+    """A thin plate."""
+
+    cells: Count = 2
+    """along
+    its width"""
+
+
+def test_a_field_is_described_by_the_text_below_it() -> None:
+    assert descriptions(Plate) == {"size": "width and height"}
+    assert descriptions(Sheet) == {"size": "width and height", "cells": "along\nits width"}
+    assert descriptions(type("Made", (Plate,), {"__doc__": "has no source", "__module__": "nowhere"})) == descriptions(
+        Plate
+    )
