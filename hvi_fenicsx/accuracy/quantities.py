@@ -243,5 +243,5 @@ def _from_true_law(level: AdaptiveLevel) -> float:
     for state in _states(level):
         for law in state.laws:
             if law.term.direction.tangential:
-                found += float(np.sum(state.surface.weights * law.true_distance()))
+                found += float(np.sum(law.term.weights * law.true_distance()))
     return float(level.comm.allreduce(found))

@@ -169,5 +169,5 @@ def _inclusion_true(states: Sequence[ContactState]) -> tuple[float, float]:
     for law in (law for state in states for law in state.laws):
         sizes = np.where(law.hidden, 0.0, law.true_distance())
         worst = max(worst, float(np.max(sizes / law.scale, initial=0.0)))
-        absolute = max(absolute, float(np.max(sizes, initial=0.0)))
+        absolute = max(absolute, float(np.max(sizes * law.term.multiplier, initial=0.0)))
     return worst, absolute

@@ -44,7 +44,7 @@ class Forces:
 
 @dataclass(frozen=True, kw_only=True)
 class LawState:
-    """One law at the vertices (m) of its part, nondimensional.
+    """One law at the vertices (m) of its part, nondimensional. Its tractions are those of j, without the multiplier.
 
     Attributes:
         term: the law.
@@ -79,6 +79,11 @@ class LawState:
         """The largest relative change of the energies of the term if they were frozen anew."""
         found = self.term.energies_of(self.components, self.near)
         return float(np.max(np.abs(found / self.term.energies - 1.0), initial=0.0))
+
+    @property
+    def carried(self) -> Array:
+        """The tractions along its directions that it puts on the body: the given ones times its multiplier, (m, k)."""
+        return self.term.multiplier[:, None] * self.given
 
     @property
     def slip_share(self) -> Array:
@@ -312,8 +317,7 @@ def _pressure(
     if normal_laws and bounds is None:
         pressure = np.zeros_like(pressure)
     for law in normal_laws:
-        pulled = law.term.energies * law.given[:, 0]
-        pressure = pressure - np.sum(law.term.directions[:, 0] * surface.normals, axis=1) * pulled
+        pressure = pressure - np.sum(law.term.directions[:, 0] * surface.normals, axis=1) * law.carried[:, 0]
     return pressure
 
 
@@ -323,6 +327,5 @@ def _friction(laws: Sequence[LawState], surface: Surface, traction: Array) -> Ar
     for law in laws:
         if law.term.direction.tangential:
             alone = law.hidden if law.term.radial else np.ones(len(friction), dtype=bool)
-            given = law.term.energies[:, None] * law.given[:, -friction.shape[1] :]
-            friction = np.where(alone[:, None], given, friction)
+            friction = np.where(alone[:, None], law.carried[:, -friction.shape[1] :], friction)
     return friction

@@ -49,7 +49,9 @@ def rounding(references: References, u: fem.Function, forces: Forces, states: Se
     force = balance.rounding_sample(references.problem, u.x.array)
     worst: Array = references.norms(force) / _force_scales(references, u, forces)
     for state in states:
-        scale = np.min([references.at(state.surface.blocks), *(law.scale for law in state.laws)], axis=0)
+        scale = np.min(
+            [references.at(state.surface.blocks), *(law.scale * law.term.multiplier for law in state.laws)], axis=0
+        )
         traction = np.max(np.abs(force[state.surface.blocks]), axis=1) / state.surface.weights
         worst = np.maximum(worst, references.largest(state.surface.blocks, traction / scale))
     return worst

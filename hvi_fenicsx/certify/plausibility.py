@@ -225,10 +225,10 @@ def _wide_smoothing(problem: Problem, law: LawState, thresholds: PlausibilityThr
     away, weights, limit = law.true_distance(), term.weights, thresholds.smoothing_change
     share = total(comm, float(weights[away > limit * peak].sum())) / total(comm, float(weights.sum()))
     if share > thresholds.smoothing_share:
-        most = largest(comm, float(np.max(away, initial=0.0)))
+        most, of_peak = (largest(comm, float(np.max(v, initial=0.0))) for v in (away * term.multiplier, away / peak))
         yield (
             f"{_place(problem, term)}: smoothing changes the traction by up to {most * problem.scales.stress:.3g} N/m² "
-            f"({100 * most / peak:.2g} % of the law's peak), and by more than {100 * limit:.0f} % on "
+            f"({100 * of_peak:.2g} % of the law's peak), and by more than {100 * limit:.0f} % on "
             f"{100 * share:.2g} % of the part; is a smaller ε meant? (epsilon_absolute is in N/m)"
         )
 

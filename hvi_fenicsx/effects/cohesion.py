@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Annotated, ClassVar, Self
 
 from pydantic import Field, model_validator
@@ -11,7 +12,7 @@ from ..errors import InputError
 from ..laws import Mixity, mixities
 from ..schema import OneOf, Positive, refusal
 from .base import FormContext
-from .contribution import BoundaryLaw, Contribution, Direction
+from .contribution import Contribution, Direction
 from .law_effect import LawEffect
 
 
@@ -49,7 +50,7 @@ class Cohesion(LawEffect):
     @override
     def contribute(self, context: FormContext, where: str | None) -> Contribution:
         """The law, acting on the effective displacement."""
-        return Contribution(laws=(BoundaryLaw(self.direction, self.law, self.beta, self._criterion),))
+        return Contribution(laws=(replace(self._brought(self.beta), mixity=self._criterion),))
 
     @override
     def check(self, dimension: int) -> None:

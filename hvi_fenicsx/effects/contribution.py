@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ..formula import Formula
 from ..laws import Length, Mixity, Superpotential
 from ..spatial_value import SpatialValue
 from ..typing import Array
@@ -93,6 +94,9 @@ class NormalBounds:
     measured: bool = False
 
 
+ONE = Formula(1.0)
+
+
 @dataclass(frozen=True, slots=True)
 class BoundaryLaw:
     """A superpotential that acts on one displacement of a part.
@@ -100,12 +104,14 @@ class BoundaryLaw:
     Attributes:
         direction: the displacement.
         law: the superpotential, SI.
+        multiplier: what it is multiplied by, positive.
         slip: β, what a slip is multiplied by where it is taken together with an opening.
         mixity: how the energy of separation depends on the mode; None: it does not.
     """
 
     direction: Direction
     law: Superpotential
+    multiplier: SpatialValue = ONE
     slip: float = 1.0
     mixity: Mixity | None = None
 

@@ -6,6 +6,7 @@ from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from pydantic import (
+    AfterValidator,
     BeforeValidator,
     PlainSerializer,
     SerializerFunctionWrapHandler,
@@ -17,9 +18,12 @@ from typing_extensions import override
 
 from .. import laws
 from ..errors import InputError
-from ..schema import refusal
+from ..formula import Formula
+from ..schema import refusal, shown
+from ..spatial_value import SpatialValue
 from .base import Effect, Evaluate, FormContext, Place, Sizes
-from .contribution import BoundaryLaw, Contribution, Direction
+from .contribution import ONE, BoundaryLaw, Contribution, Direction
+from .formula_field import FormulaField
 
 
 def _law(value: Any) -> laws.Superpotential:
@@ -35,8 +39,33 @@ def _law(value: Any) -> laws.Superpotential:
         return laws.create(name, parameters)
     except InputError as error:
         if isinstance(error.__cause__, ValidationError):
+            _refuse_formulas(error.__cause__)
             raise error.__cause__ from None  # it knows the place of each wrong parameter
         raise refusal(str(error)) from None
+
+
+def _refuse_formulas(error: ValidationError) -> None:
+    """Say how a law changes from place to place, where a formula stands for one of its numbers."""
+    for found in error.errors():
+        given = found["input"]
+        if found["type"] == "float_type" and isinstance(given, str) and _is_formula(given):
+            key = ".".join(map(str, found["loc"]))
+            raise refusal(
+                f"{key} = {shown(given)}: the parameters of a law are numbers. Where its tractions change from place "
+                'to place, state them once and what they are multiplied by: multiplier = "1 + x"'
+            )
+
+
+def _is_formula(text: str) -> bool:
+    """Whether a text is a formula, and no number in quotes."""
+    try:
+        formula = Formula(text)
+    except InputError:
+        return False
+    try:
+        return float(text) != formula.at(np.zeros((1, 3)))[0]
+    except ValueError:
+        return True
 
 
 LawField = Annotated[
@@ -45,6 +74,15 @@ LawField = Annotated[
     PlainSerializer(lambda law: laws.describe(law)),
 ]
 """A superpotential as a field of a scene model: ``{ law = "name", ...parameters }``."""
+
+
+def _positive(value: SpatialValue) -> SpatialValue:
+    if value.is_number and not float(value.source) > 0.0:
+        raise refusal(f"multiplier = {value.source} must be positive; leave the law out where there is none")
+    return value
+
+
+Multiplier = Annotated[FormulaField, AfterValidator(_positive)]
 
 
 def _lowest_traction(law: laws.Superpotential) -> float:
@@ -67,6 +105,8 @@ class LawEffect(Effect):
 
     law: LawField
     """the name of the law; write its parameters as further keys of the same table"""
+    multiplier: Multiplier = ONE
+    """what all tractions of the law are multiplied by, a positive number or a formula in x, y, z"""
 
     @model_validator(mode="before")
     @classmethod
@@ -82,12 +122,17 @@ class LawEffect(Effect):
     @model_serializer(mode="wrap")
     def _as_table(self, handler: SerializerFunctionWrapHandler) -> Any:
         table = handler(self)
+        if self.multiplier == ONE:
+            del table["multiplier"]
         return {**table.pop("law"), **table}
 
     @override
     def contribute(self, context: FormContext, where: str | None) -> Contribution:
         """The law, acting on its displacement."""
-        return Contribution(laws=(BoundaryLaw(self.direction, self.law),))
+        return Contribution(laws=(self._brought(),))
+
+    def _brought(self, slip: float = 1.0) -> BoundaryLaw:
+        return BoundaryLaw(self.direction, self.law, self.multiplier, slip)
 
     @override
     def implausible(self, largest: Evaluate, sizes: Sizes) -> tuple[str, ...]:
@@ -102,5 +147,5 @@ class LawEffect(Effect):
 
     @override
     def stress_scale(self, largest: Evaluate, sizes: Sizes) -> float:
-        """The law's own."""
-        return self.law.traction_scale
+        """The law's own, times its multiplier."""
+        return self.law.traction_scale * largest(self.multiplier)

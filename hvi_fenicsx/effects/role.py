@@ -25,7 +25,8 @@ class Role:
         prescribed: the displacement components, from 0, that it prescribes.
         bounded: whether it bounds the normal displacement.
         obstacle: the unit vector towards a flat obstacle, where it has one.
-        laws: the displacement that each of its laws acts on, and the law as a scene writes it.
+        laws: the displacement that each of its laws acts on, the law as a scene writes it, and its multiplier, a number
+            or a formula.
     """
 
     place: str
@@ -63,7 +64,7 @@ def role_of(effect: Effect, contribution: Contribution) -> Role:
 
 
 def _law(brought: BoundaryLaw) -> dict[str, Any]:
-    return {"direction": brought.direction.value, "law": _table(brought.law)}
+    return {"direction": brought.direction.value, "law": _table(brought.law), "multiplier": brought.multiplier.source}
 
 
 def _table(law: Superpotential) -> dict[str, Any]:

@@ -205,14 +205,19 @@ class Superpotential(ABC):
         return self.kinks[(self.kinks >= np.min(x - atol)) & (self.kinks <= np.max(x + atol))]
 
 
+_KEYS_BESIDE = {"multiplier"}
+"""What stands in a scene's table beside a law's parameters."""
+
+
 def _refuse_hidden_properties(cls: type[Superpotential]) -> None:
     """A parameter called `peak`, say, would silently replace the property of that name."""
-    reserved = {key for key in vars(Superpotential) if not key.startswith("_")}
+    reserved = {key for key in vars(Superpotential) if not key.startswith("_")} | _KEYS_BESIDE
     hidden = sorted(reserved & (inspect.get_annotations(cls).keys() - {"name"}))
     if hidden:
         raise InputError(
             f"law class {cls.__name__}: the parameter name {hidden[0]!r} is taken by a property that "
-            f"every law has; choose another, for example {hidden[0] + '_parameter'!r}"
+            f"every law has, or by a key beside its parameters; choose another, for example "
+            f"{hidden[0] + '_parameter'!r}"
         )
 
 

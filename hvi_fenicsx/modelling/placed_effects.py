@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from dolfinx import mesh as dmesh
@@ -185,10 +185,15 @@ class _Law(OnSide):
     Attributes:
         side: the side's name.
         law: one of ``hvi_fenicsx.laws``, or of your own class; SI.
+        multiplier: what all its tractions are multiplied by, positive.
     """
 
     side: str
     law: Superpotential
+    multiplier: Value = field(default=1.0, kw_only=True)
+
+    def _keys(self, mesh: dmesh.Mesh) -> dict[str, Any]:
+        return {"law": self.law, "multiplier": values.spatial_value(self.multiplier, mesh)}
 
 
 class Friction(_Law):
@@ -196,7 +201,7 @@ class Friction(_Law):
 
     def effect(self, mesh: dmesh.Mesh) -> Effect:
         """The law."""
-        return checked(effects.friction.Friction, law=self.law)
+        return checked(effects.friction.Friction, **self._keys(mesh))
 
 
 class Adhesion(_Law):
@@ -204,7 +209,7 @@ class Adhesion(_Law):
 
     def effect(self, mesh: dmesh.Mesh) -> Effect:
         """The law."""
-        return checked(effects.normal_laws.Adhesion, law=self.law)
+        return checked(effects.normal_laws.Adhesion, **self._keys(mesh))
 
 
 class Support(_Law):
@@ -212,7 +217,7 @@ class Support(_Law):
 
     def effect(self, mesh: dmesh.Mesh) -> Effect:
         """The law."""
-        return checked(effects.normal_laws.Support, law=self.law)
+        return checked(effects.normal_laws.Support, **self._keys(mesh))
 
 
 @dataclass(frozen=True)
@@ -230,10 +235,10 @@ class Cohesion(_Law):
 
     def effect(self, mesh: dmesh.Mesh) -> Effect:
         """The law."""
-        keys: dict[str, Any] = {}
+        keys = self._keys(mesh)
         if self.mixity is not None:
-            keys = {"mixity": self.mixity.name, **asdict(self.mixity)}
-        return checked(effects.cohesion.Cohesion, law=self.law, beta=float(self.beta), **keys)
+            keys |= {"mixity": self.mixity.name, **asdict(self.mixity)}
+        return checked(effects.cohesion.Cohesion, beta=float(self.beta), **keys)
 
 
 @dataclass(frozen=True)

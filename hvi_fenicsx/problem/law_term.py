@@ -29,6 +29,7 @@ class LawTerm:
         direction: which displacement it acts on.
         law: the superpotential j that is solved.
         exact: the unsmoothed one (the same where nothing is smoothed).
+        placed: what the scene multiplies j by at each vertex, positive, (m,).
         directions: unit vectors that the displacement is multiplied with, (m, k, d).
         length: what the law acts on is this length of the k components; None: the signed component, k = 1.
         free: 1 where a component is not prescribed, (m, d).
@@ -42,6 +43,7 @@ class LawTerm:
     direction: Direction
     law: Superpotential
     exact: Superpotential
+    placed: Array
     directions: Array
     length: Length | None
     free: Array
@@ -49,11 +51,6 @@ class LawTerm:
     residual: Any | None
     mixity: Mixity | None
     energies: Array
-
-    @property
-    def weights(self) -> Array:
-        """The lumped areas, each times the energy of separation at its mode mixity, (m,)."""
-        return self.surface.weights * self.energies
 
     def energies_of(self, components: Array, near: Array) -> Array:
         """By what the law is multiplied at the mode mixity of a displacement, (m,); where δ is zero, as it is frozen.
@@ -74,6 +71,16 @@ class LawTerm:
             energies: by vertex, (m,).
         """
         self.energies[:] = energies
+
+    @property
+    def weights(self) -> Array:
+        """Lumped areas times multiplier, over L^(d-1): j' times these are forces, and j energies, (m,)."""
+        return self.surface.weights * self.multiplier
+
+    @property
+    def multiplier(self) -> Array:
+        """What j is multiplied by: by the scene, and by the energy of separation at its mode mixity, (m,)."""
+        return self.placed * self.energies
 
     @property
     def radial(self) -> bool:
@@ -137,9 +144,9 @@ class LawTerm:
 
         Args:
             u: the displacement, a local array.
-            derivative: of the law at u, (m,).
+            derivative: of j at u, (m,).
         """
-        tau = self._vector(u, derivative) * self.free
+        tau = self.multiplier[:, None] * self._vector(u, derivative) * self.free
         self.density.x.array.reshape(-1, tau.shape[1])[self.surface.blocks] = tau
         self.density.x.scatter_forward()
 
@@ -147,7 +154,7 @@ class LawTerm:
         return np.einsum("mk,mkd->md", self.gradient(self.slip(u)) * derivative[:, None], self.directions)
 
     def rate(self, u: Array, derivative: Array, second: Array) -> Array:
-        """The tangent K of the law, (m, d, d).
+        """The tangent K of j', (m, d, d): times the weights it is that of the forces.
 
         Args:
             u: the displacement, a local array.

@@ -15,7 +15,9 @@ from ..errors import InputError
 from ..laws import Superpotential
 from ..mesh import nodes
 from ..runtime import forms
-from ..typing import Entities
+from ..runtime.mpi import agree
+from ..spatial_value import SpatialValue
+from ..typing import Array, Entities
 from .contact_surface import Surface
 from .domain_forms import DomainForms, ScaledMeasure
 from .law_term import LawTerm
@@ -104,6 +106,7 @@ def _term(
         direction=law.direction,
         law=solved,
         exact=exact,
+        placed=_multiplier(context, where, key, law.multiplier),
         directions=law.direction.along(where.normals, where.tangents),
         length=length,
         free=(~np.isin(where.dofs, fixed)).astype(np.float64),
@@ -112,6 +115,21 @@ def _term(
         mixity=law.mixity,
         energies=np.ones(len(where.weights)),
     )
+
+
+def _multiplier(context: DomainForms, where: Surface, key: str, given: SpatialValue) -> Array:
+    """What a law is multiplied by at the vertices of its part, (m,). Collective.
+
+    Raises:
+        InputError: on all ranks alike: it is not a positive number somewhere.
+    """
+    found = given.at(where.points)
+    bad = np.flatnonzero(~(np.isfinite(found) & (found > 0.0)))
+    said = [f"{found[i]:g} at {tuple(map(float, where.points[i]))}" for i in bad[:1]]
+    for text in (text for rank in agree(context.domain.mesh.comm, said) for text in rank):
+        reason = "it must be positive at every vertex. Where there is no law, leave that piece out: `where`"
+        raise InputError(f"boundary.{where.part}.{key}: multiplier = {given.source!r} is {text}; {reason}")
+    return found
 
 
 def _scaled(law: Superpotential, scales: Scales, place: str) -> Superpotential:

@@ -109,8 +109,10 @@ class References:
         return _total(self.problem, _sums(self.problem, np.ones(owned)))
 
     def traction_scale(self, term: LawTerm) -> Array:
-        """What a law's traction is judged by at its vertices: its own, but at least a share of the body's, (m,)."""
-        return np.maximum(term.exact.traction_scale, self.thresholds.law_scale * self.at(term.surface.blocks))
+        """What a law's j' is judged by at its vertices: its own size, but at least a share of the body's, (m,)."""
+        return np.maximum(
+            term.exact.traction_scale, self.thresholds.law_scale * self.at(term.surface.blocks) / term.multiplier
+        )
 
 
 def of(problem: Problem, load: Array, thresholds: Thresholds = DEFAULT) -> References:

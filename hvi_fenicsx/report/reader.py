@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 
 from ..errors import HviError
+from ..formula import Formula
 from ..typing import Array, Integers, Mask
 from . import solution_arrays
 from .body_mesh import BodyMesh, body_mesh
@@ -216,10 +217,25 @@ class Result:
         except HviError:
             return None
 
+    def multiplier(self, part: ContactPart, direction: str = "slip") -> Array | None:
+        """What the law of a part is multiplied by at its vertices, (m,); None if there is not one law, or no formula.
+
+        Args:
+            part: the part.
+            direction: the displacement that the law acts on.
+        """
+        found = [law["multiplier"] for law in self._brought(part.name, direction)]
+        try:
+            return Formula(found[0]).at(part.points.astype(np.float64)) if len(found) == 1 else None
+        except HviError:
+            return None
+
     def _laws(self, part: str, direction: str) -> list[Mapping[str, Any]]:
         """The laws that act on a displacement of a part, as a scene writes them."""
-        brought = [law for role in self.roles(part) for law in role["laws"]]
-        return [law["law"] for law in brought if law["direction"] == direction]
+        return [law["law"] for law in self._brought(part, direction)]
+
+    def _brought(self, part: str, direction: str) -> list[Mapping[str, Any]]:
+        return [law for role in self.roles(part) for law in role["laws"] if law["direction"] == direction]
 
 
 def title_of(scene: Mapping[str, Any]) -> str:

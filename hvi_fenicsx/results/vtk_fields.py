@@ -228,7 +228,7 @@ def _nodal(problem: Problem, states: Sequence[ContactState]) -> dict[str, Array]
                 put(f"friction_t{i + 1}", state, state.friction[:, i] * p)
         if (both := state.of_both_modes) is not None:
             put("mode_mixity", state, both.slip_share)
-        distances = [law.distance for law in state.laws]
+        distances = [law.term.multiplier * law.distance for law in state.laws]
         put("inclusion_distance", state, np.max(distances, axis=0) * p if distances else 0.0 * state.normal)
     for field in found.values():
         field.scatter_forward()

@@ -92,7 +92,7 @@ class _Term:
         columns = np.swapaxes(term.directions[here], 1, 2)[free].reshape(-1, components, term.directions.shape[1])
         signs = columns[:, :, 0] if term.directions.shape[1] == 1 else np.linalg.norm(columns, axis=2)
         surface = term.surface
-        parts = (unknowns, signs, surface.weights[here], surface.points[here])
+        parts = (unknowns, signs, term.weights[here], surface.points[here])
         unknowns, signs, weights, points = (np.concatenate(agree(self._comm, p)) for p in parts)
         if not len(weights):
             return []

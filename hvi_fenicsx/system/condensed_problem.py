@@ -23,7 +23,7 @@ class Bonds:
         law: j.
         unknowns: numbers of the unknowns that it acts on, (m, k); k = 2 for |u_t| in 3D.
         signs: the law's argument is signs * x[unknowns] (k = 1), or the length of that vector (k = 2), (m, k).
-        weights: lumped areas, (m,).
+        weights: lumped areas times the law's multiplier, (m,).
         part: name of the part.
         direction: which displacement it acts on.
         points: the vertices, m, (m, 3).
@@ -61,7 +61,7 @@ class PrescribedBonds:
 
     Attributes:
         law: j.
-        weights: lumped areas, (m,).
+        weights: lumped areas times the law's multiplier, (m,).
         arguments: what the law acts on is arguments[0] + λ arguments[1], (2, m).
     """
 

@@ -202,7 +202,7 @@ def _resistance(problem: Problem, body: AnyBody, term: LawTerm) -> Resistance:
     mine = inside(problem, body, surface.blocks)
     return Resistance(
         points=MotionFields(problem.motions_at(surface.blocks[mine], body)),
-        weights=surface.weights[mine],
+        weights=term.weights[mine],
         directions=term.directions[mine],
         growth=law.growth.times(least),
         peak=law.peak.times(greatest),

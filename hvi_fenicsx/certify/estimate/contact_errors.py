@@ -110,7 +110,8 @@ def _drops(traces: LawTraces, state: ContactState, law: LawState) -> tuple[Trace
     height = coupled_errors.heights(points, law, law.term.exact)
     slip = points.of_field(traces.u)
     along = law.term.gradient(slip.reshape(-1, slip.shape[2])).reshape(slip.shape) if law.term.radial else np.sign(slip)
-    return points, _PLACE / traces.degree * height[:, None, None] * along
+    multiplier = points.interpolated(law.term.multiplier[:, None])
+    return points, _PLACE / traces.degree * height[:, None, None] * multiplier * along
 
 
 def _slip(traces: LawTraces, state: ContactState, error: ErrorField, uncertain: fem.Function) -> tuple[float, float]:

@@ -83,7 +83,7 @@ class LawTrace:
     Attributes:
         points: the quadrature points.
         nodal: the interpolated nodal tractions.
-        traction: those of the law nearest to them.
+        traction: those that the law allows nearest to them.
     """
 
     points: Trace
@@ -136,15 +136,16 @@ class LawTraces:
         """
         term = law.term
         points = self.part(state.surface, term.directions)
-        nodal, sticks = points.interpolated(law.given), self._sticks(points, law)
+        multiplier = points.interpolated(term.multiplier[:, None])
+        nodal, sticks = points.interpolated(law.carried), self._sticks(points, law)
         asked = term.law if error is None else term.exact
         slip = self._slip(points, asked, sticks)
         if error is not None:
             added = points.of_field(error.nodes) + points.of_bubbles(error.bubbles)
             slip = stopped(asked, slip, slip + np.where(sticks, 0.0, added))
-        k = slip.shape[2]
-        traction = nearest(asked, term.length, slip.reshape(-1, k), nodal.reshape(-1, k), self.thresholds.near)
-        return LawTrace(points, nodal, traction.reshape(slip.shape))
+        k, of_law = slip.shape[2], nodal / multiplier
+        traction = nearest(asked, term.length, slip.reshape(-1, k), of_law.reshape(-1, k), self.thresholds.near)
+        return LawTrace(points, nodal, multiplier * traction.reshape(slip.shape))
 
     def _sticks(self, points: Trace, law: LawState) -> Mask:
         """Whether all nodes around a point are on a convex kink, (f, q, 1). Collective."""
@@ -181,7 +182,7 @@ class LawTraces:
         """∫ τ·v ds of what bodies that meet put on each other without a law, tested with bubbles. Collective."""
         force = -traction(state)
         for law in state.laws:
-            force -= np.einsum("mk,mkd->md", law.given, law.term.directions)
+            force -= np.einsum("mk,mkd->md", law.carried, law.term.directions)
         axes = np.tile(np.eye(force.shape[1]), (len(force), 1, 1))
         points = self.part(state.surface, axes)
         return points.tested(points.interpolated(force))[0]

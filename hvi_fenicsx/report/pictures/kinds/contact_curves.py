@@ -124,9 +124,9 @@ def _friction(axes: Axes, *, part: ContactPart, result: Result, length: Unit) ->
     values = part.friction
     unit = unit_for(_largest(values), "Pa")
     law = result.law(part.name) if result.summary.get("smoothing") else None
-    note = ""
-    if law is not None:
-        low, high = law.interval(part.slip.astype(np.float64))
+    multiplier, note = result.multiplier(part), ""
+    if law is not None and multiplier is not None:
+        low, high = (multiplier * end for end in law.interval(part.slip.astype(np.float64)))
         note = "dashed: the law itself, unsmoothed"
         for bound in (low, high) if np.any(high > low) else (low,):
             axes.plot(part["s"] / length.size, bound / unit.size, color=INK, ls=(0, (4, 3)), lw=1.4, zorder=4)
