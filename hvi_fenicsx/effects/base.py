@@ -11,6 +11,7 @@ from abc import abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import Enum
+from pathlib import Path
 from typing import Any, ClassVar, Protocol
 
 from pydantic import BaseModel, ConfigDict
@@ -233,6 +234,10 @@ class Effect(BaseModel):
     def surface_load(self) -> SurfaceLoad | None:
         """The load that it puts on its part, for pictures; None: none that has a formula."""
         return None
+
+    def files(self) -> tuple[Path, ...]:
+        """The files that it reads."""
+        return ()
 
     def superpotentials(self) -> tuple[Superpotential, ...]:
         """The laws that it brings: those among its fields."""

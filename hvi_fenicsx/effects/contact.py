@@ -2,28 +2,23 @@
 
 from __future__ import annotations
 
-import math
+from dataclasses import dataclass
+from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import (
-    BaseModel,
-    BeforeValidator,
-    ConfigDict,
-    Field,
-    PlainSerializer,
-    model_serializer,
-    model_validator,
-)
+import numpy as np
+from pydantic import BeforeValidator, PlainSerializer, SerializationInfo, model_serializer, model_validator
 from typing_extensions import override
 
-from ..formula import COORDINATES, Formula
+from ..formula import Formula
 from ..schema import refusal
 from ..spatial_value import SpatialValue
+from ..typing import Array
 from .base import Drive, Effect, Evaluate, FormContext, Place, Sizes
 from .contribution import Contribution, NormalBounds
 from .formula_field import FormulaField, as_formula, require_components
+from .obstacles import ObstacleField, ObstacleGap, Vector, unit
 
-Coordinate = Annotated[float, Field(allow_inf_nan=False)]
 MEASURED = "measured"
 """The gap between two bodies is the distance of their sides as they are meshed."""
 Gap = Annotated[
@@ -34,15 +29,15 @@ Gap = Annotated[
 """A number, a formula in x, y, z (SI), or "measured"."""
 
 
-class Obstacle(BaseModel):
-    """A flat obstacle."""
+@dataclass(frozen=True)
+class _Straight:
+    """One direction, stated by itself."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    constant: tuple[float, ...]
 
-    point: tuple[Coordinate, ...]
-    """a point of its surface, m"""
-    normal: tuple[Coordinate, ...]
-    """its normal, towards the body; of any length"""
+    def towards(self, points: Array) -> Array:
+        """The same everywhere."""
+        return np.tile(self.constant, (len(points), 1))
 
 
 class Contact(Effect):
@@ -67,8 +62,11 @@ class Contact(Effect):
     upper: FormulaField | None = None
     """bilateral contact, with `lower`: the largest opening -u·n, m, a number or a formula"""
 
-    obstacle: Obstacle | None = None
-    """instead of `gap`: a flat obstacle near a curved part, { point = [0, 0], normal = [0, 1] }"""
+    direction: Vector | None = None
+    """with `gap`: from the body towards the obstacle, of any length; stands for the outward normal"""
+    obstacle: ObstacleField | None = None
+    """instead of `gap`: a flat obstacle near a curved part, { point = [0, 0], normal = [0, 1] }, or one of another
+    `shape`: see docs/obstacles.md"""
 
     @model_validator(mode="after")
     def _one_way(self) -> Contact:
@@ -77,19 +75,21 @@ class Contact(Effect):
             raise refusal(
                 "needs one of gap = 0.0, both lower and upper, or obstacle = { point = [...], normal = [...] }"
             )
-        if self.obstacle is not None and not any(self.obstacle.normal):
-            raise refusal("normal of the obstacle is zero; give the direction towards the body")
+        if self.direction is not None and (not any(self.direction) or not isinstance(self.gap, SpatialValue)):
+            raise refusal("direction goes with a gap that is a number or a formula, and is not zero")
         ends = [f.source for f in (self.lower, self.upper) if f is not None and f.is_number]
         if len(ends) == 2 and ends[0] > ends[1]:  # type: ignore[operator]
             raise refusal(f"lower = {ends[0]:g} is above upper = {ends[1]:g}; swap them")
         return self
 
     @model_serializer(mode="plain")
-    def _as_table(self) -> dict[str, Any]:
+    def _as_table(self, info: SerializationInfo) -> dict[str, Any]:
+        if self.obstacle is not None:
+            return {"obstacle": self.obstacle.table(info.context)}
         if self.gap == MEASURED:
             return {"gap": MEASURED}
         found = {k: f.source for k in ("gap", "lower", "upper") if (f := getattr(self, k)) is not None}
-        return found if self.obstacle is None else {"obstacle": self.obstacle.model_dump(mode="json")}
+        return found | ({"direction": list(self.direction)} if self.direction else {})
 
     @override
     def stress_scale(self, largest: Evaluate, sizes: Sizes) -> float:
@@ -106,23 +106,22 @@ class Contact(Effect):
 
     def _bounds(self) -> NormalBounds:
         if self.obstacle is not None:
-            return _towards(self.obstacle)
+            return NormalBounds(lower=ObstacleGap(self.obstacle).negative(), upper=None, towards=self.obstacle)
         if isinstance(self.gap, str):
             return NormalBounds(lower=Formula(0.0), upper=None, measured=True)
-        return NormalBounds(lower=self.lower if self.gap is None else self.gap.negative(), upper=self.upper)
+        towards = _Straight(tuple(map(float, unit(self.direction)))) if self.direction else None
+        lower = self.lower if self.gap is None else self.gap.negative()
+        return NormalBounds(lower=lower, upper=self.upper, towards=towards)
+
+    @override
+    def files(self) -> tuple[Path, ...]:
+        """The obstacle's."""
+        return () if self.obstacle is None else self.obstacle.files()
 
     @override
     def check(self, dimension: int) -> None:
-        """An obstacle has as many components as the scene has dimensions."""
+        """Vectors have as many components as the scene has dimensions."""
         if self.obstacle is not None:
-            require_components(self.obstacle.point, dimension, "contact.obstacle.point")
-            require_components(self.obstacle.normal, dimension, "contact.obstacle.normal")
-
-
-def _towards(obstacle: Obstacle) -> NormalBounds:
-    """The gap is (x - point)·normal, and -normal stands for the outward normal."""
-    length = math.hypot(*obstacle.normal)
-    normal = [c / length for c in obstacle.normal]
-    terms = zip(normal, COORDINATES[: len(normal)], obstacle.point, strict=True)
-    gap = " + ".join(f"({n!r})*({x} - ({p!r}))" for n, x, p in terms)
-    return NormalBounds(lower=Formula(f"-({gap})"), upper=None, direction=tuple(-c for c in normal))
+            self.obstacle.check(dimension)
+        if self.direction is not None:
+            require_components(self.direction, dimension, "contact.direction")

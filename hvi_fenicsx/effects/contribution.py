@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -77,6 +77,24 @@ class Condition:
     value: SpatialValue
 
 
+class Towards(Protocol):
+    """In which direction an obstacle is."""
+
+    @property
+    def constant(self) -> tuple[float, ...] | None:
+        """The unit vector towards it, where that is the same for all points."""
+
+    def towards(self, points: Array) -> Array:
+        """The unit vectors towards it.
+
+        Args:
+            points: (m, d), m.
+
+        Returns:
+            (m, d); NaN where there is none.
+        """
+
+
 @dataclass(frozen=True, slots=True)
 class NormalBounds:
     """lower ≤ -u·n ≤ upper on a part. Unilateral contact with the gap g has lower = -g.
@@ -84,13 +102,13 @@ class NormalBounds:
     Attributes:
         lower: m; None: no bound.
         upper: m; None: no bound.
-        direction: the unit vector towards a flat obstacle, which stands for n; None: the part's own normal.
+        towards: the obstacle, whose direction stands for n; None: the part's own normal.
         measured: whether the distance of the two sides of an interface, as they are meshed, is added to the gap.
     """
 
     lower: SpatialValue | None
     upper: SpatialValue | None
-    direction: tuple[float, ...] | None = None
+    towards: Towards | None = None
     measured: bool = False
 
 

@@ -58,7 +58,7 @@ def role_of(effect: Effect, contribution: Contribution) -> Role:
         pressure=load.pressure.source if load and load.pressure else None,
         prescribed=tuple(sorted({c.component for c in contribution.conditions})),
         bounded=bool(contribution.bounds),
-        obstacle=next((b.direction for b in contribution.bounds), None),
+        obstacle=next((b.towards.constant for b in contribution.bounds if b.towards is not None), None),
         laws=tuple(map(_law, contribution.laws)),
     )
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
@@ -152,30 +152,38 @@ class Traction(OnSide):
 
 @dataclass(frozen=True)
 class Contact(OnSide):
-    """Contact: unilateral with a gap, bilateral, or with a flat obstacle.
+    """Contact: unilateral with a gap, bilateral, or with an obstacle.
 
     Attributes:
         side: the side's name.
         gap: how far the side may move outward, m; 0 unless another way is given.
         lower: bilateral contact: the smallest opening -u·n, m.
         upper: bilateral contact: the largest opening -u·n, m.
-        obstacle: a point of a flat obstacle (m), and its normal towards the body.
+        obstacle: a point of a flat obstacle (m), and its normal towards the body; or the table of an obstacle, as a
+            scene has it: ``{"shape": "sphere", "center": [0, 0], "radius": 1}``.
+        direction: with a gap: from the body towards the obstacle; stands for the outward normal.
     """
 
     side: str
     gap: Value | None = None
     lower: Value | None = None
     upper: Value | None = None
-    obstacle: tuple[Sequence[float], Sequence[float]] | None = None
+    obstacle: tuple[Sequence[float], Sequence[float]] | Mapping[str, Any] | None = None
+    direction: Sequence[float] | None = None
 
     def effect(self, mesh: dmesh.Mesh) -> Effect:
         """The bounds."""
         given = {"gap": self.gap, "lower": self.lower, "upper": self.upper}
         keys: dict[str, Any] = {k: values.spatial_value(v, mesh) for k, v in given.items() if v is not None}
-        if self.obstacle is not None:
+        if isinstance(self.obstacle, Mapping):
+            keys["obstacle"] = dict(self.obstacle)
+        elif self.obstacle is not None:
             point, normal = (tuple(map(float, vector)) for vector in self.obstacle)
             keys["obstacle"] = {"point": point, "normal": normal}
-        return checked(effects.contact.Contact, **(keys or {"gap": 0.0}))
+        keys = keys or {"gap": values.spatial_value(0.0, mesh)}
+        if self.direction is not None:
+            keys["direction"] = tuple(map(float, self.direction))
+        return checked(effects.contact.Contact, **keys)
 
 
 @dataclass(frozen=True)

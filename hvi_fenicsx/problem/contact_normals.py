@@ -45,7 +45,7 @@ class _Row:
 def decide(
     comm: MPI.Comm,
     surfaces: Mapping[str, Surface],
-    stated: Mapping[str, Sequence[float]],
+    stated: Mapping[str, Array],
     fixed: Entities,
     length: float,
     thresholds: Thresholds = DEFAULT,
@@ -55,7 +55,7 @@ def decide(
     Args:
         comm: the ranks of the mesh.
         surfaces: by part, with the normals of the facets.
-        stated: the unit normals that the scene states, by part (that towards an obstacle).
+        stated: the unit normals that the scene states (those towards an obstacle), by part, (m, d) each.
         fixed: local scalar dofs that are prescribed.
         length: of the body, m.
         thresholds: what is rounding, and by which angles a normal may be turned.
@@ -81,12 +81,12 @@ def largest_turn(comm: MPI.Comm, surface: Surface) -> float:
     return largest(comm, float(np.max(np.linalg.norm(away, axis=1), initial=0.0)))
 
 
-def _own(surface: Surface, stated: Sequence[float] | None, length: float, rounding: float) -> Surface:
+def _own(surface: Surface, stated: Array | None, length: float, rounding: float) -> Surface:
     """The surface with its normals as if it were alone, without rounding."""
     if stated is None:
         normals = _without_rounding(surface.normals, rounding * _relative_refinement(surface, length))
     else:
-        normals = _without_rounding(np.broadcast_to(np.asarray(stated), surface.normals.shape), rounding)
+        normals = _without_rounding(stated, rounding)
     return replace(surface, normals=normals, measured=normals)
 
 
@@ -178,7 +178,14 @@ def _turned(normal: _Row, rows: Sequence[_Row], thresholds: Thresholds) -> _Row 
 def _refusal(normal: _Row, row: _Row, limit: float) -> str:
     """Why two directions cannot stand at one vertex, and what to do."""
     angle = math.degrees(math.acos(min(abs(float(row.direction @ normal.direction)), 1.0)))
-    remedy = "" if normal.exact else ", or state the normal: contact = { obstacle = { point = ..., normal = ... } }"
+    remedy = (
+        ""
+        if normal.exact
+        else (
+            ", leave it out of the part (`where`), or state the normal: contact = { obstacle = { point = ..., normal "
+            "= ... } }, of a round obstacle its `direction`"
+        )
+    )
     return (
         f"its normal makes an angle of {angle:.6g}° with the direction of {row.name}; they must be orthogonal or "
         f"equal, here to within {math.degrees(limit):.2g}°. Move the edge of the part, prescribe all components "

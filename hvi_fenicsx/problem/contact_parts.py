@@ -8,7 +8,7 @@ from itertools import combinations_with_replacement
 
 import numpy as np
 
-from ..effects import NormalBounds
+from ..effects import NormalBounds, Towards
 from ..errors import InputError
 from ..mesh import nodes
 from ..runtime.mpi import agree
@@ -45,7 +45,6 @@ def make_surfaces(
     """
     found = dict.fromkeys(w for w, _, c in contributions if w is not None and (c.bounds or c.laws))
     parts = [where for where in found if where not in interfaces]
-    stated = {w: b.direction for w, _, c in contributions for b in c.bounds if w in parts and b.direction is not None}
     surfaces = {
         where: contact_surface.make_surface(
             where,
@@ -57,9 +56,25 @@ def make_surfaces(
         )
         for where in parts
     }
+    towards = {w: b.towards for w, _, c in contributions for b in c.bounds if w in parts and b.towards is not None}
+    stated = {name: _stated(context, surfaces[name], obstacle) for name, obstacle in towards.items()}
     if not context.domain.one_piece:
         facing_sides.refuse(context.domain.mesh.comm, surfaces.values(), context.length, thresholds)
     return contact_normals.decide(context.domain.mesh.comm, surfaces, stated, fixed, context.length, thresholds)
+
+
+def _stated(context: DomainForms, where: Surface, obstacle: Towards) -> Array:
+    """The unit vectors towards an obstacle at the vertices of a part, (m, d). Collective.
+
+    Raises:
+        InputError: on all ranks alike: there is none at a vertex, such as at the centre of a ball.
+    """
+    found = obstacle.towards(where.points[:, : context.dimension])
+    bad = np.flatnonzero(~np.all(np.isfinite(found), axis=1))
+    said = [str(tuple(map(float, where.points[i]))) for i in bad[:1]]
+    for text in (text for rank in agree(context.domain.mesh.comm, said) for text in rank):
+        raise InputError(f"boundary.{where.part}.contact: no direction leads from {text} to the obstacle; state one")
+    return found
 
 
 def make_bounds(
@@ -88,7 +103,7 @@ def make_bounds(
     for surface, key, bound in wanted:
         if bound.measured and surface.part not in gaps:
             raise InputError(f'boundary.{surface.part}.{key}: gap = "measured" needs two bodies; give a number')
-        if bound.direction is not None and surface.part in gaps:
+        if bound.towards is not None and surface.part in gaps:
             raise InputError(f'boundary.{surface.part}.{key}: an obstacle is no body; give gap = 0.0 or "measured"')
     return tuple(
         _along_normal(_bounds(context, surface, key, bounds, scales, gaps), prescribed)
@@ -122,7 +137,7 @@ def _bounds(
             return np.full(len(where.blocks), np.inf)
         found = _coefficients(context, where, formula) / scales.displacement
         if not all(agree(context.domain.mesh.comm, bool(np.all(np.isfinite(found))))):
-            reason = "the gap is not finite everywhere there; see its formula"
+            reason = "the gap is not finite everywhere there; see its formula, or where the obstacle lies"
             raise InputError(f"boundary.{where.part}.{effect}: {reason}")
         return np.asarray(found)
 

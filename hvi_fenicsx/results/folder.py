@@ -111,7 +111,7 @@ def inputs_of(scene: Scene, folder: Path) -> dict[str, str]:
         scene: the scene.
         folder: from which their paths are given.
     """
-    files = [*scene.domain.files(), *map(Path, scene.plugins or ())]
+    files = [*scene.files(), *map(Path, scene.plugins or ())]
     return {os.path.relpath(file, folder): manifest.digest(file) or "" for file in files}
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Iterator, Mapping
+from pathlib import Path
 from typing import Annotated, Any, NamedTuple, Self
 
 from pydantic import (
@@ -177,6 +178,10 @@ class Scene(Table):
                 yield from (PlacedEffect(Place.BODY, region, effect) for effect in body.effects)
         for name, table in (*self.boundary.items(), *self.interface.items()):
             yield from (PlacedEffect(Place.BOUNDARY, name, effect) for effect in table.effects)
+
+    def files(self) -> tuple[Path, ...]:
+        """The files of its domain and of its effects."""
+        return (*self.domain.files(), *(file for placed in self.effects() for file in placed.effect.files()))
 
 
 def _read_again(tables: dict[str, Any]) -> Scene:

@@ -5,6 +5,7 @@ Light: it loads pydantic and nothing heavier, and knows no particular table.
 
 from .descriptions import descriptions
 from .fields import LONGEST, SHORTEST, Count, Length, Names, OneOf, Positive, vector
+from .files import ExistingFile
 from .messages import refusal, shown, unknown
 from .tables import Key, Mistake, Table, choose, input_error, located_error, mistakes_of, validation_error
 
@@ -12,6 +13,7 @@ __all__ = [
     "LONGEST",
     "SHORTEST",
     "Count",
+    "ExistingFile",
     "Key",
     "Length",
     "Mistake",

@@ -44,7 +44,7 @@ class Store:
     def name(self, setting: Setting) -> str:
         """The name of a setting's point."""
         digest = hashlib.sha256(f"{__version__} {self.ranks} {setting.accuracy}\n{dump_scene(setting.scene)}".encode())
-        for file in setting.scene.domain.files():
+        for file in setting.scene.files():
             digest.update(file.read_bytes())
         return digest.hexdigest()[:16]
 

@@ -253,3 +253,14 @@ def test_two_cylinders_meet_with_the_pressure_of_hertz(degree: int) -> None:
     modulus, radius = 2.1e11 / (2 * (1 - 0.3**2)), 0.05
     peak = float(np.sqrt(force * modulus / (np.pi * radius)))
     assert -float(met.pressure.min()) * scales.stress == pytest.approx(peak, rel=1e-2)
+
+
+@pytest.mark.long
+def test_the_ball_presses_the_block_as_hertz_says() -> None:
+    """Between force and largest pressure, whatever the depth; the model is a quarter."""
+    found = demo("ball_on_block")
+    top, scales = state(found, "top"), found.problem.scales
+    force = -4 * float(top.surface.weights @ (top.pressure * top.surface.normals[:, 2])) * scales.force
+    modulus = 1e7 / (1 - 0.3**2)
+    peak = (6 * abs(force) * modulus**2 / np.pi**3) ** (1 / 3)
+    assert -float(top.pressure.min()) * scales.stress == pytest.approx(peak, rel=0.01)

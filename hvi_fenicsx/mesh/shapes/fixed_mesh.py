@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
 from fractions import Fraction
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Self
 
-from pydantic import BeforeValidator, Field, PlainSerializer, SerializationInfo, ValidationInfo
+from pydantic import Field
 
 from ...errors import InputError
-from ...schema import Positive, refusal
+from ...schema import ExistingFile, Positive
 from .base import DEFAULT, DomainShape, Thresholds
 
 if TYPE_CHECKING:
@@ -65,22 +64,6 @@ class FixedMesh(DomainShape):
         return thresholds.unknowns_of_file * 2.0 ** (dimension * self.refinements)
 
 
-def _mesh_path(value: Any, info: ValidationInfo) -> Path:
-    if not isinstance(value, str | Path) or not str(value).strip() or "\0" in str(value):
-        raise refusal('must be the name of a mesh file in quotes, like "part.msh"')
-    folder = (info.context or {}).get("folder", ".")
-    path = Path(os.path.abspath(Path(folder) / value))
-    if not path.is_file():
-        raise refusal(f"{path} {'is a folder' if path.is_dir() else 'does not exist'}")
-    return path
-
-
-def _written_path(path: Path, info: SerializationInfo) -> str:
-    """The path from the folder that the scene is written into; absolute where that is not known."""
-    folder = (info.context or {}).get("folder")
-    return str(path) if folder is None else os.path.relpath(path, folder)
-
-
 LONG = 20.0
 """A body (m) from a file that is longer than this may be one in mm."""
 
@@ -97,7 +80,7 @@ class MeshFile(FixedMesh):
 
     shape: Literal["file"] = "file"
     """the mesh comes from a gmsh file"""
-    file: Annotated[Path, BeforeValidator(_mesh_path), PlainSerializer(_written_path)]
+    file: ExistingFile
     """the gmsh file, relative to the scene file: .msh, or .geo, which gmsh meshes first; a .geo that runs programs or
     writes files is refused"""
     scale: Positive = 1.0

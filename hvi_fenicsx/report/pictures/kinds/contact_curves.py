@@ -123,9 +123,8 @@ def _listed(kinks: Array) -> str:
 def _friction(axes: Axes, *, part: ContactPart, result: Result, length: Unit) -> None:
     values = part.friction
     unit = unit_for(_largest(values), "Pa")
-    law = result.law(part.name) if result.summary.get("smoothing") else None
-    multiplier, note = result.multiplier(part), ""
-    if law is not None and multiplier is not None:
+    law, note = result.law(part.name) if result.summary.get("smoothing") else None, ""
+    if law is not None and (multiplier := result.multiplier(part)) is not None:
         low, high = (multiplier * end for end in law.interval(part.slip.astype(np.float64)))
         note = "dashed: the law itself, unsmoothed"
         for bound in (low, high) if np.any(high > low) else (low,):

@@ -1,0 +1,293 @@
+"""Rigid obstacles: how far each point of a body is from one, and in which direction.
+
+A new obstacle is a new subclass of :class:`Obstacle`; it registers itself under its ``shape``.
+"""
+
+from __future__ import annotations
+
+import math
+from abc import abstractmethod
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Annotated, Any, ClassVar
+
+import numpy as np
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    ValidationInfo,
+    model_validator,
+)
+from typing_extensions import override
+
+from ..class_registry import enter
+from ..errors import InputError
+from ..schema import ExistingFile, Positive, refusal, unknown
+from ..spatial_value import SpatialValue
+from ..typing import Array
+from .formula_field import require_components
+from .surface_files import distances_along
+
+Vector = Annotated[
+    tuple[Annotated[float, Field(allow_inf_nan=False)], ...],
+    BeforeValidator(lambda value: tuple(value) if isinstance(value, list) else value),
+]
+"""Components in m, as many as the scene has dimensions."""
+
+
+def unit(vector: Vector) -> Array:
+    """The unit vector of a direction, (d,)."""
+    return np.asarray(vector, dtype=np.float64) / math.hypot(*vector) + 0.0
+
+
+class Obstacle(BaseModel):
+    """A rigid obstacle. Points are given as (m, d), distances as (m,), in m.
+
+    Class attributes:
+        shape: the name in scenes.
+        dimensions: of space, in which it makes sense.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+    shape: ClassVar[str]
+    dimensions: ClassVar[tuple[int, ...]] = (2, 3)
+    registry: ClassVar[dict[str, type[Obstacle]]] = {}
+
+    direction: Vector | None = None
+    """from the body towards the obstacle, of any length: gaps are measured along it; by default to the nearest point"""
+    displacement: Vector | None = None
+    """by which the obstacle is moved from where it is described, m"""
+
+    @classmethod
+    def __pydantic_init_subclass__(cls, **kwargs: Any) -> None:
+        super().__pydantic_init_subclass__(**kwargs)
+        if "shape" in cls.__dict__:
+            enter(Obstacle.registry, cls, cls.shape, "obstacle")
+
+    @model_validator(mode="after")
+    def _no_zero_directions(self) -> Obstacle:
+        for key in ("direction", "normal", "axis"):
+            if (vector := getattr(self, key, None)) is not None and not any(vector):
+                raise refusal(f"{key} of the obstacle is zero; give a direction")
+        return self
+
+    def check(self, dimension: int) -> None:
+        """Refuse vectors of the wrong length.
+
+        Raises:
+            InputError: with what is wanted.
+        """
+        if dimension not in self.dimensions:
+            raise InputError(f'contact.obstacle: shape = "{self.shape}" needs {self.dimensions[0]}D')
+        for key in type(self).model_fields:
+            if isinstance(value := getattr(self, key), tuple):
+                require_components(value, dimension, f"contact.obstacle.{key}")
+
+    @property
+    def dimension(self) -> int:
+        """The number of components of its vectors."""
+        return next(len(v) for key in type(self).model_fields if isinstance(v := getattr(self, key), tuple))
+
+    @abstractmethod
+    def nearest(self, points: Array) -> tuple[Array, Array]:
+        """The distances to the nearest points, negative inside, and the unit vectors towards these, (m, d)."""
+
+    @abstractmethod
+    def ahead(self, points: Array, direction: Array) -> Array:
+        """The distances along a direction; NaN where the obstacle is not met.
+
+        Args:
+            points: (m, d).
+            direction: unit vector, (d,).
+        """
+
+    @property
+    def constant(self) -> tuple[float, ...] | None:
+        """The unit vector towards it, where that is the same for all points."""
+        return None if self.direction is None else tuple(map(float, unit(self.direction)))
+
+    def files(self) -> tuple[Path, ...]:
+        """The files that it reads."""
+        return ()
+
+    def gap(self, points: Array) -> Array:
+        """The distances of points from where it has been moved."""
+        points = self._seen(points)
+        return self.nearest(points)[0] if self.direction is None else self.ahead(points, unit(self.direction))
+
+    def towards(self, points: Array) -> Array:
+        """The unit vectors along which gaps are measured, (m, d)."""
+        if self.constant is not None:
+            return np.tile(self.constant, (len(points), 1))
+        return self.nearest(self._seen(points))[1]
+
+    def _seen(self, points: Array) -> Array:
+        return points if self.displacement is None else np.asarray(points - np.asarray(self.displacement), np.float64)
+
+    def table(self, context: Any = None) -> dict[str, Any]:
+        """What a scene would write.
+
+        Args:
+            context: has the folder that the scene is written into.
+        """
+        keys = self.model_dump(mode="json", exclude_none=True, exclude_defaults=True, context=context)
+        return {"shape": self.shape, **keys}
+
+
+class Plane(Obstacle):
+    """A plane, behind which the obstacle is."""
+
+    shape: ClassVar[str] = "plane"
+    point: Vector
+    """a point of its surface, m"""
+    normal: Vector
+    """its normal, towards the body; of any length"""
+
+    @override
+    def nearest(self, points: Array) -> tuple[Array, Array]:
+        normal = unit(self.normal)
+        distance = (points - np.asarray(self.point)) @ normal
+        return distance, np.asarray(np.broadcast_to(0.0 - normal, points.shape), np.float64)
+
+    @override
+    def ahead(self, points: Array, direction: Array) -> Array:
+        steep = float(-unit(self.normal) @ direction)
+        return np.asarray(self.nearest(points)[0] / (steep if steep > 0.0 else math.nan), np.float64)
+
+    @property
+    @override
+    def constant(self) -> tuple[float, ...] | None:
+        return super().constant or tuple(map(float, 0.0 - unit(self.normal)))
+
+    @override
+    def table(self, context: Any = None) -> dict[str, Any]:
+        """Without the shape, which may be left out."""
+        return {key: value for key, value in super().table(context).items() if key != "shape"}
+
+
+class _Round(Obstacle):
+    """All points up to a distance from a centre, or beyond it."""
+
+    center: Vector
+    """its centre, m"""
+    radius: Positive
+    """m"""
+    hollow: bool = False
+    """whether the body is inside of it, as in a bearing"""
+
+    @abstractmethod
+    def across(self, vectors: Array) -> Array:
+        """The components of vectors (m, d) that count for the distance from the centre."""
+
+    @override
+    def nearest(self, points: Array) -> tuple[Array, Array]:
+        away = self.across(points - np.asarray(self.center))
+        length = np.linalg.norm(away, axis=1)
+        out = np.divide(away, length[:, None], out=np.full_like(away, np.nan), where=length[:, None] > 0.0)
+        return (self.radius - length, out) if self.hollow else (length - self.radius, -out)
+
+    @override
+    def ahead(self, points: Array, direction: Array) -> Array:
+        away, along = self.across(points - np.asarray(self.center)), self.across(direction[None])[0]
+        square, middle = float(along @ along), away @ along
+        with np.errstate(all="ignore"):
+            root = np.sqrt(middle**2 - square * (np.sum(away**2, axis=1) - self.radius**2))
+            return np.asarray((-middle + (root if self.hollow else -root)) / square)
+
+
+class Sphere(_Round):
+    """A ball; in the plane a cylinder across it."""
+
+    shape: ClassVar[str] = "sphere"
+
+    @override
+    def across(self, vectors: Array) -> Array:
+        return vectors
+
+
+class Cylinder(_Round):
+    """A cylinder without ends, in space."""
+
+    shape: ClassVar[str] = "cylinder"
+    dimensions: ClassVar[tuple[int, ...]] = (3,)
+    axis: Vector
+    """along it; of any length"""
+
+    @override
+    def across(self, vectors: Array) -> Array:
+        axis = unit(self.axis)
+        return np.asarray(vectors - (vectors @ axis)[:, None] * axis)
+
+
+class Surface(Obstacle):
+    """A surface of triangles from a file, in space; the gap is measured along `direction`, which it needs."""
+
+    shape: ClassVar[str] = "surface"
+    dimensions: ClassVar[tuple[int, ...]] = (3,)
+    file: ExistingFile
+    """an STL file, relative to the scene file; its triangles face the body"""
+    scale: Positive = 1.0
+    """length in m of one unit of the coordinates in the file: 1e-3 for a surface in mm"""
+
+    @model_validator(mode="after")
+    def _along(self) -> Surface:
+        if self.direction is None:
+            raise refusal('shape = "surface" needs a direction, from the body towards it: direction = [0, 0, -1]')
+        return self
+
+    @override
+    def nearest(self, points: Array) -> tuple[Array, Array]:
+        raise NotImplementedError("it has a direction")
+
+    @override
+    def files(self) -> tuple[Path, ...]:
+        return (self.file,)
+
+    @override
+    def ahead(self, points: Array, direction: Array) -> Array:
+        return self.scale * distances_along(self.file, np.asarray(points / self.scale, np.float64), direction)
+
+
+class ObstacleGap(SpatialValue):
+    """The distance of points from an obstacle, as a value in space."""
+
+    __slots__ = ("_obstacle", "source")
+
+    def __init__(self, obstacle: Obstacle) -> None:
+        self._obstacle, self.source = obstacle, f"distance from the obstacle ({obstacle.shape})"
+
+    @override
+    def at(self, points: Array) -> Array:
+        return self._obstacle.gap(points[:, : self._obstacle.dimension])
+
+    @override
+    def in_ufl(self, mesh: Any, number: Callable[[float], Any]) -> Any:
+        raise NotImplementedError("bounds are evaluated at vertices")
+
+
+def read(value: Any, info: ValidationInfo) -> Obstacle:
+    """The obstacle of a table.
+
+    Args:
+        value: what a scene has, or an obstacle.
+        info: its context has the folder of the scene.
+
+    Raises:
+        PydanticCustomError: there is no such shape.
+        ValidationError: the table does not fit the shape.
+    """
+    if isinstance(value, Obstacle):
+        return value
+    if not isinstance(value, Mapping):
+        raise refusal("must be a table, like { point = [0, 0], normal = [0, 1] }")
+    keys = dict(value)
+    name = keys.pop("shape", Plane.shape)
+    if name not in Obstacle.registry:
+        raise refusal(unknown("shape", name, Obstacle.registry))
+    return Obstacle.registry[name].model_validate(keys, context=info.context)
+
+
+ObstacleField = Annotated[Obstacle, BeforeValidator(read)]
+"""An obstacle as a field of a scene."""

@@ -1,0 +1,71 @@
+"""Surfaces of triangles from STL files, and how far points are from them along a direction."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import InputError
+from ..typing import Array
+
+_STEEP = 1e-9
+"""A triangle whose normal is orthogonal to the direction up to this is not met by it."""
+
+
+@lru_cache(maxsize=8)
+def triangles(file: Path) -> Array:
+    """The triangles of a file, (n, 3, 3), m.
+
+    Args:
+        file: STL, binary or text.
+
+    Raises:
+        InputError: there is none, or VTK, which reads it, is missing.
+    """
+    try:
+        from vtkmodules.util.numpy_support import vtk_to_numpy
+        from vtkmodules.vtkCommonCore import vtkObject
+        from vtkmodules.vtkIOGeometry import vtkSTLReader
+    except ImportError:
+        raise InputError(f"{file}: VTK reads STL files; install python3-vtk9 (Debian) or vtk (pip, conda)") from None
+    reader = vtkSTLReader()
+    reader.SetFileName(str(file))
+    vtkObject.GlobalWarningDisplayOff()
+    reader.Update()
+    vtkObject.GlobalWarningDisplayOn()
+    surface = reader.GetOutput()
+    if surface.GetNumberOfCells() == 0:
+        raise InputError(f"{file}: is no STL file with triangles")
+    points = vtk_to_numpy(surface.GetPoints().GetData()).astype(np.float64)
+    corners = vtk_to_numpy(surface.GetPolys().GetConnectivityArray()).reshape(-1, 3)
+    return np.asarray(points[corners])
+
+
+def distances_along(file: Path, points: Array, direction: Array) -> Array:
+    """How far points are from the nearest triangle that faces them, negative behind it; NaN where there is none, (m,).
+
+    Args:
+        file: STL; the normals of its triangles, by their order of corners, look out of the obstacle.
+        points: (m, 3), m.
+        direction: unit vector towards the surface, (3,).
+
+    Raises:
+        InputError: the file cannot be read.
+    """
+    from shapely import STRtree, polygons
+    from shapely import points as shapely_points
+
+    corners = triangles(file)
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    facing = normals @ direction < -_STEEP * np.linalg.norm(normals, axis=1)
+    corners, normals = corners[facing], normals[facing]
+    across = np.linalg.svd(direction[None])[2][1:]
+    tree = STRtree(polygons(corners @ across.T))
+    at, met = tree.query(shapely_points(points @ across.T), predicate="intersects")
+    lengths = np.sum((corners[met, 0] - points[at]) * normals[met], axis=1) / (normals[met] @ direction)
+    found = np.full(len(points), np.inf)
+    order = np.argsort(-np.abs(lengths), kind="stable")
+    found[at[order]] = lengths[order]
+    return np.where(np.isinf(found), np.nan, found)
