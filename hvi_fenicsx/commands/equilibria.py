@@ -10,7 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from .. import console, results
-from ..errors import ExitCode
+from ..errors import ExitCode, HviError
+from ..report.html import equilibria_page
 from ..report.pictures import equilibria as picture
 from ..results.output_folder import Existing
 from ..results.whole import Wanted, write_whole
@@ -93,8 +94,8 @@ def _run(request: Request) -> int:
         code = _exit_code(prepared, found, interrupted=interrupt.requested())
         rows = [_written(request, bodies, found, i) for i in range(len(found.points))]
         files.write(folder, prepared, found, rows, code, request.options.given)
-        if not request.options.no_pictures and rows:
-            on_root(COMM, lambda: picture.draw(folder.work))
+        if rows:
+            on_root(COMM, lambda: _picture_and_page(folder.work, draw=not request.options.no_pictures))
         telling.say(_lines(prepared, found, rows))
     on_root(COMM, lambda: telling.finish(run_logs))
     on_root(COMM, lambda: _remove_earlier(folder.target))
@@ -120,6 +121,16 @@ def _reporter() -> Callable[[str], None]:
             telling.LOG.debug("%s", text, extra={"moving": True})
 
     return report
+
+
+def _picture_and_page(folder: Path, *, draw: bool) -> None:
+    """From the other files; one that fails costs a line. Rank 0 only."""
+    try:
+        if draw:
+            picture.draw(folder)
+        equilibria_page.write(folder)
+    except HviError as error:
+        telling.say([f"picture and report: {error}"])
 
 
 def _exit_code(prepared: Preparation, found: Found, *, interrupted: bool) -> ExitCode:
@@ -150,6 +161,9 @@ def _lines(prepared: Preparation, found: Found, rows: list[files.Row]) -> Iterat
         yield f"{row.index:4d}  {row.energy:.10g} {unit}  {row.kind}  {row.broken} broken{uncertified}"
     if len(rows) > MOST_TOLD:
         yield f"      and {len(rows) - MOST_TOLD} more in {files.TABLE}"
+    for one in files.barriers(found, rows)[:MOST_TOLD]:
+        ends = (f"{height:.3g} {unit} above {i}" for i, height in zip(one["between"], one["heights"], strict=True))
+        yield f"barrier at {one['saddle']}: {' and '.join(ends)}"
     if found.gap is not None and found.lower_bound is not None:
         bound = found.lower_bound * prepared.problem.scales.energy
         yield f"no displacement has an energy below {bound:.10g} {unit} (relative gap {found.gap:.1e})"

@@ -144,6 +144,7 @@ def _record(prepared: Preparation, found: Found, rows: list[Row], code: ExitCode
                     "proven": found.proven,
                     "nodes": found.nodes,
                     "continua": [r.index for r in rows if not r.isolated],
+                    "barriers": barriers(found, rows),
                     "uncertified": [r.index for r in rows if not r.certified],
                 },
                 "solvability": prepared.solvability.summary(),
@@ -154,6 +155,24 @@ def _record(prepared: Preparation, found: Found, rows: list[Row], code: ExitCode
             }
         )
     )
+
+
+def barriers(found: Found, rows: list[Row]) -> list[dict[str, Any]]:
+    """The saddles that join two minimisers, and how far they are above these; by the rows' indices.
+
+    Args:
+        found: by the search.
+        rows: of its equilibria.
+    """
+    return [
+        {
+            "saddle": rows[p.saddle].index,
+            "between": [rows[m].index for m in p.minimisers],
+            "energy": rows[p.saddle].energy,
+            "heights": [rows[p.saddle].energy - rows[m].energy for m in p.minimisers],
+        }
+        for p in found.passes
+    ]
 
 
 def earlier(target: Path, scene: Scene) -> tuple[dict[str, Any] | None, Saved | None]:

@@ -11,6 +11,7 @@ from mpi4py import MPI
 from ..errors import InputError
 from ..scene import Scene
 from ..stationary_points import bodies
+from ..stationary_points.passes import Pass
 from .model import Model
 from .solution import ModelSolution
 from .solving import check
@@ -29,6 +30,8 @@ class Equilibria:
         proven: whether what was asked for is proven.
         nodes: boxes that were bounded or tested.
         reason: how the search ended, for people.
+        passes: the saddles that join two of the minimisers, by numbers of the solutions from 0; the barrier is the
+            difference of their energies.
     """
 
     solutions: tuple[ModelSolution, ...]
@@ -39,6 +42,7 @@ class Equilibria:
     proven: bool
     nodes: int
     reason: str
+    passes: tuple[Pass, ...]
 
 
 def equilibria(
@@ -85,4 +89,5 @@ def equilibria(
         proven=found.proven,
         nodes=found.nodes,
         reason=found.reason,
+        passes=found.passes,
     )

@@ -12,6 +12,7 @@ from ..typing import Array
 from . import stationarity
 from .all_points import Enumeration, StationaryPoint
 from .lowest import LowestSearch, fresh_box
+from .passes import Pass, passes
 from .scalar_problem import ScalarProblem
 
 OWN_GAP = 0.85
@@ -78,6 +79,7 @@ class Found:
         nodes: boxes that were bounded or tested.
         reason: how it ended, for people.
         left: what is needed to go on; empty if there is nothing left.
+        passes: the saddles that join two of the minimisers, numbers of the points.
     """
 
     points: tuple[StationaryPoint, ...]
@@ -87,6 +89,7 @@ class Found:
     nodes: int
     reason: str
     left: Saved = field(default_factory=dict)
+    passes: tuple[Pass, ...] = ()
 
     @property
     def gap(self) -> float | None:
@@ -222,6 +225,7 @@ def _all(task: _Task) -> Found:
         nodes=search.cells,
         reason=_in_words(points) if complete else f"{len(points)} found, and {len(listed)} cells are open",
         left={} if complete else left,
+        passes=passes(problem, points),
     )
 
 

@@ -89,16 +89,46 @@ def kind(problem: ScalarProblem, x: Array) -> Kind:
         problem: the problem.
         x: a stationary point, (n,).
     """
-    here, force = subdifferential(problem, x), problem.force - problem.stiffness @ x
+    here = subdifferential(problem, x)
     if here.falls.any():
         return Kind.SADDLE
-    near = ACCURACY * max(float(np.max(np.abs(force), initial=0.0)), 1e-300)
-    jumps = here.high - here.low > near
-    inside = jumps & (force > here.low + near) & (force < here.high - near)
-    surely, perhaps = np.flatnonzero(~jumps), np.flatnonzero(~inside)
+    surely, perhaps = _free(problem, x, here)
     if _definite(problem, perhaps, here.least[perhaps]) > 0:
         return Kind.MINIMISER
     return Kind.SADDLE if _definite(problem, surely, here.most[surely]) < 0 else Kind.UNDECIDED
+
+
+def unstable_directions(problem: ScalarProblem, x: Array) -> Array | None:
+    """Displacements along which the energy falls from a stationary point, on both sides, (n, k); None if undecided.
+
+    One for each unknown on a drop, and one for each negative eigenvalue while these stay.
+
+    Args:
+        problem: the problem.
+        x: a stationary point, (n,).
+    """
+    here = subdifferential(problem, x)
+    surely, perhaps = _free(problem, x, here)
+    drops, free = np.flatnonzero(here.falls), np.setdiff1d(surely, np.flatnonzero(here.falls))
+    if len(np.setdiff1d(perhaps, drops)) > len(free) or np.any(here.least[free] != here.most[free]):
+        return None
+    matrix = problem.stiffness[np.ix_(free, free)] + np.diag(here.least[free])
+    values, vectors = np.linalg.eigh(matrix) if free.size else (np.empty(0), np.empty((0, 0)))
+    limit = _zero(problem, values)
+    if np.any(np.abs(values) <= limit):
+        return None
+    moves = np.zeros((problem.size, int(np.count_nonzero(values < 0.0))))
+    moves[free] = vectors[:, values < 0.0]
+    return np.column_stack([np.eye(problem.size)[:, drops], moves])
+
+
+def _free(problem: ScalarProblem, x: Array, here: Subdifferential) -> tuple[Integers, Integers]:
+    """Unknowns that can move to first order for certain, and those that perhaps can."""
+    force = problem.force - problem.stiffness @ x
+    near = ACCURACY * max(float(np.max(np.abs(force), initial=0.0)), 1e-300)
+    jumps = here.high - here.low > near
+    inside = jumps & (force > here.low + near) & (force < here.high - near)
+    return np.flatnonzero(~jumps), np.flatnonzero(~inside)
 
 
 def _definite(problem: ScalarProblem, free: Integers, slopes: Array) -> int:
@@ -106,5 +136,11 @@ def _definite(problem: ScalarProblem, free: Integers, slopes: Array) -> int:
     if not free.size:
         return 1
     values = np.linalg.eigvalsh(problem.stiffness[np.ix_(free, free)] + np.diag(slopes))
-    limit = REGULAR * max(abs(float(values[-1])), float(np.trace(problem.stiffness)) / problem.size)
+    limit = _zero(problem, values)
     return int(values[0] > limit) - int(values[0] < -limit)
+
+
+def _zero(problem: ScalarProblem, values: Array) -> float:
+    """Eigenvalues of at most this size are zero."""
+    largest = abs(float(values[-1])) if values.size else 0.0
+    return REGULAR * max(largest, float(np.trace(problem.stiffness)) / problem.size)

@@ -1,0 +1,132 @@
+"""The energies of all equilibria, the passes between minimisers, and beside each its state along Γc.
+
+``python3 -m hvi_fenicsx.report.pictures.equilibria_chart FOLDER`` draws it; it knows the folder alone, and no MPI.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from matplotlib.ticker import MaxNLocator
+
+from ..equilibria_reader import EquilibriaResult, Row, read
+from .equilibria import NAME
+from .style import BLUE, GREEN, GREY, HEADING, INK, ORANGE, PALE, PURPLE, VERMILION, area, figure, save, titled
+
+MOST = 16
+"""Equilibria in the picture, those of lowest energy."""
+CAPTION = (
+    "The equilibria that were found, the lowest at the top. Left: the energy above the lowest; a saddle is joined to "
+    "the two minimisers below it. Right: the state of each along the contact parts, vertex by vertex."
+)
+ROW = 0.62
+"""Height of a row, inches."""
+_PIECES = (BLUE, ORANGE, GREEN, PURPLE)
+
+
+def make(result: EquilibriaResult) -> Figure:
+    """The picture.
+
+    Args:
+        result: the search; it found something.
+    """
+    rows = result.rows[:MOST]
+    states = [result.state(row) for row in rows]
+    tall = ROW * len(rows)
+    fig = figure(HEADING + tall + 1.75)
+    titled(fig, result.title, *_subject(result, len(rows)))
+    energies, strips = area(fig, 0.5, 1.35, 2.2, tall), area(fig, 4.15, 1.35, 3.55, tall)
+    _energies(energies, result, rows)
+    _strips(strips, rows, states)
+    _legend(fig, states)
+    return fig
+
+
+def _subject(result: EquilibriaResult, shown: int) -> tuple[str, str]:
+    known, count = result.known, len(result.rows)
+    below = f"{count} equilibria" if count != 1 else "one equilibrium"
+    below += f", the {shown} lowest shown" if shown < count else ""
+    if known["complete"]:
+        return below, "all, proven"
+    return below, "the lowest, proven" if known["proven"] else "the search is open"
+
+
+def _energies(axes: Axes, result: EquilibriaResult, rows: Sequence[Row]) -> None:
+    values = np.array(result.energies[: len(rows)]) - result.energies[0]
+    for one in result.known.get("barriers", []):
+        top, ends = one["saddle"] - 1, [m - 1 for m in one["between"]]
+        for end in ends:
+            if top < len(rows):
+                axes.plot([values[end], values[top]], [end, top], color=PALE, lw=1.6, zorder=0)
+    for i, (row, value) in enumerate(zip(rows, values, strict=True)):
+        mark, face = {"minimiser": ("o", INK), "saddle": ("^", "white")}.get(row["kind"], ("s", "white"))
+        axes.plot(value, i, mark, color=INK, mfc=face, ms=9, clip_on=False)
+    spread = float(values[-1]) or 1.0
+    axes.set_xlim(-0.06 * spread, 1.06 * spread)
+    axes.set_ylim(len(rows) - 0.5, -0.5)
+    axes.set_yticks(range(len(rows)), [row["index"] for row in rows])
+    axes.xaxis.set_major_locator(MaxNLocator(2))
+    axes.tick_params(axis="y", length=0)
+    axes.set_xlabel(f"energy above the lowest\n{result.energies[0]:.6g} ({result.unit})")
+
+
+def _strips(axes: Axes, rows: Sequence[Row], states: Sequence[Sequence[Row]]) -> None:
+    """A strip for each equilibrium: the piece of the law at each vertex, and a line below where it has lifted off."""
+    longest = max(map(len, states))
+    for i, (row, vertices) in enumerate(zip(rows, states, strict=True)):
+        colours = np.array([[to_rgb(_colour(v)) for v in vertices]])
+        axes.imshow(colours, extent=(-0.5, len(vertices) - 0.5, i + 0.26, i - 0.26), aspect="auto", zorder=1)
+        for k, vertex in enumerate(vertices):
+            if k:
+                axes.plot([k - 0.5] * 2, [i - 0.26, i + 0.26], color="white", lw=0.8 if longest < 80 else 0.2)
+            if vertex["contact"] in ("0", "false", "False"):
+                axes.plot([k - 0.5, k + 0.5], [i + 0.34] * 2, color=INK, lw=3.0, solid_capstyle="butt")
+        axes.text(-0.02, i - 0.12, row["kind"], transform=axes.get_yaxis_transform(), ha="right", va="center", size=11)
+        words = f"{row['broken']} broken"
+        axes.text(
+            -0.02, i + 0.2, words, transform=axes.get_yaxis_transform(), ha="right", va="center", size=9.5, color=GREY
+        )
+    axes.set_xlim(-0.5, longest - 0.5)
+    axes.set_ylim(len(rows) - 0.5, -0.5)
+    axes.set_yticks([])
+    axes.spines[["left"]].set_visible(False)
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    axes.set_xlabel("vertex along the contact parts")
+
+
+def _branch(vertex: Row) -> str:
+    return vertex["branch_t"] or vertex["branch_n"]
+
+
+def _colour(vertex: Row) -> str:
+    branch = _branch(vertex)
+    if not branch:
+        return PALE
+    return VERMILION if branch == "-1" else _PIECES[int(branch) % len(_PIECES)]
+
+
+def _legend(fig: Figure, states: Sequence[Sequence[Row]]) -> None:
+    found = sorted({_branch(v) for vertices in states for v in vertices} - {"", "-1"}, key=int)
+    handles: list[Patch | Line2D] = [
+        Line2D([], [], marker="o", color=INK, ls="", label="minimiser"),
+        Line2D([], [], marker="^", color=INK, mfc="white", ls="", label="saddle"),
+    ]
+    handles += [Patch(color=_PIECES[int(b) % len(_PIECES)], label=f"piece {int(b) + 1} of the law") for b in found[:4]]
+    if any(_branch(v) == "-1" for vertices in states for v in vertices):
+        handles.append(Patch(color=VERMILION, label="on a kink or drop"))
+    if any(v["contact"] in ("0", "false", "False") for vertices in states for v in vertices):
+        handles.append(Line2D([], [], color=INK, lw=3.0, label="lifted off"))
+    fig.legend(handles=handles, loc="lower center", ncols=4, frameon=False, fontsize=10, handlelength=1.2)
+
+
+if __name__ == "__main__":
+    folder = Path(sys.argv[1])
+    save(make(read(folder)), folder / NAME, CAPTION)
