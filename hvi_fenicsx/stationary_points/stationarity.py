@@ -114,7 +114,7 @@ def unstable_directions(problem: ScalarProblem, x: Array) -> Array | None:
         return None
     matrix = problem.stiffness[np.ix_(free, free)] + np.diag(here.least[free])
     values, vectors = np.linalg.eigh(matrix) if free.size else (np.empty(0), np.empty((0, 0)))
-    limit = _zero(problem, values)
+    limit = _zero(problem, np.asarray(values, dtype=np.float64))
     if np.any(np.abs(values) <= limit):
         return None
     moves = np.zeros((problem.size, int(np.count_nonzero(values < 0.0))))

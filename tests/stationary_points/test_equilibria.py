@@ -9,10 +9,13 @@ from pathlib import Path
 import pytest
 import tomli_w
 from enumeration import Floor, polyline
+from matplotlib.colors import to_rgb
+from PIL import Image
 from scenes import DELTA, block, model, quadratic_linear
 
 import hvi_fenicsx as hvi
 from hvi_fenicsx.cli import main
+from hvi_fenicsx.report.pictures.style import BLUE, ORANGE, PALE, VERMILION
 
 GAMMA = 3e6
 STRONG = quadratic_linear(GAMMA)
@@ -56,6 +59,13 @@ def test_the_command_writes_each_equilibrium_and_refuses_what_is_there(tmp_path:
         assert own["energy"] == pytest.approx(float(row["energy"]), rel=1e-12)
     known = json.loads((out / "summary.json").read_text())["equilibria"]
     assert (known["count"], known["complete"], known["proven"]) == (3, True, True)
+    (barrier,) = known["barriers"]
+    first, second, saddle = energies()
+    assert (barrier["between"], barrier["saddle"]) == ([1, 2], 3)
+    assert barrier["heights"] == pytest.approx([saddle - first, saddle - second], rel=1e-6)
+    page = (out / "report.html").read_text(encoding="utf-8")
+    assert "All equilibria, proven: 3." in page
+    assert f"{saddle:.10g}" in page
     assert main(words) == 2
     assert main([*words, "--resume"]) == 0
 
@@ -69,6 +79,16 @@ def test_a_search_that_is_stopped_goes_on_where_it_was(tmp_path: Path) -> None:
     assert main([*words, "--resume"]) == 0
     assert json.loads((out / "summary.json").read_text())["equilibria"]["count"] == 3
     assert not (out / "search.npz").exists()
+
+
+@pytest.mark.long
+def test_the_picture_has_a_strip_for_each_equilibrium_and_lines_to_the_saddle(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    assert main(["equilibria", str(written(tmp_path)), "--out", str(out)]) == 0
+    with Image.open(out / "equilibria.png") as picture:
+        assert picture.width == 1200
+        colours = {c for _, c in picture.convert("RGB").getcolors(1_000_000) or []}
+    assert {to_rgb(c) for c in (BLUE, ORANGE, VERMILION, PALE)} <= {tuple(v / 255 for v in c) for c in colours}
 
 
 @pytest.mark.long
