@@ -114,7 +114,7 @@ def unstable_directions(problem: ScalarProblem, x: Array) -> Array | None:
         return None
     matrix = problem.stiffness[np.ix_(free, free)] + np.diag(here.least[free])
     values, vectors = np.linalg.eigh(matrix) if free.size else (np.empty(0), np.empty((0, 0)))
-    limit = _zero(problem, np.asarray(values, dtype=np.float64))
+    limit = _zero(problem, float(np.max(values, initial=0.0)))
     if np.any(np.abs(values) <= limit):
         return None
     moves = np.zeros((problem.size, int(np.count_nonzero(values < 0.0))))
@@ -136,11 +136,10 @@ def _definite(problem: ScalarProblem, free: Integers, slopes: Array) -> int:
     if not free.size:
         return 1
     values = np.linalg.eigvalsh(problem.stiffness[np.ix_(free, free)] + np.diag(slopes))
-    limit = _zero(problem, values)
+    limit = _zero(problem, float(values[-1]))
     return int(values[0] > limit) - int(values[0] < -limit)
 
 
-def _zero(problem: ScalarProblem, values: Array) -> float:
-    """Eigenvalues of at most this size are zero."""
-    largest = abs(float(values[-1])) if values.size else 0.0
-    return REGULAR * max(largest, float(np.trace(problem.stiffness)) / problem.size)
+def _zero(problem: ScalarProblem, largest: float) -> float:
+    """Eigenvalues of at most this size are zero beside the largest."""
+    return REGULAR * max(abs(largest), float(np.trace(problem.stiffness)) / problem.size)
