@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Annotated, ClassVar, Self
 
+import numpy as np
 from pydantic import Field, model_validator
 from typing_extensions import override
 
@@ -31,7 +32,7 @@ class Cohesion(LawEffect):
     energy_ratio: Positive | None = None
     """with mixity: the energy of slip alone over that of opening alone; the strength in shear is beta energy_ratio
     times that in tension"""
-    exponent: Positive | None = None
+    exponent: Annotated[float | None, Field(ge=1.0, allow_inf_nan=False)] = None
     """with mixity: the exponent of the criterion"""
 
     @model_validator(mode="after")
@@ -57,6 +58,9 @@ class Cohesion(LawEffect):
         """The law is known for δ ≥ 0 alone, and bonds do not push apart."""
         if not self.law.even:
             reason = "is one-sided; cohesion acts on δ, which is never negative: leave one_sided out"
+            raise InputError(f'law = "{self.law.name}" {reason}')
+        if self.mixity is not None and float(self.law.right(np.zeros(1))[0]) > 0.0:
+            reason = "has a traction at rest, where there is no mode yet; with mixity let it rise from 0 on a short way"
             raise InputError(f'law = "{self.law.name}" {reason}')
         if self.law.c4 > 0.0:
             reason = "has negative tractions, which would push the sides apart; use adhesion and friction instead"

@@ -17,7 +17,7 @@ from .segments import Component, Segment, chain
 
 def is_piecewise_linear(problem: CondensedProblem) -> bool:
     """Whether all equilibria form a piecewise linear curve: each law acts on one unknown and has a graph."""
-    return all(b.unknowns.shape[1] == 1 and graph_of(b.law) is not None for b in problem.bonds)
+    return all(not b.radial and graph_of(b.law) is not None for b in problem.bonds)
 
 
 @dataclass(slots=True, kw_only=True)

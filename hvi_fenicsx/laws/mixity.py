@@ -14,8 +14,9 @@ import numpy as np
 from typing_extensions import override
 
 from ..class_registry import enter
+from ..errors import InputError
 from ..typing import Array
-from .parameter_checks import require_positive
+from .parameter_checks import require_number, require_positive
 
 _REGISTRY: dict[str, type] = {}
 
@@ -26,7 +27,10 @@ class Mixity(ABC):
 
     Attributes:
         energy_ratio: the energy of slip alone over that of opening alone.
-        exponent: of the criterion.
+        exponent: of the criterion, at least 1.
+
+    Raises:
+        InputError: these are not such numbers.
     """
 
     name: ClassVar[str]
@@ -38,11 +42,22 @@ class Mixity(ABC):
         enter(_REGISTRY, cls, cls.name, "mixity")
 
     def __post_init__(self) -> None:
-        require_positive(self.name, energy_ratio=self.energy_ratio, exponent=self.exponent)
+        require_positive(self.name, energy_ratio=self.energy_ratio)
+        require_number(self.name, exponent=self.exponent)
+        if self.exponent < 1.0:
+            raise InputError(f"mixity {self.name!r}: exponent = {self.exponent!r} must be at least 1")
 
     @abstractmethod
     def energy(self, share: Array) -> Array:
         """The energy of separation over that of opening alone, monotone in the share, (m,).
+
+        Args:
+            share: of the slip in the work, 0 to 1, (m,).
+        """
+
+    @abstractmethod
+    def slope(self, share: Array) -> Array:
+        """The derivative of the energy by the share, (m,).
 
         Args:
             share: of the slip in the work, 0 to 1, (m,).
@@ -68,6 +83,10 @@ class BenzeggaghKenane(Mixity):
     def energy(self, share: Array) -> Array:
         return np.asarray(1.0 + (self.energy_ratio - 1.0) * share**self.exponent)
 
+    @override
+    def slope(self, share: Array) -> Array:
+        return np.asarray((self.energy_ratio - 1.0) * self.exponent * share ** (self.exponent - 1.0))
+
 
 class PowerLaw(Mixity):
     """(G (1 - B)/G_I)^exponent + (G B/G_II)^exponent = 1 (Wu and Reuter 1965)."""
@@ -76,8 +95,16 @@ class PowerLaw(Mixity):
 
     @override
     def energy(self, share: Array) -> Array:
-        parts = (1.0 - share) ** self.exponent + (share / self.energy_ratio) ** self.exponent
-        return np.asarray(parts ** (-1.0 / self.exponent))
+        return np.asarray(self._parts(share) ** (-1.0 / self.exponent))
+
+    @override
+    def slope(self, share: Array) -> Array:
+        power = self.exponent - 1.0
+        change = (1.0 - share) ** power - (share / self.energy_ratio) ** power / self.energy_ratio
+        return np.asarray(change * self._parts(share) ** (-1.0 / self.exponent - 1.0))
+
+    def _parts(self, share: Array) -> Array:
+        return np.asarray((1.0 - share) ** self.exponent + (share / self.energy_ratio) ** self.exponent)
 
 
 def mixities() -> dict[str, type[Mixity]]:

@@ -14,6 +14,7 @@ import numpy as np
 from ..certify import certificate
 from ..equilibrium_paths.state import Event, PathState
 from ..problem.factored_problem import FactoredProblem
+from ..solvers import frozen_mixity
 from ..system.condensation import Condensation
 from ..system.system import System
 
@@ -72,7 +73,9 @@ class Certifier:
     def _examined(self, state: PathState) -> bool:
         """Whether the certificate of the whole body passes. Collective."""
         u = self._system.displacement(self._condensation.expand(state.x, state.factor))
-        found = certificate.examine(self._factored.at(state.factor), u, self._tolerance)
+        problem = self._factored.at(state.factor)
+        frozen_mixity.freeze(problem, u)
+        found = certificate.examine(problem, u, self._tolerance)
         return found.certificate.passed
 
 

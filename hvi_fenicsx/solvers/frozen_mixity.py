@@ -13,6 +13,7 @@ import numpy as np
 from dolfinx import fem
 
 from ..problem.compose import Model
+from ..problem.problem import Problem
 from ..rigid import Solvability
 from ..runtime.log import logger
 from ..runtime.mpi import largest
@@ -55,7 +56,7 @@ def settled(
     for _ in range(_ROUNDS):
         if not found.result.converged or found.result.interrupted:
             break
-        anew = _energies(found.system, found.result.u)
+        anew = _energies(found.system.problem, found.result.u)
         change = _change(found.system, anew)
         _LOG.info("the energies of separation change by %.1e with the mode mixity", change)
         if change <= _STANDS * options.tolerance:
@@ -69,12 +70,23 @@ def settled(
     return replace(found, result=replace(found.result, counts=counts))
 
 
-def _energies(system: System, u: fem.Function) -> list[Array]:
+def freeze(problem: Problem, u: fem.Function) -> None:
+    """Freeze all energies of separation at the mode mixity of a displacement. Collective.
+
+    Args:
+        problem: the problem.
+        u: the displacement, nondimensional, ghosts updated.
+    """
+    for term, energies in zip(problem.terms, _energies(problem, u), strict=True):
+        term.freeze(energies)
+
+
+def _energies(problem: Problem, u: fem.Function) -> list[Array]:
     """The energies of separation at the mode mixity of a displacement, by term, (m,) each. Collective."""
-    found, values = [], system.problem.relative(u.x.array)
-    for term in system.problem.terms:
+    found, values = [], problem.relative(u.x.array)
+    for term in problem.terms:
         components = term.slip(values)
-        size = largest(system.comm, float(np.max(np.abs(components), initial=0.0)))
+        size = largest(problem.domain.mesh.comm, float(np.max(np.abs(components), initial=0.0)))
         found.append(term.energies_of(components, np.full(len(components), _NEAR * size)))
     return found
 

@@ -10,7 +10,7 @@ import numpy as np
 from ..errors import InputError
 from ..problem.law_term import LawTerm
 from ..runtime.mpi import agree
-from ..typing import Array, Integers
+from ..typing import Array, Integers, Mask
 from .condensed_problem import Bonds, PrescribedBonds
 from .interior import Interior
 from .system import System
@@ -49,19 +49,12 @@ def make(system: System, interior: Interior, prescribed: Array) -> CondensedLaws
         prescribed: prescribed displacements, constant and scaled, (local unknowns, 2).
 
     Raises:
-        InputError: on all ranks alike: a law on |u_t| where one component has a prescribed value that is not zero, or a
-            law of opening and slip together.
+        InputError: on all ranks alike: a law of a length where one component has a prescribed value that is not zero.
     """
-    for term in system.terms:
-        if term.length is not None and term.length.opens:
-            raise InputError(
-                f"boundary.{term.surface.part}: cohesion acts on opening and slip together, which `hvi path` and "
-                "`hvi equilibria` do not follow. `hvi run` solves one load at a time; or give adhesion and friction"
-            )
     number = np.full(system.load.local_size, -1)
     number[interior.kept] = interior.first + np.arange(len(interior.kept))
     found = [_Term(system, term, number, prescribed) for term in system.terms]
-    bonds = [b for term in found for k in (1, 2) for b in term.bonds(k)]
+    bonds = [b for term in found for b in term.bonds()]
     held = [b for term in found for b in term.prescribed_bonds()]
     return CondensedLaws(bonds=tuple(bonds), prescribed=tuple(held))
 
@@ -80,32 +73,62 @@ class _Term:
         moved = np.any(constant != 0.0, axis=(1, 2)) & ((self._components > 0) | term.radial)
         if any(agree(system.comm, bool(np.any(moved)))):
             raise InputError(
-                f"boundary.{term.surface.part}: a law acts on |u_t| where one component of u_t is prescribed and not "
-                "zero; such a scene has no condensed form"
+                f"boundary.{term.surface.part}: a law acts on the length of a vector of which one component is "
+                "prescribed and not zero; such a scene has no condensed form"
             )
 
-    def bonds(self, components: int) -> Sequence[Bonds]:
-        """The vertices where so many components are free, of all ranks. Collective."""
-        term, here = self._term, self._components == components
-        free = self._free[here]
-        unknowns = self._unknowns[here][free].reshape(-1, components)
-        columns = np.swapaxes(term.directions[here], 1, 2)[free].reshape(-1, components, term.directions.shape[1])
-        signs = columns[:, :, 0] if term.directions.shape[1] == 1 else np.linalg.norm(columns, axis=2)
-        surface = term.surface
-        parts = (unknowns, signs, term.weights[here], surface.points[here])
+    def bonds(self) -> list[Bonds]:
+        """The vertices by the number of free components and whether one is an opening, of all ranks. Collective."""
+        opening = self._opening
+        kinds = [(k, opens) for k in (1, 2, 3) for opens in (False, True)]
+        return [b for k, opens in kinds for b in self._bonds((self._components == k) & (opening == opens), k, opens)]
+
+    @property
+    def _opening(self) -> Mask:
+        """Where an opening that counts only while it is positive is free, (m,)."""
+        term = self._term
+        if term.length is None or not term.length.opens:
+            return np.zeros(len(self._components), dtype=bool)
+        return np.asarray(np.any((term.directions[:, 0] != 0.0) & self._free, axis=1))
+
+    def _bonds(self, here: Mask, components: int, opens: bool) -> Sequence[Bonds]:
+        """The vertices of one kind. Collective."""
+        term, surface = self._term, self._term.surface
+        unknowns, signs = self._felt(here, components, opens)
+        parts = (unknowns, signs, (surface.weights * term.placed)[here], surface.points[here])
         unknowns, signs, weights, points = (np.concatenate(agree(self._comm, p)) for p in parts)
         if not len(weights):
             return []
+        law = term.law
+        if term.length is not None and components == 1 and not opens:  # a slip alone: its law has the factor
+            factor = term.length.factors[-1]
+            law, signs = (law if factor == 1.0 else law.scaled(factor, 1.0 / factor)), signs / factor
         found = Bonds(
-            law=term.law,
+            law=law,
             unknowns=unknowns,
             signs=signs,
             weights=weights,
             part=surface.part,
             direction=term.direction,
             points=points,
+            opens=opens,
+            mixity=term.mixity,
         )
         return [found]
+
+    def _felt(self, here: Mask, components: int, opens: bool) -> tuple[Integers, Array]:
+        """The unknowns, an opening first, and what they are multiplied by, (m, k) each."""
+        term, free = self._term, self._free[here]
+        unknowns = self._unknowns[here][free].reshape(-1, components)
+        columns = np.swapaxes(term.directions[here], 1, 2)[free].reshape(-1, components, term.directions.shape[1])
+        if term.length is None:
+            return unknowns, columns[:, :, 0]
+        signs = np.linalg.norm(columns * np.array(term.length.factors), axis=2)
+        if not opens:
+            return unknowns, signs
+        signs = np.where(columns[:, :, 0] != 0.0, columns[:, :, 0] * term.length.factors[0], signs)
+        order = np.argsort(columns[:, :, 0] == 0.0, axis=1, kind="stable")
+        return np.take_along_axis(unknowns, order, axis=1), np.take_along_axis(signs, order, axis=1)
 
     def prescribed_bonds(self) -> Sequence[PrescribedBonds]:
         """The vertices where no component is free, and the energy is not always zero, of all ranks. Collective."""

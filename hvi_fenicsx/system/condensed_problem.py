@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..effects import Direction
-from ..laws import Superpotential
+from ..laws import Mixity, Superpotential
 from ..typing import Array, Integers
 
 
@@ -21,8 +21,10 @@ class Bonds:
 
     Attributes:
         law: j.
-        unknowns: numbers of the unknowns that it acts on, (m, k); k = 2 for |u_t| in 3D.
-        signs: the law's argument is signs * x[unknowns] (k = 1), or the length of that vector (k = 2), (m, k).
+        unknowns: numbers of the unknowns that it acts on, (m, k); k > 1 for a law on a length.
+        signs: the law's argument is signs * x[unknowns] (k = 1), or the length of that vector, (m, k).
+        opens: whether the first unknown is an opening, which counts in the length only where it is positive.
+        mixity: how the energy of separation depends on the mode; None: it does not.
         weights: lumped areas times the law's multiplier, (m,).
         part: name of the part.
         direction: which displacement it acts on.
@@ -36,6 +38,13 @@ class Bonds:
     part: str
     direction: Direction
     points: Array
+    opens: bool = False
+    mixity: Mixity | None = None
+
+    @property
+    def radial(self) -> bool:
+        """Whether the law acts on a length."""
+        return self.opens or self.unknowns.shape[1] > 1
 
     def argument(self, x: Array) -> Array:
         """What the law acts on, (m,).
@@ -44,7 +53,9 @@ class Bonds:
             x: the unknowns, (n,).
         """
         vectors = self.signs * x[self.unknowns]
-        return vectors[:, 0] if vectors.shape[1] == 1 else np.linalg.norm(vectors, axis=1)
+        if self.opens:
+            vectors[:, 0] = np.maximum(vectors[:, 0], 0.0)
+        return np.linalg.norm(vectors, axis=1) if self.radial else vectors[:, 0]
 
     def energy(self, x: Array) -> float:
         """Σ w j.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -9,9 +10,9 @@ import numpy as np
 
 from ...errors import InputError
 from ...system.condensed_problem import CondensedProblem
-from ...typing import Integers
 from ..segments import Kind, Segment
 from .deviations import between
+from .radials import Radials
 from .vertex_laws import VertexLaw
 
 
@@ -46,24 +47,41 @@ def fresh(segment: Segment, laws: Sequence[VertexLaw]) -> Segment:
     return segment
 
 
-def refuse_shared(problem: CondensedProblem, two: Integers, laws: Sequence[VertexLaw]) -> None:
-    """Refuse what has no graph of its own: unknowns that a law on |u_t| shares with another law or a bound.
+def beside_opening(lower: float) -> tuple[Segment, ...]:
+    """The segments of an opening: pressed against its bound, free while it is negative, part of a length.
+
+    Args:
+        lower: the bound, at most 0; or -inf.
+    """
+    found = [Segment(kind=Kind.PIECE, x=0.0, force=0.0, low=0.0, high=math.inf)]
+    if lower < 0.0:
+        found.insert(0, Segment(kind=Kind.PIECE, x=0.0, force=0.0, low=lower, high=0.0))
+    if math.isfinite(lower):
+        found.insert(0, Segment(kind=Kind.BOUND, x=lower, force=0.0, rise=1.0, low=-math.inf, high=0.0))
+    return tuple(found)
+
+
+def refuse_shared(problem: CondensedProblem, radials: Radials, laws: Sequence[VertexLaw]) -> None:
+    """Refuse what has no graph of its own: unknowns that a law on a length shares with another law or a bound.
 
     Args:
         problem: the problem.
-        two: the unknowns of laws on |u_t|, (p, 2).
+        radials: the sites of laws on a length.
         laws: at all vertices.
 
     Raises:
-        InputError: there are such unknowns.
+        InputError: there are such unknowns, or openings with a bound above 0.
     """
-    seen = two.ravel()
-    with_one = [i for law in laws if len(law.unknowns) == 1 for i in law.unknowns]
-    bounded = np.flatnonzero(np.isfinite(problem.lower) | np.isfinite(problem.upper))
+    seen, openings = radials.flat, radials.opening_unknowns
+    with_one = [i for law in laws if not law.radial for i in law.unknowns]
+    low = np.isfinite(problem.lower)
+    low[openings] = problem.lower[openings] > 0.0
+    bounded = np.flatnonzero(low | np.isfinite(problem.upper))
     shared = np.intersect1d(seen, np.concatenate([np.array(with_one, dtype=np.int64), bounded]))
     if len(np.unique(seen)) == len(seen) and not shared.size:
         return
     raise InputError(
-        "path: at a vertex a law acts on |u_t|, and contact or another law on a component of u_t; such an edge has no "
-        "path yet. Leave one of them away there, or let the parts not meet"
+        "path: at a vertex a law acts on |u_t| or on opening and slip, and contact or another law on a component of "
+        "it; such an edge has no path yet. Leave one of them away there, or let the parts not meet. Cohesion beside "
+        "contact has a path where nothing bounds the opening from above, and the gap is not negative"
     )

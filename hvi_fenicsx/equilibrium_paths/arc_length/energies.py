@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -41,16 +41,19 @@ class Balance:
         problem: the problem.
         sites: its sites.
         work: done before.
+        dissipated: before.
 
     Attributes:
         work: done by the loads and by what moves prescribed displacements.
         stored: the energies of the last state.
     """
 
-    def __init__(self, problem: CondensedProblem, sites: Sites, work: float = 0.0) -> None:
+    def __init__(self, problem: CondensedProblem, sites: Sites, work: float = 0.0, dissipated: float = 0.0) -> None:
         self._problem, self._sites, self.work = problem, sites, work
         self._size = sum(float(b.weights.sum()) * b.law.energy_scale for b in problem.bonds)
         self._remembers = {law.group for several in sites.laws for law in several if law.passed is not None}
+        self._in_sites = self._remembers | {n for n, b in enumerate(problem.bonds) if b.mixity is not None}
+        self._potential, self._lost = all(b.mixity is None for b in problem.bonds), dissipated
         self.stored = Stored(energy=0.0, potential=0.0, dissipated=0.0, size=0.0)
 
     def at(self, values: Values, factor: float) -> Stored:
@@ -63,12 +66,12 @@ class Balance:
         problem, x = self._problem, values.x
         elastic, load = 0.5 * float(x @ (problem.stiffness @ x)), float(problem.load(factor) @ x)
         constant = problem.constant_at(factor)
-        plain = sum(b.energy(x) for n, b in enumerate(problem.bonds) if n not in self._remembers)
+        plain = sum(b.energy(x) for n, b in enumerate(problem.bonds) if n not in self._in_sites)
         back, lost = self._bonds(values)
         return Stored(
             energy=elastic - load + constant + plain + back,
             potential=problem.potential(x, factor),
-            dissipated=lost,
+            dissipated=lost if self._potential else self._lost,
             size=abs(elastic) + abs(load) + abs(constant) + abs(plain) + abs(back) + lost,
         )
 
@@ -76,13 +79,13 @@ class Balance:
         """What bonds with memory give back, and what they have lost."""
         back = lost = 0.0
         for k, laws in enumerate(self._sites.laws):
-            if all(law.passed is None for law in laws):
+            if not any(law.group in self._in_sites for law in laws):
                 continue
             x = float(values.lengths[k])
             shares = self._sites.shares(k, x, self._sites.bond_force(k, values))
             for law, share in zip(laws, shares, strict=True):
-                if law.passed is not None:
-                    back += law.recoverable(x, share)
+                if law.group in self._in_sites:
+                    back += float(values.energies[k]) * law.recoverable(x, share)
                     lost += law.dissipated(x, share)
         return back, lost
 
@@ -103,7 +106,12 @@ class Balance:
             unit: of the factor.
         """
         after = self.at(move.after.values, float(move.after.y[-1]) * unit)
-        self.work += after.potential - self.stored.potential + self._moved(move, unit)
+        done = after.potential - self.stored.potential + self._moved(move, unit)
+        self.work += done
+        if not self._potential:  # the bonds have no energy but the frozen one: what the work leaves is lost
+            before = self.stored.energy + self.stored.potential
+            self._lost += done - (after.energy + after.potential - before)
+            after = replace(after, dissipated=self._lost)
         self._size = max(self._size, after.size)
         self.stored = after
 
@@ -125,6 +133,8 @@ class Balance:
             move: the step.
             unit: of the factor.
         """
+        if not self._potential:
+            return 0.0
         ends = [self.at(place.values, float(place.y[-1]) * unit) for place in (move.before, move.after)]
         change = sum(sign * (e.energy + e.dissipated) for sign, e in zip((-1.0, 1.0), ends, strict=True))
         size = max(self._size, *(e.size for e in ends))

@@ -13,6 +13,8 @@ from .sites import Sites, Values
 
 ROUNDING = 1e-10
 """A coordinate this near to the end of its segment is there; a rate this small beside the largest is none."""
+_ROUNDS = 40
+"""Corrections of the directions in which vertices at rest set out, at most."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -112,6 +114,16 @@ class Equations:
         Raises:
             numpy.linalg.LinAlgError: the function stands along the curve.
         """
+        found = self._tangent(values, row, sign)
+        for _ in range(_ROUNDS):
+            setting_out = self.sites.setting_out(values, found[:-1])
+            if setting_out is None or np.allclose(setting_out.energies, values.energies, rtol=1e-14, atol=0.0):
+                break
+            values = setting_out
+            found = self._tangent(values, row, sign)
+        return found
+
+    def _tangent(self, values: Values, row: Array, sign: float) -> Array:
         right = np.zeros(len(row))
         right[-1] = sign
         with np.errstate(all="ignore"):
@@ -166,11 +178,12 @@ class Equations:
         return lambda y: float(self.sites.s(y[:-1])[k]) - end, lambda y: np.append(self._gradient(y, k, unit), 0.0)
 
     def _gradient(self, y: Array, k: int, unit: Array) -> Array:
-        sites, found, m1 = self.sites, np.zeros(len(y) - 1), len(self.sites.one)
-        if k < m1:
-            found[sites.one[k]] = unit[k]
+        sites, found = self.sites, np.zeros(len(y) - 1)
+        p = sites.radial(k)
+        if p is None:
+            found[sites.unknowns()[k]] = unit[k]
         else:
-            found[sites.two[k - m1]] = sites.directions(y[:-1])[k - m1]
+            found[sites.radials.groups[p]] = sites.directions(y[:-1])[sites.radials.owner == p]
         return found
 
     def row(self, k: int) -> Array:

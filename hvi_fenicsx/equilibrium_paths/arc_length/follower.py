@@ -15,6 +15,7 @@ from ..state import End, Event, Follow, PathOptions, PathState, Place, Position,
 from .curve import Curve, Move, Outcome
 from .energies import Balance, displacement_rate
 from .equations import Refused
+from .felt import factors, felt
 from .jump import jump
 from .passage import Crossing, Passage, order
 from .rest import Rest, at_rest, is_held
@@ -37,7 +38,7 @@ class ArcLengthFollower(Follower):
         reason: that in a sentence.
 
     Raises:
-        InputError: a law on |u_t| shares an unknown with another law or a bound.
+        InputError: a law on a length shares an unknown with another law or a bound.
     """
 
     def __init__(
@@ -48,6 +49,8 @@ class ArcLengthFollower(Follower):
         interrupted: Callable[[], bool] = lambda: False,
         fineness: float = 1.0,
     ) -> None:
+        self._factors = factors(problem)
+        problem = felt(problem, self._factors)
         super().__init__(problem, options, resume, interrupted)
         self._fineness = fineness
         self._laws = vertex_laws(problem, options.remember)
@@ -107,7 +110,7 @@ class ArcLengthFollower(Follower):
             sites.enter(k, int(position.numbers[k]))
         self._follow_from(position.small.copy(), state.factor)
         self._unstable, self._leg = state.unstable, position.leg
-        self._balance = Balance(self._problem, sites, state.work)
+        self._balance = Balance(self._problem, sites, state.work, state.dissipated)
         self._balance.begin(self._curve.here.values, self._curve.factor)
         if state.event not in (Event.START, Event.TURN):
             row = np.eye(1, self._problem.size + 1, position.driver)[0]
@@ -226,7 +229,7 @@ class ArcLengthFollower(Follower):
             factor=curve.factor,
             event=event,
             place=self._place(passages[0]) if passages else None,
-            x=curve.here.values.x,
+            x=curve.here.values.x / self._factors,
             energy=stored.energy,
             work=self._balance.work,
             dissipated=stored.dissipated,
@@ -253,7 +256,7 @@ class ArcLengthFollower(Follower):
         )
 
     def _place(self, passage: Passage) -> Place:
-        laws = self._sites.laws[passage.site]
+        laws = self._sites.laws_at(passage.site)
         group = laws[0].group if laws and not (passage.closes or passage.opens) else None
         return place_of(self._problem, int(self._sites.unknowns()[passage.site][0]), group)
 

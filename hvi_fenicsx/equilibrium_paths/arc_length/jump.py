@@ -117,8 +117,9 @@ def _after_drops(problem: CondensedProblem, sites: Sites, here: Place, drops: li
     motion, groups = np.zeros(problem.size), sites.unknowns()
     rates = sites.rates(here.y[:-1], here.tangent[:-1])
     for k in drops:
-        p = k - len(sites.one)
-        motion[groups[k]] = (np.sign(rates[k]) or 1.0) * (1.0 if p < 0 else here.values.directions[p])
+        p = sites.radial(k)
+        way = 1.0 if p is None else here.values.directions[sites.radials.owner == p]
+        motion[groups[k]] = (np.sign(rates[k]) or 1.0) * way
     basis, slopes = sites.motions(here.values)
     if basis.shape[1]:
         matrix = basis.T @ problem.stiffness @ basis + np.diag(slopes)
@@ -141,7 +142,7 @@ def _evened(sites: Sites, motion: Array) -> Array:
     found = np.zeros_like(motion)
     for several, unknowns in zip(sites.laws, sites.unknowns(), strict=True):
         size = float(np.linalg.norm(motion[unknowns]))
-        if size > 1e-6:
+        if several and size > 1e-6:
             found[unknowns] = sum(law.weight for law in several) * motion[unknowns] / size
     largest = float(np.max(np.abs(found), initial=0.0))
     return np.asarray(found / largest) if largest else motion

@@ -65,7 +65,7 @@ class Relaxation:
             if float(np.max(self._sites.s(self.z), initial=0.0)) > _FAR * self._size:
                 self.escapes = True
                 return True
-            self._theta *= _FASTER if self._stepped() else _SLOWER
+            self._theta *= _FASTER if self._stepped_or_back() else _SLOWER
             if self._theta > 1e12:
                 return False
         return False
@@ -85,6 +85,15 @@ class Relaxation:
         curve = Curve(self._load, np.zeros_like(self._load), self._sites, self.z, 0.0)
         self.z = curve.correct(curve.here.y, curve.at_factor(0.0))[:-1]
         return self._sites.unstable_directions(self._sites.values(self.z)) == 0
+
+    def _stepped_or_back(self) -> bool:
+        """One step in time, if it goes well; else nothing has changed."""
+        kept, z = self._sites.kept(), self.z
+        well = self._stepped()
+        if not well:
+            self._sites.restore(kept)
+            self.z = z
+        return well
 
     def _stepped(self) -> bool:
         """One step in time, up to the first drop; whether it went well."""

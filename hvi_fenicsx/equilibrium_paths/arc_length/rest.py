@@ -40,6 +40,8 @@ def at_rest(problem: CondensedProblem, sites: Sites) -> Rest:
         i = int(sites.one[k]) if k < len(sites.one) else None
         at, wanted = (0.0, 0.0) if i is None else (float(x[i]), float(free[i]))
         number, s_force = _standing(sites.chain(k), at, wanted)
+        if sites.opening(k) is not None and sites.chain(k)[number].kind is Kind.PIECE:
+            number = len(sites.chain(k)) - 1
         sites.enter(k, number)
         if i is not None:
             z[i], force[i] = sites.coordinate(k, at, s_force), s_force

@@ -1,9 +1,10 @@
 """The graphs of all sites as chains of segments, where each site is on its own, and what their laws remember.
 
-A site is an unknown with its laws and bounds, or the two unknowns of a law on |u_t|. Its graph of force over
-displacement is one continuous line, vertical where a law jumps and at a bound (:mod:`..segments`); s runs along it,
-nondimensional. The coordinate of a site of two unknowns is a vector z of length s: displacement and force have its
-direction. So sticking, sliding, a drop at a fixed length and what is remembered all have smooth equations.
+A site is an unknown with its laws and bounds, or the unknowns of a law on a length (:mod:`.radials`). Its graph of
+force over displacement is one continuous line, vertical where a law jumps and at a bound (:mod:`..segments`); s runs
+along it, nondimensional. The coordinate of a site of a length is a vector z of length s: displacement and force have
+its direction. So sticking, sliding, a drop at a fixed length and what is remembered all have smooth equations. An
+opening has a site of its own beside, without a law: what it does where it is not positive.
 """
 
 from __future__ import annotations
@@ -17,8 +18,9 @@ from ...system.condensed_problem import CondensedProblem
 from ...typing import Array, Integers
 from ..graphs import Passed
 from ..segments import Component, Kind, Segment, chain
-from .chains import fresh, from_zero, refuse_shared
+from .chains import beside_opening, fresh, from_zero, refuse_shared
 from .deviations import Deviations
+from .radials import Radials
 from .vertex_laws import VertexLaw, shares
 
 
@@ -48,7 +50,7 @@ class SiteGraphs:
 
     Attributes:
         one: the unknowns of sites of one unknown, which come first, (m1,).
-        two: the unknowns of the others, (p, 2).
+        radials: the p sites of laws on a length, which come next; then come the sites of their openings, (q,).
         numbers: of the segments on which the sites are, (m,).
         low: least s, (m,).
         high: greatest s, (m,).
@@ -58,25 +60,31 @@ class SiteGraphs:
         stiffness: S, or another one while a body moves, (n, n).
 
     Raises:
-        InputError: a law on |u_t| shares an unknown with another law or a bound.
+        InputError: a law on a length shares an unknown with another law or a bound.
     """
 
     def __init__(self, problem: CondensedProblem, laws: Sequence[VertexLaw]) -> None:
         self._problem, self.stiffness = problem, problem.stiffness
-        radial = sorted({law.unknowns for law in laws if len(law.unknowns) == 2})
-        self.two = np.array(radial, dtype=np.int64).reshape(-1, 2)
-        self.one = np.setdiff1d(np.arange(problem.size), self.two)
-        keys = [(int(i),) for i in self.one] + radial
-        self.laws = [[law for law in laws if law.unknowns == key] for key in keys]
-        refuse_shared(problem, self.two, laws)
+        kinds = {law.unknowns: (law.opens, law.mixity) for law in laws if law.radial}
+        lengths = sorted(kinds)
+        self.radials = Radials(lengths, [kinds[group][0] for group in lengths], [kinds[group][1] for group in lengths])
+        self.one = np.setdiff1d(np.arange(problem.size), self.radials.flat)
+        by_unknowns: dict[tuple[int, ...], list[VertexLaw]] = {}
+        for law in laws:
+            by_unknowns.setdefault(law.unknowns, []).append(law)
+        keys = [*((int(i),) for i in self.one), *lengths]
+        openings = self.radials.opening_unknowns
+        self.laws = [*(by_unknowns.get(key, []) for key in keys), *([] for _ in openings)]
+        refuse_shared(problem, self.radials, laws)
         self.length, self.forces = self._units(laws)
-        self._force_units = np.concatenate([self.forces[self.one], self.forces[self.two[:, 0]]])
+        self._force_units = self.forces[[*(key[0] for key in keys), *openings]]
         self._deviations = Deviations(self.laws)
-        m = len(keys)
+        m = len(self.laws)
         self.numbers = np.zeros(m, dtype=np.int64)
         self.low, self.high, self.outward = np.zeros(m), np.zeros(m), np.zeros(m)
         self._base, self._x, self._force = np.zeros(m), np.zeros(m), np.zeros(m)
-        self._moves, self._rises, self._bent = np.zeros(m), np.zeros(m), np.zeros(m, dtype=bool)
+        self._moves, self._rises = np.zeros(m), np.zeros(m)
+        self._curved, self._bent = np.zeros(m, dtype=bool), np.zeros(m, dtype=bool)
         self._chains: list[tuple[Segment, ...]] = [()] * m
         self._bases: list[Array] = [np.zeros(0)] * m
         for k in range(m):
@@ -87,7 +95,24 @@ class SiteGraphs:
 
     def unknowns(self) -> list[Integers]:
         """The unknowns of each site."""
-        return [*self.one.reshape(-1, 1), *self.two]
+        return [*self.one.reshape(-1, 1), *self.radials.groups, *self.radials.opening_unknowns.reshape(-1, 1)]
+
+    def radial(self, k: int) -> int | None:
+        """The number among the sites of lengths of a site; None: it is none of these."""
+        p = k - len(self.one)
+        return p if 0 <= p < len(self.radials) else None
+
+    def opening(self, k: int) -> int | None:
+        """The number among the openings of a site; None: it is none of these."""
+        number = k - len(self.one) - len(self.radials)
+        return number if number >= 0 else None
+
+    def laws_at(self, k: int) -> list[VertexLaw]:
+        """The laws of a site; of an opening, those of its length."""
+        opening = self.opening(k)
+        if opening is None:
+            return self.laws[k]
+        return self.laws[len(self.one) + int(self.radials.owner[self.radials.openings[opening]])]
 
     def _units(self, laws: Sequence[VertexLaw]) -> tuple[float, Array]:
         problem = self._problem
@@ -97,8 +122,8 @@ class SiteGraphs:
         bounds = np.abs(np.concatenate([problem.lower, problem.upper]))
         elastic = np.max(np.abs(problem.force_rate) / diagonal, initial=0.0)
         length = max(lengths, default=max(elastic, float(np.max(bounds[np.isfinite(bounds)], initial=0.0))) or 1.0)
-        for pair in self.two:
-            diagonal[pair] = diagonal[pair].mean()
+        for group in self.radials.groups:
+            diagonal[group] = diagonal[group].mean()
         return float(length), diagonal * float(length)
 
     # -- graphs
@@ -113,14 +138,16 @@ class SiteGraphs:
         self._bases[k] = self._based(k)
 
     def _made(self, k: int) -> tuple[Segment, ...]:
-        laws, problem = self.laws[k], self._problem
+        laws, problem, opening = self.laws[k], self._problem, self.opening(k)
+        if opening is not None:
+            return beside_opening(float(problem.lower[self.radials.opening_unknowns[opening]]))
         parts = [
             Component(
                 graph=law.graph(), weight=law.weight, passed=None if law.passed is None else law.passed.displacements
             )
             for law in laws
         ]
-        if k >= len(self.one):
+        if self.radial(k) is not None:
             return from_zero(chain(parts, 0.0, np.inf), laws)
         i = int(self.one[k])
         found = chain(parts, float(problem.lower[i]), float(problem.upper[i]))
@@ -136,7 +163,7 @@ class SiteGraphs:
                 at += (segment.high - segment.low) / unit
             else:
                 found[number] = -segment.high / unit if np.isfinite(segment.high) else 0.0
-        return found
+        return found if self.opening(k) is None else found - found[-1]
 
     def unit(self, k: int, segment: Segment) -> float:
         """The unit of a segment's own coordinate.
@@ -166,14 +193,31 @@ class SiteGraphs:
         unit = self.unit(k, segment)
         self.numbers[k], self._base[k] = number, base
         self.low[k], self.high[k], self.outward[k] = base + segment.low / unit, base + segment.high / unit, 0
-        if k >= len(self.one) and number == 0:
+        if self.radial(k) is not None and number == 0:
             self.low[k] = -np.inf  # a length passes through 0
         self._x[k], self._force[k] = segment.x, segment.force
         self._moves[k] = 0.0 if segment.rise else unit
         self._rises[k] = (segment.rise or segment.slope) * unit
         self.outward[k] = segment.outward
-        bent = self._deviations.enter(k, segment)
-        self._bent[k] = bent or (k >= len(self.one) and not self._proportional(k))
+        self._curved[k] = self._deviations.enter(k, segment)
+        self._bent[k] = self._curved[k] or self._turns(k)
+        self._count(k, counts=number == len(self._chains[k]) - 1)
+
+    def _count(self, k: int, *, counts: bool) -> None:
+        """Let the opening that a site is count in its length, or not."""
+        opening = self.opening(k)
+        if opening is None:
+            return
+        self.radials.counts[self.radials.openings[opening]] = counts
+        of = len(self.one) + int(self.radials.owner[self.radials.openings[opening]])
+        self._bent[of] = self._curved[of] or self._turns(of)
+
+    def _turns(self, k: int) -> bool:
+        """Whether a site's vector may turn without its force being a multiple of it."""
+        p = self.radial(k)
+        if p is None or self.radials.counted(p) <= 1:
+            return False
+        return any(law.mixity is not None for law in self.laws[k]) or not self._proportional(k)
 
     def _proportional(self, k: int) -> bool:
         """Whether displacement and force are multiples of s on the present segment."""
@@ -200,24 +244,21 @@ class SiteGraphs:
             k: the site.
             s: the new one.
         """
-        m1 = len(self.one)
-        if k < m1:
-            z[self.one[k]] = s
+        p = self.radial(k)
+        if p is None:
+            z[self.unknowns()[k]] = s
         else:
-            z[self.two[k - m1]] = s * self.directions(z)[k - m1]
+            here = self.radials.owner == p
+            group = self.radials.groups[p]
+            z[group] = np.where(self.radials.counts[here], s * self.directions(z)[here], z[group])
 
     def s(self, z: Array) -> Array:
         """The coordinates along the graphs, (m,)."""
-        return np.concatenate([z[self.one], np.hypot(*z[self.two].T)])
+        return np.concatenate([z[self.one], self.radials.lengths(z), z[self.radials.opening_unknowns]])
 
     def directions(self, z: Array) -> Array:
-        """Unit vectors of the sites of two unknowns, (p, 2)."""
-        vectors = z[self.two]
-        lengths = np.hypot(*vectors.T)
-        found = np.tile([1.0, 0.0], (len(vectors), 1))
-        some = lengths > 0.0
-        found[some] = vectors[some] / lengths[some, None]
-        return found
+        """Unit vectors of the sites of lengths, (N,)."""
+        return self.radials.directions(z)
 
     def rates(self, z: Array, direction: Array) -> Array:
         """How s changes along a direction of the coordinates, (m,); a length of 0 grows in each of them.
@@ -226,10 +267,10 @@ class SiteGraphs:
             z: the coordinates, (n,).
             direction: of them, (n,).
         """
-        vectors = direction[self.two]
-        radial = np.einsum("pk,pk->p", self.directions(z), vectors)
-        radial = np.where(np.any(z[self.two] != 0.0, axis=1), radial, np.hypot(*vectors.T))
-        return np.concatenate([direction[self.one], radial])
+        radials = self.radials
+        along = radials.along(radials.directions(z), direction)
+        along = np.where(radials.lengths(z) > 0.0, along, radials.lengths(direction))
+        return np.concatenate([direction[self.one], along, direction[radials.opening_unknowns]])
 
     def on_drops(self) -> list[int]:
         """The sites where a law drops."""

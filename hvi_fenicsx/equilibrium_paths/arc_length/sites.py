@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.sparse import diags, find
 
 from ...typing import Array
 from ..segments import Kind
@@ -23,7 +24,8 @@ class Values:
         moves: derivatives of the lengths by s, (m,).
         rises: derivatives of the tractions by s, (m,).
         s: by site, (m,).
-        directions: of the sites of two unknowns, (p, 2).
+        directions: of the sites of lengths, (N,).
+        energies: by what the mode mixity multiplies the tractions, (m,).
     """
 
     x: Array
@@ -34,6 +36,7 @@ class Values:
     rises: Array
     s: Array
     directions: Array
+    energies: Array
 
 
 class Sites(SiteGraphs):
@@ -50,25 +53,79 @@ class Sites(SiteGraphs):
         lengths, tractions = self._x + self._moves * tau, self._force + self._rises * tau
         more, slopes = self._deviations.values(lengths)
         tractions, rises = tractions + more, self._rises + slopes * self._moves
-        x, force, m1 = np.zeros(len(z)), np.zeros(len(z)), len(self.one)
-        x[self.one], force[self.one] = lengths[:m1], tractions[:m1]
-        x[self.two], force[self.two] = lengths[m1:, None] * e, tractions[m1:, None] * e
+        energies = np.ones(len(s))
+        energies[len(self.one) : len(self.one) + len(self.radials)] = self.radials.energies(e)
         return Values(
-            x=x, force=force, lengths=lengths, tractions=tractions, moves=self._moves, rises=rises, s=s, directions=e
+            x=self._by_unknown(lengths, e),
+            force=self._by_unknown(tractions * energies, e),
+            lengths=lengths,
+            tractions=tractions,
+            moves=self._moves,
+            rises=rises,
+            s=s,
+            directions=e,
+            energies=energies,
         )
+
+    def setting_out(self, values: Values, direction: Array) -> Values | None:
+        """The values with the mode in which lengths of 0 begin to grow; None where no mode matters.
+
+        Args:
+            values: at the point.
+            direction: of the coordinates, (n,).
+        """
+        radials, p = self.radials, slice(len(self.one), len(self.one) + len(self.radials))
+        rest = values.s[p] == 0.0
+        if not radials.differ or not np.any(rest):
+            return None
+        e = np.where(rest[radials.owner], radials.directions(direction), values.directions)
+        energies = values.energies.copy()
+        energies[p] = radials.energies(e)
+        return replace(values, directions=e, energies=energies)
+
+    def _by_unknown(self, values: Array, e: Array) -> Array:
+        """What values along the sites are by unknown, (n,)."""
+        m1, radials, found = len(self.one), self.radials, np.zeros(len(self.forces))
+        found[self.one] = values[:m1]
+        parts = values[m1:][radials.owner] * e
+        beside = radials.openings
+        parts[beside] = np.where(radials.counts[beside], parts[beside], values[m1 + len(radials) :])
+        found[radials.flat] = parts
+        return found
+
+    def _blocks(self, values: Values, name: str) -> tuple[Array, Array]:
+        """The derivatives of vectors by z: diagonal, (N,), and what a site adds along its unit vector, (p,)."""
+        m1, radials = len(self.one), self.radials
+        p = len(radials)
+        every = getattr(values, name)
+        radial, s = every[m1 : m1 + p], values.s[m1 : m1 + p]
+        lengths = (values.lengths if name == "moves" else values.tractions)[m1 : m1 + p]
+        across = np.divide(lengths, s, out=radial.copy(), where=s > 0.0)
+        diagonal = across[radials.owner]
+        beside = radials.openings
+        diagonal[beside] = np.where(radials.counts[beside], diagonal[beside], every[m1 + p :])
+        return diagonal, radial - across
 
     def jacobian(self, values: Values) -> Array:
         """The derivative of S x + r by the coordinates, (n, n)."""
-        stiffness, m1 = self.stiffness, len(self.one)
+        stiffness, m1, radials = self.stiffness, len(self.one), self.radials
         found = np.zeros_like(stiffness)
         found[:, self.one] = stiffness[:, self.one] * values.moves[:m1]
         found[self.one, self.one] += values.rises[:m1]
-        i, j = self.two.T
-        moved, risen = (_blocks(values, ends) for ends in ("moves", "rises"))
-        for column, unknown in ((0, i), (1, j)):
-            found[:, unknown] = stiffness[:, i] * moved[:, 0, column] + stiffness[:, j] * moved[:, 1, column]
-            found[i, unknown] += risen[:, 0, column]
-            found[j, unknown] += risen[:, 1, column]
+        if not len(radials):
+            return found
+        flat, columns = radials.flat, radials.columns(values.directions)
+        (across, more), (rises, steeper) = self._blocks(values, "moves"), self._blocks(values, "rises")
+        moved = stiffness[:, flat]
+        found[:, flat] = moved * across + (columns @ (columns.multiply(more).T @ moved.T)).T
+        p = slice(m1, m1 + len(radials))
+        energies = values.energies[p]
+        by_unknown = np.where(radials.counts, energies[radials.owner], 1.0)
+        force = columns.multiply(steeper * energies) @ columns.T + diags(rises * by_unknown)
+        turned = radials.columns(radials.energy_rates(values.directions, values.s[p]))
+        force = force + columns.multiply(values.tractions[p]) @ turned.T
+        rows, others, entries = find(force)
+        found[flat[rows], flat[others]] += entries
         return found
 
     def displacement_rate(self, values: Values, direction: Array) -> Array:
@@ -78,9 +135,11 @@ class Sites(SiteGraphs):
             values: at the point.
             direction: of the coordinates, (n,).
         """
-        found, m1 = np.zeros(len(values.x)), len(self.one)
+        found, m1, radials = np.zeros(len(values.x)), len(self.one), self.radials
         found[self.one] = values.moves[:m1] * direction[self.one]
-        found[self.two] = np.einsum("pij,pj->pi", _blocks(values, "moves"), direction[self.two])
+        across, more = self._blocks(values, "moves")
+        along = radials.along(values.directions, direction)
+        found[radials.flat] = across * direction[radials.flat] + (more * along)[radials.owner] * values.directions
         return found
 
     def bond_force(self, k: int, values: Values) -> float:
@@ -107,22 +166,33 @@ class Sites(SiteGraphs):
 
     def motions(self, values: Values) -> tuple[Array, Array]:
         """The displacements that can change, as orthonormal columns (n, q), and the slopes of their forces, (q,)."""
-        n, m1 = len(values.x), len(self.one)
+        n, m1, radials = len(values.x), len(self.one), self.radials
         free = np.flatnonzero(values.moves[:m1])
         columns = [np.eye(n)[:, self.one[free]]]
         slopes = [values.rises[free] / values.moves[free]]
-        for p, pair in enumerate(self.two):
-            k, e = m1 + p, values.directions[p]
-            along, across = np.zeros((n, 1)), np.zeros((n, 1))
-            along[pair, 0], across[pair, 0] = e, (-e[1], e[0])
-            if values.moves[k]:
-                columns, slopes = [*columns, along], [*slopes, values.rises[k : k + 1] / values.moves[k]]
-            if values.lengths[k]:
-                columns = [*columns, across]
-                slopes = [*slopes, values.tractions[k : k + 1] / values.lengths[k]]
-            elif values.moves[k]:
-                columns, slopes = [*columns, across], [*slopes, slopes[-1]]
+        for p in range(len(radials)):
+            basis, steep = self._turning(p, values)
+            columns, slopes = [*columns, basis], [*slopes, steep]
+        for number, i in enumerate(radials.opening_unknowns):
+            if not radials.counts[radials.openings[number]] and values.moves[m1 + len(radials) + number]:
+                columns, slopes = [*columns, np.eye(n)[:, [i]]], [*slopes, np.zeros(1)]
         return np.concatenate(columns, axis=1), np.concatenate(slopes)
+
+    def _turning(self, p: int, values: Values) -> tuple[Array, Array]:
+        """Along a site's vector and across it: the columns that can change, (n, r), and their slopes, (r,)."""
+        k, here = len(self.one) + p, (self.radials.owner == p) & self.radials.counts
+        unknowns, e = self.radials.flat[here], values.directions[here]
+        axes = np.linalg.svd(e[None])[2].T if len(e) else np.zeros((0, 0))
+        axes[:, :1] = e[:, None]
+        moves, steep = bool(values.moves[k]), values.energies[k] * values.rises[k] / (values.moves[k] or 1.0)
+        if values.lengths[k]:
+            across, turns = values.energies[k] * values.tractions[k] / values.lengths[k], True
+        else:
+            across, turns = steep, moves
+        kept = np.array([moves, *[turns] * (len(e) - 1)][: len(e)], dtype=bool)
+        found = np.zeros((len(values.x), len(e)))
+        found[unknowns] = axes
+        return found[:, kept], np.array([steep, *[across] * (len(e) - 1)][: len(e)])[kept]
 
     @property
     def bent(self) -> bool:
@@ -132,13 +202,3 @@ class Sites(SiteGraphs):
     def reach(self, values: Values) -> Array:
         """How far the curved sites may move in one step, in units of s, (m,); infinite for the others."""
         return np.asarray(self._deviations.reach(values.lengths) / self.length)
-
-
-def _blocks(values: Values, name: str) -> Array:
-    """The derivatives of vectors along e by z: radial and across, (p, 2, 2)."""
-    e, m1 = values.directions, len(values.s) - len(values.directions)
-    radial = getattr(values, name)[m1:]
-    lengths = (values.lengths if name == "moves" else values.tractions)[m1:]
-    across = np.divide(lengths, values.s[m1:], out=radial.copy(), where=values.s[m1:] > 0.0)
-    outer = np.einsum("pi,pj->pij", e, e)
-    return np.asarray(across[:, None, None] * (np.eye(2) - outer) + radial[:, None, None] * outer)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...laws import Superpotential, TractionGraph
+from ...laws import Mixity, Superpotential, TractionGraph
 from ...system.condensed_problem import Bonds, CondensedProblem
 from ...typing import Array
 from ..graphs import Passed, graph_of, remembering, turned
@@ -15,25 +15,31 @@ from ..graphs import Passed, graph_of, remembering, turned
 
 @dataclass(slots=True, kw_only=True)
 class VertexLaw:
-    """A law at one vertex. Its coordinate is its unknown, or the length of its two unknowns.
+    """A law at one vertex. Its coordinate is its unknown, or the length of its unknowns.
 
     Attributes:
         group: number of its :class:`.Bonds`.
-        unknowns: what it acts on, one or two.
+        unknowns: what it acts on, one, or those of a length.
+        radial: whether it acts on a length.
+        opens: whether the first of them is an opening, which counts only where it is positive.
         sign: the law's argument is that times the coordinate.
         law: j.
         polyline: the traction graph of the law; None where it is curved.
         weight: lumped area.
         passed: what it remembers, along its coordinate; None without memory.
+        mixity: how the energy of separation depends on the mode; None: it does not.
     """
 
     group: int
     unknowns: tuple[int, ...]
+    radial: bool
+    opens: bool
     sign: float
     law: Superpotential
     polyline: TractionGraph | None
     weight: float
     passed: Passed | None
+    mixity: Mixity | None = None
 
     @property
     def curved(self) -> bool:
@@ -166,11 +172,14 @@ def _of_group(number: int, group: Bonds, *, remembers: bool) -> Iterator[VertexL
         yield VertexLaw(
             group=number,
             unknowns=unknowns,
-            sign=sign if len(unknowns) == 1 else 1.0,
+            radial=group.radial,
+            opens=group.opens,
+            sign=1.0 if group.radial else sign,
             law=group.law,
             polyline=graph,
             weight=float(weight),
             passed=Passed() if remembers else None,
+            mixity=group.mixity,
         )
 
 

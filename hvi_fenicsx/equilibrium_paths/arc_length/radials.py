@@ -1,0 +1,131 @@
+"""The sites of laws on a length: which unknowns they have, and which of these count.
+
+The coordinate of such a site is a vector z of its unknowns; displacement and force have its direction. An opening
+counts only while it is positive: where its z is negative it is free, or pressed against a bound, and the rest of the
+vector is the length. So z is continuous over all of these.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.sparse import csr_matrix
+
+from ...laws import Mixity
+from ...typing import Array, Integers, Mask
+
+
+class Radials:
+    """The p sites of laws on a length, with N unknowns together, of which q are openings.
+
+    Args:
+        groups: the unknowns of each site, an opening first.
+        opens: of each site, whether its first unknown is an opening.
+        mixities: of each site, how the energy of separation depends on the mode; None: it does not.
+
+    Attributes:
+        groups: the unknowns of each site.
+        flat: all of them, one site after the other, (N,).
+        owner: number of the site of each, (N,).
+        openings: numbers among the N of the openings, (q,).
+        counts: which of the N count, (N,).
+    """
+
+    def __init__(
+        self, groups: Sequence[tuple[int, ...]], opens: Sequence[bool], mixities: Sequence[Mixity | None]
+    ) -> None:
+        self.groups = [np.array(group, dtype=np.int64) for group in groups]
+        self.flat = np.concatenate([np.empty(0, np.int64), *self.groups])
+        self.owner = np.repeat(np.arange(len(groups)), [len(group) for group in groups])
+        firsts = np.cumsum([0, *[len(group) for group in groups]])[:-1]
+        self.openings = firsts[np.array(opens, dtype=bool)] if groups else np.empty(0, np.int64)
+        self.counts: Mask = np.ones(len(self.flat), dtype=bool)
+        self._slips = np.ones(len(self.flat))
+        self._slips[self.openings] = 0.0
+        criteria = [c for number, c in enumerate(mixities) if c is not None and c not in mixities[:number]]
+        self._criteria = [(c, np.array([p for p, own in enumerate(mixities) if own == c])) for c in criteria]
+
+    def __len__(self) -> int:
+        return len(self.groups)
+
+    @property
+    def opening_unknowns(self) -> Integers:
+        """The unknowns that are openings, (q,)."""
+        return self.flat[self.openings]
+
+    @property
+    def differ(self) -> bool:
+        """Whether any energy of separation depends on the mode."""
+        return bool(self._criteria)
+
+    def counted(self, p: int) -> int:
+        """How many unknowns of a site count."""
+        return int(np.count_nonzero(self.counts[self.owner == p]))
+
+    def lengths(self, z: Array) -> Array:
+        """The lengths of the vectors, (p,).
+
+        Args:
+            z: all coordinates, (n,) or more.
+        """
+        return np.asarray(np.sqrt(self._sums(self._vectors(z) ** 2)))
+
+    def directions(self, z: Array) -> Array:
+        """Unit vectors, (N,); where the length is 0 the first unknown that counts.
+
+        Args:
+            z: all coordinates, (n,) or more.
+        """
+        vectors, lengths = self._vectors(z), self.lengths(z)
+        found = np.divide(vectors, lengths[self.owner], out=np.zeros_like(vectors), where=lengths[self.owner] > 0.0)
+        for p in np.flatnonzero(lengths == 0.0):
+            found[np.flatnonzero((self.owner == p) & self.counts)[:1]] = 1.0
+        return found
+
+    def along(self, directions: Array, change: Array) -> Array:
+        """The products of unit vectors with a change of the coordinates, (p,).
+
+        Args:
+            directions: the unit vectors, (N,).
+            change: of all coordinates, (n,) or more.
+        """
+        return self._sums(directions * change[self.flat])
+
+    def columns(self, directions: Array) -> csr_matrix:
+        """The unit vectors as columns, (N, p)."""
+        return csr_matrix((directions, (np.arange(len(self.flat)), self.owner)), shape=(len(self.flat), len(self)))
+
+    def energies(self, directions: Array) -> Array:
+        """By what the mode mixity multiplies the forces of each site, (p,).
+
+        Args:
+            directions: the unit vectors, (N,).
+        """
+        found = np.ones(len(self))
+        for criterion, sites in self._criteria:
+            found[sites] = criterion.energy(self._shares(directions)[sites])
+        return found
+
+    def energy_rates(self, directions: Array, lengths: Array) -> Array:
+        """The derivatives of these by the coordinates, (N,).
+
+        Args:
+            directions: the unit vectors, (N,).
+            lengths: of the vectors, (p,).
+        """
+        share, slopes = self._shares(directions), np.zeros(len(self))
+        for criterion, sites in self._criteria:
+            slopes[sites] = criterion.slope(share[sites])
+        per_length = np.divide(2.0 * slopes, lengths, out=np.zeros_like(slopes), where=lengths > 0.0)
+        return np.asarray(per_length[self.owner] * directions * (self._slips - share[self.owner]))
+
+    def _shares(self, directions: Array) -> Array:
+        """The share of the slip in the square of each length, (p,)."""
+        return np.minimum(self._sums(self._slips * directions**2), 1.0)
+
+    def _vectors(self, z: Array) -> Array:
+        return np.where(self.counts, z[self.flat], 0.0)
+
+    def _sums(self, values: Array) -> Array:
+        return np.bincount(self.owner, values, minlength=len(self)).astype(np.float64)
