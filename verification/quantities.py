@@ -112,6 +112,35 @@ class ForceAt(OnPath, name="force_at"):
 
 
 @dataclass(frozen=True, kw_only=True)
+class LeverAtPeak(Quantity, name="lever_at_peak"):
+    """How far a rigid lever's load point goes down at the first largest load: it stands on the middle, and pulls the end."""
+
+    lever: float
+    half_span: float
+
+    def in_si(self, folder: Path) -> float:
+        rows = rows_of(folder / "path.csv")
+        at = first_peak(column(rows, "factor"))
+        end, middle = (float(column(rows, f"{part}.uy")[at]) for part in ("end", "middle"))
+        return -middle + self.lever / self.half_span * (end - middle)
+
+
+@dataclass(frozen=True, kw_only=True)
+class FirstPeak(Quantity, name="first_peak"):
+    """The factor at which the path first turns: the load at which a crack begins to grow."""
+
+    def in_si(self, folder: Path) -> float:
+        factors = column(rows_of(folder / "path.csv"), "factor")
+        return float(factors[first_peak(factors)])
+
+
+def first_peak(factors: Array) -> int:
+    """The row before the first fall of the factor; the last row without one."""
+    falls = np.flatnonzero(np.diff(factors) < 0.0)
+    return int(falls[0]) if falls.size else len(factors) - 1
+
+
+@dataclass(frozen=True, kw_only=True)
 class OnContact(Quantity):
     """A column of ``contact.csv`` on one part."""
 

@@ -102,7 +102,8 @@ class _Term:
         law = term.law
         if term.length is not None and components == 1 and not opens:  # a slip alone: its law has the factor
             factor = term.length.factors[-1]
-            law, signs = (law if factor == 1.0 else law.scaled(factor, 1.0 / factor)), signs / factor
+            law = law if factor == 1.0 else law.scaled(factor, 1.0 / factor)
+            signs = np.asarray(signs / factor, dtype=np.float64)
         found = Bonds(
             law=law,
             unknowns=unknowns,

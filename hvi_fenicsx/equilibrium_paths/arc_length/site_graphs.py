@@ -21,6 +21,7 @@ from ..segments import Component, Kind, Segment, chain
 from .chains import beside_opening, fresh, from_zero, refuse_shared
 from .deviations import Deviations
 from .radials import Radials
+from .units import units
 from .vertex_laws import VertexLaw, shares
 
 
@@ -76,7 +77,7 @@ class SiteGraphs:
         openings = self.radials.opening_unknowns
         self.laws = [*(by_unknowns.get(key, []) for key in keys), *([] for _ in openings)]
         refuse_shared(problem, self.radials, laws)
-        self.length, self.forces = self._units(laws)
+        self.length, self.forces = units(problem, laws, self.radials.groups)
         self._force_units = self.forces[[*(key[0] for key in keys), *openings]]
         self._deviations = Deviations(self.laws)
         m = len(self.laws)
@@ -113,18 +114,6 @@ class SiteGraphs:
         if opening is None:
             return self.laws[k]
         return self.laws[len(self.one) + int(self.radials.owner[self.radials.openings[opening]])]
-
-    def _units(self, laws: Sequence[VertexLaw]) -> tuple[float, Array]:
-        problem = self._problem
-        diagonal = np.diag(problem.stiffness).copy()
-        diagonal[diagonal <= 0.0] = np.max(diagonal, initial=0.0) or 1.0
-        lengths = {law.group: law.law.length_scale for law in laws}.values()
-        bounds = np.abs(np.concatenate([problem.lower, problem.upper]))
-        elastic = np.max(np.abs(problem.force_rate) / diagonal, initial=0.0)
-        length = max(lengths, default=max(elastic, float(np.max(bounds[np.isfinite(bounds)], initial=0.0))) or 1.0)
-        for group in self.radials.groups:
-            diagonal[group] = diagonal[group].mean()
-        return float(length), diagonal * float(length)
 
     # -- graphs
 

@@ -14,10 +14,10 @@ from test_curved_paths import events, folds, largest_distance, path, peak
 from test_exact_paths import largest_imbalance
 
 from hvi_fenicsx.effects import Direction
+from hvi_fenicsx.equilibrium_paths.exact import ExactFollower
+from hvi_fenicsx.equilibrium_paths.state import End, Event, Follow, PathOptions, PathState
 from hvi_fenicsx.errors import InputError
 from hvi_fenicsx.laws import BenzeggaghKenane, Mixity, PowerLaw, Superpotential
-from hvi_fenicsx.path.exact import ExactFollower
-from hvi_fenicsx.path.state import End, Event, Follow, PathOptions, PathState
 from hvi_fenicsx.system.condensed_problem import Bonds, CondensedProblem
 
 Array = npt.NDArray[np.float64]
