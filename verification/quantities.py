@@ -113,31 +113,31 @@ class ForceAt(OnPath, name="force_at"):
 
 @dataclass(frozen=True, kw_only=True)
 class LeverAtPeak(Quantity, name="lever_at_peak"):
-    """How far a rigid lever's load point goes down at the first largest load: it stands on the middle, and pulls the end."""
+    """How far a rigid lever's load point goes down at the largest load that falls again: it stands on the middle, and pulls the end."""
 
     lever: float
     half_span: float
 
     def in_si(self, folder: Path) -> float:
         rows = rows_of(folder / "path.csv")
-        at = first_peak(column(rows, "factor"))
+        at = largest_turn(column(rows, "factor"))
         end, middle = (float(column(rows, f"{part}.uy")[at]) for part in ("end", "middle"))
         return -middle + self.lever / self.half_span * (end - middle)
 
 
 @dataclass(frozen=True, kw_only=True)
-class FirstPeak(Quantity, name="first_peak"):
-    """The factor at which the path first turns: the load at which a crack begins to grow."""
+class LargestTurn(Quantity, name="largest_turn"):
+    """The largest factor of a path from which it falls again: the load at which a crack grows."""
 
     def in_si(self, folder: Path) -> float:
         factors = column(rows_of(folder / "path.csv"), "factor")
-        return float(factors[first_peak(factors)])
+        return float(factors[largest_turn(factors)])
 
 
-def first_peak(factors: Array) -> int:
-    """The row before the first fall of the factor; the last row without one."""
-    falls = np.flatnonzero(np.diff(factors) < 0.0)
-    return int(falls[0]) if falls.size else len(factors) - 1
+def largest_turn(factors: Array) -> int:
+    """The row of the largest factor from which a path falls again."""
+    turns = np.flatnonzero((np.diff(factors[:-1]) >= 0.0) & (np.diff(factors[1:]) < 0.0)) + 1
+    return int(turns[factors[turns].argmax()])
 
 
 @dataclass(frozen=True, kw_only=True)
