@@ -113,7 +113,10 @@ class ForceAt(OnPath, name="force_at"):
 
 @dataclass(frozen=True, kw_only=True)
 class LeverAtPeak(Quantity, name="lever_at_peak"):
-    """How far a rigid lever's load point goes down at the largest load that falls again: it stands on the middle, and pulls the end."""
+    """How far a rigid lever's load point goes down at the largest load that falls again.
+
+    The lever stands on the middle and pulls the end.
+    """
 
     lever: float
     half_span: float

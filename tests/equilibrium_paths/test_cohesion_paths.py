@@ -57,8 +57,15 @@ def one_mode(law: Superpotential, sign: float, pull: float, n: int = 4) -> Conde
     return problem(chain(n, 2.0) + 0.02 * np.eye(n), np.eye(1, n, n - 1)[0] * pull, own)
 
 
-@pytest.mark.parametrize("points", [SOFTENING, RIGID])
-@pytest.mark.parametrize("follow", Follow)
+@pytest.mark.parametrize(
+    ("points", "follow"),
+    [
+        (SOFTENING, Follow.STABLE),
+        pytest.param(SOFTENING, Follow.EXACT, marks=pytest.mark.long),
+        pytest.param(RIGID, Follow.STABLE, marks=pytest.mark.long),
+        pytest.param(RIGID, Follow.EXACT, marks=pytest.mark.long),
+    ],
+)
 def test_one_mode_alone_is_the_exact_path_of_that_mode(points: Any, follow: Follow) -> None:
     opening = graph(points, one_sided=True), -1.0
     slip = graph([[x / BETA, traction * BETA] for x, traction in points]), 1.0
@@ -74,9 +81,19 @@ def test_one_mode_alone_is_the_exact_path_of_that_mode(points: Any, follow: Foll
             assert states[-1].dissipated == pytest.approx(wanted[-1].dissipated, rel=1e-9)
 
 
-@pytest.mark.parametrize("width", [2, 3])
-@pytest.mark.parametrize("closes", [False, True])
-@pytest.mark.parametrize("angle", [-20.0, 30.0])
+@pytest.mark.parametrize(
+    ("angle", "closes", "width"),
+    [
+        (30.0, True, 2),
+        (-20.0, False, 3),
+        *(
+            pytest.param(angle, closes, width, marks=pytest.mark.long)
+            for angle in (-20.0, 30.0)
+            for closes in (False, True)
+            for width in (2, 3)
+        ),
+    ],
+)
 def test_energies_balance_on_mixed_paths_with_memory(angle: float, closes: bool, width: int) -> None:
     """Pulled off askew or pressed on: opening and slip turn on the way; nothing is dissipated twice."""
     pull = [-np.sin(np.radians(angle)), np.cos(np.radians(angle)), 0.3][:width]
@@ -94,8 +111,15 @@ def test_energies_balance_on_mixed_paths_with_memory(angle: float, closes: bool,
     assert turns[2].x == pytest.approx(turns[0].x, abs=1e-8)
 
 
-@pytest.mark.parametrize("angle", [20.0, 70.0])
-@pytest.mark.parametrize("points", [SOFTENING, RIGID])
+@pytest.mark.parametrize(
+    ("points", "angle"),
+    [
+        pytest.param(SOFTENING, 20.0, marks=pytest.mark.long),
+        (SOFTENING, 70.0),
+        pytest.param(RIGID, 20.0, marks=pytest.mark.long),
+        (RIGID, 70.0),
+    ],
+)
 def test_points_without_springs_bear_the_ellipse(points: Any, angle: float) -> None:
     """All points are pulled alike: 1/sqrt(t_n² + (t_s/beta)²), then they come off together."""
     across, along = np.sin(np.radians(angle)), np.cos(np.radians(angle))
@@ -114,6 +138,7 @@ def energy_slopes(given: CondensedProblem, state: PathState) -> Array:
     return np.asarray((np.array(ends[0]) - np.array(ends[1])) / (2 * step))
 
 
+@pytest.mark.long
 def test_states_are_stationary_points_of_the_energy() -> None:
     given = strip(graph(SOFTENING), [-0.5, 1.0])
     _, states = path(given, programme=(3.0,), follow=Follow.EXACT)
@@ -133,6 +158,7 @@ def test_a_tenth_of_the_step_is_the_same_branch(closes: bool) -> None:
     assert states[-1].x == pytest.approx(finer[-1].x, abs=1e-8)
 
 
+@pytest.mark.long
 def test_a_path_goes_on_from_any_of_its_states() -> None:
     given = strip(graph(SOFTENING), [-0.5, 1.0], closes=True)
     options: dict[str, Any] = {"programme": (1.2, 0.2, 2.0), "remember": (0,)}
@@ -178,7 +204,7 @@ def test_all_of_the_energy_at_a_mixity_is_dissipated(criterion: Mixity, angle: f
 
 
 @pytest.mark.parametrize("criterion", [BenzeggaghKenane(3.0, 2.1), PowerLaw(0.5, 1.5)])
-@pytest.mark.parametrize("closes", [False, True])
+@pytest.mark.parametrize("closes", [pytest.param(False, marks=pytest.mark.long), True])
 def test_with_energies_that_differ_every_state_is_an_equilibrium_of_its_own_mixity(
     criterion: Mixity, closes: bool
 ) -> None:
