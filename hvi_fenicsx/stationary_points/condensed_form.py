@@ -66,6 +66,6 @@ def _far(laws: Sequence[Bonds]) -> float:
 def _refuse_others(bonds: Bonds) -> None:
     if bonds.radial:
         raise InputError(
-            f"boundary.{bonds.part}: friction in space acts on |u_t|, and cohesion on opening and slip together; what is "
-            "searched are laws of one component"
+            f"boundary.{bonds.part}: friction in space acts on |u_t|, and cohesion on opening and slip together; what "
+            "is searched are laws of one component"
         )
