@@ -22,6 +22,10 @@ from ..typing import Array, Integers
 from . import vtk_files
 from .vtk_files import Grid
 
+_LENGTHS = ("displacement", "u_n", "u_t1", "u_t2", "gap")
+_STRESSES = ("stress", "von_mises", "sigma_n", "friction_t1", "friction_t2", "inclusion_distance")
+_UNITS = dict.fromkeys(_LENGTHS, "m") | dict.fromkeys(_STRESSES, "N/m²")
+
 
 def write_body(path: Path, solution: Solution, stress: Array) -> None:
     """Write displacement and reaction by vertex; by cell stress, strain, von Mises stress, estimated error.
@@ -113,6 +117,7 @@ def _grid(problem: Problem, at_points: Mapping[str, Array], in_cells: Mapping[st
         cells=numbered.reshape(cells.shape),
         at_points={name: _spatial(values[used]) for name, values in at_points.items()},
         in_cells={name: _flat(np.repeat(_rounded(values, 7), parts, axis=0)) for name, values in in_cells.items()},
+        units=_units(problem),
     )
 
 
@@ -136,6 +141,11 @@ def write_series(path: Path, problem: Problem, states: Iterable[tuple[float, flo
             yield time, _grid(problem, {"displacement": field}, {"factor": np.full(count, factor)})
 
     vtk_files.write_series(path, problem.domain.mesh.comm, grids())
+
+
+def _units(problem: Problem) -> dict[str, str]:
+    """The units of the fields that have one, by name."""
+    return _UNITS | {"reaction": "N/m" if problem.scales.dimension == 2 else "N"}
 
 
 def _flat(values: Array) -> npt.NDArray[np.float32]:
@@ -199,6 +209,7 @@ def write_contact(path: Path, problem: Problem, states: Sequence[ContactState]) 
         cells=numbered.reshape(cells.shape),
         at_points={name: values[used] for name, values in _nodal(problem, states).items()},
         in_cells={},
+        units=_units(problem),
     )
     vtk_files.write(path, mesh.comm, grid)
 

@@ -34,12 +34,14 @@ class Grid:
         cells: by their vertices, (c, k).
         at_points: fields by name, (n,) or (n, k).
         in_cells: fields by name, (c,) or (c, k).
+        units: of fields by name; those without one are numbers.
     """
 
     points: Array
     cells: Integers
     at_points: Mapping[str, npt.NDArray[Any]]
     in_cells: Mapping[str, npt.NDArray[Any]]
+    units: Mapping[str, str]
 
 
 def write(path: Path, comm: MPI.Comm, grid: Grid) -> None:
@@ -116,7 +118,7 @@ def _write_piece(path: Path, grid: Grid) -> bool:
 
 def _vtk_grid(grid: Grid) -> Any:
     from vtkmodules.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray
-    from vtkmodules.vtkCommonCore import vtkPoints
+    from vtkmodules.vtkCommonCore import vtkDataArray, vtkPoints
     from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkUnstructuredGrid
 
     count, corners = grid.cells.shape
@@ -131,6 +133,7 @@ def _vtk_grid(grid: Grid) -> Any:
         for name, values in fields.items():
             array = numpy_to_vtk(np.ascontiguousarray(values), deep=True)
             array.SetName(name)
+            array.GetInformation().Set(vtkDataArray.UNITS_LABEL(), grid.units.get(name, "1"))
             data.AddArray(array)
     return made
 
@@ -142,8 +145,8 @@ def _write_pieces(path: Path, grid: Grid, pieces: list[Path]) -> None:
     )
     whole = Xml.SubElement(parallel, "PUnstructuredGrid", GhostLevel="0")
     for place, fields in (("PPointData", grid.at_points), ("PCellData", grid.in_cells)):
-        Xml.SubElement(whole, place).extend(_declared(fields))
-    Xml.SubElement(whole, "PPoints").extend(_declared({"Points": grid.points}))
+        Xml.SubElement(whole, place).extend(_declared(fields, grid.units))
+    Xml.SubElement(whole, "PPoints").extend(_declared({"Points": grid.points}, {"Points": "m"}))
     for piece in pieces:
         Xml.SubElement(whole, "Piece", Source=piece.name)
     _write_xml(path, parallel)
@@ -163,8 +166,12 @@ def _write_xml(path: Path, root: Xml.Element) -> None:
     Xml.ElementTree(root).write(path, encoding="utf-8", xml_declaration=True)
 
 
-def _declared(fields: Mapping[str, npt.NDArray[Any]]) -> Iterator[Xml.Element]:
+def _declared(fields: Mapping[str, npt.NDArray[Any]], units: Mapping[str, str]) -> Iterator[Xml.Element]:
     for name, values in fields.items():
         components = values.shape[1] if values.ndim > 1 else 1
         kind = _NAMES[values.dtype]
-        yield Xml.Element("PDataArray", type=kind, Name=name, NumberOfComponents=str(components))
+        declared = Xml.Element("PDataArray", type=kind, Name=name, NumberOfComponents=str(components))
+        Xml.SubElement(declared, "InformationKey", name="UNITS_LABEL", location="vtkDataArray").text = units.get(
+            name, "1"
+        )
+        yield declared

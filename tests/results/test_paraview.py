@@ -51,6 +51,30 @@ def strain_by_vtk(body: Any) -> Any:
     return pyvista.wrap(derivatives.GetOutput()).cell_data["Strain"]
 
 
+def test_each_array_tells_its_unit(result: tuple[int, Path]) -> None:
+    from vtkmodules.vtkCommonCore import vtkDataArray
+
+    dimension, folder = result
+    wanted = {
+        "displacement": "m",
+        "reaction": "N/m" if dimension == 2 else "N",
+        "stress": "N/m²",
+        "strain": "1",
+        "u_n": "m",
+    }
+    told = {}
+    for name in ("displacement.pvd", "contact.pvd"):
+        if (folder / name).exists():
+            grid = pyvista.get_reader(folder / name).read()[0]
+            for data in (grid.GetPointData(), grid.GetCellData()):
+                arrays = (data.GetArray(i) for i in range(data.GetNumberOfArrays()))
+                told |= {a.GetName(): a.GetInformation().Get(vtkDataArray.UNITS_LABEL()) for a in arrays}
+    assert all(told.values())
+    assert {name: told[name] for name in wanted.keys() & told.keys()} == {
+        n: wanted[n] for n in wanted.keys() & told.keys()
+    }
+
+
 def test_every_array_that_the_macro_names_is_there(result: tuple[int, Path]) -> None:
     dimension, folder = result
     named = constants()
