@@ -176,6 +176,6 @@ def _ranks(text: str) -> int:
 
 
 def _whole_number(text: str, most: int) -> int:
-    if not text.isdigit() or not 1 <= int(text) <= most:
+    if not (text.isascii() and text.isdigit()) or not 1 <= int(text) <= most:
         raise argparse.ArgumentTypeError(f"must be a whole number from 1 to {most} (is {text!r})")
     return int(text)

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import configparser
+import re
 import shutil
 import subprocess
 import sys
+import tarfile
+import tomllib
 import zipfile
 from pathlib import Path
 
@@ -15,22 +18,58 @@ from runs import ROOT
 from hvi_fenicsx.runtime.processes import environment
 
 pytestmark = pytest.mark.long
-BUILD = "import sys; from setuptools import build_meta; build_meta.build_wheel(sys.argv[1])"
 DATA = {".py", ".j2", ".css", ".typed"}
 
 
 @pytest.fixture(scope="module")
-def wheel(tmp_path_factory: pytest.TempPathFactory) -> zipfile.ZipFile:
-    """The wheel, by the build backend itself: pip adds a network and an environment, which are not ours to test."""
+def source(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """What a build sees of the repository."""
     pytest.importorskip("setuptools", minversion="77")
-    source, built = tmp_path_factory.mktemp("source"), tmp_path_factory.mktemp("wheel")
+    copy = tmp_path_factory.mktemp("source")
     for name in ("README.md", "LICENSE", "pyproject.toml"):
-        shutil.copy(ROOT / name, source)
+        shutil.copy(ROOT / name, copy)
     for name in ("hvi_fenicsx", "tests", "benchmarks", "docs", "demos"):
-        shutil.copytree(ROOT / name, source / name, ignore=shutil.ignore_patterns("__pycache__"))
-    subprocess.run([sys.executable, "-c", BUILD, built], cwd=source, check=True, capture_output=True, timeout=120)
-    (file,) = built.glob("*.whl")
-    return zipfile.ZipFile(file)
+        shutil.copytree(ROOT / name, copy / name, ignore=shutil.ignore_patterns("__pycache__"))
+    return copy
+
+
+def built(kind: str, source: Path, folder: Path) -> Path:
+    """A wheel or sdist by the build backend itself: pip adds a network and an environment, not ours to test."""
+    code = f"import sys; from setuptools import build_meta; build_meta.build_{kind}(sys.argv[1])"
+    subprocess.run([sys.executable, "-c", code, folder], cwd=source, check=True, capture_output=True, timeout=120)
+    (file,) = folder.iterdir()
+    return file
+
+
+@pytest.fixture(scope="module")
+def wheel(source: Path, tmp_path_factory: pytest.TempPathFactory) -> zipfile.ZipFile:
+    """The wheel."""
+    return zipfile.ZipFile(built("wheel", source, tmp_path_factory.mktemp("wheel")))
+
+
+def test_the_sdist_gives_the_same_wheel(source: Path, wheel: zipfile.ZipFile, tmp_path: Path) -> None:
+    for name in ("sdist", "unpacked", "wheel"):
+        (tmp_path / name).mkdir()
+    with tarfile.open(built("sdist", source, tmp_path / "sdist")) as archive:
+        archive.extractall(tmp_path / "unpacked", filter="data")
+    (unpacked,) = (tmp_path / "unpacked").iterdir()
+    again = zipfile.ZipFile(built("wheel", unpacked, tmp_path / "wheel"))
+    assert {n: again.read(n) for n in again.namelist() if ".dist-info/" not in n} == {
+        n: wheel.read(n) for n in wheel.namelist() if ".dist-info/" not in n
+    }
+
+
+def test_the_conda_recipe_has_the_requirements_of_pip() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    recipe = (ROOT / ".ci/conda/meta.yaml").read_text()
+    asked = set(re.findall(r"^    - ([\w-]+(?: >=[\d.]+)?)$", recipe.partition("  run:")[2], flags=re.MULTILINE))
+    renamed = {"matplotlib": "matplotlib-base", "gmsh": "python-gmsh"}
+    extras = [*project["optional-dependencies"]["gmsh"], *project["optional-dependencies"]["pyvista"]]
+    wanted = {renamed.get(name, name).replace(">=", " >=") for name in [*project["dependencies"], *extras]}
+    assert wanted <= asked
+    assert f'version: "{project["version"]}"' in recipe
+    assert f"- python {project['requires-python']}" in recipe
+    assert all(f"{command} = {target}" in recipe for command, target in project["scripts"].items())
 
 
 def test_it_holds_the_package_and_nothing_else(wheel: zipfile.ZipFile) -> None:
