@@ -16,7 +16,6 @@ from typing import Literal
 import numpy as np
 from dolfinx import fem
 
-from ..laws.polyline import PolylineLaw
 from ..problem import references
 from ..problem.law_term import LawTerm
 from ..rigid import Mode
@@ -64,7 +63,7 @@ def uniqueness(
     motions = [system.unknowns(field).array_r.copy() for field in free_motions.fields(system.problem, modes)]
     doubt = _doubt(system, modes, motions, thresholds)
     if doubt is not None:
-        searched = all(isinstance(term.law, PolylineLaw) and not term.radial for term in system.terms)
+        searched = not any(term.radial for term in system.terms)
         return Uniqueness(state="unknown", why=f"{doubt}; {WAY_OUT}" if searched else doubt)
     falling = any(term.law.steepest_fall > 0.0 for term in system.terms)
     proof = "the body is stiffer than its laws fall, so the energy is convex" if falling else "the energy is convex"
