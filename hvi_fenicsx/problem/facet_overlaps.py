@@ -35,7 +35,7 @@ class Facets:
 
     @property
     def degree(self) -> int:
-        """Of the elements."""
+        """The degree of the elements."""
         return 1 if self.points.shape[1] == self.points.shape[2] else 2
 
     @property

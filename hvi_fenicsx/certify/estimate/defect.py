@@ -98,7 +98,7 @@ def _at(space: fem.FunctionSpace, blocks: Entities, u: fem.Function) -> Array:
     cells = np.flatnonzero(chosen[space.dofmap.list].any(axis=1)).astype(np.int32)
     found = fem.Function(space)
     found.interpolate(u, cells, cells)
-    return np.asarray(found.x.array.reshape(len(chosen), -1)[blocks])
+    return np.asarray(found.x.array.reshape(-1, space.dofmap.bs)[blocks])
 
 
 def bubble_bounds(problem: Problem, u: fem.Function, bounds: Bounds, space: fem.FunctionSpace) -> BubbleBounds:
