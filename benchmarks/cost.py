@@ -1,6 +1,7 @@
 """What contact costs over one linear solve of the same mesh: time and memory, each run in a process of its own.
 
     ./hvi exec python3 benchmarks/cost.py [--cells 512 1024] [--boxes] [--unstructured] [--algebraic gamg hypre mumps]
+    ./hvi exec python3 benchmarks/cost.py --degree 2 --cells 128 256 --boxes 28
 
 The linear solve has contact closed and the laws at rest; algebraic ones on the one mesh, the geometric one with the
 hierarchy's coarser meshes. All to 1e-8, in turn, medians of the repeats.
@@ -69,7 +70,7 @@ def counts(scene: str, run: Figures) -> list[object]:
     return [scene, *(run[k] for k in ("dofs", "levels", "branch", "newton", "linear"))]
 
 
-def draw(rows: Sequence[Sequence[object]]) -> None:
+def draw(page: str, rows: Sequence[Sequence[object]]) -> None:
     figure, axes = plt.subplots(figsize=(8, 0.45 * len(rows) + 1.5))
     names = [f"{r[0]}, {float(str(r[1])) / 1e3:,.0f}k dofs" for r in rows]
     for shift, column, label in ((0.2, 5, "best algebraic linear solve"), (-0.2, 7, "geometric multigrid solve")):
@@ -80,7 +81,7 @@ def draw(rows: Sequence[Sequence[object]]) -> None:
     axes.invert_yaxis()
     axes.set_xlabel("time of the contact problem over that of a linear solve")
     axes.legend(loc="upper center", bbox_to_anchor=(0.4, -0.22 if len(rows) < 6 else -0.12), ncol=2, frameon=False)
-    picture("cost", figure)
+    picture(page, figure)
 
 
 @contextmanager
@@ -132,6 +133,7 @@ def command_line() -> argparse.Namespace:
     made.add_argument("--unstructured", type=float, nargs="*", default=[], help="cell sizes of gmsh meshes: 0.004")
     made.add_argument("--refined", type=float, nargs="*", default=[], help="such sizes, refined four times: 0.064")
     made.add_argument("--bored", type=float, nargs="*", default=[], help="cell sizes of gmsh meshes in 3D: 0.028")
+    made.add_argument("--degree", type=int, default=1, choices=(1, 2), help="of the elements: twice the cells a side")
     made.add_argument("--scenes", nargs="*", choices=[*SCENES], default=[*PLANE])
     return made.parse_args()
 
@@ -156,19 +158,21 @@ def main() -> None:
     rows, counted = [], []
     with tempfile.TemporaryDirectory() as folder:
         for name, scene, overrides, kinds in cases(options, Path(folder)):
-            runs = measured(scene, overrides, kinds, options)
+            runs = measured(scene, [*overrides, f"solver.degree={options.degree}"], kinds, options)
             if not runs["contact"] or not any(runs[kind] for kind in options.algebraic):
                 say(f"{name}, {overrides[0]}: left out, since its runs failed")
                 continue
             rows.append(row(name, runs))
             counted.append(counts(name, runs["contact"][0]))
-    draw(rows)
+    page = "cost" if options.degree == 1 else "cost-degree-2"
+    draw(page, rows)
     text = (
         '"Contact" is the time of assembly (forms included), setup and solve on all levels; "with mesh" adds the '
         f"mesh. Times are medians of {options.repeats} with their range. Each ratio is the time of the contact problem "
         "over that of one linear solve."
     )
-    document("cost", "The cost of contact", [text, table(HEAD, rows), table(COUNTS, counted)], options)
+    title = "The cost of contact" if options.degree == 1 else "The cost of contact at degree 2"
+    document(page, title, [text, table(HEAD, rows), table(COUNTS, counted)], options)
 
 
 if __name__ == "__main__":
