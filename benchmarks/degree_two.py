@@ -1,6 +1,6 @@
-"""Degree 2: the rule on Γc in space, the pressure, what it saves, and the penetration between nodes.
+"""Degree 2: the rule on Γc in space, the pressure, what it saves, penetration between nodes, iterations towards ν = ½.
 
-    ./hvi exec python3 benchmarks/degree_two.py rules|pressure|block|strip|hertz|dips
+    ./hvi exec python3 benchmarks/degree_two.py rules|pressure|block|strip|hertz|dips|rubber
 
 Energies decide: the square root of the relative error of the energy is the relative error in the energy norm, but for
 what the rule on Γc adds to the energy.
@@ -13,9 +13,19 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
+from mpi4py import MPI
 
 import hvi_fenicsx as hvi
+from hvi_fenicsx.mesh.thresholds import Thresholds
 from hvi_fenicsx.problem import contact_surface, spaces
+from hvi_fenicsx.runtime.timing import Timer
+from hvi_fenicsx.scene_model import model_of, options_of
+from hvi_fenicsx.solvers import nested_iteration
+from hvi_fenicsx.solvers.active_set import ActiveSetSolver
+from hvi_fenicsx.solvers.closed_start import resting_start
+from hvi_fenicsx.solvers.context import RunControl
+from hvi_fenicsx.system.assemble import assemble
+from hvi_fenicsx.system.held_solver import LinearSettings
 
 SHARES = (0.02, 0.05, 0.1, 0.125, 0.2, 0.25)
 OWN = spaces.EDGE_SHARE[3]
@@ -198,5 +208,51 @@ def dips() -> None:
             print(f"{name}, {cells} cells: {(found.examination.between_nodes or 0.0) / most:.1e}", flush=True)
 
 
+def rubber() -> None:
+    """Iterations of a linear solve to 1e-8, contact closed, by Poisson's ratio."""
+    for dimension, degree, cells in ((2, 1, 64), (2, 2, 32), (2, 2, 64), (2, 2, 128), (3, 2, 8), (3, 2, 12)):
+        for nu in (0.3, 0.45, 0.49, 0.499, 0.4999)[:: 1 if cells in (32, 64) else 3]:
+            scene = hvi.Scene.model_validate(pressed(dimension, degree, cells, nu))
+            kinds = ("gamg", "mg") if cells in (32, 64) else ("mg",)
+            found = ", ".join(f"{kind} {iterations(scene, kind)}" for kind in kinds)
+            print(f"{dimension}D, degree {degree}, {cells} cells a side, ν = {nu}: {found}", flush=True)
+
+
+def pressed(dimension: int, degree: int, cells: int, nu: float) -> dict[str, Any]:
+    """A square or cube between smooth walls, pressed askew onto a floor."""
+    free: list[Any] = ["free"] * dimension
+    walls = {
+        side: [*free[:axis], 0.0, *free[axis + 1 :]] for axis, side in enumerate(("left", "front")[: dimension - 1])
+    }
+    return {
+        "domain": {
+            "shape": ("rectangle", "box")[dimension - 2],
+            "size": [1.0] * dimension,
+            "cells": [cells] * dimension,
+        },
+        "material": {
+            "model": ("plane_strain", "three_dimensional")[dimension - 2],
+            "youngs_modulus": 1e9,
+            "poisson_ratio": nu,
+        },
+        "boundary": {
+            **{side: {"on": side, "displacement": held} for side, held in walls.items()},
+            "press": {"on": "top", "traction": ["1e5*x", *[0.0] * (dimension - 2), "-1e6*(1.2 - 0.8*x)"]},
+            "floor": {"on": "bottom", "contact": {"gap": 0.0}},
+        },
+        "solver": {"degree": degree},
+    }
+
+
+def iterations(scene: hvi.Scene, kind: Any) -> int:
+    """The linear iterations, contact closed."""
+    timer = Timer()
+    domain = scene.domain.build_hierarchy(MPI.COMM_WORLD, scene.dimension, Thresholds())
+    system, options = assemble(domain, model_of(scene), timer), options_of(scene.solver)
+    levels = nested_iteration.coarser_levels(model_of(scene), system, options, RunControl(timer=timer))
+    solver = ActiveSetSolver(system, levels if kind == "mg" else (), LinearSettings(kind), timer)
+    return resting_start(solver, [], 1e-8)[1]
+
+
 if __name__ == "__main__":
-    {f.__name__: f for f in (rules, pressure, block, strip, hertz, dips)}[sys.argv[1]]()
+    {f.__name__: f for f in (rules, pressure, block, strip, hertz, dips, rubber)}[sys.argv[1]]()

@@ -76,6 +76,11 @@ class Bulk:
         """Whether div u is averaged by vertex anywhere (nearly incompressible regions)."""
         return bool(self.averaged)
 
+    @property
+    def volumetric_ratio(self) -> float:
+        """The largest λ/μ of regions where div u is averaged; 0 where there are none."""
+        return max((2 * part.modulus / part.shear for part in self.averaged), default=0.0)
+
     def matrix(self) -> PETSc.Mat:
         """The stiffness matrix, a new one without conditions; block size d. Collective."""
         if self.shared is None:

@@ -17,6 +17,7 @@ import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
+from ..mesh import nodes
 from ..runtime.timing import Timer
 from ..typing import Array, Entities
 from . import multigrid, schur
@@ -67,7 +68,7 @@ class LinearSettings:
         *,
         levels: bool = False,
     ) -> LinearSettings:
-        """The solver that suits the number of unknowns; nearly incompressible bodies are solved directly.
+        """The solver that suits the number of unknowns, and nearly incompressible bodies.
 
         Args:
             system: the system to be solved.
@@ -77,10 +78,12 @@ class LinearSettings:
         """
         if wanted != "auto":
             return cls(wanted, thresholds)
-        if system.problem.bulk.averages_dilatation:
-            return cls("lu", thresholds)
-        if levels and system.free_motions is None:
+        stiff = system.problem.bulk.volumetric_ratio
+        most = thresholds.volumetric_ratio[nodes.degree(system.problem.space)]
+        if levels and system.free_motions is None and stiff <= most:
             return cls("mg", thresholds)
+        if stiff > 0.0:
+            return cls("lu", thresholds)
         return cls("lu" if _small(system, thresholds) else "gamg", thresholds)
 
     @property

@@ -12,6 +12,8 @@ class Thresholds:
 
     Attributes:
         largest_direct: unknowns up to which a direct solve is the faster one, by dimension (docs/benchmarks.md).
+        volumetric_ratio: λ/μ where dilatation is averaged, up to which geometric multigrid is used, by degree; 600 is
+            that of ν = 0.4992 (docs/degree-2.md).
         drift: change of a law's nodal stiffness, relative to an elastic one (about 1), up to which a Krylov method
             keeps its preconditioner.
         changed_held: part of the held unknowns that may change while algebraic multigrid keeps its preconditioner.
@@ -33,6 +35,7 @@ class Thresholds:
     """
 
     largest_direct: Mapping[int, int] = field(default_factory=lambda: {2: 60_000, 3: 15_000})
+    volumetric_ratio: Mapping[int, float] = field(default_factory=lambda: {1: 0.0, 2: 600.0})
     drift: float = 0.3
     changed_held: float = 0.1
     slow: int = 50

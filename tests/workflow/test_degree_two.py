@@ -20,7 +20,7 @@ from runs import summary, table
 from scenes import NESTED, STEEL, Table, model, quadratic_linear
 
 import hvi_fenicsx as hvi
-from hvi_fenicsx import Scene
+from hvi_fenicsx import Scene, solve
 from hvi_fenicsx.mesh import blocks, nodes, refinement
 from hvi_fenicsx.mesh.transfer import DegreeTransfer
 from hvi_fenicsx.problem import spaces
@@ -224,6 +224,27 @@ def test_nearly_incompressible_bodies_do_not_lock() -> None:
 
     ratios = [coarse / fine - 1 for coarse, fine in map(energies, (0.3, 0.4999))]
     assert abs(ratios[1]) < 3 * abs(ratios[0]) + 1e-3
+
+
+@pytest.mark.long
+def test_nearly_incompressible_bodies_are_solved_by_multigrid() -> None:
+    """At ν = 0.499, with contact and a law; at 0.4999 directly. The same is found, and by as many iterations a step."""
+    each = []
+    for cells in (16, 32):
+        scene = model(cells, 3e6, friction=quadratic_linear(1e6), degree=2)
+        scene["material"] = {"model": "plane_strain", "youngs_modulus": E, "poisson_ratio": 0.499}
+        nested, direct = (
+            solve(Scene.model_validate(scene).with_solver(linear_solver=kind), thresholds=NESTED)
+            for kind in ("auto", "lu")
+        )
+        assert nested.solve_result is not None
+        assert nested.examination is not None
+        assert direct.examination is not None
+        assert nested.examination.energy == pytest.approx(direct.examination.energy, rel=1e-8)
+        assert nested.exit_code == direct.exit_code == 0
+        each.append(nested.solve_result.counts.linear / nested.solve_result.counts.newton)
+    assert each[0] > 2.0
+    assert each[1] < 2.0 * each[0]
 
 
 @pytest.mark.parametrize("name", ["plane", pytest.param("space", marks=pytest.mark.long)])

@@ -43,8 +43,12 @@ def test_auto_solves_a_small_case(case: Case) -> None:
     solve_and_judge(case)
 
 
+STEEP = [case for case in LISTED if case.key == "9206d05c90"]
+"""A law smoothed with ε = 1e-6, 1e-5 from the limit load: it was not certified at degree 2."""
+
+
 @pytest.mark.long
-@pytest.mark.parametrize("case", parameters(FAST))
+@pytest.mark.parametrize("case", parameters([*FAST, *(case for case in STEEP if case not in FAST)]))
 def test_auto_solves_a_small_case_at_degree_two(case: Case) -> None:
     solve_and_judge(case, degree=2)
 
