@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pytest
+from joints import away_from_affine, seam, seam_scene
 from scenes import NESTED, Table, quadratic_linear
 
-from hvi_fenicsx import InputError, Scene, Solution, prepare, solve
+from hvi_fenicsx import InputError, Scene, prepare, solve
 from hvi_fenicsx.certify import placed_forces
 from hvi_fenicsx.problem.problem import Problem
 from hvi_fenicsx.scene.writer import dump_scene
@@ -36,15 +37,7 @@ def stacked(
     """A block (0.9 high) on a block of width 1 and height 0.5, cut otherwise; upper: where it begins and its width."""
     low, high = rectangle([1.0, 0.5], [7, 4], angle=angle), rectangle([upper[1], 0.4], [5, 3], angle=angle)
     high["origin"] = turned(angle, upper[0], 0.5)
-    return Scene.model_validate(
-        {
-            "domain": {"lower": low, "upper": high},
-            "material": MATERIAL,
-            "boundary": boundary,
-            "interface": {"seam": {"between": ["upper.bottom", "lower.top"], **between}},
-            "solver": {"tolerance": 1e-10, **solver},
-        }
-    )
+    return seam_scene(low, high, MATERIAL, boundary, between, **solver)
 
 
 def pulled(angle: float, stress: Array) -> Table:
@@ -53,25 +46,6 @@ def pulled(angle: float, stress: Array) -> Table:
     sides = ["lower.left", "lower.right", "lower.bottom", "upper.left", "upper.right", "upper.top"]
     forces = {side: stress @ np.array(normals[side.split(".")[1]]) for side in sides}
     return {s.replace(".", "_"): {"on": s, "traction": turned(angle, *map(float, t))} for s, t in forces.items()}
-
-
-def seam(found: Solution) -> Any:
-    assert found.examination is not None
-    return next(state for state in found.examination.states if state.surface.part == "seam")
-
-
-def away_from_affine(found: Solution) -> float:
-    """The largest part of the displacement of a body that is not affine, relative."""
-    assert found.solve_result is not None
-    problem = found.problem
-    u = found.solve_result.u.x.array.reshape(-1, problem.scales.dimension)
-    x = np.column_stack([np.ones(len(u)), problem.points[:, :2]])
-    worst = 0.0
-    for member in np.unique(problem.bodies.members):
-        mine = problem.bodies.members == member
-        fitted = np.linalg.lstsq(x[mine], u[mine], rcond=None)[0]
-        worst = max(worst, float(np.abs(x[mine] @ fitted - u[mine]).max()))
-    return worst / float(np.abs(u).max())
 
 
 AT = pytest.mark.parametrize(("angle", "degree"), [(0.0, 1), (25.0, 1), (25.0, 2)])

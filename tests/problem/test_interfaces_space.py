@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pytest
+from joints import away_from_affine, seam, seam_scene
 from mpi4py import MPI
 from scenes import Table, quadratic_linear
 from scipy.spatial import Delaunay
@@ -36,15 +37,7 @@ def stacked(boundary: Table, between: Table, upper: Plan = WHOLE, **solver: Any)
     """A block on a block of 1 x 1 x 0.5, cut otherwise; upper: the corner of its base, and the base's size."""
     low = {"shape": "box", "size": [1.0, 1.0, 0.5], "cells": [4, 3, 2]}
     high = {"shape": "box", "size": [*upper[1], 0.4], "cells": [3, 4, 2], "origin": [*upper[0], 0.5]}
-    return Scene.model_validate(
-        {
-            "domain": {"lower": low, "upper": high},
-            "material": MATERIAL,
-            "boundary": boundary,
-            "interface": {"seam": {"between": ["upper.bottom", "lower.top"], **between}},
-            "solver": {"tolerance": 1e-10, **solver},
-        }
-    )
+    return seam_scene(low, high, MATERIAL, boundary, between, **solver)
 
 
 def placed(scene: Scene, rotation: Array) -> Domain:
@@ -66,25 +59,6 @@ def pulled(rotation: Array, stress: Array) -> Table:
     sides = [f"lower.{side}" for side in NORMALS if side != "top"] + [f"upper.{s}" for s in NORMALS if s != "bottom"]
     forces = {side: rotation @ stress @ np.array(NORMALS[side.split(".")[1]]) for side in sides}
     return {s.replace(".", "_"): {"on": s, "traction": list(map(float, t))} for s, t in forces.items()}
-
-
-def seam(found: Solution) -> Any:
-    assert found.examination is not None
-    return next(state for state in found.examination.states if state.surface.part == "seam")
-
-
-def away_from_affine(found: Solution) -> float:
-    """The largest part of the displacement of a body that is not affine, relative."""
-    assert found.solve_result is not None
-    problem = found.problem
-    u = found.solve_result.u.x.array.reshape(-1, 3)
-    x = np.column_stack([np.ones(len(u)), problem.points])
-    worst = 0.0
-    for member in np.unique(problem.bodies.members):
-        mine = problem.bodies.members == member
-        fitted = np.linalg.lstsq(x[mine], u[mine], rcond=None)[0]
-        worst = max(worst, float(np.abs(x[mine] @ fitted - u[mine]).max()))
-    return worst / float(np.abs(u).max())
 
 
 AT = pytest.mark.parametrize(

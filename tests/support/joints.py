@@ -1,0 +1,43 @@
+"""Scenes of a block on another one, and what tests read at their seam."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from scenes import Table
+
+from hvi_fenicsx import Scene, Solution
+
+
+def seam_scene(low: Table, high: Table, material: Table, boundary: Table, between: Table, **solver: Any) -> Scene:
+    """Two bodies, upper and lower, that meet in the interface "seam"; the upper one's side comes first."""
+    return Scene.model_validate(
+        {
+            "domain": {"lower": low, "upper": high},
+            "material": material,
+            "boundary": boundary,
+            "interface": {"seam": {"between": ["upper.bottom", "lower.top"], **between}},
+            "solver": {"tolerance": 1e-10, **solver},
+        }
+    )
+
+
+def seam(found: Solution) -> Any:
+    """The state of the part or interface "seam"."""
+    assert found.examination is not None
+    return next(state for state in found.examination.states if state.surface.part == "seam")
+
+
+def away_from_affine(found: Solution) -> float:
+    """The largest part of the displacement of a body that is not affine, relative."""
+    assert found.solve_result is not None
+    problem, d = found.problem, found.problem.scales.dimension
+    u = found.solve_result.u.x.array.reshape(-1, d)
+    x = np.column_stack([np.ones(len(u)), problem.points[:, :d]])
+    worst = 0.0
+    for member in np.unique(problem.bodies.members):
+        mine = problem.bodies.members == member
+        fitted = np.linalg.lstsq(x[mine], u[mine], rcond=None)[0]
+        worst = max(worst, float(np.abs(x[mine] @ fitted - u[mine]).max()))
+    return worst / float(np.abs(u).max())
