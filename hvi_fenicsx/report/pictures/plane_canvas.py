@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
@@ -58,8 +61,7 @@ def paint(
     body, points = shape.body, shape.points
     loops = chains(body.boundary)
     outline = closed_path(points, loops)
-    drawn = _shading(axes, corners, triangles, values)
-    drawn.set(cmap=colours, clim=(0.0, end or 1.0))
+    drawn = _shading(axes, corners, triangles, values, lambda image: colours(image / (end or 1.0), bytes=True))
     drawn.set_clip_path(outline, axes.transData)
     for patch, style in (
         (closed_path(body.points, loops), {"ec": GREY, "ls": (0, (5, 4)), "lw": 1.3, "zorder": 3}),
@@ -76,12 +78,14 @@ def _pixels_between_lines(axes: Axes, body: BodyMesh) -> float:
     return per_metre * float(np.sqrt(np.prod(np.ptp(body.points[:, :2], axis=0)) / len(body.cells)))
 
 
-def _shading(axes: Axes, corners: Array, triangles: Integers, values: Array) -> AxesImage:
-    """Values as an image of the picture's own pixels."""
+def _shading(
+    axes: Axes, corners: Array, triangles: Integers, values: Array, coloured: Callable[[Array], Any]
+) -> AxesImage:
+    """Values as an image of the picture's own pixels, coloured here: matplotlib would resample numbers and mask apart."""
     (left, right), (bottom, top) = axes.get_xlim(), axes.get_ylim()
     wide = round(SIDE * DPI)
     tall = round(wide * (top - bottom) / (right - left))
     pixels = (corners[:, :2] - [left, bottom]) * [wide / (right - left), tall / (top - bottom)]
     image = shade(pixels, triangles, values, (tall, wide))
     extent = (left, right, bottom, top)
-    return axes.imshow(image, origin="lower", extent=extent, interpolation="nearest", aspect="auto", zorder=1)
+    return axes.imshow(coloured(image), origin="lower", extent=extent, interpolation="nearest", aspect="auto", zorder=1)
