@@ -100,7 +100,7 @@ def written(found: dict[str, list[Seconds]], options: Any) -> None:
         [text, *(f"{middle(scene, phase, 'work'):.2f}" for scene in PLANE)]
         for phase, text in (("whole", "whole run"), ("mesh", "mesh"), ("estimate", "estimate"), ("output", "output"))
     ]
-    figure, axes = plt.subplots(figsize=(7, 3))
+    figure, axes = plt.subplots(figsize=(8, 3))
     left = [0.0] * len(PLANE)
     for phase in PHASES:
         widths = [middle(scene, phase) for scene in PLANE]
@@ -108,7 +108,7 @@ def written(found: dict[str, list[Seconds]], options: Any) -> None:
         left = [a + b for a, b in zip(left, widths, strict=True)]
     axes.set_xlabel("s")
     axes.invert_yaxis()
-    axes.legend(fontsize=7, ncols=2)
+    axes.legend(fontsize=8, loc="center left", bbox_to_anchor=(1.0, 0.5))
     picture("shell-to-files", figure)
     text = (
         f"`hvi run` with {options.cells} x {options.cells} cells on {options.ranks} rank(s), with pictures and page; "
