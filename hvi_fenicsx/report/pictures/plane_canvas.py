@@ -81,7 +81,7 @@ def _pixels_between_lines(axes: Axes, body: BodyMesh) -> float:
 def _shading(
     axes: Axes, corners: Array, triangles: Integers, values: Array, coloured: Callable[[Array], Any]
 ) -> AxesImage:
-    """Values as an image of the picture's own pixels, coloured here: matplotlib would resample values and mask apart."""
+    """Values as an image of the picture's own pixels, coloured here: matplotlib would resample values and mask."""
     (left, right), (bottom, top) = axes.get_xlim(), axes.get_ylim()
     wide = round(SIDE * DPI)
     tall = round(wide * (top - bottom) / (right - left))
