@@ -45,7 +45,7 @@ class EquilibriaResult:
 
     @property
     def energies(self) -> tuple[float, ...]:
-        """Of the equilibria, J/m or J."""
+        """The energies of the equilibria, J/m or J."""
         return tuple(float(row["energy"]) for row in self.rows)
 
     @property

@@ -20,7 +20,7 @@ from .descent import descend
 from .scalar_problem import ScalarProblem
 from .stationarity import Kind, unstable_directions
 
-MOST_DESCENTS = 50
+MOST_DESCENTS = 10
 """Descents that are made one after the other, each of several steps."""
 STEPS = tuple(10.0**-k for k in range(2, 10))
 """Lengths of the first step off a saddle, relative to the displacements; the first that lowers the energy is taken."""

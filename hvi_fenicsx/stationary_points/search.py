@@ -79,7 +79,7 @@ class Found:
         nodes: boxes that were bounded or tested.
         reason: how it ended, for people.
         left: what is needed to go on; empty if there is nothing left.
-        passes: the saddles that join two of the minimisers, numbers of the points.
+        passes: the saddles that join two of the minimisers, numbers of the points; none where points may be missing.
     """
 
     points: tuple[StationaryPoint, ...]
@@ -225,7 +225,7 @@ def _all(task: _Task) -> Found:
         nodes=search.cells,
         reason=_in_words(points) if complete else f"{len(points)} found, and {len(listed)} cells are open",
         left={} if complete else left,
-        passes=passes(problem, points),
+        passes=passes(problem, points) if complete else (),
     )
 
 
