@@ -1,0 +1,77 @@
+"""Paths of scenes with cohesion between two bodies: their ends against single runs, and several ranks against one."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+import tomli_w
+from runs import hvi, summary
+from scenes import Table
+
+PEAK, FIRST, LAST = 2.0e6, 1.0e-6, 1.0e-5
+MIXED = {"mixity": "benzeggagh_kenane", "energy_ratio": 2.0, "exponent": 2.1}
+
+
+def blocks(**mixity: Any) -> Table:
+    """A block torn off a longer one by a displacement that differs along it; a part of the glue is pressed."""
+    glue = {"law": "graph", "points": [[0.0, 0.0], [FIRST, PEAK], [LAST, 0.0]], "beta": 0.7, **mixity}
+    return {
+        "domain": {
+            "lower": {"shape": "rectangle", "size": [1.0, 0.5], "cells": [7, 3]},
+            "upper": {"shape": "rectangle", "size": [0.8, 0.4], "cells": [5, 3], "origin": [0.1, 0.5]},
+        },
+        "material": {"model": "plane_stress", "youngs_modulus": 2.0e11, "poisson_ratio": 0.3},
+        "boundary": {
+            "base": {"on": "lower.bottom", "displacement": [0.0, 0.0]},
+            "pull": {"on": "upper.top", "displacement": [5.2e-6, "1.75e-5*(x - 0.3)"]},
+        },
+        "interface": {"glue": {"between": ["upper.bottom", "lower.top"], "contact": {"gap": 0.0}, "cohesion": glue}},
+    }
+
+
+def written(folder: Path, table: Table) -> Path:
+    (folder / "scene.toml").write_text(tomli_w.dumps(table), encoding="utf-8")
+    return folder / "scene.toml"
+
+
+def rows(folder: Path) -> tuple[list[str], npt.NDArray[np.float64]]:
+    """The events, and factor, work and the forces of the pull, by row."""
+    with (folder / "path.csv").open(encoding="utf-8") as stream:
+        found = list(csv.DictReader(stream))
+    keys = ("factor", "work", "dissipated", "pull.fx", "pull.fy")
+    found = [row for row in found if row["event"] != "step"]  # where a curve is sampled is nothing that has to agree
+    return [row["event"] for row in found], np.array([[float(row[key]) for key in keys] for row in found])
+
+
+@pytest.mark.parametrize("mixity", [{}, MIXED], ids=["one energy", "by mode"])
+def test_a_path_ends_where_a_run_at_its_end_does(mixity: Table, tmp_path: Path) -> None:
+    """Every row is certified; the run knows nothing of the path."""
+    scene = written(tmp_path, blocks(**mixity))
+    for command in ("path", "run"):
+        done = hvi(command, scene, "--out", tmp_path / command, "--no-pictures")
+        assert done.returncode == 0, done.stdout + done.stderr
+    events, values = rows(tmp_path / "path")
+    assert "kink" in events
+    assert summary(tmp_path / "path")["path"]["uncertified"] == 0
+    wanted = json.loads((tmp_path / "run" / "summary.json").read_text(encoding="utf-8"))["resultants"]["pull"]
+    assert values[-1, 3:] == pytest.approx(wanted, rel=1e-6)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("mixity", [{}, MIXED], ids=["one energy", "by mode"])
+def test_several_ranks_follow_the_path_that_one_follows(mixity: Table, tmp_path: Path) -> None:
+    scene = written(tmp_path, blocks(**mixity))
+    found = []
+    for ranks in (1, 2, 3):
+        done = hvi("path", scene, "--out", tmp_path / str(ranks), "--no-pictures", ranks=ranks)
+        assert done.returncode == 0, done.stdout + done.stderr
+        found.append(rows(tmp_path / str(ranks)))
+    for events, values in found[1:]:
+        assert events == found[0][0]
+        assert np.allclose(values, found[0][1], rtol=0.0, atol=1e-8 * np.abs(found[0][1]).max(axis=0))
