@@ -23,7 +23,7 @@ from runs import command, contact, hvi, process, summary, write_scene
 from scenes import block, model, quadratic_linear
 
 from hvi_fenicsx import cli, read_scene
-from hvi_fenicsx.runtime import processes
+from hvi_fenicsx.runtime import petsc, processes
 
 LAW = quadratic_linear(1.0e3)
 COLUMNS = "part,s,x,y,z,u_n,u_t1,u_t2,gap,sigma_n,friction_t1,friction_t2,contact,branch_t,branch_n"
@@ -285,15 +285,14 @@ def test_an_interrupted_run_writes_what_it_has_and_says_so(
 def test_a_stop_that_a_library_turns_into_an_error_of_its_own_is_an_interruption(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    def library(*_: object) -> int:
+    def library() -> None:
         try:
             signal.raise_signal(signal.SIGTERM)
         except KeyboardInterrupt:
             raise ValueError("a callback failed") from None
-        return 0
 
     before = {number: signal.getsignal(number) for number in processes.STOP}
-    monkeypatch.setattr(cli, "_dispatch", library)
+    monkeypatch.setattr(petsc, "start", library)
     try:
         assert cli.main(["version"]) == 130
     finally:
