@@ -19,29 +19,40 @@ from petsc4py import PETSc
 
 from ..errors import SolverError
 from ..laws import Superpotential
+from . import load_path_start
 from .branch import BranchIteration
 from .closed_start import resting_start
 from .context import SolveContext
 from .continuation import Continuation
 from .law_models import Majorant
+from .load_path_start import softens
 from .result import Counts, SolveResult
 from .rigid_start import at_rest
 
 
 class _StepLimit:
-    """Whether to stop: the user asks for it, or all starts together have taken too many Newton steps (None: any)."""
+    """Whether to stop: the user asks for it, or all starts together have taken too many Newton steps (None: any).
+
+    The first start may have a limit of its own.
+    """
 
     def __init__(self, interrupted: Callable[[], bool], most: int | None) -> None:
         self._interrupted, self._most = interrupted, most
-        self._steps, self.exceeded = 0, False
+        self._steps, self.exceeded, self.cut = 0, False, False
+        self.first: int | None = None
 
     def __call__(self) -> bool:
         """Asked once a Newton step. Collective."""
         if self._interrupted():
             return True
         self._steps += 1
+        self.cut = self.first is not None and self._steps > self.first
         self.exceeded = self.exceeded or (self._most is not None and self._steps > self._most)
-        return self.exceeded
+        return self.exceeded or self.cut
+
+    def without_first(self) -> None:
+        """The first start is done."""
+        self.first, self.cut = None, False
 
 
 class Auto(BranchIteration):
@@ -71,9 +82,22 @@ class Auto(BranchIteration):
         return replace(found, interrupted=False, reason=reason)
 
     def _search(self, start: PETSc.Vec | None, branches: PETSc.Vec | None) -> SolveResult:
+        follows = start is None and branches is None and self._asks_for_path()
+        self._limit.first = self.options.thresholds.path.quick_steps if follows and self._soft() else None
         first = super().solve(start, branches)
-        if first.converged or first.interrupted or not self.system.terms:
+        cut = self._limit.cut
+        self._limit.without_first()
+        if first.converged or (first.interrupted and not cut) or not self.system.terms:
             return first
+        along = self._along_path(first) if follows else None
+        if along is not None:
+            return along
+        if cut:
+            first = BranchIteration(self.context, self._laws, self._epsilon).solve()
+        return first if first.converged or first.interrupted else self._further(first)
+
+    def _further(self, first: SolveResult) -> SolveResult:
+        """The first of the further starts' results that converged; else that of the first start."""
         counts = Counts()
         counts.add(first.counts)
         for other in self._others():
@@ -81,6 +105,29 @@ class Auto(BranchIteration):
             if other.converged or other.interrupted:
                 return replace(other, counts=counts)
         return first
+
+    def _soft(self) -> bool:
+        return any(softens(law) for law in self._laws)
+
+    def _asks_for_path(self) -> bool:
+        """Whether loading decides which equilibrium is meant, or if there is one."""
+        loose = self.context.solvability.state != "held"
+        return bool(self.system.terms) and self.options.start == "unbroken" and (loose or self._soft())
+
+    def _along_path(self, first: SolveResult) -> SolveResult | None:
+        """The equilibrium on the load path, or that there is none on it; None where this is not known. Collective."""
+        with self.context.timer("setup"):
+            path = load_path_start.follow(self.system, self.options.thresholds.path)
+        if path is None:
+            return None
+        if path.x is None:
+            reason = f"no equilibrium on the loading path: {path.reason}"
+            return replace(first, interrupted=False, reason=reason)
+        for found in self._attempt(self._iteration().solve, path.x):
+            found.counts.add(first.counts)
+            if found.converged or found.interrupted:
+                return found
+        return None
 
     def _others(self) -> Iterator[SolveResult]:
         """Results from further starts, one after the other."""

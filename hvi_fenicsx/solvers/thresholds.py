@@ -130,6 +130,21 @@ class BranchThresholds:
 
 
 @dataclass(frozen=True, kw_only=True)
+class PathThresholds:
+    """When a load path is followed to find a start.
+
+    Attributes:
+        quick_steps: Newton steps of the first start before a path is followed, where laws soften.
+        vertex_unknowns: unknowns of Γc's vertices up to which the system is condensed.
+        most_events: of one path.
+    """
+
+    quick_steps: int = 8
+    vertex_unknowns: int = 1_600
+    most_events: int = 20_000
+
+
+@dataclass(frozen=True, kw_only=True)
 class Thresholds:
     """When nested iteration pays, and how the methods solve.
 
@@ -138,6 +153,7 @@ class Thresholds:
         active_set: of the active set solver.
         projected_newton: of the projected Newton method.
         branch: of the branch iteration.
+        path: of the start from the load path.
         nested_from: unknowns from which a coarser level pays.
         coarse_tolerance: tolerance of the solution on a coarser level.
         start_tolerance: relative tolerance of a start's linear solve: enough for its active set; an exact solution
@@ -161,6 +177,7 @@ class Thresholds:
     active_set: ActiveSetThresholds = field(default_factory=ActiveSetThresholds)
     projected_newton: ProjectedNewtonThresholds = field(default_factory=ProjectedNewtonThresholds)
     branch: BranchThresholds = field(default_factory=BranchThresholds)
+    path: PathThresholds = field(default_factory=PathThresholds)
     nested_from: int = 5_000
     coarse_tolerance: float = 1e-4
     start_tolerance: float = 1e-2

@@ -1,0 +1,77 @@
+"""A start from the load path: the equilibrium to which loading in proportion leads, on the condensed system.
+
+Where laws soften, starts of the iteration are far from the equilibria that loading leads to, and where a state is
+metastable there may be none. The path (:mod:`..equilibrium_paths`) tells: it leads to an equilibrium under the whole
+load, or it ends before.
+"""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from dataclasses import dataclass
+
+import numpy as np
+from petsc4py import PETSc
+
+from ..equilibrium_paths.bonds import is_piecewise_linear
+from ..equilibrium_paths.full_load import FullLoad, at_full_load
+from ..equilibrium_paths.graphs import graph_of
+from ..errors import InputError, SolverError
+from ..laws import Superpotential
+from ..system.condensation import Condensation
+from ..system.condensed_problem import CondensedProblem
+from ..system.system import System
+from .thresholds import PathThresholds
+
+
+@dataclass(frozen=True, kw_only=True)
+class PathStart:
+    """Where the load path leads.
+
+    Attributes:
+        x: the displacement under the whole load, in equilibrium; None: the path ends before.
+        reason: how it ended.
+    """
+
+    x: PETSc.Vec | None
+    reason: str
+
+
+def softens(law: Superpotential) -> bool:
+    """Whether a law's piecewise linear traction falls, other than by jumps.
+
+    Args:
+        law: the law.
+    """
+    graph = graph_of(law)
+    return graph is not None and bool(np.any(graph.slopes < 0.0))
+
+
+def follow(system: System, thresholds: PathThresholds) -> PathStart | None:
+    """The start, where its path can be followed in short time; None where it cannot, or is lost. Collective.
+
+    Args:
+        system: the system; its tangent and what it holds are taken away.
+        thresholds: how large the condensed system may be.
+    """
+    linear = all(graph_of(term.law) is not None for term in system.terms)
+    if not linear or system.comm.allreduce(len(system.jacobian.rows.dofs)) > thresholds.vertex_unknowns:
+        return None
+    system.jacobian.set_rates([np.zeros_like(rates) for rates in system.jacobian.rates])
+    try:
+        condensation = Condensation(system)
+    except (InputError, SolverError):
+        return None
+    found = _on_first_rank(system, condensation.problem, thresholds)
+    u = None if found is None or found.x is None else condensation.expand(found.x)
+    condensation.free()
+    return None if found is None else PathStart(x=u, reason=found.reason)
+
+
+def _on_first_rank(system: System, problem: CondensedProblem, thresholds: PathThresholds) -> FullLoad | None:
+    """Where the path leads, the same on all ranks to the last digit. Collective."""
+    found = None
+    if system.comm.rank == 0 and is_piecewise_linear(problem):
+        with suppress(np.linalg.LinAlgError):
+            found = at_full_load(problem, thresholds.most_events)
+    return system.comm.bcast(found)

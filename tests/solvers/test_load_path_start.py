@@ -1,0 +1,87 @@
+"""Where laws soften, or a state is metastable, `auto` takes the equilibrium of the load path, or says where it ends."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+from scenes import Table, solved
+
+from hvi_fenicsx import Scene, prepare
+from hvi_fenicsx.equilibrium_paths.eliminated import without_fixed
+from hvi_fenicsx.system.condensation import Condensation
+
+STRENGTH = 220.591e3
+"""Of the bar, N/m: Yuan and Teng's closed form."""
+
+
+def bar(pull: float, cells: int = 95) -> Table:
+    """A bar glued along its length and pulled at one end."""
+    return {
+        "domain": {"shape": "rectangle", "size": [0.190, 0.001], "cells": [cells, 1]},
+        "material": {"model": "plane_stress", "youngs_modulus": 4.224e10, "poisson_ratio": 0.0},
+        "boundary": {
+            "pull": {"on": "right", "traction": [pull / 0.001, 0.0]},
+            "glue": {
+                "on": "bottom",
+                "contact": {"lower": 0.0, "upper": 0.0},
+                "friction": {"law": "graph", "points": [[0, 0], [3.4e-5, 7.2e6], [1.6e-4, 0]]},
+            },
+        },
+    }
+
+
+def strip(**solver: object) -> Table:
+    """An arm of a double cantilever whose end is lifted until a third of the glue is broken."""
+    glue = {"law": "graph", "points": [[0, 0], [4e-6, 5e6], [20e-6, 0]], "one_sided": True}
+    return {
+        "domain": {"shape": "rectangle", "size": [0.15, 0.005], "cells": [75, 3]},
+        "material": {"model": "plane_strain", "youngs_modulus": 7.0e10, "poisson_ratio": 0.3},
+        "boundary": {
+            "lifted": {"on": "left", "displacement": ["free", 1.0e-3]},
+            "far": {"on": "right", "displacement": [0.0, 0.0]},
+            "glue": {"on": "bottom", "contact": {"gap": 0.0}, "adhesion": glue},
+        },
+        "solver": solver,
+    }
+
+
+@pytest.mark.parametrize("load", [1.05, 2.0])
+def test_above_its_strength_the_path_of_a_bar_says_which_load_it_bears(load: float) -> None:
+    found = solved(bar(load * STRENGTH))
+    assert found.exit_code == 4
+    match = re.search(r"no equilibrium on the loading path: at the factor ([\d.]+)", found.solve_result.reason)
+    assert match is not None
+    assert float(match[1]) * load == pytest.approx(1.0, rel=1e-3)
+    assert found.solve_result.counts.newton < 20
+
+
+def test_just_below_its_strength_the_bar_is_solved() -> None:
+    found = solved(bar(0.995 * STRENGTH))
+    assert found.converged
+
+
+def test_a_peeled_strip_is_the_same_as_by_the_branch_iteration_in_few_newton_steps() -> None:
+    path, branch = solved(strip()), solved(strip(method="branch"))
+    assert path.converged
+    assert branch.converged
+    assert path.examination.energy == pytest.approx(branch.examination.energy, rel=1e-10)
+    assert path.solve_result.counts.newton < 20 < branch.solve_result.counts.newton
+
+
+@pytest.mark.parametrize("gap", [0.0, 1e-6])
+def test_a_problem_without_fixed_unknowns_has_the_same_energy_and_work(gap: float) -> None:
+    table = bar(STRENGTH, 6)
+    table["boundary"]["glue"]["contact"] = {"lower": gap, "upper": gap}
+    table["boundary"]["glue"]["adhesion"] = {"law": "linear_spring", "stiffness": 1e12}
+    whole = Condensation(prepare(Scene.model_validate(table)).system).problem
+    fewer, kept = without_fixed(whole)
+    assert fewer.size == 7 < whole.size
+    rng = np.random.default_rng(1)
+    for factor in (0.0, 0.7):
+        x = np.where(whole.lower == whole.upper, whole.lower, rng.normal(0.0, 1.0, whole.size))
+        assert fewer.energy(x[kept], factor) == pytest.approx(whole.energy(x, factor), rel=1e-12)
+        assert fewer.potential(x[kept], factor) == pytest.approx(whole.potential(x, factor), rel=1e-12)
+        slope = whole.stiffness @ x - whole.load(factor)
+        assert fewer.stiffness @ x[kept] - fewer.load(factor) == pytest.approx(slope[kept], rel=1e-10)
