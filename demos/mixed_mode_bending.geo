@@ -1,11 +1,11 @@
 // Mixed-mode bending: two arms of 100.8 mm x 2.25 mm that share no point, with a crack of 25.4 mm between them. Lengths in mm.
 DefineConstant[ n = 10 ];       // cells through the height of an arm
-DefineConstant[ fine = 60 ];    // along the 15 mm into which the crack grows, 0.25 mm each
+DefineConstant[ fine = 24 ];    // along the 6 mm into which the crack grows, 0.25 mm each
 Function Arm
   // s: 1 above, -1 below; p: number of the first point, line and surface
-  Point(p) = {0, 0, 0};               Point(p + 1) = {25.4, 0, 0};      Point(p + 2) = {40.4, 0, 0};
+  Point(p) = {0, 0, 0};               Point(p + 1) = {25.4, 0, 0};      Point(p + 2) = {31.4, 0, 0};
   Point(p + 3) = {50.4, 0, 0};        Point(p + 4) = {100.8, 0, 0};     Point(p + 5) = {100.8, s*2.25, 0};
-  Point(p + 6) = {50.4, s*2.25, 0};   Point(p + 7) = {40.4, s*2.25, 0}; Point(p + 8) = {25.4, s*2.25, 0};
+  Point(p + 6) = {50.4, s*2.25, 0};   Point(p + 7) = {31.4, s*2.25, 0}; Point(p + 8) = {25.4, s*2.25, 0};
   Point(p + 9) = {0, s*2.25, 0};
   Line(p) = {p, p + 1};         Line(p + 1) = {p + 1, p + 2}; Line(p + 2) = {p + 2, p + 3}; Line(p + 3) = {p + 3, p + 4};
   Line(p + 4) = {p + 4, p + 5}; Line(p + 5) = {p + 5, p + 6}; Line(p + 6) = {p + 6, p + 7}; Line(p + 7) = {p + 7, p + 8};
@@ -17,7 +17,7 @@ Function Arm
   Curve Loop(p + 3) = {p + 3, p + 4, p + 5, -(p + 12)};     Plane Surface(p + 3) = {p + 3};
   Transfinite Curve {p, p + 8} = 52;
   Transfinite Curve {p + 1, p + 7} = fine + 1;
-  Transfinite Curve {p + 2, p + 6} = 11;
+  Transfinite Curve {p + 2, p + 6} = 20;
   Transfinite Curve {p + 3, p + 5} = 51;
   Transfinite Curve {p + 4, p + 9, p + 10, p + 11, p + 12} = n + 1;
   Transfinite Surface {p, p + 1, p + 2, p + 3};
