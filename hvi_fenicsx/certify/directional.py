@@ -84,7 +84,8 @@ def growth(
     if local is not None:
         u, forces = local.local_components(u), local.local_components(forces)
         terms, bounds = tuple(local.term(t) for t in terms), tuple(local.bounds(b) for b in bounds)
-    found = _Collector(references, u, forces.ravel(), forces.shape[1], tolerance, thresholds)
+    near = thresholds.near * references.at(np.arange(len(forces)))
+    found = _Collector(references, u, forces.ravel(), near, tolerance, thresholds)
     for term in terms:
         (found.enter_vector_law if term.radial else found.enter_law)(term)
     for one in bounds:
@@ -137,22 +138,23 @@ class _Collector:
         references: what tractions are relative to.
         u: the displacement in local components, a local array.
         forces: r, (n,).
-        d: the dimension.
+        near: distance from a kink or a bound that counts as being on it, by vertex.
         tolerance: relative traction up to which a growth is none.
-        thresholds: when a vertex is on a kink or a bound.
+        thresholds: up to when a jump is rounding.
         couplings: of the laws of a length.
     """
 
     references: References
     u: Array
     forces: Array
-    d: int
+    near: Array
     tolerance: float
     thresholds: Thresholds
     couplings: list[_Coupling] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         n = len(self.forces)
+        self.d = n // len(self.near)
         self.up, self.down = self.forces.copy(), -self.forces
         self.jump, self.slack = np.zeros(n), np.zeros(n)
         self.curved_up, self.curved_down = np.zeros(n), np.zeros(n)
@@ -165,9 +167,10 @@ class _Collector:
             term: the law, in local components.
         """
         (dofs, sign), w = next(shared_forces.components(term)), term.weights
-        x = self._on_kink(term.law, term.argument(self.u))
+        near = self.near[term.surface.blocks]
+        x = _on_kink(term.law, term.argument(self.u), near)
         left, right = w * term.law.left(x), w * term.law.right(x)
-        before, after = (w * c for c in self._curvatures(term.law, x))
+        before, after = (w * _second(term.law, x + step) for step in (-2 * near, 2 * near))
         ahead = sign > 0
         np.add.at(self.up, dofs, np.where(ahead, right, -left))
         np.add.at(self.down, dofs, np.where(ahead, -left, right))
@@ -183,15 +186,16 @@ class _Collector:
         Args:
             term: the law, in local components.
         """
-        w, slip = term.weights, term.slip(self.u)
-        x = self._on_kink(term.law, term.argument(self.u))
-        moving = x > self.thresholds.near
+        w, slip, near = term.weights, term.slip(self.u), self.near[term.surface.blocks]
+        x = _on_kink(term.law, term.argument(self.u), near)
+        moving = x > near
         size = np.where(moving, x, 1.0)
         unit = np.where(moving[:, None], term.gradient(slip), 0.0)
         left, right = np.where(moving, term.law.left(x), 0.0), term.law.right(x)
         force = np.einsum("m,mk,mkd->md", w * (left + right) / 2, unit, term.directions)
         across = np.where(moving, np.minimum(left, right) / size, np.inf)
-        curvature = w * np.minimum(np.minimum(*self._curvatures(term.law, x, moving)), across)
+        sides = [_second(term.law, x + step) for step in (np.where(moving, -2, 2) * near, 2 * near)]
+        curvature = w * np.minimum(np.minimum(*sides), across)
         touched = np.any(term.directions != 0.0, axis=1)
         dofs = term.surface.dofs
         self.up[dofs] += force
@@ -203,7 +207,7 @@ class _Collector:
         on = np.isin(x, term.law.kinks)
         ahead = np.einsum("mk,mkd->md", unit, term.directions)[:, None]
         self._couple(term, on & moving, w * (right - left) / 2, ahead, Length.plain(1))
-        counting = term.directions * term.counts(self.u, self.thresholds.near)[:, :, None]
+        counting = term.directions * term.counts(self.u, near)[:, :, None]
         self._couple(term, on & ~moving, w * right, counting, term.length or Length.plain(1))
 
     def _couple(self, term: LawTerm, on: Mask, factors: Array, rows: Array, length: Length) -> None:
@@ -216,7 +220,8 @@ class _Collector:
             bounds: of one part, in local components.
         """
         dofs, sign = bounds.component()
-        lower, upper = force_attribution.on_bounds(bounds, sign * self.u.ravel()[dofs], self.thresholds.near)
+        near = self.near[bounds.surface.blocks]
+        lower, upper = force_attribution.on_bounds(bounds, sign * self.u.ravel()[dofs], near)
         ahead = sign > 0
         self.up[dofs[np.where(ahead, upper, lower)]] = np.inf
         self.down[dofs[np.where(ahead, lower, upper)]] = np.inf
@@ -269,18 +274,13 @@ class _Collector:
         pairs = np.abs(v) @ self.jump[dofs] + ahead + behind
         return float(np.min(rises, initial=np.inf)), float(np.min(pairs[both], initial=np.inf))
 
-    def _on_kink(self, law: Superpotential, x: Array) -> Array:
-        """Arguments, those near a kink put on it."""
-        if not len(law.kinks):
-            return x
-        nearest = law.kinks[np.argmin(np.abs(x[:, None] - law.kinks), axis=1)]
-        return np.where(np.abs(x - nearest) <= self.thresholds.near, nearest, x)
 
-    def _curvatures(self, law: Superpotential, x: Array, back: Mask | None = None) -> tuple[Array, Array]:
-        """J'' on the left and on the right of x; on the right alone where there is no way back."""
-        step = 2 * self.thresholds.near
-        left = x - step if back is None else np.where(back, x - step, x + step)
-        return _second(law, left), _second(law, x + step)
+def _on_kink(law: Superpotential, x: Array, near: Array) -> Array:
+    """Arguments, those near a kink put on it."""
+    if not len(law.kinks):
+        return x
+    nearest = law.kinks[np.argmin(np.abs(x[:, None] - law.kinks), axis=1)]
+    return np.where(np.abs(x - nearest) <= near, nearest, x)
 
 
 def _second(law: Superpotential, x: Array) -> Array:

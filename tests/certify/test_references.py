@@ -94,6 +94,21 @@ def test_another_bodys_stress_hides_no_tension(two_squares: Path) -> None:
         assert 0 < np.count_nonzero(state.contact) < len(state.contact)
 
 
+@pytest.mark.parametrize("pull", [1.0, 1e8])
+def test_a_drop_just_ahead_of_a_slip_is_none_that_is_reached(two_squares: Path, pull: float) -> None:
+    """What counts as being on a kink belongs to the body: half a percent of its slip is far away."""
+    table = lifting(two_squares, pull)
+    free = solve(Scene.model_validate(table))
+    bottom = (points(free)[:, 0] > 1.5) & (points(free)[:, 1] < 1e-9)
+    drop = 1.005 * float(np.max(np.abs(displacement(free)[bottom, 0])))
+    law = {"law": "graph", "points": [[0.0, 0.0], [drop, 1e-6], [drop, 0.5e-6]]}
+    table["boundary"]["floor"]["friction"] = law
+    table["solver"]["second_order"] = True
+    found = solve(Scene.model_validate(table))
+    assert found.examination is not None
+    assert found.examination.certificate.second_order == "local minimiser"
+
+
 def test_a_tiny_load_beside_a_large_displacement_spoils_no_scale() -> None:
     table = model(4)
     table["boundary"] = {
