@@ -47,7 +47,7 @@ class Answer:
 def run(scene_file: Path, limit: float = 60.0) -> Answer:
     """Solve a scene file in this process, with at most so many seconds of processor time for the solve."""
     from hvi_fenicsx import read_scene
-    from hvi_fenicsx.errors import InputError
+    from hvi_fenicsx.errors import InputError, Interrupted
     from hvi_fenicsx.workflow import finish, prepare
 
     began = time.process_time()
@@ -57,6 +57,8 @@ def run(scene_file: Path, limit: float = 60.0) -> Answer:
         solution = finish(prepared, interrupted=lambda: time.process_time() > late)
     except InputError as error:
         return Answer(2, str(error), seconds=time.process_time() - began)
+    except Interrupted as error:
+        return Answer(130, str(error), seconds=time.process_time() - began)
     except Exception as error:
         return Answer(1, f"{type(error).__name__}: {error}", seconds=time.process_time() - began)
     problem, verdict = solution.problem, solution.solvability
