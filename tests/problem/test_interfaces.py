@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pytest
-from joints import away_from_affine, seam, seam_scene
+from joint_scenes import away_from_affine, seam, seam_scene
 from scenes import NESTED, Table, quadratic_linear
 
 from hvi_fenicsx import InputError, Scene, prepare, solve

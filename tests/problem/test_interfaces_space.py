@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pytest
-from joints import away_from_affine, seam, seam_scene
+from joint_scenes import away_from_affine, seam, seam_scene
 from mpi4py import MPI
 from scenes import Table, quadratic_linear
 from scipy.spatial import Delaunay

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from joints import seam_scene
+from joint_scenes import seam_scene
 from scenes import Table
 
 from hvi_fenicsx import prepare
