@@ -85,7 +85,7 @@ def growth(
         u, forces = local.local_components(u), local.local_components(forces)
         terms, bounds = tuple(local.term(t) for t in terms), tuple(local.bounds(b) for b in bounds)
     near = thresholds.near * references.at(np.arange(len(forces)))
-    found = _Collector(references, u, forces.ravel(), near, tolerance, thresholds)
+    found = _Collector(references, u, forces.ravel(), forces.shape[1], near, tolerance, thresholds)
     for term in terms:
         (found.enter_vector_law if term.radial else found.enter_law)(term)
     for one in bounds:
@@ -138,6 +138,7 @@ class _Collector:
         references: what tractions are relative to.
         u: the displacement in local components, a local array.
         forces: r, (n,).
+        d: the dimension.
         near: distance from a kink or a bound that counts as being on it, by vertex.
         tolerance: relative traction up to which a growth is none.
         thresholds: up to when a jump is rounding.
@@ -147,6 +148,7 @@ class _Collector:
     references: References
     u: Array
     forces: Array
+    d: int
     near: Array
     tolerance: float
     thresholds: Thresholds
@@ -154,7 +156,6 @@ class _Collector:
 
     def __post_init__(self) -> None:
         n = len(self.forces)
-        self.d = n // len(self.near)
         self.up, self.down = self.forces.copy(), -self.forces
         self.jump, self.slack = np.zeros(n), np.zeros(n)
         self.curved_up, self.curved_down = np.zeros(n), np.zeros(n)
