@@ -94,7 +94,7 @@ def main() -> None:
     figures = loop(options.cells, pulls)
     command = statistics.median(by_command(options.cells, pulls[:: max(1, options.loads // options.runs)]))
     spent, own, begun, begun_own = figures["rows"].T
-    (_, few), *_, (_, all_) = figures["memory"].items()
+    few, all_ = figures["memory"][min(10, options.loads)], figures["memory"][options.loads]
     ways = {"from the coarse meshes": (spent, own), "from the last solution": (begun, begun_own)}
     rows = [
         [name, f"{np.median(time):.3f}", f"{np.max(time):.3f}", f"{np.sum(time) / np.sum(alone):.2f}",

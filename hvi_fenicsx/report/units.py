@@ -23,7 +23,11 @@ class Unit:
 
     def text(self, value: float) -> str:
         """A value in this unit, to three digits."""
-        return f"{_digits(value / self.size)}{_NARROW}{self.name}"
+        return f"{self.number(value)}{_NARROW}{self.name}"
+
+    def number(self, value: float) -> str:
+        """The same without the unit, for a column that names it at its head."""
+        return _digits(value / self.size)
 
 
 def unit_for(largest: float, name: str) -> Unit:

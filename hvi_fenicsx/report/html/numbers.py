@@ -74,8 +74,8 @@ def forces(result: Result) -> dict[str, Any] | None:
     places = {**found, "in all": [sum(component) for component in zip(*found.values(), strict=True)]}
     dimension = len(places["in all"])
     unit = unit_for(max(abs(v) for force in places.values() for v in force), "N" if dimension == 3 else "N/m")
-    rows = [{"name": name, "values": [unit.text(v) for v in force]} for name, force in places.items()]
-    return {"axes": "xyz"[:dimension], "rows": rows}
+    rows = [{"name": name, "values": [unit.number(v) for v in force]} for name, force in places.items()]
+    return {"axes": [f"{axis}, {unit.name}" for axis in "xyz"[:dimension]], "rows": rows}
 
 
 def _largest(values: Any, unit: str) -> str:
