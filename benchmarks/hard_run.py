@@ -14,7 +14,7 @@ from covering import Case
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from hvi_fenicsx import workflow
+from hvi_fenicsx import preparation, workflow
 from hvi_fenicsx.certify import certificate
 from hvi_fenicsx.errors import HviError
 from hvi_fenicsx.solvers import SolveContext, SolveResult, registry
@@ -80,7 +80,7 @@ def _unsolved(state: str, found: SolveResult) -> str:
 
 
 def _solved(
-    case: Case, data: Mapping[str, Any], prepared: workflow.Preparation, late: Callable[[], bool]
+    case: Case, data: Mapping[str, Any], prepared: preparation.Preparation, late: Callable[[], bool]
 ) -> SolveResult:
     """The method's result; the case's start is for the methods that begin on pieces of the laws."""
     control = RunControl(timer=prepared.timer, interrupted=late)

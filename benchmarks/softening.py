@@ -20,9 +20,10 @@ from pathlib import Path
 from typing import Any
 
 from hvi_fenicsx import Scene
+from hvi_fenicsx.preparation import DEFAULT, prepare
 from hvi_fenicsx.solvers.thresholds import PathThresholds
 from hvi_fenicsx.solvers.thresholds import Thresholds as SolverThresholds
-from hvi_fenicsx.workflow import DEFAULT, finish, prepare
+from hvi_fenicsx.workflow import finish
 
 Table = dict[str, Any]
 DEMOS = Path(__file__).parent.parent / "demos"

@@ -128,11 +128,11 @@ if TYPE_CHECKING:
         solve,
         study,
     )
+    from .preparation import prepare
     from .runtime.log import set_log_level
     from .runtime.newton_step import NewtonStep
     from .runtime.versions import __version__
     from .scene import Scene, dump_scene, read_scene
-    from .workflow import prepare
 
 
 def __dir__() -> list[str]:

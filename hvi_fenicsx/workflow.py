@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
+from collections.abc import Callable
 
 from dolfinx import fem
 from mpi4py import MPI
@@ -13,139 +12,19 @@ from .certify.certificate import Examination
 from .certify.estimate.estimator import Estimate, estimate
 from .certify.uniqueness import Uniqueness, uniqueness
 from .errors import SolverError
-from .mesh.domain import Domain
-from .mesh.thresholds import Thresholds as MeshThresholds
-from .problem.compose import Model
-from .problem.problem import Problem
-from .rigid import LoadFactors, Solvability
-from .runtime.log import logger, newton_step
+from .preparation import DEFAULT, Preparation, Thresholds, prepare
+from .runtime.log import logger, newton_step, warn
 from .runtime.timing import Timer
 from .scene import Scene
-from .scene_model import model_of, options_of
 from .solution import Solution
 from .solvers import frozen_mixity, nested_iteration
 from .solvers.context import Progress, RunControl, never
 from .solvers.nested_iteration import CoarseStart, LevelSolution
-from .solvers.options import SolverOptions
 from .solvers.result import SolveResult
-from .solvers.thresholds import Thresholds as SolverThresholds
-from .system import existence, free_motions
-from .system.assemble import assemble
+from .system import free_motions
 from .system.levels import Levels
-from .system.system import System
 
 _LOG = logger("workflow")
-
-
-@dataclass(frozen=True, kw_only=True)
-class Thresholds:
-    """The numbers that tune a run.
-
-    Attributes:
-        mesh: how mesh hierarchies are made.
-        solvers: how systems are solved.
-    """
-
-    mesh: MeshThresholds = field(default_factory=MeshThresholds)
-    solvers: SolverThresholds = field(default_factory=SolverThresholds)
-
-
-DEFAULT = Thresholds()
-
-
-@dataclass(frozen=True, kw_only=True)
-class Preparation:
-    """A scene as an assembled problem, before the solve.
-
-    Attributes:
-        scene: what the user asked for.
-        model: the effects and their places.
-        options: how to solve.
-        system: the assembled problem.
-        solvability: whether a solution can exist.
-        timer: wall time by phase.
-        warnings: sentences about numbers that may be mistakes, as far as they are known before the solve.
-    """
-
-    scene: Scene
-    model: Model
-    options: SolverOptions
-    system: System
-    solvability: Solvability
-    timer: Timer
-    warnings: tuple[str, ...] = ()
-
-    @property
-    def problem(self) -> Problem:
-        """The problem that is assembled."""
-        return self.system.problem
-
-    def load_factors(self, load: str | None = None) -> LoadFactors:
-        """Between which factors of a load the body is held, the other loads constant. Collective.
-
-        Args:
-            load: None for the whole load; else ``part.traction`` or ``region.force`` (``body.force``), or just the part
-                or region.
-
-        Raises:
-            InputError: on all ranks alike: there is no such load.
-        """
-        return existence.load_factors(self.problem, self.system.forces, load)
-
-
-def prepare(
-    scene: Scene,
-    comm: MPI.Comm = MPI.COMM_WORLD,
-    timer: Timer | None = None,
-    domain: Domain | None = None,
-    solvability: Solvability | None = None,
-    thresholds: Thresholds = DEFAULT,
-) -> Preparation:
-    """Everything before the solve: mesh, forms, assembly, existence. Collective.
-
-    Args:
-        scene: what to solve.
-        comm: the ranks.
-        timer: where time goes; by default a new one.
-        domain: the body on its mesh, where that exists already; by default it is meshed.
-        solvability: whether a solution can exist, where that is known.
-        thresholds: the numbers that tune the run.
-
-    Raises:
-        InputError: on all ranks alike.
-    """
-    timer = timer or Timer()
-    options, model = options_of(scene.solver, thresholds.solvers), model_of(scene)
-    with timer("mesh"):
-        domain = domain or scene.domain.build_hierarchy(comm, scene.dimension, thresholds.mesh)
-    system = assemble(domain, model, timer, thresholds.solvers.linear)
-    with timer("existence"):
-        solvability = solvability or existence.solvability(system.problem, system.forces)
-    margin = "" if solvability.margin is None else f", margin {solvability.margin:.3g}"
-    _LOG.info("%d unknowns; existence: %s%s", system.dofs, solvability.state, margin)
-    with timer("assembly"):
-        system.attach_free_motions(solvability.free)
-        warnings = _warnings(scene, system, solvability)
-    return Preparation(
-        scene=scene,
-        model=model,
-        options=options,
-        system=system,
-        solvability=solvability,
-        timer=timer,
-        warnings=warnings,
-    )
-
-
-def _warnings(scene: Scene, system: System, solvability: Solvability) -> tuple[str, ...]:
-    """Warnings about numbers that may be mistakes, logged. Collective."""
-    found = (
-        *scene.domain.implausible(system.problem.domain.length),
-        *plausibility.before_solving(system.problem, system.forces),
-        *plausibility.of_existence(solvability),
-    )
-    _log_warnings(found)
-    return found
 
 
 def solve(
@@ -248,7 +127,7 @@ def _examined(prepared: Preparation, found: SolveResult) -> tuple[Examination, t
     with prepared.timer("certificate"):
         examination = certificate.examine(prepared.problem, found.u, options.tolerance, inertia=options.second_order)
         warnings = plausibility.of_solution(prepared.problem, examination, found.u)
-    _log_warnings(warnings)
+    warn(_LOG, warnings)
     _log_certificate(examination.certificate)
     return examination, warnings
 
@@ -283,11 +162,6 @@ def _solution(
         timer=prepared.timer,
         warnings=warnings,
     )
-
-
-def _log_warnings(warnings: Iterable[str]) -> None:
-    for warning in warnings:
-        _LOG.warning("%s", warning)
 
 
 def _log_certificate(found: certificate.Certificate) -> None:

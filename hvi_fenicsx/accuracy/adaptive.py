@@ -17,6 +17,7 @@ from ..certify.estimate.estimator import Estimate
 from ..mesh import refinement
 from ..mesh.domain import Domain
 from ..mesh.refinement import Refinement
+from ..preparation import DEFAULT, Preparation, Thresholds, prepare
 from ..runtime.log import newton_step
 from ..runtime.mpi import agree, total
 from ..runtime.timing import Timer
@@ -26,7 +27,7 @@ from ..solvers.context import Progress, RunControl, never
 from ..solvers.nested_iteration import CoarseStart, refined_levels
 from ..system.levels import Level, Levels
 from ..typing import Entities
-from ..workflow import DEFAULT, Preparation, Thresholds, finish_with_levels, prepare
+from ..workflow import finish_with_levels
 from . import first_mesh
 from .thresholds import CONTROL, ControlThresholds
 

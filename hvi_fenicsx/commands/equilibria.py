@@ -11,6 +11,7 @@ from pathlib import Path
 
 from .. import console, results
 from ..errors import ExitCode, HviError
+from ..preparation import Preparation, prepare
 from ..report.html import equilibria_page
 from ..report.pictures import equilibria as picture
 from ..results.output_folder import Existing
@@ -23,7 +24,6 @@ from ..scene import read_scene
 from ..stationary_points.bodies import Equilibria
 from ..stationary_points.search import Found, Saved
 from ..system import petsc_options
-from ..workflow import Preparation, prepare
 from . import equilibria_files as files
 from . import telling
 from .telling import COMM

@@ -13,6 +13,7 @@ import numpy as np
 from .. import results
 from ..certify.contact_state import ContactState
 from ..errors import ExitCode
+from ..preparation import Preparation
 from ..results.write import write_record
 from ..runtime import memory, versions
 from ..runtime.mpi import largest, on_root
@@ -21,7 +22,6 @@ from ..solution import Solution
 from ..stationary_points.all_points import StationaryPoint
 from ..stationary_points.bodies import Equilibria
 from ..stationary_points.search import Found, Saved, falls_passed
-from ..workflow import Preparation
 
 TABLE, LEFT = "equilibria.csv", "search.npz"
 COLUMNS = ("index", "energy", "kind", "max_slip", "max_opening", "broken", "folder")

@@ -16,6 +16,7 @@ from ..load_path import INTERRUPTED, PathRow
 from ..path import journal
 from ..path.following import Control, PathRun
 from ..path.journal import Journal, Record
+from ..preparation import prepare
 from ..report.html.render import NAME as PAGE
 from ..results.folder import inputs_of
 from ..results.output_folder import Existing
@@ -26,7 +27,6 @@ from ..runtime.timing import Timer
 from ..runtime.versions import __version__
 from ..scene import PathTable, Scene, dump_scene, read_scene
 from ..system import petsc_options
-from ..workflow import prepare
 from . import telling
 from .telling import COMM
 

@@ -12,6 +12,7 @@ from ..accuracy import control, quantities
 from ..accuracy.adaptive import AdaptiveSolver
 from ..accuracy.goal import AccuracyResult, Goal
 from ..errors import ExitCode, InputError
+from ..preparation import prepare
 from ..report.html import render
 from ..results.output_folder import Existing
 from ..results.whole import Wanted, write_whole
@@ -22,7 +23,7 @@ from ..runtime.timing import Timer
 from ..scene import Scene, read_scene
 from ..solution import Solution
 from ..system import petsc_options
-from ..workflow import finish, prepare
+from ..workflow import finish
 from . import telling
 from .telling import COMM
 

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from petsc4py import PETSc
 
+from ..preparation import Preparation
 from ..problem import side_moments
 from ..system import existence
-from ..workflow import Preparation
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -11,9 +11,10 @@ from mpi4py import MPI
 from petsc4py import PETSc
 from pydantic import ValidationError
 
-from .. import console, workflow
+from .. import console, preparation, workflow
 from ..errors import InputError
 from ..mesh.domain import Domain
+from ..preparation import DEFAULT, Preparation, Thresholds
 from ..runtime.log import newton_step
 from ..runtime.timing import Timer
 from ..scene import Scene, SolverTable
@@ -22,7 +23,6 @@ from ..solution import Solution
 from ..solvers.context import Progress
 from ..system import petsc_options
 from ..system.system import System
-from ..workflow import DEFAULT, Preparation, Thresholds
 from .model import Model
 from .solution import ModelSolution
 from .user_energy import UserEnergy
@@ -108,7 +108,7 @@ def check(
     else:
         scene, domain, comm = model.scene, _domain(model), model.body.comm
     scene, comm = _with_options(scene, options), comm or MPI.COMM_WORLD
-    prepared = workflow.prepare(scene, comm, timer, domain, thresholds=thresholds)
+    prepared = preparation.prepare(scene, comm, timer, domain, thresholds=thresholds)
     return ModelPreparation(**_fields(prepared))
 
 

@@ -14,13 +14,13 @@ from ..equilibrium_paths.programme import Follower
 from ..equilibrium_paths.state import End, Event, Follow, PathOptions, PathState
 from ..errors import InputError
 from ..load_path import LoadPath, PathRow
+from ..preparation import Preparation
 from ..problem.factored_problem import FactoredProblem
 from ..problem.problem import Problem
 from ..scene import PathTable
 from ..system import loading
 from ..system.condensation import Condensation
 from ..typing import Array
-from ..workflow import Preparation
 from . import records
 from .certifying import Certifier, Verdict
 from .journal import Record

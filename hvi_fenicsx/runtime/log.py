@@ -11,6 +11,7 @@ import contextlib
 import logging
 import sys
 import time
+from collections.abc import Iterable
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -19,7 +20,9 @@ from . import terminal
 from .newton_step import NewtonStep
 
 PACKAGE = __name__.partition(".")[0]
-COMMANDS, WORKFLOW = f"{PACKAGE}.commands", f"{PACKAGE}.workflow"
+COMMANDS = f"{PACKAGE}.commands"
+TOLD_BY_COMMANDS = (f"{PACKAGE}.preparation", f"{PACKAGE}.workflow")
+"""Loggers whose records a command tells in words of its own."""
 logging.getLogger(PACKAGE).addHandler(logging.NullHandler())
 
 
@@ -28,6 +31,17 @@ def logger(room: str) -> logging.Logger:
     found = logging.getLogger(f"{PACKAGE}.{room}")
     found.addFilter(_on_first_rank)
     return found
+
+
+def warn(log: logging.Logger, sentences: Iterable[str]) -> None:
+    """Record warnings, each by itself.
+
+    Args:
+        log: the logger of a room.
+        sentences: the warnings.
+    """
+    for sentence in sentences:
+        log.warning("%s", sentence)
 
 
 def set_log_level(level: int | str = logging.INFO) -> None:
@@ -77,7 +91,7 @@ class RunLog(logging.FileHandler):
     def __init__(self, path: Path) -> None:
         super().__init__(path, mode="w", encoding="utf-8")
         self._error: OSError | None = None
-        self.addFilter(lambda record: record.name != WORKFLOW)  # the command says the same in full
+        self.addFilter(lambda record: record.name not in TOLD_BY_COMMANDS)
         self.setFormatter(_ElapsedFormatter())
 
     def handleError(self, record: logging.LogRecord) -> None:
@@ -121,7 +135,7 @@ class WarningDisplay(logging.Handler):
 
     def __init__(self) -> None:
         super().__init__(logging.WARNING)
-        self.addFilter(lambda record: record.name != WORKFLOW)
+        self.addFilter(lambda record: record.name not in TOLD_BY_COMMANDS)
 
     def emit(self, record: logging.LogRecord) -> None:
         """Show one record."""

@@ -8,10 +8,11 @@ from dataclasses import replace
 import numpy as np
 
 from ..errors import InputError, SolverError
+from ..preparation import Preparation
 from ..solution import Solution
 from ..solvers.result import SolveResult
 from ..system.condensation import Condensation
-from ..workflow import Preparation, certified, finish
+from ..workflow import certified, finish
 from .all_points import StationaryPoint
 from .condensed_form import scalar_problem
 from .scalar_problem import ScalarProblem

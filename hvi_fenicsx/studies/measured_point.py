@@ -15,6 +15,7 @@ from ..accuracy.adaptive import AdaptiveSolver
 from ..accuracy.control import solve_to_goal
 from ..accuracy.goal import Goal
 from ..errors import InputError
+from ..preparation import prepare
 from ..report.solution_arrays import SolutionArrays, save
 from ..results.gathering import solution_arrays
 from ..results.summary import summary
@@ -22,7 +23,7 @@ from ..runtime.mpi import on_root
 from ..runtime.timing import Timer
 from ..scene import Scene
 from ..solution import Solution
-from ..workflow import finish, prepare
+from ..workflow import finish
 from . import cost
 from .errors import NotStoredError
 from .solution_fields import fields, width

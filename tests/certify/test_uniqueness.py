@@ -12,8 +12,9 @@ from hvi_fenicsx import Scene, console, laws
 from hvi_fenicsx.certify import uniqueness
 from hvi_fenicsx.certify.thresholds import UniquenessThresholds
 from hvi_fenicsx.laws import Superpotential
+from hvi_fenicsx.preparation import prepare
 from hvi_fenicsx.solution import Solution
-from hvi_fenicsx.workflow import finish, prepare
+from hvi_fenicsx.workflow import finish
 
 TRESCA = {"law": "tresca", "yield_traction": 2e6}
 

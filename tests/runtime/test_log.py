@@ -13,9 +13,9 @@ from runs import command, write_scene
 from scenes import model, quadratic_linear
 
 from hvi_fenicsx import Scene, solve
+from hvi_fenicsx.preparation import Thresholds
 from hvi_fenicsx.runtime import log
 from hvi_fenicsx.solvers.thresholds import Thresholds as SolverThresholds
-from hvi_fenicsx.workflow import Thresholds
 
 NESTED = Thresholds(solvers=SolverThresholds(nested_from=500))
 LAW = quadratic_linear(1.0e6)
@@ -92,7 +92,7 @@ def test_from_python_existence_levels_and_certificate_are_told_at_info(caplog: p
     records = solve_from_python(caplog, logging.INFO)
     told = [(r.name, r.getMessage().partition(":")[0]) for r in records]
     assert told == [
-        ("hvi_fenicsx.workflow", "2178 unknowns; existence"),
+        ("hvi_fenicsx.preparation", "2178 unknowns; existence"),
         *(("hvi_fenicsx.solvers", f"level of {n} unknowns") for n in (162, 578, 2178)),
         ("hvi_fenicsx.workflow", "certificate passed (1e-08)"),
     ]
@@ -119,5 +119,5 @@ def test_python_users_who_configure_nothing_see_nothing(scene: Path) -> None:
 def test_on_two_ranks_only_the_first_tells(scene: Path) -> None:
     words = ["mpirun", "-n", "2", sys.executable, "-m", "mpi4py", "-c", _TOLD]
     done = subprocess.run(words, cwd=scene.parent, capture_output=True, text=True, check=True, timeout=300)
-    assert done.stdout.split().count("hvi_fenicsx.workflow") == 2
+    assert done.stdout.split().count("hvi_fenicsx.preparation") == 1
     assert "hvi_fenicsx.solvers" in done.stdout

@@ -9,6 +9,7 @@ from mpi4py import MPI
 from scenes import DELTA, displacement, model, quadratic_linear, solved
 
 from hvi_fenicsx import Scene, prepare
+from hvi_fenicsx.preparation import Thresholds
 from hvi_fenicsx.runtime.timing import Timer
 from hvi_fenicsx.solvers.active_set import ActiveSetSolver
 from hvi_fenicsx.solvers.convergence import Outcome, Sizes
@@ -17,7 +18,6 @@ from hvi_fenicsx.system import schur
 from hvi_fenicsx.system.held_solver import HeldPreconditioner, LinearSettings
 from hvi_fenicsx.system.system import System
 from hvi_fenicsx.system.thresholds import Thresholds as LinearThresholds
-from hvi_fenicsx.workflow import Thresholds
 
 DIRECT = LinearSettings("lu")
 STRONG = quadratic_linear(3e6, DELTA)

@@ -1,0 +1,136 @@
+"""A scene as an assembled problem: mesh, forms, assembly, and whether a solution can exist."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from mpi4py import MPI
+
+from .certify import plausibility
+from .mesh.domain import Domain
+from .mesh.thresholds import Thresholds as MeshThresholds
+from .problem.compose import Model
+from .problem.problem import Problem
+from .rigid import LoadFactors, Solvability
+from .runtime.log import logger, warn
+from .runtime.timing import Timer
+from .scene import Scene
+from .scene_model import model_of, options_of
+from .solvers.options import SolverOptions
+from .solvers.thresholds import Thresholds as SolverThresholds
+from .system import existence
+from .system.assemble import assemble
+from .system.system import System
+
+_LOG = logger("preparation")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Thresholds:
+    """The numbers that tune a run.
+
+    Attributes:
+        mesh: how mesh hierarchies are made.
+        solvers: how systems are solved.
+    """
+
+    mesh: MeshThresholds = field(default_factory=MeshThresholds)
+    solvers: SolverThresholds = field(default_factory=SolverThresholds)
+
+
+DEFAULT = Thresholds()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Preparation:
+    """A scene as an assembled problem, before the solve.
+
+    Attributes:
+        scene: what the user asked for.
+        model: the effects and their places.
+        options: how to solve.
+        system: the assembled problem.
+        solvability: whether a solution can exist.
+        timer: wall time by phase.
+        warnings: sentences about numbers that may be mistakes, as far as they are known before the solve.
+    """
+
+    scene: Scene
+    model: Model
+    options: SolverOptions
+    system: System
+    solvability: Solvability
+    timer: Timer
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def problem(self) -> Problem:
+        """The problem that is assembled."""
+        return self.system.problem
+
+    def load_factors(self, load: str | None = None) -> LoadFactors:
+        """Between which factors of a load the body is held, the other loads constant. Collective.
+
+        Args:
+            load: None for the whole load; else ``part.traction`` or ``region.force`` (``body.force``), or just the part
+                or region.
+
+        Raises:
+            InputError: on all ranks alike: there is no such load.
+        """
+        return existence.load_factors(self.problem, self.system.forces, load)
+
+
+def prepare(
+    scene: Scene,
+    comm: MPI.Comm = MPI.COMM_WORLD,
+    timer: Timer | None = None,
+    domain: Domain | None = None,
+    solvability: Solvability | None = None,
+    thresholds: Thresholds = DEFAULT,
+) -> Preparation:
+    """Everything before the solve: mesh, forms, assembly, existence. Collective.
+
+    Args:
+        scene: what to solve.
+        comm: the ranks.
+        timer: where time goes; by default a new one.
+        domain: the body on its mesh, where that exists already; by default it is meshed.
+        solvability: whether a solution can exist, where that is known.
+        thresholds: the numbers that tune the run.
+
+    Raises:
+        InputError: on all ranks alike.
+    """
+    timer = timer or Timer()
+    options, model = options_of(scene.solver, thresholds.solvers), model_of(scene)
+    with timer("mesh"):
+        domain = domain or scene.domain.build_hierarchy(comm, scene.dimension, thresholds.mesh)
+    system = assemble(domain, model, timer, thresholds.solvers.linear)
+    with timer("existence"):
+        solvability = solvability or existence.solvability(system.problem, system.forces)
+    margin = "" if solvability.margin is None else f", margin {solvability.margin:.3g}"
+    _LOG.info("%d unknowns; existence: %s%s", system.dofs, solvability.state, margin)
+    with timer("assembly"):
+        system.attach_free_motions(solvability.free)
+        warnings = _warnings(scene, system, solvability)
+    return Preparation(
+        scene=scene,
+        model=model,
+        options=options,
+        system=system,
+        solvability=solvability,
+        timer=timer,
+        warnings=warnings,
+    )
+
+
+def _warnings(scene: Scene, system: System, solvability: Solvability) -> tuple[str, ...]:
+    """Warnings about numbers that may be mistakes, logged. Collective."""
+    found = (
+        *scene.domain.implausible(system.problem.domain.length),
+        *plausibility.before_solving(system.problem, system.forces),
+        *plausibility.of_existence(solvability),
+    )
+    warn(_LOG, found)
+    return found
