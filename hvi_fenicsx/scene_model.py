@@ -7,7 +7,7 @@ import functools
 from .errors import InputError
 from .laws import smoothing
 from .problem.compose import Model
-from .problem.interfaces import Sides
+from .problem.interface_sides import Sides
 from .problem.part_laws import Modification, unchanged
 from .scene import Scene, SolverTable
 from .solvers import registry

@@ -13,7 +13,7 @@ from dolfinx import fem
 
 from ..problem.problem import Problem
 from ..problem.references import References
-from ..problem.strained import strained
+from ..problem.rigid_part import strained
 from ..system import net_forces as rigid_balance
 from ..system.net_forces import ActingForces, Holder, spread
 from ..typing import Array

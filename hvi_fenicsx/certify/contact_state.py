@@ -18,7 +18,7 @@ from ..problem.contact_surface import Surface
 from ..problem.law_term import LawTerm
 from ..problem.problem import Bounds, Problem
 from ..problem.references import References
-from ..problem.strained import strained
+from ..problem.rigid_part import strained
 from ..problem.vectors import nodal
 from ..typing import Array, Integers, Mask
 from . import force_attribution, shared_forces

@@ -22,7 +22,7 @@ from ..mesh.domain import Domain
 from ..mesh.shapes import Box, DomainShape, GivenMesh, MeshFile, Rectangle
 from ..mesh.thresholds import DEFAULT
 from ..mesh.transfer import Transfer
-from ..problem.interfaces import Sides
+from ..problem.interface_sides import Sides
 from ..schema import located_error, unknown
 
 

@@ -10,7 +10,7 @@ from pydantic import ValidationError
 from ..effects import Effect, Place
 from ..errors import InputError
 from ..mesh.boundary_part import BoundaryPart
-from ..problem.interfaces import Sides
+from ..problem.interface_sides import Sides
 from ..scene import BodyTable, BoundaryTable, InterfaceTable, MaterialTable, Scene
 from ..schema import located_error, unknown
 from .body import Body

@@ -23,7 +23,7 @@ from ..spatial_value import SpatialValue
 from ..typing import Array, Entities
 from . import bulk, contact_parts, dirichlet, interfaces, part_facets, part_laws, scaling
 from .domain_forms import DomainForms
-from .interfaces import Sides
+from .interface_sides import Sides
 from .part_laws import Modification, unchanged
 from .problem import PlacedContribution, PrescribedComponent, Problem
 from .scaling import Placed, Scales

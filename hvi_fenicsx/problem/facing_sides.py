@@ -38,8 +38,7 @@ def refuse(comm: MPI.Comm, surfaces: Iterable[Surface], length: float, threshold
             raise InputError(
                 f"boundary.{surface.part}: two sides lie on each other at ({at}) and face each other. Contact and laws "
                 "of a boundary part act between the body and a rigid obstacle: each side would be held by an "
-                "obstacle of its own. Give the part one of the sides only; in the plane, name both in an "
-                "[interface.NAME]"
+                "obstacle of its own. Give the part one of the sides only, or name both in an [interface.NAME]"
             )
 
 

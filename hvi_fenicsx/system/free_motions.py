@@ -8,7 +8,7 @@ to them in L².
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,11 +18,13 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from ..problem.problem import Problem
+from ..problem.rigid_part import BodyMotions, RigidPart
 from ..problem.vectors import null_space
 from ..rigid import Mode
 from ..runtime import forms
 from ..runtime.mpi import total
 from ..typing import Array, Entities
+from . import existence
 
 
 @dataclass(frozen=True)
@@ -65,6 +67,32 @@ def fields(problem: Problem, modes: Sequence[Mode]) -> list[fem.Function]:
         field.x.array[:] = problem.bodies.motion(points, mode).ravel()
         found.append(field)
     return found
+
+
+def rigid_part(problem: Problem, unknowns: Callable[[fem.Function], PETSc.Vec]) -> RigidPart | None:
+    """That of the motions which conditions leave and the elastic operator does not see; None for none. Collective.
+
+    Across an interface they leave no strain only up to the rounding of its integrals, so they are not taken there.
+
+    Args:
+        problem: the problem.
+        unknowns: makes the unknowns of a displacement field.
+    """
+    if problem.bulk.foundation is not None or problem.interfaces:
+        return None
+    modes = existence.motions(problem, contact_closed=False)
+    motions = [unknowns(field) for field in fields(problem, modes)]
+    if not motions:
+        return None
+    for motion in motions:
+        motion.array[problem.fixed_here] = 0.0
+    values, moving = np.array([motion.array_r for motion in motions]), np.array([mode.body for mode in modes])
+    labels, every = problem.bodies.labels[np.arange(values.shape[1]) // problem.scales.dimension], []
+    for body in np.unique(moving):
+        places = np.flatnonzero(labels == body)
+        own = values[moving == body][:, places]
+        every.append(BodyMotions(places=places, owned=len(places), values=own))
+    return RigidPart(problem.domain.mesh.comm, every)
 
 
 def remove_free_motions(problem: Problem, modes: Sequence[Mode], u: fem.Function) -> None:

@@ -13,9 +13,9 @@ from petsc4py import PETSc
 
 from ..problem.law_term import LawTerm
 from ..problem.problem import Bounds
+from ..problem.rigid_part import RigidPart
 from ..typing import Array, Entities
 from .contact_rows import ContactRows
-from .rigid_part import RigidPart
 from .thresholds import DEFAULT, Thresholds
 
 
@@ -49,6 +49,7 @@ class Jacobian:
         self._rates = [np.zeros((*t.free.shape, t.free.shape[1])) for t in terms]
         self.held: Entities = np.empty(0, np.int32)
         self._comm = stiffness.comm.tompi4py()
+        self._strained = stiffness.createVecRight()
 
     @property
     def rates(self) -> list[Array]:
@@ -120,4 +121,7 @@ class Jacobian:
         Args:
             x: the vector.
         """
-        return x if self._rigid is None else self._rigid.without(x)
+        if self._rigid is None:
+            return x
+        self._strained.array[:] = self._rigid.without(x.array_r)
+        return self._strained

@@ -29,7 +29,6 @@ from . import existence, free_motions, local_frames, near_null_space
 from .free_motions import FreeMotions
 from .holding_forces import HoldingForces
 from .jacobian import Jacobian
-from .rigid_part import RigidPart
 from .thresholds import DEFAULT, Thresholds
 
 
@@ -102,7 +101,7 @@ class System:
             self.forces = {name: assembled(form) for name, form in compiled.linear.items()}
             stiffness, self.load = self._constrained()
             stiffness, self.rotation, self.terms, self.bounds = self._in_local_components(stiffness)
-            rigid = RigidPart.of(problem, self.unknowns)
+            rigid = free_motions.rigid_part(problem, self.unknowns)
             self.jacobian = Jacobian(stiffness, self.terms, self.bounds, thresholds, rigid)
             self.references = references.of(problem, self._sum_of(self.forces))
             self.pushing = self._sum_of(existence.loads_of_rigid_motions(problem, self.forces))

@@ -1,0 +1,124 @@
+"""The two sides of an interface: their facets, the same on all ranks, and where they lie over each other."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import InputError
+from ..mesh import nodes
+from ..mesh.refinement import cell_facets
+from ..runtime.mpi import agree
+from ..typing import Array, Entities, Mask
+from . import facet_overlaps, spaces
+from .domain_forms import DomainForms
+from .facet_overlaps import Facets, Overlaps
+from .thresholds import Thresholds
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sides:
+    """What a scene says of an interface.
+
+    Attributes:
+        first: the side that carries contact and laws.
+        second: the other one.
+        tied: whether the sides are glued for ever.
+    """
+
+    first: str
+    second: str
+    tied: bool = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class Pair:
+    """The facets of the two sides of an interface, the same on all ranks.
+
+    Attributes:
+        name: of the interface.
+        sides: what the scene says of it.
+        first: the facets of the first side.
+        second: those of the second.
+    """
+
+    name: str
+    sides: Sides
+    first: Facets
+    second: Facets
+
+    def overlaps(self, thresholds: Thresholds) -> Overlaps:
+        """The intersections of the facets of both sides."""
+        if self.first.points.shape[2] == 2:
+            return facet_overlaps.in_plane(self.first, self.second, thresholds)
+        from . import facet_polygons  # shapely, which plane bodies do not need
+
+        return facet_polygons.in_space(self.first, self.second, thresholds)
+
+    def covered(self, overlaps: Overlaps) -> Mask:
+        """Whether each node of the first side lies over the second, a midpoint with both ends of its edge, (f, n)."""
+        middles = [overlaps.covered[:, ends].all(axis=1) for ends in self.first.edges]
+        return np.column_stack([overlaps.covered, *middles])
+
+    def members(self, context: DomainForms) -> Entities:
+        """Local vertices (owned) of both sides."""
+        start, end = context.space.dofmap.index_map.local_range
+        both = np.unique(np.concatenate([self.first.nodes.ravel(), self.second.nodes.ravel()]))
+        return np.asarray(both[(both >= start) & (both < end)] - start, dtype=np.int32)
+
+
+def pair(context: DomainForms, name: str, sides: Sides) -> Pair:
+    """The facets of both sides on all ranks. Collective.
+
+    Args:
+        context: spaces, parts and vertices.
+        name: of the interface.
+        sides: what the scene says of it.
+
+    Raises:
+        InputError: on all ranks alike: a side without facets.
+    """
+    found = []
+    for side in (sides.first, sides.second):
+        facets = _gathered(context, context.domain.facets([side]))
+        if not len(facets.nodes):
+            raise InputError(f"interface.{name}.between: no facet lies on {side!r}")
+        found.append(facets)
+    return Pair(name=name, sides=sides, first=found[0], second=found[1])
+
+
+def _gathered(context: DomainForms, local: Entities) -> Facets:
+    """Facets whose cells this rank owns, and those of all other ranks. Collective."""
+    space, d = context.space, context.dimension
+    of_cell, topology = cell_facets(context.domain.mesh), context.domain.mesh.topology
+    connected = topology.connectivity(d - 1, d)
+    local = local[np.diff(connected.offsets)[local] == 1]
+    cells = connected.array[connected.offsets[local]]
+    owned = cells < topology.index_map(d).size_local
+    local, cells = local[owned], cells[owned]
+    blocks = nodes.facet_nodes(space, local)
+    inner = space.dofmap.list[cells][:, : d + 1][of_cell[cells] == local[:, None]]
+    parts = [
+        space.dofmap.index_map.local_to_global(np.ascontiguousarray(blocks.ravel())).reshape(blocks.shape),
+        context.points_on_curves[blocks][:, :, :d],
+        _outward(context.points[blocks[:, :d]][:, :, :d], context.points[inner][:, :d]),
+    ]
+    every = agree(context.domain.mesh.comm, parts)
+    numbers, points, normals = (np.concatenate([part[i] for part in every]) for i in range(3))
+    order = np.lexsort(np.round(points[:, :d].mean(axis=1) / context.length, 12).T)
+    return Facets(
+        nodes=numbers[order].astype(np.int64),
+        points=points[order],
+        normals=normals[order],
+        share=spaces.edge_share(space),
+    )
+
+
+def _outward(corners: Array, inner: Array) -> Array:
+    """Unit normals of segments or triangles (f, d, d) away from points inside (f, d)."""
+    sides = corners[:, 1:] - corners[:, :1]
+    plane = corners.shape[1] == 2
+    across = np.column_stack([sides[:, 0, 1], -sides[:, 0, 0]]) if plane else np.cross(sides[:, 0], sides[:, 1])
+    normals = across / np.linalg.norm(across, axis=1, keepdims=True)
+    return np.asarray(normals * -np.sign(np.sum(normals * (inner - corners[:, 0]), axis=1, keepdims=True)))
