@@ -7,8 +7,7 @@ its vertex by a term c δ(B v). A kink that lets the energy fall in no admissibl
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -17,12 +16,10 @@ from ..problem.law_term import LawTerm
 from ..problem.problem import Bounds
 from ..problem.references import References
 from ..system import local_frames
-from ..typing import Array, Entities, Integers, Mask
+from ..typing import Array, Entities, Mask
 from . import force_attribution, shared_forces
+from .coupled_growth import Coupling, Sides, coupled
 from .thresholds import DEFAULT, Thresholds
-
-_DIRECTIONS = 256
-"""How many directions are tried where components are coupled, beside that of steepest descent."""
 
 
 @dataclass(frozen=True)
@@ -94,42 +91,6 @@ def growth(
     return found.growth()
 
 
-@dataclass(frozen=True)
-class _Coupling:
-    """The terms c δ(B v) of one law of a length at vertices on its kinks.
-
-    Attributes:
-        blocks: the vertices, (m,).
-        factors: c, (m,).
-        rows: B, (m, q, d).
-        length: δ.
-    """
-
-    blocks: Entities
-    factors: Array
-    rows: Array
-    length: Length
-
-
-@dataclass(frozen=True)
-class _Bend:
-    """One term c δ(B v) at one vertex.
-
-    Attributes:
-        factor: c.
-        rows: B, (q, d), or its columns of some components.
-        length: δ.
-    """
-
-    factor: float
-    rows: Array
-    length: Length
-
-    def value(self, v: Array) -> Array:
-        """The term at directions v (p, d), (p,)."""
-        return self.factor * self.length.of(v @ self.rows.T)
-
-
 @dataclass
 class _Collector:
     """The sums over laws, bounds and supports, by scalar dof (n,); couplings by vertex.
@@ -152,7 +113,7 @@ class _Collector:
     near: Array
     tolerance: float
     thresholds: Thresholds
-    couplings: list[_Coupling] = field(default_factory=list)
+    couplings: list[Coupling] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         n = len(self.forces)
@@ -212,7 +173,7 @@ class _Collector:
         self._couple(term, on & ~moving, w * right, counting, term.length or Length.plain(1))
 
     def _couple(self, term: LawTerm, on: Mask, factors: Array, rows: Array, length: Length) -> None:
-        self.couplings.append(_Coupling(term.surface.blocks[on], factors[on], rows[on], length))
+        self.couplings.append(Coupling(term.surface.blocks[on], factors[on], rows[on], length))
 
     def enter_bounds(self, bounds: Bounds) -> None:
         """Directions beyond a reached bound are not admissible.
@@ -243,37 +204,11 @@ class _Collector:
         free_up, free_down = np.isfinite(self.up), np.isfinite(self.down)
         opposite = np.where(free_up & free_down, self.jump, np.inf)
         least = np.minimum(self.up, self.down)
-        for dofs, lowest, pair in self._coupled():
+        for dofs, lowest, pair in coupled(self.couplings, Sides(self.up, self.down, self.jump), self.d):
             least[dofs], opposite[dofs], self.bent[dofs] = lowest, pair, True
         up, down = np.where(free_up, self.curved_up, np.inf), np.where(free_down, self.curved_down, np.inf)
         rounding = self.thresholds.no_jump / self.tolerance * self.slack
         return Growth(least, opposite, self.slack, rounding, np.minimum(up, down), self.bent)
-
-    def _coupled(self) -> Iterator[tuple[Integers, float, float]]:
-        """For each vertex with couplings: the components that they touch, their least growth, and that of a pair."""
-        at: dict[int, list[_Bend]] = {}
-        for one in self.couplings:
-            for i, block in enumerate(one.blocks):
-                at.setdefault(int(block), []).append(_Bend(float(one.factors[i]), one.rows[i], one.length))
-        for vertex, bends in at.items():
-            moved = np.flatnonzero(np.any(np.vstack([b.rows for b in bends]) != 0.0, axis=0))
-            dofs = vertex * self.d + moved
-            yield dofs, *self._least(dofs, [replace(b, rows=b.rows[:, moved]) for b in bends])
-
-    def _least(self, dofs: Integers, bends: list[_Bend]) -> tuple[float, float]:
-        """The least growth of coupled components over their admissible directions, and of opposite ones together."""
-        up, down = self.up[dofs], self.down[dofs]
-        with np.errstate(invalid="ignore"):  # both infinite: the next line
-            middle = (down - up) / 2
-        steepest = np.where(np.isfinite(up) & np.isfinite(down), middle, np.where(np.isfinite(up), -up, down))
-        steepest = np.where(np.isfinite(steepest), steepest, 0.0)
-        v = _admissible(np.vstack([steepest, _sphere(len(dofs))]), np.isfinite(up), np.isfinite(down))
-        ahead, behind = (np.sum([b.value(side) for b in bends], axis=0) for side in (v, -v))
-        one_way = np.where(v > 0, np.where(np.isfinite(up), up, 0.0), np.where(np.isfinite(down), down, 0.0))
-        both = np.all((v == 0.0) | (np.isfinite(up) & np.isfinite(down)), axis=1)
-        rises = np.sum(one_way * np.abs(v), axis=1) + ahead
-        pairs = np.abs(v) @ self.jump[dofs] + ahead + behind
-        return float(np.min(rises, initial=np.inf)), float(np.min(pairs[both], initial=np.inf))
 
 
 def _on_kink(law: Superpotential, x: Array, near: Array) -> Array:
@@ -286,22 +221,3 @@ def _on_kink(law: Superpotential, x: Array, near: Array) -> Array:
 
 def _second(law: Superpotential, x: Array) -> Array:
     return law.convex.second(x) - law.concave.second(x)
-
-
-def _admissible(directions: Array, up: Mask, down: Mask) -> Array:
-    """Unit directions (q, k) without the components that are not admissible; those left empty are left out."""
-    v = np.where(((directions > 0) & ~up) | ((directions < 0) & ~down), 0.0, directions)
-    length = np.linalg.norm(v, axis=1)
-    return np.asarray(v[length > 0.0] / length[length > 0.0, None])
-
-
-def _sphere(k: int) -> Array:
-    """Directions spread over the sphere in k = 1, 2 or 3 dimensions, the axes among them."""
-    axes = np.vstack([np.eye(k), -np.eye(k)])
-    if k == 1:
-        return axes
-    turns = np.arange(_DIRECTIONS) * (np.pi * (3.0 - np.sqrt(5.0)))
-    height = np.zeros(_DIRECTIONS) if k == 2 else 1.0 - (2.0 * np.arange(_DIRECTIONS) + 1.0) / _DIRECTIONS
-    circle = np.sqrt(1.0 - height**2)
-    spread = np.column_stack([circle * np.cos(turns), circle * np.sin(turns), height])
-    return np.vstack([axes, spread[:, :k]])

@@ -21,9 +21,10 @@ from ..rigid import Solvability, kernel
 from ..runtime.mpi import largest, total
 from ..system import existence
 from .certificate import Examination
-from .contact_state import ContactState, LawState
+from .contact_state import ContactState
 from .estimate.contact_errors import ratio
 from .estimate.estimator import Estimate
+from .law_state import LawState
 from .thresholds import PLAUSIBILITY, PlausibilityThresholds
 
 
@@ -160,7 +161,7 @@ def _strain(problem: Problem, u: fem.Function, thresholds: PlausibilityThreshold
     for a, b in combinations(range(d + 1), 2):
         ends = problem.space.dofmap.list[:, [a, b]]
         edge, change = (v[ends[:, 1]] - v[ends[:, 0]] for v in (x, values))
-        along = np.abs(np.sum(edge * change, axis=1)) / np.sum(edge**2, axis=1)
+        along = np.abs(np.einsum("nd,nd->n", edge, change)) / np.einsum("nd,nd->n", edge, edge)
         most = max(most, float(np.max(along, initial=0.0)))
     strain = largest(problem.domain.mesh.comm, most) * scales.displacement
     if strain > thresholds.largest_strain:

@@ -46,7 +46,8 @@ class References:
 
     def norms(self, values: Array) -> Array:
         """Euclidean norms of values at this rank's vertices, any shape of (vertices, d), by body. Collective."""
-        squares = np.sum(values.reshape(-1, self.problem.scales.dimension) ** 2, axis=1)
+        by_vertex = values.reshape(-1, self.problem.scales.dimension)
+        squares = np.einsum("vd,vd->v", by_vertex, by_vertex)  # a sum over a short axis is much slower
         return np.sqrt(_total(self.problem, _sums(self.problem, squares)))
 
     def largest(self, blocks: npt.NDArray[np.integer], values: Array) -> Array:
@@ -78,7 +79,7 @@ class References:
         Args:
             u: at this rank's vertices, in units of u0, any shape of (vertices, d).
         """
-        sizes = np.max(np.abs(u.reshape(-1, self.problem.scales.dimension)), axis=1)
+        sizes = functools.reduce(np.maximum, np.abs(u.reshape(-1, self.problem.scales.dimension)).T)
         found = self.largest(np.arange(len(sizes)), sizes)
         return np.where(self.driven & (found > 0.0), found, np.maximum(found, self.scale))
 

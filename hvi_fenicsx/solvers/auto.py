@@ -63,8 +63,8 @@ class Auto(BranchIteration):
     takes_smoothing = True
 
     def __init__(self, context: SolveContext) -> None:
-        held = context.solvability.state == "held"
-        most = None if held else context.options.thresholds.branch.search_steps
+        self._held = context.solvability.state == "held"
+        most = None if self._held else context.options.thresholds.branch.search_steps
         self._limit = _StepLimit(context.solver.interrupted, most)
         super().__init__(replace(context, solver=context.solver.with_interruption(self._limit)))
 
@@ -111,14 +111,17 @@ class Auto(BranchIteration):
 
     def _asks_for_path(self) -> bool:
         """Whether loading decides which equilibrium is meant, or if there is one."""
-        loose = self.context.solvability.state != "held"
-        return bool(self.system.terms) and self.options.start == "unbroken" and (loose or self._soft())
+        undecided = not self._held or self._soft()
+        return bool(self.system.terms) and self.options.start == "unbroken" and undecided
 
     def _along_path(self, first: SolveResult) -> SolveResult | None:
-        """The equilibrium on the load path, or that there is none on it; None where this is not known. Collective."""
+        """The equilibrium on the load path, or that there is none on it; None where this is not known. Collective.
+
+        A body that is held has an equilibrium, be it off the path.
+        """
         with self.context.timer("setup"):
             path = load_path_start.follow(self.system, self.options.thresholds.path)
-        if path is None:
+        if path is None or (path.x is None and self._held):
             return None
         if path.x is None:
             reason = f"no equilibrium on the loading path: {path.reason}"

@@ -10,6 +10,7 @@ from scenes import Table, solved
 
 from hvi_fenicsx import Scene, prepare
 from hvi_fenicsx.equilibrium_paths.eliminated import without_fixed
+from hvi_fenicsx.solvers import load_path_start
 from hvi_fenicsx.system.condensation import Condensation
 
 STRENGTH = 220.591e3
@@ -68,6 +69,11 @@ def test_a_peeled_strip_is_the_same_as_by_the_branch_iteration_in_few_newton_ste
     assert branch.converged
     assert path.examination.energy == pytest.approx(branch.examination.energy, rel=1e-10)
     assert path.solve_result.counts.newton < 20 < branch.solve_result.counts.newton
+
+
+def test_the_end_of_a_path_is_no_answer_for_a_body_that_is_held(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(load_path_start, "follow", lambda *_: load_path_start.PathStart(x=None, reason="it ends"))
+    assert solved(strip()).converged
 
 
 @pytest.mark.parametrize("gap", [0.0, 1e-6])

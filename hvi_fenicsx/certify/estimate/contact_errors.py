@@ -16,7 +16,8 @@ from ...system.levels import Levels
 from ...system.system import System
 from ...typing import Array
 from ..certificate import Examination
-from ..contact_state import ContactState, LawState
+from ..contact_state import ContactState
+from ..law_state import LawState
 from . import coupled_errors
 from .dual_norm import DualNorm
 from .law_traces import ErrorField, LawTraces, Trace

@@ -17,7 +17,7 @@ from ...laws import Superpotential
 from ...problem.problem import Problem
 from ...runtime.mpi import total
 from ...typing import Array
-from ..contact_state import LawState
+from ..law_state import LawState
 from . import defect
 from .bubble_stiffness import BubbleStiffness
 from .dual_norm import DualNorm

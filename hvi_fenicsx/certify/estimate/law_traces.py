@@ -17,7 +17,8 @@ from ...mesh import nodes
 from ...problem.contact_surface import Surface
 from ...problem.problem import Problem
 from ...typing import Array, Mask
-from ..contact_state import ContactState, LawState
+from ..contact_state import ContactState
+from ..law_state import LawState
 from ..placed_forces import traction
 from . import bubbles
 from .contact_facets import PartTrace, local_blocks
