@@ -123,11 +123,12 @@ def outcome(solution: Solution) -> Iterator[str]:
     """What was found and how sure it is."""
     yield f"result: {solution.reason}"
     if not solution.converged and solution.solvability.state in ("metastable", "escapes"):
-        yield "`hvi path SCENE` follows the load to the last state that is borne, and says its factor"
+        yield "`hvi path SCENE` follows the load to the last state that is borne, and beyond"
     if solution.examination is None or solution.solve_result is None:
         return
     c, counts = solution.examination.certificate, solution.solve_result.counts
-    yield f"certificate ({c.tolerance:g}): {c}"
+    of = "" if (last := solution.last_borne) is None else f" of the state at load factor {last.factor:.6g}"
+    yield f"certificate{of} ({c.tolerance:g}): {c}"
     if solution.uniqueness is not None:
         yield f"other equilibria: {_OTHERS[solution.uniqueness.state]}; {solution.uniqueness.why}"
     if c.rounding is not None and c.rounding > c.tolerance:

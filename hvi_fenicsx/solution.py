@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from .certify import placed_forces
-from .certify.certificate import Examination
+from .certify.certificate import Certificate, Examination
 from .certify.estimate.estimator import Estimate
 from .certify.placed_forces import PlacedForces
 from .certify.uniqueness import Uniqueness
@@ -16,6 +16,19 @@ from .rigid import Solvability
 from .runtime.timing import Timer
 from .scene import Scene
 from .solvers.result import SolveResult
+
+
+@dataclass(frozen=True, kw_only=True)
+class LastBorne:
+    """That a solution is the last state that is borne, since none was found under the whole load.
+
+    Attributes:
+        factor: of all loads and prescribed displacements.
+        whole_load: what was found under the whole load.
+    """
+
+    factor: float
+    whole_load: Solution
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -34,6 +47,8 @@ class Solution:
         timer: wall time by phase.
         uniqueness: what is known about other equilibria; None where nothing was certified, or it was found elsewhere.
         warnings: sentences about numbers that may be mistakes (:mod:`.plausibility`).
+        last_borne: where none was found under the whole load, and problem, displacement and examination are those of
+            the last state that is borne.
     """
 
     scene: Scene
@@ -47,11 +62,19 @@ class Solution:
     timer: Timer
     warnings: tuple[str, ...] = ()
     uniqueness: Uniqueness | None = None
+    last_borne: LastBorne | None = None
+
+    @property
+    def certificate(self) -> Certificate | None:
+        """How far the conditions of a solution under the whole load are met; None where nothing was solved."""
+        if self.last_borne is not None:
+            return self.last_borne.whole_load.certificate
+        return None if self.examination is None else self.examination.certificate
 
     @property
     def converged(self) -> bool:
-        """Certified within the tolerance."""
-        return self.examination is not None and self.examination.certificate.passed
+        """Certified within the tolerance, under the whole load."""
+        return self.certificate is not None and self.certificate.passed
 
     @property
     def exit_code(self) -> int:
@@ -65,6 +88,9 @@ class Solution:
     @property
     def reason(self) -> str:
         """Why it ended, for people."""
+        if self.last_borne is not None:
+            shown = f"the last state that is borne is shown, at load factor {self.last_borne.factor:.6g}"
+            return f"{self.last_borne.whole_load.reason}; {shown}"
         if self.solve_result is None:
             return "no solution exists: the load moves the body away"
         if self.converged:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +12,7 @@ from ..accuracy import control, quantities
 from ..accuracy.adaptive import AdaptiveSolver
 from ..accuracy.goal import AccuracyResult, Goal
 from ..errors import ExitCode, InputError
+from ..path import last_borne
 from ..preparation import prepare
 from ..report.html import render
 from ..results.output_folder import Existing
@@ -107,6 +108,8 @@ def _solve(request: RunRequest, interrupt: Interrupt) -> tuple[Solution, Accurac
     if request.goal is not None:
         solver = AdaptiveSolver(timer=request.timer, interrupted=interrupt.requested)
         reached = control.solve_to_goal(request.scene, COMM, request.goal, solver, telling.LOG.info)
+        shown = last_borne.in_place_of(reached.level.prepared, reached.solution, interrupt.requested)
+        reached = replace(reached, solution=shown)
         telling.say(
             [
                 *console.outcome(reached.solution),
@@ -118,6 +121,7 @@ def _solve(request: RunRequest, interrupt: Interrupt) -> tuple[Solution, Accurac
     prepared = prepare(request.scene, COMM, request.timer)
     telling.say(console.heading(prepared, COMM.size))
     solution = finish(prepared, interrupted=interrupt.requested)
+    solution = last_borne.in_place_of(prepared, solution, interrupt.requested)
     new = (warning for warning in solution.warnings if warning not in prepared.warnings)
     telling.say([*console.outcome(solution), *console.warnings(new)])
     return solution, None

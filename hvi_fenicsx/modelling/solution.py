@@ -12,7 +12,7 @@ from pathlib import Path
 from dolfinx import fem
 from matplotlib.figure import Figure
 
-from ..certify.certificate import Certificate, Examination
+from ..certify.certificate import Examination
 from ..errors import InputError
 from ..results import ResultFolder, gathering
 from ..results.output_folder import Existing
@@ -70,11 +70,6 @@ class ModelSolution(Solution):
             InputError: on all ranks alike: nothing was solved, since no solution exists.
         """
         return self._examined.energy * self.problem.scales.energy
-
-    @property
-    def certificate(self) -> Certificate | None:
-        """How far the conditions of a solution are met; None where nothing was solved."""
-        return None if self.examination is None else self.examination.certificate
 
     @cached_property
     def contact(self) -> Mapping[str, ContactArrays]:

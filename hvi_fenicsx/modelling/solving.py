@@ -14,6 +14,7 @@ from pydantic import ValidationError
 from .. import console, preparation, workflow
 from ..errors import InputError
 from ..mesh.domain import Domain
+from ..path import last_borne
 from ..preparation import DEFAULT, Preparation, Thresholds
 from ..runtime.log import newton_step
 from ..runtime.timing import Timer
@@ -77,6 +78,7 @@ def solve(
         found, levels = workflow.finish_with_levels(prepared, progress, start=first, estimating=estimate)
         if found.solve_result is not None:
             petsc_options.check_read(petsc or {}, prepared.system.comm)
+        found = last_borne.in_place_of(prepared, found)
     _free_garbage([prepared.system, *(level.system for level in levels)])
     return ModelSolution(**_fields(found))
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from dolfinx import fem
 
+from ..equilibrium_paths.bonds import is_piecewise_linear
 from ..equilibrium_paths.kinds import kind_of
 from ..equilibrium_paths.programme import Follower
 from ..equilibrium_paths.state import End, Event, Follow, PathOptions, PathState
@@ -78,6 +79,16 @@ class PathRun:
         self.states: list[PathState] = []
         self._verdicts: list[Verdict] = []
         self._extremes: list[tuple[float, float]] = []
+
+    @property
+    def is_straight(self) -> bool:
+        """Whether the path is straight between two events."""
+        return is_piecewise_linear(self._condensation.problem)
+
+    @property
+    def size(self) -> int:
+        """The number of unknowns of Γc that are followed."""
+        return self._condensation.problem.size
 
     def follow(self, control: Control, known: Sequence[Record] = ()) -> LoadPath:
         """Follow the path to its end. Collective.
@@ -158,6 +169,16 @@ class PathRun:
         """
         state = self.states[number]
         return self._expanded(state.x, state.factor)
+
+    def state(self, number: int) -> tuple[Problem, fem.Function]:
+        """The problem at the factor of a row, and the displacement there. Collective.
+
+        The problem holds until another factor is asked for.
+
+        Args:
+            number: of the row.
+        """
+        return self._factored.at(self.states[number].factor), self.displacement(number)
 
     def crossings(self, factor: float) -> Iterator[tuple[int, Problem, fem.Function]]:
         """The states at which the path crosses a factor: the row before, problem and displacement. Collective.

@@ -156,6 +156,11 @@ class Result:
         return bool((self.summary.get("certificate") or {}).get("passed"))
 
     @property
+    def last_borne(self) -> Mapping[str, Any] | None:
+        """Where the state that is shown is the last that is borne: its load factor and its certificate."""
+        return self.summary.get("last_borne")
+
+    @property
     def coarse(self) -> bool:
         """Whether the mesh's estimated error is so large that the numbers are rough."""
         return bool((self.summary.get("estimate") or {}).get("coarse"))

@@ -36,7 +36,8 @@ def summary(solution: Solution) -> dict[str, Any]:
             "mode_mixity": _mode_mixity(solution),
             "resultants": _resultants(solution),
             "solvability": solution.solvability.summary(),
-            "certificate": examination.certificate.as_dict() if examination else None,
+            "certificate": solution.certificate.as_dict() if solution.certificate else None,
+            "last_borne": _last_borne(solution),
             "uniqueness": solution.uniqueness.as_dict() if solution.uniqueness else None,
             "estimate": _estimate(solution),
             "accuracy": None,
@@ -48,6 +49,13 @@ def summary(solution: Solution) -> dict[str, Any]:
             "versions": versions.versions(),
         }
     )
+
+
+def _last_borne(solution: Solution) -> dict[str, Any] | None:
+    """The factor of the loads under which the state that is written is in equilibrium, and its certificate."""
+    if solution.last_borne is None or solution.examination is None:
+        return None
+    return {"factor": solution.last_borne.factor, "certificate": solution.examination.certificate.as_dict()}
 
 
 def _iterations(solution: Solution) -> dict[str, int] | None:

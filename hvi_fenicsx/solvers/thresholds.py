@@ -136,11 +136,13 @@ class PathThresholds:
     Attributes:
         quick_steps: Newton steps of the first start before a path is followed, where laws soften.
         vertex_unknowns: unknowns of Γc's vertices up to which the system is condensed.
+        curved_unknowns: condensed unknowns up to which a path that is not straight between events is followed.
         most_events: of one path.
     """
 
     quick_steps: int = 8
     vertex_unknowns: int = 1_600
+    curved_unknowns: int = 200
     most_events: int = 20_000
 
 

@@ -356,7 +356,12 @@ def test_an_equilibrium_that_is_not_found_ends_with_4_and_what_there_is(tmp_path
     record = summary(tmp_path / "r")
     assert "no equilibrium found" in record["reason"]
     assert record["converged"] is False
-    assert (tmp_path / "r" / "displacement.pvd").exists()
+    assert record["certificate"]["passed"] is False
+    assert record["last_borne"]["certificate"]["passed"] is True
+    borne = record["last_borne"]["factor"]
+    assert record["resultants"]["pull"] == pytest.approx([borne * 0.97e6, 0.0])
+    with np.load(tmp_path / "r" / "solution.npz") as arrays:
+        assert np.max(np.abs(arrays["displacement"])) < 1e-4
 
 
 def test_version_names_every_part() -> None:

@@ -38,7 +38,7 @@ _NO_HISTORY = (
 
 def certificate(result: Result) -> dict[str, Any] | None:
     """Its rows and what goes with them; None where nothing was solved."""
-    found = result.summary.get("certificate")
+    found = (result.last_borne or result.summary).get("certificate")
     if not found:
         return None
     tolerance = float(found["tolerance"])
@@ -72,7 +72,12 @@ def _two_digits(value: float | None) -> str:
 
 
 def _remarks(result: Result, found: Mapping[str, Any]) -> Iterator[str]:
-    if found["passed"]:
+    if (last := result.last_borne) is not None:
+        yield (
+            f"This is the certificate of the state shown, at load factor {last['factor']:.6g}, where stability ends. "
+            "Under the whole load no equilibrium was found."
+        )
+    elif found["passed"]:
         yield _SECOND_ORDER.get(str(found["second_order"]), str(found["second_order"]))
     if others := result.summary.get("uniqueness"):
         yield f"{_OTHERS[others['state']]} {others['why'][0].upper()}{others['why'][1:]}."

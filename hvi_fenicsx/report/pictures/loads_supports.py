@@ -79,6 +79,12 @@ def loaded_sides(result: Result) -> list[LoadedSide]:
     return found
 
 
+def borne_loads(result: Result) -> list[LoadedSide]:
+    """The tractions under which the state that is shown is in equilibrium: the scene's, or the part that is borne."""
+    factor = 1.0 if result.last_borne is None else float(result.last_borne["factor"])
+    return [LoadedSide(load.side, factor * load.traction) for load in loaded_sides(result)]
+
+
 def held_sides(result: Result) -> list[HeldSide]:
     """The sides that are held along the axis nearest to their normal."""
     found = []

@@ -152,6 +152,8 @@ def _verdict(result: Result) -> tuple[str, str]:
         return "✓ certified", GREEN
     if not result.solved:
         return "✗ no solution exists", VERMILION
+    if (last := result.last_borne) is not None:
+        return f"✗ borne up to factor {last['factor']:.4g}", VERMILION
     return "✗ NOT certified", VERMILION
 
 

@@ -10,7 +10,7 @@ from ...units import times, unit_for
 from .. import plane_marks as marks
 from ..deformed import deform, largest_stress, part_geometries
 from ..legend import colour_bar, legend
-from ..loads_supports import held_sides, loaded_sides
+from ..loads_supports import borne_loads, held_sides
 from ..plane_canvas import canvas, paint
 from ..registry import picture
 from ..style import SLATE, heading
@@ -28,7 +28,7 @@ def draw(result: Result) -> Figure:
     shape = deform(body, parts)
     drawn = [
         *marks.supports(shape, held_sides(result)),
-        *marks.loads(shape, loaded_sides(result)),
+        *marks.loads(shape, borne_loads(result)),
         *(m for part in parts for m in marks.contact(shape, part, largest_stress(parts))),
     ]
     fig, axes = canvas(np.concatenate([shape.points[:, :2], body.points[:, :2], *(m.extent for m in drawn)]))

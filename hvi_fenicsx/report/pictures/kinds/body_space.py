@@ -16,7 +16,7 @@ from .. import vtk_loads
 from ..deformed import DeformedBody, PartGeometry, deform, largest_stress, part_geometries
 from ..footprints import Footprint, footprint, guides
 from ..legend import colour_bar
-from ..loads_supports import loaded_sides
+from ..loads_supports import borne_loads
 from ..plane_canvas import canvas
 from ..registry import picture
 from ..style import GREY, INK, PALE, SLATE, heading, pressure_scale
@@ -38,7 +38,7 @@ LEGIBLE = 5000
 )
 def draw(result: Result) -> Figure:
     """Draw the body with its loads and contact parts."""
-    body, parts, pulled = result.body, part_geometries(result), loaded_sides(result)
+    body, parts, pulled = result.body, part_geometries(result), borne_loads(result)
     shape = deform(body, parts)
     normals = [area_vectors(body.points, geometry.facets).sum(axis=0) for geometry in parts]
     view = best_view(normals)

@@ -14,7 +14,7 @@ from ...units import times
 from .. import vtk_loads
 from ..deformed import DeformedBody, deform, part_geometries
 from ..footprints import Footprint, footprint, guides
-from ..loads_supports import loaded_sides
+from ..loads_supports import borne_loads
 from ..plane_canvas import canvas
 from ..registry import picture
 from ..stress_scale import bar, scale_of
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 )
 def draw(result: Result) -> Figure:
     """Draw the deformed body with its loads, each cell in the colour of its stress."""
-    body, parts, pulled = result.body, part_geometries(result), loaded_sides(result)
+    body, parts, pulled = result.body, part_geometries(result), borne_loads(result)
     assert body.von_mises is not None
     shape, values = deform(body, parts), body.von_mises
     normals = [area_vectors(body.points, geometry.facets).sum(axis=0) for geometry in parts]

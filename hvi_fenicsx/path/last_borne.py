@@ -1,0 +1,84 @@
+"""Above the limit load: the last state that is borne, in the place of a body on its way off."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from ..certify import certificate, plausibility
+from ..errors import InputError, SolverError
+from ..load_path import INTERRUPTED, LoadPath
+from ..preparation import Preparation
+from ..runtime.log import logger
+from ..scene import PathTable
+from ..solution import LastBorne, Solution
+from ..solvers import frozen_mixity
+from ..solvers.context import never
+from .following import Control, PathRun
+
+_LOG = logger("path")
+
+
+def in_place_of(prepared: Preparation, failed: Solution, interrupted: Callable[[], bool] = never) -> Solution:
+    """The last state that is borne, where no solution was found and the body may come off; else what was found.
+
+    The factor of all loads and prescribed displacements grows from 0; bonds have no memory. Collective.
+
+    Args:
+        prepared: the scene.
+        failed: what was found of it.
+        interrupted: whether to stop (collective).
+    """
+    if not _may_come_off(prepared, failed):
+        return failed
+    _LOG.info("no equilibrium found under the whole load: the load is followed from 0 to the last state that is borne")
+    try:
+        return _at_the_limit(prepared, failed, interrupted)
+    except (InputError, SolverError) as error:
+        _LOG.info("the load cannot be followed: %s", error)
+        return failed
+
+
+def _at_the_limit(prepared: Preparation, failed: Solution, interrupted: Callable[[], bool]) -> Solution:
+    """The state of the largest factor below that of the whole load; else what was found. Collective."""
+    run = PathRun(prepared, PathTable(memory=False))
+    if not run.is_straight and run.size > prepared.options.thresholds.path.curved_unknowns:
+        return failed
+    path = run.follow(Control(interrupted=interrupted))
+    assert failed.solve_result is not None
+    if path.end == INTERRUPTED:
+        return replace(failed, solve_result=replace(failed.solve_result, interrupted=True))
+    borne = path.rows and 0.0 < path.rows[path.peak].factor < 1.0
+    return _shown(run, path, failed) if borne else failed
+
+
+def _may_come_off(prepared: Preparation, failed: Solution) -> bool:
+    """Whether there is a limit load to look for, and a path to it takes little time. Collective."""
+    if failed.converged or failed.solve_result is None or failed.solve_result.interrupted:
+        return False
+    system = prepared.system
+    if failed.solvability.state == "held" or not prepared.problem.has_potential:
+        return False
+    if system.comm.allreduce(len(system.jacobian.rows.dofs)) > prepared.options.thresholds.path.vertex_unknowns:
+        return False
+    system.jacobian.set_rates([np.zeros_like(rates) for rates in system.jacobian.rates])
+    return True
+
+
+def _shown(run: PathRun, path: LoadPath, failed: Solution) -> Solution:
+    """The state of the largest factor, certified under its load. Collective."""
+    assert failed.solve_result is not None
+    options, factor = run.prepared.options, path.rows[path.peak].factor
+    problem, u = run.state(path.peak)
+    frozen_mixity.freeze(problem, u)
+    found = certificate.examine(problem, u, options.tolerance, inertia=options.second_order)
+    return replace(
+        failed,
+        problem=problem,
+        solve_result=replace(failed.solve_result, u=u),
+        examination=found,
+        warnings=run.prepared.warnings + plausibility.of_solution(problem, found, u),
+        last_borne=LastBorne(factor=factor, whole_load=failed),
+    )
