@@ -156,11 +156,11 @@ def _holds(problem: Problem, forces: Mapping[str, PETSc.Vec], term: LawTerm, rou
 def _strain(problem: Problem, u: fem.Function, thresholds: PlausibilityThresholds) -> Iterator[str]:
     """By the edges: of P1, the strain along an edge is its change of length over its length."""
     scales, d = problem.scales, problem.scales.dimension
-    x, values = problem.points[:, :d], u.x.array.reshape(-1, d)
+    corners = problem.space.dofmap.list[:, : d + 1]
+    x, values = (np.take(v, corners, axis=0) for v in (problem.points[:, :d], u.x.array.reshape(-1, d)))
     most = 0.0
     for a, b in combinations(range(d + 1), 2):
-        ends = problem.space.dofmap.list[:, [a, b]]
-        edge, change = (v[ends[:, 1]] - v[ends[:, 0]] for v in (x, values))
+        edge, change = x[:, b] - x[:, a], values[:, b] - values[:, a]
         along = np.abs(np.einsum("nd,nd->n", edge, change)) / np.einsum("nd,nd->n", edge, edge)
         most = max(most, float(np.max(along, initial=0.0)))
     strain = largest(problem.domain.mesh.comm, most) * scales.displacement

@@ -6,6 +6,7 @@ stresses. So it is not judged by these: large loads that balance each other hide
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -16,7 +17,7 @@ from ..problem.contact_surface import Surface
 from ..problem.problem import Problem
 from ..problem.references import References
 from ..rigid import AnyBody, FixedDirections, MotionFields, kernel
-from ..typing import Array, Mask
+from ..typing import Array, Integers, Mask
 from . import existence
 
 
@@ -48,10 +49,11 @@ class Holder:
             fields: the motions.
             tiny: the part of a motion along the direction that counts as none.
         """
-        along = np.einsum("vd,jvd->jv", self.direction, fields)
+        at = np.flatnonzero((self.least != self.force) | (self.most != self.force))
+        along = np.einsum("vd,jvd->jv", self.direction[at], fields[:, at])
         ends = np.zeros((2, *along.shape))
         for end, limit in zip(ends, (self.least, self.most), strict=True):
-            np.multiply(along, limit - self.force, out=end, where=np.abs(along) > tiny)
+            np.multiply(along, (limit - self.force)[at], out=end, where=np.abs(along) > tiny)
         return -np.sum(np.min(ends, axis=0), axis=1), np.sum(np.max(ends, axis=0), axis=1)
 
 
@@ -174,17 +176,17 @@ def along(references: References, body: AnyBody, fields: Array, acting: ActingFo
         acting: what acts on all bodies.
     """
     carried = [*acting.carried, *(holder.forces for holder in acting.holders)]
-    spare = np.zeros((2, len(fields)))
+    spare, none = np.zeros((2, len(fields))), np.zeros(len(fields))
     for holder in acting.holders:
         spare += holder.spare(fields, acting.tiny)
     sums = np.array(
         [
-            _works(fields, [acting.left]),
-            _works(fields, [acting.loads]),
-            _works(fields, carried, each=True),
-            _works(fields, acting.capable, each=True),
-            np.linalg.norm(fields, axis=2) @ sum(np.linalg.norm(f, axis=1) for f in (acting.loads, *carried)),
-            np.sum(fields**2, axis=(1, 2)),
+            _work(fields, acting.left),
+            _work(fields, acting.loads),
+            sum((_works(fields, force) for force in carried), none),
+            sum((_works(fields, force) for force in acting.capable), none),
+            sum((_sizes(fields, force) for force in (acting.loads, *carried)), none),
+            np.einsum("jvd,jvd->j", fields, fields),
             *spare,
         ]
     )
@@ -196,8 +198,23 @@ def along(references: References, body: AnyBody, fields: Array, acting: ActingFo
     return NetForces(np.maximum(np.abs(left) - np.where(left > 0, fall, rise), 0.0), rounding, scale, sizes)
 
 
-def _works(fields: Array, forces: Sequence[Array], *, each: bool = False) -> Array:
-    """The work of forces (vertices, d) in motions (j, vertices, d), or the sum of the sizes by vertex, (j,)."""
-    works = [np.einsum("vd,jvd->jv", force, fields) for force in forces]
-    found = (np.sum(np.abs(w) if each else w, axis=1) for w in works)
-    return np.asarray(sum(found, np.zeros(len(fields))))
+def _work(fields: Array, force: Array) -> Array:
+    """The work of a force (vertices, d) in motions (j, vertices, d), (j,)."""
+    return np.asarray(fields.reshape(len(fields), force.size) @ force.ravel())
+
+
+def _works(fields: Array, force: Array) -> Array:
+    """The sum of the sizes of the works by vertex, (j,)."""
+    at = _acting(force)
+    return np.asarray(np.sum(np.abs(np.einsum("vd,jvd->jv", force[at], fields[:, at])), axis=1))
+
+
+def _sizes(fields: Array, force: Array) -> Array:
+    """The sum of the sizes of a force, each times that of the motion there, (j,)."""
+    at = _acting(force)
+    return np.asarray(np.linalg.norm(fields[:, at], axis=2) @ np.linalg.norm(force[at], axis=1))
+
+
+def _acting(force: Array) -> Integers:
+    """The vertices where a force is not zero: those of a surface, as a rule."""
+    return np.flatnonzero(functools.reduce(np.logical_or, (force != 0.0).T))
