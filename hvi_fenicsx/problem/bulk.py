@@ -25,7 +25,7 @@ from . import nodal_averaging, stress
 from .nodal_averaging import Dilatation
 from .scaling import Scales
 from .strain_energy import feels_no_rigid_motion
-from .vectors import nodal, nodal_sum, nodal_values
+from .vectors import LinearForm, nodal, nodal_sum, nodal_values
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -119,17 +119,14 @@ class Bulk:
             return np.zeros((self.space.dofmap.index_map.size_local, self.scales.dimension))
         return nodal(ufl.action(self.foundation, u))
 
-    def force_in(self, space: fem.FunctionSpace, u: fem.Function) -> Array:
+    def force_in(self, space: fem.FunctionSpace, u: Any) -> LinearForm:
         """a(u, v) of the test functions v of any vector space, without what is averaged by vertex. Collective.
 
         Args:
             space: of the test functions.
-            u: P1, ghosts updated.
-
-        Returns:
-            The force at the blocks that this rank owns, (n, d).
+            u: a displacement of any space, or a sum of such, ghosts updated when the form is evaluated.
         """
-        return nodal_sum(self.between(u, ufl.TestFunction(space)))
+        return LinearForm(self.between(u, ufl.TestFunction(space)))
 
     def residual_in(self, space: fem.FunctionSpace, u: fem.Function, loads: Iterable[Any]) -> Array:
         """<g, v> - a(u, v) of the test functions v of any vector space. Collective.
@@ -160,14 +157,49 @@ class Bulk:
         integrals = self.between(v, v).integrals()
         return ufl.Form([integral.reconstruct(integrand=integral.integrand() * q) for integral in integrals])
 
-    def energy_by_cell(self, v: Any) -> Array:
-        """a(v, v) of every owned cell, without what is averaged, (cells,). Collective.
+    @functools.cached_property
+    def _constants(self) -> fem.FunctionSpace:
+        """Functions that are constant in cells."""
+        return fem.functionspace(self.space.mesh, ("Discontinuous Lagrange", 0))
+
+    def in_cells(self, measure: Any) -> Any:
+        """The UFL form ∫ q dx, q being the test function that is constant in cells.
+
+        Args:
+            measure: dx.
+        """
+        return ufl.TestFunction(self._constants) * measure
+
+    def uniform_work(self, one: Any, other: Any) -> Any:
+        """The UFL form of the work of a uniform strain's stress in another one, by cell.
+
+        Args:
+            one: a constant strain, (d, d).
+            other: the same.
+        """
+        place, q = ufl.SpatialCoordinate(self.space.mesh) / self.scales.length, ufl.TestFunction(self._constants)
+        test, trial = self.form.arguments()
+        u, v = ufl.dot(one, place), q * ufl.dot(other, place)
+        form = ufl.replace(self.material, {test: v, trial: u})
+        return form + sum(
+            (part.work(part.averaged.modulus * ufl.tr(one), v) for part in self._dilatations), ufl.Form([])
+        )
+
+    def energy_in_cells(self, v: Any) -> LinearForm:
+        """a(v, v) of every owned cell, without what is averaged, (cells, 1). Collective.
 
         Args:
             v: a displacement of any space, or a sum of such in UFL.
         """
-        q = ufl.TestFunction(fem.functionspace(self.space.mesh, ("Discontinuous Lagrange", 0)))
-        return np.maximum(nodal_sum(self.energy_form(v, q))[:, 0], 0.0)
+        return LinearForm(self.energy_form(v, ufl.TestFunction(self._constants)))
+
+    def energy_by_cell(self, v: Any) -> Array:
+        """The same, not negative, for v as it is, (cells,). Collective.
+
+        Args:
+            v: a displacement of any space, or a sum of such in UFL.
+        """
+        return np.maximum(self.energy_in_cells(v).values()[:, 0], 0.0)
 
     def pressures(self, u: fem.Function) -> list[fem.Function]:
         """The averaged volumetric stress of each region in ``averaged``, P1 fields. Collective."""
@@ -200,7 +232,7 @@ class Bulk:
         Args:
             pressures: P1 fields p, by region in ``averaged``.
         """
-        q = ufl.TestFunction(fem.functionspace(self.space.mesh, ("Discontinuous Lagrange", 0)))
+        q = ufl.TestFunction(self._constants)
         pairs = zip(self._dilatations, pressures, strict=True)
         found = [nodal_sum(part.across(p, p * q))[:, 0] / part.averaged.modulus for part, p in pairs]
         return np.asarray(sum(found))

@@ -44,7 +44,22 @@ def nodal_values(compiled: fem.Form) -> Array:
 
 def nodal_sum(form: Any) -> Array:
     """As :func:`nodal`, of a form whose integrals may have different subdomain data. Collective."""
-    return np.asarray(sum(nodal(ufl.Form(integrals)) for integrals in _alike(form)))
+    return LinearForm(form).values()
+
+
+class LinearForm:
+    """A UFL linear form, compiled once for all values of its coefficients. Creation is collective.
+
+    Args:
+        form: its integrals may have different subdomain data.
+    """
+
+    def __init__(self, form: Any) -> None:
+        self._parts = [forms.compiled(ufl.Form(integrals)) for integrals in _alike(form)]
+
+    def values(self) -> Array:
+        """The values at the blocks that this rank owns, (n, d), with the coefficients as they are. Collective."""
+        return np.asarray(sum(nodal_values(part) for part in self._parts))
 
 
 def _alike(form: Any) -> list[list[Any]]:

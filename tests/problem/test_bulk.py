@@ -59,7 +59,7 @@ def test_the_energies_of_the_cells_add_up_to_that_of_the_matrix() -> None:
     u = bent(problem)
     wanted = u.x.petsc_vec.dot(problem.bulk.matrix() * u.x.petsc_vec)
     assert problem.bulk.energy_by_cell(u).sum() == pytest.approx(wanted, rel=1e-12)
-    assert problem.bulk.force_in(problem.space, u).ravel() @ u.x.array == pytest.approx(wanted, rel=1e-12)
+    assert problem.bulk.force_in(problem.space, u).values().ravel() @ u.x.array == pytest.approx(wanted, rel=1e-12)
 
 
 def test_a_constant_dilatation_is_its_own_average() -> None:

@@ -112,18 +112,21 @@ def diagonal(problem: Problem, bubbles: fem.FunctionSpace) -> Array:
     slopes = [*hats, *(hats[a] + hats[b] for a, b in itertools.combinations(range(d + 1), 2))]
     upward = [tuple((slope * np.sign(slope[np.flatnonzero(slope)[0]])).tolist()) for slope in slopes]
     known = {slope: affine.energies(np.array(slope)) for slope in dict.fromkeys(upward)}
-    energies = [known[slope] for slope in upward]
-    cells, values = bubbles.dofmap.list[: len(energies[0])], fem.Function(bubbles)
+    numbers, energies = {slope: i for i, slope in enumerate(known)}, np.array([e.ravel() for e in known.values()])
+    cells, values = bubbles.dofmap.list[: energies.shape[1] // d], fem.Function(bubbles)
     blocks, cell = values.x.array.reshape(-1, d), bubbles.mesh.topology.cell_name()
     for k, index in enumerate(of_cell(nodes.degree(problem.space), cell)):
-        shares = energy_shares(index, cell)
-        own = functools.reduce(np.add, (share * energies[i] for i, share in shares))
+        weights = np.zeros(len(energies))
+        for number, share in energy_shares(index, cell):
+            weights[numbers[upward[number]]] += share
+        own = (weights @ energies).reshape(-1, d)
         for i in range(d):
             blocks[:, i] += np.bincount(cells[:, k], own[:, i], minlength=len(blocks))
     values.x.scatter_reverse(la.InsertMode.add)
     return np.array(blocks[: bubbles.dofmap.index_map.size_local]) * 16 / ((d + 1) * (d + 2))
 
 
+@functools.cache
 def energy_shares(index: Index, cell: str) -> list[tuple[int, float]]:
     """The energy of a bubble as a sum of those of affine functions: numbers and shares, times (d + 1)(d + 2)/16.
 

@@ -104,6 +104,7 @@ def slope(index: Index, corner: int, barycentric: Array) -> Array:
     return np.asarray(functools.reduce(np.multiply, values))
 
 
+@functools.cache
 def _factor(order: int, degree: int) -> np.polynomial.Polynomial:
     """The factor of a bubble of one barycentric coordinate: 1 at order/degree, 0 at the points before it."""
     found = np.polynomial.Polynomial([1.0])

@@ -58,7 +58,7 @@ def estimate_contact_errors(
     """
     traces = LawTraces(system.problem, u, examination.states, thresholds)
     inverse = DualNorm(system, levels, u, thresholds)
-    error = coupled_errors.of_solution(traces, inverse)
+    error, _ = coupled_errors.of_solution(traces, inverse)
     uncertain = _uncertainty(traces, inverse)
     inverse.destroy()
     slips = [_slip(traces, state, error, uncertain) for state in examination.states]

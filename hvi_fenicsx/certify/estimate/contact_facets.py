@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import functools
 from dataclasses import dataclass
 
 import numpy as np
@@ -130,7 +130,7 @@ class PartTrace:
     def of_bubbles(self, e: fem.Function) -> Array:
         """The values of bubbles, (f, q, k)."""
         blocks, result = e.x.array.reshape(-1, self._problem.scales.dimension), 0.0
-        for i, shape, middle in self._bubbles_of_facet():
+        for i, shape, middle in self._bubbles_of_facet:
             at = np.einsum("fkd,fd->fk", middle, blocks[self._facets.bubbles[:, i]])
             result = result + at[:, None, :] * shape[None, :, None]
         return np.asarray(result)
@@ -142,7 +142,7 @@ class PartTrace:
         for i in range(self._functions.shape[1]):
             share = np.einsum("fqk,q->fk", scaled, self._functions[:, i])
             np.add.at(at_nodes, self._facets.nodes[:, i], np.einsum("fk,fkd->fd", share, self._vectors[:, i]))
-        for i, shape, middle in self._bubbles_of_facet():
+        for i, shape, middle in self._bubbles_of_facet:
             share = np.einsum("fqk,q->fk", scaled, shape)
             np.add.at(found, self._facets.bubbles[:, i], np.einsum("fk,fkd->fd", share, middle))
         return found, at_nodes
@@ -156,16 +156,20 @@ class PartTrace:
     def _combined(functions: Array, values: Array) -> Array:
         return np.asarray(np.einsum("qn,fnk->fqk", functions, values))
 
-    @property
+    @functools.cached_property
     def _hats(self) -> Array:
         """At the points, the functions that are linear from node to node, (q, n)."""
         return nodes.hats(self._facets.degree, self._barycentric)
 
-    def _bubbles_of_facet(self) -> Iterator[tuple[int, Array, Array]]:
+    @functools.cached_property
+    def _bubbles_of_facet(self) -> list[tuple[int, Array, Array]]:
         """For each bubble of a facet its number, its values at the points (q,), its directions (f, k, d)."""
+        found = []
         for i, index in enumerate(bubbles.of_facet(self._facets.degree, self._facets.dimension)):
             at = self._functions_at(np.array([index]) / sum(index))[0]
-            yield i, bubbles.shape(index, self._barycentric), np.einsum("n,fnkd->fkd", at, self._vectors)
+            middle = np.einsum("n,fnkd->fkd", at, self._vectors)
+            found.append((i, bubbles.shape(index, self._barycentric), middle))
+        return found
 
 
 def local_blocks(space: fem.FunctionSpace) -> int:

@@ -14,7 +14,6 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from ...laws import Superpotential
-from ...problem.problem import Problem
 from ...runtime.mpi import total
 from ...typing import Array
 from ..law_state import LawState
@@ -50,48 +49,75 @@ def heights(points: Trace, law: LawState, of: Superpotential) -> Array:
     return height
 
 
-def of_solution(traces: LawTraces, inverse: DualNorm) -> ErrorField:
+class _Coupled:
+    """The forms and constraints of bubbles and nodes that are found together. Creation is collective.
+
+    Args:
+        traces: the laws between the nodes.
+        inverse: of the system.
+
+    Attributes:
+        error: as it is known so far.
+    """
+
+    def __init__(self, traces: LawTraces, inverse: DualNorm) -> None:
+        problem, space = traces.problem, traces.bubbles
+        self._traces, self._inverse, self._thresholds = traces, inverse, traces.thresholds
+        self._stiffness = BubbleStiffness(problem, space)
+        self._constraints = defect.constraints(problem, traces.u, space)
+        self._residual = problem.bulk.residual_in(space, traces.u, problem.linear.values())
+        nodes, bubbles = fem.Function(problem.space), fem.Function(space)
+        self.error = ErrorField(nodes, bubbles)
+        self._of_nodes = problem.bulk.force_in(space, nodes)
+        self._on_nodes = problem.bulk.force_in(problem.space, nodes + bubbles)
+        self._energies = problem.bulk.energy_in_cells(nodes + bubbles)
+
+    def squares(self) -> Array:
+        """η_K² of the owned cells. Collective."""
+        return np.maximum(self._energies.values()[:, 0], 0.0)
+
+    def find_bubbles(self, *, first: bool) -> None:
+        """Find the bubbles that belong to the nodes. Collective.
+
+        Args:
+            first: whether nothing is known yet.
+        """
+        between, _ = self._traces.tested(None if first else self.error)
+        load = self._residual - between
+        if not first:
+            load -= self._of_nodes.values()
+        found = defect.least_energy(self._stiffness, self._constraints, load, self._thresholds)
+        self.error.bubbles.x.array[:] = found.x.array
+
+    def move_nodes(self) -> None:
+        """Move the nodes as the bubbles ask; the laws answer that, so it takes a few rounds. Collective."""
+        problem, size, nodes = self._traces.problem, 0.0, self.error.nodes
+        for _ in range(self._thresholds.answer_rounds):
+            _, laws = self._traces.tested(self.error)
+            step, length = self._inverse.solve(laws - problem.combined(self._on_nodes.values()))
+            nodes.x.array[:] += step.x.array
+            size = max(size, length)
+            if length <= self._thresholds.answer_change * size:
+                break
+        self._inverse.keep_within_bounds(nodes)
+
+
+def of_solution(traces: LawTraces, inverse: DualNorm) -> tuple[ErrorField, Array]:
     """Bubbles and nodes in turns, each under the influence of the other, until their energy settles. Collective.
 
     Args:
         traces: the laws between the nodes.
         inverse: of the system.
+
+    Returns:
+        The estimated error, and η_K² of the owned cells.
     """
-    problem, thresholds, error, size = traces.problem, traces.thresholds, None, 0.0
-    at_nodes, stiffness = fem.Function(problem.space), BubbleStiffness(problem, traces.bubbles)
-    residual = problem.bulk.residual_in(traces.bubbles, traces.u, problem.linear.values())
-    for _ in range(thresholds.coupled_rounds):
-        between, _ = traces.tested(error)
-        load = residual - between - problem.bulk.force_in(traces.bubbles, at_nodes)
-        error = ErrorField(at_nodes, defect.least_energy(stiffness, traces.u, load, thresholds))
-        _move_nodes(traces, inverse, error)
-        inverse.keep_within_bounds(error.nodes)
-        before, size = size, float(np.sqrt(total(stiffness.comm, float(squares(problem, error).sum()))))
-        if abs(size - before) <= thresholds.coupled_change * size:
+    coupled, size, comm = _Coupled(traces, inverse), 0.0, traces.problem.domain.mesh.comm
+    for number in range(traces.thresholds.coupled_rounds):
+        coupled.find_bubbles(first=number == 0)
+        coupled.move_nodes()
+        cells = coupled.squares()
+        before, size = size, float(np.sqrt(total(comm, float(cells.sum()))))
+        if abs(size - before) <= traces.thresholds.coupled_change * size:
             break
-    assert error is not None
-    return error
-
-
-def squares(problem: Problem, error: ErrorField) -> Array:
-    """η_K² of the owned cells. Collective.
-
-    Args:
-        problem: what was solved.
-        error: its estimated error.
-    """
-    return problem.bulk.energy_by_cell(error.nodes + error.bubbles)
-
-
-def _move_nodes(traces: LawTraces, inverse: DualNorm, error: ErrorField) -> None:
-    """Move the nodes as the bubbles ask; the laws answer that, so it takes a few rounds. Collective."""
-    problem, thresholds = traces.problem, traces.thresholds
-    size, bubbling = 0.0, problem.bulk.force_in(problem.space, error.bubbles)
-    for _ in range(thresholds.answer_rounds):
-        _, laws = traces.tested(error)
-        internal = problem.bulk.force_in(problem.space, error.nodes) + bubbling
-        step, length = inverse.solve(laws - problem.combined(internal))
-        error.nodes.x.array[:] += step.x.array
-        size = max(size, length)
-        if length <= thresholds.answer_change * size:
-            break
+    return coupled.error, cells

@@ -45,8 +45,12 @@ def squares(
     """
     found = np.zeros(problem.domain.mesh.topology.index_map(problem.scales.dimension).size_local)
 
+    known: dict[int, FacetModes] = {}
+
     def modes(facets: Entities) -> FacetModes:
-        return facet_modes(problem, bubbles, facets, thresholds)
+        if id(facets) not in known:
+            known[id(facets)] = facet_modes(problem, bubbles, facets, thresholds)
+        return known[id(facets)]
 
     for facets, axis, value in boundary_data.tractions(problem):
         on = modes(facets)

@@ -135,23 +135,49 @@ def _on(space: fem.FunctionSpace, facets: Entities) -> Entities:
     return np.unique(found[found < space.dofmap.index_map.size_local]).astype(np.int32)
 
 
+@dataclass(frozen=True, kw_only=True)
+class Constraints:
+    """What the bubbles must meet.
+
+    Attributes:
+        free: where they are not prescribed, (n, d).
+        prescribed: what is prescribed elsewhere, (n, d).
+        bounds: of the parts with contact.
+    """
+
+    free: Mask
+    prescribed: Array
+    bounds: tuple[BubbleBounds, ...]
+
+
+def constraints(problem: Problem, u: fem.Function, space: fem.FunctionSpace) -> Constraints:
+    """What the bubbles must meet beside a solution. Collective.
+
+    Args:
+        problem: what was solved.
+        u: the solution, nondimensional.
+        space: the bubbles.
+    """
+    free, value = prescribed(problem, u, space)
+    parts = [b for b in problem.bounds if problem.interface_of(b.surface) is None]
+    bounds = tuple(bubble_bounds(problem, u, part, space) for part in parts)
+    return Constraints(free=free, prescribed=value, bounds=bounds)
+
+
 def least_energy(
-    stiffness: BubbleStiffness, u: fem.Function, load: Array, thresholds: Thresholds = DEFAULT
+    stiffness: BubbleStiffness, under: Constraints, load: Array, thresholds: Thresholds = DEFAULT
 ) -> fem.Function:
     """The admissible bubbles of least energy under a load, ghosts updated. Collective.
 
     Args:
         stiffness: a(e, e).
-        u: the solution, nondimensional.
+        under: what they must meet.
         load: ρ, (n, d).
         thresholds: how accurately.
     """
-    problem, space = stiffness.problem, stiffness.space
-    free, value = prescribed(problem, u, space)
-    bounds = [bubble_bounds(problem, u, b, space) for b in problem.bounds if problem.interface_of(b.surface) is None]
-    solve(stiffness, load, free, value, bounds, thresholds)
-    e = fem.Function(space)
-    e.x.array[: value.size] = value.ravel()
+    e, found = fem.Function(stiffness.space), under.prescribed.copy()
+    solve(stiffness, load, under.free, found, under.bounds, thresholds)
+    e.x.array[: found.size] = found.ravel()
     e.x.scatter_forward()
     return e
 

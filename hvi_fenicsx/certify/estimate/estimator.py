@@ -114,7 +114,7 @@ def _discretisation(traces: LawTraces, inverse: dual_norm.DualNorm, energy: floa
         cells = _between_nodes(traces, inverse)
         if total(traces.problem.domain.mesh.comm, float(cells.sum())) <= limit**2 * energy:
             return cells
-    return coupled_errors.squares(traces.problem, coupled_errors.of_solution(traces, inverse))
+    return coupled_errors.of_solution(traces, inverse)[1]
 
 
 def _between_nodes(traces: LawTraces, inverse: dual_norm.DualNorm) -> Array:
@@ -123,7 +123,8 @@ def _between_nodes(traces: LawTraces, inverse: dual_norm.DualNorm) -> Array:
     load, unmet = traces.tested()
     load *= -1.0
     load += problem.bulk.residual_in(traces.bubbles, u, problem.linear.values())
-    bubbles = defect.least_energy(BubbleStiffness(problem, traces.bubbles), u, load, traces.thresholds)
+    stiffness = BubbleStiffness(problem, traces.bubbles)
+    bubbles = defect.least_energy(stiffness, defect.constraints(problem, u, traces.bubbles), load, traces.thresholds)
     cells = problem.bulk.energy_by_cell(bubbles)
     if problem.terms:
         cells += problem.bulk.energy_by_cell(inverse.solve(unmet)[0])

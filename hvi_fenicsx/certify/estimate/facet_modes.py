@@ -16,6 +16,7 @@ import numpy as np
 from dolfinx import fem
 
 from ...problem.problem import Problem
+from ...problem.stiffness_tensor import stiffness_tensor
 from ...typing import Array, Entities
 from . import half_space
 from .boundary_data import FacetSamples, sample
@@ -76,7 +77,7 @@ def facet_modes(problem: Problem, bubbles: fem.FunctionSpace, facets: Entities, 
     legendre: Any = basix.tabulate_polynomials(basix.PolynomialType.legendre, kind, degree, at.barycentric[:, 1:])
     values = legendre / math.sqrt(math.factorial(d - 1))
     degrees = np.concatenate([np.full(math.comb(n + d - 2, d - 2), n) for n in range(degree + 1)])
-    material = half_space.elasticity(problem, at.facets.cells)
+    material = stiffness_tensor(problem.bulk, at.facets.cells)
     size = (math.factorial(d - 1) * at.facets.areas) ** (1 / (d - 1))  # in space, a leg of a right triangle
     compliance = size[:, None] / math.pi * half_space.compliance(material, at.corners)
     return FacetModes(at.facets, at.nodes, at.barycentric, at.weights, values, degrees, compliance)

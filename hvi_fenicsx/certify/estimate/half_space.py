@@ -9,36 +9,14 @@ plane.
 from __future__ import annotations
 
 import numpy as np
-from dolfinx import fem
 
-from ...problem.problem import Problem
-from ...typing import Array, Entities
+from ...typing import Array
 
 _ANGLES = 32
 """Angles of the rectangle rule on a periodic integrand; an isotropic material is met to 1e-12."""
 
 _DIRECTIONS = 4
 """Directions of the waves on a surface in space, over which the compliance is averaged."""
-
-
-def elasticity(problem: Problem, cells: Entities) -> Array:
-    """C_ijkl of owned cells, nondimensional, (c, d, d, d, d). Collective.
-
-    Args:
-        problem: what is solved.
-        cells: the owned cells.
-    """
-    d, found = problem.scales.dimension, np.zeros((len(cells), *[problem.scales.dimension] * 4))
-    u = fem.Function(problem.space)
-    unloaded = problem.bulk.stress(u)
-    for i in range(d):
-        for j in range(i, d):
-            strain = np.zeros((d, d))
-            strain[i, j] = strain[j, i] = 1.0 if i == j else 0.5
-            u.x.array[:] = (problem.points[:, :d] / problem.scales.length @ strain).ravel()
-            stress = (problem.bulk.stress(u) - unloaded)[cells] / problem.scales.stress
-            found[:, :, :, i, j] = found[:, :, :, j, i] = stress[:, :d, :d]
-    return found
 
 
 def compliance(stiffness: Array, corners: Array) -> Array:

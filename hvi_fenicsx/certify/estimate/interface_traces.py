@@ -65,6 +65,12 @@ def _numbers(space: fem.FunctionSpace, blocks: Entities) -> Integers:
     return np.asarray(found, dtype=np.int64).reshape(blocks.shape)
 
 
+def _shapes(degree: int, at: Array) -> list[Array]:
+    """The values of each bubble of a facet at points (f, q, d), (f, q)."""
+    d = at.shape[2]
+    return [shape(index, at.reshape(-1, d)).reshape(at.shape[:2]) for index in of_facet(degree, d)]
+
+
 class InterfacePoints:
     """Quadrature points (q) on the intersections (f) that this rank looks at. Creation is collective.
 
@@ -78,7 +84,7 @@ class InterfacePoints:
         degree: of the elements.
         weights: of the points, over L^(d-1), (f, q).
         facets: of the first side and of the second, (f,) each.
-        places: barycentric coordinates of the points in these, (f, q, d) each.
+        shapes: the values of each of their bubbles at the points, (f, q) each.
         functions: the basis functions of the first side's nodes at the points, (f, q, n).
         hats: the functions that are linear from node to node, (f, q, n).
         at_ends: the basis functions at the corners of the intersections, (f, d, n).
@@ -93,10 +99,11 @@ class InterfacePoints:
         rule, weights = quadrature("interval" if d == 2 else "triangle", degree)
         self.weights: Array = overlaps.areas[own, None] / problem.scales.length ** (d - 1) * weights
         self.facets = overlaps.first[own], overlaps.second[own]
-        self.places = rule @ overlaps.on_first[own], rule @ overlaps.on_second[own]
+        places = rule @ overlaps.on_first[own], rule @ overlaps.on_second[own]
         first = interface.first
-        self.degree, flat = first.degree, self.places[0].reshape(-1, d)
-        self.functions, self.at_ends = first.functions(self.places[0]), first.functions(overlaps.on_first[own])
+        self.degree, flat = first.degree, places[0].reshape(-1, d)
+        self.shapes = [_shapes(self.degree, at) for at in places]
+        self.functions, self.at_ends = first.functions(places[0]), first.functions(overlaps.on_first[own])
         self.hats = nodes.hats(self.degree, flat).reshape(self.functions.shape)
         self.sides = (
             _bubbles_of(problem, bubbles, first, names.first),
@@ -159,11 +166,11 @@ class InterfaceTrace:
         """The relative values of bubbles, (f, q, k). Collective."""
         found = np.zeros((*self.weights.shape, self._problem.scales.dimension))
         blocks = e.x.array.reshape(-1, found.shape[2])
-        for sign, side, facet, at in self._sides():
+        for sign, side, facet, shapes in self._sides():
             known = np.zeros((side.count, found.shape[2]))
             known[side.owned] = blocks[side.blocks]
             known = self._problem.domain.mesh.comm.allreduce(known)
-            for i, values in self._shapes(at):
+            for i, values in enumerate(shapes):
                 found += sign * values[:, :, None] * known[side.of_facet[facet, i]][:, None]
         return np.asarray(np.einsum("fqkd,fqd->fqk", self._vectors, found))
 
@@ -177,9 +184,9 @@ class InterfaceTrace:
         scaled = self.weights[:, :, None] * tau
         vectors = np.einsum("fqk,fqkd->fqd", scaled, self._vectors)
         found, at_nodes = (np.zeros((local_blocks(s), d)) for s in (self._bubbles, self._problem.space))
-        for sign, side, facet, at in self._sides():
+        for sign, side, facet, shapes in self._sides():
             sums = np.zeros((side.count, d))
-            for i, values in self._shapes(at):
+            for i, values in enumerate(shapes):
                 np.add.at(sums, side.of_facet[facet, i], sign * np.einsum("fq,fqd->fd", values, vectors))
             found[side.blocks] += self._problem.domain.mesh.comm.allreduce(sums)[side.owned]
         on_facets = np.zeros((*self._points.spread.carriers.shape[:2], scaled.shape[2]))
@@ -188,16 +195,10 @@ class InterfaceTrace:
         at_nodes[self._surface.blocks] = np.einsum("mk,mkd->md", carried, self._directions)
         return found, at_nodes
 
-    def _sides(self) -> Iterator[tuple[float, _SideBubbles, Integers, Array]]:
-        """By side: its sign, its bubbles, the facet of each intersection (f,), the points therein (f, q, d)."""
+    def _sides(self) -> Iterator[tuple[float, _SideBubbles, Integers, list[Array]]]:
+        """By side: its sign, its bubbles, the facet of each intersection (f,), the bubbles at the points (f, q)."""
         points = self._points
-        yield from zip((1.0, -1.0), points.sides, points.facets, points.places, strict=True)
-
-    def _shapes(self, at: Array) -> Iterator[tuple[int, Array]]:
-        """The number of each bubble of a facet, and its values at points (f, q, d), (f, q)."""
-        d = at.shape[2]
-        for i, index in enumerate(of_facet(self._points.degree, d)):
-            yield i, shape(index, at.reshape(-1, d)).reshape(at.shape[:2])
+        yield from zip((1.0, -1.0), points.sides, points.facets, points.shapes, strict=True)
 
 
 class _Spread:

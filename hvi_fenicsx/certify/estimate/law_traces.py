@@ -6,6 +6,7 @@ interpolated to τ_h, and the law wants τ ∈ ∂j(u_t): here the nearest such 
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -92,6 +93,31 @@ class LawTrace:
     traction: Array
 
 
+@dataclass(frozen=True, kw_only=True)
+class _Solved:
+    """What u_h gives one law between the nodes, (f, q, k) each; no error changes it.
+
+    Attributes:
+        points: the quadrature points.
+        multiplier: of the law, (f, q, 1).
+        nodal: the interpolated nodal tractions.
+        sticks: whether all nodes around are on a convex kink, (f, q, 1).
+        nodewise: the slip, linear from node to node.
+        slip: of u_h.
+    """
+
+    points: Trace
+    multiplier: Array
+    nodal: Array
+    sticks: Mask
+    nodewise: Array
+    slip: Array
+
+    def slip_under(self, law: Superpotential) -> Array:
+        """The slip, (f, q, k): where the nodes around do not pass a convex kink it does not dip beyond that."""
+        return np.where(self.sticks, self.nodewise, stopped(law, self.nodewise, self.slip))
+
+
 class LawTraces:
     """The laws between the nodes at a displacement. Creation is collective.
 
@@ -111,6 +137,8 @@ class LawTraces:
         self.degree = nodes.degree(problem.space)
         self.bubbles = bubbles.space(problem.domain.mesh, self.degree)
         self._interfaces: dict[str, InterfacePoints] = {}
+        self._traces: dict[int, tuple[Array, Trace]] = {}
+        self._solved: dict[int, tuple[LawState, _Solved]] = {}
 
     def part(self, surface: Surface, directions: Array) -> Trace:
         """The quadrature points of a part, or of an interface. Collective.
@@ -119,6 +147,12 @@ class LawTraces:
             surface: the part.
             directions: along which displacements are looked at, (m, k, d).
         """
+        known = self._traces.get(id(directions))
+        if known is None:
+            known = self._traces[id(directions)] = directions, self._new_part(surface, directions)
+        return known[1]
+
+    def _new_part(self, surface: Surface, directions: Array) -> Trace:
         problem, space, degree = self.problem, self.bubbles, self.thresholds.interface_degree[self.degree]
         if (interface := problem.interface_of(surface)) is None:
             return PartTrace(problem, space, surface, directions, self.thresholds.facet_degree[self.degree])
@@ -135,28 +169,32 @@ class LawTraces:
             error: added to u_h before the law, the unsmoothed one then, is evaluated; nothing is added where a whole
                 part of a facet sticks (its nodes on a convex kink), and elsewhere no slip passes a convex kink.
         """
-        term = law.term
-        points = self.part(state.surface, term.directions)
-        multiplier = points.interpolated(term.multiplier[:, None])
-        nodal, sticks = points.interpolated(law.carried), self._sticks(points, law)
+        term, solved = law.term, self._of_u(state, law)
+        points, nodal = solved.points, solved.nodal
         asked = term.law if error is None else term.exact
-        slip = self._slip(points, asked, sticks)
+        slip = solved.slip_under(asked)
         if error is not None:
             added = points.of_field(error.nodes) + points.of_bubbles(error.bubbles)
-            slip = stopped(asked, slip, slip + np.where(sticks, 0.0, added))
-        k, of_law = slip.shape[2], nodal / multiplier
+            slip = stopped(asked, slip, slip + np.where(solved.sticks, 0.0, added))
+        k, of_law = slip.shape[2], nodal / solved.multiplier
         traction = nearest(asked, term.length, slip.reshape(-1, k), of_law.reshape(-1, k), self.thresholds.near)
-        return LawTrace(points, nodal, multiplier * traction.reshape(slip.shape))
+        return LawTrace(points, nodal, solved.multiplier * traction.reshape(slip.shape))
 
-    def _sticks(self, points: Trace, law: LawState) -> Mask:
-        """Whether all nodes around a point are on a convex kink, (f, q, 1). Collective."""
-        on_kink = points.from_node_to_node(law.on_convex_kink()[:, None].astype(float))
-        return np.asarray(on_kink > 1 - self.thresholds.near)
-
-    def _slip(self, points: Trace, law: Superpotential, sticks: Mask) -> Array:
-        """The slip of u_h, (f, q, k): where the nodes around do not pass a convex kink it does not dip beyond that."""
-        nodewise = points.of_field_from_node_to_node(self.u)
-        return np.where(sticks, nodewise, stopped(law, nodewise, points.of_field(self.u)))
+    def _of_u(self, state: ContactState, law: LawState) -> _Solved:
+        """What u_h gives a law. Collective."""
+        if id(law) not in self._solved:
+            points = self.part(state.surface, law.term.directions)
+            on_kink = points.from_node_to_node(law.on_convex_kink()[:, None].astype(float))
+            solved = _Solved(
+                points=points,
+                multiplier=points.interpolated(law.term.multiplier[:, None]),
+                nodal=points.interpolated(law.carried),
+                sticks=np.asarray(on_kink > 1 - self.thresholds.near),
+                nodewise=points.of_field_from_node_to_node(self.u),
+                slip=points.of_field(self.u),
+            )
+            self._solved[id(law)] = law, solved
+        return self._solved[id(law)][1]
 
     def tested(self, error: ErrorField | None = None) -> tuple[Array, Array]:
         """∫ τ·v ds of all laws tested with bubbles; the nodal forces minus that with u_h's; each (n, d). Collective.
@@ -175,9 +213,15 @@ class LawTraces:
                 between += with_bubbles
                 at_nodes -= with_nodes
                 np.add.at(at_nodes, state.surface.blocks, np.einsum("mk,mkd->md", nodal, law.term.directions))
-            if self.problem.interface_of(state.surface) is not None:
-                between += self._carried(state)
+        if self._carried_between_bodies is not None:
+            between += self._carried_between_bodies
         return _gathered(self.bubbles, between), _gathered(self.problem.space, at_nodes)
+
+    @functools.cached_property
+    def _carried_between_bodies(self) -> Array | None:
+        """As :meth:`_carried`, of all interfaces; None where there are none. Collective when first used."""
+        found = [self._carried(state) for state in self.states if self.problem.interface_of(state.surface) is not None]
+        return np.sum(found, axis=0) if found else None
 
     def _carried(self, state: ContactState) -> Array:
         """∫ τ·v ds of what bodies that meet put on each other without a law, tested with bubbles. Collective."""
