@@ -63,6 +63,7 @@ class _Coupled:
     def __init__(self, traces: LawTraces, inverse: DualNorm) -> None:
         problem, space = traces.problem, traces.bubbles
         self._traces, self._inverse, self._thresholds = traces, inverse, traces.thresholds
+        self._longest = 0.0
         self._stiffness = BubbleStiffness(problem, space)
         self._constraints = defect.constraints(problem, traces.u, space)
         self._residual = problem.bulk.residual_in(space, traces.u, problem.linear.values())
@@ -91,13 +92,13 @@ class _Coupled:
 
     def move_nodes(self) -> None:
         """Move the nodes as the bubbles ask; the laws answer that, so it takes a few rounds. Collective."""
-        problem, size, nodes = self._traces.problem, 0.0, self.error.nodes
+        problem, nodes = self._traces.problem, self.error.nodes
         for _ in range(self._thresholds.answer_rounds):
             _, laws = self._traces.tested(self.error)
             step, length = self._inverse.solve(laws - problem.combined(self._on_nodes.values()))
             nodes.x.array[:] += step.x.array
-            size = max(size, length)
-            if length <= self._thresholds.answer_change * size:
+            self._longest = max(self._longest, length)
+            if length <= self._thresholds.answer_change * self._longest:
                 break
         self._inverse.keep_within_bounds(nodes)
 
