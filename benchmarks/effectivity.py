@@ -63,7 +63,7 @@ def steps(scene: Scene, count: int) -> list[Step]:
         coarse = found[-1].solved
         refined = refinement.uniform(coarse.system.problem.domain)
         system = assemble(refined.domain, model, Timer())
-        lift, levels = refined_levels(model, system, coarse.system, coarse.levels, refined.transfer, control)
+        lift, levels = refined_levels(model, system, coarse.system, coarse.levels, refined.transfer, options, control)
         start = CoarseStart(system=coarse.system, result=coarse.result, prolongation=lift, levels=levels)
         found.append(Step(solve_from_coarser(system, start, verdict, options, control), refined))
     return found

@@ -89,18 +89,32 @@ class AdaptiveSolver:
         """
         return self._begun(prepare(scene, comm, self.timer, thresholds=self.thresholds))
 
-    def begin_resolved(self, scene: Scene, comm: MPI.Comm, thresholds: ControlThresholds = CONTROL) -> AdaptiveLevel:
-        """As :meth:`begin`, on the scene's own mesh refined where the data on the boundary ask for it. Collective.
+    def first_domain(self, scene: Scene, comm: MPI.Comm) -> Domain:
+        """The body on the mesh to begin with. Collective.
 
         Args:
             scene: what to solve.
             comm: the ranks.
+
+        Raises:
+            InputError: the scene does not fit its mesh, on all ranks alike.
+        """
+        with self.timer("mesh"):
+            return coarsest(scene).domain.build_hierarchy(comm, scene.dimension, self.thresholds.mesh)
+
+    def begin_resolved(self, scene: Scene, domain: Domain, thresholds: ControlThresholds = CONTROL) -> AdaptiveLevel:
+        """As :meth:`begin`, on a mesh that is refined where the data on the boundary ask for it. Collective.
+
+        Args:
+            scene: what to solve.
+            domain: the body on its first mesh.
             thresholds: what is fine enough, and up to which size the mesh is refined.
 
         Raises:
             InputError: the scene does not fit its mesh, on all ranks alike.
         """
-        prepared = prepare(scene, comm, self.timer, thresholds=self.thresholds)
+        comm = domain.mesh.comm
+        prepared = prepare(scene, comm, self.timer, domain, thresholds=self.thresholds)
         while prepared.system.dofs < thresholds.first_unknowns:
             cells = first_mesh.unresolved(prepared.problem, thresholds)
             if not comm.allreduce(len(cells)):
@@ -129,7 +143,13 @@ class AdaptiveSolver:
         prepared, coarse = self._prepared(level, scene, refined.domain), level.prepared.system
         with self.timer("setup"):
             found = refined_levels(
-                prepared.model, prepared.system, coarse, level.levels, refined.transfer, RunControl(timer=self.timer)
+                prepared.model,
+                prepared.system,
+                coarse,
+                level.levels,
+                refined.transfer,
+                prepared.options,
+                RunControl(timer=self.timer),
             )
         step, levels = found
         return self._solved(level, prepared, levels, step, ahead)

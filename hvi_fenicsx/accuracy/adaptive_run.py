@@ -13,6 +13,7 @@ from dataclasses import dataclass, field, replace
 from mpi4py import MPI
 
 from ..mesh import nodes
+from ..mesh.domain import Domain
 from ..mesh.refinement import Refinement
 from ..runtime import memory
 from ..runtime.mpi import largest
@@ -33,8 +34,8 @@ class AdaptiveRun:
     """One run to a goal. Everything it decides on is the same on all ranks.
 
     Attributes:
-        scene: what to solve; its mesh sets where to begin (:func:`.adaptive.coarsest`), its ε is the largest.
-        comm: the ranks.
+        scene: what to solve; its ε is the largest.
+        domain: the body on the first mesh (:meth:`.AdaptiveSolver.first_domain`).
         goal: what is asked for.
         solver: timer, progress and interruption.
         report: called with a line about each mesh.
@@ -43,7 +44,7 @@ class AdaptiveRun:
     """
 
     scene: Scene
-    comm: MPI.Comm
+    domain: Domain
     goal: Goal
     solver: AdaptiveSolver
     report: Callable[[str], None]
@@ -51,6 +52,7 @@ class AdaptiveRun:
     steps: list[AdaptiveStep] = field(default_factory=list)
 
     def __post_init__(self) -> None:
+        self.comm: MPI.Comm = self.domain.mesh.comm
         self.elements = Elements(dimension=self.scene.dimension, degree=self.scene.solver.degree or 1)
         self.base, self.room = memory.peak(self.comm), memory.room(self.comm) * self.thresholds.usable_memory
         self.quantity = quantities.find(self.goal.quantity)()
@@ -101,7 +103,7 @@ class AdaptiveRun:
         """The coarsest mesh that sees the data, solved to a loose tolerance. Collective."""
         scene = adaptive.coarsest(self.scene)
         tolerance = min(self.thresholds.coarsest_tolerance, scene.solver.tolerance * 1e3)
-        return self.solver.begin_resolved(with_tolerance(scene, tolerance), self.comm, self.thresholds)
+        return self.solver.begin_resolved(with_tolerance(scene, tolerance), self.domain, self.thresholds)
 
     def _cost(self, accuracy: float) -> Cost:
         return cost_forecast.cost(self.steps, accuracy, self.elements, self.base, self.quantity.power_of_energy)

@@ -11,7 +11,7 @@ from ..scene import Scene
 from . import degree_choice
 from .adaptive import AdaptiveSolver
 from .adaptive_run import AdaptiveRun
-from .goal import AccuracyResult, Goal
+from .goal import AccuracyResult, DegreeChoice, Goal
 from .thresholds import CONTROL, ControlThresholds
 
 
@@ -36,11 +36,12 @@ def solve_to_goal(
     Raises:
         InputError: on all ranks alike: the scene has no such quantity, or does not fit its mesh.
     """
+    domain = solver.first_domain(scene, comm)
 
     def begun(degree: int) -> AdaptiveRun:
         run = AdaptiveRun(
             scene=scene.with_solver(degree=degree),
-            comm=comm,
+            domain=domain,
             goal=goal,
             solver=solver,
             report=report,
@@ -49,12 +50,25 @@ def solve_to_goal(
         run.begin()
         return run
 
-    choice, run = None, begun(scene.solver.degree or 1)
-    if scene.solver.degree is None and degree_choice.worthwhile(run):
-        other = begun(2)
-        choice = degree_choice.between(run, other)
+    run, choice = _begun(scene, begun, quadratic=degree_choice.at_once(goal, domain))
+    if choice is not None:
         report(str(choice))
-        run = other if choice.degree == 2 else run
-        del other
     found = run.finish()
     return replace(found, solution=replace(found.solution, scene=scene), choice=choice)
+
+
+def _begun(
+    scene: Scene, begun: Callable[[int], AdaptiveRun], *, quadratic: bool
+) -> tuple[AdaptiveRun, DegreeChoice | None]:
+    """The run on its first mesh, and how its degree was chosen where both were tried. Collective."""
+    if scene.solver.degree is not None:
+        return begun(scene.solver.degree), None
+    other = begun(2) if quadratic else None
+    if other is not None and other.steps and other.quantity.known_from_one_mesh:
+        return other, None
+    run = begun(1)
+    if not degree_choice.worthwhile(run):
+        return run, None
+    other = other or begun(2)
+    choice = degree_choice.between(run, other)
+    return (other if choice.degree == 2 else run), choice

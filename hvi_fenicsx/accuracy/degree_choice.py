@@ -1,7 +1,8 @@
 """The degree of a run to a goal, where the scene states none: the one that is forecast to be cheaper.
 
-Both degrees are solved on the first mesh, which is coarse. From its error there each is forecast to converge at its
-best rate in the number of unknowns, which adaptive meshes reach.
+Where much is asked for, and the first mesh is small, that is degree 2. Else both degrees are solved on the first mesh.
+From its error there each is forecast to converge at its best rate in the number of unknowns, which adaptive meshes
+reach.
 """
 
 from __future__ import annotations
@@ -11,12 +12,29 @@ import math
 import numpy as np
 
 from ..mesh import nodes
+from ..mesh.domain import Domain
 from ..runtime.mpi import largest
-from . import cost_forecast
+from . import cost_forecast, quantities
 from .adaptive_run import AdaptiveRun
 from .cost_forecast import Elements
-from .goal import DegreeChoice
+from .goal import DegreeChoice, Goal
 from .thresholds import CHOICE, ChoiceThresholds
+
+
+def at_once(goal: Goal, domain: Domain, thresholds: ChoiceThresholds = CHOICE) -> bool:
+    """Whether to begin at degree 2: much is asked for, and the first mesh is small. Collective.
+
+    Args:
+        goal: what is asked for.
+        domain: the body on the first mesh.
+        thresholds: what is much, and what is small.
+    """
+    quantity = quantities.find(goal.quantity)()
+    if not quantity.estimated:
+        return False
+    accuracy = (goal.accuracy or 0.0) ** (1.0 / quantity.power_of_energy)
+    unknowns = domain.dimension * nodes.count(domain.mesh, 2)
+    return accuracy <= thresholds.much and unknowns <= thresholds.small
 
 
 def worthwhile(run: AdaptiveRun, thresholds: ChoiceThresholds = CHOICE) -> bool:

@@ -35,7 +35,7 @@ class EnergyNorm(Quantity):
     name = "energy"
     description = "the displacement in the energy norm"
     in_energy_norm = True
-    known_from_one_mesh = True
+    estimated = True
     safety: ClassVar[float] = 1.25
 
     def error(self) -> float:
@@ -57,6 +57,7 @@ class ContactField(Observable):
         safety: what the estimate is multiplied with: on coarse meshes it may be too small.
     """
 
+    estimated = True
     safety: ClassVar[float]
     _ahead: fem.Function | None = None
 

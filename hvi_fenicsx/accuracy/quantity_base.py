@@ -40,6 +40,7 @@ class Quantity(ABC):
     name: ClassVar[str]
     description: ClassVar[str]
     in_energy_norm: ClassVar[bool] = False
+    estimated: ClassVar[bool] = False
     needs_existence: ClassVar[bool] = False
     registry: ClassVar[dict[str, type[Quantity]]] = {}
 
@@ -70,7 +71,7 @@ class Quantity(ABC):
     @property
     def known_from_one_mesh(self) -> bool:
         """Whether one mesh is enough to estimate the error."""
-        return False
+        return self.estimated
 
     def parts(self, step: AdaptiveStep) -> tuple[float, float, float]:
         """The mesh's, smoothing's and the solver's part of the last level's error, relative.

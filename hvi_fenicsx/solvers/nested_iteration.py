@@ -230,11 +230,17 @@ def _of_degree_one(model: Model, system: System, control: RunControl) -> System:
 
 
 def refined_levels(
-    model: Model, system: System, coarse: System, below: Levels, transfer: Transfer, control: RunControl
+    model: Model,
+    system: System,
+    coarse: System,
+    below: Levels,
+    transfer: Transfer,
+    options: SolverOptions,
+    control: RunControl,
 ) -> tuple[PETSc.Mat, Levels]:
     """The way to a system from the one on the mesh that was refined, and the system's coarser levels. Collective.
 
-    At degree 2 these are degree 1 on the same mesh and then on the coarser ones.
+    At degree 2 these are degree 1 on the same mesh and then on the coarser ones. A small system has none.
 
     Args:
         model: what is solved.
@@ -242,9 +248,12 @@ def refined_levels(
         coarse: on the mesh that was refined.
         below: the coarser levels of that one.
         transfer: from that mesh.
+        options: from which size on a coarser level pays.
         control: where time goes.
     """
     step = prolongation(system, coarse, transfer)
+    if system.dofs < options.thresholds.nested_from:
+        return step, ()
     if nodes.degree(system.problem.space) == 1:
         return step, with_coarser_system(system, coarse, below, step)
     linear = _of_degree_one(model, system, control)

@@ -19,7 +19,7 @@ from runs import hvi, summary, write_scene
 from scenes import STEEL, model, quadratic_linear
 
 from hvi_fenicsx import Scene, read_scene
-from hvi_fenicsx.accuracy import adaptive, control, cost_forecast, quantities
+from hvi_fenicsx.accuracy import adaptive, control, cost_forecast, degree_choice, quantities
 from hvi_fenicsx.accuracy.adaptive import AdaptiveLevel, AdaptiveSolver
 from hvi_fenicsx.accuracy.cost_forecast import AdaptiveStep, Elements
 from hvi_fenicsx.accuracy.goal import AccuracyResult, Goal
@@ -98,8 +98,8 @@ def test_a_drop_on_its_way_and_a_wavy_gap_keep_what_is_asked_for(table: dict[str
 
 def test_the_first_mesh_sees_the_data_and_no_more() -> None:
     def first(**changes: Any) -> int:
-        scene = adaptive.coarsest(Scene.model_validate(model(16, **changes)))
-        return AdaptiveSolver(timer=Timer()).begin_resolved(scene, COMM).dofs
+        scene, solver = adaptive.coarsest(Scene.model_validate(model(16, **changes))), AdaptiveSolver(timer=Timer())
+        return solver.begin_resolved(scene, solver.first_domain(scene, COMM)).dofs
 
     plain = first()
     assert first(gap="1e-6*x") == plain
@@ -209,8 +209,9 @@ def test_adaptive_refinement_at_degree_two_is_optimal_at_a_corner() -> None:
 
 
 @pytest.mark.parametrize(("asked", "degree"), [(0.07, 1), (0.01, 2)])
-def test_the_degree_is_the_cheaper_one(asked: float, degree: int) -> None:
+def test_the_degree_is_the_cheaper_one(asked: float, degree: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """A little more than the first mesh has at degree 1 does not pay for degree 2; an eighth does. One degree a run."""
+    monkeypatch.setattr(degree_choice, "at_once", lambda *_: False)
     scene = Scene.model_validate(STRONG)
     reached = reach(scene, Goal(asked), None)
     alone = [reach(scene, Goal(asked), p) for p in (1, 2)]
@@ -219,6 +220,16 @@ def test_the_degree_is_the_cheaper_one(asked: float, degree: int) -> None:
     assert [s.dofs for s in reached.steps] == [s.dofs for s in alone[degree - 1].steps]
     price = [alone[0].steps[-1].dofs, 2 * alone[1].steps[-1].dofs]
     assert price[degree - 1] == min(price)
+
+
+def test_where_much_is_asked_for_the_run_begins_at_degree_two() -> None:
+    scene = Scene.model_validate(STRONG)
+    reached, alone = (reach(scene, Goal(0.01), degree) for degree in (None, 2))
+    assert (reached.degree, reached.choice) == (2, None)
+    assert [s.dofs for s in reached.steps] == [s.dofs for s in alone.steps]
+    loose, value = (reach(scene, goal, None) for goal in (Goal(0.07), Goal(0.2, "resultant")))
+    assert loose.choice is not None
+    assert (value.degree, value.choice) == (1, None)
 
 
 def test_where_the_first_mesh_suffices_degree_two_is_not_tried() -> None:
