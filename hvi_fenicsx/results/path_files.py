@@ -47,6 +47,8 @@ def shown_rows(path: LoadPath, most: int) -> list[int]:
         path: the path.
         most: so many at most.
     """
+    if not path.rows:
+        return []
     last = len(path.rows) - 1
     marked = [n for n, row in enumerate(path.rows) if row.event in _SHOWN - {"fold"}]
     chosen = set(_evenly([*{*marked, path.peak, 0, last}], most))

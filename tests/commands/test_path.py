@@ -98,6 +98,22 @@ def test_a_path_that_is_interrupted_goes_on_to_the_same_end_with_energies_in_bal
     np.testing.assert_allclose(stored + dissipated, work, atol=1e-8 * work[-1])
 
 
+def test_a_path_without_any_state_is_written_and_said(tmp_path: Path) -> None:
+    """The floor's law pushes from the first slip on: nothing holds the body even without a load."""
+    law = "{ law = 'graph', points = [[0.0, 0.0], [1e-6, -1e3]] }"
+    scene = tmp_path / "pushed.toml"
+    scene.write_text(f"""
+        domain = {{ shape = "rectangle", size = [1.0, 1.0], cells = [2, 2] }}
+        material = {{ model = "plane_stress", youngs_modulus = 2.15e11, poisson_ratio = 0.29 }}
+        boundary.press = {{ on = "top", traction = [0.0, -1e6] }}
+        boundary.floor = {{ on = "bottom", contact = {{ gap = 0.0 }}, friction = {law} }}
+    """)
+    done = hvi("path", scene, "--out", tmp_path / "out")
+    assert done.returncode == 0, done.stderr
+    assert "no state is borne: nothing holds the body at rest" in done.stdout
+    assert summary(tmp_path / "out")["path"]["rows"] == 0
+
+
 @pytest.mark.long
 @pytest.mark.parametrize("follow_how", ["stable", "exact"])
 def test_the_strength_of_the_glued_bar(follow_how: str, tmp_path: Path) -> None:
