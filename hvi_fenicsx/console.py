@@ -124,6 +124,8 @@ def outcome(solution: Solution) -> Iterator[str]:
     yield f"result: {solution.reason}"
     if not solution.converged and solution.solvability.state in ("metastable", "escapes"):
         yield "`hvi path SCENE` follows the load to the last state that is borne, and beyond"
+    if not solution.converged and solution.solvability.state == "metastable":
+        yield "`hvi equilibria SCENE` looks for all equilibria, and can prove that there is none"
     if solution.examination is None or solution.solve_result is None:
         return
     c, counts = solution.examination.certificate, solution.solve_result.counts
