@@ -377,6 +377,7 @@ def test_what_cannot_be_asked_for(words: list[str], said: str, tmp_path: Path) -
     assert not (tmp_path / "x").exists()
 
 
+@pytest.mark.long
 def test_the_command_and_two_ranks(tmp_path: Path) -> None:
     scene = write_scene(tmp_path / "strong.toml", STRONG)
     common = ["run", scene, "--no-pictures", "--accuracy", "0.04"]

@@ -128,9 +128,8 @@ def test_a_drop_spoils_no_minimum_where_a_bound_or_a_kink_covers_it(table: Table
     assert found.examination.certificate.second_order == "local minimiser"
 
 
-@pytest.mark.parametrize(
-    ("name", "minimal"), [("pushed from rest", False), pytest.param("pushed and pulled", True, marks=pytest.mark.long)]
-)
+@pytest.mark.long
+@pytest.mark.parametrize(("name", "minimal"), [("pushed from rest", False), ("pushed and pulled", True)])
 def test_a_law_that_pushes_is_unstable_across_the_slip(name: str, minimal: bool) -> None:
     """Its force turns with the slip: j'/|u_t| is negative, however straight the law."""
     found, short = solved(IN_SPACE[name]), solved(IN_SPACE[name] | {"solver": {}})

@@ -112,6 +112,7 @@ def test_a_misspelt_smoothing_is_told_with_the_users_own(files: Path) -> None:
     assert 'unknown value "cubik"; did you mean "cubic"? allowed: chks, cubic, log_exp' in " ".join(done.stderr.split())
 
 
+@pytest.mark.long
 def test_an_accuracy_of_the_users_quantity_is_kept(files: Path) -> None:
     """On two ranks; against a solution that is right to 1 % in the energy norm, so to 0.01 % in energy."""
     for name, ranks, words in (("asked", 2, ("0.02", "--quantity", "work")), ("exact", 1, ("0.01",))):

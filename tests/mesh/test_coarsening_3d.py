@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 from domains import lost, space_on
 from mpi4py import MPI
-from runs import RANKS
+from runs import LONG_RANKS
 
 from hvi_fenicsx import Scene, preparation, workflow
 from hvi_fenicsx.mesh import coarsening_3d, gmsh_file
@@ -98,7 +98,7 @@ def test_a_coarse_mesh_of_another_size_is_given_up(bored: Path) -> None:
     assert with_hierarchy(gmsh_file.read(COMM, bored, 3), replace(COARSER, remeshed_size=1e-6)).coarser() is None
 
 
-@pytest.mark.parametrize("ranks", RANKS[1:])
+@pytest.mark.parametrize("ranks", LONG_RANKS[1:])
 def test_the_coarse_mesh_is_the_same_on_several_ranks_shared_like_the_fine_one(ranks: int, bored: Path) -> None:
     command = ["mpirun", "--oversubscribe", "-n", str(ranks), sys.executable, "remeshed_ranks.py", str(bored)]
     run = subprocess.run(command, cwd=HERE, capture_output=True, text=True, timeout=120)

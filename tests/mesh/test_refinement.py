@@ -18,7 +18,7 @@ import pytest
 from dolfinx import fem
 from dolfinx import mesh as dmesh
 from domains import BODIES, COMM, half_disk, lost, measure, rough, towards, volume
-from runs import RANKS
+from runs import LONG_RANKS
 from scenes import model, quadratic_linear, solved_system
 
 from hvi_fenicsx import Scene, preparation, workflow
@@ -174,7 +174,7 @@ def assembled(scene: Scene, body: Domain) -> System:
     return assemble(body, model_of(scene), Timer())
 
 
-@pytest.mark.parametrize("ranks", RANKS[1:])
+@pytest.mark.parametrize("ranks", LONG_RANKS[1:])
 def test_ranks_agree(ranks: int) -> None:
     """The same lengths, vertices and transferred field, however the mesh is split; ghosts are where owners are."""
     parallel = _run(ranks)

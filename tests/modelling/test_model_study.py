@@ -27,6 +27,7 @@ def with_ufl(body: hvi.Body) -> hvi.Model:
     return steel_square(body=body, press=[0.0, -1e6 * (1 + x[0])])
 
 
+@pytest.mark.long
 def test_meshes_of_a_model_are_refinements_of_its_body(body: hvi.Body) -> None:
     """Loads by Python functions are known on all of them; the errors are those against the refined solution."""
     model = steel_square(body=body, press=[0.0, lambda x: -1e6 * (1 + x[0])])

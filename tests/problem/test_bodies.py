@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from mpi4py import MPI
-from runs import RANKS, hvi, on_ranks, summary, write_scene
+from runs import LONG_RANKS, hvi, on_ranks, summary, write_scene
 from scenes import NU, E, Table, quadratic_linear
 
 from hvi_fenicsx import InputError, Scene, prepare, read_scene, solve
@@ -92,7 +92,7 @@ def _slips(solution: Any) -> list[float]:
     return [float(comm.allreduce(parts[side].sum())) for side in (~right, right)]
 
 
-@pytest.fixture(scope="module", params=RANKS)
+@pytest.fixture(scope="module", params=LONG_RANKS)
 def answers(request: pytest.FixtureRequest, folder: Path) -> dict[str, Any]:
     """What `told` says on one, two and three ranks."""
     found: dict[str, Any] = (

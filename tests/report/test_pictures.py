@@ -355,6 +355,7 @@ def test_a_package_that_is_not_there_is_named(tmp_path: Path) -> None:
     assert "needs the package pyvista, which is not installed here" in told.stderr
 
 
+@pytest.mark.long
 def test_the_pieces_of_several_ranks_are_one_body(tmp_path: Path) -> None:
     """The model problem without friction, whose displacement is known."""
     scene = write_scene(tmp_path / "s.toml", model(8))

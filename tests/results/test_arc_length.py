@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pytest
-from runs import RANKS, contact, run_all
+from runs import LONG_RANKS, contact, run_all
 from scenes import STEEL
 
 from hvi_fenicsx.results.arc_length import along
@@ -40,7 +40,7 @@ SCENES = {
 }
 
 
-@pytest.fixture(scope="module", params=RANKS)
+@pytest.fixture(scope="module", params=LONG_RANKS)
 def tables(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Array]:
     """``contact.csv`` of each scene, on one, two and three ranks."""
     folder = tmp_path_factory.mktemp("arc")

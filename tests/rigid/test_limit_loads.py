@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 from mpi4py import MPI
-from runs import RANKS, on_ranks
+from runs import LONG_RANKS, on_ranks
 from scenes import NU, E, Table, quadratic_linear
 
 from hvi_fenicsx import Scene, prepare, solve
@@ -87,7 +87,7 @@ def told(comm: MPI.Comm) -> dict[str, Any]:
     return found
 
 
-@pytest.fixture(scope="module", params=RANKS)
+@pytest.fixture(scope="module", params=LONG_RANKS)
 def answers(request: pytest.FixtureRequest) -> dict[str, Any]:
     """What `told` says on one, two and three ranks."""
     found: dict[str, Any] = told(MPI.COMM_SELF) if request.param == 1 else on_ranks(request.param, __file__)

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 from numpy.typing import NDArray
-from runs import RANKS, on_ranks
+from runs import LONG_RANKS, on_ranks
 from scipy.optimize import linprog
 
 from hvi_fenicsx.errors import InputError
@@ -750,7 +750,7 @@ def verdicts(comm: MPI.Comm) -> dict[str, object]:
     }
 
 
-@pytest.mark.parametrize("ranks", RANKS[1:])
+@pytest.mark.parametrize("ranks", LONG_RANKS[1:])
 def test_the_verdict_does_not_depend_on_the_number_of_ranks(ranks: int) -> None:
     answers = on_ranks(ranks, __file__)
     assert len(answers) == ranks

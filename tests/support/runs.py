@@ -25,6 +25,8 @@ from hvi_fenicsx.runtime.signals import SIGNALS
 ROOT = Path(__file__).parents[2]
 RANKS = (1, pytest.param(2, marks=pytest.mark.long), 3)
 """Three ranks show what two do, and more: one with a neighbour on either side, parts of unequal size."""
+LONG_RANKS = (1, *(pytest.param(n, marks=pytest.mark.long) for n in (2, 3)))
+"""For what the scenes of ``workflow/test_ranks.py`` go through on three ranks as well."""
 
 
 def command(*words: object, ranks: int = 1) -> list[str]:

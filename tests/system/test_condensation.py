@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from mpi4py import MPI
-from runs import RANKS, on_ranks
+from runs import LONG_RANKS, on_ranks
 from scenes import DELTA, NU, E, Table, block, model, quadratic_linear
 
 from hvi_fenicsx import Scene, prepare
@@ -207,7 +207,7 @@ def test_a_name_that_is_no_load_is_refused() -> None:
         Condensation(system, ["pull.force"])
 
 
-@pytest.mark.parametrize("ranks", RANKS[1:])
+@pytest.mark.parametrize("ranks", LONG_RANKS[1:])
 def test_all_ranks_hold_the_problem_of_one(ranks: int) -> None:
     """Its energies and forces, for displacements given by place."""
     alone, together = (on_ranks(n, "tests/system/condensed_ranks.py") for n in (1, ranks))

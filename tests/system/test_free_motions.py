@@ -15,7 +15,7 @@ import numpy.typing as npt
 import pytest
 from mpi4py import MPI
 from petsc4py import PETSc
-from runs import RANKS, hvi, on_ranks, summary, write_scene
+from runs import LONG_RANKS, hvi, on_ranks, summary, write_scene
 from scenes import NU, E, P, Q, Table, block, quadratic_linear
 
 from hvi_fenicsx import Scene, Solution, prepare, solve
@@ -129,7 +129,7 @@ def solve_cases(comm: MPI.Comm) -> dict[str, Any]:
     return found
 
 
-@pytest.fixture(scope="module", params=RANKS)
+@pytest.fixture(scope="module", params=LONG_RANKS)
 def answers(request: pytest.FixtureRequest) -> dict[str, Any]:
     """What `solve_cases` returns on one, two and three ranks."""
     found: dict[str, Any] = solve_cases(MPI.COMM_SELF) if request.param == 1 else on_ranks(request.param, __file__)

@@ -176,7 +176,7 @@ def _matched(other: Solution, one: Solution, turn: Array) -> Array:
     return np.asarray((displacement(other) @ turn)[distance.argmin(axis=1)])
 
 
-@pytest.mark.parametrize("degrees", [30.0, 200.0])
+@pytest.mark.parametrize("degrees", [30.0, pytest.param(200.0, marks=pytest.mark.long)])
 def test_a_floor_may_slant(degrees: float, mesh: Path, tmp_path: Path) -> None:
     """The wall is a slot without play there, since a support holds along the axes only."""
     c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
