@@ -29,12 +29,10 @@ def at_once(goal: Goal, domain: Domain, thresholds: ChoiceThresholds = CHOICE) -
         domain: the body on the first mesh.
         thresholds: what is much, and what is small.
     """
-    quantity = quantities.find(goal.quantity)()
-    if not quantity.estimated:
+    if not quantities.find(goal.quantity).estimated:
         return False
-    accuracy = (goal.accuracy or 0.0) ** (1.0 / quantity.power_of_energy)
     unknowns = domain.dimension * nodes.count(domain.mesh, 2)
-    return accuracy <= thresholds.much and unknowns <= thresholds.small
+    return (goal.accuracy or 0.0) <= thresholds.much and unknowns <= thresholds.small
 
 
 def worthwhile(run: AdaptiveRun, thresholds: ChoiceThresholds = CHOICE) -> bool:

@@ -89,7 +89,8 @@ class ContactField(Observable):
             return np.inf
         last = self._last
         u, examination = found.solve_result.u, found.examination
-        errors = estimate_contact_errors(last.prepared.system, last.levels, u, examination)
+        known = None if found.estimate is None else found.estimate.field
+        errors = estimate_contact_errors(last.prepared.system, last.levels, u, examination, known=known)
         self._ahead = errors.corrected
         return self.safety * self.pick(errors)
 

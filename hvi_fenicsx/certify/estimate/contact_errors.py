@@ -43,7 +43,12 @@ class ContactErrors:
 
 
 def estimate_contact_errors(
-    system: System, levels: Levels, u: fem.Function, examination: Examination, thresholds: Thresholds = DEFAULT
+    system: System,
+    levels: Levels,
+    u: fem.Function,
+    examination: Examination,
+    thresholds: Thresholds = DEFAULT,
+    known: ErrorField | None = None,
 ) -> ContactErrors:
     """Estimate the errors of slip and -σ_t, what smoothing changes included. Collective.
 
@@ -55,10 +60,11 @@ def estimate_contact_errors(
         u: its solution, nondimensional, ghosts updated.
         examination: of the same u.
         thresholds: how accurately.
+        known: the estimated error, where it is known as a field (:attr:`.Estimate.field`).
     """
     traces = LawTraces(system.problem, u, examination.states, thresholds)
     inverse = DualNorm(system, levels, u, thresholds)
-    error, _ = coupled_errors.of_solution(traces, inverse)
+    error = known or coupled_errors.of_solution(traces, inverse)[0]
     uncertain = _uncertainty(traces, inverse)
     inverse.destroy()
     slips = [_slip(traces, state, error, uncertain) for state in examination.states]
@@ -70,10 +76,11 @@ def estimate_contact_errors(
     ]
     comm = system.comm
     apart, whole = (total(comm, sum(pair[i] for pair in slips)) for i in (0, 1))
-    known, unknown, carried = (total(comm, sum(sizes[i] for sizes in frictions)) for i in (0, 1, 2))
-    away = float(np.hypot(known, unknown))
-    error.nodes.x.array[:] += u.x.array
-    return ContactErrors(float(np.sqrt(ratio(apart, whole))), ratio(away, carried), error.nodes)
+    seen, unseen, carried = (total(comm, sum(sizes[i] for sizes in frictions)) for i in (0, 1, 2))
+    away = float(np.hypot(seen, unseen))
+    corrected = fem.Function(system.problem.space)
+    corrected.x.array[:] = error.nodes.x.array + u.x.array
+    return ContactErrors(float(np.sqrt(ratio(apart, whole))), ratio(away, carried), corrected)
 
 
 def ratio(part: float, whole: float) -> float:

@@ -21,7 +21,7 @@ from ..certificate import Examination
 from . import coupled_errors, data_errors, defect, dual_norm, nearly_incompressible
 from .bubble_stiffness import BubbleStiffness
 from .contact_errors import ratio
-from .law_traces import LawTraces
+from .law_traces import ErrorField, LawTraces
 from .thresholds import DEFAULT, Thresholds
 
 
@@ -35,6 +35,7 @@ class Estimate:
         smoothing: the smoothed laws' error, 0 for exact ones.
         algebraic: the solver's error.
         energy_norm: |||u_h|||.
+        field: the estimated error itself, where nodes and bubbles were found together.
     """
 
     cells: Array
@@ -42,6 +43,7 @@ class Estimate:
     smoothing: float
     algebraic: float
     energy_norm: float
+    field: ErrorField | None = None
 
     @property
     def total(self) -> float:
@@ -83,7 +85,7 @@ def estimate(
     traces = LawTraces(problem, u, examination.states, thresholds)
     inverse = dual_norm.DualNorm(system, levels, u, thresholds)
     energy = _energy(problem, u, examination)
-    cells = _discretisation(traces, inverse, energy)
+    field, cells = _discretisation(traces, inverse, energy)
     cells += data_errors.squares(problem, traces.bubbles, examination.states, thresholds)
     smoothing = inverse.solve(dual_norm.smoothing(problem, examination.states, near))[1] if _smoothed(problem) else 0.0
     _, algebraic = inverse.solve(dual_norm.algebraic(problem, examination, near))
@@ -97,7 +99,7 @@ def estimate(
         "energy_norm": energy,
     }
     norms = {name: _norm(square, thresholds.rounding) for name, square in squares.items()}
-    return Estimate(cells=np.sqrt(cells), **norms)
+    return Estimate(cells=np.sqrt(cells), field=field, **norms)
 
 
 def _norm(square: float, rounding: float) -> float:
@@ -105,16 +107,16 @@ def _norm(square: float, rounding: float) -> float:
     return float(np.sqrt(square)) if square > rounding**2 else 0.0
 
 
-def _discretisation(traces: LawTraces, inverse: dual_norm.DualNorm, energy: float) -> Array:
-    """η_K² of the owned cells, for a solution of the energy a(u_h, u_h). Collective."""
+def _discretisation(traces: LawTraces, inverse: dual_norm.DualNorm, energy: float) -> tuple[ErrorField | None, Array]:
+    """The error, where it is known as a field, and η_K² of the owned cells; a(u_h, u_h) is the energy. Collective."""
     if traces.problem.bulk.averages_dilatation:
-        return nearly_incompressible.squares(traces, inverse)
+        return None, nearly_incompressible.squares(traces, inverse)
     limit = traces.thresholds.coupled[traces.degree]
     if limit and not coupled_errors.within_facets(traces):
         cells = _between_nodes(traces, inverse)
         if total(traces.problem.domain.mesh.comm, float(cells.sum())) <= limit**2 * energy:
-            return cells
-    return coupled_errors.of_solution(traces, inverse)[1]
+            return None, cells
+    return coupled_errors.of_solution(traces, inverse)
 
 
 def _between_nodes(traces: LawTraces, inverse: dual_norm.DualNorm) -> Array:
