@@ -18,7 +18,7 @@ from scipy.optimize import linprog
 from ..typing import Array, Integers
 from . import monotone_radius, stationarity
 from .arcs import on_interval
-from .convex_programme import minimise
+from .convex_programme import Chains, minimise
 from .linear_test import LinearTest
 from .lowest import fresh_box
 from .relaxation import Box, Relaxation, envelopes
@@ -141,7 +141,7 @@ class Enumeration:
 
     def _minimum(self, cell: Box, added: Array) -> Array:
         """The minimiser of a cell on which the energy is convex, the falls of its laws being less than S."""
-        chains = envelopes(self.problem, cell.low, cell.high, added)
+        chains = Chains.of(envelopes(self.problem, cell.low, cell.high, added))
         return minimise(self.problem.stiffness - np.diag(added), self.problem.force, chains, cell.x).x
 
     def _enter_linear(self, cell: Box, free: Integers, matrix: Array) -> None:

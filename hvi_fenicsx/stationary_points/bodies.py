@@ -106,7 +106,7 @@ class Equilibria:
         if not np.allclose(comm.bcast(point.x), point.x, rtol=1e-9, atol=1e-12):
             raise SolverError("the ranks found different equilibria; run on one")
         u = self._prepared.system.displacement(self._condensation.expand(point.x))
-        if self.problem is not None and self.problem.error:  # the point is that of polylines near the laws
+        if self.problem is not None and (self.problem.error or len(self.problem.lengths)):  # the point is not exact
             u.x.array[:] *= self._prepared.problem.scales.displacement
             return finish(self._prepared, start=u, estimating=False)
         found = SolveResult(u=u, method="stationary points of the condensed problem", converged=True, reason=point.kind)

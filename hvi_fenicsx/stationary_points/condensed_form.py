@@ -1,9 +1,11 @@
-"""The condensed problem of a system with one chain of parabolas for each unknown."""
+"""The condensed problem of a system with one chain of parabolas for each argument of its laws."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -11,6 +13,7 @@ from ..errors import InputError
 from ..system.condensed_problem import Bonds, CondensedProblem
 from .arcs import FREE, Chain, chain, total
 from .law_graphs import LawGraph, exact_graph, law_graph
+from .lengths import Lengths
 from .scalar_problem import FAR, ScalarProblem
 
 COARSE = 1e-4
@@ -26,26 +29,65 @@ def scalar_problem(problem: CondensedProblem, factor: float = 1.0, *, tolerance:
         tolerance: energy by which curved laws may differ from their polylines, altogether; None: a coarse one.
 
     Raises:
-        InputError: a law acts on the length of a slip vector.
+        InputError: a law has no potential, or acts on the length of a vector whose components have other laws.
     """
-    found: list[list[Chain]] = [[] for _ in range(problem.size)]
+    found: dict[_Argument, list[Chain]] = {}
     far, constant, error = _far(problem.bonds), problem.constant_at(factor), 0.0
     for bonds, law in zip(problem.bonds, _graphs(problem.bonds, far, tolerance), strict=True):
-        _refuse_others(bonds)
+        _refuse_mixity(bonds)
         area = float(bonds.weights.sum())
         constant, error = constant + area * law.offset, error + area * law.error
-        for unknown, sign, weight in zip(bonds.unknowns[:, 0], bonds.signs[:, 0], bonds.weights, strict=True):
-            if weight > 0.0:
-                found[unknown].append(chain(law.graph, float(weight), float(sign)))
+        for argument, sign, weight in _arguments(bonds):
+            found.setdefault(argument, []).append(chain(law.graph, weight, sign))
+    vectors = [argument for argument in found if argument.radial]
+    _refuse_overlap(problem, found)
+    unknowns = [found.get(_Argument(unknowns=(i,)), []) for i in range(problem.size)]
+    chains = [*unknowns, *(found[v] for v in vectors)]
     return ScalarProblem(
         stiffness=problem.stiffness,
         force=problem.load(factor),
         lower=problem.lower,
         upper=problem.upper,
-        chains=tuple(total(chains) if chains else FREE for chains in found),
+        chains=tuple(total(one) if one else FREE for one in chains),
+        lengths=_lengths(vectors),
         constant=constant,
         error=error,
         farthest=far if error else math.inf,
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Argument:
+    """What laws act on: one unknown, or the length of a vector factors * x[unknowns]."""
+
+    unknowns: tuple[int, ...]
+    factors: tuple[float, ...] = ()
+    opens: bool = False
+
+    @property
+    def radial(self) -> bool:
+        return bool(self.factors)
+
+
+def _arguments(bonds: Bonds) -> Iterator[tuple[_Argument, float, float]]:
+    """Argument, factor and weight of each bond that has a weight."""
+    for k in np.flatnonzero(bonds.weights > 0.0):
+        weight = float(bonds.weights[k])
+        numbers, factors = tuple(int(i) for i in bonds.unknowns[k]), tuple(float(s) for s in bonds.signs[k])
+        if bonds.radial:
+            yield _Argument(unknowns=numbers, factors=factors, opens=bonds.opens), 1.0, weight
+        else:
+            yield _Argument(unknowns=numbers), factors[0], weight
+
+
+def _lengths(vectors: Sequence[_Argument]) -> Lengths:
+    """The vectors as arrays."""
+    if not vectors:
+        return Lengths.none()
+    return Lengths(
+        unknowns=np.array([[*v.unknowns, *[v.unknowns[0]] * (3 - len(v.unknowns))] for v in vectors]),
+        factors=np.array([[*v.factors, *[0.0] * (3 - len(v.factors))] for v in vectors]),
+        opens=np.array([v.opens for v in vectors]),
     )
 
 
@@ -63,9 +105,21 @@ def _far(laws: Sequence[Bonds]) -> float:
     return FAR * max([1.0, *map(float, sizes)])
 
 
-def _refuse_others(bonds: Bonds) -> None:
-    if bonds.radial:
+def _refuse_mixity(bonds: Bonds) -> None:
+    if bonds.mixity is not None:
         raise InputError(
-            f"boundary.{bonds.part}: friction in space acts on |u_t|, and cohesion on opening and slip together; what "
-            "is searched are laws of one component"
+            f"boundary.{bonds.part}: the energy of separation depends on the mode; such a law has no potential, and "
+            "its equilibria are not searched"
+        )
+
+
+def _refuse_overlap(problem: CondensedProblem, found: Iterable[_Argument]) -> None:
+    """A component of a vector must have no other law."""
+    taken = Counter(i for argument in found for i in argument.unknowns)
+    several = {i for argument in found if argument.radial for i in argument.unknowns if taken[i] > 1}
+    if several:
+        parts = sorted({b.part for b in problem.bonds if several & set(b.unknowns.ravel().tolist())})
+        raise InputError(
+            f"boundary.{', boundary.'.join(parts)}: a vertex has a law on the length of a slip or an opening, and "
+            "another law on one of its components; such a scene is not searched"
         )

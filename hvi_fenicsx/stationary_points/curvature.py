@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 from scipy.linalg import eigh
 
-from ..typing import Array, Integers
+from ..typing import Array, Integers, Mask
 from .scalar_problem import ScalarProblem
 
 REGULAR = 1e-10
@@ -38,8 +38,8 @@ class Curvature:
     """The diagonal D of one box.
 
     Attributes:
-        added: d, which is negative where the law's own slope is given to S, (n,).
-        radii: half widths (n,) of what strong convexity allows for a gap of ½; inf where a rigid motion moves.
+        added: d, which is negative where the law's own slope is given to S, (n + m,).
+        radii: half widths (n + m,) of what strong convexity allows for a gap of ½; inf where a rigid motion moves.
         range_radii: the same of displacements without rigid motions.
     """
 
@@ -67,36 +67,74 @@ class CurvatureShare:
         """D on a box.
 
         Args:
-            low: of the box, (n,).
-            high: of the box, (n,).
-            undecided: unknowns whose law is not convex on the box.
-            weights: how much of D each of these is to have, (n,).
+            low: of the box, (n + m,).
+            high: of the box, (n + m,).
+            undecided: arguments whose law is not convex on the box.
+            weights: how much of D each of these is to have, (n + m,).
             part: the share of the largest D of that kind that is taken, below 1.
         """
-        arcs, n = self._problem.arcs, self._problem.size
-        slope = arcs.least_slope(low, high)
-        own = np.where(np.isfinite(slope), np.maximum(slope, 0.0), 0.0)
-        matrix = self._problem.stiffness + np.diag(own)
-        motions = self._free_motions(own)
-        need = np.where(arcs.drops(low, high) > 0.0, np.inf, np.maximum(-slope, 0.0))
-        added = np.zeros(n)
-        left = undecided[np.all(np.abs(motions[undecided]) <= 1e-9, axis=1)]
+        problem = self._problem
+        slope = problem.arcs.least_slope(low, high)
+        drops = problem.arcs.drops(low, high) > 0.0
+        own = self._own(low, slope, drops)
+        matrix = problem.stiffness + np.diag(problem.diagonal(own))
+        motions = self._free_motions(problem.diagonal(own))
+        need = np.where(drops, np.inf, np.maximum(-slope, 0.0))
+        added = np.zeros(len(low))
+        left = undecided[~self._moved(motions)[undecided]]
         for _ in range(MOST_ROUNDS):
             if not left.size:
                 break
-            inverse = np.linalg.inv(matrix - np.diag(added) + self._scale * motions @ motions.T)
-            q = np.sqrt(np.maximum(weights[left], 1e-12))
-            given = part / float(np.linalg.eigvalsh(q[:, None] * inverse[np.ix_(left, left)] * q)[-1]) * q * q
+            inverse = self._inverse(matrix - np.diag(problem.diagonal(added)), motions)
+            given = part / self._largest(inverse, left, weights) * np.maximum(weights[left], 1e-12)
             enough = given >= need[left]
             if not enough.any():
                 added[left] = given
                 break
             added[left[enough]] = need[left[enough]]
             left = left[~enough]
-        inverse = np.linalg.inv(matrix - np.diag(added) + self._scale * motions @ motions.T)
-        radii = np.sqrt(np.maximum(np.diag(inverse), 0.0))
-        moved = np.any(np.abs(motions) > 1e-9, axis=1)
-        return Curvature(added=added - own, radii=np.where(moved, np.inf, radii), range_radii=radii)
+        radii = self._radii(self._inverse(matrix - np.diag(problem.diagonal(added)), motions))
+        return Curvature(added=added - own, radii=np.where(self._moved(motions), np.inf, radii), range_radii=radii)
+
+    def _own(self, low: Array, slope: Array, drops: Mask) -> Array:
+        """How much of its curvature each law gives to S, (n + m,); a law of a length must still rise then."""
+        problem, n = self._problem, self._problem.size
+        own = np.where(np.isfinite(slope), np.maximum(slope, 0.0), 0.0)
+        if not len(problem.lengths):
+            return own
+        at = low[n:]
+        rate, _ = problem.arcs.rates(low)
+        secant = np.divide(np.maximum(rate[n:], 0.0), at, out=np.full_like(at, np.inf), where=at > 0.0)
+        own[n:] = np.where(problem.lengths.opens | drops[n:], 0.0, np.minimum(own[n:], secant))
+        return own
+
+    def _inverse(self, matrix: Array, motions: Array) -> Array:
+        """The inverse of a matrix that is made regular along rigid motions."""
+        return np.asarray(np.linalg.inv(matrix + self._scale * motions @ motions.T), dtype=np.float64)
+
+    def _moved(self, motions: Array) -> Mask:
+        """Which arguments a rigid motion moves, (n + m,)."""
+        lengths = self._problem.lengths
+        unknowns = np.any(np.abs(motions) > 1e-9, axis=1)
+        return np.concatenate([unknowns, np.any(unknowns[lengths.unknowns] & lengths.there, axis=1)])
+
+    def _largest(self, inverse: Array, left: Integers, weights: Array) -> float:
+        """The largest share θ has θ times this eigenvalue = 1: of S⁻¹ on the weighted components of some arguments."""
+        problem, n = self._problem, self._problem.size
+        q = np.sqrt(np.maximum(weights, 1e-12))
+        vectors = left[left >= n] - n
+        there = problem.lengths.there[vectors]
+        rows = np.concatenate([left[left < n], problem.lengths.unknowns[vectors][there]])
+        sizes = (q[n + vectors, None] * np.abs(problem.lengths.factors[vectors]))[there]
+        scale = np.concatenate([q[left[left < n]], sizes])
+        return float(np.linalg.eigvalsh(scale[:, None] * inverse[np.ix_(rows, rows)] * scale)[-1])
+
+    def _radii(self, inverse: Array) -> Array:
+        lengths = self._problem.lengths
+        blocks = inverse[lengths.unknowns[:, :, None], lengths.unknowns[:, None, :]]
+        blocks = lengths.factors[:, :, None] * blocks * lengths.factors[:, None, :]
+        squares = np.concatenate([np.diag(inverse), np.linalg.eigvalsh(blocks)[:, -1]])
+        return np.asarray(np.sqrt(np.maximum(squares, 0.0)))
 
     def _free_motions(self, own: Array) -> Array:
         """The kernel of S + diag(own), orthonormal columns."""

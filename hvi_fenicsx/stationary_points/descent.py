@@ -9,10 +9,13 @@ import numpy as np
 from ..typing import Array
 from .arcs import Arc, Chain, on_interval
 from .convex_programme import Chains, minimise
+from .length_programme import LengthProgramme
 from .scalar_problem import ScalarProblem
 
 MOST_STEPS = 60
 """Convex programmes of one descent."""
+SLOW = 1e-10
+"""Where laws act on lengths, a fall of the energy below this share of its parts is the last."""
 ROUNDING = 1e-13
 """A fall of the energy below this share of its parts is none."""
 
@@ -44,16 +47,42 @@ def descend(problem: ScalarProblem, low: Array, high: Array, x: Array) -> tuple[
 
     Args:
         problem: the problem.
-        low: of the box, (n,), finite.
-        high: of the box, (n,), finite.
+        low: of the box, (n + m,), finite.
+        high: of the box, (n + m,), finite.
         x: where to begin, (n,).
     """
     energy = problem.energy(x)
     for _ in range(MOST_STEPS):
-        chains = [majorant(c, *ends) for c, *ends in zip(problem.chains, low, high, x, strict=True)]
-        found = minimise(problem.stiffness, problem.force, Chains.of(chains), x)
-        after = problem.energy(found.x)
-        if not after < energy - ROUNDING * problem.energy_size(x):
+        at = problem.arguments(x)
+        ends = zip(low, np.maximum(high, at), at, strict=True)
+        chains = [majorant(c, *e) for c, e in zip(problem.chains, ends, strict=True)]
+        found = _minimiser(problem, chains, x)
+        after = problem.energy(found)
+        fall, size = energy - after, problem.energy_size(x)
+        if not fall > ROUNDING * size:
             break
-        x, energy = found.x, after
+        x, energy = found, after
+        if len(problem.lengths) and fall <= SLOW * size:
+            break
     return np.asarray(x), energy
+
+
+def _minimiser(problem: ScalarProblem, chains: list[Sequence[Arc]], x: Array) -> Array:
+    """The minimiser of a majorant. Of a law of a length ψ, the part that would fall is linearised along the vector."""
+    lengths, n = problem.lengths, problem.size
+    if not len(lengths):
+        return minimise(problem.stiffness, problem.force, Chains.of(chains), x).x
+    slopes = np.array([max(-c[0].rate(c[0].low), 0.0) for c in chains[n:]])
+    size = lengths.of(x)
+    felt = lengths.felt(lengths.vectors(x)) * lengths.factors
+    pull = np.divide(slopes, size, out=np.zeros_like(size), where=size > 0.0)[:, None] * felt
+    force = problem.force.copy()
+    force[lengths.members] += pull[lengths.there]
+    risen = [[_steeper(a, slope) for a in c] for c, slope in zip(chains[n:], slopes, strict=True)]
+    programme = LengthProgramme.of(problem, problem.stiffness, force, [*chains[:n], *risen], np.zeros(len(lengths)))
+    return programme.minimiser(x)[0]
+
+
+def _steeper(arc: Arc, slope: float) -> Arc:
+    """The arc with a line through zero added."""
+    return arc._replace(value=arc.value + slope * arc.anchor, traction=arc.traction + slope)

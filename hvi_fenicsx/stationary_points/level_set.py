@@ -23,7 +23,7 @@ SLACK = 1e-6
 
 
 def level_set(problem: ScalarProblem, box: Box, curvature: Curvature, level: float) -> tuple[Array, Array]:
-    """The ends of a box (n,) with all points of at most an energy.
+    """The ends of a box (n + m,) with all points of at most an energy.
 
     Args:
         problem: the problem.
@@ -36,14 +36,15 @@ def level_set(problem: ScalarProblem, box: Box, curvature: Curvature, level: flo
     """
     energy = level + SLACK * problem.energy_size(box.x)
     root = np.sqrt(2.0 * max(energy - box.bound, 0.0))
-    low, high = box.x - root * curvature.radii, box.x + root * curvature.radii
-    free = np.flatnonzero(~np.isfinite(curvature.radii))
+    n = problem.size
+    low, high = box.x - root * curvature.radii[:n], box.x + root * curvature.radii[:n]
+    free = np.flatnonzero(~np.isfinite(curvature.radii[:n]))
     if free.size:
         motions = kernel(problem.stiffness)
         spread = np.abs(motions[free]) @ _reach(problem, box, motions, energy)
         around = root * curvature.range_radii[free] + spread
         low[free], high[free] = box.x[free] - around, box.x[free] + around
-    return np.maximum(low, box.low), np.minimum(high, box.high)
+    return problem.with_lengths(np.maximum(low, box.low[:n]), np.minimum(high, box.high[:n]))
 
 
 def _reach(problem: ScalarProblem, box: Box, motions: Array, energy: float) -> Array:
@@ -61,7 +62,8 @@ def _farthest(problem: ScalarProblem, box: Box, c: Array, energy: float) -> floa
     for _ in range(MOST_FORCES):
         found, _ = Relaxation(replace(problem, force=problem.force + tau * c)).solve(replace(box, bound=-np.inf), 0.9)
         if not np.any(
-            (found.x <= box.low) & np.isneginf(problem.lower) | (found.x >= box.high) & np.isposinf(problem.upper)
+            (found.x <= box.low[: problem.size]) & np.isneginf(problem.lower)
+            | (found.x >= box.high[: problem.size]) & np.isposinf(problem.upper)
         ):
             bound = (energy - found.bound) / tau
             if bound >= best:

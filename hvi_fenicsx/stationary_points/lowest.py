@@ -1,4 +1,4 @@
-"""The lowest energy with a proof: branch and bound over intervals of the bonded unknowns.
+"""The lowest energy with a proof: branch and bound over intervals of the unknowns and lengths with laws.
 
 Of the open boxes the one with the lowest bound is divided, until no open box can hold a point below the lowest
 energy found by more than the gap that is allowed. A box is made smaller first, in turn: what the balance of forces
@@ -89,11 +89,11 @@ class LowestSearch:
         """
         problem = self.problem
         far = problem.far
-        low, high = np.maximum(problem.lower, -far), np.minimum(problem.upper, far)
-        self.x = np.clip(np.zeros(problem.size), low, high)
+        low, high = problem.with_lengths(np.maximum(problem.lower, -far), np.minimum(problem.upper, far))
         self._low, self._high = low, high
+        self.x = self._inside(np.zeros(problem.size))
         for x in (self.x, *points):
-            self._try(np.clip(x, low, high))
+            self._try(self._inside(x))
         box = fresh_box(low, high, self.x)
         first, curvature = self._relaxation.solve(box, PARTS[0])
         if self._far(first.x):
@@ -145,11 +145,18 @@ class LowestSearch:
 
     @property
     def _size(self) -> float:
-        return max(abs(self.upper), 1e-6 * self.problem.energy_size(self.x), 1e-300)
+        return max(abs(self.upper), 1e-6 * self._parts, 1e-300)
 
     @property
     def _allowed(self) -> float:
-        return max(self.gap * self._size, ROUNDING * self.problem.energy_size(self.x))
+        return max(self.gap * self._size, ROUNDING * self._parts)
+
+    @property
+    def _parts(self) -> float:
+        """The sizes of the parts of the energy, at the lowest point or, where it is at rest, in the region."""
+        n = self.problem.size
+        reach = np.maximum(np.abs(self._low[:n]), np.abs(self._high[:n]))
+        return self.problem.energy_size(self.x) or float(np.abs(self.problem.force) @ reach)
 
     def run(self, stop: Callable[[], bool], report: Callable[[Progress], None]) -> bool:
         """Divide boxes until the proof is there; whether it is.
@@ -170,7 +177,7 @@ class LowestSearch:
     def _halves(self, box: Box) -> list[tuple[Array, Array]]:
         """Two boxes: where the envelope and the law differ most, at the joint in the chord that is nearest to x."""
         i = int(np.argmax(box.gaps))
-        at = float(box.x[i])
+        at = float(self.problem.arguments(box.x)[i])
         ends = (a.high for a in on_interval(self.problem.chains[i], float(box.low[i]), float(box.high[i]))[:-1])
         inside = [e for e in ends if box.chord_low[i] < e < box.chord_high[i]]
         if inside:
@@ -199,7 +206,7 @@ class LowestSearch:
                 smaller = self._forces.tightened(box.low, box.high)
                 if smaller is None:
                     return None
-                box = replace(box, low=smaller[0], high=smaller[1], x=np.clip(box.x, *smaller))
+                box = replace(box, low=smaller[0], high=smaller[1], x=_clipped(box.x, *smaller))
                 box, curvature = self._relaxation.solve(box, part)
                 if self._closed(box):
                     return None
@@ -208,7 +215,8 @@ class LowestSearch:
                     if self._closed(box):
                         return None
                 reach = curvature.radii * math.sqrt(2.0 * max(self.upper - box.bound, 0.0))
-                box = replace(box, low=np.maximum(box.low, box.x - reach), high=np.minimum(box.high, box.x + reach))
+                at = self.problem.arguments(box.x)
+                box = replace(box, low=np.maximum(box.low, at - reach), high=np.minimum(box.high, at + reach))
             if not box.gaps.any() or box.bound - before < WORTHWHILE * (self.upper - box.bound):
                 break
         return box
@@ -224,18 +232,20 @@ class LowestSearch:
 
     def _far(self, x: Array) -> bool:
         """Whether a point touches the first box where there is no bound."""
-        problem = self.problem
-        return bool(
-            np.any((x <= self._low) & np.isneginf(problem.lower) | (x >= self._high) & np.isposinf(problem.upper))
-        )
+        problem, n = self.problem, self.problem.size
+        below, above = x <= self._low[:n], x >= self._high[:n]
+        return bool(np.any(below & np.isneginf(problem.lower) | above & np.isposinf(problem.upper)))
+
+    def _inside(self, x: Array) -> Array:
+        return _clipped(x, self._low, self._high)
 
 
 def fresh_box(low: Array, high: Array, x: Array) -> Box:
     """A box of which nothing is known.
 
     Args:
-        low: (n,).
-        high: (n,).
+        low: (n + m,).
+        high: (n + m,).
         x: where its relaxation is to begin, (n,).
     """
     none = np.zeros(len(low))
@@ -243,9 +253,14 @@ def fresh_box(low: Array, high: Array, x: Array) -> Box:
         low=low,
         high=high,
         bound=-math.inf,
-        x=np.clip(x, low, high),
+        x=_clipped(x, low, high),
         weights=none,
         gaps=none,
         chord_low=low,
         chord_high=high,
     )
+
+
+def _clipped(x: Array, low: Array, high: Array) -> Array:
+    """The unknowns within their intervals, (n,)."""
+    return np.asarray(np.clip(x, low[: len(x)], high[: len(x)]))

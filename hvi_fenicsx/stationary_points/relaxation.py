@@ -7,9 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..typing import Array, Integers
-from .arcs import envelope
+from .arcs import Arc, envelope
 from .convex_programme import Chains, minimise
 from .curvature import Curvature, CurvatureShare
+from .dual_bound import DualBound
+from .length_programme import LengthProgramme
 from .scalar_problem import ScalarProblem
 
 TIGHT = 1e-14
@@ -20,17 +22,17 @@ LEAST_WEIGHT = 0.1
 
 @dataclass(frozen=True, kw_only=True)
 class Box:
-    """Intervals of the unknowns, and what is known of the energy there.
+    """Intervals of the unknowns and the lengths, and what is known of the energy there.
 
     Attributes:
-        low: (n,).
-        high: (n,).
+        low: (n + m,).
+        high: (n + m,).
         bound: no point of it has a lower energy.
         x: the relaxation's minimiser, (n,).
-        weights: where envelopes were not tight, (n,).
-        gaps: law minus envelope at x, (n,).
-        chord_low: begin of the chord of the envelope at x, (n,).
-        chord_high: end of it, (n,).
+        weights: where envelopes were not tight, (n + m,).
+        gaps: law minus envelope at x, (n + m,).
+        chord_low: begin of the chord of the envelope at x, (n + m,).
+        chord_high: end of it, (n + m,).
     """
 
     low: Array
@@ -43,17 +45,30 @@ class Box:
     chord_high: Array
 
 
-def envelopes(problem: ScalarProblem, low: Array, high: Array, added: Array) -> Chains:
-    """The convex envelopes of all laws with ½ d x² added, on a box.
+def envelopes(problem: ScalarProblem, low: Array, high: Array, added: Array) -> list[list[Arc]]:
+    """The convex envelopes of all laws with ½ d t² added, on a box; those of lengths reach to zero, and never fall.
 
     Args:
         problem: the problem.
-        low: of the box, (n,), finite.
-        high: of the box, (n,), finite.
-        added: d, (n,).
+        low: of the box, (n + m,), finite.
+        high: of the box, (n + m,), finite.
+        added: d, (n + m,).
     """
     sides = zip(problem.chains, map(float, low), map(float, high), map(float, added), strict=True)
-    return Chains.of([envelope(c, begin, end, d) for c, begin, end, d in sides])
+    chains = [envelope(c, begin, end, d) for c, begin, end, d in sides]
+    return [*chains[: problem.size], *map(_risen, chains[problem.size :])]
+
+
+def _risen(arcs: list[Arc]) -> list[Arc]:
+    """The largest convex chain from zero on that does not fall and is nowhere above the given one."""
+    rising = [a for a in arcs if a.rate(a.high) > 0.0 or (a.slope > 0.0 and a.rate(a.low) >= 0.0)]
+    if not rising:
+        end = arcs[-1]
+        return [Arc(0.0, end.high, end.high, end.at(end.high), 0.0, 0.0)]
+    first = rising[0]
+    turn = max(first.low, first.toucher(0.0)) if first.rate(first.low) < 0.0 else first.low
+    flat = [Arc(0.0, turn, turn, first.at(turn), 0.0, 0.0)] if turn > 0.0 else []
+    return [*flat, first._replace(low=turn), *rising[1:]]
 
 
 class Relaxation:
@@ -69,11 +84,11 @@ class Relaxation:
         self.programmes = 0
 
     def undecided(self, low: Array, high: Array) -> Integers:
-        """Unknowns whose law is not convex on a box.
+        """Arguments whose law is not convex on a box.
 
         Args:
-            low: of the box, (n,).
-            high: of the box, (n,).
+            low: of the box, (n + m,).
+            high: of the box, (n + m,).
         """
         arcs = self.problem.arcs
         wide = high > low
@@ -87,13 +102,25 @@ class Relaxation:
             part: share of the largest curvature.
         """
         problem, undecided = self.problem, self.undecided(box.low, box.high)
-        weights = np.zeros(problem.size)
+        weights = np.zeros(len(box.low))
         weights[undecided] = self._weights(box, undecided)
         curvature = self._share.share(box.low, box.high, undecided, weights, part)
-        stack = envelopes(problem, box.low, box.high, curvature.added)
-        found = minimise(problem.stiffness - np.diag(curvature.added), problem.force, stack, box.x)
-        self.programmes += found.steps
-        return self._examined(box, found.x, found.bound, stack, curvature, undecided), curvature
+        chains = envelopes(problem, box.low, box.high, curvature.added)
+        x, bound, steps = self._minimised(box, curvature, chains)
+        self.programmes += steps
+        return self._examined(box, x, bound, Chains.of(chains), curvature, undecided), curvature
+
+    def _minimised(self, box: Box, curvature: Curvature, chains: list[list[Arc]]) -> tuple[Array, float, int]:
+        """The minimiser, a lower bound, and the linear systems or steps that it took."""
+        problem = self.problem
+        a = problem.stiffness - np.diag(problem.diagonal(curvature.added))
+        if not len(problem.lengths):
+            found = minimise(a, problem.force, Chains.of(chains), box.x)
+            return found.x, found.bound, found.steps
+        programme = LengthProgramme.of(problem, a, problem.force, chains, curvature.added[problem.size :])
+        x, steps = programme.minimiser(box.x)
+        dual = DualBound(problem=problem, low=box.low, high=box.high, added=curvature.added)
+        return x, dual.at(x, programme.multipliers(x)), steps
 
     def _weights(self, box: Box, undecided: Integers) -> Array:
         arcs, low, high = self.problem.arcs, box.low, box.high
@@ -107,14 +134,15 @@ class Relaxation:
         self, box: Box, x: Array, bound: float, stack: Chains, curvature: Curvature, undecided: Integers
     ) -> Box:
         """Where the envelope is not tight at x: the gaps, the chords, and the weights for the next D."""
-        problem, rows = self.problem, np.arange(len(x))
-        k = np.minimum(stack.arc_at(x), stack.slopes.shape[1] - 1)
+        problem, at = self.problem, self.problem.arguments(x)
+        rows = np.arange(len(at))
+        k = np.minimum(stack.arc_at(at), stack.slopes.shape[1] - 1)
         begin, end = stack.ends[rows, k], stack.ends[rows, k + 1]
-        gaps = problem.arcs.energy(x) + 0.5 * curvature.added * x * x - stack.energy(x)
-        loose = np.zeros(len(x), dtype=bool)
+        gaps = problem.arcs.energy(at) + 0.5 * curvature.added * at * at - stack.energy(at)
+        loose = np.zeros(len(at), dtype=bool)
         loose[undecided] = gaps[undecided] > TIGHT * problem.energy_size(x)
         with np.errstate(invalid="ignore", divide="ignore"):
-            spread = np.where(loose, 0.5 * (x - begin) * (end - x), 0.0)
+            spread = np.where(loose, 0.5 * (at - begin) * (end - at), 0.0)
         weights = 0.5 * (box.weights + spread) if box.weights.any() else spread
         return Box(
             low=box.low,

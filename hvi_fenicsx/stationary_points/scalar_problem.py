@@ -1,15 +1,19 @@
-"""The condensed problem with its laws as chains of parabolas, one of each unknown: ½ xᵀSx - fᵀx + Σ φᵢ(xᵢ)."""
+"""The condensed problem with its laws as chains of parabolas: ½ xᵀSx - fᵀx + Σ φᵢ, each of one argument.
+
+An argument is an unknown, or the length of a vector of unknowns.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 
 from ..typing import Array, Integers, Mask
-from .arcs import FREE, INF, Arc, Chain
+from .arcs import INF, Arc, Chain
+from .lengths import Lengths
 
 FAR = 1e6
 """Ends of the first box, relative to the problem's displacements; what is found must stay off them."""
@@ -17,14 +21,15 @@ FAR = 1e6
 
 @dataclass(frozen=True, kw_only=True)
 class ScalarProblem:
-    """Minimise, or make stationary, ½ xᵀSx - fᵀx + Σ φᵢ(xᵢ) + constant over lower ≤ x ≤ upper.
+    """Minimise, or make stationary, ½ xᵀSx - fᵀx + Σ φᵢ + constant over lower ≤ x ≤ upper.
 
     Attributes:
         stiffness: S, symmetric, positive semidefinite, (n, n).
         force: f, (n,).
         lower: bounds, -inf where there is none, (n,).
         upper: bounds, inf where there is none, (n,).
-        chains: φ, one of each unknown, over the whole line.
+        chains: φ over the whole line, n of the unknowns and m of the lengths.
+        lengths: of vectors of unknowns which have no law of their own.
         constant: a part of the energy that x does not change.
         error: the energy of the laws differs from that of the chains by this at most; 0 where these are exact.
         farthest: displacements up to which this is known.
@@ -35,6 +40,7 @@ class ScalarProblem:
     lower: Array
     upper: Array
     chains: tuple[Chain, ...]
+    lengths: Lengths = field(default_factory=Lengths.none)
     constant: float = 0.0
     error: float = 0.0
     farthest: float = INF
@@ -50,10 +56,23 @@ class ScalarProblem:
         """Number of unknowns n."""
         return len(self.force)
 
-    @cached_property
-    def bonded(self) -> Integers:
-        """Numbers of the unknowns with a law."""
-        return np.flatnonzero([c is not FREE for c in self.chains])
+    def arguments(self, x: Array) -> Array:
+        """What the laws act on: the unknowns and the lengths, (n + m,)."""
+        return np.concatenate([x, self.lengths.of(x)])
+
+    def with_lengths(self, low: Array, high: Array) -> tuple[Array, Array]:
+        """The ends of a box with the least and the largest lengths in it, (n + m,) each.
+
+        Args:
+            low: of the unknowns, (n,).
+            high: of the unknowns, (n,).
+        """
+        least, most = self.lengths.within(low, high)
+        return np.concatenate([low, least]), np.concatenate([high, most])
+
+    def diagonal(self, d: Array) -> Array:
+        """The diagonal, (n,), of the quadratic form that has dᵢ times the square of each argument, d (n + m,)."""
+        return np.asarray(d[: self.size] + self.lengths.diagonal(d[self.size :], self.size))
 
     @cached_property
     def arcs(self) -> ArcTable:
@@ -62,12 +81,13 @@ class ScalarProblem:
 
     def energy(self, x: Array) -> float:
         """The energy at x."""
-        return float(0.5 * x @ (self.stiffness @ x) - self.force @ x + self.arcs.energy(x).sum()) + self.constant
+        laws = self.arcs.energy(self.arguments(x)).sum()
+        return float(0.5 * x @ (self.stiffness @ x) - self.force @ x + laws) + self.constant
 
     def energy_size(self, x: Array) -> float:
         """The sum of the sizes of all parts of the energy at x: what rounding is relative to."""
         elastic = 0.5 * np.abs(x) @ (np.abs(self.stiffness) @ np.abs(x)) + np.abs(self.force) @ np.abs(x)
-        return float(elastic + np.abs(self.arcs.energy(x)).sum()) + abs(self.constant)
+        return float(elastic + np.abs(self.arcs.energy(self.arguments(x))).sum()) + abs(self.constant)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -156,3 +176,35 @@ class ArcTable:
             high: of the box, (n,).
         """
         return np.asarray(np.where(self.meets(low, high), self.slopes, np.inf).min(axis=1))
+
+    def rates(self, t: Array) -> tuple[Array, Array]:
+        """The tractions right of and left of t, (n,) each."""
+        rows = np.arange(len(t))
+        behind, k = np.asarray((self.high <= t[:, None]).sum(axis=1), dtype=np.int64), self.at(t)
+        after, before = (
+            self.tractions[rows, i] + self.slopes[rows, i] * (t - self.anchors[rows, i]) for i in (behind, k)
+        )
+        return np.asarray(after), np.asarray(before)
+
+    def least(self, low: Array, high: Array, added: Array, force: Array) -> tuple[Array, Array]:
+        """The least of φ + ½ d t² - force t over an interval, and the t where it is taken, (n,) each.
+
+        Args:
+            low: of the intervals, finite, (n,).
+            high: of the intervals, finite, (n,).
+            added: d, (n,).
+            force: (n,).
+        """
+        first, last = np.maximum(self.low, low[:, None]), np.minimum(self.high, high[:, None])
+        slope, offset = self.slopes + added[:, None], self.tractions - self.slopes * self.anchors - force[:, None]
+        with np.errstate(invalid="ignore", divide="ignore"):
+            turn = np.clip(np.where(slope > 0.0, -offset / slope, first), first, last)
+            places = np.stack([first, last, turn])
+            d = places - self.anchors
+            values = self.values + (self.tractions + 0.5 * self.slopes * d) * d
+            values += (0.5 * added[:, None] * places - force[:, None]) * places
+        values = np.where(first <= last, values, np.inf)
+        flat = np.moveaxis(values, 0, 1).reshape(len(low), -1)
+        k = np.argmin(flat, axis=1)[:, None]
+        at = np.moveaxis(places, 0, 1).reshape(len(low), -1)
+        return np.take_along_axis(flat, k, axis=1)[:, 0], np.take_along_axis(at, k, axis=1)[:, 0]

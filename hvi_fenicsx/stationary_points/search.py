@@ -9,8 +9,8 @@ import numpy as np
 
 from ..errors import InputError, SolverError
 from ..typing import Array
-from . import stationarity
 from .all_points import Enumeration, StationaryPoint
+from .length_kinds import kind_of
 from .lowest import LowestSearch, fresh_box
 from .passes import Pass, passes
 from .scalar_problem import ScalarProblem
@@ -117,11 +117,16 @@ def find(
         saved: what an earlier search of the same problem left.
 
     Raises:
-        InputError: an earlier search was for something else.
+        InputError: an earlier search was for something else, or all are wanted and a law acts on a length.
     """
     if saved is not None and bool(saved["lowest"]) != wanted.lowest:
         raise InputError(
             "--resume: the search there was for something else: give or leave --lowest as then, or --force"
+        )
+    if len(problem.lengths) and not wanted.lowest:
+        raise InputError(
+            "a law acts on the length of a slip in space, or on opening and slip together: all equilibria are found "
+            "where each law has one component. `--lowest` proves the lowest energy of such laws too"
         )
     task = _Task(problem=problem, wanted=wanted, stop=stop, report=report, saved=saved)
     return _lowest(task) if wanted.lowest else _all(task)
@@ -178,7 +183,7 @@ def _proof(search: LowestSearch, wanted: float) -> Found:
     point = StationaryPoint(
         x=search.x,
         energy=search.upper + problem.error,
-        kind=stationarity.kind(problem, search.x),
+        kind=kind_of(problem, search.x),
         isolated=True,
     )
     lower = now.lower - problem.error
@@ -243,13 +248,14 @@ def _stacked(boxes: list[tuple[Array, Array, Array]]) -> dict[str, Array]:
 
 
 def falls_passed(problem: ScalarProblem, x: Array) -> int:
-    """Number of unknowns beyond a drop of their law, or on or beyond a falling part.
+    """Number of unknowns and lengths beyond a drop of their law, or on or beyond a falling part.
 
     Args:
         problem: the problem.
         x: a point, (n,).
     """
-    low, high = np.minimum(x, 0.0), np.maximum(x, 0.0)
+    at = problem.arguments(x)
+    low, high = np.minimum(at, 0.0), np.maximum(at, 0.0)
     moved = high > low
     dropped = problem.arcs.drops(low, high) > 0.0
     slopes = problem.arcs.least_slope(low, high)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..typing import Array, Mask
-from .scalar_problem import ScalarProblem
+from .scalar_problem import ArcTable, ScalarProblem
 
 MOST_ROUNDS = 8
 """Passes over all unknowns."""
@@ -26,31 +26,68 @@ class ForceIntervals:
 
     def __init__(self, problem: ScalarProblem, *, joints_at_ends: bool = True) -> None:
         self._problem, self._joints_at_ends = problem, joints_at_ends
+        self._arcs = ArcTable.of(problem.chains[: problem.size])
         self._diagonal = np.diag(problem.stiffness).copy()
         others = problem.stiffness - np.diag(self._diagonal)
+        self._lengths_arcs = ArcTable.of(problem.chains[problem.size :]) if len(problem.lengths) else None
         self._positive, self._negative = np.maximum(others, 0.0), np.minimum(others, 0.0)
 
     def tightened(self, low: Array, high: Array) -> tuple[Array, Array] | None:
         """A smaller box with the same stationary points; None if there is none in it.
 
         Args:
-            low: of the box, (n,), finite.
-            high: of the box, (n,), finite.
+            low: of the box, (n + m,), finite.
+            high: of the box, (n + m,), finite.
         """
+        n = self._problem.size
         for _ in range(MOST_ROUNDS):
-            found = self._pass(low, high)
-            if found is None:
+            found = self._pass(low[:n], high[:n], self._most_tractions(low[n:], high[n:]))
+            ends = None if found is None else self._with_lengths(found, low[n:], high[n:])
+            if ends is None:
                 return None
-            shorter = (found[1] - found[0]) < (1.0 - PROGRESS) * (high - low)
-            low, high = found
+            shorter = (ends[1] - ends[0]) < (1.0 - PROGRESS) * (high - low)
+            low, high = ends
             if not shorter.any():
                 break
         return low, high
 
-    def _pass(self, low: Array, high: Array) -> tuple[Array, Array] | None:
-        force, diagonal, arcs = self._problem.force, self._diagonal, self._problem.arcs
-        least = force - self._positive @ high - self._negative @ low
-        most = force - self._positive @ low - self._negative @ high
+    def _most_tractions(self, low: Array, high: Array) -> Array:
+        """The largest forces of laws of lengths on the unknowns, (n,)."""
+        problem = self._problem
+        lengths, result = problem.lengths, np.zeros(problem.size)
+        if (arcs := self._lengths_arcs) is None:
+            return result
+        begin, end = np.maximum(arcs.low, low[:, None]), np.minimum(arcs.high, high[:, None])
+        with np.errstate(invalid="ignore"):
+            ends = [np.abs(arcs.tractions + arcs.slopes * (at - arcs.anchors)) for at in (begin, end)]
+        most = np.where(begin <= end, np.maximum(*ends), 0.0).max(axis=1)
+        result[lengths.members] = (most[:, None] * np.abs(lengths.factors))[lengths.there]
+        return result
+
+    def _with_lengths(self, box: tuple[Array, Array], low: Array, high: Array) -> tuple[Array, Array] | None:
+        """A box of the unknowns and one of the lengths, each smaller by the other; None if they do not meet."""
+        lengths = self._problem.lengths
+        if not len(lengths):
+            return box
+        factors, there = np.abs(lengths.factors), lengths.there
+        wide = 1.0 + WIDENED
+        reach = np.divide((high * wide)[:, None], factors, out=np.zeros_like(factors), where=there)
+        first, last = box[0].copy(), box[1].copy()
+        opening = lengths.opens[:, None] & (np.arange(3) == 0)
+        below = np.where(opening & (lengths.factors > 0.0), -np.inf, -reach)
+        above = np.where(opening & (lengths.factors < 0.0), np.inf, reach)
+        first[lengths.members] = np.maximum(first[lengths.members], below[there])
+        last[lengths.members] = np.minimum(last[lengths.members], above[there])
+        least, most = lengths.within(first, last)
+        low, high = np.maximum(low, least / wide), np.minimum(high, most * wide)
+        if np.any(first > last) or np.any(low > high):
+            return None
+        return np.concatenate([first, low]), np.concatenate([last, high])
+
+    def _pass(self, low: Array, high: Array, others: Array) -> tuple[Array, Array] | None:
+        force, diagonal, arcs = self._problem.force, self._diagonal, self._arcs
+        least = force - self._positive @ high - self._negative @ low - others
+        most = force - self._positive @ low - self._negative @ high + others
         slack = WIDENED * (np.abs(least) + np.abs(most) + np.abs(force))
         least, most = (least - slack)[:, None], (most + slack)[:, None]
         begin, end = np.maximum(arcs.low, low[:, None]), np.minimum(arcs.high, high[:, None])
@@ -66,7 +103,7 @@ class ForceIntervals:
 
     def _on_arcs(self, begin: Array, end: Array, least: Array, most: Array, meets: Mask) -> tuple[Array, Array]:
         """The ends of what is left of each arc; (inf, -inf) of those that are lost."""
-        arcs, d = self._problem.arcs, self._diagonal[:, None]
+        arcs, d = self._arcs, self._diagonal[:, None]
         with np.errstate(invalid="ignore", divide="ignore"):
             slope = arcs.slopes + d
             at_begin = arcs.tractions + arcs.slopes * (begin - arcs.anchors) + d * begin
@@ -81,7 +118,7 @@ class ForceIntervals:
 
     def _at_joints(self, low: Array, high: Array, least: Array, most: Array) -> tuple[Array, Array]:
         """The first and the last joint in the box whose interval of tractions meets the forces."""
-        arcs, d = self._problem.arcs, self._diagonal[:, None]
+        arcs, d = self._arcs, self._diagonal[:, None]
         at = arcs.high[:, :-1]
         inside = (at >= low[:, None]) & (at <= high[:, None])
         if not self._joints_at_ends:
@@ -97,7 +134,7 @@ class ForceIntervals:
     ) -> tuple[Array, Array]:
         """The ends of the range stay where a bound can push there."""
         problem, rows = self._problem, np.arange(len(low))
-        arcs = problem.arcs
+        arcs = self._arcs
         for at, bound, upper in ((low, problem.lower, False), (high, problem.upper, True)):
             k = arcs.at(at)
             pull = arcs.tractions[rows, k] + arcs.slopes[rows, k] * (at - arcs.anchors[rows, k]) + diagonal * at
