@@ -19,7 +19,8 @@ from ..problem.problem import Problem
 from ..problem.references import References
 from ..runtime.timing import Timer
 from ..solvers.law_models import Cells, ExactLaw
-from ..system.system import System, compile_forms
+from ..system.compiled_forms import compile_forms
+from ..system.system import System
 from ..typing import Array, Integers
 from .directional import Growth, growth
 

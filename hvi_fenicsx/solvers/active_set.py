@@ -17,9 +17,10 @@ from petsc4py import PETSc
 
 from ..runtime.timing import Timer
 from ..system.held_solver import HeldPreconditioner, LinearSettings
+from ..system.law_model import LawModel
 from ..system.levels import Levels
 from ..system.petsc_options import configure, prefix
-from ..system.system import LawModel, System
+from ..system.system import System
 from ..typing import Entities
 from .convergence import NOT_MEASURED, ConvergenceTest, Outcome
 from .snes_views import ReducedPreconditioner, unextracted

@@ -8,7 +8,8 @@ import numpy as np
 from petsc4py import PETSc
 
 from ..laws import Superpotential
-from ..system.system import LawModel, System
+from ..system.law_model import LawModel
+from ..system.system import System
 from ..typing import Array, Integers
 from . import rigid_position
 from .active_set import ActiveSetSolver

@@ -20,7 +20,8 @@ from scipy.sparse import csr_matrix
 from ..errors import InputError
 from ..laws import Superpotential
 from ..system.interior import Interior
-from ..system.system import LawModel, System
+from ..system.law_model import LawModel
+from ..system.system import System
 from ..typing import Array, Integers
 from .context import SolveContext
 from .method import Method

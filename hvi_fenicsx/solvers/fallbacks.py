@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from petsc4py import PETSc
 
-from ..system.system import LawModel
+from ..system.law_model import LawModel
 from .active_set import ActiveSetSolver
 from .convergence import Outcome
 from .projected_newton import ProjectedNewton

@@ -15,7 +15,7 @@ from collections.abc import Sequence
 import numpy as np
 from petsc4py import PETSc
 
-from ..system.system import LawModel
+from ..system.law_model import LawModel
 from ..typing import Array
 from .active_set import ActiveSetSolver
 from .convergence import Outcome

@@ -15,7 +15,8 @@ from ..laws import Superpotential
 from ..problem.law_term import LawTerm
 from ..rigid import Rest, Sides, least_energy
 from ..system import existence, free_motions
-from ..system.system import LawModel, System
+from ..system.law_model import LawModel
+from ..system.system import System
 from ..typing import Array, Integers
 from .active_set import ActiveSetSolver
 from .law_models import Cells, Majorant, SecantMajorant

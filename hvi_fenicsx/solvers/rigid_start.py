@@ -16,7 +16,8 @@ from petsc4py import PETSc
 from ..laws import Superpotential
 from ..rigid import Sides
 from ..runtime.mpi import agree
-from ..system.system import LawModel, System
+from ..system.law_model import LawModel
+from ..system.system import System
 from ..typing import Integers
 from . import rigid_position
 from .closed_start import contact_dofs

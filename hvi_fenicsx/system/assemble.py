@@ -10,7 +10,8 @@ from ..mesh.domain import Domain
 from ..problem import scaling
 from ..problem.compose import Model, compose
 from ..runtime.timing import Timer
-from .system import System, compile_forms
+from .compiled_forms import compile_forms
+from .system import System
 from .thresholds import DEFAULT, Thresholds
 
 

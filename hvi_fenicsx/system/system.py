@@ -7,9 +7,7 @@ The bulk matrix A is assembled once. Laws and active sets touch only the diagona
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol
 
 import numpy as np
 from dolfinx import fem
@@ -22,45 +20,15 @@ from ..problem.law_term import LawTerm
 from ..problem.problem import Bounds, Problem
 from ..problem.vectors import assembled, new_vector, turn
 from ..rigid import Mode
-from ..runtime import forms
 from ..runtime.timing import Timer
 from ..typing import Array, Entities
 from . import existence, free_motions, local_frames, near_null_space
+from .compiled_forms import CompiledForms
 from .free_motions import FreeMotions
 from .holding_forces import HoldingForces
 from .jacobian import Jacobian
+from .law_model import LawModel
 from .thresholds import DEFAULT, Thresholds
-
-
-class LawModel(Protocol):
-    """What takes the place of a law in one nonlinear solve: a function of its argument (m,) with two derivatives."""
-
-    def value(self, x: Array) -> Array:
-        """Energy per area."""
-
-    def derivative(self, x: Array) -> Array:
-        """Traction."""
-
-    def second(self, x: Array) -> Array:
-        """Tangent stiffness."""
-
-
-@dataclass(frozen=True)
-class CompiledForms:
-    """A problem's compiled forms.
-
-    Attributes:
-        bilinear: of the elastic operator.
-        linear: of the loads, by name.
-    """
-
-    bilinear: fem.Form
-    linear: dict[str, fem.Form]
-
-
-def compile_forms(problem: Problem) -> CompiledForms:
-    """Compile (or take from the cache) what the assembly needs. Collective."""
-    return CompiledForms(problem.bulk.compiled, {name: forms.compiled(f) for name, f in problem.linear.items()})
 
 
 class System:
