@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import lu_factor, lu_solve
+from scipy.linalg.lapack import dgesv
 
 from ...typing import Array
 from .sites import Sites, Values
@@ -140,17 +140,16 @@ class Equations:
             condition: the condition.
 
         Raises:
-            Refused: the method does not converge.
+            Refused: the method does not converge, or comes to a point whose equations are singular.
         """
         value, gradient = condition
         size, last = 1.0 + float(np.max(np.abs(y))), np.inf
         for _ in range(10):
             values = self.sites.values(y[:-1])
             right = np.append(self.residual(y, values), value(y))
-            with np.errstate(all="ignore"):
-                step = lu_solve(
-                    lu_factor(self._matrix(values, gradient(y)), check_finite=False), right, check_finite=False
-                )
+            _, _, step, singular = dgesv(self._matrix(values, gradient(y)), right)
+            if singular:
+                raise Refused
             change = float(np.max(np.abs(step)))
             if not np.isfinite(change) or (change > 2.0 * last and change > 1e-9 * size):
                 break

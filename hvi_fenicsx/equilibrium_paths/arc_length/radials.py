@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.sparse import csr_matrix
 
 from ...laws import Mixity
 from ...typing import Array, Integers, Mask
@@ -28,6 +27,7 @@ class Radials:
         groups: the unknowns of each site.
         flat: all of them, one site after the other, (N,).
         owner: number of the site of each, (N,).
+        pairs: the numbers among the N of each two unknowns of one site, and of each with itself.
         openings: numbers among the N of the openings, (q,).
         counts: which of the N count, (N,).
     """
@@ -38,8 +38,9 @@ class Radials:
         self.groups = [np.array(group, dtype=np.int64) for group in groups]
         self.flat = np.concatenate([np.empty(0, np.int64), *self.groups])
         self.owner = np.repeat(np.arange(len(groups)), [len(group) for group in groups])
-        firsts = np.cumsum([0, *[len(group) for group in groups]])[:-1]
-        self.openings = firsts[np.array(opens, dtype=bool)] if groups else np.empty(0, np.int64)
+        self._firsts = np.cumsum([0, *[len(group) for group in groups]])[:-1]
+        self.pairs = np.nonzero(self.owner[:, None] == self.owner)
+        self.openings = self._firsts[np.array(opens, dtype=bool)] if groups else np.empty(0, np.int64)
         self.counts: Mask = np.ones(len(self.flat), dtype=bool)
         self._slips = np.ones(len(self.flat))
         self._slips[self.openings] = 0.0
@@ -79,8 +80,11 @@ class Radials:
         """
         vectors, lengths = self._vectors(z), self.lengths(z)
         found = np.divide(vectors, lengths[self.owner], out=np.zeros_like(vectors), where=lengths[self.owner] > 0.0)
-        for p in np.flatnonzero(lengths == 0.0):
-            found[np.flatnonzero((self.owner == p) & self.counts)[:1]] = 1.0
+        if np.all(lengths > 0.0):
+            return found
+        counted = np.flatnonzero(self.counts)
+        sites, first = np.unique(self.owner[counted], return_index=True)
+        found[counted[first[lengths[sites] == 0.0]]] = 1.0
         return found
 
     def along(self, directions: Array, change: Array) -> Array:
@@ -92,9 +96,13 @@ class Radials:
         """
         return self._sums(directions * change[self.flat])
 
-    def columns(self, directions: Array) -> csr_matrix:
-        """The unit vectors as columns, (N, p)."""
-        return csr_matrix((directions, (np.arange(len(self.flat)), self.owner)), shape=(len(self.flat), len(self)))
+    def summed(self, values: Array) -> Array:
+        """Sums over the unknowns of each site, (n, p).
+
+        Args:
+            values: by unknown of a site, (n, N).
+        """
+        return np.asarray(np.add.reduceat(values, self._firsts, axis=1), dtype=np.float64)
 
     def energies(self, directions: Array) -> Array:
         """By what the mode mixity multiplies the forces of each site, (p,).

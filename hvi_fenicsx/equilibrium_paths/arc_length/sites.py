@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.sparse import diags, find
 
 from ...typing import Array
 from ..segments import Kind
@@ -114,19 +113,24 @@ class Sites(SiteGraphs):
         found[self.one, self.one] += values.rises[:m1]
         if not len(radials):
             return found
-        flat, columns = radials.flat, radials.columns(values.directions)
-        (across, more), (rises, steeper) = self._blocks(values, "moves"), self._blocks(values, "rises")
+        flat, owner, e = radials.flat, radials.owner, values.directions
+        across, more = self._blocks(values, "moves")
         moved = stiffness[:, flat]
-        found[:, flat] = moved * across + (columns @ (columns.multiply(more).T @ moved.T)).T
-        p = slice(m1, m1 + len(radials))
-        energies = values.energies[p]
-        by_unknown = np.where(radials.counts, energies[radials.owner], 1.0)
-        force = columns.multiply(steeper * energies) @ columns.T + diags(rises * by_unknown)
-        turned = radials.columns(radials.energy_rates(values.directions, values.s[p]))
-        force = force + columns.multiply(values.tractions[p]) @ turned.T
-        rows, others, entries = find(force)
-        found[flat[rows], flat[others]] += entries
+        found[:, flat] = moved * across + (radials.summed(moved * e) * more)[:, owner] * e
+        rows, others = radials.pairs
+        found[flat[rows], flat[others]] += self._force_rates(values)
         return found
+
+    def _force_rates(self, values: Values) -> Array:
+        """The derivatives of the forces on lengths by the coordinates, for each of the pairs of unknowns."""
+        radials, e, p = self.radials, values.directions, slice(len(self.one), len(self.one) + len(self.radials))
+        (rows, others), owner, energies = radials.pairs, radials.owner, values.energies[p]
+        rises, steeper = self._blocks(values, "rises")
+        turned = radials.energy_rates(e, values.s[p])
+        found = (steeper * energies)[owner[rows]] * e[rows] * e[others]
+        found += values.tractions[p][owner[rows]] * e[rows] * turned[others]
+        alone = rises * np.where(radials.counts, energies[owner], 1.0)
+        return np.asarray(found + np.where(rows == others, alone[rows], 0.0))
 
     def displacement_rate(self, values: Values, direction: Array) -> Array:
         """How the displacements change along a direction of the coordinates, (n,).
