@@ -44,9 +44,10 @@ def peeling(cells: list[int]) -> Table:
     return demo("peeling", cells)
 
 
-def bar(cells: list[int], strength: float) -> Table:
+def bar(cells: list[int], strength: float, **solver: object) -> Table:
     """The glued bar under a part of its strength, 220.6 N/mm."""
     table = demo("glued_bar", cells)
+    table["solver"] = solver
     table["boundary"]["pull"]["traction"] = [strength * 2.206e8, 0.0]
     return table
 
@@ -71,6 +72,14 @@ def anchor(cells: list[int], load: float) -> Table:
     return table
 
 
+def sticking_anchor(cells: list[int], load: float) -> Table:
+    """The anchor whose adhesion softens, with friction on the length of the slip."""
+    table = anchor(cells, load)
+    friction = {"law": "quadratic_linear", "gamma1": 1e6, "gamma2": 5e5, "delta": 2e-5}
+    table["boundary"]["base"]["friction"] = friction
+    return table
+
+
 def plate(cells: list[int], lift: float) -> Table:
     """A plate in space, peeled from its base by lifting one side."""
     glue = {"law": "graph", "points": [[0, 0], [4e-6, 5e6], [20e-6, 0]], "one_sided": True}
@@ -85,6 +94,7 @@ def plate(cells: list[int], lift: float) -> Table:
     }
 
 
+SMOOTHED = {"smoothing": "quadratic", "epsilon": 0.01}
 CASES: dict[str, tuple[Table, Table]] = {
     # the scene; what stands in the column of springs
     "peeling, 30,050": (peeling([600, 24]), peeling([600, 24])),
@@ -92,8 +102,11 @@ CASES: dict[str, tuple[Table, Table]] = {
     "single lap, load x 3": (lap(3.0), lap(3.0)),
     "plate in space": (plate([24, 10, 3], 1e-4), plate([24, 10, 3], 1e-4)),
     "anchor in space, load x 1.3": (anchor([16, 16, 8], 1.3), anchor([16, 16, 8], 1.3)),
+    "anchor with friction in space, load x 1.3": (sticking_anchor([8, 8, 4], 1.3), anchor([8, 8, 4], 1.3)),
     "no: glued bar, 1.05 of its strength": (bar([380, 2], 1.05), bar([380, 2], 0.98)),
     "no: single lap, load x 8": (lap(8.0), lap(3.0)),
+    "no: smoothed glued bar, 1.05 of its strength": (bar([190, 2], 1.05, **SMOOTHED), bar([190, 2], 0.98)),
+    "no: anchor with friction in space, load x 1.42": (sticking_anchor([8, 8, 4], 1.42), anchor([8, 8, 4], 1.3)),
 }
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.linalg.lapack import dpotrf
 
 from ..typing import Array, Integers, Mask
 from .segments import Kind, Segment
@@ -139,3 +140,16 @@ class Cells:
         size = float(np.max(np.abs(values), initial=0.0))
         drops = np.count_nonzero((self.rise < 0.0) & ~self.bound)
         return int(np.count_nonzero(values < -negligible * size) + drops)
+
+    def is_stable(self, negligible: float = 1e-12) -> bool:
+        """Whether the energy falls in no direction at constant loads.
+
+        Args:
+            negligible: an eigenvalue that is zero, relative to the greatest.
+        """
+        if np.any((self.rise < 0.0) & ~self.bound):
+            return False
+        matrix, free = self.tangent()
+        size = float(np.max(np.sum(np.abs(matrix), axis=0), initial=0.0))
+        matrix[np.diag_indices(free.size)] += negligible * size
+        return not free.size or dpotrf(matrix, lower=1)[1] == 0

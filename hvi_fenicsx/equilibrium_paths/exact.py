@@ -15,7 +15,7 @@ from .bonds import BondTable
 from .books import EnergyBalance
 from .cells import Cells
 from .descent import Descent, Landing
-from .onward import chosen, ways_on
+from .onward import Way, chosen, ways_on
 from .passing import Passing, classify, go_on
 from .placing import place
 from .programme import Follower
@@ -57,6 +57,7 @@ class ExactFollower(Follower):
         super().__init__(problem, options, resume, interrupted)
         self._beginning, self._bonds = beginning, BondTable(problem, options.remember)
         self._moved, self._direction, self._blocked = 0, 1, False
+        self._untried: tuple[Array, list[Way]] = np.empty(0), []
         self.tracer: Tracer
 
     @property
@@ -108,7 +109,14 @@ class ExactFollower(Follower):
         chains = [self._bonds.chain(i) for i in range(problem.size)]
         return place(problem.stiffness, chains, x, problem.load(factor) - problem.stiffness @ x, numbers)
 
-    def _follow_from(self, cells: Cells, factor: float, position: Position | None = None, heading: int = 1) -> None:
+    def _follow_from(
+        self,
+        cells: Cells,
+        factor: float,
+        position: Position | None = None,
+        heading: int = 1,
+        inverse: Array | None = None,
+    ) -> None:
         given, problem = position, self._problem
         self.tracer = Tracer(
             problem.stiffness,
@@ -119,6 +127,7 @@ class ExactFollower(Follower):
             driver=FACTOR if given is None else given.driver,
             heading=heading if given is None else given.heading,
             small=None if given is None else given.small,
+            inverse=inverse,
         )
 
     def _begin_balance(self, *, anew: bool) -> None:
@@ -172,10 +181,13 @@ class ExactFollower(Follower):
         return state
 
     def _takes_another_way(self, aim: float) -> bool:
-        """On by another of all ways; a stable path that has none jumps."""
+        """On by another of all ways, of those not tried yet; a stable path that has none jumps."""
         tracer, stable = self.tracer, self._options.follow is Follow.STABLE
-        ways = ways_on(self._problem, self._bonds, tracer.cells, tracer.sizes())
+        at, ways = self._untried
+        if not np.array_equal(at, self._rounds.came):
+            ways = ways_on(self._problem, self._bonds, tracer.cells, tracer.sizes())
         way = chosen(ways, self._rounds.came, float(np.sign(aim - tracer.factor)), stable=stable)
+        self._untried = self._rounds.came, [other for other in ways if other is not way]
         if way is not None:
             self._follow_from(way.cells, tracer.factor, heading=way.heading)
             self._unstable, (self._moved, self._direction) = way.unstable, way.leader
@@ -213,9 +225,9 @@ class ExactFollower(Follower):
     def _jump(self, aim: float) -> Iterator[PathState]:
         """On to the next stable equilibrium at the same factor, or off."""
         cells, factor, memory = self.tracer.cells, self.tracer.factor, self._bonds.memory
-        found = snap(self._bonds, self._problem.load(factor), cells, self._moved, self._direction)
+        found = snap(self._bonds, self._problem.load(factor), self.tracer, self._moved, self._direction)
         if found is not None and found.cells is not None:
-            yield self._landed(found.cells, aim)
+            yield self._landed(found.cells, aim, found.inverse)
             return
         landing = self._descended() if found is None else Landing(x=cells.x, escapes=True, found=False, steps=0)
         if landing.escapes:
@@ -235,10 +247,10 @@ class ExactFollower(Follower):
         descent = Descent(self._bonds, self._problem.load(self.tracer.factor))
         return descent.land(descent.pushed(cells, rates), cells.x)
 
-    def _landed(self, cells: Cells, aim: float) -> PathState:
+    def _landed(self, cells: Cells, aim: float, inverse: Array | None = None) -> PathState:
         self._blocked = False
-        self._follow_from(cells, self.tracer.factor)
-        self._unstable = self.tracer.cells.unstable_directions()
+        self._follow_from(cells, self.tracer.factor, inverse=inverse)
+        self._unstable = 0 if cells.is_stable() else cells.unstable_directions()
         cells = self.tracer.cells
         released = self._balance.leap(cells.x, cells.bond_force)
         self._orient(aim)

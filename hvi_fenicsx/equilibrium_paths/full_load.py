@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..system.condensed_problem import CondensedProblem
 from ..typing import Array
+from .bonds import is_piecewise_linear
 from .eliminated import without_fixed
-from .exact import ExactFollower
+from .kinds import kind_of
+from .programme import Follower
 from .state import End, Follow, PathOptions, PathState
 
 
@@ -27,32 +30,52 @@ class FullLoad:
 
 
 def at_full_load(problem: CondensedProblem, most_events: int) -> FullLoad | None:
-    """The equilibrium to which a stable path leads, or else the whole curve of equilibria.
-
-    Where a body comes off on the way, an exact path is followed on, through the limit point, since its factor may rise
-    to 1 again. None where this says nothing: the path is lost, or does not begin since nothing holds the body at rest.
+    """The equilibrium to which a path leads. None where this says nothing: the path is lost, or does not begin.
 
     Args:
-        problem: the problem, of piecewise linear laws; its factor scales all loads.
+        problem: the problem; its factor scales all loads.
         most_events: events at most, of each path.
     """
     fewer, kept = without_fixed(problem)
-    follower, last = _followed(fewer, Follow.STABLE, most_events)
-    if follower.end is End.ESCAPES and last is not None:
+    found = (_event_by_event if is_piecewise_linear(fewer) else _along_the_curve)(fewer, most_events)
+    if found is None or found.x is None:
+        return found
+    whole = np.where(np.isfinite(problem.lower), problem.lower, 0.0)
+    whole[kept] = found.x
+    return FullLoad(x=whole, reason=found.reason)
+
+
+def _event_by_event(problem: CondensedProblem, most_events: int) -> FullLoad | None:
+    """Of piecewise linear laws: as stable as it goes, or else along the whole curve of equilibria.
+
+    Where a body comes off on the way, the curve is followed on, through the limit point, since its factor may rise to 1
+    again.
+    """
+    follower, states = _followed(problem, Follow.STABLE, most_events)
+    if follower.end is End.ESCAPES and states:
         reason = follower.reason
-        follower, last = _followed(fewer, Follow.EXACT, most_events)
+        follower, states = _followed(problem, Follow.EXACT, most_events)
         if follower.end is not End.REACHED:
             return FullLoad(x=None, reason=reason)
-    if follower.end is not End.REACHED or last is None:
+    return _reached(follower, states)
+
+
+def _along_the_curve(problem: CondensedProblem, most_events: int) -> FullLoad | None:
+    """Of other laws: along the curve of equilibria, since a jump takes longer to follow than the whole curve."""
+    follower, states = _followed(problem, Follow.EXACT, most_events)
+    if follower.end is End.ESCAPES and states:
+        largest = max(state.factor for state in states)
+        return FullLoad(x=None, reason=f"at the factor {largest:.6g} the equilibria turn back to no load")
+    return _reached(follower, states)
+
+
+def _reached(follower: Follower, states: Sequence[PathState]) -> FullLoad | None:
+    if follower.end is not End.REACHED or not states:
         return None
-    found = np.where(np.isfinite(problem.lower), problem.lower, 0.0)
-    found[kept] = last.x
-    return FullLoad(x=found, reason="the whole load is reached")
+    return FullLoad(x=states[-1].x, reason="the whole load is reached")
 
 
-def _followed(problem: CondensedProblem, follow: Follow, most_events: int) -> tuple[ExactFollower, PathState | None]:
-    """The follower at the end of its path, and the last state there."""
-    follower, last = ExactFollower(problem, PathOptions(follow=follow, most_events=most_events)), None
-    for state in follower.states():
-        last = state
-    return follower, last
+def _followed(problem: CondensedProblem, follow: Follow, most_events: int) -> tuple[Follower, list[PathState]]:
+    """The follower at the end of its path, and the states."""
+    follower = kind_of(problem).follower(problem, PathOptions(follow=follow, most_events=most_events))
+    return follower, list(follower.states())

@@ -32,26 +32,29 @@ class Snap:
 
     Attributes:
         cells: the stable equilibrium; None: the body comes off.
-        fall: of the energy.
+        inverse: of its matrix, (n, n); None where it is not known.
     """
 
     cells: Cells | None
-    fall: float
+    inverse: Array | None = None
 
 
-def snap(bonds: BondTable, load: Array, cells: Cells, moved: int, direction: int) -> Snap | None:
+def snap(bonds: BondTable, load: Array, path: Tracer, moved: int, direction: int) -> Snap | None:
     """Follow the curve with the first restraint that leads to an end; None where none does.
 
     Args:
         bonds: the bonds, which remember.
         load: f, (n,).
-        cells: the state that is not stable.
+        path: the curve, at a state that is not stable.
         moved: the unknown whose passage made it so.
         direction: of that unknown along its graph, 1 or -1.
     """
-    memory = bonds.memory
+    memory, inverse, cells = bonds.memory, path.inverse(), path.cells
     for restraint in _restraints(bonds, cells, moved, direction):
-        found = _followed(bonds, load, cells, restraint, (moved, direction))
+        held = _held_back(bonds, load, cells, restraint, inverse)
+        if held is None or held.rates[moved] * direction <= 0.0:
+            continue
+        found = _to_its_end(held, bonds, load, restraint)
         if found is not None:
             return found
         bonds.restore(memory)
@@ -59,7 +62,7 @@ def snap(bonds: BondTable, load: Array, cells: Cells, moved: int, direction: int
 
 
 def _restraints(bonds: BondTable, cells: Cells, moved: int, direction: int) -> Iterator[Array]:
-    """Forces against the unstable direction: of equal size on all bonds that it moves, then as it is."""
+    """Forces against the unstable direction, of size 1: equal on all bonds that it moves, then as it is."""
     matrix, free = cells.tangent()
     unstable = np.zeros(len(cells))
     if cells.rise[moved]:  # on a drop: the unknown goes on, and all others follow
@@ -74,28 +77,22 @@ def _restraints(bonds: BondTable, cells: Cells, moved: int, direction: int) -> I
     size = float(np.max(np.abs(unstable), initial=0.0))
     if size == 0.0:
         return
-    yield bonds.weights * np.sign(np.where(np.abs(unstable) > 1e-6 * size, unstable, 0.0))
-    yield unstable
+    even = bonds.weights * np.sign(np.where(np.abs(unstable) > 1e-6 * size, unstable, 0.0))
+    if np.any(even):
+        yield np.asarray(even / np.max(np.abs(even)))
+    yield np.asarray(unstable / size)
     yield np.eye(1, len(cells), moved)[0] * direction
 
 
-def _followed(bonds: BondTable, load: Array, cells: Cells, restraint: Array, passed: tuple[int, int]) -> Snap | None:
-    """Along the curve of one restraint; None where it leads to no end."""
-    size = float(np.max(np.abs(restraint), initial=0.0))
-    if size == 0.0:
-        return None
-    c = np.asarray(restraint / size, dtype=np.float64)
+def _held_back(bonds: BondTable, load: Array, cells: Cells, restraint: Array, inverse: Array | None) -> Tracer | None:
+    """The curve of one restraint; None where there is none."""
     chains = [cells.chain(i) for i in range(len(cells))]
-    problem = bonds.problem
-    here = place(problem.stiffness, chains, cells.x, load - problem.stiffness @ cells.x, cells.numbers)
+    stiffness = bonds.problem.stiffness
+    here = place(stiffness, chains, cells.x, load - stiffness @ cells.x, cells.numbers)
     try:
-        tracer = Tracer(problem.stiffness, load, c, here, 0.0, driver=FACTOR, heading=-1)
+        return Tracer(stiffness, load, restraint, here, 0.0, driver=FACTOR, heading=-1, inverse=inverse)
     except np.linalg.LinAlgError:
         return None
-    moved, direction = passed
-    if tracer.rates[moved] * direction <= 0.0:
-        return None
-    return _to_its_end(tracer, bonds, load, c)
 
 
 def _to_its_end(tracer: Tracer, bonds: BondTable, load: Array, c: Array) -> Snap | None:
@@ -108,11 +105,11 @@ def _to_its_end(tracer: Tracer, bonds: BondTable, load: Array, c: Array) -> Snap
             return None
         if step.variable is None:
             free = tracer.factor < 0.0 and tracer.stands
-            return Snap(cells=None, fall=np.inf) if free else None
+            return Snap(cells=None) if free else None
         step_fall = -0.5 * (t + tracer.factor) * float(c @ (tracer.cells.x - x))
         fall, turnover = fall + step_fall, turnover + abs(step_fall)
         if step.variable == FACTOR:
-            stable = tracer.cells.unstable_directions() == 0
-            return Snap(cells=tracer.cells, fall=fall) if stable and fall > 1e-9 * turnover else None
+            lower = fall > 1e-9 * turnover and tracer.cells.is_stable()
+            return Snap(cells=tracer.cells, inverse=tracer.inverse()) if lower else None
         go_on(tracer, bonds, step)
     return None

@@ -12,12 +12,10 @@ random: each coordinate then has a part of the order ε as well, which says who 
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from scipy.linalg.blas import dger
 
 from ..typing import Array, Integers
+from .basis import Basis
 from .cells import Cells
 from .segments import Segment
 from .step import FACTOR, Step
@@ -38,19 +36,16 @@ class Tracer:
         driver: the variable that drives.
         heading: its direction, 1 or -1.
         small: parts of the order ε of the coordinates, (n,); by default at random.
-        seed: of the perturbation.
+        inverse: of the cell's matrix, where it is known and the factor drives, (n, n).
 
     Attributes:
         factor: λ.
         cells: where all unknowns are.
-        driver: the variable that drives.
-        heading: its direction, 1 or -1.
-        refactored: how often the inverse was computed anew.
+        heading: the direction of the variable that drives, 1 or -1.
         small: parts of the order ε of the coordinates, (n,).
         rates: how all coordinates change with the driving variable, (n,).
         factor_rate: how the factor does.
         stands: whether the factor stands still while unknowns move.
-        worst: the greatest residual met, relative to the forces.
 
     Raises:
         numpy.linalg.LinAlgError: the tangent is singular.
@@ -67,18 +62,15 @@ class Tracer:
         driver: int = FACTOR,
         heading: int = 1,
         small: Array | None = None,
-        seed: int = 0,
+        inverse: Array | None = None,
     ) -> None:
         self._stiffness, self._constant, self._rate = stiffness, constant, rate
-        self.cells, self.factor, self.driver, self.heading = cells, factor, driver, heading
-        self.refactored, self.worst, self._size = 0, 0.0, 0.0
-        self._inverse: Any = None
-        self._column = np.empty(0)
-        self._generator = np.random.default_rng(seed)
+        self.cells, self.factor, self.heading, self._size = cells, factor, heading, 0.0
+        self._generator = np.random.default_rng(0)
         self._perturb()
         if small is not None:
             self.small = np.array(small)
-        self._factorise()
+        self._basis = Basis(stiffness, rate, cells, driver, inverse)
         self._find_direction()
 
     # -- the perturbation
@@ -94,27 +86,19 @@ class Tracer:
 
     # -- linear algebra
 
-    def _factorise(self) -> None:
-        matrix = self.cells.matrix()
-        if self.driver != FACTOR:
-            matrix[:, self.driver] = -self._rate
-        self._inverse = self._inverse_of(matrix)
-        self.refactored += 1
+    @property
+    def driver(self) -> int:
+        """The variable that drives."""
+        return self._basis.driver
 
-    @staticmethod
-    def _inverse_of(matrix: Array) -> Array:
-        found = np.asarray(np.asfortranarray(np.linalg.inv(matrix)), dtype=np.float64)
-        if not np.all(np.isfinite(found)):
-            raise np.linalg.LinAlgError("the tangent is singular")
-        return found
-
-    def _driving_column(self) -> Array:
-        return -self._rate if self.driver == FACTOR else self.cells.column(self.driver)
+    def inverse(self) -> Array | None:
+        """The inverse of the present cell's matrix, (n, n); None where it is not known to enough digits."""
+        return self._basis.inverse()
 
     def _find_direction(self) -> None:
         """How all variables change with the driving one."""
-        self._column = self._inverse @ self._driving_column()
-        rates = -self.heading * self._column
+        self._basis.renew()
+        rates = -self.heading * self._basis.column
         if self.driver == FACTOR:
             self.factor_rate = float(self.heading)
         else:
@@ -123,37 +107,18 @@ class Tracer:
         self.rates: Array = rates
         self.stands = self._factor_stands()
 
-    def _exchange(self, leaving: int) -> None:
-        """Let the driving variable enter the basis, and a coordinate leave it, which drives from now on."""
-        spread, row = self._column.copy(), self._inverse[leaving].copy()
-        pivot = spread[leaving]
-        spread[leaving] -= 1.0
-        self._inverse = dger(-1.0 / pivot, spread, row, a=self._inverse, overwrite_a=1)
-        if self.driver != FACTOR:
-            pair = [leaving, self.driver]
-            self._inverse[pair] = self._inverse[pair[::-1]]
-        self.driver = leaving
-
     def _residual(self) -> Array:
         cells = self.cells
         self.elastic = self._stiffness @ cells.x
         return np.asarray(self.elastic + cells.force - self._constant - self.factor * self._rate)
 
-    def refine(self, allowed: float = 1e-9) -> None:
-        """Take out what rounding has left in the equations; factorise anew where the inverse has lost digits.
-
-        Args:
-            allowed: residual up to which the inverse is kept, relative to the forces.
-        """
+    def refine(self) -> None:
+        """Take out what rounding has left in the equations, and find the direction."""
         residual = self._residual()
         forces = [self.elastic, self.cells.force, self._constant, self.factor * self._rate]
         self._size = max(self._size, *(float(np.max(np.abs(f), initial=0.0)) for f in forces))
-        left = float(np.max(np.abs(residual), initial=0.0)) / (self._size or 1.0)
-        self.worst = max(self.worst, left)
-        if left > allowed:
-            self._factorise()
         self._find_direction()
-        self._correct(self._inverse @ residual)
+        self._correct(self._basis.roughly(residual))
 
     def _correct(self, change: Array) -> None:
         """Take a change off, the driving variable held; if that is a slow one, to the nearest point of the curve."""
@@ -260,7 +225,7 @@ class Tracer:
         """
         direction = 1 if self.rates[i] > 0.0 else -1
         if i != self.driver:
-            self._exchange(i)
+            self._basis.exchange(i)
         self.heading = direction
         if chain is None:
             self.cells.enter(i, number, coordinate)

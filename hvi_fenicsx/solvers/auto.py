@@ -107,7 +107,7 @@ class Auto(BranchIteration):
         return first
 
     def _soft(self) -> bool:
-        return any(softens(law) for law in self._laws)
+        return any(softens(term.exact) for term in self.system.terms)
 
     def _asks_for_path(self) -> bool:
         """Whether loading decides which equilibrium is meant, or if there is one."""

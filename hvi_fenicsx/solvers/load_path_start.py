@@ -50,12 +50,14 @@ def softens(law: Superpotential) -> bool:
 def follow(system: System, thresholds: PathThresholds) -> PathStart | None:
     """The start, where its path can be followed in short time; None where it cannot, or is lost. Collective.
 
+    A path of other than piecewise linear equations is followed where laws soften and Γc has few unknowns.
+
     Args:
         system: the system; its tangent and what it holds are taken away.
         thresholds: how large the condensed system may be.
     """
-    linear = all(graph_of(term.law) is not None for term in system.terms)
-    if not linear or system.comm.allreduce(len(system.jacobian.rows.dofs)) > thresholds.vertex_unknowns:
+    known = all(graph_of(term.exact) is not None for term in system.terms)
+    if not known or system.comm.allreduce(len(system.jacobian.rows.dofs)) > thresholds.vertex_unknowns:
         return None
     system.jacobian.set_rates([np.zeros_like(rates) for rates in system.jacobian.rates])
     try:
@@ -71,7 +73,14 @@ def follow(system: System, thresholds: PathThresholds) -> PathStart | None:
 def _on_first_rank(system: System, problem: CondensedProblem, thresholds: PathThresholds) -> FullLoad | None:
     """Where the path leads, the same on all ranks to the last digit. Collective."""
     found = None
-    if system.comm.rank == 0 and is_piecewise_linear(problem):
+    if system.comm.rank == 0 and _is_short(system, problem, thresholds):
         with suppress(np.linalg.LinAlgError):
             found = at_full_load(problem, thresholds.most_events)
     return system.comm.bcast(found)
+
+
+def _is_short(system: System, problem: CondensedProblem, thresholds: PathThresholds) -> bool:
+    """Whether the path is piecewise linear, or a curve of few unknowns that softening makes worth while."""
+    if is_piecewise_linear(problem):
+        return True
+    return problem.size <= thresholds.whole_curve_unknowns and any(softens(term.exact) for term in system.terms)

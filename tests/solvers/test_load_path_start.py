@@ -10,6 +10,8 @@ from scenes import Table, solved
 
 from hvi_fenicsx import Scene, prepare
 from hvi_fenicsx.equilibrium_paths.eliminated import without_fixed
+from hvi_fenicsx.equilibrium_paths.kinds import kind_of
+from hvi_fenicsx.equilibrium_paths.state import PathOptions
 from hvi_fenicsx.solvers import load_path_start
 from hvi_fenicsx.system.condensation import Condensation
 
@@ -48,13 +50,55 @@ def strip(**solver: object) -> Table:
     }
 
 
+def anchor(load: float) -> Table:
+    """A block that is pulled off its base in space: adhesion softens, friction acts on the length of the slip."""
+    glue = {"law": "graph", "points": [[0, 0], [5e-6, 1e6], [1e-4, 0]], "one_sided": True}
+    friction = {"law": "quadratic_linear", "gamma1": 1.0e6, "gamma2": 0.5e6, "delta": 2e-5}
+    return {
+        "domain": {"shape": "box", "size": [0.2, 0.2, 0.1], "cells": [3, 3, 2]},
+        "material": {"model": "three_dimensional", "youngs_modulus": 2.1e11, "poisson_ratio": 0.3},
+        "boundary": {
+            "pull": {"on": "top", "traction": [0.0, 0.0, f"{load}*0.6e6*(1 + (x - 0.1)/0.3)"]},
+            "base": {"on": "bottom", "contact": {"gap": 0.0}, "adhesion": glue, "friction": friction},
+        },
+    }
+
+
+def largest_factor(table: Table) -> float:
+    """The factor at which the path of unsmoothed laws ends."""
+    problem = Condensation(prepare(Scene.model_validate(table)).system).problem
+    return max(state.factor for state in kind_of(problem).follower(problem, PathOptions(programme=(9.0,))).states())
+
+
+def said_factor(reason: str) -> float:
+    match = re.search(r"no equilibrium on the loading path: at the factor ([\d.]+)", reason)
+    assert match is not None
+    return float(match[1])
+
+
 @pytest.mark.parametrize("load", [1.05, 2.0])
 def test_above_its_strength_the_path_of_a_bar_says_which_load_it_bears(load: float) -> None:
     found = solved(bar(load * STRENGTH))
     assert found.exit_code == 4
-    match = re.search(r"no equilibrium on the loading path: at the factor ([\d.]+)", found.solve_result.reason)
-    assert match is not None
-    assert float(match[1]) * load == pytest.approx(1.0, rel=1e-3)
+    assert said_factor(found.solve_result.reason) * load == pytest.approx(1.0, rel=1e-3)
+    assert found.solve_result.counts.newton < 20
+
+
+def test_above_its_strength_in_space_with_friction_on_a_length_the_curve_says_which_load_is_borne() -> None:
+    found = solved(anchor(1.5))
+    assert found.exit_code == 4
+    assert found.solve_result.counts.newton < 20
+    borne = said_factor(found.solve_result.reason) * 1.5
+    assert borne == pytest.approx(1.43225, rel=1e-5)  # the stable path of docs/paths.md
+    assert solved(anchor(0.999 * borne)).converged
+
+
+def test_above_the_strength_of_a_smoothed_law_the_curve_says_which_load_is_borne() -> None:
+    table = bar(1.05 * STRENGTH, 24)
+    table["solver"] = {"smoothing": "quadratic", "epsilon": 0.01}
+    found = solved(table)
+    strength = largest_factor(bar(STRENGTH, 24))
+    assert said_factor(found.solve_result.reason) * 1.05 == pytest.approx(strength, rel=2e-3)
     assert found.solve_result.counts.newton < 20
 
 

@@ -1,0 +1,120 @@
+"""The basis of the linear equations of one cell: the columns of all variables but the one that drives, inverted.
+
+The variables are the coordinates of the unknowns and the factor. Where one of them enters and another leaves, the
+inverse is changed by a matrix of rank one; what it leaves of a column says when it has lost digits.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from scipy.linalg.blas import dger
+
+from ..typing import Array
+from .cells import Cells
+from .step import FACTOR
+
+_KEPT = 1e-6
+"""What an inverse that is kept may leave of a column; one step of refinement takes this out."""
+
+
+class Basis:
+    """The basis of a cell.
+
+    Args:
+        stiffness: S, (n, n).
+        rate: f1, (n,).
+        cells: where all unknowns are; changed from outside.
+        driver: the variable that drives.
+        inverse: of the cell's matrix, where it is known and the factor drives, (n, n).
+
+    Attributes:
+        driver: the variable that drives.
+        column: the values of the basis that the driving variable's column has, (n,).
+
+    Raises:
+        numpy.linalg.LinAlgError: the tangent is singular.
+    """
+
+    def __init__(self, stiffness: Array, rate: Array, cells: Cells, driver: int, inverse: Array | None = None) -> None:
+        self._stiffness, self._rate, self._cells, self.driver = stiffness, rate, cells, driver
+        self._inverse: Any = None
+        if inverse is None or driver != FACTOR:
+            self._factorise()
+        else:
+            self._inverse = inverse.copy(order="F")
+        self.column: Array = np.empty(0)
+
+    def _factorise(self) -> None:
+        matrix = self._cells.matrix()
+        if self.driver != FACTOR:
+            matrix[:, self.driver] = -self._rate
+        found = np.asarray(np.asfortranarray(np.linalg.inv(matrix)), dtype=np.float64)
+        if not np.all(np.isfinite(found)):
+            raise np.linalg.LinAlgError("the tangent is singular")
+        self._inverse = found
+
+    def renew(self) -> None:
+        """Find :attr:`column` in the present cell."""
+        self.column = self._solved(-self._rate if self.driver == FACTOR else self._cells.column(self.driver))
+
+    def _solved(self, right: Array) -> Array:
+        """The values that the basis takes to a column, (n,); factorised anew where the inverse has lost digits."""
+        found = self.roughly(right)
+        left = right - self._product(found, self.driver)
+        if not np.max(np.abs(left), initial=0.0) <= _KEPT * np.max(np.abs(right), initial=0.0):
+            self._factorise()
+            found = self.roughly(right)
+            left = right - self._product(found, self.driver)
+        return found + self.roughly(left)
+
+    def roughly(self, right: Array) -> Array:
+        """The same without refinement, (n,).
+
+        Args:
+            right: a column, (n,).
+        """
+        return np.asarray(self._inverse @ right, dtype=np.float64)
+
+    def _product(self, values: Array, driver: int) -> Array:
+        """The basis times values: of the coordinates, and of the factor in the place of the one that drives, (n,)."""
+        cells, moving, coordinates = self._cells, self._cells.moving, values.copy()
+        if driver != FACTOR:
+            coordinates[driver] = 0.0
+        found = self._stiffness @ np.where(moving, coordinates, 0.0)
+        found += np.where(moving, cells.slope, cells.rise) * coordinates
+        return np.asarray(found if driver == FACTOR else found - values[driver] * self._rate)
+
+    def exchange(self, leaving: int) -> None:
+        """Let the driving variable enter, and a coordinate leave, which drives from now on.
+
+        Args:
+            leaving: number of its unknown.
+        """
+        self._inverse = _exchanged(self._inverse, self.column, leaving)
+        if self.driver != FACTOR:
+            pair = [leaving, self.driver]
+            self._inverse[pair] = self._inverse[pair[::-1]]
+        self.driver = leaving
+
+    def inverse(self) -> Array | None:
+        """The inverse of the cell's matrix, (n, n); None where it is not known to enough digits."""
+        found = self._inverse.copy(order="F")
+        if self.driver != FACTOR:
+            with np.errstate(all="ignore"):
+                found = _exchanged(found, self.column, self.driver)
+        return np.asarray(found) if self._inverts(found) else None
+
+    def _inverts(self, inverse: Array) -> bool:
+        with np.errstate(all="ignore"):
+            left = self._product(inverse @ self._rate, FACTOR) - self._rate
+            return bool(np.max(np.abs(left), initial=0.0) <= _KEPT * np.max(np.abs(self._rate), initial=0.0))
+
+
+def _exchanged(inverse: Any, column: Array, place: int) -> Any:
+    """The inverse, overwritten, of the basis with another column at a place, of which the values are given."""
+    spread, row = column.copy(), inverse[place].copy()
+    pivot = spread[place]
+    spread[place] -= 1.0
+    return dger(-1.0 / pivot, spread, row, a=inverse, overwrite_a=1)
