@@ -18,8 +18,9 @@ from .runtime.timing import Timer
 from .scene import Scene
 from .solution import Solution
 from .solvers import frozen_mixity, nested_iteration
+from .solvers.coarse_start import CoarseStart
 from .solvers.context import Progress, RunControl, never
-from .solvers.nested_iteration import CoarseStart, LevelSolution
+from .solvers.nested_iteration import LevelSolution
 from .solvers.result import SolveResult
 from .system import free_motions
 from .system.levels import Levels

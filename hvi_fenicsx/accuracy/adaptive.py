@@ -23,8 +23,9 @@ from ..runtime.mpi import agree, total
 from ..runtime.timing import Timer
 from ..scene import Scene
 from ..solution import Solution
+from ..solvers.coarse_start import CoarseStart
 from ..solvers.context import Progress, RunControl, never
-from ..solvers.nested_iteration import CoarseStart, refined_levels
+from ..solvers.nested_iteration import refined_levels
 from ..system.levels import Level, Levels
 from ..typing import Entities
 from ..workflow import finish_with_levels

@@ -15,7 +15,8 @@ from ..problem.problem import Problem
 from ..problem.references import References
 from ..problem.rigid_part import strained
 from ..system import net_forces as rigid_balance
-from ..system.net_forces import ActingForces, Holder, spread
+from ..system.net_forces import ActingForces, Holder, PartForces
+from ..system.supported_body import Motions, SupportedBody
 from ..typing import Array
 from .contact_state import ContactState, Forces
 from .thresholds import DEFAULT, Thresholds
@@ -79,18 +80,17 @@ def net_forces(
     """
     problem, acting = references.problem, _acting(references, forces, states, u, thresholds)
     closed = [(state.surface, state.contact) for state in states]
-    fields = [rigid_balance.motions(problem, body, closed) for body in problem.bodies]
-    found = _beyond_rounding(references, fields, acting, thresholds)
+    motions = [SupportedBody.of(problem, body).motions(closed) for body in problem.bodies]
+    found = _beyond_rounding(references, motions, acting, thresholds)
     if np.all(found <= tolerance):
         return found
-    return _beyond_rounding(references, fields, _with_noise(references, acting, u, thresholds), thresholds)
+    return _beyond_rounding(references, motions, _with_noise(references, acting, u, thresholds), thresholds)
 
 
 def _beyond_rounding(
-    references: References, fields: Sequence[Array], acting: ActingForces, thresholds: Thresholds
+    references: References, motions: Sequence[Motions], acting: ActingForces, thresholds: Thresholds
 ) -> Array:
-    pairs = zip(references.problem.bodies, fields, strict=True)
-    nets = (rigid_balance.along(references, body, y, acting) for body, y in pairs)
+    nets = (rigid_balance.along(references, one, acting) for one in motions)
     return np.array([net.beyond_rounding(thresholds.nothing_acts) for net in nets])
 
 
@@ -102,12 +102,15 @@ def _acting(
     thresholds: Thresholds,
 ) -> ActingForces:
     problem = references.problem
-    holders = [holder for state in states for holder in _holders(problem, state)]
+    holders = [holder for state in states for holder in _holders(state)]
     foundation = -problem.combined(problem.bulk.foundation_force(u))
+    left = forces.pushing + foundation
+    for given in (holder.forces for holder in holders):
+        left[given.blocks] += given.values
     return ActingForces(
-        left=np.sum([forces.pushing, foundation, *(holder.forces for holder in holders)], axis=0),
-        loads=forces.pushing,
-        carried=[foundation],
+        left=left,
+        loads=PartForces.nonzero(forces.pushing),
+        carried=[PartForces.nonzero(foundation)],
         holders=holders,
         capable=rigid_balance.capable(problem),
         noise=np.zeros(references.count),
@@ -124,13 +127,12 @@ def _with_noise(references: References, acting: ActingForces, u: fem.Function, t
     return replace(acting, noise=thresholds.rounding_safety * noise / np.sqrt(unknowns))
 
 
-def _holders(problem: Problem, state: ContactState) -> Iterator[Holder]:
+def _holders(state: ContactState) -> Iterator[Holder]:
     """What contact and laws of a part give, as far as they may, and what else they might give."""
     surface = state.surface
 
     def holder(direction: Array, weights: Array, *tractions: Array) -> Holder:
-        forces = (spread(problem, surface, (weights * t)[:, None])[:, 0] for t in tractions)
-        return Holder(spread(problem, surface, direction), *forces)
+        return Holder(surface.blocks, direction, *(weights * traction for traction in tractions))
 
     if state.bounds is not None:
         yield holder(surface.normals, surface.weights, allowed_pressure(state), *_pressures(state))

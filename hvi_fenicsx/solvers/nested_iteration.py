@@ -21,7 +21,8 @@ from ..system.assemble import assemble
 from ..system.held_solver import LinearSettings
 from ..system.levels import Level, Levels, prolongation, with_coarser_system
 from ..system.system import System
-from . import registry
+from . import coarse_start, registry
+from .coarse_start import CoarseStart
 from .context import RunControl, SolveContext
 from .method import Method
 from .options import SolverOptions
@@ -44,23 +45,6 @@ class LevelSolution:
     system: System
     levels: Levels
     result: SolveResult
-
-
-@dataclass(frozen=True, kw_only=True)
-class CoarseStart:
-    """A solution on a coarser mesh, as the start on a finer one.
-
-    Attributes:
-        system: the system on the coarser mesh.
-        result: what was found there.
-        prolongation: from the coarser system's unknowns to the finer one's.
-        levels: the coarser levels of the finer system.
-    """
-
-    system: System
-    result: SolveResult
-    prolongation: PETSc.Mat
-    levels: Levels
 
 
 def linear_settings(system: System, options: SolverOptions) -> LinearSettings:
@@ -130,7 +114,7 @@ def solve_from_coarser(
         SolverError: a convex step raised the energy.
     """
     kind, found = registry.choose(options, system), start.result
-    first = _prolonged(start, system) if found.converged and kind.takes_start else None
+    first = coarse_start.prolonged(start, system) if found.converged and kind.takes_start else None
     context = SolveContext.create(system, start.levels, solvability, options, control, steady=found.steady)
     _log_level(system, kind)
     result = kind(context).solve() if first is None else kind(context).solve(first)
@@ -171,7 +155,7 @@ def solve_from_displacement(
     levels = coarser_levels(model, system, options, control)
     first = system.unknowns(u)
     first.scale(1.0 / system.problem.scales.displacement)
-    _make_admissible(first, system)
+    coarse_start.make_admissible(first, system)
     _log_level(system, kind)
     context = SolveContext.create(system, levels, solvability, options, control)
     result = kind(context).solve(first)
@@ -266,20 +250,3 @@ def refined_levels(
 def _with_coarse_tolerance(options: SolverOptions) -> SolverOptions:
     """The options with the tolerance of a coarser level."""
     return replace(options, tolerance=max(options.thresholds.coarse_tolerance, options.tolerance))
-
-
-def _prolonged(start: CoarseStart, system: System) -> PETSc.Vec:
-    """The coarse solution on the finer mesh, within its bounds and with its prescribed values. Collective."""
-    coarse = start.system
-    x = system.load.duplicate()
-    start.prolongation.mult(coarse.unknowns(start.result.u), x)
-    x.scale(coarse.problem.scales.displacement / system.problem.scales.displacement)
-    _make_admissible(x, system)
-    return x
-
-
-def _make_admissible(x: PETSc.Vec, system: System) -> None:
-    """Move unknowns within their bounds, and to their prescribed values."""
-    x.pointwiseMax(x, system.lower)
-    x.pointwiseMin(x, system.upper)
-    system.prescribe(x)

@@ -7,7 +7,8 @@ from petsc4py import PETSc
 
 from ..problem.contact_surface import Surface
 from ..system import net_forces
-from ..system.net_forces import ActingForces, Holder, NetForces
+from ..system.net_forces import ActingForces, Holder, NetForces, PartForces
+from ..system.supported_body import Motions, SupportedBody
 from ..system.system import System
 from ..typing import Array, Mask
 from .thresholds import ActiveSetThresholds
@@ -24,10 +25,13 @@ class NetForceTest:
     def __init__(self, system: System, thresholds: ActiveSetThresholds) -> None:
         self._system, self._thresholds = system, thresholds
         self._d = system.problem.scales.dimension
-        self._loads = self._local(system.pushing)
-        self._capable = [self._local(force) for force in net_forces.capable(system.problem)]
+        self._contact = np.unique(system.jacobian.rows.dofs // self._d).astype(np.int32)
+        self._loads = PartForces.nonzero(self._local(system.pushing))
+        self._capable = [self._local_part(force) for force in net_forces.capable(system.problem)]
+        bodies = (SupportedBody.of(system.problem, body) for body in system.problem.bodies)
+        self._bodies = [body.in_components(self._local) for body in bodies]
         self._masks: list[Mask] | None = None
-        self._motions: list[Array] = []
+        self._motions: list[Motions] = []
 
     def sizes(self, x: PETSc.Vec, residual: Array, projected: Array, on: tuple[Mask, Mask]) -> tuple[Array, Array]:
         """The largest net force of each body, relative, and what it grows by with a unit of noise. Collective.
@@ -46,24 +50,22 @@ class NetForceTest:
         acting = ActingForces(
             left=-self._blocks(projected),
             loads=self._loads,
-            carried=[-self._blocks(laws)],
+            carried=[PartForces(self._contact, -self._blocks(laws)[self._contact])],
             holders=self._holders(residual - projected, *on),
             capable=self._capable,
             noise=np.ones(system.references.count),
             summation=0.0,
             tiny=self._thresholds.along,
         )
-        pairs = zip(system.problem.bodies, self._motions, strict=True)
-        found = [self._relative(net_forces.along(system.references, body, y, acting)) for body, y in pairs]
+        found = [self._relative(net_forces.along(system.references, y, acting)) for y in self._motions]
         return np.array([left for left, _ in found]), np.array([noise for _, noise in found])
 
     def _holders(self, reactions: Array, on_lower: Mask, on_upper: Mask) -> list[Holder]:
         """The bounds that are reached: each pushes along the axis of its unknown."""
         least, most = np.where(on_upper, -np.inf, 0.0), np.where(on_lower, np.inf, 0.0)
-        columns = [self._blocks(values) for values in (reactions, least, most)]
-        shape = columns[0].shape
-        axes = (np.broadcast_to(axis, shape) for axis in np.eye(self._d))
-        return [Holder(axis, *(c[:, k] for c in columns)) for k, axis in enumerate(axes)]
+        columns = [self._blocks(values)[self._contact] for values in (reactions, least, most)]
+        axes = (np.broadcast_to(axis, columns[0].shape) for axis in np.eye(self._d))
+        return [Holder(self._contact, axis, *(c[:, k] for c in columns)) for k, axis in enumerate(axes)]
 
     def _relative(self, net: NetForces) -> tuple[float, float]:
         """The largest net force and its rounding, along motions in which anything acts at all."""
@@ -78,8 +80,7 @@ class NetForceTest:
         masks = [mask for _, mask in closed]
         known = self._masks is not None and all(map(np.array_equal, masks, self._masks))
         if system.comm.allreduce(not known):
-            every = (net_forces.motions(system.problem, body, closed) for body in system.problem.bodies)
-            self._motions = [np.array([self._local(y) for y in fields]).reshape(fields.shape) for fields in every]
+            self._motions = [body.motions(closed) for body in self._bodies]
         self._masks = masks
 
     def _closed(self, x: PETSc.Vec, k: int) -> tuple[Surface, Mask]:
@@ -94,6 +95,12 @@ class NetForceTest:
         """Vectors (vertices, d) in the components of the unknowns."""
         frames = self._system.frames
         return vectors if frames is None else frames.local_components(vectors)
+
+    def _local_part(self, forces: PartForces) -> PartForces:
+        """Forces in the components of the unknowns."""
+        every = np.zeros((len(self._system.pushing), self._d))
+        every[forces.blocks] = forces.values
+        return PartForces(forces.blocks, self._local(every)[forces.blocks])
 
     def _blocks(self, values: Array) -> Array:
         return values.reshape(-1, self._d)

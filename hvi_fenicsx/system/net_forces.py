@@ -6,63 +6,81 @@ stresses. So it is not judged by these: large loads that balance each other hide
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 from mpi4py import MPI
 
-from ..problem.contact_surface import Surface
 from ..problem.problem import Problem
 from ..problem.references import References
-from ..rigid import AnyBody, FixedDirections, MotionFields, kernel
-from ..typing import Array, Integers, Mask
-from . import existence
+from ..typing import Array, Entities, Mask
+from .supported_body import Motions
+
+
+@dataclass(frozen=True)
+class PartForces:
+    """Nodal forces at some of this rank's vertices.
+
+    Attributes:
+        blocks: the vertices, each once, (m,).
+        values: in the components of the motions, (m, d).
+    """
+
+    blocks: Entities
+    values: Array
+
+    @classmethod
+    def nonzero(cls, values: Array) -> Self:
+        """Forces at all of this rank's vertices (vertices, d), where there are any."""
+        blocks = np.flatnonzero(values.any(axis=1)).astype(np.int32)
+        return cls(blocks, values[blocks])
 
 
 @dataclass(frozen=True)
 class Holder:
-    """A contact or a law that acts along one direction at each of this rank's vertices, in the components of motions.
+    """A contact or a law that acts along one direction at some of this rank's vertices, in the components of motions.
 
     Attributes:
-        direction: unit vectors, zero where nothing acts, (vertices, d).
-        force: what it gives along them, (vertices,).
-        least: the least it may give without a change of the displacement, perhaps -inf, (vertices,).
-        most: the most, perhaps inf, (vertices,).
+        blocks: the vertices, each once, (m,).
+        direction: unit vectors, (m, d).
+        force: what it gives along them, (m,).
+        least: the least it may give without a change of the displacement, perhaps -inf, (m,).
+        most: the most, perhaps inf, (m,).
     """
 
+    blocks: Entities
     direction: Array
     force: Array
     least: Array
     most: Array
 
     @property
-    def forces(self) -> Array:
-        """The forces as vectors, (vertices, d)."""
-        return self.direction * self.force[:, None]
+    def forces(self) -> PartForces:
+        """The forces as vectors."""
+        return PartForces(self.blocks, self.direction * self.force[:, None])
 
-    def spare(self, fields: Array, tiny: float) -> tuple[Array, Array]:
-        """By how much its work in motions (j, vertices, d) may fall and rise, (j,) each.
+    def spare(self, motions: Motions, tiny: float) -> tuple[Array, Array]:
+        """By how much its work in motions may fall and rise, (j,) each.
 
         Args:
-            fields: the motions.
+            motions: of a body.
             tiny: the part of a motion along the direction that counts as none.
         """
-        at = np.flatnonzero((self.least != self.force) | (self.most != self.force))
-        along = np.einsum("vd,jvd->jv", self.direction[at], fields[:, at])
+        along = np.einsum("md,jmd->jm", self.direction, motions.at(self.blocks))
         ends = np.zeros((2, *along.shape))
         for end, limit in zip(ends, (self.least, self.most), strict=True):
-            np.multiply(along, (limit - self.force)[at], out=end, where=np.abs(along) > tiny)
+            np.multiply(along, limit - self.force, out=end, where=np.abs(along) > tiny)
         return -np.sum(np.min(ends, axis=0), axis=1), np.sum(np.max(ends, axis=0), axis=1)
 
 
 @dataclass(frozen=True, kw_only=True)
 class ActingForces:
-    """Nodal forces at this rank's vertices, each (vertices, d), in the components of the motions.
+    """Nodal forces at this rank's vertices, in the components of the motions.
 
     Attributes:
-        left: what is left of all forces that act on the bodies.
+        left: what is left of all forces that act on the bodies, (vertices, d).
         loads: the loads.
         carried: forces that follow from the displacement.
         holders: contact and laws whose forces do not.
@@ -73,10 +91,10 @@ class ActingForces:
     """
 
     left: Array
-    loads: Array
-    carried: Sequence[Array]
+    loads: PartForces
+    carried: Sequence[PartForces]
     holders: Sequence[Holder]
-    capable: Sequence[Array]
+    capable: Sequence[PartForces]
     noise: Array
     summation: float
     tiny: float
@@ -118,103 +136,44 @@ class NetForces:
         return float(np.max(found, initial=0.0))
 
 
-def motions(problem: Problem, body: AnyBody, closed: Sequence[tuple[Surface, Mask]]) -> Array:
-    """Rigid motions that supports leave, then those that closed contact does not see, (j, vertices, d). Collective.
-
-    On interfaces they are relative, as forces there are those of bounds and laws.
-
-    Args:
-        problem: the problem.
-        body: the body that moves; the fields are zero on the others.
-        closed: surfaces, and at which of their vertices contact is closed.
-    """
-    comm = problem.domain.mesh.comm
-    fixed = existence.prescribed_directions(problem, body)
-    rows = [_normals(problem, body, surface, mask) for surface, mask in closed]
-    free, unseen = kernel(comm, body, [fixed]), kernel(comm, body, [fixed, *rows])
-    basis = free if unseen.shape == free.shape else np.hstack([free, unseen])
-    here = problem.space.dofmap.index_map.size_local
-    mine = problem.bodies.labels[:here] == body.index
-    fields = np.einsum("vnd,nj->jvd", problem.motions_at(np.arange(here, dtype=np.int32), body), basis)
-    return np.where(mine[:, None], fields, 0.0)
-
-
-def _normals(problem: Problem, body: AnyBody, surface: Surface, closed: Mask) -> FixedDirections:
-    mine = closed & existence.inside(problem, body, surface.blocks)
-    return FixedDirections(MotionFields(problem.motions_at(surface.blocks[mine], body)), surface.normals[mine])
-
-
-def capable(problem: Problem) -> list[Array]:
-    """Forces of the laws' own size along each of their directions, (vertices, d) each."""
+def capable(problem: Problem) -> list[PartForces]:
+    """Forces of the laws' own size along each of their directions."""
     found = []
     for term in problem.terms:
         size = term.weights[:, None] * term.exact.traction_scale
-        found += [spread(problem, term.surface, size * along) for along in np.moveaxis(term.directions, 1, 0)]
+        found += [PartForces(term.surface.blocks, size * along) for along in np.moveaxis(term.directions, 1, 0)]
     return found
 
 
-def spread(problem: Problem, surface: Surface, values: Array) -> Array:
-    """Values at a surface's vertices as those at all of this rank's vertices, zero elsewhere, (vertices, d).
-
-    Args:
-        problem: the problem.
-        surface: its vertices (m).
-        values: there, (m, d).
-    """
-    found = np.zeros((problem.space.dofmap.index_map.size_local, values.shape[1]))
-    found[surface.blocks] = values
-    return found
-
-
-def along(references: References, body: AnyBody, fields: Array, acting: ActingForces) -> NetForces:
+def along(references: References, motions: Motions, acting: ActingForces) -> NetForces:
     """The net forces of one body. Collective.
 
     Args:
         references: of the problem.
-        body: the body.
-        fields: its motions, (j, vertices, d).
+        motions: of the body.
         acting: what acts on all bodies.
     """
     carried = [*acting.carried, *(holder.forces for holder in acting.holders)]
-    spare, none = np.zeros((2, len(fields))), np.zeros(len(fields))
+    spare = np.zeros((2, motions.combined.shape[1]))
     for holder in acting.holders:
-        spare += holder.spare(fields, acting.tiny)
-    sums = np.array(
-        [
-            _work(fields, acting.left),
-            _work(fields, acting.loads),
-            sum((_works(fields, force) for force in carried), none),
-            sum((_works(fields, force) for force in acting.capable), none),
-            sum((_sizes(fields, force) for force in (acting.loads, *carried)), none),
-            np.einsum("jvd,jvd->j", fields, fields),
-            *spare,
-        ]
-    )
+        spare += holder.spare(motions, acting.tiny)
+    loads, carry, could = (_works(motions, forces) for forces in ([acting.loads], carried, acting.capable))
+    left = motions.works(acting.left)
+    sums = np.array([left, loads[0], carry[1], could[1], loads[2] + carry[2], motions.squares, *spare])
     references.problem.domain.mesh.comm.Allreduce(MPI.IN_PLACE, sums)
     left, push, held, able, sizes, squares, fall, rise = sums
-    lengths = np.sqrt(squares)
-    scale = np.max([np.abs(push), held, able], axis=0) * lengths * references.surface[body.index]
-    rounding = acting.summation * sizes + acting.noise[body.index] * lengths
+    index, lengths = motions.of.body.index, np.sqrt(squares)
+    scale = np.max([np.abs(push), held, able], axis=0) * lengths * references.surface[index]
+    rounding = acting.summation * sizes + acting.noise[index] * lengths
     return NetForces(np.maximum(np.abs(left) - np.where(left > 0, fall, rise), 0.0), rounding, scale, sizes)
 
 
-def _work(fields: Array, force: Array) -> Array:
-    """The work of a force (vertices, d) in motions (j, vertices, d), (j,)."""
-    return np.asarray(fields.reshape(len(fields), force.size) @ force.ravel())
-
-
-def _works(fields: Array, force: Array) -> Array:
-    """The sum of the sizes of the works by vertex, (j,)."""
-    at = _acting(force)
-    return np.asarray(np.sum(np.abs(np.einsum("vd,jvd->jv", force[at], fields[:, at])), axis=1))
-
-
-def _sizes(fields: Array, force: Array) -> Array:
-    """The sum of the sizes of a force, each times that of the motion there, (j,)."""
-    at = _acting(force)
-    return np.asarray(np.linalg.norm(fields[:, at], axis=2) @ np.linalg.norm(force[at], axis=1))
-
-
-def _acting(force: Array) -> Integers:
-    """The vertices where a force is not zero: those of a surface, as a rule."""
-    return np.flatnonzero(functools.reduce(np.logical_or, (force != 0.0).T))
+def _works(motions: Motions, forces: Sequence[PartForces]) -> Array:
+    """The work of forces in motions, the sum of its sizes by vertex, and of the products of lengths there, (3, j)."""
+    found = np.zeros((3, motions.combined.shape[1]))
+    for force in forces:
+        fields = motions.at(force.blocks)
+        works = np.einsum("md,jmd->jm", force.values, fields)
+        lengths = np.linalg.norm(fields, axis=2) @ np.linalg.norm(force.values, axis=1)
+        found += [works.sum(axis=1), np.abs(works).sum(axis=1), lengths]
+    return found

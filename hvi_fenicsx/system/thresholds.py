@@ -27,6 +27,8 @@ class Thresholds:
         level_growth: factor by which unknowns grow from one level of a multigrid to the next, at least.
         held_weight: weight in the prolongation from which a coarse unknown is held with the fine one: of the unknowns
             that move a vertex, one in space has 1/4 or more.
+        whole_weight: weights in the prolongation from which a relative displacement has all its coarse vertices on the
+            interface; with one of two missing they are 1/2.
         held_stiffness: diagonal of a held unknown, in units of an elastic stiffness (about 1): what the unknown moves
             is less than rounding.
         rounding: of the local components of a unit vector.
@@ -45,6 +47,7 @@ class Thresholds:
     dense_columns: int = 64
     level_growth: float = 3.0
     held_weight: float = 0.2
+    whole_weight: float = 0.9
     held_stiffness: float = 1e20
     rounding: float = 1e-12
     infinite_displacement: float = 1e100
