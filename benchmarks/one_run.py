@@ -108,8 +108,10 @@ def spmv(system: System) -> float:
 
 
 def warm(task: Figures) -> None:
-    """The same on a small mesh."""
-    if task.get("warm", True):
+    """The same on a small mesh; ``warm`` may give overrides for it, or be false."""
+    if isinstance(task.get("warm"), list):
+        contact(read_scene(Path(task["scene"]), [*task["overrides"], *task["warm"]]))
+    elif task.get("warm", True):
         scene = read_scene(Path(task["scene"]), task["overrides"])
         cells = (16, 16) if scene.dimension == 2 else (4, 4, 4)
         if scene.domain.shape != "file":

@@ -104,7 +104,8 @@ def _interfaces(scene: Tables) -> Iterator[Mistake]:
             yield Mistake(("interface", name), f"boundary.{name} has this name already; choose another")
         sides = frozenset(part.between)
         if sides in met:
-            yield Mistake(("interface", name, "between"), f"these sides meet in interface.{met[sides]} already")
+            text = f"these sides meet in interface.{met[sides]} already; give that one all that acts between them"
+            yield Mistake(("interface", name, "between"), text)
         met.setdefault(sides, name)
 
 

@@ -221,6 +221,13 @@ def _toml(file: Path, text: str) -> dict[str, Any]:
         raise InputError(f"{file}: {reason}") from None
 
 
+_MENDS = {
+    "Invalid value": "texts need quotes",
+    "Cannot declare": "give each table a name of its own, or join the two",
+}
+"""How to mend what tomllib says."""
+
+
 def _broken(file: Path, text: str, message: str) -> str:
     """Tomllib's message with its place in front."""
     reason = re.sub(r" \(at .*\)$", "", message, flags=re.DOTALL)
@@ -228,5 +235,5 @@ def _broken(file: Path, text: str, message: str) -> str:
     line, column = found.groups() if found else (str(text.count("\n") + 1), "1")
     content = text.splitlines()[int(line) - 1 :][:1]
     hint = f": {content[0].strip()[:60]}" if content and content[0].strip() else ""
-    mend = "; texts need quotes" if "Invalid value" in reason else ""
+    mend = next((f"; {mend}" for start, mend in _MENDS.items() if reason.startswith(start)), "")
     return f"{file}:{line}:{column}: not valid TOML: {reason}{mend}{hint}"

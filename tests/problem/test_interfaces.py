@@ -304,7 +304,7 @@ def changed(path: str, value: Any) -> Table:
         ("interface.seam.between", ["upper.bottom", "middle.top"], 'unknown side "middle.top"'),
         ("interface.seam.between", ["upper.bottom"], "2 entries"),
         ("interface.seam.tied", True, "leave out contact"),
-        ("interface.other", {"between": ["lower.top", "upper.bottom"], "tied": True}, "meet in interface.seam"),
+        ("interface.other", {"between": ["lower.top", "upper.bottom"], "tied": True}, "already; give that one"),
         ("interface.push", {"between": ["lower.left", "upper.bottom"], "tied": True}, "has this name already"),
         ("interface.seam.traction", [0.0, 1.0], 'unknown key "traction"'),
         ("interface.seam.contact", {"obstacle": {"point": [0, 0], "normal": [0, 1]}}, "no body"),

@@ -256,6 +256,12 @@ REFUSED = {
         "on = left",
         "s.toml:11:6: not valid TOML: Invalid value; texts need quotes: on = left",
     ),
+    "table that is there twice": (
+        "[solver]",
+        "[boundary.wall]",
+        "s.toml:20:15: not valid TOML: Cannot declare ('boundary', 'wall') twice; give each table a name of its own, "
+        "or join the two: [boundary.wall]",
+    ),
     "name that no file can have": (
         "[boundary.wall]",
         '[boundary."a,b"]',
