@@ -15,7 +15,6 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from hvi_fenicsx import preparation, workflow
-from hvi_fenicsx.certify import certificate
 from hvi_fenicsx.errors import HviError
 from hvi_fenicsx.solvers import SolveContext, SolveResult, registry
 from hvi_fenicsx.solvers.context import RunControl
@@ -58,7 +57,7 @@ def _attempt(case: Case, data: Mapping[str, Any], method: str, late: Callable[[]
     if known.state == "escapes":
         return {**about, "outcome": "escapes", "reason": "no solution exists"}
     found = _solved(case, data, prepared, late)
-    proof = certificate.examine(prepared.problem, found.u, data["tolerance"])
+    found, proof = workflow.judged(prepared, found)
     outcome = "certified" if proof.certificate.passed else _unsolved(known.state, found)
     return {
         **about,

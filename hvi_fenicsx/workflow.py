@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 from dolfinx import fem
 from mpi4py import MPI
 
-from .certify import certificate, plausibility
+from .certify import certificate, correction, plausibility
 from .certify.certificate import Examination
 from .certify.estimate.estimator import Estimate, estimate
 from .certify.uniqueness import Uniqueness, uniqueness
@@ -92,14 +93,14 @@ def finish_with_levels(
         return unsolved(prepared), ()
     control = RunControl(timer=prepared.timer, progress=progress, interrupted=interrupted)
     solved = _solved(prepared, control, start)
-    examination, warnings = _examined(prepared, solved.result)
+    result, examination, warnings = _examined(prepared, solved.result, solved.levels)
     errors = None
     if estimating and examination.certificate.passed and prepared.problem.has_potential:
         with prepared.timer("estimate"):
-            errors = estimate(prepared.system, solved.levels, solved.result.u, examination)
+            errors = estimate(prepared.system, solved.levels, result.u, examination)
         warnings += plausibility.of_estimate(errors)
-    only = _uniqueness(prepared, solved.result, examination)
-    found = _solution(prepared, solved.result, examination, prepared.warnings + warnings, errors, only)
+    only = _uniqueness(prepared, result, examination)
+    found = _solution(prepared, result, examination, prepared.warnings + warnings, errors, only)
     return found, solved.levels
 
 
@@ -110,8 +111,8 @@ def certified(prepared: Preparation, found: SolveResult) -> Solution:
         prepared: the scene.
         found: the displacement.
     """
-    examination, warnings = _examined(prepared, found)
-    return _solution(prepared, found, examination, prepared.warnings + warnings)
+    result, examination, warnings = _examined(prepared, found)
+    return _solution(prepared, result, examination, prepared.warnings + warnings)
 
 
 def _uniqueness(prepared: Preparation, found: SolveResult, examination: Examination) -> Uniqueness | None:
@@ -122,15 +123,37 @@ def _uniqueness(prepared: Preparation, found: SolveResult, examination: Examinat
         return uniqueness(prepared.system, found.u, examination)
 
 
-def _examined(prepared: Preparation, found: SolveResult) -> tuple[Examination, tuple[str, ...]]:
-    """The certificate, and warnings about the solution. Collective."""
-    options = prepared.options
+def _examined(
+    prepared: Preparation, found: SolveResult, levels: Levels = ()
+) -> tuple[SolveResult, Examination, tuple[str, ...]]:
+    """The result, its certificate, and warnings about the solution. Collective."""
     with prepared.timer("certificate"):
-        examination = certificate.examine(prepared.problem, found.u, options.tolerance, inertia=options.second_order)
-        warnings = plausibility.of_solution(prepared.problem, examination, found.u)
+        result, examination = judged(prepared, found, levels)
+        warnings = plausibility.of_solution(prepared.problem, examination, result.u)
     warn(_LOG, warnings)
     _log_certificate(examination.certificate)
-    return examination, warnings
+    return result, examination, warnings
+
+
+def judged(prepared: Preparation, found: SolveResult, levels: Levels = ()) -> tuple[SolveResult, Examination]:
+    """A result and what the certificate says of it; corrected where rounding alone may speak against it. Collective.
+
+    Args:
+        prepared: the scene.
+        found: the result.
+        levels: the coarser levels of the system.
+    """
+    options = prepared.options
+
+    def examined(u: fem.Function) -> Examination:
+        return certificate.examine(prepared.problem, u, options.tolerance, inertia=options.second_order)
+
+    examination = examined(found.u)
+    if not (found.converged and correction.may_help(examination.certificate)):
+        return found, examination
+    u = correction.corrected(prepared.system, levels, found.u, examination)
+    again = examined(u)
+    return (replace(found, u=u), again) if again.certificate.passed else (found, examination)
 
 
 def unsolved(prepared: Preparation) -> Solution:

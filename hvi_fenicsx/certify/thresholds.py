@@ -14,6 +14,7 @@ class Thresholds:
         no_jump: jump of a traction, relative to the law's scale, that is rounding.
         largest_rounding: a certificate's entry above this is no rounding.
         rounding_safety: factor within which the sample of the rounding error is trusted.
+        correction: relative residual of the step that takes the rounding of the matrix out.
         along: part of a rigid motion along a direction, per radian or unit length, that is rounding.
         nothing_acts: net forces along a rigid motion that are this small beside the sum of all forces are none.
         summation: rounding error of a sum of nodal forces, relative to the sum of their sizes.
@@ -28,6 +29,7 @@ class Thresholds:
     no_jump: float = 1e-12
     largest_rounding: float = 1e-4
     rounding_safety: float = 4.0
+    correction: float = 1e-6
     along: float = 1e-9
     nothing_acts: float = 1e-10
     summation: float = 1e-14

@@ -43,8 +43,9 @@ def test_auto_solves_a_small_case(case: Case) -> None:
     solve_and_judge(case)
 
 
-STEEP = [case for case in LISTED if case.key == "9206d05c90"]
-"""A law smoothed with ε = 1e-6, 1e-5 from the limit load: it was not certified at degree 2."""
+STEEP = [case for case in LISTED if case.key in ("9206d05c90", "135630e77f")]
+"""They were not certified at degree 2: a law smoothed with ε = 1e-6, 1e-5 from the limit load, and a body a hundred
+times as long as high, bent so far that the rounding of the matrix had a net force."""
 
 
 @pytest.mark.long
