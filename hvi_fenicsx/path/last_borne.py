@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,7 +17,9 @@ from ..scene import PathTable
 from ..solution import LastBorne, Solution
 from ..solvers import frozen_mixity
 from ..solvers.context import never
-from .following import Control, PathRun
+
+if TYPE_CHECKING:
+    from .following import PathRun
 
 _LOG = logger("path")
 
@@ -43,6 +46,8 @@ def in_place_of(prepared: Preparation, failed: Solution, interrupted: Callable[[
 
 def _at_the_limit(prepared: Preparation, failed: Solution, interrupted: Callable[[], bool]) -> Solution:
     """The state of the largest factor below that of the whole load; else what was found. Collective."""
+    from .following import Control, PathRun  # two hundred modules, which few runs want
+
     run = PathRun(prepared, PathTable(memory=False))
     if not run.is_straight and run.size > prepared.options.thresholds.path.curved_unknowns:
         return failed
