@@ -100,13 +100,13 @@ class ChoiceThresholds:
     Attributes:
         price: how many times as much an unknown of degree 2 costs as one of degree 1.
         budget: part of a time budget by which degree 2 must have been solved on the first mesh.
-        much: accuracy from which on degree 2 is begun with: on a coarse mesh degree 1 hardly has it.
+        much: accuracy from which on degree 2 is begun with.
         small: unknowns of degree 2 on the first mesh up to which this is done.
     """
 
     price: float = 2.0
     budget: float = 0.5
-    much: float = 0.03
+    much: float = 0.1
     small: int = 20_000
 
 

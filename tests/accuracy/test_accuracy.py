@@ -224,11 +224,10 @@ def test_the_degree_is_the_cheaper_one(asked: float, degree: int, monkeypatch: p
 
 def test_where_much_is_asked_for_the_run_begins_at_degree_two() -> None:
     scene = Scene.model_validate(STRONG)
-    reached, alone = (reach(scene, Goal(0.01), degree) for degree in (None, 2))
+    reached, alone = (reach(scene, Goal(0.03), degree) for degree in (None, 2))
     assert (reached.degree, reached.choice) == (2, None)
     assert [s.dofs for s in reached.steps] == [s.dofs for s in alone.steps]
-    loose, value = (reach(scene, goal, None) for goal in (Goal(0.07), Goal(0.2, "resultant")))
-    assert loose.choice is not None
+    value = reach(scene, Goal(0.2, "resultant"), None)
     assert (value.degree, value.choice) == (1, None)
 
 
