@@ -111,6 +111,7 @@ def test_energies_balance_on_mixed_paths_with_memory(angle: float, closes: bool,
     assert turns[2].x == pytest.approx(turns[0].x, abs=1e-8)
 
 
+@pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize(
     ("points", "angle"),
     [

@@ -11,8 +11,10 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 import tomli_w
-from runs import hvi, summary
+from runs import ROOT, hvi, summary
 from scenes import Table
+
+import hvi_fenicsx
 
 PEAK, FIRST, LAST = 2.0e6, 1.0e-6, 1.0e-5
 MIXED = {"mixity": "benzeggagh_kenane", "energy_ratio": 2.0, "exponent": 2.1}
@@ -47,6 +49,15 @@ def rows(folder: Path) -> tuple[list[str], npt.NDArray[np.float64]]:
     keys = ("factor", "work", "dissipated", "pull.fx", "pull.fy")
     found = [row for row in found if row["event"] != "step"]  # where a curve is sampled is nothing that has to agree
     return [row["event"] for row in found], np.array([[float(row[key]) for key in keys] for row in found])
+
+
+def test_a_joint_whose_vertices_all_soften_at_once_comes_off_at_its_strength() -> None:
+    """s = 3e7 / sqrt(sin⁴ 30° + (sin 30° cos 30° / 0.7)²); the limit points of 28 vertices are 1e-10 apart."""
+    path = hvi_fenicsx.follow(hvi_fenicsx.read_scene(ROOT / "demos" / "scarf_joint.toml"), to=1.3)
+    strength = 3.0e7 / np.hypot(0.25, 0.25 * np.sqrt(3.0) / 0.7)
+    assert path.end == "escapes"
+    assert path.peak_factor == pytest.approx(strength / 4.0e7, rel=1e-6)
+    assert path.uncertified == 0
 
 
 @pytest.mark.parametrize("mixity", [{}, MIXED], ids=["one energy", "by mode"])

@@ -205,7 +205,8 @@ class ArcLengthFollower(Follower):
     def _jump(self, aim: float) -> Iterator[PathState]:
         """On to the next stable equilibrium at the same factor, or off."""
         factor, problem = self._curve.factor, self._problem
-        landing = jump(problem, self._sites, self._curve.here, problem.load(factor), self._lag)
+        heading = -self._curve.trend or 1
+        landing = jump(problem, self._sites, self._curve.here, problem.load(factor), self._lag, heading)
         if landing is None:
             self._finish(End.LOST, f"no stable equilibrium found at the factor {factor:.6g}")
             yield self._state(Event.END)

@@ -23,6 +23,8 @@ from .sites import Sites
 
 _BEYOND = 1e-2
 """A step along the path, in units of s."""
+_PUSH = 1e-6
+"""How much larger the loads are that take a body off a state at which it would rest."""
 _MOST = 40
 """Steps of such a curve at most."""
 
@@ -38,7 +40,9 @@ class Landing:
     z: Array | None
 
 
-def jump(problem: CondensedProblem, sites: Sites, here: Place, load: Array, lag: Array) -> Landing | None:
+def jump(
+    problem: CondensedProblem, sites: Sites, here: Place, load: Array, lag: Array, heading: int
+) -> Landing | None:
     """The landing, with the sites there; None where none was found, with the sites where they were.
 
     Args:
@@ -47,6 +51,7 @@ def jump(problem: CondensedProblem, sites: Sites, here: Place, load: Array, lag:
         here: the state, and where its curve goes on.
         load: f, (n,).
         lag: an order of the sites, (m,).
+        heading: 1 where larger factors are not borne, -1 where smaller ones are not.
     """
     kept = sites.kept()
     for restraint in _restraints(problem, sites, here):
@@ -56,11 +61,35 @@ def jump(problem: CondensedProblem, sites: Sites, here: Place, load: Array, lag:
                 return found
             sites.restore(kept)
     start = here.y[:-1] if sites.on_drops() else _beyond(problem, sites, here)
-    relaxation = Relaxation(problem, sites, start, load, lag)
-    if relaxation.run(sites.rates(here.y[:-1], here.tangent[:-1])):
-        return Landing(z=None if relaxation.escapes else relaxation.z)
-    sites.restore(kept)
-    return None
+    directions = sites.rates(here.y[:-1], here.tangent[:-1])
+    found = _relaxed(problem, sites, start, load, lag, directions)
+    if found is None:
+        sites.restore(kept)
+        push = _PUSH * heading * np.max(np.abs(load)) / np.max(np.abs(problem.force_rate), initial=1e-300)
+        found = _pushed_off(problem, sites, here, load, push * problem.force_rate, lag)
+    if found is None:
+        sites.restore(kept)
+    return found
+
+
+def _relaxed(
+    problem: CondensedProblem, sites: Sites, z: Array, load: Array, lag: Array, directions: Array
+) -> Landing | None:
+    relaxation = Relaxation(problem, sites, z, load, lag)
+    if not relaxation.run(directions):
+        return None
+    return Landing(z=None if relaxation.escapes else relaxation.z)
+
+
+def _pushed_off(
+    problem: CondensedProblem, sites: Sites, here: Place, load: Array, push: Array, lag: Array
+) -> Landing | None:
+    """By loads that are a little larger at first: where many bonds reach an end together, the body is at rest."""
+    directions = sites.rates(here.y[:-1], here.tangent[:-1])
+    found = _relaxed(problem, sites, here.y[:-1].copy(), load + push, lag, directions)
+    if found is None or found.z is None:
+        return found
+    return _relaxed(problem, sites, found.z, load, lag, directions)
 
 
 def _beyond(problem: CondensedProblem, sites: Sites, here: Place) -> Array:

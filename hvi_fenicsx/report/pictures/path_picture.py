@@ -20,6 +20,8 @@ _CAPTION = (
     "The load path: force over mean displacement of the driven part. Solid: stable; dashed: unstable, which a test "
     "cannot hold; dotted: jumps; dots: events on the way."
 )
+_ENTRIES = 0.25
+"""Room for the second line of the legend, inches."""
 _DOTS = 400
 """So many events have a dot at most."""
 
@@ -49,7 +51,7 @@ def make(result: PathResult) -> Figure:
     assert result.driven is not None
     u, force = result.along(result.driven)
     units = unit_for(float(np.max(np.abs(u))), "m"), unit_for(float(np.max(np.abs(force))), _unit(result))
-    fig = figure(HEADING + 5.4)
+    fig = figure(HEADING + 5.4 + _ENTRIES)
     titled(fig, result.title, _subject(result), *_verdict(result))
     axes = area(fig, 1.15, 0.85, 6.5, 4.45)
     x, y = np.asarray(u / units[0].size), np.asarray(force / units[1].size)
@@ -59,9 +61,16 @@ def make(result: PathResult) -> Figure:
     axes.set_xlabel(f"mean displacement of “{result.driven}” along its force ({units[0].name})")
     axes.set_ylabel(f"force on “{result.driven}” ({units[1].name})")
     axes.margins(0.06, 0.10)
-    axes.legend(loc="lower right", bbox_to_anchor=(1.015, 1.0), ncols=5, frameon=False, fontsize=10, borderaxespad=0.0,
-                handlelength=1.6, columnspacing=0.9)  # fmt: skip
+    _explain(axes)
     return fig
+
+
+def _explain(axes: Axes) -> None:
+    """The legend above the curve, in two lines where it has more than four entries."""
+    count = len(axes.get_legend_handles_labels()[0])
+    columns = count if count <= 4 else -(-count // 2)
+    axes.legend(loc="lower right", bbox_to_anchor=(1.015, 1.0), ncols=columns, frameon=False, fontsize=10,
+                borderaxespad=0.0, handlelength=1.6, columnspacing=0.9)  # fmt: skip
 
 
 def _unit(result: PathResult) -> str:

@@ -1,0 +1,49 @@
+"""The picture of a load path: its legend is read beside the heading and inside the picture, however much it names."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+from hvi_fenicsx.report.path_reader import PathResult
+from hvi_fenicsx.report.pictures.path_picture import make
+
+EVENTS = ("start", "kink", "fold", "jump", "turn", "fold", "end")
+
+
+def result(events: tuple[str, ...], stable: tuple[float, ...], end: str) -> PathResult:
+    force = 220.6e3 * np.array([0.0, 0.7, 1.0, 1.0, 0.6, 0.2, 0.1])
+    columns = {"stable": np.array(stable), "pull.fx": force, "pull.fy": 0 * force}
+    columns |= {"pull.ux": 1e-4 * np.arange(7.0), "pull.uy": np.zeros(7)}
+    peak = {"pull": {"force": [220.6e3, 0.0]}}
+    path = {"peak_factor": 1.10313, "events": 31, "folds": 2, "uncertified": 0, "end": end}
+    summary = {"path": {**path, "scaled": ["pull.traction"], "peak_forces": peak}}
+    title = {"title": "A bar, glued along its length and pulled at one end"}
+    return PathResult(folder=Path(), scene=title, summary=summary, columns=columns, events=events)
+
+
+@pytest.mark.parametrize(
+    ("events", "stable", "end", "entries"),
+    [
+        (("start", *["kink"] * 5, "end"), (1,) * 7, "reached", 3),
+        (EVENTS, (1,) * 7, "reached", 5),
+        (EVENTS, (1, 1, 0, 1, 1, 0, 0), "escapes", 7),
+    ],
+)
+def test_the_legend_is_inside_the_picture_and_below_its_heading(
+    events: tuple[str, ...], stable: tuple[float, ...], end: str, entries: int
+) -> None:
+    fig = make(result(events, stable, end))
+    canvas = FigureCanvasAgg(fig)
+    canvas.draw()
+    legend = fig.axes[0].get_legend()
+    assert legend is not None
+    assert len(legend.get_texts()) == entries
+    box = legend.get_window_extent()
+    assert box.x0 >= 0.0
+    assert box.x1 <= fig.bbox.width
+    assert not any(box.overlaps(text.get_window_extent()) for text in fig.texts)
+    assert box.y0 >= fig.axes[0].get_window_extent().y1 - 1.0
