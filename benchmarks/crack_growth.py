@@ -23,7 +23,9 @@ from common import DEMOS, ROOT, insert, table
 
 import hvi_fenicsx as hvi
 from hvi_fenicsx.modelling.following import ModelPath
+
 PAGE = ROOT / "docs" / "benchmarks" / "paths.md"
+HEAD = ("vertices", "rows", "jumps", "largest factor")
 GROWN = 4.5
 """The factor at which half of the glue is broken."""
 
@@ -55,11 +57,11 @@ def followed(file: Path, vertices: int) -> tuple[Any, ...]:
     return (vertices, len(path.rows), len(path.jumps), f"{path.peak_factor:.4g}", certified, *figures)
 
 
-def exponents(rows: list[tuple[Any, ...]]) -> str:
-    """Of events and time over vertices, between the two finest meshes."""
+def exponents(rows: list[tuple[Any, ...]]) -> tuple[str, str]:
+    """Of events and time over vertices, between the two finest meshes, as a row."""
     (n0, e0, *_, t0, _), (n1, e1, *_, t1, _) = rows[-2:]
     events, seconds = (np.log(b / a) / np.log(n1 / n0) for a, b in ((e0, e1), (float(t0), float(t1))))
-    return f"Exponents between {n0} and {n1} vertices: events {events:.2f}, processor time {seconds:.2f}."
+    return f"exponents of rows and processor time, {n0} to {n1} vertices", f"{events:.2f}; {seconds:.2f}"
 
 
 def loop(file: Path, increments: int) -> dict[str, Any]:
@@ -135,14 +137,14 @@ def main() -> None:
         for file, vertices in zip(files, options.vertices, strict=True):
             rows.append(followed(file, vertices))
             print(*rows[-1], sep="\t", flush=True)
-        print(exponents(rows), flush=True)
-        beside = compared(files[0], options.increments)
+        print(*exponents(rows), flush=True)
+        beside = [exponents(rows), *compared(files[0], options.increments)]
     for row in beside:
         print(*row, sep="\t")
     if options.write:
-        head = ("vertices", "rows", "jumps", "largest factor", "certified", "processor time, s", "share of the follower")
-        text = table(head, rows) + "\n" + exponents(rows) + "\n\n" + table(("", ""), beside)
-        insert(PAGE, "crack growth", text)
+        head = (*HEAD, "certified", "processor time, s", "share of the follower")
+        insert(PAGE, "crack growth", table(head, rows))
+        insert(PAGE, "single runs", table(("", ""), beside))
 
 
 if __name__ == "__main__":

@@ -1,7 +1,8 @@
 """Is a state of a path an equilibrium? On Γc for each, for the whole body as often as it costs little.
 
 On Γc: each unknown must be on the graph of its laws and bounds, with the force that the body leaves there; S and f come
-from the factorised body. The certificate of the whole body (:mod:`.certify`) reassembles all forces from the forms.
+from the factorised body. The certificate of the whole body (:mod:`.certify`) reassembles all forces from the forms;
+where bonds remember, what was judged on Γc must be what these forces leave there.
 """
 
 from __future__ import annotations
@@ -11,9 +12,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..certify import certificate
+from ..certify import certificate, contact_state
 from ..equilibrium_paths.state import Event, PathState
 from ..problem.factored_problem import FactoredProblem
+from ..problem.vectors import turn
 from ..solvers import frozen_mixity
 from ..system.condensation import Condensation
 from ..system.system import System
@@ -67,8 +69,23 @@ class Certifier:
             number: of its row.
         """
         on_surface = self._distance(state) <= self._tolerance
-        whole = _plain(state) and (state.event in ALWAYS or is_examined(number))
-        return Verdict(certified=on_surface and (not whole or self._examined(state)), whole=whole)
+        whole = state.event in ALWAYS or is_examined(number)
+        examined = self._examined if _plain(state) else self._in_balance
+        return Verdict(certified=on_surface and (not whole or examined(state)), whole=whole)
+
+    def _in_balance(self, state: PathState) -> bool:
+        """Whether forces from the forms are those that were judged on Γc, and none are left elsewhere. Collective.
+
+        What bonds remember is in their graphs on Γc, not in the laws that the certificate of a single run knows.
+        """
+        system, factor = self._system, state.factor
+        u = system.displacement(self._condensation.expand(state.x, factor))
+        forces = contact_state.forces(self._factored.at(factor), u)
+        reaction = system.load.duplicate()
+        reaction.array[:] = forces.reaction.ravel()
+        turn(reaction, system.rotation)
+        size = max(np.sqrt(system.comm.allreduce(float(np.sum(f**2)))) for f in (forces.load, forces.reaction))
+        return self._condensation.unbalanced(reaction, state.x, factor) <= self._tolerance * (size or 1.0)
 
     def _examined(self, state: PathState) -> bool:
         """Whether the certificate of the whole body passes. Collective."""

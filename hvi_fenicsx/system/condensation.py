@@ -181,6 +181,24 @@ class Condensation:
         found[fixed] = self._system.holding.at_prescribed(u, self._system.rotation) - applied[fixed]
         return found
 
+    def unbalanced(self, reaction: PETSc.Vec, x: Array, factor: float) -> float:
+        """What is left of forces on the body once contact and laws carry S x - f at their unknowns. Collective.
+
+        Args:
+            reaction: internal forces minus loads of the whole body, in the components of the unknowns.
+            x: the condensed unknowns, (n,).
+            factor: λ.
+
+        Returns:
+            The Euclidean norm off the supports.
+        """
+        interior, carried = self._interior, np.zeros(self._interior.size)
+        carried[self._stay] = self.problem.stiffness @ x - self.problem.load(factor)
+        left = reaction.array.copy()
+        left[interior.kept] -= carried[interior.first : interior.first + len(interior.kept)]
+        left[np.union1d(self._system.problem.fixed_here, self._system.pins)] = 0.0
+        return float(np.sqrt(self._system.comm.allreduce(float(left @ left))))
+
     def free(self) -> None:
         """Free the PETSc objects."""
         self._interior.free()

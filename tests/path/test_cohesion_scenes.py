@@ -52,7 +52,7 @@ def rows(folder: Path) -> tuple[list[str], npt.NDArray[np.float64]]:
 
 
 def test_a_joint_whose_vertices_all_soften_at_once_comes_off_at_its_strength() -> None:
-    """s = 3e7 / sqrt(sin⁴ 30° + (sin 30° cos 30° / 0.7)²); the limit points of 28 vertices are 1e-10 apart."""
+    """S = 3e7 / sqrt(sin⁴ 30° + (sin 30° cos 30° / 0.7)²); the limit points of 28 vertices are 1e-10 apart."""
     path = hvi_fenicsx.follow(hvi_fenicsx.read_scene(ROOT / "demos" / "scarf_joint.toml"), to=1.3)
     strength = 3.0e7 / np.hypot(0.25, 0.25 * np.sqrt(3.0) / 0.7)
     assert path.end == "escapes"

@@ -40,9 +40,7 @@ class Landing:
     z: Array | None
 
 
-def jump(
-    problem: CondensedProblem, sites: Sites, here: Place, load: Array, lag: Array, heading: int
-) -> Landing | None:
+def jump(problem: CondensedProblem, sites: Sites, here: Place, load: Array, lag: Array, heading: int) -> Landing | None:
     """The landing, with the sites there; None where none was found, with the sites where they were.
 
     Args:

@@ -20,7 +20,7 @@ _CAPTION = (
     "The load path: force over mean displacement of the driven part. Solid: stable; dashed: unstable, which a test "
     "cannot hold; dotted: jumps; dots: events on the way."
 )
-_ENTRIES = 0.25
+_ENTRIES = 0.35
 """Room for the second line of the legend, inches."""
 _DOTS = 400
 """So many events have a dot at most."""

@@ -1,0 +1,48 @@
+"""States after unloading are certified with the whole body: with memory, on a floor, in space, between two bodies."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from runs import ROOT
+
+import hvi_fenicsx as hvi
+from hvi_fenicsx import prepare
+from hvi_fenicsx.certify import contact_state
+from hvi_fenicsx.problem.vectors import turn
+from hvi_fenicsx.system.condensation import Condensation
+
+SOFT = "boundary.base.adhesion.points=[[0,0],[5e-6,1e6],[1e-4,0]]"
+
+
+@pytest.mark.parametrize(
+    ("demo", "changes"),
+    [
+        ("anchor_3d", ["domain.cells=[2,2,1]", SOFT, "path.to=[1.3,0.4]"]),
+        pytest.param("scarf_joint", ["path.to=[1.0,0.3]"], marks=pytest.mark.long),
+        pytest.param("single_lap", ["path.to=[5.0,0.3]"], marks=pytest.mark.long),
+    ],
+)
+def test_every_row_is_certified_with_the_whole_body(demo: str, changes: list[str]) -> None:
+    path = hvi.follow(hvi.read_scene(ROOT / "demos" / f"{demo}.toml", changes))
+    assert len(path.rows) < 100
+    assert path.run.states[-1].memory is not None
+    assert path.examined == len(path.rows)
+    assert path.uncertified == 0
+
+
+@pytest.mark.parametrize("demo", ["anchor_3d", "scarf_joint", "hertz"])
+def test_a_force_inside_the_body_that_nothing_carries_is_seen(demo: str) -> None:
+    """Whatever the unknowns of Γc are, the body follows them; with other loads inside it does not."""
+    system = prepare(hvi.read_scene(ROOT / "demos" / f"{demo}.toml")).system
+    condensed, rng = Condensation(system), np.random.default_rng(0)
+    x = rng.normal(0.0, 1.0, condensed.problem.size)
+    for factor, balanced in ((1.0, True), (0.9, False)):
+        forces = contact_state.forces(system.problem, system.displacement(condensed.expand(x, factor)))
+        reaction = system.load.duplicate()
+        reaction.array[:] = forces.reaction.ravel()
+        turn(reaction, system.rotation)
+        left = condensed.unbalanced(reaction, x, 1.0)
+        size = float(np.linalg.norm(forces.load))
+        assert (left < 1e-8 * float(np.linalg.norm(forces.reaction))) is balanced
+        assert balanced or left > 0.01 * size
