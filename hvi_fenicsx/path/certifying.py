@@ -85,7 +85,7 @@ class Certifier:
         reaction.array[:] = forces.reaction.ravel()
         turn(reaction, system.rotation)
         size = max(np.sqrt(system.comm.allreduce(float(np.sum(f**2)))) for f in (forces.load, forces.reaction))
-        return self._condensation.unbalanced(reaction, state.x, factor) <= self._tolerance * (size or 1.0)
+        return bool(self._condensation.unbalanced(reaction, state.x, factor) <= self._tolerance * (size or 1.0))
 
     def _examined(self, state: PathState) -> bool:
         """Whether the certificate of the whole body passes. Collective."""
