@@ -46,7 +46,7 @@ def at_full_load(problem: CondensedProblem, most_events: int) -> FullLoad | None
 
 
 def _event_by_event(problem: CondensedProblem, most_events: int) -> FullLoad | None:
-    """Of piecewise linear laws: as stable as it goes, or else along the whole curve of equilibria.
+    """Where piecewise linear laws lead: as stable as it goes, or else along the whole curve of equilibria.
 
     Where a body comes off on the way, the curve is followed on, through the limit point, since its factor may rise to 1
     again.
@@ -61,7 +61,7 @@ def _event_by_event(problem: CondensedProblem, most_events: int) -> FullLoad | N
 
 
 def _along_the_curve(problem: CondensedProblem, most_events: int) -> FullLoad | None:
-    """Of other laws: along the curve of equilibria, since a jump takes longer to follow than the whole curve."""
+    """Where other laws lead: along the curve of equilibria, since a jump takes longer than the whole curve."""
     follower, states = _followed(problem, Follow.EXACT, most_events)
     if follower.end is End.ESCAPES and states:
         largest = max(state.factor for state in states)

@@ -82,7 +82,7 @@ def _relaxed(
 def _pushed_off(
     problem: CondensedProblem, sites: Sites, here: Place, load: Array, push: Array, lag: Array
 ) -> Landing | None:
-    """By loads that are a little larger at first: where many bonds reach an end together, the body is at rest."""
+    """The landing under loads that are larger at first: where many bonds reach an end together, the body rests."""
     directions = sites.rates(here.y[:-1], here.tangent[:-1])
     found = _relaxed(problem, sites, here.y[:-1].copy(), load + push, lag, directions)
     if found is None or found.z is None:
