@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import argparse
-import shutil
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from .. import console, results
 from ..errors import ExitCode, HviError
@@ -20,12 +20,13 @@ from ..runtime import log
 from ..runtime.mpi import on_root
 from ..runtime.signals import Interrupt
 from ..runtime.timing import Timer
-from ..scene import read_scene
+from ..scene import Scene, read_scene
 from ..stationary_points.bodies import Equilibria
 from ..stationary_points.search import Found, Saved
 from ..system import petsc_options
 from . import equilibria_files as files
-from . import telling
+from . import search_file, telling
+from .search_file import SearchFile
 from .telling import COMM
 
 BETWEEN = 0.2
@@ -64,15 +65,21 @@ def execute(options: argparse.Namespace) -> int:
     scene = on_root(COMM, lambda: read_scene(options.scene, options.overrides))
     default = Path("results") / f"{options.scene.stem}-equilibria"
     target = on_root(COMM, lambda: results.resolved(options.out or default))
-    record, saved = on_root(COMM, lambda: files.earlier(target, scene)) if options.resume else (None, None)
-    if record is not None and record["equilibria"]["proven"]:
+    if options.resume and (record := on_root(COMM, lambda: _proven(target, scene))) is not None:
         telling.say([f"{target}: finished already ({record['reason']})"])
         return int(record["exit_code"])
+    saved = on_root(COMM, lambda: search_file.read(target, scene)) if options.resume else None
     existing: Existing = "replace" if options.force or options.resume else "refuse"
     display = telling.on_first_rank(log.TerminalDisplay)
     with results.ResultFolder(COMM, target, existing, inputs=[options.scene]) as folder, log.Handlers(*display):
         prepared = prepare(scene, COMM, timer)
         return _run(Request(options=options, prepared=prepared, folder=folder, saved=saved))
+
+
+def _proven(target: Path, scene: Scene) -> dict[str, Any] | None:
+    """The summary of an earlier search of the same scene that came to its end. Rank 0 only."""
+    record = results.finished.read(target, scene).record
+    return record if record is not None and record.get("equilibria", {}).get("proven") else None
 
 
 def _run(request: Request) -> int:
@@ -83,14 +90,16 @@ def _run(request: Request) -> int:
     run_logs = telling.on_first_rank(lambda: log.RunLog(folder.work / "run.log"))
     with log.Handlers(*run_logs):
         telling.say(console.heading(prepared, COMM.size))
-        bodies = Equilibria(prepared)
+        bodies, kept = Equilibria(prepared), SearchFile(folder, prepared.scene)
         found = bodies.find(
             lowest=request.options.lowest,
             gap=request.options.gap,
             stop=_stop(interrupt, request.options.limit),
             report=_reporter(),
             saved=request.saved,
+            keep=kept.keep,
         )
+        on_root(COMM, lambda: kept.write_left(found.left))
         code = _exit_code(prepared, found, interrupted=interrupt.requested())
         rows = [_written(request, bodies, found, i) for i in range(len(found.points))]
         files.write(folder, prepared, found, rows, code, request.options.given)
@@ -98,7 +107,6 @@ def _run(request: Request) -> int:
             on_root(COMM, lambda: _picture_and_page(folder.work, draw=not request.options.no_pictures))
         telling.say(_lines(prepared, found, rows))
     on_root(COMM, lambda: telling.finish(run_logs))
-    on_root(COMM, lambda: _remove_earlier(folder.target))
     folder.commit(prepared.scene)
     telling.say([f"{folder.target}: {prepared.timer.total:.1f} s in all"])
     return int(code)
@@ -167,10 +175,3 @@ def _lines(prepared: Preparation, found: Found, rows: list[files.Row]) -> Iterat
     if found.gap is not None and found.lower_bound is not None:
         bound = found.lower_bound * prepared.problem.scales.energy
         yield f"no displacement has an energy below {bound:.10g} {unit} (relative gap {found.gap:.1e})"
-
-
-def _remove_earlier(target: Path) -> None:
-    """Remove the equilibria of an earlier search from the folder. Rank 0 only."""
-    for folder in sorted(target.glob("equilibrium-*")):
-        if results.finished.is_result(folder):
-            shutil.rmtree(folder)

@@ -1,11 +1,10 @@
-"""The files of ``hvi equilibria`` beside the result folders: the table, the summary, and what is left of a search."""
+"""The files of ``hvi equilibria`` beside the result folders: the table and the summary."""
 
 from __future__ import annotations
 
 import csv
 import math
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -21,9 +20,9 @@ from ..scene import Scene, dump_scene
 from ..solution import Solution
 from ..stationary_points.all_points import StationaryPoint
 from ..stationary_points.bodies import Equilibria
-from ..stationary_points.search import Found, Saved, falls_passed
+from ..stationary_points.search import Found, falls_passed
 
-TABLE, LEFT = "equilibria.csv", "search.npz"
+TABLE = "equilibria.csv"
 COLUMNS = ("index", "energy", "kind", "max_slip", "max_opening", "broken", "folder")
 
 
@@ -94,7 +93,7 @@ def _largest(values: np.ndarray[Any, np.dtype[np.float64]]) -> float:
 def write(
     folder: results.ResultFolder, prepared: Preparation, found: Found, rows: list[Row], code: ExitCode, command: str
 ) -> None:
-    """Write table, summary, scene and what is left of the search. Collective.
+    """Write table, summary and scene. Collective.
 
     Args:
         folder: being written.
@@ -114,8 +113,6 @@ def _write(folder: results.ResultFolder, scene: Scene, found: Found, rows: list[
         table.writerow(COLUMNS)
         table.writerows([_cell(getattr(r, name)) for name in COLUMNS] for r in rows)
     (folder.work / "scene.toml").write_text(dump_scene(scene, folder.target), encoding="utf-8")
-    if found.left:
-        np.savez_compressed(folder.work / LEFT, allow_pickle=False, **found.left)
     write_record(folder.work, record)
 
 
@@ -173,19 +170,3 @@ def barriers(found: Found, rows: list[Row]) -> list[dict[str, Any]]:
         }
         for p in found.passes
     ]
-
-
-def earlier(target: Path, scene: Scene) -> tuple[dict[str, Any] | None, Saved | None]:
-    """The summary of an earlier search of the same scene, and what it left. Rank 0 only.
-
-    Args:
-        target: the folder.
-        scene: the scene.
-    """
-    record = results.finished.read(target, scene).record
-    if record is None or "equilibria" not in record:
-        return None, None
-    if not (target / LEFT).exists():
-        return record, None
-    with np.load(target / LEFT, allow_pickle=False) as arrays:
-        return record, dict(arrays)

@@ -11,7 +11,6 @@ from __future__ import annotations
 import contextlib
 import errno
 import glob
-import itertools
 import os
 import re
 import secrets
@@ -26,6 +25,7 @@ from ..runtime import manifest
 from ..runtime.folder_lock import FolderLock
 from ..runtime.manifest import MARKS, Kind, Manifest
 from ..runtime.signals import SIGNALS
+from .moving import is_folder, move_in
 
 Existing = Literal["refuse", "replace", "resume"]
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
@@ -63,7 +63,7 @@ class OutputFolder:
         if not re.fullmatch(re.escape(f".{self.target.name}.hvi-") + "[0-9a-f]{8}", name):
             return
         for left in (self.target.parent / name, self.target / name):
-            if _is_folder(left):
+            if is_folder(left):
                 self._left = True  # until it is done, the next one must find it too
                 self._finish(left)
                 self._left = False
@@ -180,7 +180,7 @@ class OutputFolder:
             for file in [self.target / name for name in sorted(found.owned if found else ())]:
                 for half in file.parent.glob(f".{glob.escape(file.name)}.*"):
                     half.unlink()
-                if not _is_folder(file):
+                if not is_folder(file):
                     file.unlink(missing_ok=True)
 
     def close(self) -> None:
@@ -240,51 +240,3 @@ def resolved(target: Path) -> Path:
     if found.is_symlink():  # Python 3.13 and later hand a circle back
         raise InputError(f"--out {target}: its symbolic links go round in a circle; choose another folder")
     return found
-
-
-def move_in(work: Path, target: Path) -> tuple[str, ...]:
-    """Move the files of a hidden folder into a folder; again, it goes on where it was killed.
-
-    Args:
-        work: the hidden folder, with the manifest of what the other is to hold.
-        target: the folder; one that does not exist is the hidden one, renamed.
-
-    Returns:
-        What became of files of others that had the name of one of these, in words.
-
-    Raises:
-        OSError: a file cannot be moved; what is not yet moved is still there.
-    """
-    if not target.exists():
-        os.rename(work, target)
-        return ()
-    new, old = manifest.read(work), manifest.read(target)
-    assert new is not None
-    owned = old.owned if old else frozenset()
-    mark = MARKS[new.kind]
-    for name in [*([mark] if mark in owned and (work / mark).exists() else []), *sorted(owned - new.owned)]:
-        if not _is_folder(target / name):
-            (target / name).unlink(missing_ok=True)
-    last = {mark: 1, manifest.NAME: 2}
-    there = (n for n in sorted(new.owned, key=lambda n: (last.get(n, 0), n)) if (work / n).exists())
-    kept = tuple(filter(None, [_move(work / name, target / name, name in owned) for name in there]))
-    shutil.rmtree(work, ignore_errors=True)
-    return kept
-
-
-def _move(source: Path, goal: Path, owned: bool) -> str | None:
-    """Move a file; another's that has its name gets a new one."""
-    aside = None
-    if os.path.lexists(goal) and (not owned or _is_folder(goal)):
-        aside = next(free for n in itertools.count(1) if not os.path.lexists(free := _aside(goal, n)))
-        os.rename(goal, aside)
-    os.replace(source, goal)
-    return f"{goal.name} was there, and not of this program; it is {aside.name} now" if aside else None
-
-
-def _aside(path: Path, number: int) -> Path:
-    return path.with_name(f"{path.name}.kept" + (f"-{number}" if number > 1 else ""))
-
-
-def _is_folder(path: Path) -> bool:
-    return path.is_dir() and not path.is_symlink()

@@ -16,7 +16,7 @@ from ..workflow import certified, finish
 from .all_points import StationaryPoint
 from .condensed_form import scalar_problem
 from .scalar_problem import ScalarProblem
-from .search import Found, Saved, Wanted, begun, find
+from .search import Found, Keep, Saved, Wanted, begun, find, forget
 
 COARSE_GAP = 1e-3
 """Gap of the first search where laws are curved, from which the error of their polylines is chosen."""
@@ -56,6 +56,7 @@ class Equilibria:
         stop: Callable[[], bool],
         report: Callable[[str], None],
         saved: Saved | None = None,
+        keep: Keep = forget,
     ) -> Found:
         """Search; all ranks do the same. Collective.
 
@@ -65,6 +66,7 @@ class Equilibria:
             stop: asked before each box, by all ranks.
             report: told how far it is.
             saved: what an earlier search left.
+            keep: keeps what is left while the search goes on.
 
         Raises:
             InputError: an earlier search was for something else, or all are wanted and a law is curved.
@@ -75,7 +77,7 @@ class Equilibria:
         with self._prepared.timer("solve"):
             if self.problem.error:
                 wanted = self._refined(self.problem, wanted, stop, report)
-            return find(self.problem, wanted, stop, report, saved)
+            return find(self.problem, wanted, stop, report, saved, keep)
 
     def _refined(
         self, coarse: ScalarProblem, wanted: Wanted, stop: Callable[[], bool], report: Callable[[str], None]

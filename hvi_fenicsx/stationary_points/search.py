@@ -20,6 +20,8 @@ OWN_GAP = 0.85
 
 Saved = Mapping[str, Array]
 """What is left of an unfinished search: arrays, by name."""
+Keep = Callable[[Callable[[], Saved]], None]
+"""Is given, after each box, what makes the state to go on from."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,6 +67,15 @@ class _Task:
     stop: Callable[[], bool]
     report: Callable[[str], None]
     saved: Saved | None
+    keep: Keep
+
+
+def forget(state: Callable[[], Saved]) -> None:
+    """Keep nothing.
+
+    Args:
+        state: makes what could be kept.
+    """
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -106,6 +117,7 @@ def find(
     stop: Callable[[], bool],
     report: Callable[[str], None],
     saved: Saved | None = None,
+    keep: Keep = forget,
 ) -> Found:
     """All stationary points, or the lowest energy.
 
@@ -115,6 +127,7 @@ def find(
         stop: asked before each box.
         report: told how far it is, in words.
         saved: what an earlier search of the same problem left.
+        keep: keeps what is left while the search goes on.
 
     Raises:
         InputError: an earlier search was for something else, or all are wanted and a law acts on a length.
@@ -128,7 +141,7 @@ def find(
             "a law acts on the length of a slip in space, or on opening and slip together: all equilibria are found "
             "where each law has one component. `--lowest` proves the lowest energy of such laws too"
         )
-    task = _Task(problem=problem, wanted=wanted, stop=stop, report=report, saved=saved)
+    task = _Task(problem=problem, wanted=wanted, stop=stop, report=report, saved=saved, keep=keep)
     return _lowest(task) if wanted.lowest else _all(task)
 
 
@@ -146,6 +159,8 @@ def _lowest(task: _Task) -> Found:
     def tell(_: object) -> None:
         now = search.progress()
         task.report(f"lowest: gap {now.gap:.1e}, {now.boxes} boxes, {now.waiting} open")
+        if not search.proven:
+            task.keep(lambda: _left_of_lowest(search))
 
     search.run(task.stop, tell)
     return _proof(search, task.wanted.gap)
@@ -188,8 +203,7 @@ def _proof(search: LowestSearch, wanted: float) -> Found:
     )
     lower = now.lower - problem.error
     proven = search.proven and (not problem.error or point.energy - lower <= wanted * abs(point.energy))
-    listed = list(search.open_boxes())
-    left = {} if search.proven else {"lowest": np.array(True), "x": search.x[None], **_stacked(listed)}
+    left = {} if search.proven else _left_of_lowest(search)
     open_gap = max(point.energy - lower, 0.0) / (abs(point.energy) or 1.0)
     return Found(
         points=(point,),
@@ -200,6 +214,17 @@ def _proof(search: LowestSearch, wanted: float) -> Found:
         reason=("the lowest energy, proven" if proven else f"a gap of {open_gap:.1e} is open in {now.waiting} boxes"),
         left=left,
     )
+
+
+def _left_of_lowest(search: LowestSearch) -> Saved:
+    return {"lowest": np.array(True), "x": search.x[None], **_stacked(list(search.open_boxes()))}
+
+
+def _left_of_all(search: Enumeration) -> Saved:
+    listed = [(c.low, c.high, c.weights) for c in search.waiting]
+    points = [p.x for p in sorted(search.points, key=lambda p: p.energy)]
+    found = np.array(points) if points else np.empty((0, search.problem.size))
+    return {"lowest": np.array(False), "x": found, **_stacked(listed)}
 
 
 def _all(task: _Task) -> Found:
@@ -215,12 +240,10 @@ def _all(task: _Task) -> Found:
 
     def tell(_: object) -> None:
         task.report(f"all equilibria: {len(search.points)} found, {search.cells} cells, {len(search.waiting)} open")
+        task.keep(lambda: _left_of_all(search))
 
     complete = search.run(task.stop, tell)
     points = tuple(sorted(search.points, key=lambda p: p.energy))
-    listed = [(c.low, c.high, c.weights) for c in search.waiting]
-    none = np.empty((0, problem.size))
-    left = {"lowest": np.array(False), "x": np.array([p.x for p in points]) if points else none, **_stacked(listed)}
     bound = points[0].energy if complete and points and task.wanted.bounded else None
     return Found(
         points=points,
@@ -228,8 +251,8 @@ def _all(task: _Task) -> Found:
         lower_bound=bound,
         proven=complete,
         nodes=search.cells,
-        reason=_in_words(points) if complete else f"{len(points)} found, and {len(listed)} cells are open",
-        left={} if complete else left,
+        reason=_in_words(points) if complete else f"{len(points)} found, and {len(search.waiting)} cells are open",
+        left={} if complete else _left_of_all(search),
         passes=passes(problem, points) if complete else (),
     )
 

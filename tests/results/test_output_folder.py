@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import json
 import os
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +25,20 @@ def written(out: Path, existing: output_folder.Existing = "replace", **files: st
         work = folder.stage()
         for name, text in files.items():
             (work / f"{name}.json").write_text(text)
+        return folder.move_in({})
+    finally:
+        folder.close()
+
+
+def nested(out: Path, text: str, *names: str) -> tuple[str, ...]:
+    """A result with results in it, as a search for equilibria makes them."""
+    folder = OutputFolder(out, "result")
+    try:
+        folder.check("replace")
+        work = folder.stage()
+        (work / "summary.json").write_text(text)
+        for name in names:
+            written(work / name, summary=text)
         return folder.move_in({})
     finally:
         folder.close()
@@ -49,6 +64,18 @@ def test_only_what_the_manifest_lists_makes_room(tmp_path: Path) -> None:
     assert (out / "a.json").read_text() == "2"
     assert names(tmp_path) == [".r.old", ".r.partial", "r"]
     assert all((tmp_path / beside / "thesis.txt").exists() for beside in (".r.old", ".r.partial"))
+
+
+def test_results_within_a_result_make_room_but_for_files_of_others(tmp_path: Path) -> None:
+    out = tmp_path / "r"
+    nested(out, "1", "one", "two", "three")
+    (out / "two" / "mine.txt").write_text("mine")
+    (out / "three" / "mine.txt").write_text("mine")
+    kept = nested(out, "2", "one", "two")
+    assert names(out) == ["manifest.json", "one", "summary.json", "three", "two", "two.kept"]
+    assert names(out / "two") == ["manifest.json", "summary.json"]
+    assert names(out / "two.kept") == names(out / "three") == ["mine.txt"]
+    assert len(kept) == 1
 
 
 def test_files_put_there_meanwhile_are_kept_and_one_with_a_name_of_ours_gets_another(tmp_path: Path) -> None:
@@ -153,14 +180,18 @@ class Killed(BaseException):
     """The end of the process: nothing of the program's own runs after it."""
 
 
-def killed_at(step: int, out: Path, patch: pytest.MonkeyPatch) -> bool:
+def filled(work: Path) -> None:
+    """Write the files of a second result."""
+    for name in ("summary", "a", "c"):
+        (work / f"{name}.json").write_text("2")
+
+
+def killed_at(step: int, out: Path, patch: pytest.MonkeyPatch, fill: Callable[[Path], None] = filled) -> bool:
     """Replace a result, killed at a system call that changes files, counted from 0; whether there were so many."""
     calls = itertools.count()
     folder = OutputFolder(out, "result")
     folder.check("replace")
-    work = folder.stage()
-    for name in ("summary", "a", "c"):
-        (work / f"{name}.json").write_text("2")
+    fill(folder.stage())
 
     def counted(real: Any) -> Any:
         def call(*arguments: Any, **keys: Any) -> Any:
@@ -211,6 +242,33 @@ def test_killed_at_any_call_the_result_is_the_old_or_the_new_one_and_the_next_ru
             break
     assert seen == sorted(seen)
     assert seen[0] == "1"
+    assert seen.count("2") > 6
+
+
+def test_killed_at_any_call_results_within_a_result_are_those_of_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As above: while the old results make room for the new ones."""
+
+    def fill(work: Path) -> None:
+        (work / "summary.json").write_text("2")
+        for name in ("one", "three"):
+            written(work / name, summary="2")
+
+    seen = []
+    for step in itertools.count():
+        out = tmp_path / str(step) / "r"
+        nested(out, "1", "one", "two")
+        alive = not killed_at(step, out, monkeypatch, fill)
+        OutputFolder(out, "result").close()
+        now = (out / "summary.json").read_text()
+        inside = ["one", "two"] if now == "1" else ["one", "three"]
+        assert names(out) == sorted([*inside, "manifest.json", "summary.json"])
+        assert all((out / name / "summary.json").read_text() == now for name in inside)
+        seen.append(now)
+        if alive:
+            break
+    assert seen == sorted(seen)
     assert seen.count("2") > 6
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -11,11 +12,14 @@ import tomli_w
 from enumeration import Floor, polyline
 from matplotlib.colors import to_rgb
 from PIL import Image
-from scenes import DELTA, block, model, quadratic_linear
+from scenes import DELTA, Table, block, model, quadratic_linear
 
 import hvi_fenicsx as hvi
 from hvi_fenicsx.cli import main
+from hvi_fenicsx.commands import search_file
+from hvi_fenicsx.commands.search_file import SearchFile
 from hvi_fenicsx.report.pictures.style import BLUE, ORANGE, PALE, VERMILION
+from hvi_fenicsx.stationary_points.search import Saved
 
 GAMMA = 3e6
 STRONG = quadratic_linear(GAMMA)
@@ -68,6 +72,68 @@ def test_the_command_writes_each_equilibrium_and_refuses_what_is_there(tmp_path:
     assert f"{saddle:.10g}" in page
     assert main(words) == 2
     assert main([*words, "--resume"]) == 0
+
+
+class Killed(BaseException):
+    """Stands for SIGKILL, after which nothing is tidied up."""
+
+
+TEETH = {"law": "graph", "points": [[0, 0], *([d, t] for d in (4e-6, 9e-6, 1.4e-5, 2e-5) for t in (2e6, 8e5))]}
+
+
+@pytest.mark.parametrize(
+    ("words", "table"),
+    [((), model(3, 6e6, friction=STRONG)), (("--lowest",), model(32, 5e6, friction=TEETH))],
+    ids=["all", "lowest"],
+)
+def test_a_search_that_is_killed_goes_on_from_its_last_state(
+    words: tuple[str, ...], table: Table, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """After some boxes the process dies; the next one needs fewer boxes than a whole search, and finds the same."""
+    run = ["equilibria", str(written(tmp_path, **table)), "--no-pictures", *words]
+    assert main([*run, "--out", str(tmp_path / "whole")]) == 0
+    whole = json.loads((tmp_path / "whole" / "summary.json").read_text())["equilibria"]
+    assert whole["nodes"] > 4
+    kept = SearchFile.keep
+    states: list[int] = []
+
+    def keep(file: SearchFile, state: Callable[[], Saved]) -> None:
+        kept(file, state)
+        states.append(1)
+        if 4 * len(states) >= whole["nodes"] - 4:
+            raise Killed
+
+    out, mine = tmp_path / "out", tmp_path / "out" / "mine.txt"
+    with monkeypatch.context() as patched:
+        patched.setattr(search_file, "BETWEEN", 0.0)
+        patched.setattr(search_file, "SHARE", 1e9)
+        patched.setattr(SearchFile, "keep", keep)
+        with pytest.raises(Killed):
+            main([*run, "--out", str(out)])
+    mine.write_text("precious")
+    assert main([*run, "--out", str(out)]) == 2
+    assert main([*run, "--out", str(out), "--resume"]) == 0
+    found = json.loads((out / "summary.json").read_text())["equilibria"]
+    assert found["proven"]
+    assert found["nodes"] < whole["nodes"]
+    assert found["lowest_energy"] == pytest.approx(whole["lowest_energy"], rel=1e-9)
+    assert found["count"] == whole["count"]
+    assert mine.read_text() == "precious"
+    assert not (out / "search.npz").exists()
+
+
+def test_a_search_on_another_number_of_ranks_begins_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """There the unknowns have another order: boxes of the one are none of the other."""
+    out, scene = tmp_path / "out", written(tmp_path)
+    assert main(["equilibria", str(scene), "--out", str(out), "--no-pictures", "--limit", "1e-9"]) == 4
+    read = hvi.read_scene(scene)
+    assert search_file.read(out, read) is not None
+
+    class OtherRanks:
+        size = 2
+
+    monkeypatch.setattr(search_file, "COMM", OtherRanks)
+    assert search_file.read(out, read) is None
 
 
 @pytest.mark.long

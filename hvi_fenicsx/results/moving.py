@@ -1,0 +1,77 @@
+"""Whole files moved into a folder, in the place of those that the program wrote before; no other file is touched."""
+
+from __future__ import annotations
+
+import contextlib
+import itertools
+import os
+import shutil
+from pathlib import Path
+
+from ..runtime import manifest
+from ..runtime.manifest import MARKS
+
+
+def move_in(work: Path, target: Path) -> tuple[str, ...]:
+    """Move the files of a hidden folder into a folder; again, it goes on where it was killed.
+
+    Args:
+        work: the hidden folder, with the manifest of what the other is to hold.
+        target: the folder; one that does not exist is the hidden one, renamed.
+
+    Returns:
+        What became of files of others that had the name of one of these, in words.
+
+    Raises:
+        OSError: a file cannot be moved; what is not yet moved is still there.
+    """
+    if not target.exists():
+        os.rename(work, target)
+        return ()
+    new, old = manifest.read(work), manifest.read(target)
+    assert new is not None
+    owned = old.owned if old else frozenset()
+    mark = MARKS[new.kind]
+    for name in [*([mark] if mark in owned and (work / mark).exists() else []), *sorted(owned - new.owned)]:
+        if not is_folder(target / name):
+            (target / name).unlink(missing_ok=True)
+    for name in sorted(name for name in owned if name not in new.owned or (work / name).exists()):
+        if is_folder(target / name):
+            _remove_owned(target / name)
+    last = {mark: 1, manifest.NAME: 2}
+    there = (n for n in sorted(new.owned, key=lambda n: (last.get(n, 0), n)) if (work / n).exists())
+    kept = tuple(filter(None, [_move(work / name, target / name, name in owned) for name in there]))
+    shutil.rmtree(work, ignore_errors=True)
+    return kept
+
+
+def _remove_owned(folder: Path) -> None:
+    """Remove a result within a result; files of others in it stay, and it with them."""
+    found = manifest.read(folder)
+    for name in sorted(found.owned if found else (), key=lambda name: name == manifest.NAME):
+        (folder / name).unlink(missing_ok=True)
+    with contextlib.suppress(OSError):  # it is not empty
+        folder.rmdir()
+
+
+def _move(source: Path, goal: Path, owned: bool) -> str | None:
+    """Move a file; another's that has its name gets a new one."""
+    aside = None
+    if os.path.lexists(goal) and (not owned or is_folder(goal)):
+        aside = next(free for n in itertools.count(1) if not os.path.lexists(free := _aside(goal, n)))
+        os.rename(goal, aside)
+    os.replace(source, goal)
+    return f"{goal.name} was there, and not of this program; it is {aside.name} now" if aside else None
+
+
+def _aside(path: Path, number: int) -> Path:
+    return path.with_name(f"{path.name}.kept" + (f"-{number}" if number > 1 else ""))
+
+
+def is_folder(path: Path) -> bool:
+    """Whether it is a folder, and no link to one.
+
+    Args:
+        path: of what may be one.
+    """
+    return path.is_dir() and not path.is_symlink()
