@@ -75,7 +75,7 @@ def row(index: int, bodies: Equilibria, point: StationaryPoint, solution: Soluti
         kind=point.kind,
         max_slip=largest(comm, slip) * unit,
         max_opening=largest(comm, opening) * unit,
-        broken=falls_passed(bodies.problem, point.x),
+        broken=falls_passed(bodies.problem, point.x) if point.x.size else 0,
         folder=folder,
         isolated=point.isolated,
         certified=solution.converged,

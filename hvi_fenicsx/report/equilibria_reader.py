@@ -50,17 +50,20 @@ class EquilibriaResult:
 
     @property
     def unit(self) -> str:
-        """The unit of energy: J in space, where vertices have a z."""
-        states = self.state(self.rows[0]) if self.rows else []
-        return "J" if states and states[0]["z"] else "J/m"
+        """The unit of energy: J in space, where forces have three components."""
+        if not self.rows:
+            return "J/m"
+        own = json.loads((self.folder / self.rows[0]["folder"] / "summary.json").read_text(encoding="utf-8"))
+        return "J" if any(len(force) > 2 for force in own["resultants"].values()) else "J/m"
 
     def state(self, row: Row) -> list[Row]:
-        """The rows of ``contact.csv`` of an equilibrium.
+        """The rows of ``contact.csv`` of an equilibrium; none where there is neither contact nor law.
 
         Args:
             row: of :attr:`rows`.
         """
-        return _table(self.folder / row["folder"] / "contact.csv")
+        file = self.folder / row["folder"] / "contact.csv"
+        return _table(file) if file.exists() else []
 
 
 def read(folder: Path) -> EquilibriaResult:

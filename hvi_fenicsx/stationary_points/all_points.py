@@ -199,10 +199,10 @@ class Enumeration:
     def _at_joint(self, cell: Box, i: int, *, drops_only: bool) -> Iterator[Box]:
         arcs = on_interval(self.problem.chains[i], float(cell.low[i]), float(cell.high[i]))
         joints = [(a.high, b.rate(b.low) - a.rate(a.high)) for a, b in itertools.pairwise(arcs)]
-        size = max(abs(a.rate(x)) for a in arcs for x in (a.low, a.high))
-        chosen = [(x, j) for x, j in joints if j < -1e-13 * size or not drops_only]
+        rounding = float(self.problem.arcs.rounding[i])
+        chosen = [(x, j) for x, j in joints if j < -rounding or not drops_only]
         at, jump = chosen[len(chosen) // 2]
-        if abs(jump) > 1e-13 * size:  # looked at last: a minimiser is on no drop
+        if abs(jump) > rounding:  # looked at last: a minimiser is on no drop
             yield _with(cell, i, at, at)
         yield _with(cell, i, cell.low[i], at)
         yield _with(cell, i, at, cell.high[i])

@@ -12,7 +12,7 @@ from functools import cached_property
 import numpy as np
 
 from ..typing import Array, Integers, Mask
-from .arcs import INF, Arc, Chain
+from .arcs import INF, ROUNDING, Arc, Chain
 from .lengths import Lengths
 
 FAR = 1e6
@@ -132,6 +132,11 @@ class ArcTable:
             after=tractions + slopes * (begin - anchors),
         )
 
+    @cached_property
+    def rounding(self) -> Array:
+        """The size of a jump of the traction that is rounding, (n,)."""
+        return np.asarray(ROUNDING * np.maximum(np.abs(self.before), np.abs(self.after)).max(axis=1))
+
     def at(self, x: Array) -> Integers:
         """The arc that holds x, of the two at a joint the left one; (n,)."""
         return np.asarray((self.high < x[:, None]).sum(axis=1), dtype=np.int64)
@@ -164,8 +169,7 @@ class ArcTable:
         """
         inside = (self.high[:, :-1] > low[:, None]) & (self.high[:, :-1] < high[:, None])
         fall = np.where(inside, self.before[:, :-1] - self.after[:, 1:], 0.0)
-        sizes = np.abs(self.before[:, :-1]) + np.abs(self.after[:, 1:])
-        fall = np.where(fall > 1e-13 * np.where(inside, sizes, 0.0), fall, 0.0)
+        fall = np.where(fall > self.rounding[:, None], fall, 0.0)
         return np.asarray(fall.max(axis=1, initial=0.0))
 
     def least_slope(self, low: Array, high: Array) -> Array:

@@ -132,6 +132,8 @@ def find(
     Raises:
         InputError: an earlier search was for something else, or all are wanted and a law acts on a length.
     """
+    if not problem.size:
+        return _only(problem)
     if saved is not None and bool(saved["lowest"]) != wanted.lowest:
         raise InputError(
             "--resume: the search there was for something else: give or leave --lowest as then, or --force"
@@ -143,6 +145,20 @@ def find(
         )
     task = _Task(problem=problem, wanted=wanted, stop=stop, report=report, saved=saved, keep=keep)
     return _lowest(task) if wanted.lowest else _all(task)
+
+
+def _only(problem: ScalarProblem) -> Found:
+    """The equilibrium of bodies without contact and laws: the minimiser of a convex energy."""
+    kind = stationarity.Kind.MINIMISER
+    point = StationaryPoint(x=np.empty(0), energy=problem.constant, kind=kind, isolated=True)
+    return Found(
+        points=(point,),
+        complete=True,
+        lower_bound=point.energy,
+        proven=True,
+        nodes=0,
+        reason="the only equilibrium: there is no contact and no law",
+    )
 
 
 def _lowest(task: _Task) -> Found:

@@ -18,6 +18,7 @@ from typing import Any
 
 import pytest
 import tomli_w
+from damage_search import SEARCH, TORN_SEARCH
 from damage_study import ACCURACY, STUDY, TORN
 from runs import ROOT
 from scenes import model, quadratic_linear
@@ -30,8 +31,33 @@ RUNNER = ROOT / "tests" / "support" / "fuzz_runner.py"
 CASES, SLICES = 600, 6
 LIMIT = 600.0
 """Seconds that the cases of a process may take."""
-OPTIONS = ("--accuracy", "--quantity", "--time-budget", "--axis", "--repeat", "--limit", "--np", "--out")
-PLACES = ("scene.toml", "the mesh", "m.msh", "boundary", "body", "load '", "material", "domain", "solver", *OPTIONS)
+OPTIONS = (
+    "--accuracy",
+    "--quantity",
+    "--time-budget",
+    "--axis",
+    "--repeat",
+    "--limit",
+    "--np",
+    "--out",
+    "--gap",
+    "--set",
+    "--petsc",
+)
+PLACES = (
+    "scene.toml",
+    "the mesh",
+    "m.msh",
+    "boundary",
+    "body",
+    "load '",
+    "material",
+    "domain",
+    "solver",
+    "interface",
+    "path",
+    *OPTIONS,
+)
 
 
 def run(folder: Path, first: int, last: int, step: int, ranks: int = 1) -> list[dict[str, Any]]:
@@ -98,6 +124,15 @@ def test_damaged_cases_on_two_ranks(tmp_path: Path) -> None:
 def test_damaged_requests_and_study_folders(first: int, count: int, tmp_path: Path) -> None:
     """An accuracy or a study asked of damaged scenes or in damaged words; a torn study that shall be resumed."""
     found = run(tmp_path, first, first + count, 1)
+    assert {f"{f['number']} ({f['done']})": faults(f) for f in found if faults(f)} == {}
+    assert len(found) == count
+    assert any(set(f["codes"]) & {0, 3, 4} for f in found), "none gets as far as solving"
+
+
+@pytest.mark.parametrize(("first", "count", "ranks"), [(SEARCH, 240, 1), (SEARCH + 300, 40, 2), (TORN_SEARCH, 40, 1)])
+def test_damaged_paths_searches_and_pairs_of_bodies(first: int, count: int, ranks: int, tmp_path: Path) -> None:
+    """`path`, `equilibria` and scenes of two bodies, damaged; folders of stopped ones, torn before `--resume`."""
+    found = run(tmp_path, first, first + count, 1, ranks)
     assert {f"{f['number']} ({f['done']})": faults(f) for f in found if faults(f)} == {}
     assert len(found) == count
     assert any(set(f["codes"]) & {0, 3, 4} for f in found), "none gets as far as solving"

@@ -162,3 +162,16 @@ def test_a_metastable_block_has_no_lowest_energy(tmp_path: Path) -> None:
     path = tmp_path / "scene.toml"
     path.write_text(tomli_w.dumps({"title": "block", **block(2, 7e5, friction=quadratic_linear(1e6))}))
     assert main(["equilibria", str(path), "--lowest", "--out", str(tmp_path / "out"), "--no-pictures"]) == 4
+
+
+@pytest.mark.parametrize("words", [(), ("--lowest",)])
+def test_without_contact_and_laws_there_is_one_equilibrium(words: tuple[str, ...], tmp_path: Path) -> None:
+    """The square of the model problem, held below: u2 = -(Q + ν P)/E y, energy -6 J/m in closed form."""
+    table = model(2)
+    table["boundary"]["floor"] = {"on": "bottom", "displacement": ["free", 0.0]}
+    out = tmp_path / "out"
+    assert main(["equilibria", str(written(tmp_path, **table)), "--out", str(out), "--no-pictures", *words]) == 0
+    found = json.loads((out / "summary.json").read_text())["equilibria"]
+    assert (found["count"], found["proven"]) == (1, True)
+    assert found["lowest_energy"] == pytest.approx(-6.0, rel=1e-9)
+    assert found["lower_bound"] == pytest.approx(-6.0, rel=1e-9)

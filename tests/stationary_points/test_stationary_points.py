@@ -206,3 +206,16 @@ def test_no_point_of_a_box_is_below_its_bound(seed: int) -> None:
         bound = Relaxation(problem).solve(fresh_box(low, high, low), part)[0].bound
         samples = random.uniform(low, high, (300, n))
         assert min(problem.energy(x) for x in samples) >= bound
+
+
+def test_a_drop_that_is_rounding_is_none() -> None:
+    """The end of a softening law, whose last piece ends a rounding error above 0: the search once ended in an error."""
+    table = model(3, 6e6, 1e6, {"law": "graph", "points": [list(p) for p in paper(3e6)]})
+    glue = {"law": "graph", "points": [[0, 0], [4e-6, 5e6], [2e-5, 0]], "one_sided": True}
+    table["boundary"]["another"] = {"on": "bottom", "adhesion": glue}
+    prepared = prepare(Scene.model_validate(table))
+    search = Enumeration(problem=scalar_problem(Condensation(prepared.system).problem))
+    search.start()
+    steps = itertools.count()
+    assert search.run(lambda: next(steps) > 4_000, lambda _: None)
+    assert search.points

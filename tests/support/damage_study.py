@@ -110,7 +110,7 @@ def _dangling(chance: random.Random, file: Path) -> None:
     file.symlink_to(file.parent / "absent")
 
 
-_WAYS: list[Callable[[random.Random, Path], None]] = [_shorter, _shorter, _zeros, _other, _other, _gone, _dangling]
+WAYS: list[Callable[[random.Random, Path], None]] = [_shorter, _shorter, _zeros, _other, _other, _gone, _dangling]
 
 
 def tear(number: int, finished: Path, folder: Path) -> str:
@@ -120,10 +120,10 @@ def tear(number: int, finished: Path, folder: Path) -> str:
     files = sorted(file for file in folder.rglob("*") if file.is_file())
     done = []
     for file in chance.sample(files, chance.choice([1, 1, 2, 3])):
-        way = chance.choice(_WAYS)
+        way = chance.choice(WAYS)
         way(chance, file)
         done.append(f"{way.__name__} {file.relative_to(folder)}")
     return ", ".join(done)
 
 
-__all__ = ["ACCURACY", "ASKED", "SOUND", "STUDY", "TORN", "tear", "words"]
+__all__ = ["ACCURACY", "ASKED", "SOUND", "STUDY", "TORN", "WAYS", "tear", "words"]

@@ -13,11 +13,14 @@ import os
 import shutil
 import sys
 import traceback
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import damage_search
 import damage_study
 import tomli_w
+from damage_search import SEARCH, TORN_SEARCH
 from damage_study import STUDY, TORN
 from mpi4py import MPI
 
@@ -39,10 +42,17 @@ def outcome(number: int, folder: Path) -> dict[str, Any]:
         trace = traceback.format_exc()
     codes = COMM.gather(code)
     found = {"number": number, "done": done, "codes": codes, "error": err.getvalue(), "trace": trace}
-    written = code in (0, 3, 4) if number < STUDY else code == 0
-    lacking = (_faults if number < STUDY else _faults_of_study)(case / "out") if written and COMM.rank == 0 else []
+    written = code == 0 if STUDY <= number < SEARCH else code in (0, 3, 4)
+    lacking = _lacking(number)(case / "out") if written and COMM.rank == 0 else []
     left = sorted(os.listdir(case)) if COMM.rank == 0 else []  # rank 0 removes the case, the others may come late
     return found | {"files": left, "faults": lacking}
+
+
+def _lacking(number: int) -> Callable[[Path], list[str]]:
+    """What tells what a folder lacks."""
+    if number >= SEARCH:
+        return _faults_of_search
+    return _faults if number < STUDY else _faults_of_study
 
 
 def _made(number: int, folder: Path, case: Path) -> list[str]:
@@ -50,6 +60,10 @@ def _made(number: int, folder: Path, case: Path) -> list[str]:
     shutil.rmtree(case, ignore_errors=True)
     case.mkdir()
     (folder / "now").write_text(f"{number}\n", encoding="utf-8")
+    if SEARCH <= number < TORN_SEARCH:
+        return damage_search.words(number, case)
+    if number >= TORN_SEARCH:
+        return _torn_search(number, folder, case)
     if number < TORN:
         return damage_study.words(number, case)
     scene = folder / "sound.toml"
@@ -60,6 +74,30 @@ def _made(number: int, folder: Path, case: Path) -> list[str]:
     done = damage_study.tear(number, folder / "finished", case / "out")
     (folder / "now").write_text(f"{number} {done}\n", encoding="utf-8")
     return [*asked, "--resume"]
+
+
+def _torn_search(number: int, folder: Path, case: Path) -> list[str]:
+    """Tear a copy of a path or a search for equilibria that was stopped, and resume it. Rank 0 only."""
+    command = ("path", "equilibria")[number % 2]
+    asked, stopped = damage_search.stopped(command, folder)
+    done = damage_search.tear(number, stopped, case / "out")
+    (folder / "now").write_text(f"{number} {done}\n", encoding="utf-8")
+    return [*asked, "--resume"]
+
+
+def _faults_of_search(result: Path) -> list[str]:
+    """What the folder of a path, of a search or of a run of two bodies lacks."""
+    table = {"summary.json": "", "scene.toml": "", "run.log": "", "manifest.json": ""}
+    lacking = [name for name in table if not (result / name).is_file()]
+    with contextlib.suppress(OSError):
+        text = (result / "summary.json").read_text(encoding="utf-8")
+        record = json.loads(text)
+        lacking += ["a summary without NaN"] if "NaN" in text else []
+        rows = (record.get("path") or {}).get("rows") or (record.get("equilibria") or {}).get("count")
+        lacking += ["report.html"] if rows and not (result / "report.html").is_file() else []
+        if record["scene"] == damage_search.STOPPED and not rows:
+            lacking.append("the rows of the sound scene")
+    return lacking
 
 
 def _faults_of_study(result: Path) -> list[str]:
