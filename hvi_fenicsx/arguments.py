@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import math
+import re
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -176,6 +177,6 @@ def _ranks(text: str) -> int:
 
 
 def _whole_number(text: str, most: int) -> int:
-    if not (text.isascii() and text.isdigit()) or not 1 <= int(text) <= most:
-        raise argparse.ArgumentTypeError(f"must be a whole number from 1 to {most} (is {text!r})")
+    if not re.fullmatch(r"[1-9][0-9]{0,8}", text) or int(text) > most:
+        raise argparse.ArgumentTypeError(f"must be a whole number from 1 to {most}, in digits like 2 (is {text!r})")
     return int(text)

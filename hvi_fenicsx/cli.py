@@ -115,8 +115,17 @@ def _placed(options: argparse.Namespace) -> Iterator[None]:
     try:
         yield
     except InputError as error:
-        error.args = (with_place(str(error), options.scene, options.overrides),)  # it stays what it is, on which ranks
+        text = with_place(str(error), options.scene, options.overrides)
+        error.args = (_in_one_line(text, options),)  # it stays what it is, on which ranks
         raise
+
+
+def _in_one_line(text: str, options: argparse.Namespace) -> str:
+    """A message in which the line ends of names are escapes, so that names are not cut."""
+    for path in filter(None, (options.scene, getattr(options, "out", None))):
+        for name in (part for part in path.parts if "\n" in part):
+            text = text.replace(name, name.replace("\n", "\\n"))
+    return text
 
 
 @contextmanager

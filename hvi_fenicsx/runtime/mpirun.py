@@ -21,10 +21,14 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from types import FrameType
 
-from ..errors import ExitCode, InputError
+from ..errors import ExitCode, HviError, InputError
 from . import processes, terminal
 
 _CODE_FILE = "HVI_EXIT_CODE_FILE"
+_ROOM = 1 << 18
+"""Bytes that mpirun and the ranks need for temporary files; Open MPI ends without a word where there is no room."""
+_RULE = 40 * "-"
+"""The beginning of the first and the last line of a notice of mpirun's own."""
 _LAST_LINES = 2.0
 """Seconds for the last lines, where a rank that was killed has left the pipe open to a child of its own."""
 
@@ -41,28 +45,60 @@ def run(ranks: int, words: Sequence[str]) -> int:
     """
     command = [*processes.launcher(ranks), "-m", "hvi_fenicsx", *without_ranks(words)]
     signalled: list[int] = []
-    held: list[str] = []
+    errors = _Errors(signalled)
 
     def pass_on(number: int, frame: FrameType | None) -> None:
         signalled.append(number)
         process.send_signal(signal.SIGUSR1 if len(signalled) == 1 else signal.SIGTERM)
 
-    def complain(line: str) -> None:
-        (held.append if signalled else terminal.complain)(line)
-
     with _code_file() as file:
         process: subprocess.Popen[str] = _started(command, file)
         processes.catch(processes.STOP, pass_on)
-        writers = [_writer(process.stdout, terminal.say), _writer(process.stderr, complain)]
+        writers = [_writer(process.stdout, terminal.say), _writer(process.stderr, errors.take)]
         ended, agreed = process.wait(), file.read_text(encoding="ascii")
         for writer in writers:
             writer.join(_LAST_LINES)
     if signalled and ended and not agreed:  # before the ranks could catch it; mpirun's notice of that helps nobody
         raise KeyboardInterrupt
-    for line in held:
-        terminal.complain(line)
+    errors.tell_held()
+    if ended and not errors.any:
+        raise HviError(
+            f"--np: mpirun ended with code {ended} and without a word, as it does where the folder for temporary files "
+            f"({tempfile.gettempdir()}) is full; make room there, or set TMPDIR to another folder"
+        )
     code = ended or int(agreed or 0)
     return ExitCode.INTERRUPTED if signalled and code else code
+
+
+class _Errors:
+    """Writes what comes from standard error; after a signal mpirun's own notices wait, which stand between two rules.
+
+    Args:
+        signalled: the signals so far.
+
+    Attributes:
+        any: whether there was a line.
+    """
+
+    def __init__(self, signalled: Sequence[int]) -> None:
+        self._signalled, self._held = signalled, list[str]()
+        self._in_notice = self.any = False
+
+    def take(self, line: str) -> None:
+        """Write a line, or keep it."""
+        self.any = True
+        rule = line.startswith(_RULE)
+        if rule or self._in_notice:
+            self._in_notice ^= rule
+            if self._signalled:
+                self._held.append(line)
+                return
+        terminal.complain(line)
+
+    def tell_held(self) -> None:
+        """Write what was kept."""
+        for line in self._held:
+            terminal.complain(line)
 
 
 def _started(command: Sequence[str], file: Path) -> subprocess.Popen[str]:
@@ -100,7 +136,11 @@ def _code_file() -> Iterator[Path]:
         raise InputError(f"--np: no temporary file can be made ({error}); set TMPDIR to a folder with room") from None
     with folder:
         file = Path(folder.name, "code")
-        file.touch()
+        try:
+            file.write_bytes(bytes(_ROOM))
+            file.write_bytes(b"")
+        except OSError as error:
+            raise InputError(f"--np: {folder.name}: {error.strerror}; set TMPDIR to a folder with room") from None
         yield file
 
 

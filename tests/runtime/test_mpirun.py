@@ -1,0 +1,91 @@
+"""``--np``: what is asked for, and what mpirun says or does not say. A script stands for mpirun."""
+
+from __future__ import annotations
+
+import errno
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+from runs import ROOT, hvi, write_scene
+from scenes import model
+
+RULE = 76 * "-"
+
+
+@pytest.fixture
+def scene(tmp_path: Path) -> Path:
+    return write_scene(tmp_path / "scene.toml", model(1))
+
+
+def on_path(folder: Path, script: str) -> str:
+    """A PATH whose mpirun is a shell script."""
+    file = folder / "bin" / "mpirun"
+    file.parent.mkdir()
+    file.write_text(f"#!/bin/bash\n{script}\n", encoding="utf-8")
+    file.chmod(0o755)
+    return f"{file.parent}:{os.environ['PATH']}"
+
+
+@pytest.mark.parametrize("words", ["02", "1e3", "²", "2²", "+2", " 2", "0", "2.0", "4097", "9" * 5000, ""])
+def test_a_number_of_ranks_is_digits_without_a_leading_zero(words: str, scene: Path) -> None:
+    done = hvi("run", scene, f"--np={words}")
+    assert done.returncode == 2
+    assert "must be a whole number from 1 to 4096" in done.stderr
+
+
+def test_an_mpirun_that_ends_without_a_word_is_told(
+    scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As Open MPI does, with 249, where the folder for temporary files is full."""
+    monkeypatch.setenv("PATH", on_path(tmp_path, "exit 249"))
+    done = hvi("run", scene, "--np", "2", "--out", tmp_path / "r")
+    assert done.returncode == 1
+    assert "mpirun ended with code 249 and without a word" in done.stderr
+    assert "TMPDIR" in done.stderr
+
+
+def test_a_full_folder_for_temporary_files_is_told_before(
+    scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(path: Path, content: bytes) -> int:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
+
+    monkeypatch.setenv("PATH", on_path(tmp_path, "echo started"))
+    monkeypatch.setattr(Path, "write_bytes", full)
+    done = hvi("run", scene, "--np", "2", "--out", tmp_path / "r")
+    assert (done.returncode, done.stdout) == (2, "")
+    assert "No space left on device; set TMPDIR to a folder with room" in done.stderr
+
+
+def test_after_a_signal_the_ranks_are_heard_at_once_and_mpiruns_notices_are_not(scene: Path, tmp_path: Path) -> None:
+    said = f"echo 'hvi: saving' >&2; echo {RULE} >&2; echo 'mpirun noticed' >&2; echo {RULE} >&2; echo more >&2"
+    path = on_path(
+        tmp_path, f"trap \"{said}; read -t 60 line < '{tmp_path}/go'; exit 1\" USR1; echo ready; sleep 60 & wait"
+    )
+    os.mkfifo(tmp_path / "go")
+    words = [sys.executable, "-m", "hvi_fenicsx", "run", str(scene), "--np", "2", "--out", str(tmp_path / "r")]
+    pipes: dict[str, Any] = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    with subprocess.Popen(words, cwd=ROOT, env=os.environ | {"PATH": path}, **pipes) as process:
+        assert process.stdout.readline() == "ready\n"
+        process.send_signal(signal.SIGTERM)
+        assert process.stderr.readline() == "hvi: saving\n"
+        assert process.stderr.readline() == "more\n"
+        assert process.poll() is None
+        (tmp_path / "go").write_text("\n")
+        assert process.wait(60) == 130
+        assert "mpirun noticed" not in process.stderr.read()
+
+
+def test_a_name_with_a_line_end_is_told_in_one_line(scene: Path, tmp_path: Path) -> None:
+    out = tmp_path / "two\nlines"
+    out.mkdir()
+    (out / "mine.txt").write_text("mine")
+    done = hvi("run", scene, "--out", out)
+    assert done.returncode == 2
+    assert done.stderr.count("\n") == 1
+    assert "two\\nlines: holds other files" in done.stderr
