@@ -1,6 +1,6 @@
 # The environment of ./hvi as an image: Debian 13's own packages by the list in .ci/packages, and this package.
-#   docker build -t hvi_fenicsx .
-#   docker run --rm --user "$(id -u):$(id -g)" -v "$PWD:/work" hvi_fenicsx run scene.toml
+#   docker build -t hvi_fenicsx:0.1.0 --build-arg REVISION="$(git rev-parse HEAD)" .
+#   docker run --rm --user "$(id -u):$(id -g)" -v "$PWD:/work" hvi_fenicsx:0.1.0 run scene.toml
 FROM debian:trixie-slim
 
 # The sections of .ci/packages to install; the launcher adds "tests".
@@ -25,6 +25,11 @@ ENV PYTHONPATH=/opt/hvi_fenicsx \
     OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 \
     PRTE_MCA_rmaps_default_mapping_policy=:oversubscribe \
     PRTE_MCA_mapby=:oversubscribe
+
+# The commit, which `hvi version` and every summary name.
+ARG REVISION=""
+ENV HVI_REVISION=$REVISION
+LABEL org.opencontainers.image.revision=$REVISION org.opencontainers.image.licenses=MIT
 
 # Whoever the caller is (--user), home and caches are writable, so that results in /work belong to the caller.
 RUN printf '#!/bin/sh\nexec python3 -P -m hvi_fenicsx "$@"\n' >/usr/local/bin/hvi \

@@ -3,10 +3,18 @@
 from __future__ import annotations
 
 import importlib.metadata
+import os
 import platform
 import sys
+from pathlib import Path
 
 __version__ = "0.1.0"
+"""Of the release; the only place that states it."""
+_ROOT = Path(__file__).parents[2]
+_REVISION = "HVI_REVISION"
+"""The variable by which an image names the commit that it was built from."""
+_SHORT = 10
+"""Digits of a commit's name that are shown."""
 
 _MODULES = ("numpy", "scipy", "pydantic", "mpi4py", "pyvista", "matplotlib", "gmsh")
 
@@ -16,12 +24,45 @@ def versions() -> dict[str, str]:
     from ..compat import VERSION, petsc_version
 
     found = {
-        "hvi_fenicsx": __version__,
+        "hvi_fenicsx": with_revision(),
         "python": platform.python_version(),
         "dolfinx": VERSION,
         "petsc": petsc_version(),
     }
     return {**found, **{name: _version(name) for name in _MODULES}, "platform": sys.platform}
+
+
+def with_revision(root: Path = _ROOT) -> str:
+    """The version, with the commit after a plus sign where the program runs from a clone or from an image of one.
+
+    Args:
+        root: of the repository.
+    """
+    found = _checked_out(root / ".git") or os.environ.get(_REVISION)
+    return f"{__version__}+g{found[:_SHORT]}" if found else __version__
+
+
+def _checked_out(folder: Path) -> str | None:
+    """The commit that is checked out, by git's own files: git may be absent; None where there is no repository."""
+    try:
+        if folder.is_file():  # a further working tree
+            folder = folder.parent / folder.read_text(encoding="utf-8").removeprefix("gitdir:").strip()
+        head = (folder / "HEAD").read_text(encoding="utf-8").strip()
+        if not head.startswith("ref: "):
+            return head
+        shared = folder / "commondir"
+        common = folder / shared.read_text(encoding="utf-8").strip() if shared.exists() else folder
+        return _commit_of(common, head.removeprefix("ref: "))
+    except (OSError, UnicodeDecodeError):
+        return None
+
+
+def _commit_of(repository: Path, name: str) -> str | None:
+    """The commit of a branch."""
+    if (repository / name).exists():
+        return (repository / name).read_text(encoding="utf-8").strip()
+    packed = (repository / "packed-refs").read_text(encoding="utf-8").splitlines()
+    return next((line.split()[0] for line in packed if line.endswith(f" {name}")), None)
 
 
 def _version(name: str) -> str:

@@ -16,6 +16,7 @@ import pytest
 from runs import ROOT
 
 from hvi_fenicsx.runtime.processes import environment
+from hvi_fenicsx.runtime.versions import __version__
 
 pytestmark = pytest.mark.long
 DATA = {".py", ".j2", ".css", ".typed"}
@@ -67,9 +68,15 @@ def test_the_conda_recipe_has_the_requirements_of_pip() -> None:
     extras = [*project["optional-dependencies"]["gmsh"], *project["optional-dependencies"]["pyvista"]]
     wanted = {renamed.get(name, name).replace(">=", " >=") for name in [*project["dependencies"], *extras]}
     assert wanted <= asked
-    assert f'version: "{project["version"]}"' in recipe
+    assert f'version: "{__version__}"' in recipe
     assert f"- python {project['requires-python']}" in recipe
     assert all(f"{command} = {target}" in recipe for command, target in project["scripts"].items())
+
+
+def test_one_version_is_stated_everywhere(wheel: zipfile.ZipFile) -> None:
+    assert any(name == f"hvi_fenicsx-{__version__}.dist-info/METADATA" for name in wheel.namelist())
+    assert f"\nversion: {__version__}\n" in (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    assert f"({__version__})" in (ROOT / "CHANGELOG.md").read_text(encoding="utf-8").splitlines()[2]
 
 
 def test_it_holds_the_package_and_nothing_else(wheel: zipfile.ZipFile) -> None:
