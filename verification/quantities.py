@@ -196,6 +196,67 @@ class PeakOverLineContact(OnContact, name="peak_over_line_contact"):
 
 
 @dataclass(frozen=True, kw_only=True)
+class Cattaneo(OnContact):
+    """Partial slip on |x| < 1 m of a half-plane, at the tangential force of the run.
+
+    ``bound`` is the largest of the friction's bound, N/m².
+    """
+
+    bound: float
+
+    def stick(self, folder: Path) -> float:
+        """Half the width of the stick zone in closed form, m."""
+        force = json.loads((folder / "summary.json").read_text(encoding="utf-8"))["resultants"][self.part]
+        return float(np.sqrt(1.0 - abs(force[0]) / (0.5 * np.pi * self.bound)))
+
+    def points(self, folder: Path) -> Array:
+        """The coordinates x of the part's vertices, m."""
+        return column([row for row in rows_of(folder / "contact.csv") if row["part"] == self.part], "x")
+
+
+@dataclass(frozen=True, kw_only=True)
+class CattaneoStick(Cattaneo, name="cattaneo_stick"):
+    """Half the width between the outermost vertices that stick, and half a cell beyond; over the closed form."""
+
+    column: str = "u_t1"
+
+    def in_si(self, folder: Path) -> float:
+        x, slip = self.points(folder), np.abs(self.values(folder))
+        stuck = x[slip < 1e-6 * slip.max()]
+        return float((np.ptp(stuck) + np.median(np.diff(x))) / 2 / self.stick(folder))
+
+
+@dataclass(frozen=True, kw_only=True)
+class CattaneoMiddle(Cattaneo, name="cattaneo_middle"):
+    """The traction at x = 0 over the closed form."""
+
+    def in_si(self, folder: Path) -> float:
+        middle = self.values(folder)[np.abs(self.points(folder)).argmin()]
+        return float(abs(middle) / (self.bound * (1.0 - self.stick(folder))))
+
+
+@dataclass(frozen=True, kw_only=True)
+class CattaneoTraction(Cattaneo, name="cattaneo_traction"):
+    """The traction's projection on that of the closed form."""
+
+    def in_si(self, folder: Path) -> float:
+        x, c = self.points(folder), self.stick(folder)
+        inner = c * np.sqrt(np.clip(1.0 - (x / c) ** 2, 0.0, None))
+        wanted = np.sqrt(np.clip(1.0 - x**2, 0.0, None)) - inner
+        return float(np.abs(self.values(folder)) @ wanted / (wanted @ wanted) / self.bound)
+
+
+@dataclass(frozen=True, kw_only=True)
+class SlipOfEquilibrium(Quantity, name="slip_of_equilibrium"):
+    """The largest slip in an equilibrium, by its number from 1 in the order of energies."""
+
+    index: int
+
+    def in_si(self, folder: Path) -> float:
+        return float(rows_of(folder / "equilibria.csv")[self.index - 1]["max_slip"])
+
+
+@dataclass(frozen=True, kw_only=True)
 class TipOfLowest(Quantity, name="tip_of_lowest"):
     """The largest displacement of a part in the equilibrium of the lowest energy."""
 
