@@ -25,7 +25,7 @@ NAME = "search.npz"
 BETWEEN = 2.0
 """Seconds at least between two states that are kept."""
 SHARE = 0.05
-"""Of the time that keeping them may take."""
+"""The share of the time that keeping them may take."""
 _IDENTITY = "identity"
 
 

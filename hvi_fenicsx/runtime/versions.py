@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 
 __version__ = "0.1.0"
-"""Of the release; the only place that states it."""
+"""The release; this is the only place that states it."""
 _ROOT = Path(__file__).parents[2]
 _REVISION = "HVI_REVISION"
 """The variable by which an image names the commit that it was built from."""
