@@ -14,6 +14,7 @@ from .length_kinds import kind_of
 from .lowest import LowestSearch, fresh_box
 from .passes import Pass, passes
 from .scalar_problem import ScalarProblem
+from .stationarity import Kind
 
 OWN_GAP = 0.85
 """Share of the gap that a search may leave where the laws are curved; the rest is for what their polylines differ."""
@@ -149,7 +150,7 @@ def find(
 
 def _only(problem: ScalarProblem) -> Found:
     """The equilibrium of bodies without contact and laws: the minimiser of a convex energy."""
-    kind = stationarity.Kind.MINIMISER
+    kind = Kind.MINIMISER
     point = StationaryPoint(x=np.empty(0), energy=problem.constant, kind=kind, isolated=True)
     return Found(
         points=(point,),
