@@ -10,6 +10,7 @@ import signal
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from pathlib import Path
 from typing import NoReturn
 
 from .arguments import parser
@@ -122,7 +123,8 @@ def _placed(options: argparse.Namespace) -> Iterator[None]:
 
 def _in_one_line(text: str, options: argparse.Namespace) -> str:
     """A message in which the line ends of names are escapes, so that names are not cut."""
-    for path in filter(None, (options.scene, getattr(options, "out", None))):
+    given: list[Path | None] = [options.scene, getattr(options, "out", None)]
+    for path in (path for path in given if path is not None):
         for name in (part for part in path.parts if "\n" in part):
             text = text.replace(name, name.replace("\n", "\\n"))
     return text
