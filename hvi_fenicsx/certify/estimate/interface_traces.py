@@ -131,8 +131,8 @@ class InterfaceTrace:
     ) -> None:
         self._problem, self._bubbles, self._points = problem, bubbles, points
         self._surface, self._directions, self.weights = surface, directions, points.weights
-        flat = directions.reshape(len(directions), int(np.prod(directions.shape[1:])))  # there may be no node here
-        vectors = self.interpolated(flat)
+        _, count, d = directions.shape
+        vectors = self.interpolated(directions.reshape(-1, count * d))
         self._vectors = vectors.reshape(*self.weights.shape, *directions.shape[1:])
 
     def interpolated(self, values: Array) -> Array:
