@@ -46,7 +46,7 @@ SCENES: dict[str, Table] = {
     "degree-2": model(6, 6e6, 1e6, quadratic_linear(3e6), degree=2),
     "degree-2-in-space": CUBE,
     "joined": two_blocks("rectangle", [1.0], [[9, 4], [7, 3]], "plane_stress"),
-    "joined-high": two_blocks("rectangle", [1.0], [[8, 12], [9, 12]], "plane_stress"),  # one rank has no node of the seam
+    "joined-high": two_blocks("rectangle", [1.0], [[8, 12], [9, 12]], "plane_stress"),  # a rank without the seam
     "joined-degree-2": two_blocks("rectangle", [1.0], [[9, 4], [7, 3]], "plane_stress", degree=2),
     "joined-in-space": two_blocks("box", [1.0, 1.0], [[4, 3, 2], [3, 4, 2]], "three_dimensional"),
 }
