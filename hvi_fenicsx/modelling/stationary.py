@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import logging
 import time
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 from typing import Any
 
@@ -10,11 +12,15 @@ from mpi4py import MPI
 
 from ..errors import InputError
 from ..scene import Scene
+from ..solution import Solution
 from ..stationary_points import bodies
 from ..stationary_points.passes import Pass
+from ..stationary_points.search import Found
 from .model import Model
 from .solution import ModelSolution
 from .solving import check
+
+_LOG = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,10 +60,10 @@ def equilibria(
     limit: float | None = None,
     **options: Any,
 ) -> Equilibria:
-    """All equilibria of a model or a scene, or the lowest with a proof. Collective.
+    """All equilibria of a model or a scene, or the lowest with a proof; at level DEBUG progress is logged. Collective.
 
     Args:
-        model: what to search; for all equilibria the tractions of its laws are polylines.
+        model: what to search; for all equilibria the tractions of its laws are polylines of one component each.
         comm: the ranks; by default those of the body, for a scene all.
         lowest: the lowest energy with a proof, instead of all equilibria.
         gap: what that proof may leave open, relative to the energy.
@@ -70,21 +76,24 @@ def equilibria(
     if not 0.0 < gap < 1.0:
         raise InputError(f"gap: must be between 0 and 1 (is {gap!r})")
     prepared = check(model, comm, **options)
-    ranks, start = prepared.system.comm, time.monotonic()
     searched = bodies.Equilibria(prepared)
-    found = searched.find(
-        lowest=lowest,
-        gap=gap,
-        stop=lambda: bool(ranks.bcast(limit is not None and time.monotonic() - start > limit)),
-        report=lambda _: None,
-    )
-    solutions = [searched.solution(point) for point in found.points]
-    bound = None if found.lower_bound is None else found.lower_bound * prepared.problem.scales.energy
+    stop = _stop(prepared.system.comm, limit)
+    found = searched.find(lowest=lowest, gap=gap, stop=stop, report=_LOG.debug)
+    return _result(found, tuple(searched.solution(p) for p in found.points), prepared.problem.scales.energy)
+
+
+def _stop(ranks: MPI.Comm, limit: float | None) -> Callable[[], bool]:
+    """Whether the time is over on rank 0. Collective."""
+    start = time.monotonic()
+    return lambda: bool(ranks.bcast(limit is not None and time.monotonic() - start > limit))
+
+
+def _result(found: Found, solutions: Sequence[Solution], energy: float) -> Equilibria:
     return Equilibria(
         solutions=tuple(ModelSolution(**{f.name: getattr(s, f.name) for f in fields(s)}) for s in solutions),
         kinds=tuple(str(point.kind) for point in found.points),
         complete=found.complete,
-        lower_bound=bound,
+        lower_bound=None if found.lower_bound is None else found.lower_bound * energy,
         gap=found.gap,
         proven=found.proven,
         nodes=found.nodes,

@@ -100,7 +100,8 @@ class Enumeration:
             self.cells += 1
             cell = self._tightened(self.waiting.pop())
             if cell is not None and not self._decided(cell) and not self._linear.excludes(cell.low, cell.high):
-                self.waiting += self._parts(cell)
+                parts = list(self._parts(cell))
+                self.waiting += (replace(part, share=cell.share / len(parts)) for part in parts)
             report(self)
         return True
 

@@ -15,6 +15,7 @@ from ..system.condensation import Condensation
 from ..workflow import certified, finish
 from .all_points import StationaryPoint
 from .condensed_form import scalar_problem
+from .progress_words import Unit
 from .scalar_problem import ScalarProblem
 from .search import Found, Keep, Saved, Wanted, begun, find, forget
 
@@ -73,7 +74,13 @@ class Equilibria:
         """
         if self.problem is None:
             return NONE
-        wanted = Wanted(lowest=lowest, gap=gap, bounded=self._prepared.solvability.state == "held")
+        scales = self._prepared.problem.scales
+        wanted = Wanted(
+            lowest=lowest,
+            gap=gap,
+            bounded=self._prepared.solvability.state == "held",
+            energies=Unit(size=scales.energy, name="J/m" if scales.dimension == 2 else "J"),
+        )
         with self._prepared.timer("solve"):
             if self.problem.error:
                 wanted = self._refined(self.problem, wanted, stop, report)

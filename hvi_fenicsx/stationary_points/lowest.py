@@ -44,6 +44,7 @@ class Progress:
         gap: their difference, relative to the energy.
         boxes: bounded so far.
         waiting: not yet decided.
+        share: what these are of the whole search.
     """
 
     lower: float
@@ -51,6 +52,7 @@ class Progress:
     gap: float
     boxes: int
     waiting: int
+    share: float
 
 
 @dataclass(kw_only=True)
@@ -116,7 +118,7 @@ class LowestSearch:
         self._high = np.max([b[1] for b in listed], axis=0, initial=-np.inf)
         self._try(point)
         for low, high, weights in listed:
-            self._enter(replace(fresh_box(low, high, point), weights=weights))
+            self._enter(replace(fresh_box(low, high, point), weights=weights, share=1.0 / len(listed)))
 
     @property
     def region(self) -> tuple[Array, Array]:
@@ -136,6 +138,7 @@ class LowestSearch:
             gap=max(self.upper - lower, 0.0) / self._size,
             boxes=self.boxes,
             waiting=len(self.waiting),
+            share=sum(box.share for _, _, box in self.waiting),
         )
 
     @property
@@ -170,7 +173,8 @@ class LowestSearch:
                 return False
             _, _, box = heapq.heappop(self.waiting)
             for low, high in self._halves(box):
-                self._enter(replace(fresh_box(low, high, box.x), bound=box.bound, weights=box.weights))
+                half = replace(fresh_box(low, high, box.x), bound=box.bound, weights=box.weights)
+                self._enter(replace(half, share=0.5 * box.share))
             report(self.progress())
         return True
 

@@ -7,6 +7,8 @@ graph of each law; they are not negative where the law only rises.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from ..typing import Array
@@ -35,7 +37,8 @@ def tightened(relaxation: Relaxation, box: Box) -> Box:
     )
     low, high = np.maximum(box.low, y - reach), np.minimum(box.high, y + reach)
     fixed = box.low == box.high
-    return Box(
+    return replace(
+        box,
         low=np.where(fixed, box.low, low),
         high=np.where(fixed, box.high, high),
         bound=-np.inf,

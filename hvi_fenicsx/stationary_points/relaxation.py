@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -33,6 +33,7 @@ class Box:
         gaps: law minus envelope at x, (n + m,).
         chord_low: begin of the chord of the envelope at x, (n + m,).
         chord_high: end of it, (n + m,).
+        share: of the whole search, by the number of parts at each division.
     """
 
     low: Array
@@ -43,6 +44,7 @@ class Box:
     gaps: Array
     chord_low: Array
     chord_high: Array
+    share: float = 1.0
 
 
 def envelopes(problem: ScalarProblem, low: Array, high: Array, added: Array) -> list[list[Arc]]:
@@ -144,9 +146,8 @@ class Relaxation:
         with np.errstate(invalid="ignore", divide="ignore"):
             spread = np.where(loose, 0.5 * (at - begin) * (end - at), 0.0)
         weights = 0.5 * (box.weights + spread) if box.weights.any() else spread
-        return Box(
-            low=box.low,
-            high=box.high,
+        return replace(
+            box,
             bound=max(box.bound, bound + problem.constant),
             x=x,
             weights=weights,

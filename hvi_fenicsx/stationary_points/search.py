@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -11,8 +11,9 @@ from ..errors import InputError, SolverError
 from ..typing import Array
 from .all_points import Enumeration, StationaryPoint
 from .length_kinds import kind_of
-from .lowest import LowestSearch, fresh_box
+from .lowest import LowestSearch, Progress, fresh_box
 from .passes import Pass, passes
+from .progress_words import Clock, Unit, all_in_words, lowest_in_words
 from .scalar_problem import ScalarProblem
 from .stationarity import Kind
 
@@ -51,12 +52,14 @@ class Wanted:
         gap: relative gap that the proof of the lowest may leave.
         bounded: whether the energy is known to be bounded from below.
         start: where the lowest is, as far as that is known.
+        energies: the unit of energies in reports.
     """
 
     lowest: bool = False
     gap: float = 1e-8
     bounded: bool = True
     start: Start | None = None
+    energies: Unit = field(default_factory=Unit)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -173,9 +176,10 @@ def _lowest(task: _Task) -> Found:
     except SolverError as error:
         return Found(points=(), complete=False, lower_bound=None, proven=False, nodes=search.boxes, reason=str(error))
 
-    def tell(_: object) -> None:
-        now = search.progress()
-        task.report(f"lowest: gap {now.gap:.1e}, {now.boxes} boxes, {now.waiting} open")
+    clock = Clock()
+
+    def tell(now: Progress) -> None:
+        task.report(lowest_in_words(now, task.wanted.energies, clock))
         if not search.proven:
             task.keep(lambda: _left_of_lowest(search))
 
@@ -253,10 +257,13 @@ def _all(task: _Task) -> Found:
         for x in saved["x"]:
             search.enter(x)
         low, high = saved["low"], saved["high"]
-        search.waiting = [fresh_box(low[i], high[i], 0.5 * (low[i] + high[i])) for i in range(len(low))]
+        cells = [fresh_box(low[i], high[i], 0.5 * (low[i] + high[i])) for i in range(len(low))]
+        search.waiting = [replace(cell, share=1.0 / len(cells)) for cell in cells]
 
-    def tell(_: object) -> None:
-        task.report(f"all equilibria: {len(search.points)} found, {search.cells} cells, {len(search.waiting)} open")
+    clock = Clock()
+
+    def tell(now: Enumeration) -> None:
+        task.report(all_in_words(now, clock))
         task.keep(lambda: _left_of_all(search))
 
     complete = search.run(task.stop, tell)

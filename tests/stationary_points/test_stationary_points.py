@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import itertools
+import time
 from collections.abc import Sequence
 
 import numpy as np
@@ -19,8 +20,10 @@ from hvi_fenicsx.stationary_points.all_points import Enumeration
 from hvi_fenicsx.stationary_points.arcs import FREE, chain, energy, envelope, total
 from hvi_fenicsx.stationary_points.condensed_form import scalar_problem
 from hvi_fenicsx.stationary_points.lowest import LowestSearch, fresh_box
+from hvi_fenicsx.stationary_points.progress_words import Clock, Unit, lowest_in_words
 from hvi_fenicsx.stationary_points.relaxation import Relaxation
 from hvi_fenicsx.stationary_points.scalar_problem import ScalarProblem
+from hvi_fenicsx.stationary_points.search import Wanted
 from hvi_fenicsx.stationary_points.stationarity import Kind
 from hvi_fenicsx.system.condensation import Condensation
 
@@ -219,3 +222,33 @@ def test_a_drop_that_is_rounding_is_none() -> None:
     steps = itertools.count()
     assert search.run(lambda: next(steps) > 4_000, lambda _: None)
     assert search.points
+
+
+def test_progress_tells_bounds_that_close_on_the_lowest_energy() -> None:
+    case = (3, 6e6, 1e6, paper(3e6), True)
+    problem, unit = problem_of(case)
+    wanted = Wanted(lowest=True, gap=1e-9, energies=Unit(size=unit, name="J/m"))
+    search, told = LowestSearch(problem=problem, gap=1e-9), []
+    search.start()
+    before = search.progress()
+    search.run(lambda: False, told.append)
+    least = oracle(case).stationary()[0].energy / unit
+    for now in (before, *told):
+        assert now.lower <= least * (1 - 1e-12 * np.sign(least))
+        assert now.upper >= least - 1e-9 * abs(least)
+    shares = [now.share for now in told]
+    assert shares == sorted(shares, reverse=True)
+    if told:
+        words = lowest_in_words(told[-1], wanted.energies, Clock(time.monotonic() - 10.0))
+        assert f"{told[-1].lower * unit:.8g} and {told[-1].upper * unit:.8g} J/m" in words
+        assert words.endswith("about 0 s to go")
+
+
+def test_the_shares_of_open_cells_are_what_is_not_done() -> None:
+    problem, _ = problem_of((2, -4e6, 3e5, SAWTOOTH, True))
+    search, shares = Enumeration(problem=problem), []
+    search.start()
+    search.run(lambda: False, lambda now: shares.append(sum(cell.share for cell in now.waiting)))
+    assert shares == sorted(shares, reverse=True)
+    assert shares[-1] == 0.0
+    assert Clock(time.monotonic() - 30.0).to_go(0.25) == ", about 10 s to go"

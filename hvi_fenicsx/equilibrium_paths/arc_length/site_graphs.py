@@ -18,10 +18,9 @@ from ...system.condensed_problem import CondensedProblem
 from ...typing import Array, Integers
 from ..graphs import Passed
 from ..segments import Component, Kind, Segment, chain
-from .chains import beside_opening, fresh, from_zero, refuse_shared
+from .chains import beside_opening, fresh, from_zero
 from .deviations import Deviations
-from .radials import Radials
-from .units import units
+from .site_laws import SiteLaws
 from .vertex_laws import VertexLaw, shares
 
 
@@ -42,7 +41,7 @@ class Kept:
     passed: list[Passed | None]
 
 
-class SiteGraphs:
+class SiteGraphs(SiteLaws):
     """All sites, each on one segment of its graph.
 
     Args:
@@ -50,14 +49,10 @@ class SiteGraphs:
         laws: at its vertices.
 
     Attributes:
-        one: the unknowns of sites of one unknown, which come first, (m1,).
-        radials: the p sites of laws on a length, which come next; then come the sites of their openings, (q,).
         numbers: of the segments on which the sites are, (m,).
         low: least s, (m,).
         high: greatest s, (m,).
         outward: where bonds with memory go on, 1 or -1; else 0, (m,).
-        length: the unit of displacements.
-        forces: the units of forces by unknown, (n,).
         stiffness: S, or another one while a body moves, (n, n).
 
     Raises:
@@ -65,20 +60,8 @@ class SiteGraphs:
     """
 
     def __init__(self, problem: CondensedProblem, laws: Sequence[VertexLaw]) -> None:
-        self._problem, self.stiffness = problem, problem.stiffness
-        kinds = {law.unknowns: (law.opens, law.mixity) for law in laws if law.radial}
-        lengths = sorted(kinds)
-        self.radials = Radials(lengths, [kinds[group][0] for group in lengths], [kinds[group][1] for group in lengths])
-        self.one = np.setdiff1d(np.arange(problem.size), self.radials.flat)
-        by_unknowns: dict[tuple[int, ...], list[VertexLaw]] = {}
-        for law in laws:
-            by_unknowns.setdefault(law.unknowns, []).append(law)
-        keys = [*((int(i),) for i in self.one), *lengths]
-        openings = self.radials.opening_unknowns
-        self.laws = [*(by_unknowns.get(key, []) for key in keys), *([] for _ in openings)]
-        refuse_shared(problem, self.radials, laws)
-        self.length, self.forces = units(problem, laws, self.radials.groups)
-        self._force_units = self.forces[[*(key[0] for key in keys), *openings]]
+        super().__init__(problem, laws)
+        self.stiffness = problem.stiffness
         self._deviations = Deviations(self.laws)
         m = len(self.laws)
         self.numbers = np.zeros(m, dtype=np.int64)
@@ -90,30 +73,6 @@ class SiteGraphs:
         self._bases: list[Array] = [np.zeros(0)] * m
         for k in range(m):
             self.rebuild(k)
-
-    def __len__(self) -> int:
-        return len(self.numbers)
-
-    def unknowns(self) -> list[Integers]:
-        """The unknowns of each site."""
-        return [*self.one.reshape(-1, 1), *self.radials.groups, *self.radials.opening_unknowns.reshape(-1, 1)]
-
-    def radial(self, k: int) -> int | None:
-        """The number among the sites of lengths of a site; None: it is none of these."""
-        p = k - len(self.one)
-        return p if 0 <= p < len(self.radials) else None
-
-    def opening(self, k: int) -> int | None:
-        """The number among the openings of a site; None: it is none of these."""
-        number = k - len(self.one) - len(self.radials)
-        return number if number >= 0 else None
-
-    def laws_at(self, k: int) -> list[VertexLaw]:
-        """The laws of a site; of an opening, those of its length."""
-        opening = self.opening(k)
-        if opening is None:
-            return self.laws[k]
-        return self.laws[len(self.one) + int(self.radials.owner[self.radials.openings[opening]])]
 
     # -- graphs
 

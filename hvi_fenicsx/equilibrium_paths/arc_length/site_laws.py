@@ -1,0 +1,73 @@
+"""Which unknowns and laws each site has."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ...system.condensed_problem import CondensedProblem
+from ...typing import Integers
+from .chains import refuse_shared
+from .radials import Radials
+from .units import units
+from .vertex_laws import VertexLaw
+
+
+class SiteLaws:
+    """The unknowns and laws of all m sites.
+
+    Args:
+        problem: the problem.
+        laws: at its vertices.
+
+    Attributes:
+        one: the unknowns of sites of one unknown, which come first, (m1,).
+        radials: the p sites of laws on a length, which come next; then come the sites of their openings, (q,).
+        laws: of each site; those of openings have none.
+        length: the unit of displacements.
+        forces: the units of forces by unknown, (n,).
+
+    Raises:
+        InputError: a law on a length shares an unknown with another law or a bound.
+    """
+
+    def __init__(self, problem: CondensedProblem, laws: Sequence[VertexLaw]) -> None:
+        self._problem = problem
+        kinds = {law.unknowns: (law.opens, law.mixity) for law in laws if law.radial}
+        lengths = sorted(kinds)
+        self.radials = Radials(lengths, [kinds[group][0] for group in lengths], [kinds[group][1] for group in lengths])
+        self.one = np.setdiff1d(np.arange(problem.size), self.radials.flat)
+        by_unknowns: dict[tuple[int, ...], list[VertexLaw]] = {}
+        for law in laws:
+            by_unknowns.setdefault(law.unknowns, []).append(law)
+        keys = [*((int(i),) for i in self.one), *lengths]
+        openings = self.radials.opening_unknowns
+        self.laws = [*(by_unknowns.get(key, []) for key in keys), *([] for _ in openings)]
+        refuse_shared(problem, self.radials, laws)
+        self.length, self.forces = units(problem, laws, self.radials.groups)
+        self._force_units = self.forces[[*(key[0] for key in keys), *openings]]
+
+    def __len__(self) -> int:
+        return len(self.laws)
+
+    def unknowns(self) -> list[Integers]:
+        """The unknowns of each site."""
+        return [*self.one.reshape(-1, 1), *self.radials.groups, *self.radials.opening_unknowns.reshape(-1, 1)]
+
+    def radial(self, k: int) -> int | None:
+        """The number among the sites of lengths of a site; None: it is none of these."""
+        p = k - len(self.one)
+        return p if 0 <= p < len(self.radials) else None
+
+    def opening(self, k: int) -> int | None:
+        """The number among the openings of a site; None: it is none of these."""
+        number = k - len(self.one) - len(self.radials)
+        return number if number >= 0 else None
+
+    def laws_at(self, k: int) -> list[VertexLaw]:
+        """The laws of a site; of an opening, those of its length."""
+        opening = self.opening(k)
+        if opening is None:
+            return self.laws[k]
+        return self.laws[len(self.one) + int(self.radials.owner[self.radials.openings[opening]])]
