@@ -14,7 +14,7 @@ from .scalar_problem import ScalarProblem
 
 MOST_STEPS = 60
 """Convex programmes of one descent."""
-SLOW = 1e-10
+SLOW = 1e-12
 """Where laws act on lengths, a fall of the energy below this share of its parts is the last."""
 ROUNDING = 1e-13
 """A fall of the energy below this share of its parts is none."""
