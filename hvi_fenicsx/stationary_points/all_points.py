@@ -73,6 +73,7 @@ class Enumeration:
 
     def __post_init__(self) -> None:
         self._forces = ForceIntervals(self.problem, joints_at_ends=False)
+        self._places = np.empty((0, self.problem.size))
         self._linear, self._relaxation = LinearTest(self.problem), Relaxation(self.problem)
 
     def start(self) -> None:
@@ -175,8 +176,12 @@ class Enumeration:
         if stationarity.imbalance(problem, x) > stationarity.ACCURACY:
             return
         near = SAME * (1.0 + float(np.max(np.abs(x), initial=0.0)))
-        if any(np.max(np.abs(p.x - x), initial=0.0) < near for p in self.points):
+        count = len(self.points)
+        if np.any(np.abs(self._places[:count] - x).max(axis=1, initial=0.0) < near):
             return
+        if count == len(self._places):
+            self._places = np.concatenate([self._places, np.empty((count + 1, problem.size))])
+        self._places[count] = x
         kind = stationarity.kind(problem, x)
         self.points.append(StationaryPoint(x=x, energy=problem.energy(x), kind=kind, isolated=isolated))
 
