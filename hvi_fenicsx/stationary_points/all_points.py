@@ -73,7 +73,7 @@ class Enumeration:
 
     def __post_init__(self) -> None:
         self._forces = ForceIntervals(self.problem, joints_at_ends=False)
-        self._places = np.empty((0, self.problem.size))
+        self._places: Array = np.empty((0, self.problem.size))
         self._linear, self._relaxation = LinearTest(self.problem), Relaxation(self.problem)
 
     def start(self) -> None:
