@@ -11,6 +11,7 @@ from typing import Any
 
 import hard_scenes
 from covering import Case
+from dolfinx import fem
 from mpi4py import MPI
 from petsc4py import PETSc
 
@@ -90,5 +91,5 @@ def _solved(
     try:
         return method.solve(branches=begin) if takes else method.solve()  # type: ignore[call-arg]
     except HviError as error:
-        u = workflow.fem.Function(prepared.problem.space)
+        u = fem.Function(prepared.problem.space)
         return SolveResult(u=u, method=method.label, converged=False, reason=str(error))
