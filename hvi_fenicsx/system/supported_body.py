@@ -36,7 +36,12 @@ class SupportedBody:
 
     @classmethod
     def of(cls, problem: Problem, body: AnyBody) -> Self:
-        """A body of a problem. Collective."""
+        """A body of a problem. Collective.
+
+        Args:
+            problem: the problem.
+            body: the body that moves.
+        """
         free = kernel(problem.domain.mesh.comm, body, [existence.prescribed_directions(problem, body)])
         here = problem.space.dofmap.index_map.size_local
         mine = np.flatnonzero(problem.bodies.labels[:here] == body.index).astype(np.int32)
@@ -51,7 +56,7 @@ class SupportedBody:
 
     @cached_property
     def products(self) -> Array:
-        """Of each two motions, on this rank, (n, n)."""
+        """The products of each two motions, on this rank, (n, n)."""
         return np.asarray(np.tensordot(self.fields, self.fields, ((1, 2), (1, 2))))
 
     def motions(self, closed: Sequence[tuple[Surface, Mask]]) -> Motions:

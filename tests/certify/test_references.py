@@ -46,8 +46,8 @@ def test_a_small_net_push_beside_large_balanced_loads_is_never_lost() -> None:
     """Nothing carries it: the friction's peak is half of it."""
     found = solved(squeezed(2 * PEAK, quadratic_linear(PEAK, 1e-2)))
     assert found.exit_code != 0
-    if found.examination is not None:
-        assert found.examination.certificate.net_force > 0.1
+    if found.certificate is not None:
+        assert found.certificate.net_force > 0.1
 
 
 @pytest.mark.parametrize("solver", ["lu", "gamg"])

@@ -45,6 +45,10 @@ class Estimate:
     energy_norm: float
     field: ErrorField | None = None
 
+    def __getstate__(self) -> dict[str, object]:
+        """What is pickled: the numbers, not the field, which belongs to a mesh."""
+        return {**self.__dict__, "field": None}
+
     @property
     def total(self) -> float:
         """All three; the last two are errors within the space, to which the first is orthogonal."""
