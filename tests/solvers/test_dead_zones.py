@@ -138,6 +138,17 @@ def test_what_is_held_beyond_a_dead_zone_is_solved(name: str) -> None:
     assert found.exit_code == 0, found.reason
 
 
+def test_the_error_of_a_body_that_may_move_in_a_dead_zone_is_that_on_weak_springs() -> None:
+    """The motion that nothing resists is no error; it hid the others."""
+    pressed = {"on": "top", "traction": [0.0, "-1e6*(1 + x*(1 - x))"]}
+    springs = {"on": "bottom", "contact": {"gap": 0.0}, "friction": {"law": "linear_spring", "stiffness": 1e6}}
+    free, held = (solved(square(top=pressed, floor=below)).estimate for below in (floor(JUMP), springs))
+    assert free is not None
+    assert held is not None
+    assert free.relative == pytest.approx(held.relative, rel=1e-3)
+    assert free.relative > 0.01
+
+
 def test_two_bodies_each_beyond_its_own_dead_zone(tmp_path: Path) -> None:
     path = meshes.make(tmp_path / "two.msh", meshes.BLOCKS.format(size=0.5, dimension=2, named=False))
     table = square(

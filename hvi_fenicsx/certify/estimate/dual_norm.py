@@ -45,7 +45,7 @@ class DualNorm:
         self._u, self._near = u, thresholds.near
         x = system.unknowns(u)
         self.held = _held(system, x, thresholds.near)
-        system.jacobian.set_rates([_rising(term, x.array_r) for term in system.terms])
+        system.jacobian.set_rates([_rising(system.comm, term, x.array_r, thresholds) for term in system.terms])
         self._inverse = HeldPreconditioner(system, levels, LinearSettings.choose(system, levels=bool(levels)), Timer())
         self._inverse.prepare(self.held)
 
@@ -62,7 +62,7 @@ class DualNorm:
         if load.norm() > 0:
             self._inverse.solve(load, x, self._tolerance if tolerance is None else tolerance)
         energy = float(load.dot(x))
-        return system.displacement(x), float(np.sqrt(max(energy, 0.0)))
+        return system.displacement(x), float(np.sqrt(max(energy, 0.0))) if np.isfinite(energy) else np.inf
 
     def keep_within_bounds(self, error: fem.Function) -> None:
         """Put u + an error on the bounds that it leaves, in place; from then on it is held there. Collective.
@@ -112,10 +112,14 @@ def _held(system: System, x: PETSc.Vec, near: float) -> Entities:
     return np.setdiff1d(np.unique(np.concatenate(found)), system.problem.fixed).astype(np.int32)
 
 
-def _rising(term: LawTerm, u: Array) -> Array:
+def _rising(comm: MPI.Comm, term: LawTerm, u: Array, thresholds: Thresholds) -> Array:
+    """The rising part of a law's tangent; where it is flat everywhere, a foundation in its place. Collective."""
     argument = term.argument(u)
     convex = term.law.convex
     second = np.maximum(convex.second(argument) - term.law.concave.second(argument), 0.0)
+    if comm.allreduce(float(np.max(second, initial=0.0)), op=MPI.MAX) == 0.0:
+        second = np.full_like(second, thresholds.foundation)
+        return term.rate(u, second * argument, second)
     secant = np.maximum((convex.left(argument) + convex.right(argument)) / 2, 0.0) if term.radial else second
     return term.rate(u, secant, second)
 

@@ -21,6 +21,8 @@ class Thresholds:
         bubble_steps: conjugate gradient steps at most of such a solve.
         bubble_rounds: of the active set of the bounds between the nodes, at most.
         dual_tolerance: of a solve with the system's matrix, relative residual: the energy is right to about its square.
+        foundation: stiffness per area, in units of E0/L, in the place of a law that is flat everywhere: it may be all
+            that could hold a motion.
         vertex_tolerance: the same, where conjugate gradients on the bubbles solve for the nodes at each step.
         data_degree: of the modes by which the data on a facet are sampled, by dimension.
         gap_shifts: bisections of the body's motion along a normal, where a gap varies within facets.
@@ -43,6 +45,7 @@ class Thresholds:
     bubble_steps: int = 30
     bubble_rounds: int = 4
     dual_tolerance: float = 0.1
+    foundation: float = 1e-8
     vertex_tolerance: float = 1e-6
     data_degree: Mapping[int, int] = field(default_factory=lambda: {2: 14, 3: 6})
     gap_shifts: int = 20
