@@ -62,7 +62,7 @@ def test_the_document_has_the_files_and_counts_their_lines() -> None:
     assert set(BLOCKS) == {*told, "pressed.toml", "pressed.py", "standing.toml"}
 
 
-@pytest.mark.parametrize("ranks", [1, 2])
+@pytest.mark.parametrize("ranks", [1, pytest.param(2, marks=pytest.mark.long)])
 def test_the_users_scene_is_that_of_the_programs_own_words(ranks: int, files: Path, request: Any) -> None:
     before, out = package(), request.getfixturevalue("pressed") if ranks == 1 else files / "parallel"
     if ranks > 1:
@@ -96,6 +96,7 @@ def test_check_tells_what_they_add(files: Path) -> None:
     assert "the lower energy" in data["solver"]
 
 
+@pytest.mark.long
 def test_the_users_smoothing_gives_what_a_narrow_one_of_the_programs_gives(files: Path) -> None:
     for name in ("cubic", "quadratic"):
         wanted = f'solver={{smoothing="{name}", epsilon=1e-3}}'

@@ -102,6 +102,7 @@ def test_from_python_they_are_the_same() -> None:
     assert found.energy == pytest.approx(energy(plate(force=[3e5, 0.0], moment=1e5, pressure="1e6*y")), rel=1e-10)
 
 
+@pytest.mark.long
 def test_the_same_on_two_ranks(tmp_path: Path) -> None:
     path = write_scene(tmp_path / "s.toml", plate(force=[3e5, -1e5], moment=1e5, pressure=1e5))
     found = []

@@ -73,6 +73,7 @@ def test_a_linear_field_is_prolonged_exactly(tmp_path: Path) -> None:
     assert lost(InterpolationTransfer().prolongation(fine, under), fine, under, linear=True) < 1e-10
 
 
+@pytest.mark.long
 def test_what_is_solved_does_not_change(bored: Path) -> None:
     thresholds = preparation.Thresholds(mesh=COARSER, solvers=SolverThresholds(nested_from=500))
     scene = Scene.model_validate(LIFTED | {"domain": {"shape": "file", "file": str(bored)}})

@@ -349,6 +349,7 @@ def test_a_solution_writes_the_folder_of_a_run(found: hvi.Solution, tmp_path: Pa
     found.write(folder, force=True, pictures=False)
 
 
+@pytest.mark.long
 def test_the_ranks_of_any_communicator_tell_the_same(found: hvi.Solution) -> None:
     everywhere = on_ranks(2, str(Path(__file__).parent / "own_mesh_ranks.py"))
     alone = hvi.solve(steel_square(MPI.COMM_SELF), tolerance=1e-12)

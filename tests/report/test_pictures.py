@@ -469,6 +469,7 @@ def paper_figures(out: Path, ranks: int) -> tuple[list[Path], list[str]]:
     return sorted(out.iterdir()), [line for line in told.stdout.splitlines() if line.startswith("norm")]
 
 
+@pytest.mark.long
 def test_the_papers_figures_are_drawn_and_their_captions_tell_what_epsilon_does(tmp_path: Path) -> None:
     found, norms = paper_figures(tmp_path / "p", 1)
     assert_drawn(found, "figure_3a.png", "figure_3b.png", "figure_4.png", "figure_5.png")

@@ -116,6 +116,7 @@ def test_python_users_who_configure_nothing_see_nothing(scene: Path) -> None:
     assert (done.stdout, done.stderr) == ("", "")
 
 
+@pytest.mark.long
 def test_on_two_ranks_only_the_first_tells(scene: Path) -> None:
     words = ["mpirun", "-n", "2", sys.executable, "-m", "mpi4py", "-c", _TOLD]
     done = subprocess.run(words, cwd=scene.parent, capture_output=True, text=True, check=True, timeout=300)

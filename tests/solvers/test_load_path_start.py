@@ -93,6 +93,7 @@ def test_above_its_strength_in_space_with_friction_on_a_length_the_curve_says_wh
     assert solved(anchor(0.999 * borne)).converged
 
 
+@pytest.mark.long
 def test_above_the_strength_of_a_smoothed_law_the_curve_says_which_load_is_borne() -> None:
     table = bar(1.05 * STRENGTH, 24)
     table["solver"] = {"smoothing": "quadratic", "epsilon": 0.01}

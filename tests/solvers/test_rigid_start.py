@@ -85,6 +85,7 @@ def answers() -> list[Any]:
     return [found.exit_code, found.examination.energy if found.examination else None]
 
 
+@pytest.mark.long
 def test_on_two_ranks_it_rests_where_it_does_on_one() -> None:
     one, two = answers(), on_ranks(2, __file__)
     assert one[0] == two[0] == 0
