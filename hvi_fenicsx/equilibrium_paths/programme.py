@@ -50,6 +50,8 @@ class Follower(ABC):
             self._leg += 1
             if self.end is None:
                 yield self._after_leg(programme)
+        if self.end is None:  # resumed from its last state
+            self._finish(End.REACHED, "the programme is done")
 
     def _after_leg(self, programme: Sequence[float]) -> PathState:
         if self._leg < len(programme):

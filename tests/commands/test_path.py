@@ -71,8 +71,9 @@ def test_a_path_that_is_interrupted_goes_on_to_the_same_end_with_energies_in_bal
     """Loaded, unloaded and loaded again, with memory."""
     scene = read_scene(BAR, ["domain.size=[0.05, 0.001]", "domain.cells=[25, 1]", "path.to=[1.0, 0.3, 1.05]"])
     prepared, wanted = prepare(scene), scene.path or PathTable()
-    whole, _ = follow(PathRun(prepared, wanted))
+    whole, every = follow(PathRun(prepared, wanted))
     assert whole.converged
+    assert follow(PathRun(prepared, wanted), None, every)[0].end == whole.end  # killed after its last row
     assert whole.examined == len(whole.rows)
     assert [row.event for row in whole.rows].count("turn") == 2
     for stop in (1, 9, len(whole.rows) - 2):
