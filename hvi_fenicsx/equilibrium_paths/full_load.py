@@ -52,7 +52,7 @@ def _event_by_event(problem: CondensedProblem, most_events: int) -> FullLoad | N
     again.
     """
     follower, states = _followed(problem, Follow.STABLE, most_events)
-    if follower.end is End.ESCAPES and states:
+    if follower.end is End.ESCAPES and _begins(states):
         reason = follower.reason
         follower, states = _followed(problem, Follow.EXACT, most_events)
         if follower.end is not End.REACHED:
@@ -63,10 +63,15 @@ def _event_by_event(problem: CondensedProblem, most_events: int) -> FullLoad | N
 def _along_the_curve(problem: CondensedProblem, most_events: int) -> FullLoad | None:
     """Where other laws lead: along the curve of equilibria, since a jump takes longer than the whole curve."""
     follower, states = _followed(problem, Follow.EXACT, most_events)
-    if follower.end is End.ESCAPES and states:
+    if follower.end is End.ESCAPES and _begins(states):
         largest = max(state.factor for state in states)
         return FullLoad(x=None, reason=f"at the factor {largest:.6g} the equilibria turn back to no load")
     return _reached(follower, states)
+
+
+def _begins(states: Sequence[PathState]) -> bool:
+    """Whether some load is borne on a path; where none is, the whole load may be borne all the same, off the path."""
+    return any(state.factor > 0.0 for state in states)
 
 
 def _reached(follower: Follower, states: Sequence[PathState]) -> FullLoad | None:

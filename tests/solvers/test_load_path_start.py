@@ -121,6 +121,24 @@ def test_the_end_of_a_path_is_no_answer_for_a_body_that_is_held(monkeypatch: pyt
     assert solved(strip()).converged
 
 
+def test_a_path_that_bears_no_load_does_not_say_that_the_whole_load_is_not_borne() -> None:
+    """Where slips are negative the law pushes on: no small load is borne, but the whole one is."""
+    law = {"law": "quadratic_linear_literal", "gamma1": 1e6, "gamma2": 5e5, "delta": 9.302325581395349e-07}
+    found = solved(
+        {
+            "domain": {"shape": "rectangle", "size": [1.0, 0.001], "cells": [8, 8]},
+            "material": {"model": "plane_stress", "youngs_modulus": 2.15e11, "poisson_ratio": 0.49},
+            "boundary": {
+                "pull": {"on": "right", "traction": ["4.5e8*(4 - 6*y/0.001)", 0.0]},
+                "press": {"on": "top", "traction": [0.0, -1e6]},
+                "floor": {"on": "bottom", "contact": {"gap": 0.0}, "friction": law},
+            },
+        }
+    )
+    assert found.solvability.state == "metastable"
+    assert found.converged
+
+
 @pytest.mark.parametrize("gap", [0.0, 1e-6])
 def test_a_problem_without_fixed_unknowns_has_the_same_energy_and_work(gap: float) -> None:
     table = bar(STRENGTH, 6)
