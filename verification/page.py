@@ -21,7 +21,8 @@ HEAD = """# Do the results of others come out?
 
 This page and its pictures are written by that command. The cases are in `verification/cases.toml`: a command, a source,
 and for each number the value and the tolerance that were written down before the case first ran here. A miss stays in
-the table, with its explanation. The seconds are those of a busy machine of two cores.
+the table, with its explanation. The seconds are those of a
+machine of two cores on which other programs ran too.
 
 """
 
