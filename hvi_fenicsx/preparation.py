@@ -7,7 +7,8 @@ from dataclasses import dataclass, field
 from mpi4py import MPI
 
 from .certify import plausibility
-from .mesh.domain import Domain
+from .mesh import nodes
+from .mesh.domain import Domain, check_affordable
 from .mesh.thresholds import Thresholds as MeshThresholds
 from .problem.compose import Model
 from .problem.problem import Problem
@@ -105,7 +106,7 @@ def prepare(
     timer = timer or Timer()
     options, model = options_of(scene.solver, thresholds.solvers), model_of(scene)
     with timer("mesh"):
-        domain = domain or scene.domain.build_hierarchy(comm, scene.dimension, thresholds.mesh)
+        domain = domain or _meshed(scene, comm, thresholds.mesh)
     system = assemble(domain, model, timer, thresholds.solvers.linear)
     with timer("existence"):
         solvability = solvability or existence.solvability(system.problem, system.forces)
@@ -123,6 +124,15 @@ def prepare(
         timer=timer,
         warnings=warnings,
     )
+
+
+def _meshed(scene: Scene, comm: MPI.Comm, thresholds: MeshThresholds) -> Domain:
+    """The body on its mesh; each shape knows what its own vertices take, but neither other bodies nor the degree."""
+    domain, degree = scene.domain.build_hierarchy(comm, scene.dimension, thresholds), scene.solver.degree or 1
+    place, mend = ("solver.degree", "use degree 1, or fewer cells") if degree > 1 else ("domain", "use fewer cells")
+    unknowns = domain.dimension * nodes.count(domain.mesh, degree)
+    check_affordable(comm, unknowns, domain.dimension, place, mend)
+    return domain
 
 
 def _warnings(scene: Scene, system: System, solvability: Solvability) -> tuple[str, ...]:

@@ -122,14 +122,14 @@ Coarsening: TypeAlias = Callable[[], tuple[Domain, Transfer]]
 """Makes the next coarser domain, and the transfer from it. Collective."""
 
 
-def check_affordable(comm: MPI.Comm, unknowns: float, dimension: int, key: str, mend: str) -> None:
-    """Refuse a mesh that cannot be solved on in the memory that there is, before it is made. Collective.
+def check_affordable(comm: MPI.Comm, unknowns: float, dimension: int, place: str, mend: str) -> None:
+    """Refuse what cannot be solved in the memory that there is, before it is made. Collective.
 
     Args:
         comm: all ranks.
-        unknowns: number of unknowns of the mesh to be made.
+        unknowns: how many there would be.
         dimension: 2 or 3.
-        key: the key of ``[domain]`` that makes them so many.
+        place: the key of the scene that makes them so many.
         mend: what to do about it.
 
     Raises:
@@ -138,7 +138,7 @@ def check_affordable(comm: MPI.Comm, unknowns: float, dimension: int, key: str, 
     needed, room = memory.needed(unknowns, dimension), memory.room(comm)
     if needed > room:
         raise InputError(
-            f"domain.{key}: {unknowns:.1e} unknowns need {needed / 1024:.3g} GB or more; there are "
+            f"{place}: {unknowns:.1e} unknowns need {needed / 1024:.3g} GB or more; there are "
             f"{room / 1024:.3g} GB: {mend}"
         )
 

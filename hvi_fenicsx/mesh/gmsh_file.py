@@ -45,7 +45,7 @@ def read(comm: MPI.Comm, path: Path, dimension: int, scale: float = 1.0, thresho
     """
     found: list[MeshArrays] = []
     names, nodes = on_root(comm, lambda: _read(path, dimension, scale, found, thresholds.gmsh_file_seconds))
-    check_affordable(comm, dimension * nodes, dimension, "file", "mesh the body coarser")
+    check_affordable(comm, dimension * nodes, dimension, "domain.file", "mesh the body coarser")
     arrays = found.pop() if found else None
     curves = on_root(comm, lambda: {} if arrays is None else _curves(arrays, names[dimension - 1], scale, dimension))
     mesh, sides, regions = gmsh_model.distribute(comm, arrays, dimension, names)

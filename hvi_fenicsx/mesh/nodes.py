@@ -48,7 +48,7 @@ def count(mesh: dmesh.Mesh, degree: int) -> int:
         mesh: of simplices.
         degree: 1 or 2.
     """
-    mesh.topology.create_entities(1)
+    mesh.topology.create_entities(degree - 1)
     return sum(int(mesh.topology.index_map(dimension).size_global) for dimension in range(degree))
 
 

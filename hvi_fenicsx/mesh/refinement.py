@@ -55,7 +55,8 @@ def repeated(domain: Domain, times: int) -> Domain:
     """
     d, vertices = domain.dimension, domain.mesh.topology.index_map(0).size_global
     if times:
-        check_affordable(domain.mesh.comm, d * vertices * 2 ** (d * times), d, "refinements", "use fewer refinements")
+        unknowns = d * vertices * 2 ** (d * times)
+        check_affordable(domain.mesh.comm, unknowns, d, "domain.refinements", "use fewer refinements")
     for _ in range(times):
         domain = _with_coarser(domain, uniform(domain))
     return domain

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import os
 import random
-import signal
-import subprocess
 import time
 import tomllib
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
 import pytest
-from runs import command, contact, hvi, summary, write_scene
+from kills import WAYS, end, started
+from runs import command, contact, hvi, process, summary, write_scene
 from scenes import model, quadratic_linear
 
 from hvi_fenicsx.results.output_folder import OutputFolder
@@ -20,24 +19,20 @@ from hvi_fenicsx.runtime import manifest
 
 pytestmark = pytest.mark.long
 
-ROUNDS, KILLS = 14, 5
-"""Seventy kills in all; those while forms compile are in test_kills_compiling.py."""
+FIRST, ROUNDS, KILLS = int(os.environ.get("HVI_SEED", "0")), 14, 5
+"""Seventy kills in all, HVI_SEED draws others; those while forms compile are in test_kills_compiling.py."""
 STARTUP = 0.2
-"""Seconds, or the part of a whole run where that is more, in which Python itself starts, and words its end itself."""
-SOFT = ("SIGINT", "SIGTERM", "SIGHUP")
-"""Requests to stop."""
+"""The part of a whole run in which Python itself starts, and words its end itself."""
 CELLS = {"few": 4, "more": 8}
 """Two scenes, told apart by their title and the length of their tables."""
 
 
-@pytest.mark.parametrize("seed", range(ROUNDS))
+@pytest.mark.parametrize("seed", range(FIRST, FIRST + ROUNDS))
 def test_a_kill_leaves_a_whole_result_and_the_next_run_works(seed: int, tmp_path: Path) -> None:
     chance = random.Random(seed)
     scenes = {title: scene(tmp_path, title) for title in CELLS}
     out = tmp_path / "r"
-    began = time.monotonic()
-    assert hvi("run", scenes["few"], "--out", out).returncode == 0
-    span = time.monotonic() - began
+    span = min(seconds(scenes[title], out) for title in CELLS)
     (out / "mine.txt").write_text("precious")
     for _ in range(KILLS):
         killed(chance, span, scenes[chance.choice(list(scenes))], out)
@@ -55,49 +50,19 @@ def scene(folder: Path, title: str) -> Path:
     )
 
 
+def seconds(file: Path, out: Path) -> float:
+    """How long a whole run takes; the first one also makes what the machine keeps."""
+    began = time.monotonic()
+    assert process("run", file, "--out", out, "--force").returncode == 0
+    return time.monotonic() - began
+
+
 def killed(chance: random.Random, span: float, file: Path, out: Path) -> None:
     """Start a run over the result that is there and end it at a random moment, in a random way."""
-    way, ranks = chance.choice([*SOFT, "SIGKILL", "one rank"]), chance.choice([(), ("--np", "2")])
-    words = command("run", file, "--out", out, "--force", *ranks)
-    process = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True)
-    time.sleep(chance.uniform(max(STARTUP, STARTUP * span), span))
-    kin = family(process.pid)
-    if way == "SIGKILL":
-        os.killpg(process.pid, signal.SIGKILL)
-    elif way == "one rank":
-        os.kill(chance.choice(kin), signal.SIGKILL)
-    else:
-        process.send_signal(getattr(signal, way))
-    _, errors = process.communicate(timeout=120)
-    wait_for_end(kin)
-    if way in SOFT:
-        # negative: before the program's own first line
-        assert process.returncode in (0, 130, -getattr(signal, way)), (way, ranks, errors)
-        assert "Traceback" not in errors
-
-
-def family(pid: int) -> list[int]:
-    """The processes that a run has started, itself first."""
-    found = [pid]
-    for parent in found:
-        found += children(parent)
-    return found
-
-
-def wait_for_end(processes: list[int]) -> None:
-    """Ranks whose launcher was killed end a little later, and hold the folder until then."""
-    end = time.monotonic() + 60
-    while any(Path(f"/proc/{process}").exists() for process in processes):
-        assert time.monotonic() < end, "processes stay"
-        time.sleep(0.1)
-
-
-def children(pid: int) -> list[int]:
-    """Its child processes, while it lives."""
-    try:
-        return [int(c) for t in Path(f"/proc/{pid}/task").iterdir() for c in (t / "children").read_text().split()]
-    except OSError:
-        return []
+    way, ranks = chance.choice(WAYS), chance.choice([(), ("--np", "2")])
+    run = started(command("run", file, "--out", out, "--force", *ranks))
+    time.sleep(chance.uniform(STARTUP * span, span * (1.3 if ranks else 1.0)))
+    end(run, way, chance)
 
 
 def assert_whole(out: Path) -> None:

@@ -7,16 +7,14 @@ from __future__ import annotations
 
 import os
 import random
-import signal
-import subprocess
 import time
 from pathlib import Path
 from typing import Any
 
 import pytest
+from kills import WAYS, end, started
 from runs import command, hvi, summary, write_scene
 from scenes import model, quadratic_linear, two_blocks
-from test_kills import family, wait_for_end
 
 from hvi_fenicsx.results.output_folder import OutputFolder
 from hvi_fenicsx.runtime import manifest
@@ -25,7 +23,6 @@ pytestmark = pytest.mark.long
 
 FIRST, ROUNDS = int(os.environ.get("HVI_SEED", "0")), int(os.environ.get("HVI_ROUNDS", "2"))
 KILLS = 5
-WAYS = ("SIGINT", "SIGTERM", "SIGHUP", "SIGKILL", "one rank")
 STRONG = model(5, 6e6, friction=quadratic_linear(3e6)) | {"path": {"to": [1.0, 0.3, 1.05]}}
 PAIR = two_blocks("rectangle", [0.6], [[6, 4], [5, 4]], "plane_strain") | {"title": "pair"}
 CASES = {"path": STRONG, "equilibria": STRONG, "run": PAIR}
@@ -58,22 +55,9 @@ def test_kills_tear_and_lose_nothing(name: str, seed: int, tmp_path: Path) -> No
 def killed(words: list[object], chance: random.Random, span: float) -> None:
     """Start a run and end it at a random moment, in a random way."""
     way, ranks = chance.choice(WAYS), chance.choice([[], ["--np", "2"]])
-    process = subprocess.Popen(
-        command(*words, *ranks), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
-    )
+    process = started(command(*words, *ranks))
     time.sleep(chance.uniform(0.3, span * (2.0 if ranks else 1.0)))
-    kin = family(process.pid)
-    if way == "SIGKILL":
-        os.killpg(process.pid, signal.SIGKILL)
-    elif way == "one rank":
-        os.kill(chance.choice(kin), signal.SIGKILL)
-    else:
-        process.send_signal(getattr(signal, way))
-    _, errors = process.communicate(timeout=120)
-    wait_for_end(kin)
-    assert "Traceback" not in errors, (way, ranks, errors)
-    if way.startswith("SIG") and way != "SIGKILL":
-        assert process.returncode in (0, 130, -getattr(signal, way)), (way, ranks, errors)
+    end(process, way, chance)
 
 
 def assert_sound(out: Path) -> None:

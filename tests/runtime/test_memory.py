@@ -9,8 +9,9 @@ from typing import Any
 import meshes
 import pytest
 from mpi4py import MPI
+from scenes import model
 
-from hvi_fenicsx import InputError
+from hvi_fenicsx import InputError, Scene, prepare
 from hvi_fenicsx.mesh.shapes import DomainShape
 from hvi_fenicsx.mesh.thresholds import Thresholds
 from hvi_fenicsx.runtime import memory
@@ -71,3 +72,22 @@ def test_a_mesh_of_any_shape_that_memory_cannot_hold_is_refused(
         shape.build_hierarchy(MPI.COMM_WORLD, dimension, Thresholds())
     monkeypatch.setattr(memory, "room", lambda comm: 1.5 * measured)
     shape.build_hierarchy(MPI.COMM_WORLD, dimension, Thresholds())
+
+
+SQUARE = {"shape": "rectangle", "size": [1.0, 1.0], "cells": [30, 30]}
+TOGETHER: dict[str, tuple[dict[str, Any], float]] = {
+    "solver.degree": (model(30, degree=2), 2 * 61**2),
+    "domain": (model(30) | {"domain": {"a": SQUARE, "b": SQUARE | {"origin": [2.0, 0.0]}}, "boundary": {}}, 4 * 31**2),
+}
+
+
+@pytest.mark.parametrize("place", TOGETHER)
+def test_what_degree_two_and_several_bodies_take_is_foreseen(place: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each body alone, and the mesh at degree 1, have room enough."""
+    table, unknowns = TOGETHER[place]
+    scene, measured = Scene.model_validate(table), unknowns * 1.3 / 1024
+    monkeypatch.setattr(memory, "room", lambda comm: 0.8 * measured)
+    with pytest.raises(InputError, match=rf"^{place}: .* unknowns need .* GB or more; there are"):
+        prepare(scene)
+    monkeypatch.setattr(memory, "room", lambda comm: 1.2 * measured)
+    prepare(scene)

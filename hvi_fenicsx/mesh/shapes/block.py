@@ -47,7 +47,7 @@ class Block(DomainShape):
         """The block in triangles or tetrahedra. Collective."""
         from .. import blocks, domain
 
-        domain.check_affordable(comm, self._unknowns(), self.dimension, "cells", "use fewer cells")
+        domain.check_affordable(comm, self._unknowns(), self.dimension, "domain.cells", "use fewer cells")
         return blocks.block(comm, self.size, self.cells)
 
     def build_hierarchy(self, comm: MPI.Comm, dimension: int, thresholds: MeshThresholds) -> Domain:

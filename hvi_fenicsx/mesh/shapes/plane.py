@@ -60,7 +60,7 @@ class PlaneShape(DomainShape):
         """The mesh that gmsh makes on rank 0. Collective."""
         from .. import domain, gmsh_shapes
 
-        domain.check_affordable(comm, self.unknowns(2), 2, "mesh_size", "make it larger")
+        domain.check_affordable(comm, self.unknowns(2), 2, "domain.mesh_size", "make it larger")
         return gmsh_shapes.build(comm, self.outline(), self.mesh_size)
 
     def coarsest(self, thresholds: Thresholds = DEFAULT) -> Self:

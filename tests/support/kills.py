@@ -1,0 +1,67 @@
+"""Ends of runs by signals, as users, schedulers and a lack of memory end them."""
+
+from __future__ import annotations
+
+import os
+import random
+import signal
+import subprocess
+import time
+from collections.abc import Mapping
+from pathlib import Path
+
+SOFT = ("SIGINT", "SIGTERM", "SIGHUP")
+"""Requests to stop."""
+WAYS = (*SOFT, "SIGKILL", "one rank")
+"""The last is SIGKILL to one process of a run."""
+LONGEST = 60
+"""Seconds within which all processes of a run that was ended are gone."""
+
+
+def started(words: list[str], environment: Mapping[str, str] | None = None) -> subprocess.Popen[str]:
+    """A run in a session of its own."""
+    return subprocess.Popen(
+        words, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
+    )
+
+
+def end(process: subprocess.Popen[str], way: str, chance: random.Random) -> None:
+    """End a run in one of the ways, and wait until its processes are gone; a request to stop is met in words."""
+    kin = family(process.pid)
+    if way == "SIGKILL":
+        os.killpg(process.pid, signal.SIGKILL)
+    elif way == "one rank":
+        os.kill(chance.choice(kin), signal.SIGKILL)
+    else:
+        process.send_signal(getattr(signal, way))
+    _, errors = process.communicate(timeout=120)
+    wait_for_end(kin)
+    print(f"ended by {way}: {process.returncode}")
+    assert "Traceback" not in errors, (way, process.args, errors)
+    if way in SOFT:
+        # negative: before the program's own first line
+        assert process.returncode in (0, 130, -getattr(signal, way)), (way, process.args, errors)
+
+
+def family(pid: int) -> list[int]:
+    """The processes that a run has started, itself first."""
+    found = [pid]
+    for parent in found:
+        found += children(parent)
+    return found
+
+
+def children(pid: int) -> list[int]:
+    """Its child processes, while it lives."""
+    try:
+        return [int(c) for t in Path(f"/proc/{pid}/task").iterdir() for c in (t / "children").read_text().split()]
+    except OSError:
+        return []
+
+
+def wait_for_end(processes: list[int]) -> None:
+    """Ranks whose launcher was killed end a little later, and hold the folder until then."""
+    late = time.monotonic() + LONGEST
+    while any(Path(f"/proc/{process}").exists() for process in processes):
+        assert time.monotonic() < late, "processes stay"
+        time.sleep(0.1)
