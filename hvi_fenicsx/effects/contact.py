@@ -15,9 +15,9 @@ from ..schema import refusal
 from ..spatial_value import SpatialValue
 from ..typing import Array
 from .base import Drive, Effect, Evaluate, FormContext, Place, Sizes
-from .contribution import Contribution, NormalBounds
+from .contribution import Contribution, NormalBounds, ObstacleMove
 from .formula_field import FormulaField, as_formula, require_components
-from .obstacles import ObstacleField, ObstacleGap, Vector, unit
+from .obstacles import Obstacle, ObstacleField, ObstacleGap, Vector, unit
 
 MEASURED = "measured"
 """The gap between two bodies is the distance of their sides as they are meshed."""
@@ -27,6 +27,14 @@ Gap = Annotated[
     PlainSerializer(lambda gap: gap if isinstance(gap, str) else gap.source),
 ]
 """A number, a formula in x, y, z (SI), or "measured"."""
+
+
+def _move(obstacle: Obstacle) -> ObstacleMove | None:
+    """The displacement of an obstacle, where it has one."""
+    if obstacle.displacement is None:
+        return None
+    before = ObstacleGap(obstacle.unmoved).negative()
+    return ObstacleMove(vector=obstacle.displacement, before=before, straight=obstacle.moves_straight)
 
 
 @dataclass(frozen=True)
@@ -106,7 +114,8 @@ class Contact(Effect):
 
     def _bounds(self) -> NormalBounds:
         if self.obstacle is not None:
-            return NormalBounds(lower=ObstacleGap(self.obstacle).negative(), upper=None, towards=self.obstacle)
+            least = ObstacleGap(self.obstacle).negative()
+            return NormalBounds(lower=least, upper=None, towards=self.obstacle, move=_move(self.obstacle))
         if isinstance(self.gap, str):
             return NormalBounds(lower=Formula(0.0), upper=None, measured=True)
         towards = _Straight(tuple(map(float, unit(self.direction)))) if self.direction else None

@@ -96,6 +96,21 @@ class Towards(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
+class ObstacleMove:
+    """The displacement of an obstacle.
+
+    Attributes:
+        vector: m.
+        before: the lower bound without it, m.
+        straight: whether the bound changes in proportion to it.
+    """
+
+    vector: tuple[float, ...]
+    before: SpatialValue
+    straight: bool
+
+
+@dataclass(frozen=True, slots=True)
 class NormalBounds:
     """lower ≤ -u·n ≤ upper on a part. Unilateral contact with the gap g has lower = -g.
 
@@ -104,12 +119,14 @@ class NormalBounds:
         upper: m; None: no bound.
         towards: the obstacle, whose direction stands for n; None: the part's own normal.
         measured: whether the distance of the two sides of an interface, as they are meshed, is added to the gap.
+        move: the displacement of the obstacle that is in the bounds; None: it has none.
     """
 
     lower: SpatialValue | None
     upper: SpatialValue | None
     towards: Towards | None = None
     measured: bool = False
+    move: ObstacleMove | None = None
 
 
 ONE = Formula(1.0)

@@ -37,6 +37,10 @@ Vector = Annotated[
 """Components in m, as many as the scene has dimensions."""
 
 
+_ACROSS = 1e-12
+"""A displacement with no larger part than this across a direction is along it."""
+
+
 def unit(vector: Vector) -> Array:
     """The unit vector of a direction, (d,)."""
     return np.asarray(vector, dtype=np.float64) / math.hypot(*vector) + 0.0
@@ -89,6 +93,19 @@ class Obstacle(BaseModel):
     def dimension(self) -> int:
         """The number of components of its vectors."""
         return next(len(v) for key in type(self).model_fields if isinstance(v := getattr(self, key), tuple))
+
+    @property
+    def unmoved(self) -> Obstacle:
+        """The obstacle where it is described."""
+        return self.model_copy(update={"displacement": None})
+
+    @property
+    def moves_straight(self) -> bool:
+        """Whether gaps change in proportion to its displacement, and no direction changes."""
+        if self.displacement is None or self.direction is None:
+            return self.displacement is None
+        move, way = np.asarray(self.displacement), unit(self.direction)
+        return bool(np.linalg.norm(move - (move @ way) * way) <= _ACROSS * np.linalg.norm(move))
 
     @abstractmethod
     def nearest(self, points: Array) -> tuple[Array, Array]:
@@ -155,6 +172,11 @@ class Plane(Obstacle):
     def ahead(self, points: Array, direction: Array) -> Array:
         steep = float(-unit(self.normal) @ direction)
         return np.asarray(self.nearest(points)[0] / (steep if steep > 0.0 else math.nan), np.float64)
+
+    @property
+    @override
+    def moves_straight(self) -> bool:
+        return True
 
     @property
     @override

@@ -156,7 +156,7 @@ class Measures:
 
 
 def driven(problem: Problem) -> Iterator[str]:
-    """The boundary parts with a load or a prescribed displacement, in the order of the scene.
+    """The boundary parts with a load, a prescribed displacement or a moved obstacle, in the order of the scene.
 
     Args:
         problem: the problem.
@@ -166,6 +166,7 @@ def driven(problem: Problem) -> Iterator[str]:
         for where, effect, _ in problem.contributions
         if effect.place is Place.BOUNDARY and (effect.drive is Drive.LOAD or effect.prescribed())
     }
+    with_load |= {bounds.surface.part for bounds in problem.bounds if bounds.move is not None}
     return (part for part in problem.part_facets if part in with_load)
 
 

@@ -127,6 +127,7 @@ def _problem(
     contact_parts.check_bounds(context, bounds, prescribed, fixed, thresholds)
     contact_parts.check_contradictions(context, scales, bounds, thresholds)
     part_laws.check_laws(contributions)
+    part_laws.check_moved(context.domain.mesh.comm, contributions, surfaces, thresholds)
     terms = part_laws.make_terms(context, scales, surfaces, contributions, fixed, model.modify, gaps)
     linear, strains = (_by_name(contributions, kind) for kind in ("linear", "strains"))
     return Problem(

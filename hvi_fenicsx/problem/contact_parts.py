@@ -8,7 +8,7 @@ from itertools import combinations_with_replacement
 
 import numpy as np
 
-from ..effects import NormalBounds, Towards
+from ..effects import Effect, NormalBounds, Towards, load_name
 from ..errors import InputError
 from ..mesh import nodes
 from ..runtime.mpi import agree
@@ -17,7 +17,7 @@ from ..typing import Array, Entities
 from . import contact_normals, contact_surface, facing_sides
 from .contact_surface import Surface
 from .domain_forms import DomainForms
-from .problem import Bounds, PlacedContribution
+from .problem import Bounds, BoundsMove, PlacedContribution
 from .scaling import Scales
 from .spaces import contact_rule, edge_share
 from .thresholds import Thresholds
@@ -99,15 +99,15 @@ def make_bounds(
         InputError: on all ranks alike: a bound that is not a finite number at some vertex, or a measured gap of a part
             that is no interface.
     """
-    wanted = [(surfaces[w], e.key, b) for w, e, c in contributions if w is not None for b in c.bounds]
-    for surface, key, bound in wanted:
+    wanted = [(surfaces[w], e, b) for w, e, c in contributions if w is not None for b in c.bounds]
+    for surface, key, bound in ((surface, effect.key, bound) for surface, effect, bound in wanted):
         if bound.measured and surface.part not in gaps:
             raise InputError(f'boundary.{surface.part}.{key}: gap = "measured" needs two bodies; give a number')
         if bound.towards is not None and surface.part in gaps:
             raise InputError(f'boundary.{surface.part}.{key}: an obstacle is no body; give gap = 0.0 or "measured"')
     return tuple(
-        _along_normal(_bounds(context, surface, key, bounds, scales, gaps), prescribed)
-        for surface, key, bounds in wanted
+        _along_normal(_bounds(context, surface, effect, bounds, scales, gaps), prescribed)
+        for surface, effect, bounds in wanted
     )
 
 
@@ -119,13 +119,15 @@ def _along_normal(stated: Bounds, prescribed: Array) -> Bounds:
     surface = stated.surface
     along = np.sum(surface.measured * surface.normals, axis=1, keepdims=True)
     known = np.sum(surface.values(prescribed) * (surface.measured - along * surface.normals), axis=1)
-    return replace(stated, lower=(stated.lower - known) / along[:, 0], upper=(stated.upper - known) / along[:, 0])
+    lower, upper = ((bound - known) / along[:, 0] for bound in (stated.lower, stated.upper))
+    move = stated.move and replace(stated.move, by=stated.move.by / along[:, 0])
+    return replace(stated, lower=lower, upper=upper, move=move)
 
 
 def _bounds(
     context: DomainForms,
     where: Surface,
-    effect: str,
+    effect: Effect,
     bounds: NormalBounds,
     scales: Scales,
     gaps: Mapping[str, Array],
@@ -138,12 +140,17 @@ def _bounds(
         found = _coefficients(context, where, formula) / scales.displacement
         if not all(agree(context.domain.mesh.comm, bool(np.all(np.isfinite(found))))):
             reason = "the gap is not finite everywhere there; see its formula, or where the obstacle lies"
-            raise InputError(f"boundary.{where.part}.{effect}: {reason}")
+            raise InputError(f"boundary.{where.part}.{effect.key}: {reason}")
         return np.asarray(found)
 
     # lower ≤ -u·n ≤ upper
     open_by = gaps[where.part] / scales.displacement if bounds.measured else 0.0
-    return Bounds(where, -value(bounds.upper), open_by - value(bounds.lower) if bounds.lower else value(None))
+    upper = open_by - value(bounds.lower) if bounds.lower else value(None)
+    move = None
+    if bounds.move is not None:
+        by = upper + value(bounds.move.before) if bounds.move.straight else np.zeros(len(upper))
+        move = BoundsMove(name=load_name(where.part, effect), by=by, straight=bounds.move.straight)
+    return Bounds(where, -value(bounds.upper), upper, move)
 
 
 def _coefficients(context: DomainForms, where: Surface, formula: SpatialValue) -> Array:

@@ -1,4 +1,4 @@
-"""A problem at any factor of some of its loads and prescribed displacements, without being composed again."""
+"""A problem at any factor of some of its loads and given displacements, without being composed again."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from petsc4py import PETSc
 from ..effects import load_name
 from ..typing import Array
 from .law_term import LawTerm
-from .problem import Problem
+from .problem import Bounds, Problem
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,7 +50,13 @@ class FactoredProblem:
             linear=self._times_factor(problem.linear, scaled),
             bulk=replace(problem.bulk, strains=self._times_factor(problem.bulk.strains, scaled)),
             conditions=tuple(conditions),
+            bounds=tuple(_own(bounds) if _is_moved(bounds, scaled) else bounds for bounds in problem.bounds),
         )
+        self._bounds = [
+            (own, once)
+            for own, once in zip(self._problem.bounds, problem.bounds, strict=True)
+            if _is_moved(once, scaled)
+        ]
 
     def _times_factor(self, named: Mapping[str, Any], scaled: Collection[str]) -> dict[str, Any]:
         return {name: self._factor * form if name in scaled else form for name, form in named.items()}
@@ -65,11 +71,25 @@ class FactoredProblem:
         self._factor.value = factor
         for moved in self._moved.values():
             moved.values.x.array[:] = factor * moved.once
+        for own, once in self._bounds:
+            assert once.move is not None
+            back = (1.0 - factor) * once.move.by
+            own.lower[:], own.upper[:] = once.lower - back, once.upper - back
         if terms is None:
             return self._problem
         changed = replace(self._problem, terms=tuple(terms))
         changed.__dict__["bodies"] = self._problem.bodies  # the mesh is the same
         return changed
+
+
+def _own(bounds: Bounds) -> Bounds:
+    """The bounds with arrays of their own, which will be changed."""
+    return replace(bounds, lower=bounds.lower.copy(), upper=bounds.upper.copy())
+
+
+def _is_moved(bounds: Bounds, scaled: Collection[str]) -> bool:
+    """Whether the factor moves the obstacle of these bounds."""
+    return bounds.move is not None and bounds.move.name in scaled
 
 
 def _scaled_conditions(problem: Problem, scaled: Collection[str]) -> dict[int, _ScaledCondition]:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import ufl
 from dolfinx import fem
+from mpi4py import MPI
 
 from ..effects import BoundaryLaw
 from ..errors import InputError
@@ -24,6 +25,7 @@ from .law_term import LawTerm
 from .problem import PlacedContribution
 from .scaling import Scales
 from .spaces import contact_rule
+from .thresholds import Thresholds
 
 Modification = Callable[[Superpotential], Superpotential]
 """The law that is solved in the place of a law, SI: the same law, smoothed for example."""
@@ -49,6 +51,39 @@ def check_laws(contributions: Sequence[PlacedContribution]) -> None:
         raise InputError(
             f"boundary.{one}: {key} and {second_key} act on the same displacement; state them as one law: {mend}"
         )
+
+
+def check_moved(
+    comm: MPI.Comm,
+    contributions: Sequence[PlacedContribution],
+    surfaces: Mapping[str, Surface],
+    thresholds: Thresholds,
+) -> None:
+    """Refuse laws beside an obstacle that is moved along what they act on: the body's own displacement. Collective.
+
+    Args:
+        comm: the ranks.
+        contributions: of all effects.
+        surfaces: by part.
+        thresholds: up to which angle an obstacle moves along the normals.
+
+    Raises:
+        InputError: on all ranks alike.
+    """
+    moves = {w: np.array(b.move.vector) for w, _, c in contributions for b in c.bounds if b.move is not None}
+    for where, effect, contribution in contributions:
+        if where is None or where not in moves or not contribution.laws:
+            continue
+        move, normals = moves[where], surfaces[where].normals
+        across = np.linalg.norm(move - (normals @ move)[:, None] * normals, axis=1)
+        slips = bool(np.any(across > thresholds.turned_to_prescribed * np.linalg.norm(move)))
+        normal = any(law.direction.normal for law in contribution.laws)
+        if any(agree(comm, normal or slips)):
+            mend = "leave that displacement out" if normal else "move it along the normal, or give it a direction"
+            raise InputError(
+                f"boundary.{where}.{effect.key}: acts on the displacement of the body, not on that relative to the "
+                f"obstacle, which is moved along it; {mend}, or prescribe a displacement of the body"
+            )
 
 
 def make_terms(

@@ -44,6 +44,21 @@ class PlacedContribution(NamedTuple):
     contribution: Contribution
 
 
+@dataclass(frozen=True, kw_only=True)
+class BoundsMove:
+    """By how much the displacement of an obstacle has moved bounds.
+
+    Attributes:
+        name: of the obstacle's part and effect, such as ``lid.contact``.
+        by: what it added to the bounds on u·n, (m,).
+        straight: whether a part of the displacement adds the same part of it.
+    """
+
+    name: str
+    by: Array
+    straight: bool
+
+
 @dataclass(frozen=True)
 class Bounds:
     """Bounds on u·n at the m vertices of a surface, nondimensional.
@@ -52,11 +67,13 @@ class Bounds:
         surface: the surface.
         lower: lower bounds, -inf where there is none, (m,).
         upper: upper bounds, inf where there is none, (m,).
+        move: what the displacement of an obstacle has to do with them; None: nothing.
     """
 
     surface: Surface
     lower: Array
     upper: Array
+    move: BoundsMove | None = None
 
     def beyond(self, normal: Array) -> Array:
         """The distance of u·n (m,) beyond its bounds, (m,); negative within them."""

@@ -48,8 +48,8 @@ class PathTable(Table):
     to: Annotated[tuple[float, ...], BeforeValidator(_programme), PlainSerializer(_written)] = (1.0,)
     """the factor at which the path ends; or a programme with turns: [1.0, 0.2, 1.5] loads, unloads, loads again"""
     scaled: Names | None = None
-    """what the factor multiplies: loads and prescribed displacements by name, such as ["pull.traction"]; all others are
-    constant; by default all"""
+    """what the factor multiplies: loads, prescribed displacements and moved obstacles by name, such as
+    ["pull.traction", "lid.contact"]; all others are constant; by default all"""
     follow: Literal["stable", "exact"] = "stable"
     """stable: as a testing machine does, at a limit point on to the next stable equilibrium; exact: the path itself,
     through limit points, where the factor falls and rises again"""

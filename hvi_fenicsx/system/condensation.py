@@ -8,13 +8,14 @@ are, one unknown for each such motion stays.
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from petsc4py import PETSc
 from scipy.linalg import cho_factor, cho_solve
 from scipy.linalg.lapack import dpstrf
 
+from ..errors import InputError
 from ..runtime.mpi import agree
 from ..typing import Array, Integers
 from . import condensed_laws, loading
@@ -33,10 +34,12 @@ class _Carriers:
         points: vertices, m, (n, 3).
         parts: the part whose contact bounds the unknown, (n,).
         carrying: numbers of those that carry a bound or a law.
+        shift: by how much obstacles that the factor moves have moved the bounds, which are those without, (n,).
     """
 
     lower: Array
     upper: Array
+    shift: Array
     points: Array
     parts: tuple[str, ...]
     carrying: Integers
@@ -47,10 +50,11 @@ class Condensation:
 
     Args:
         system: the system, nothing held and without tangents of laws.
-        scaled: names (``part.effect``) of the loads and prescribed displacements that the factor scales; None: all.
+        scaled: names (``part.effect``) of the loads, prescribed displacements and obstacles that the factor scales;
+            None: all but the obstacles, which stay where they have been moved to.
 
     Attributes:
-        problem: the arrays.
+        problem: the arrays. Its unknowns x are those of Γc without λ times the obstacles' shift: their bounds stand.
 
     Raises:
         InputError: on all ranks alike: a name in ``scaled`` is none; a law on |u_t| cannot be condensed.
@@ -62,7 +66,7 @@ class Condensation:
         kept = np.setdiff1d(system.jacobian.rows.dofs, np.union1d(system.problem.fixed, system.pins))
         self._interior = Interior(system, kept)
         laws = condensed_laws.make(system, self._interior, self._loading.prescribed)
-        carriers = _carriers(system, self._interior, laws)
+        carriers = _carriers(system, self._interior, laws, loading.obstacle_shift(system, scaled or ()))
         whole = self._interior.stiffness()
         self._split(whole, carriers.carrying)
         self.problem = self._condensed(whole, carriers, laws)
@@ -83,21 +87,25 @@ class Condensation:
         """The problem on the unknowns that stay. Collective."""
         stay, at = self._stay, self._coupling
         stiffness = whole[np.ix_(stay, stay)] - at.T @ self._eliminated(at)
+        self._shift = carriers.shift[stay]
         force, applied, constant, applied_constant = self._loads()
         laws = laws.renumbered(stay, len(whole))
-        return CondensedProblem(
-            stiffness=0.5 * (stiffness + stiffness.T),
-            force=force[:, 0],
-            force_rate=force[:, 1],
-            lower=carriers.lower[stay],
-            upper=carriers.upper[stay],
-            bonds=laws.bonds,
-            prescribed_bonds=laws.prescribed,
-            constant=constant,
-            applied=applied.T,
-            applied_constant=applied_constant,
-            points=carriers.points[stay],
-            parts=tuple(carriers.parts[i] for i in stay),
+        return _shifted(
+            self._shift,
+            CondensedProblem(
+                stiffness=0.5 * (stiffness + stiffness.T),
+                force=force[:, 0],
+                force_rate=force[:, 1],
+                lower=carriers.lower[stay],
+                upper=carriers.upper[stay],
+                bonds=laws.bonds,
+                prescribed_bonds=laws.prescribed,
+                constant=constant,
+                applied=applied.T,
+                applied_constant=applied_constant,
+                points=carriers.points[stay],
+                parts=tuple(carriers.parts[i] for i in stay),
+            ),
         )
 
     def _loads(self) -> tuple[Array, Array, Array, Array]:
@@ -130,7 +138,9 @@ class Condensation:
         gone = self._eliminated(outer[self._gone])
         inside = self._system.comm.allreduce(vectors.T @ interior.solve(self._loading.lifted))
         rows = outer[self._stay] - self._coupling.T @ gone
-        return np.asarray(inside + gone.T @ self._force[self._gone]), np.asarray(rows.T)
+        constants = np.asarray(inside + gone.T @ self._force[self._gone])
+        constants[:, 1] += rows.T @ self._shift
+        return constants, np.asarray(rows.T)
 
     def values(self, x: Array, factor: float = 1.0) -> Array:
         """The displacements of all unknowns of Γc that the body keeps, (n of the interior,).
@@ -140,9 +150,9 @@ class Condensation:
             factor: λ.
         """
         found = np.empty(self._interior.size)
-        found[self._stay] = x
+        found[self._stay] = x + factor * self._shift
         load = self._force[self._gone] @ np.array([1.0, factor])
-        found[self._gone] = self._eliminated(load - self._coupling @ x)
+        found[self._gone] = self._eliminated(load - self._coupling @ found[self._stay])
         return found
 
     def expand(self, x: Array, factor: float = 1.0) -> PETSc.Vec:
@@ -212,23 +222,46 @@ def _regular(matrix: Array, tolerance: float) -> Integers:
     return np.asarray(pivots[:rank] - 1, dtype=np.int64)
 
 
+def _shifted(by: Array, problem: CondensedProblem) -> CondensedProblem:
+    """The problem in the unknowns x of u = x + λ shift, from that in u."""
+    pull = problem.stiffness @ by
+    energy = [0.0, -float(problem.force @ by), float((0.5 * pull - problem.force_rate) @ by)]
+    return replace(
+        problem,
+        force_rate=problem.force_rate - pull,
+        constant=problem.constant + np.array(energy),
+    )
+
+
 def _quadratic(products: Array) -> Array:
     """c0, c1, c2 of the bilinear form at (1, λ)."""
     return np.array([products[0, 0], products[0, 1] + products[1, 0], products[1, 1]])
 
 
-def _carriers(system: System, interior: Interior, laws: condensed_laws.CondensedLaws) -> _Carriers:
+def _refuse_laws(laws: condensed_laws.CondensedLaws, shift: Array) -> None:
+    """Laws act on the body's own displacement, which is not that relative to an obstacle."""
+    for bonds in laws.bonds:
+        if np.any(shift[bonds.unknowns] != 0.0):
+            raise InputError(
+                f"boundary.{bonds.part}: the path moves an obstacle along the displacement that this "
+                "law acts on; leave the vertices that both parts share out of one of them (where)"
+            )
+
+
+def _carriers(system: System, interior: Interior, laws: condensed_laws.CondensedLaws, moved: Array) -> _Carriers:
     """What the kept unknowns carry. Collective."""
-    lower, upper = (interior.gathered(v.array_r) for v in (system.lower, system.upper))
+    lower, upper, shift = (interior.gathered(v) for v in (system.lower.array_r, system.upper.array_r, moved))
     bounded = np.isfinite(lower) | np.isfinite(upper)
     with_law = [b.unknowns.ravel() for b in laws.bonds]
     d = system.problem.scales.dimension
     named = np.full(system.load.local_size, "", dtype=object)
     for bounds in system.bounds:
         named[bounds.component()[0]] = bounds.surface.part
+    _refuse_laws(laws, shift)
     return _Carriers(
-        lower=lower,
-        upper=upper,
+        lower=lower - shift,
+        upper=upper - shift,
+        shift=shift,
         points=np.concatenate(agree(system.comm, system.problem.points[interior.kept // d])),
         parts=tuple(str(p) if b else "" for p, b in zip(interior.gathered(named), bounded, strict=True)),
         carrying=np.unique(np.concatenate([np.flatnonzero(bounded), *with_law])).astype(np.int64),

@@ -34,8 +34,42 @@ class Loading:
 
 
 def names(system: System) -> tuple[str, ...]:
-    """All that a factor can scale: ``part.effect`` of each load and each prescribed displacement."""
-    return tuple(dict.fromkeys([*system.forces, *_conditions(system)]))
+    """All that a factor can scale: ``part.effect`` of each load, prescribed displacement and moved obstacle."""
+    moved = [bounds.move.name for bounds in system.bounds if bounds.move is not None]
+    return tuple(dict.fromkeys([*system.forces, *_conditions(system), *moved]))
+
+
+def obstacle_shift(system: System, scaled: Collection[str]) -> Array:
+    """By how much the obstacles that a factor moves have moved the bounds of this rank's unknowns, (local unknowns,).
+
+    Args:
+        system: the system.
+        scaled: names of what the factor scales.
+
+    Raises:
+        InputError: on all ranks alike: not in proportion; or another bound of the same unknown stands still.
+    """
+    shift, still = np.zeros(system.load.local_size), np.zeros(system.load.local_size, dtype=bool)
+    both = False
+    for bounds in system.bounds:
+        dofs, sign = bounds.component()
+        if bounds.move is None or bounds.move.name not in scaled:
+            still[dofs] = True
+            continue
+        if not bounds.move.straight:
+            raise InputError(
+                f"{bounds.move.name}: this obstacle's gaps do not change in proportion to its displacement, so that no "
+                "path can move it; give it a direction along its displacement, or leave it out of path.scaled"
+            )
+        by = sign * bounds.move.by
+        both |= bool(np.any((shift[dofs] != 0.0) & (shift[dofs] != by)))
+        shift[dofs] = by
+    if any(agree(system.comm, both or bool(np.any(still & (shift != 0.0))))):
+        raise InputError(
+            "path: a vertex is on two parts with contact, and the path moves the obstacle of one only; leave the "
+            "vertex out of one part (where)"
+        )
+    return shift
 
 
 def make(system: System, scaled: Collection[str] | None) -> Loading:
