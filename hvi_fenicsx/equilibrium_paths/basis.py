@@ -17,6 +17,8 @@ from .step import FACTOR
 
 _KEPT = 1e-6
 """What an inverse that is kept may leave of a column; one step of refinement takes this out."""
+_WEAK = 1e-3
+"""A pivot that is so small beside its column costs digits."""
 
 
 class Basis:
@@ -86,6 +88,24 @@ class Basis:
         found += np.where(moving, cells.slope, cells.rise) * coordinates
         return np.asarray(found if driver == FACTOR else found - values[driver] * self._rate)
 
+    def replace(self, changed: int) -> int:
+        """Put the column of a coordinate in its new segment in the place of its old one; the same variable drives.
+
+        Args:
+            changed: number of its unknown.
+
+        Returns:
+            0 where that, or an exchange, costs no fewer digits: nothing is done; else the direction in which the
+            driving variable goes on, relative to before, for the coordinate to go on as it did.
+        """
+        if _strength(self.column, changed) >= _WEAK:
+            return 0
+        spread = self.roughly(self._cells.column(changed))
+        if _strength(spread, changed) < _WEAK:
+            return 0
+        self._inverse = _exchanged(self._inverse, spread, changed)
+        return 1 if spread[changed] > 0.0 else -1
+
     def exchange(self, leaving: int) -> None:
         """Let the driving variable enter, and a coordinate leave, which drives from now on.
 
@@ -110,6 +130,11 @@ class Basis:
         with np.errstate(all="ignore"):
             left = self._product(inverse @ self._rate, FACTOR) - self._rate
             return bool(np.max(np.abs(left), initial=0.0) <= _KEPT * np.max(np.abs(self._rate), initial=0.0))
+
+
+def _strength(column: Array, place: int) -> float:
+    """The pivot at a place over the largest entry of its column."""
+    return float(abs(column[place])) / (float(np.max(np.abs(column))) or 1.0)
 
 
 def _exchanged(inverse: Any, column: Array, place: int) -> Any:

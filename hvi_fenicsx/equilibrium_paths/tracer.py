@@ -224,16 +224,26 @@ class Tracer:
             chain: the segments, where they have changed.
         """
         direction = 1 if self.rates[i] > 0.0 else -1
-        if i != self.driver:
-            self._basis.exchange(i)
-        self.heading = direction
         if chain is None:
             self.cells.enter(i, number, coordinate)
         else:
             self.cells.replace_chain(i, chain, number, coordinate)
+        self.heading = self._heading_on(i, direction)
         self.small[i] = 0.0
         self._behind[i] = self._lag[i]
         self.refine()
+
+    def _heading_on(self, i: int, direction: int) -> int:
+        """Choose what drives from an unknown's new segment on; its direction for the unknown to go in a given one.
+
+        The unknown itself drives, unless it is so slow that the variable that drives already keeps more digits.
+        """
+        if i == self.driver:
+            return direction
+        if onward := self._basis.replace(i):
+            return onward * self.heading
+        self._basis.exchange(i)
+        return direction
 
     def _factor_stands(self) -> bool:
         """Whether the factor stands still, but for rounding, while unknowns move."""

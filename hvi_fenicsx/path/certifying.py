@@ -2,7 +2,8 @@
 
 On Γc: each unknown must be on the graph of its laws and bounds, with the force that the body leaves there; S and f come
 from the factorised body. The certificate of the whole body (:mod:`.certify`) reassembles all forces from the forms;
-where bonds remember, what was judged on Γc must be what these forces leave there.
+where bonds remember, what was judged on Γc must be what these forces leave there. So it must at states where the loads
+are nothing beside those of the whole programme: there is nothing else by which to measure what is left of forces.
 """
 
 from __future__ import annotations
@@ -48,6 +49,7 @@ class Certifier:
         factored: its problem at any factor.
         tolerance: relative.
         distance: how far a state is from the graphs of Γc, relative to the forces.
+        largest: factor of the programme, in size.
     """
 
     def __init__(
@@ -57,9 +59,11 @@ class Certifier:
         factored: FactoredProblem,
         tolerance: float,
         distance: Callable[[PathState], float],
+        largest: float,
     ) -> None:
         self._system, self._condensation, self._factored = system, condensation, factored
         self._tolerance, self._distance = tolerance, distance
+        self._whole_load = self._load(largest)
 
     def verdict(self, state: PathState, number: int) -> Verdict:
         """What a state is found to be. Collective.
@@ -70,8 +74,16 @@ class Certifier:
         """
         on_surface = self._distance(state) <= self._tolerance
         whole = state.event in ALWAYS or is_examined(number)
-        examined = self._examined if _plain(state) else self._in_balance
+        examined = self._examined if _plain(state) and not self._is_unloaded(state) else self._in_balance
         return Verdict(certified=on_surface and (not whole or examined(state)), whole=whole)
+
+    def _load(self, factor: float) -> float:
+        """The Euclidean norm of loads, and of what prescribed displacements pull. Collective."""
+        return float(self._condensation.load(factor).norm())
+
+    def _is_unloaded(self, state: PathState) -> bool:
+        """Whether the loads are less than the tolerance of those of the whole programme. Collective."""
+        return self._load(state.factor) <= self._tolerance * self._whole_load
 
     def _in_balance(self, state: PathState) -> bool:
         """Whether forces from the forms are those that were judged on Γc, and none are left elsewhere. Collective.
@@ -85,6 +97,7 @@ class Certifier:
         reaction.array[:] = forces.reaction.ravel()
         turn(reaction, system.rotation)
         size = max(np.sqrt(system.comm.allreduce(float(np.sum(f**2)))) for f in (forces.load, forces.reaction))
+        size = max(size, self._whole_load if self._is_unloaded(state) else 0.0)
         return bool(self._condensation.unbalanced(reaction, state.x, factor) <= self._tolerance * (size or 1.0))
 
     def _examined(self, state: PathState) -> bool:

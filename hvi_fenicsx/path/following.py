@@ -75,7 +75,8 @@ class PathRun:
         problem = self._condensation.problem
         self._kind = kind_of(problem)
         distance = self._kind.distances(problem, self._remember)
-        self._certifier = Certifier(system, self._condensation, self._factored, prepared.options.tolerance, distance)
+        tolerance, largest = prepared.options.tolerance, max(wanted.to, key=abs)
+        self._certifier = Certifier(system, self._condensation, self._factored, tolerance, distance, largest)
         self.states: list[PathState] = []
         self._verdicts: list[Verdict] = []
         self._extremes: list[tuple[float, float]] = []

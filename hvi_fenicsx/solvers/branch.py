@@ -87,7 +87,7 @@ class BranchIteration(Method):
         """
         x = start.copy()
         with self.solver.reporting(self._progress):
-            outcome, stationary = self._convex.newton(x, self._convex.cells(x), "basic")
+            outcome, stationary = self._convex.newton(x, self._convex.cells(x))
         return self._result(x, replace(outcome, converged=stationary))
 
     def _resting(self) -> PETSc.Vec:

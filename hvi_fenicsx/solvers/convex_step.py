@@ -154,19 +154,20 @@ class ConvexStep:
         if not self.anywhere([np.asarray(law.concave.second(a) > 0) for law, a in arguments]):
             return outcome, False
         trial = x.copy()
-        found, stationary = self.newton(trial, cells, "bt")
+        found, stationary = self.newton(trial, cells)
         if not found.converged or self.energy(trial) > self.energy(x) + self.energy_rounding(self.energy(x), x):
             return outcome, False
         trial.copy(x)
         return found, stationary
 
-    def newton(self, x: PETSc.Vec, cells: Sequence[Cells], line_search: str) -> tuple[Outcome, bool]:
-        """Newton steps on the laws themselves, each vertex kept in its cell. Collective.
+    def newton(self, x: PETSc.Vec, cells: Sequence[Cells]) -> tuple[Outcome, bool]:
+        """Newton steps on the laws themselves, whole ones, each vertex kept in its cell. Collective.
+
+        Near a solution a line search on the energy would see no more than its rounding.
 
         Args:
             x: start and result.
             cells: where each vertex is kept, by term.
-            line_search: PETSc's name.
 
         Returns:
             How it ended, and whether x is stationary.
@@ -175,7 +176,7 @@ class ConvexStep:
         exact = [ExactLaw(law, c) for law, c in zip(self._laws, cells, strict=True)]
         most = self._thresholds.newton_steps
         found = self._solver.solve(
-            x, exact, self._options.tolerance, lower=lower, upper=upper, line_search=line_search, max_iterations=most
+            x, exact, self._options.tolerance, lower=lower, upper=upper, line_search="basic", max_iterations=most
         )
         self._counts.add_outcome(found)
         return found, found.converged and not self.anywhere(self._overloaded(x, exact))
