@@ -45,7 +45,8 @@ class EnergyBalance:
         self._recoverable = self._bonds.recoverable(x, force)
         self._potential = problem.potential(x, factor)
         elastic = 0.5 * float(x @ (problem.stiffness @ x)) - float(problem.load(factor) @ x)
-        self.energy = elastic + problem.constant_at(factor) + self._recoverable
+        self._constant = problem.constant_at(factor)
+        self.energy = elastic + self._constant + self._recoverable
 
     def go(self, x: Array, force: Array, factor: float) -> None:
         """Along a straight part of the path.
@@ -55,11 +56,11 @@ class EnergyBalance:
             force: of their bonds, (n,).
             factor: λ.
         """
-        problem, before = self._problem, (self._x, self._force, self._factor)
+        before, constant = (self._x, self._force, self._factor), self._constant
         potential, recoverable = self._potential, self._recoverable
         self._note(x, force, factor)
-        change = problem.constant_at(factor) - problem.constant_at(before[2])
-        change -= 0.5 * float(problem.force_rate @ (x + before[0])) * (factor - before[2])
+        change = self._constant - constant
+        change -= 0.5 * float(self._problem.force_rate @ (x + before[0])) * (factor - before[2])
         self.work += change + self._potential - potential
         taken = 0.5 * float((force + before[1]) @ (x - before[0]))
         if self._bonds.remembers:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -17,16 +18,31 @@ from .state import End, Follow, PathOptions, PathState
 
 
 @dataclass(frozen=True, kw_only=True)
+class Loaded:
+    """An equilibrium under a part of the load.
+
+    Attributes:
+        x: the unknowns, (n,).
+        factor: of the load.
+    """
+
+    x: Array
+    factor: float
+
+
+@dataclass(frozen=True, kw_only=True)
 class FullLoad:
     """Where loading leads.
 
     Attributes:
         x: the unknowns of an equilibrium under the whole load, (n,); None: there is none on the path.
         reason: how the path ended.
+        borne: where there is none, the last state that is borne; None where that is not known.
     """
 
     x: Array | None
     reason: str
+    borne: Loaded | None = None
 
 
 def at_full_load(problem: CondensedProblem, most_events: int) -> FullLoad | None:
@@ -38,11 +54,16 @@ def at_full_load(problem: CondensedProblem, most_events: int) -> FullLoad | None
     """
     fewer, kept = without_fixed(problem)
     found = (_event_by_event if is_piecewise_linear(fewer) else _along_the_curve)(fewer, most_events)
-    if found is None or found.x is None:
-        return found
-    whole = np.where(np.isfinite(problem.lower), problem.lower, 0.0)
-    whole[kept] = found.x
-    return FullLoad(x=whole, reason=found.reason)
+    if found is None:
+        return None
+
+    def whole(x: Array) -> Array:
+        values = np.where(np.isfinite(problem.lower), problem.lower, 0.0)
+        values[kept] = x
+        return values
+
+    borne = None if found.borne is None else replace(found.borne, x=whole(found.borne.x))
+    return replace(found, x=None if found.x is None else whole(found.x), borne=borne)
 
 
 def _event_by_event(problem: CondensedProblem, most_events: int) -> FullLoad | None:
@@ -53,10 +74,10 @@ def _event_by_event(problem: CondensedProblem, most_events: int) -> FullLoad | N
     """
     follower, states = _followed(problem, Follow.STABLE, most_events)
     if follower.end is End.ESCAPES and _begins(states):
-        reason = follower.reason
+        ended = FullLoad(x=None, reason=follower.reason, borne=_largest(states))
         follower, states = _followed(problem, Follow.EXACT, most_events)
         if follower.end is not End.REACHED:
-            return FullLoad(x=None, reason=reason)
+            return ended
     return _reached(follower, states)
 
 
@@ -64,14 +85,22 @@ def _along_the_curve(problem: CondensedProblem, most_events: int) -> FullLoad | 
     """Where other laws lead: along the curve of equilibria, since a jump takes longer than the whole curve."""
     follower, states = _followed(problem, Follow.EXACT, most_events)
     if follower.end is End.ESCAPES and _begins(states):
-        largest = max(state.factor for state in states)
-        return FullLoad(x=None, reason=f"at the factor {largest:.6g} the equilibria turn back to no load")
+        largest, stable = _largest(states), list(itertools.takewhile(lambda state: state.stable, states))
+        first = len(stable) == len(states) or states[len(stable)].factor == largest.factor
+        reason = f"at the factor {largest.factor:.6g} the equilibria turn back to no load"
+        return FullLoad(x=None, reason=reason, borne=largest if first else None)
     return _reached(follower, states)
 
 
 def _begins(states: Sequence[PathState]) -> bool:
     """Whether some load is borne on a path; where none is, the whole load may be borne all the same, off the path."""
     return any(state.factor > 0.0 for state in states)
+
+
+def _largest(states: Sequence[PathState]) -> Loaded:
+    """The state of the largest factor."""
+    state = max(states, key=lambda one: one.factor)
+    return Loaded(x=state.x, factor=state.factor)
 
 
 def _reached(follower: Follower, states: Sequence[PathState]) -> FullLoad | None:

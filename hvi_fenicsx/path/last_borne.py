@@ -1,25 +1,28 @@
-"""Above the limit load: the last state that is borne, in the place of a body on its way off."""
+"""Above the limit load: the last state that is borne, in the place of a body on its way off.
+
+Where ``auto`` has followed the load path to its end, that state is known; else the path is followed here.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..certify import certificate, plausibility
 from ..errors import InputError, SolverError
-from ..load_path import INTERRUPTED, LoadPath
+from ..load_path import INTERRUPTED
 from ..preparation import Preparation
+from ..problem.factored_problem import FactoredProblem
+from ..problem.problem import Problem
 from ..runtime.log import logger
 from ..scene import PathTable
 from ..solution import LastBorne, Solution
 from ..solvers import frozen_mixity
 from ..solvers.context import never
-
-if TYPE_CHECKING:
-    from .following import PathRun
+from ..solvers.result import Borne
+from ..system import loading
 
 _LOG = logger("path")
 
@@ -36,6 +39,10 @@ def in_place_of(prepared: Preparation, failed: Solution, interrupted: Callable[[
     """
     if not _may_come_off(prepared, failed):
         return failed
+    assert failed.solve_result is not None
+    if (known := failed.solve_result.borne) is not None:
+        factored = FactoredProblem(prepared.problem, loading.names(prepared.system))
+        return _shown(prepared, factored.at(known.factor), known, failed)
     _LOG.info("no equilibrium found under the whole load: the load is followed from 0 to the last state that is borne")
     try:
         return _at_the_limit(prepared, failed, interrupted)
@@ -56,7 +63,10 @@ def _at_the_limit(prepared: Preparation, failed: Solution, interrupted: Callable
     if path.end == INTERRUPTED:
         return replace(failed, solve_result=replace(failed.solve_result, interrupted=True))
     borne = path.rows and 0.0 < path.rows[path.peak].factor < 1.0
-    return _shown(run, path, failed) if borne else failed
+    if not borne:
+        return failed
+    problem, u = run.state(path.peak)
+    return _shown(prepared, problem, Borne(u=u, factor=path.rows[path.peak].factor), failed)
 
 
 def _may_come_off(prepared: Preparation, failed: Solution) -> bool:
@@ -72,11 +82,10 @@ def _may_come_off(prepared: Preparation, failed: Solution) -> bool:
     return True
 
 
-def _shown(run: PathRun, path: LoadPath, failed: Solution) -> Solution:
-    """The state of the largest factor, certified under its load. Collective."""
+def _shown(prepared: Preparation, problem: Problem, borne: Borne, failed: Solution) -> Solution:
+    """The last state that is borne, certified under its load. Collective."""
     assert failed.solve_result is not None
-    options, factor = run.prepared.options, path.rows[path.peak].factor
-    problem, u = run.state(path.peak)
+    options, u = prepared.options, borne.u
     frozen_mixity.freeze(problem, u)
     found = certificate.examine(problem, u, options.tolerance, inertia=options.second_order)
     return replace(
@@ -84,6 +93,6 @@ def _shown(run: PathRun, path: LoadPath, failed: Solution) -> Solution:
         problem=problem,
         solve_result=replace(failed.solve_result, u=u),
         examination=found,
-        warnings=run.prepared.warnings + plausibility.of_solution(problem, found, u),
-        last_borne=LastBorne(factor=factor, whole_load=failed),
+        warnings=prepared.warnings + plausibility.of_solution(problem, found, u),
+        last_borne=LastBorne(factor=borne.factor, whole_load=failed),
     )

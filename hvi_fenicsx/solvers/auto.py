@@ -125,7 +125,7 @@ class Auto(BranchIteration):
             return None
         if path.x is None:
             reason = f"no equilibrium on the loading path: {path.reason}"
-            return replace(first, interrupted=False, reason=reason)
+            return replace(first, interrupted=False, reason=reason, borne=path.borne)
         for found in self._attempt(self._iteration().solve, path.x):
             found.counts.add(first.counts)
             if found.converged or found.interrupted:

@@ -21,6 +21,7 @@ from ..laws import Superpotential
 from ..system.condensation import Condensation
 from ..system.condensed_problem import CondensedProblem
 from ..system.system import System
+from .result import Borne
 from .thresholds import PathThresholds
 
 
@@ -31,10 +32,12 @@ class PathStart:
     Attributes:
         x: the displacement under the whole load, in equilibrium; None: the path ends before.
         reason: how it ended.
+        borne: where it ends before, the last state that is borne; None where that is not known.
     """
 
     x: PETSc.Vec | None
     reason: str
+    borne: Borne | None = None
 
 
 def softens(law: Superpotential) -> bool:
@@ -65,9 +68,19 @@ def follow(system: System, thresholds: PathThresholds) -> PathStart | None:
     except (InputError, SolverError):
         return None
     found = _on_first_rank(system, condensation.problem, thresholds)
-    u = None if found is None or found.x is None else condensation.expand(found.x)
+    start = None if found is None else _expanded(system, condensation, found)
     condensation.free()
-    return None if found is None else PathStart(x=u, reason=found.reason)
+    return start
+
+
+def _expanded(system: System, condensation: Condensation, found: FullLoad) -> PathStart:
+    """The same of the whole body. Collective."""
+    borne = None
+    if (last := found.borne) is not None:
+        u = system.displacement(condensation.expand(last.x, last.factor))
+        borne = Borne(u=u, factor=last.factor)
+    x = None if found.x is None else condensation.expand(found.x)
+    return PathStart(x=x, reason=found.reason, borne=borne)
 
 
 def _on_first_rank(system: System, problem: CondensedProblem, thresholds: PathThresholds) -> FullLoad | None:

@@ -36,6 +36,19 @@ class Counts:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Borne:
+    """The last state that is borne, where the load path ends before the whole load.
+
+    Attributes:
+        u: the displacement in units of u0, ghosts updated.
+        factor: of all loads and prescribed displacements.
+    """
+
+    u: fem.Function
+    factor: float
+
+
+@dataclass(frozen=True, kw_only=True)
 class SolveResult:
     """What a method found.
 
@@ -49,6 +62,7 @@ class SolveResult:
         interrupted: whether it ended because it was asked to.
         levels: levels of the mesh hierarchy on which it was solved, one after the other.
         steady: whether the pieces and the active set of the start were the final ones, on every level.
+        borne: what of the load is borne, where a load path was followed and says so.
     """
 
     u: fem.Function
@@ -60,3 +74,4 @@ class SolveResult:
     interrupted: bool = False
     levels: int = 1
     steady: bool = False
+    borne: Borne | None = None

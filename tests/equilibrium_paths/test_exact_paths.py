@@ -15,6 +15,7 @@ from mpi4py import MPI
 from scenes import DELTA, model, quadratic_linear
 
 from hvi_fenicsx import Scene, prepare
+from hvi_fenicsx.equilibrium_paths import basis
 from hvi_fenicsx.equilibrium_paths.bonds import BondTable
 from hvi_fenicsx.equilibrium_paths.exact import ExactFollower
 from hvi_fenicsx.equilibrium_paths.segments import Segment
@@ -107,6 +108,36 @@ def test_the_glued_bar_bears_its_closed_form(length: float, strength: float) -> 
         follower, states = path(bar(length, 100), programme=(400.0,), follow=follow)
         assert max(s.factor for s in states) == pytest.approx(strength, rel=1e-3)
         assert follower.end is End.ESCAPES
+
+
+def peeled() -> CondensedProblem:
+    """A strip that is peeled off: ahead of the crack vertices close and open that hardly move."""
+    glue = {"law": "graph", "points": [[0, 0], [4e-6, 5e6], [2e-5, 0]], "one_sided": True}
+    table = model() | {
+        "domain": {"shape": "rectangle", "size": [0.15, 0.005], "cells": [50, 2]},
+        "boundary": {
+            "lifted": {"on": "left", "displacement": ["free", 1e-3]},
+            "far": {"on": "right", "displacement": [0.0, 0.0]},
+            "glue": {"on": "bottom", "contact": {"gap": 0.0}, "adhesion": glue},
+        },
+    }
+    return Condensation(prepare(Scene.model_validate(table), MPI.COMM_SELF).system).problem
+
+
+def test_what_hardly_moves_does_not_drive_and_the_path_is_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As long as the crack drives, the basis keeps its digits; the states are those that each new coordinate drives."""
+    given, made = peeled(), []
+    monkeypatch.setattr(basis.Basis, "_factorise", lambda self, do=basis.Basis._factorise: made.append(do(self)))
+    _, states = path(given, follow=Follow.EXACT)
+    kept = len(made)
+    monkeypatch.setattr(basis, "_WEAK", 0.0)
+    _, others = path(given, follow=Follow.EXACT)
+    assert len(states) == len(others) > 100
+    for one, other in zip(states, others, strict=True):
+        assert (one.event, one.unstable) == (other.event, other.unstable)
+        assert one.factor == pytest.approx(other.factor, rel=1e-8)
+        assert one.x == pytest.approx(other.x, abs=1e-9 * float(np.max(np.abs(other.x))))
+    assert kept < 0.2 * (len(made) - kept)
 
 
 def random_law(generator: np.random.Generator) -> Any:

@@ -10,14 +10,23 @@ from scenes import DELTA, P, block, displacement, far, points, quadratic_linear
 import hvi_fenicsx as hvi
 from hvi_fenicsx import Scene
 from hvi_fenicsx.modelling.solution import ModelSolution
+from hvi_fenicsx.path import following
 
 ABOVE, STRENGTH, CELLS = 0.97 * P, 1e6, 3
 PUSHED = block(CELLS, ABOVE, P, quadratic_linear(STRENGTH))
 
 
-@pytest.fixture(scope="module")
-def last() -> ModelSolution:
-    return hvi.solve(Scene.model_validate(PUSHED))
+@pytest.fixture(scope="module", params=["auto", "branch"])
+def last(request: pytest.FixtureRequest) -> ModelSolution:
+    """``auto`` knows the state from the path that it has followed; otherwise the path is followed afterwards."""
+    with pytest.MonkeyPatch.context() as patch:
+        if request.param == "auto":
+            patch.setattr(following.PathRun, "follow", _must_not)
+        return hvi.solve(Scene.model_validate(PUSHED | {"solver": {"method": request.param}}))
+
+
+def _must_not(*_: object) -> None:
+    raise AssertionError("the path is followed a second time")
 
 
 def listed(factor: float) -> list[np.ndarray]:

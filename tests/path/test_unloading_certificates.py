@@ -31,6 +31,26 @@ def test_every_row_is_certified_with_the_whole_body(demo: str, changes: list[str
     assert path.uncertified == 0
 
 
+def test_states_in_which_a_body_moves_without_load_are_certified() -> None:
+    """Pressed against a wall above it, the body crosses the gap at the factor 0, and meets the wall bit by bit."""
+    floor = {"lower": 0.0, "upper": 1e-6}
+    law = {"law": "graph", "points": [[0, 0], [9e-6, 3e6], [9e-6, 1.5e6]]}
+    table = {
+        "domain": {"shape": "rectangle", "size": [1.0, 1.0], "cells": [6, 6]},
+        "material": {"model": "plane_stress", "youngs_modulus": 2.15e11, "poisson_ratio": 0.29},
+        "boundary": {
+            "wall": {"on": "left", "displacement": [0.0, "free"]},
+            "pull": {"on": "right", "traction": [6e6, 0.0]},
+            "press": {"on": "top", "traction": [0.0, 5e5]},
+            "floor": {"on": "bottom", "contact": floor, "friction": law},
+        },
+    }
+    path = hvi.follow(hvi.Scene.model_validate(table))
+    unloaded = [row for row in path.rows[1:] if abs(row.factor) < 1e-9]
+    assert len(unloaded) > 2
+    assert path.uncertified == 0
+
+
 @pytest.mark.parametrize("demo", ["anchor_3d", "scarf_joint", "hertz"])
 def test_a_force_inside_the_body_that_nothing_carries_is_seen(demo: str) -> None:
     """Whatever the unknowns of Γc are, the body follows them; with other loads inside it does not."""
