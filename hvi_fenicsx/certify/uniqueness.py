@@ -5,6 +5,9 @@ convex if the stiffness A less C, the sum of c w over the laws' vertices, is pos
 its negative pivots decide. Every equilibrium is then one of lowest energy, and two of them differ by a rigid motion
 that the supports leave. There is no other one where such motions meet a component in which the energy grows to first
 order in each direction (a pressed contact, a kink that is not used up), or a law that is a spring.
+
+Where laws drop, the state itself may tell: no displacement has a lower energy if the stiffness outweighs by how much
+the laws' energies are below their tangents there (:mod:`.supporting_parabolas`).
 """
 
 from __future__ import annotations
@@ -26,6 +29,7 @@ from ..typing import Array
 from .certificate import Examination
 from .directional import growth
 from .second_order import negative_eigenvalues
+from .supporting_parabolas import needed_falls
 from .thresholds import UNIQUENESS, UniquenessThresholds
 
 WAY_OUT = "`hvi equilibria SCENE --lowest` finds out"
@@ -63,7 +67,10 @@ def uniqueness(
     motions = [system.unknowns(field).array_r.copy() for field in free_motions.fields(system.problem, modes)]
     doubt = _doubt(system, modes, motions, thresholds)
     if doubt is not None:
-        searched = not any(term.radial for term in system.terms)
+        supported = _supported(system, modes, motions, examination, thresholds)
+        if supported is not None:
+            return Uniqueness(state="lowest", why=f"{supported} ({doubt}, so there may be other equilibria)")
+        searched = all(term.mixity is None for term in system.terms)
         return Uniqueness(state="unknown", why=f"{doubt}; {WAY_OUT}" if searched else doubt)
     falling = any(term.law.steepest_fall > 0.0 for term in system.terms)
     proof = "the body is stiffer than its laws fall, so the energy is convex" if falling else "the energy is convex"
@@ -83,17 +90,60 @@ def _doubt(
             return f"boundary.{term.surface.part}: {_steepness(term)}"
     if not any(falls):
         return None
-    unknowns = int(total(system.comm, float(len(system.jacobian.rows.dofs))))
-    if unknowns > thresholds.most_on_boundary or system.dofs > thresholds.most_unknowns:
+    if not _is_tried(system, thresholds):
         return (
             f"a law falls, and it was not tried whether the body is stiffer: more than {thresholds.most_on_boundary} "
             f"unknowns on Γc, or {thresholds.most_unknowns:,} in all"
         )
+    each = [np.full(len(term.placed), fall) for term, fall in zip(system.terms, falls, strict=True)]
+    if (moved := _moved(system, modes, motions, each, thresholds)) is not None:
+        return f"a law falls, and only laws and contact hold the motion {moved}"
+    return None if _stiffer(system, modes, each, thresholds) else "a law falls more steeply than the body is stiff"
+
+
+def _supported(
+    system: System,
+    modes: Sequence[Mode],
+    motions: Sequence[Array],
+    examination: Examination,
+    thresholds: UniquenessThresholds,
+) -> str | None:
+    """Why no displacement has a lower energy, be the energy convex or not; None where this is not known. Collective."""
+    laws = {id(law.term): law for state in examination.states for law in state.laws}
+    falls = [needed_falls(laws[id(term)], thresholds) for term in system.problem.terms]
+    known = [fall for fall in falls if fall is not None]
+    if len(known) < len(falls) or not np.isfinite(most := largest(system.comm, _size(known))):
+        return None
+    if most == 0.0:
+        return "no law's energy is anywhere below its tangent at this state"
+    if not _is_tried(system, thresholds) or _moved(system, modes, motions, known, thresholds) is not None:
+        return None
+    return (
+        "the body is stiffer than the laws' energies fall below their tangents at this state"
+        if _stiffer(system, modes, known, thresholds)
+        else None
+    )
+
+
+def _is_tried(system: System, thresholds: UniquenessThresholds) -> bool:
+    """Whether the problem is small enough for a factorisation. Collective."""
+    unknowns = int(total(system.comm, float(len(system.jacobian.rows.dofs))))
+    return unknowns <= thresholds.most_on_boundary and system.dofs <= thresholds.most_unknowns
+
+
+def _moved(
+    system: System,
+    modes: Sequence[Mode],
+    motions: Sequence[Array],
+    falls: Sequence[Array],
+    thresholds: UniquenessThresholds,
+) -> str | None:
+    """A rigid motion that moves a vertex whose law falls; None if there is none. Collective."""
     for mode, motion in zip(modes, motions, strict=True):
-        falling = [term.slip(motion) for term, fall in zip(system.terms, falls, strict=True) if fall > 0.0]
+        falling = [term.slip(motion)[fall > 0.0] for term, fall in zip(system.terms, falls, strict=True)]
         if largest(system.comm, _size(falling)) > thresholds.rounding:
-            return f"a law falls, and only laws and contact hold the motion {mode.name}"
-    return None if _stiffer(system, modes, falls, thresholds) else "a law falls more steeply than the body is stiff"
+            return mode.name
+    return None
 
 
 def _fall(term: LawTerm) -> float:
@@ -117,21 +167,21 @@ def _size(values: Sequence[Array]) -> float:
     return max((float(np.max(np.abs(v), initial=0.0)) for v in values), default=0.0)
 
 
-def _stiffer(system: System, modes: Sequence[Mode], falls: Sequence[float], thresholds: UniquenessThresholds) -> bool:
+def _stiffer(system: System, modes: Sequence[Mode], falls: Sequence[Array], thresholds: UniquenessThresholds) -> bool:
     """Whether A less C, a little enlarged, is positive but for the motions, which C does not feel. Collective."""
     vectors = [system.unknowns(field) for field in free_motions.fields(system.problem, modes)]
     pins = free_motions.create(vectors, modes).pins.astype(np.int64) if modes else np.empty(0, np.int64)
     enlarged = 1.0 + thresholds.enlarged
     system.jacobian.set_rates([_rate(t, -enlarged * c) for t, c in zip(system.terms, falls, strict=True)])
     negative = negative_eigenvalues(system, pins)
-    system.jacobian.set_rates([_rate(term, 0.0) for term in system.terms])
+    system.jacobian.set_rates([np.zeros_like(rates) for rates in system.jacobian.rates])
     return negative == 0
 
 
-def _rate(term: LawTerm, slope: float) -> Array:
-    """The tangent of a law with the same slope by the argument wherever it is, (m, d, d)."""
+def _rate(term: LawTerm, slope: Array) -> Array:
+    """The tangent of a law with given slopes by the argument wherever it is, (m,); (m, d, d)."""
     factors = np.ones(1) if term.length is None else np.array(term.length.factors)
-    full = slope * np.einsum("k,mka,mkb->mab", factors**2, term.directions, term.directions)
+    full = np.einsum("m,k,mka,mkb->mab", slope, factors**2, term.directions, term.directions)
     return np.asarray(term.free[:, :, None] * full * term.free[:, None, :])
 
 

@@ -131,6 +131,12 @@ class TractionGraph:
         with np.errstate(over="ignore"):
             return np.asarray(self._energy[anchor] + (self._start[piece] + (0.5 * self.slopes[piece]) * d) * d)
 
+    def parabolas(self) -> Array:
+        """The pieces of the primitive: begin, end, anchor, and at the anchor value, traction and slope, (k+1, 6)."""
+        ends = np.concatenate([[-np.inf], self.breaks, [np.inf]])
+        anchors = self.breaks[self._anchor]
+        return np.column_stack([ends[:-1], ends[1:], anchors, self.primitive(anchors), self._start, self.slopes])
+
     def split(self) -> tuple[TractionGraph, TractionGraph]:
         """H' and G': rising parts and upward jumps, and falling parts and downward jumps, turned round."""
         at_zero = np.array([self.left[self.zero], self.right[self.zero]])

@@ -12,8 +12,6 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-import numpy as np
-
 from ..laws.traction_graph import TractionGraph
 
 INF = math.inf
@@ -67,12 +65,7 @@ def chain(graph: TractionGraph, weight: float, sign: float) -> Chain:
         weight: lumped area.
         sign: +1 or -1 (or a factor of the argument).
     """
-    ends = np.concatenate([[-INF], graph.breaks, [INF]])
-    anchors = np.append(graph.breaks[: graph.zero + 1], graph.breaks[graph.zero :])
-    start = np.append(graph.left[: graph.zero + 1], graph.right[graph.zero :])
-    values = graph.primitive(anchors)
-    rows = np.column_stack([ends[:-1], ends[1:], anchors, values, start, graph.slopes]).tolist()
-    arcs = [_bond(Arc(*row), weight, sign) for row in rows]
+    arcs = [_bond(Arc(*row), weight, sign) for row in graph.parabolas().tolist()]
     return tuple(arcs if sign > 0 else arcs[::-1])
 
 
