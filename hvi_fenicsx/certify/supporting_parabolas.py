@@ -32,8 +32,8 @@ def needed_falls(state: LawState, thresholds: UniquenessThresholds) -> Array | N
     low, high = state.term.law.interval(state.argument, state.near)
     traction = np.clip(state.traction, low, high)
     x = _on_breaks(graph, state.argument, state.near)
-    falls = np.zeros(len(x))
-    pieces = [_Piece(*row) for row in graph.parabolas().tolist()]
+    falls: Array = np.zeros(len(x))
+    pieces = [_Piece(*row) for row in graph.parabolas()]
     for piece in (p for p in pieces if not state.term.radial or p.low >= 0.0):
         falls = np.maximum(falls, piece.needed(x, graph.primitive(x), traction, thresholds.rounding * state.scale))
     falls[falls <= thresholds.rounding * float(np.max(np.abs(graph.slopes)))] = 0.0
@@ -75,7 +75,7 @@ class _Piece(NamedTuple):
             ends = 1.0 / (self.low - x), 1.0 / (self.high - x)  # c(y) = -(2 a w² + 2 b w + slope), w being 1/(y - x)
             turn = np.clip(np.where(above > 0.0, -0.5 * steeper / above, ends[0]), np.minimum(*ends), np.maximum(*ends))
             found = [-2.0 * (above * w + steeper) * w - self.slope for w in (*ends, turn)]
-            sides = [self._beside(abs(w), way * steeper, rounding) for way, w in zip((-1.0, 1.0), ends, strict=True)]
+            sides = [self._beside(np.abs(w), way * steeper, rounding) for way, w in zip((-1.0, 1.0), ends, strict=True)]
         return np.where(inside, np.maximum(*sides), np.max(found, axis=0))
 
     def _beside(self, w: Array, steeper: Array, rounding: Array) -> Array:

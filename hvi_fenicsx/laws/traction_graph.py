@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -131,11 +131,13 @@ class TractionGraph:
         with np.errstate(over="ignore"):
             return np.asarray(self._energy[anchor] + (self._start[piece] + (0.5 * self.slopes[piece]) * d) * d)
 
-    def parabolas(self) -> Array:
-        """The pieces of the primitive: begin, end, anchor, and at the anchor value, traction and slope, (k+1, 6)."""
+    def parabolas(self) -> Iterator[tuple[float, float, float, float, float, float]]:
+        """The pieces of the primitive: begin, end, anchor, and at the anchor value, traction and slope."""
         ends = np.concatenate([[-np.inf], self.breaks, [np.inf]])
         anchors = self.breaks[self._anchor]
-        return np.column_stack([ends[:-1], ends[1:], anchors, self.primitive(anchors), self._start, self.slopes])
+        columns = (ends[:-1], ends[1:], anchors, self.primitive(anchors), self._start, self.slopes)
+        low, high, anchor, value, traction, slope = (map(float, c) for c in columns)
+        yield from zip(low, high, anchor, value, traction, slope, strict=True)
 
     def split(self) -> tuple[TractionGraph, TractionGraph]:
         """H' and G': rising parts and upward jumps, and falling parts and downward jumps, turned round."""

@@ -65,7 +65,7 @@ def chain(graph: TractionGraph, weight: float, sign: float) -> Chain:
         weight: lumped area.
         sign: +1 or -1 (or a factor of the argument).
     """
-    arcs = [_bond(Arc(*row), weight, sign) for row in graph.parabolas().tolist()]
+    arcs = [_bond(Arc(*row), weight, sign) for row in graph.parabolas()]
     return tuple(arcs if sign > 0 else arcs[::-1])
 
 
