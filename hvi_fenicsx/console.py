@@ -130,6 +130,8 @@ def outcome(solution: Solution) -> Iterator[str]:
         return
     c, counts = solution.examination.certificate, solution.solve_result.counts
     of = "" if (last := solution.last_borne) is None else f" of the state at load factor {last.factor:.6g}"
+    if solution.obstacle is not None:
+        yield f"obstacle of {solution.obstacle.part}: {solution.obstacle}"
     yield f"certificate{of} ({c.tolerance:g}): {c}"
     if solution.uniqueness is not None:
         yield f"other equilibria: {_OTHERS[solution.uniqueness.state]}; {solution.uniqueness.why}"

@@ -18,10 +18,11 @@ from .runtime.log import logger, newton_step, warn
 from .runtime.timing import Timer
 from .scene import Scene
 from .solution import Solution
-from .solvers import frozen_mixity, nested_iteration
+from .solvers import frozen_mixity, nested_iteration, obstacle_force
 from .solvers.coarse_start import CoarseStart
 from .solvers.context import Progress, RunControl, never
 from .solvers.nested_iteration import LevelSolution
+from .solvers.obstacle_force import ObstacleBalance
 from .solvers.result import SolveResult
 from .system import free_motions
 from .system.levels import Levels
@@ -92,15 +93,16 @@ def finish_with_levels(
     if prepared.solvability.state == "escapes":
         return unsolved(prepared), ()
     control = RunControl(timer=prepared.timer, progress=progress, interrupted=interrupted)
-    solved = _solved(prepared, control, start)
+    solved, balance = _solved(prepared, control, start)
+    prepared = replace(prepared, system=solved.system)
     result, examination, warnings = _examined(prepared, solved.result, solved.levels)
     errors = None
-    if estimating and examination.certificate.passed and prepared.problem.has_potential:
+    if estimating and examination.certificate.passed and prepared.problem.has_potential and balance is None:
         with prepared.timer("estimate"):
             errors = estimate(prepared.system, solved.levels, result.u, examination)
         warnings += plausibility.of_estimate(errors)
     only = _uniqueness(prepared, result, examination)
-    found = _solution(prepared, result, examination, prepared.warnings + warnings, errors, only)
+    found = _solution(prepared, result, examination, prepared.warnings + warnings, errors, only, balance)
     return found, solved.levels
 
 
@@ -172,6 +174,7 @@ def _solution(
     warnings: tuple[str, ...],
     errors: Estimate | None = None,
     only: Uniqueness | None = None,
+    balance: ObstacleBalance | None = None,
 ) -> Solution:
     return Solution(
         scene=prepared.scene,
@@ -185,6 +188,7 @@ def _solution(
         epsilon=prepared.options.relative_width(prepared.system),
         timer=prepared.timer,
         warnings=warnings,
+        balance=balance,
     )
 
 
@@ -195,11 +199,17 @@ def _log_certificate(found: certificate.Certificate) -> None:
     _LOG.info("certificate %s (%g): %s; %s", verdict, found.tolerance, parts, found.second_order)
 
 
-def _solved(prepared: Preparation, control: RunControl, start: CoarseStart | fem.Function | None) -> LevelSolution:
-    """What the method found; a displacement of zero where it broke down. Collective."""
+def _solved(
+    prepared: Preparation, control: RunControl, start: CoarseStart | fem.Function | None
+) -> tuple[LevelSolution, ObstacleBalance | None]:
+    """What the method found, zero where it broke down; and where an obstacle is that a force presses. Collective."""
     model, system, options, solvability = prepared.model, prepared.system, prepared.options, prepared.solvability
+    balance = None
     try:
-        if isinstance(start, CoarseStart):
+        if obstacle_force.pressed(prepared.problem) is not None:
+            solve = obstacle_force.ObstacleForceSolve(model, system, solvability, options, control)
+            found, balance = solve.solve(start if isinstance(start, fem.Function) else None)
+        elif isinstance(start, CoarseStart):
             found = nested_iteration.solve_from_coarser(system, start, solvability, options, control)
         elif start is not None:
             found = nested_iteration.solve_from_displacement(model, system, start, solvability, options, control)
@@ -208,9 +218,9 @@ def _solved(prepared: Preparation, control: RunControl, start: CoarseStart | fem
         found = frozen_mixity.settled(model, found, solvability, options, control)
         if system.free_motions is not None:
             free_motions.remove_free_motions(prepared.problem, solvability.free, found.result.u)
-        return found
+        return found, balance
     except SolverError as error:
         u = fem.Function(prepared.problem.space, name="displacement")
         result = SolveResult(u=u, method=options.method, converged=False, reason=str(error))
         levels = start.levels if isinstance(start, CoarseStart) else ()
-        return LevelSolution(system=system, levels=levels, result=result)
+        return LevelSolution(system=system, levels=levels, result=result), balance

@@ -23,6 +23,7 @@ from ..runtime.mpi import agree, total
 from ..runtime.timing import Timer
 from ..scene import Scene
 from ..solution import Solution
+from ..solvers import obstacle_force
 from ..solvers.coarse_start import CoarseStart
 from ..solvers.context import Progress, RunControl, never
 from ..solvers.nested_iteration import refined_levels
@@ -125,6 +126,7 @@ class AdaptiveSolver:
         return self._begun(prepared)
 
     def _begun(self, prepared: Preparation) -> AdaptiveLevel:
+        obstacle_force.refuse(prepared.problem, "no error is estimated")
         solution, levels = finish_with_levels(prepared, self.progress, self.interrupted)
         return AdaptiveLevel(prepared=prepared, solution=solution, levels=levels, step=None)
 

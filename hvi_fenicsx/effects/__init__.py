@@ -3,7 +3,17 @@
 from ..class_registry import load_modules
 from . import anisotropic, cohesion, contact, elasticity, friction, loads, normal_laws, thermal, total_loads
 from .base import Drive, Effect, Evaluate, FormContext, Place, SideMoments, Sizes, SurfaceLoad, load_name
-from .contribution import Averaged, BoundaryLaw, Condition, Contribution, Direction, NormalBounds, ObstacleMove, Towards
+from .contribution import (
+    Averaged,
+    BoundaryLaw,
+    Condition,
+    Contribution,
+    Direction,
+    NormalBounds,
+    ObstacleForce,
+    ObstacleMove,
+    Towards,
+)
 from .formula_field import FormulaField
 from .role import Role, role_of
 
@@ -19,6 +29,7 @@ __all__ = [
     "FormContext",
     "FormulaField",
     "NormalBounds",
+    "ObstacleForce",
     "ObstacleMove",
     "Place",
     "Role",

@@ -231,6 +231,14 @@ class Effect(BaseModel):
         """The displacement components, from 0, that it prescribes."""
         return ()
 
+    def obstacle_moved(self, way: float) -> Effect:
+        """Itself, with its obstacle moved if a force presses one.
+
+        Args:
+            way: along the force, m.
+        """
+        return self
+
     def surface_load(self) -> SurfaceLoad | None:
         """The load that it puts on its part, for pictures; None: none that has a formula."""
         return None

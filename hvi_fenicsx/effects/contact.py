@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
@@ -15,7 +16,7 @@ from ..schema import refusal
 from ..spatial_value import SpatialValue
 from ..typing import Array
 from .base import Drive, Effect, Evaluate, FormContext, Place, Sizes
-from .contribution import Contribution, NormalBounds, ObstacleMove
+from .contribution import Contribution, NormalBounds, ObstacleForce, ObstacleMove
 from .formula_field import FormulaField, as_formula, require_components
 from .obstacles import Obstacle, ObstacleField, ObstacleGap, Vector, unit
 
@@ -35,6 +36,14 @@ def _move(obstacle: Obstacle) -> ObstacleMove | None:
         return None
     before = ObstacleGap(obstacle.unmoved).negative()
     return ObstacleMove(vector=obstacle.displacement, before=before, straight=obstacle.moves_straight)
+
+
+def _force(obstacle: Obstacle) -> ObstacleForce | None:
+    """The force that presses an obstacle, where there is one."""
+    if obstacle.force is None:
+        return None
+    ahead = ObstacleGap(obstacle.moved(1.0)).negative()
+    return ObstacleForce(vector=obstacle.force, ahead=ahead, straight=obstacle.moves_straight)
 
 
 @dataclass(frozen=True)
@@ -101,11 +110,21 @@ class Contact(Effect):
 
     @override
     def stress_scale(self, largest: Evaluate, sizes: Sizes) -> float:
-        """The stress of the largest displacement that the bounds demand, as a strain over the body's length."""
+        """The stress of an obstacle's force, or of the largest displacement that is demanded, over the length."""
         bounds = self._bounds()
         demanded = [bounds.lower] if bounds.lower else []
         demanded += [bounds.upper.negative()] if bounds.upper else []
-        return max(largest(value.positive_part()) for value in demanded) * sizes.modulus / sizes.length
+        strained = max(largest(value.positive_part()) for value in demanded) * sizes.modulus / sizes.length
+        force = self.obstacle.force if self.obstacle is not None else None
+        pressed = 0.0 if force is None else math.hypot(*force) / sizes.length ** (len(force) - 1)
+        return max(strained, pressed)
+
+    @override
+    def obstacle_moved(self, way: float) -> Contact:
+        """With the obstacle, if a force presses it, moved by so much, m."""
+        if self.obstacle is None or self.obstacle.force is None:
+            return self
+        return self.model_copy(update={"obstacle": self.obstacle.moved(way)})
 
     @override
     def contribute(self, context: FormContext, where: str | None) -> Contribution:
@@ -115,7 +134,8 @@ class Contact(Effect):
     def _bounds(self) -> NormalBounds:
         if self.obstacle is not None:
             least = ObstacleGap(self.obstacle).negative()
-            return NormalBounds(lower=least, upper=None, towards=self.obstacle, move=_move(self.obstacle))
+            move, force = _move(self.obstacle), _force(self.obstacle)
+            return NormalBounds(lower=least, upper=None, towards=self.obstacle, move=move, force=force)
         if isinstance(self.gap, str):
             return NormalBounds(lower=Formula(0.0), upper=None, measured=True)
         towards = _Straight(tuple(map(float, unit(self.direction)))) if self.direction else None

@@ -111,6 +111,21 @@ class ObstacleMove:
 
 
 @dataclass(frozen=True, slots=True)
+class ObstacleForce:
+    """The force that presses an obstacle, which slides along it.
+
+    Attributes:
+        vector: N/m in 2D, N in 3D.
+        ahead: the lower bound where it has moved by a metre, m.
+        straight: whether the bound changes in proportion to the way.
+    """
+
+    vector: tuple[float, ...]
+    ahead: SpatialValue
+    straight: bool
+
+
+@dataclass(frozen=True, slots=True)
 class NormalBounds:
     """lower ≤ -u·n ≤ upper on a part. Unilateral contact with the gap g has lower = -g.
 
@@ -120,6 +135,7 @@ class NormalBounds:
         towards: the obstacle, whose direction stands for n; None: the part's own normal.
         measured: whether the distance of the two sides of an interface, as they are meshed, is added to the gap.
         move: the displacement of the obstacle that is in the bounds; None: it has none.
+        force: what presses the obstacle, which is where it is described in the bounds; None: it does not slide.
     """
 
     lower: SpatialValue | None
@@ -127,6 +143,7 @@ class NormalBounds:
     towards: Towards | None = None
     measured: bool = False
     move: ObstacleMove | None = None
+    force: ObstacleForce | None = None
 
 
 ONE = Formula(1.0)

@@ -63,6 +63,9 @@ class Obstacle(BaseModel):
     """from the body towards the obstacle, of any length: gaps are measured along it; by default to the nearest point"""
     displacement: Vector | None = None
     """by which the obstacle is moved from where it is described, m"""
+    force: Vector | None = None
+    """instead of a displacement: the force that presses it, N/m in 2D, N in 3D; it slides along it until contact bears
+    it, and does not turn"""
 
     @classmethod
     def __pydantic_init_subclass__(cls, **kwargs: Any) -> None:
@@ -72,9 +75,11 @@ class Obstacle(BaseModel):
 
     @model_validator(mode="after")
     def _no_zero_directions(self) -> Obstacle:
-        for key in ("direction", "normal", "axis"):
+        for key in ("direction", "normal", "axis", "force"):
             if (vector := getattr(self, key, None)) is not None and not any(vector):
                 raise refusal(f"{key} of the obstacle is zero; give a direction")
+        if self.force is not None and self.displacement is not None:
+            raise refusal("an obstacle is moved by a displacement or pressed by a force; give one of them")
         return self
 
     def check(self, dimension: int) -> None:
@@ -99,12 +104,23 @@ class Obstacle(BaseModel):
         """The obstacle where it is described."""
         return self.model_copy(update={"displacement": None})
 
+    def moved(self, way: float) -> Obstacle:
+        """The obstacle that a force presses, moved along it, and held there.
+
+        Args:
+            way: m.
+        """
+        assert self.force is not None
+        along = tuple(map(float, way * unit(self.force)))
+        return self.model_copy(update={"force": None, "displacement": along})
+
     @property
     def moves_straight(self) -> bool:
-        """Whether gaps change in proportion to its displacement, and no direction changes."""
-        if self.displacement is None or self.direction is None:
-            return self.displacement is None
-        move, way = np.asarray(self.displacement), unit(self.direction)
+        """Whether gaps change in proportion to the way it is moved, and no direction changes."""
+        moves = self.displacement or self.force
+        if moves is None or self.direction is None:
+            return moves is None
+        move, way = np.asarray(moves), unit(self.direction)
         return bool(np.linalg.norm(move - (move @ way) * way) <= _ACROSS * np.linalg.norm(move))
 
     @abstractmethod

@@ -164,6 +164,8 @@ class ModelSolution(Solution):
         rows = [("result", self.reason), ("existence", self.solvability.state), ("unknowns", f"{self.dofs:,}")]
         if self.examination is not None:
             rows += [("energy", f"{self.energy:.10g} {unit}"), ("certificate", str(self.certificate))]
+        if self.obstacle is not None:
+            rows.append((f"obstacle of {self.obstacle.part}", str(self.obstacle)))
         if self.estimate is not None:
             part = self.estimate.total / (self.estimate.energy_norm or 1.0)
             rows.append(("estimated error", f"{100 * part:.2g} % in the energy norm"))

@@ -19,6 +19,7 @@ from ..preparation import Preparation
 from ..problem.factored_problem import FactoredProblem
 from ..problem.problem import Problem
 from ..scene import PathTable
+from ..solvers import obstacle_force
 from ..system import loading
 from ..system.condensation import Condensation
 from ..typing import Array
@@ -63,6 +64,7 @@ class PathRun:
     def __init__(self, prepared: Preparation, wanted: PathTable) -> None:
         self.prepared, self.wanted = prepared, wanted
         system = prepared.system
+        obstacle_force.refuse(system.problem, "no path is followed")
         known = loading.names(system)
         self.scaled = known if wanted.scaled is None else wanted.scaled
         if not known:

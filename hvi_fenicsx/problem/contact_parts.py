@@ -8,7 +8,7 @@ from itertools import combinations_with_replacement
 
 import numpy as np
 
-from ..effects import Effect, NormalBounds, Towards, load_name
+from ..effects import Effect, NormalBounds, ObstacleForce, Towards, load_name
 from ..errors import InputError
 from ..mesh import nodes
 from ..runtime.mpi import agree
@@ -17,7 +17,7 @@ from ..typing import Array, Entities
 from . import contact_normals, contact_surface, facing_sides
 from .contact_surface import Surface
 from .domain_forms import DomainForms
-from .problem import Bounds, BoundsMove, PlacedContribution
+from .problem import Bounds, BoundsForce, BoundsMove, PlacedContribution
 from .scaling import Scales
 from .spaces import contact_rule, edge_share
 from .thresholds import Thresholds
@@ -121,7 +121,8 @@ def _along_normal(stated: Bounds, prescribed: Array) -> Bounds:
     known = np.sum(surface.values(prescribed) * (surface.measured - along * surface.normals), axis=1)
     lower, upper = ((bound - known) / along[:, 0] for bound in (stated.lower, stated.upper))
     move = stated.move and replace(stated.move, by=stated.move.by / along[:, 0])
-    return replace(stated, lower=lower, upper=upper, move=move)
+    force = stated.force and replace(stated.force, rate=stated.force.rate / along[:, 0])
+    return replace(stated, lower=lower, upper=upper, move=move, force=force)
 
 
 def _bounds(
@@ -150,7 +151,37 @@ def _bounds(
     if bounds.move is not None:
         by = upper + value(bounds.move.before) if bounds.move.straight else np.zeros(len(upper))
         move = BoundsMove(name=load_name(where.part, effect), by=by, straight=bounds.move.straight)
-    return Bounds(where, -value(bounds.upper), upper, move)
+    force = None
+    if bounds.force is not None:
+        ahead = -value(bounds.force.ahead) if bounds.force.straight else upper
+        force = _pressed(load_name(where.part, effect), bounds.force, ahead - upper, scales)
+    return Bounds(where, -value(bounds.upper), upper, move, force)
+
+
+def _pressed(name: str, stated: ObstacleForce, moved: Array, scales: Scales) -> BoundsForce:
+    """The force on an obstacle, nondimensional.
+
+    Args:
+        name: of part and effect.
+        stated: SI.
+        moved: by what a metre of its way moves the bounds, (m,).
+        scales: what one unit is in SI.
+
+    Raises:
+        InputError: on all ranks alike: the gaps do not change in proportion to the way.
+    """
+    if not stated.straight:
+        raise InputError(
+            f"boundary.{name}: this obstacle's gaps do not change in proportion to the way that a force moves it; give "
+            "it a direction along the force"
+        )
+    size = float(np.linalg.norm(stated.vector))
+    return BoundsForce(
+        name=name,
+        rate=moved * scales.displacement,
+        force=size / scales.force,
+        direction=np.asarray(stated.vector) / size,
+    )
 
 
 def _coefficients(context: DomainForms, where: Surface, formula: SpatialValue) -> Array:

@@ -70,7 +70,8 @@ def check_moved(
     Raises:
         InputError: on all ranks alike.
     """
-    moves = {w: np.array(b.move.vector) for w, _, c in contributions for b in c.bounds if b.move is not None}
+    given = [(w, b.move or b.force) for w, _, c in contributions for b in c.bounds]
+    moves = {w: np.array(one.vector) for w, one in given if one is not None}
     for where, effect, contribution in contributions:
         if where is None or where not in moves or not contribution.laws:
             continue
@@ -79,10 +80,10 @@ def check_moved(
         slips = bool(np.any(across > thresholds.turned_to_prescribed * np.linalg.norm(move)))
         normal = any(law.direction.normal for law in contribution.laws)
         if any(agree(comm, normal or slips)):
-            mend = "leave that displacement out" if normal else "move it along the normal, or give it a direction"
+            mend = "let it stand still" if normal else "move it along the normal, or give it a direction"
             raise InputError(
                 f"boundary.{where}.{effect.key}: acts on the displacement of the body, not on that relative to the "
-                f"obstacle, which is moved along it; {mend}, or prescribe a displacement of the body"
+                f"obstacle, which moves along it; {mend}, or prescribe a displacement of the body"
             )
 
 

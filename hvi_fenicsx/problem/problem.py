@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -59,6 +59,25 @@ class BoundsMove:
     straight: bool
 
 
+@dataclass(frozen=True, kw_only=True)
+class BoundsForce:
+    """The force that presses an obstacle.
+
+    Attributes:
+        name: of the obstacle's part and effect, such as ``lid.contact``.
+        rate: what a unit of the obstacle's way adds to the bounds on u·n, (m,).
+        force: its size, nondimensional.
+        direction: its unit vector, (d,).
+        way: along it, by which the obstacle has been moved.
+    """
+
+    name: str
+    rate: Array
+    force: float
+    direction: Array
+    way: float = 0.0
+
+
 @dataclass(frozen=True)
 class Bounds:
     """Bounds on u·n at the m vertices of a surface, nondimensional.
@@ -68,16 +87,30 @@ class Bounds:
         lower: lower bounds, -inf where there is none, (m,).
         upper: upper bounds, inf where there is none, (m,).
         move: what the displacement of an obstacle has to do with them; None: nothing.
+        force: what presses the obstacle; None: it is held by its position.
     """
 
     surface: Surface
     lower: Array
     upper: Array
     move: BoundsMove | None = None
+    force: BoundsForce | None = None
 
     def beyond(self, normal: Array) -> Array:
         """The distance of u·n (m,) beyond its bounds, (m,); negative within them."""
         return np.maximum(normal - self.upper, self.lower - normal)
+
+    def moved(self, way: float) -> Bounds:
+        """The bounds where an obstacle that a force presses has moved; else these.
+
+        Args:
+            way: along the force, from where it is described, in units of u0.
+        """
+        if self.force is None:
+            return self
+        more = (way - self.force.way) * self.force.rate
+        force = replace(self.force, way=way)
+        return replace(self, lower=self.lower + more, upper=self.upper + more, force=force)
 
     def component(self) -> tuple[Integers, Array]:
         """The scalar dof of u·n where n is along an axis of its vertex's frame, and the sign of n there, (m,) both."""
@@ -160,6 +193,17 @@ class Problem:
     def coupling(self) -> Coupling | None:
         """The way between displacements and unknowns; None where both are the same. Collective when first used."""
         return coupling.of(self.space, self.interfaces)
+
+    def with_obstacle_at(self, way: float) -> Problem:
+        """The problem where the obstacle that a force presses has moved.
+
+        Args:
+            way: along the force, in units of u0.
+        """
+        found = replace(self, bounds=tuple(bounds.moved(way) for bounds in self.bounds))
+        known = {name: value for name, value in self.__dict__.items() if name not in found.__dict__}
+        found.__dict__.update(known)  # what was computed from the mesh alone
+        return found
 
     @functools.cached_property
     def _relative_motions(self) -> tuple[Array, ...]:

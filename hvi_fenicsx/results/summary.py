@@ -38,6 +38,7 @@ def summary(solution: Solution) -> dict[str, Any]:
             "solvability": solution.solvability.summary(),
             "certificate": solution.certificate.as_dict() if solution.certificate else None,
             "last_borne": _last_borne(solution),
+            "obstacle": solution.obstacle.summary() if solution.obstacle else None,
             "uniqueness": solution.uniqueness.as_dict() if solution.uniqueness else None,
             "estimate": _estimate(solution),
             "accuracy": None,

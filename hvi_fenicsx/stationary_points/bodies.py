@@ -10,6 +10,7 @@ import numpy as np
 from ..errors import InputError, SolverError
 from ..preparation import Preparation
 from ..solution import Solution
+from ..solvers import obstacle_force
 from ..solvers.result import SolveResult
 from ..system.condensation import Condensation
 from ..workflow import certified, finish
@@ -42,6 +43,7 @@ class Equilibria:
     """
 
     def __init__(self, prepared: Preparation) -> None:
+        obstacle_force.refuse(prepared.problem, "equilibria are not searched")
         self._prepared = prepared
         self.problem: ScalarProblem | None = None
         if prepared.solvability.state != "escapes":

@@ -6,6 +6,7 @@ The bulk matrix A is assembled once. Laws and active sets touch only the diagona
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 
@@ -126,6 +127,19 @@ class System:
         turn(self.load, q)
         terms = tuple(self.frames.term(t) for t in self.problem.terms)
         return rotated, q, terms, tuple(self.frames.bounds(b) for b in self.problem.bounds)
+
+    def with_obstacle_at(self, way: float) -> System:
+        """The system where the obstacle that a force presses has moved; all matrices are shared. Collective.
+
+        Args:
+            way: along the force, in units of u0.
+        """
+        found = copy.copy(self)
+        found.problem = self.problem.with_obstacle_at(way)
+        found.bounds = tuple(bounds.moved(way) for bounds in self.bounds)
+        found.references = references.of(found.problem, self._sum_of(self.forces))
+        found.lower, found.upper = found._box()
+        return found
 
     def displacement(self, x: PETSc.Vec) -> fem.Function:
         """The displacement field of unknowns x: Cartesian, in units of u0, ghosts updated. Collective."""

@@ -106,7 +106,7 @@ def test_an_obstacle_whose_gaps_change_otherwise_is_not_moved_by_a_path(scene: h
     ("law", "obstacle", "said"),
     [
         ("friction", {"displacement": [1e-4, -1e-3]}, "move it along the normal"),
-        ("adhesion", {}, "leave that displacement out"),
+        ("adhesion", {}, "let it stand still"),
     ],
 )
 def test_laws_that_would_feel_the_displacement_of_an_obstacle_are_refused(law: str, obstacle: Table, said: str) -> None:

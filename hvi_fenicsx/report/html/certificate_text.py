@@ -79,12 +79,24 @@ def _remarks(result: Result, found: Mapping[str, Any]) -> Iterator[str]:
         )
     elif found["passed"]:
         yield _SECOND_ORDER.get(str(found["second_order"]), str(found["second_order"]))
+    if pressed := result.summary.get("obstacle"):
+        yield _pressed(pressed, result.summary["certificate"]["tolerance"])
     if others := result.summary.get("uniqueness"):
         yield f"{_OTHERS[others['state']]} {others['why'][0].upper()}{others['why'][1:]}."
     if any(role["laws"] for part in result.parts for role in result.roles(part.name)):
         yield _NO_HISTORY
     if result.summary.get("smoothing") and result.summary["epsilon"] is not None:  # null: there is no law
         yield _smoothed(result.summary, found)
+
+
+def _pressed(obstacle: Mapping[str, Any], tolerance: float) -> str:
+    """How far a force has moved the obstacle."""
+    unit = "N/m" if len(obstacle["force"]) == 2 else "N"
+    moved, force = (", ".join(number(float(f"{v:.6g}")) for v in obstacle[key]) for key in ("displacement", "force"))
+    return (
+        f"The obstacle of {obstacle['part']} is moved by ({moved}) m by the force ({force}) {unit}. Contact bears the "
+        f"force but for {_two_digits(obstacle['difference'])} of it, which must be at most {number(tolerance)}."
+    )
 
 
 def _smoothed(summary: Mapping[str, Any], found: Mapping[str, Any]) -> str:

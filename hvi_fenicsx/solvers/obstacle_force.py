@@ -1,0 +1,271 @@
+"""An obstacle that a force presses: how far it moves until contact bears the force.
+
+The force R that contact bears is the derivative of the body's least energy by the obstacle's way; where the energy is
+convex R never falls. A safeguarded secant method solves R = F: for contact alone R is piecewise linear, and the last
+secant is exact. Each step is a solve on the same matrices, with other bounds.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from dolfinx import fem
+from mpi4py import MPI
+
+from ..errors import InputError
+from ..problem.compose import Model
+from ..problem.problem import BoundsForce, Problem
+from ..rigid import Solvability
+from ..runtime.log import logger
+from ..system.system import System
+from ..typing import Array
+from . import coarse_start, nested_iteration, registry
+from .context import RunControl, SolveContext
+from .nested_iteration import LevelSolution
+from .options import SolverOptions
+from .result import Counts
+
+_LOG = logger("solvers")
+_MOST = 60
+"""Solves at most."""
+_STRIDE = 4.0
+"""Where contact does not bear the force yet, the next way is so many times as long, at most."""
+_BISECTS = 6
+"""Each so many-th step halves what is known, in case secants do not."""
+_ROUNDING = 1e-14
+"""Two ways whose difference is so small a part of them are one."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ObstacleBalance:
+    """Where an obstacle is that a force presses, nondimensional.
+
+    Attributes:
+        name: of part and effect, such as ``lid.contact``.
+        way: by which it has moved along the force.
+        direction: unit vector of the force, (d,).
+        force: its size.
+        borne: what contact bears of it, along it.
+        tolerance: relative, of the difference.
+    """
+
+    name: str
+    way: float
+    direction: Array
+    force: float
+    borne: float
+    tolerance: float
+
+    @property
+    def difference(self) -> float:
+        """Of both, relative to the force."""
+        return abs(self.borne - self.force) / self.force
+
+    @property
+    def passed(self) -> bool:
+        """Whether contact bears the force."""
+        return self.difference <= self.tolerance
+
+
+def pressed(problem: Problem) -> BoundsForce | None:
+    """The force that presses an obstacle; None where all obstacles are held by their positions.
+
+    Args:
+        problem: the problem.
+
+    Raises:
+        InputError: on all ranks alike: forces press several obstacles.
+    """
+    found = [bounds.force for bounds in problem.bounds if bounds.force is not None]
+    if len(found) > 1:
+        names = " and ".join(force.name for force in found)
+        raise InputError(f"boundary.{names}: a force may press one obstacle of a scene; give the others a displacement")
+    return found[0] if found else None
+
+
+def refuse(problem: Problem, what: str) -> None:
+    """Refuse a problem with such an obstacle.
+
+    Args:
+        problem: the problem.
+        what: is not done with it.
+
+    Raises:
+        InputError: on all ranks alike.
+    """
+    if (force := pressed(problem)) is not None:
+        mend = "give the obstacle the displacement that `hvi run` finds for it"
+        raise InputError(f"boundary.{force.name}: a force presses its obstacle, for which {what}; {mend}")
+
+
+class ObstacleForceSolve:
+    """A solve with an obstacle that a force presses; call :meth:`solve` once.
+
+    Args:
+        model: what is solved, for the coarser meshes.
+        system: assembled, the obstacle where it is described.
+        solvability: whether a solution can exist where the obstacle stands still.
+        options: method, tolerance, limits.
+        control: timer, progress and interruption.
+    """
+
+    def __init__(
+        self, model: Model, system: System, solvability: Solvability, options: SolverOptions, control: RunControl
+    ) -> None:
+        force = pressed(system.problem)
+        assert force is not None
+        self._model, self._system, self._force = model, system, force
+        self._solvability, self._options, self._control = solvability, options, control
+        self._counts = Counts()
+
+    def solve(self, start: fem.Function | None = None) -> tuple[LevelSolution, ObstacleBalance]:
+        """The solution and where the obstacle is. Collective.
+
+        Args:
+            start: a displacement on the same mesh to begin at, m.
+        """
+        ways = _Ways(self._first_touch(), self._force.force, self._farthest)
+        found = self._anew(ways.first, start)
+        balance = self._balance(found)
+        for _ in range(_MOST):
+            if balance.passed or not found.result.converged:
+                break
+            if (way := ways.after(balance.way, balance.borne)) is None:
+                break
+            found = self._at(way, found)
+            balance = self._balance(found)
+        return self._told(found, balance), balance
+
+    @property
+    def _farthest(self) -> float:
+        """The length of the body, in units of u0."""
+        scales = self._system.problem.scales
+        return scales.length / scales.displacement
+
+    def _first_touch(self) -> float:
+        """The way after which the obstacle touches the body at rest; behind it where it would overlap. Collective."""
+        ways = [b.upper[b.force.rate < 0] / -b.force.rate[b.force.rate < 0] for b in self._system.bounds if b.force]
+        least = min((float(np.min(way, initial=np.inf)) for way in ways), default=np.inf)
+        found = self._system.comm.allreduce(least, op=MPI.MIN)
+        if not np.isfinite(found):
+            raise InputError(
+                f"boundary.{self._force.name}: the force moves the obstacle away from the body; turn it round"
+            )
+        return float(found)
+
+    def _anew(self, way: float, start: fem.Function | None) -> LevelSolution:
+        """From the coarse meshes, or from a displacement. Collective."""
+        system, model = self._system.with_obstacle_at(way), self._moved(way)
+        arguments = self._solvability, self._options, self._control
+        if start is None:
+            found = nested_iteration.solve(model, system, *arguments)
+        else:
+            found = nested_iteration.solve_from_displacement(model, system, start, *arguments)
+        self._counts.add(found.result.counts)
+        return found
+
+    def _moved(self, way: float) -> Model:
+        metres = way * self._system.problem.scales.displacement
+        return replace(self._model, effects=[(w, effect.obstacle_moved(metres)) for w, effect in self._model.effects])
+
+    def _at(self, way: float, before: LevelSolution) -> LevelSolution:
+        """From the solution where the obstacle was before; from the coarse meshes where that fails. Collective."""
+        system = self._system.with_obstacle_at(way)
+        kind = registry.choose(self._options, system)
+        if not kind.takes_start:
+            return self._anew(way, None)
+        first = system.unknowns(before.result.u)
+        coarse_start.make_admissible(first, system)
+        context = SolveContext.create(system, before.levels, self._solvability, self._options, self._control)
+        result = kind(context).solve(first)
+        self._counts.add(result.counts)
+        if not result.converged and not result.interrupted:
+            return self._anew(way, None)
+        return LevelSolution(system=system, levels=before.levels, result=result)
+
+    def _balance(self, found: LevelSolution) -> ObstacleBalance:
+        """What contact bears: what the body's energy gains by a unit of the obstacle's way. Collective."""
+        system = found.system
+        x = system.unknowns(found.result.u)
+        forces, borne, way = system.holding_forces(x), 0.0, 0.0
+        for bounds in system.bounds:
+            if bounds.force is not None:
+                dofs, sign = bounds.component()
+                free = ~np.isin(dofs, system.problem.fixed_here)  # at others the supports bear it
+                borne += float(np.sum((bounds.force.rate * sign * forces[dofs])[free]))
+                way = bounds.force.way
+        return ObstacleBalance(
+            name=self._force.name,
+            way=way,
+            direction=self._force.direction,
+            force=self._force.force,
+            borne=float(system.comm.allreduce(borne)),
+            tolerance=self._options.tolerance,
+        )
+
+    def _told(self, found: LevelSolution, balance: ObstacleBalance) -> LevelSolution:
+        """The solution with all counts; not converged where contact does not bear the force."""
+        _LOG.info(
+            "obstacle of %s: %d Newton steps, difference %.1e", balance.name, self._counts.newton, balance.difference
+        )
+        result = replace(found.result, counts=self._counts)
+        if result.converged and not balance.passed:
+            reason = (
+                f"contact of {balance.name} bears {balance.borne / balance.force:.6g} of the force at all positions "
+                "that were tried; the body gives way, or what it bears jumps there"
+            )
+            result = replace(result, converged=False, reason=reason)
+        return replace(found, result=result)
+
+
+class _Ways:
+    """The secant method for R(way) = F, within what is known.
+
+    Args:
+        touch: the way at which R begins, if nothing else strains the body.
+        force: F.
+        farthest: beyond so long a way from there nothing is tried.
+    """
+
+    def __init__(self, touch: float, force: float, farthest: float) -> None:
+        self._touch, self._force, self._farthest = touch, force, farthest
+        self._points: list[tuple[float, float]] = [(touch, 0.0)]
+        self._low, self._high = -np.inf, np.inf
+
+    @property
+    def first(self) -> float:
+        """The way of a block of the body's size."""
+        return self._touch + self._force
+
+    def after(self, way: float, borne: float) -> float | None:
+        """The way to try next; None where there is none left.
+
+        Args:
+            way: that was tried last.
+            borne: what was found there.
+        """
+        self._points.append((way, borne))
+        if borne < self._force:
+            self._low = max(self._low, way)
+        else:
+            self._high = min(self._high, way)
+        return self._between() if np.isfinite(self._high - self._low) else self._beyond()
+
+    def _between(self) -> float | None:
+        low, high, way = self._low, self._high, self._secant()
+        if high - low <= _ROUNDING * max(abs(high), abs(low)):
+            return None
+        halves = len(self._points) % _BISECTS == 0 or not low < way < high
+        return 0.5 * (low + high) if halves else way
+
+    def _beyond(self) -> float | None:
+        """No further than some times the longest way so far."""
+        reach = _STRIDE * max(abs(way - self._touch) for way, _ in self._points)
+        way = float(np.clip(self._secant(), self._touch - reach, self._touch + reach))
+        return None if abs(way - self._touch) > self._farthest else way
+
+    def _secant(self) -> float:
+        (before, first), (last, second) = self._points[-2:]
+        rise = (second - first) / (last - before)
+        return last + (self._force - second) / rise if rise > 0.0 else float(np.copysign(np.inf, self._force - second))
