@@ -203,6 +203,15 @@ def test_smoothing_is_what_it_changes_of_the_solution(strong: bool) -> None:
     assert estimated(exact).smoothing == 0.0
 
 
+@pytest.mark.parametrize("degree", [1, 2])
+def test_what_smoothing_changes_is_counted_once(degree: int) -> None:
+    """Nodes that are found with the bubbles, as at degree 2, would answer the unsmoothed law."""
+    table = model(8, friction=quadratic_linear(1e3), smoothing="paper", epsilon=20.0, degree=degree)
+    (row,) = rows(Scene.model_validate(table), levels=1)
+    assert row.estimate.smoothing > 0.5 * row.true
+    assert 0.8 < row.index < 1.1
+
+
 def test_algebraic_is_the_distance_from_the_discrete_solution() -> None:
     prepared = prepare(Scene.model_validate(model(8, pull=3e6, friction=STRONG)))
     problem, system = prepared.problem, prepared.system

@@ -11,9 +11,13 @@ from collections.abc import Mapping
 from pathlib import Path
 
 SOFT = ("SIGINT", "SIGTERM", "SIGHUP")
-"""Requests to stop."""
-WAYS = (*SOFT, "SIGKILL", "one rank")
+"""Requests to stop, at the next iteration."""
+TWICE = ("SIGINT twice", "SIGTERM twice", "SIGHUP twice")
+"""Requests to stop at once."""
+WAYS = (*SOFT, *TWICE, "SIGKILL", "one rank")
 """The last is SIGKILL to one process of a run."""
+PAUSE = 0.2
+"""Seconds between two signals: the first has come when the second does."""
 LONGEST = 60
 """Seconds within which all processes of a run that was ended are gone."""
 
@@ -33,14 +37,17 @@ def end(process: subprocess.Popen[str], way: str, chance: random.Random) -> None
     elif way == "one rank":
         os.kill(chance.choice(kin), signal.SIGKILL)
     else:
-        process.send_signal(getattr(signal, way))
+        name, _, twice = way.partition(" ")
+        for _ in range(2 if twice else 1):
+            process.send_signal(getattr(signal, name))
+            time.sleep(PAUSE)
     _, errors = process.communicate(timeout=120)
     wait_for_end(kin)
     print(f"ended by {way}: {process.returncode}")
     assert "Traceback" not in errors, (way, process.args, errors)
-    if way in SOFT:
+    if way in SOFT or way in TWICE:
         # negative: before the program's own first line
-        assert process.returncode in (0, 130, -getattr(signal, way)), (way, process.args, errors)
+        assert process.returncode in (0, 130, -getattr(signal, way.split()[0])), (way, process.args, errors)
 
 
 def family(pid: int) -> list[int]:

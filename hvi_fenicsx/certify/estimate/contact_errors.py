@@ -62,7 +62,7 @@ def estimate_contact_errors(
         thresholds: how accurately.
         known: the estimated error, where it is known as a field (:attr:`.Estimate.field`).
     """
-    traces = LawTraces(system.problem, u, examination.states, thresholds)
+    traces = LawTraces(system.problem, u, examination.states, thresholds, exact=True)
     inverse = DualNorm(system, levels, u, thresholds)
     error = known or coupled_errors.of_solution(traces, inverse)[0]
     uncertain = _uncertainty(traces, inverse)

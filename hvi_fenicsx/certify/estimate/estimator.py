@@ -35,7 +35,7 @@ class Estimate:
         smoothing: the smoothed laws' error, 0 for exact ones.
         algebraic: the solver's error.
         energy_norm: |||u_h|||.
-        field: the estimated error itself, where nodes and bubbles were found together.
+        field: the whole estimated error, where nodes and bubbles were found together and no law is smoothed.
     """
 
     cells: Array
@@ -86,12 +86,13 @@ def estimate(
         thresholds: how accurately.
     """
     problem, near = system.problem, thresholds.near
-    traces = LawTraces(problem, u, examination.states, thresholds)
+    traces = LawTraces(problem, u, examination.states, thresholds, exact=False)
     inverse = dual_norm.DualNorm(system, levels, u, thresholds)
     energy = _energy(problem, u, examination)
     field, cells = _discretisation(traces, inverse, energy)
     cells += data_errors.squares(problem, traces.bubbles, examination.states, thresholds)
-    smoothing = inverse.solve(dual_norm.smoothing(problem, examination.states, near))[1] if _smoothed(problem) else 0.0
+    smoothed = any(term.law != term.exact for term in problem.terms)
+    smoothing = inverse.solve(dual_norm.smoothing(problem, examination.states, near))[1] if smoothed else 0.0
     _, algebraic = inverse.solve(dual_norm.algebraic(problem, examination, near))
     inverse.destroy()
     comm = problem.domain.mesh.comm
@@ -103,7 +104,7 @@ def estimate(
         "energy_norm": energy,
     }
     norms = {name: _norm(square, thresholds.rounding) for name, square in squares.items()}
-    return Estimate(cells=np.sqrt(cells), field=field, **norms)
+    return Estimate(cells=np.sqrt(cells), field=None if smoothed else field, **norms)
 
 
 def _norm(square: float, rounding: float) -> float:
@@ -135,10 +136,6 @@ def _between_nodes(traces: LawTraces, inverse: dual_norm.DualNorm) -> Array:
     if problem.terms:
         cells += problem.bulk.energy_by_cell(inverse.solve(unmet)[0])
     return cells
-
-
-def _smoothed(problem: Problem) -> bool:
-    return any(term.law != term.exact for term in problem.terms)
 
 
 def _energy(problem: Problem, u: fem.Function, examination: Examination) -> float:

@@ -126,14 +126,21 @@ class LawTraces:
         u: its solution u_h, nondimensional, ghosts updated.
         states: of the parts of Γc at u_h.
         thresholds: of the quadrature and of kinks.
+        exact: whether an error meets the unsmoothed laws, so that it has what smoothing changes, too.
         degree: of the solution.
         bubbles: the space of bubbles.
     """
 
     def __init__(
-        self, problem: Problem, u: fem.Function, states: Sequence[ContactState], thresholds: Thresholds = DEFAULT
+        self,
+        problem: Problem,
+        u: fem.Function,
+        states: Sequence[ContactState],
+        thresholds: Thresholds = DEFAULT,
+        *,
+        exact: bool,
     ) -> None:
-        self.problem, self.u, self.states, self.thresholds = problem, u, states, thresholds
+        self.problem, self.u, self.states, self.thresholds, self.exact = problem, u, states, thresholds, exact
         self.degree = nodes.degree(problem.space)
         self.bubbles = bubbles.space(problem.domain.mesh, self.degree)
         self._interfaces: dict[str, InterfacePoints] = {}
@@ -166,12 +173,12 @@ class LawTraces:
         Args:
             state: of its part.
             law: one of the part's.
-            error: added to u_h before the law, the unsmoothed one then, is evaluated; nothing is added where a whole
-                part of a facet sticks (its nodes on a convex kink), and elsewhere no slip passes a convex kink.
+            error: added to u_h before the law is evaluated; nothing is added where a whole part of a facet sticks (its
+                nodes on a convex kink), and elsewhere no slip passes a convex kink.
         """
         term, solved = law.term, self._of_u(state, law)
         points, nodal = solved.points, solved.nodal
-        asked = term.law if error is None else term.exact
+        asked = term.exact if self.exact and error is not None else term.law
         slip = solved.slip_under(asked)
         if error is not None:
             added = points.of_field(error.nodes) + points.of_bubbles(error.bubbles)
