@@ -93,7 +93,8 @@ def finish_with_levels(
     if prepared.solvability.state == "escapes":
         return unsolved(prepared), ()
     control = RunControl(timer=prepared.timer, progress=progress, interrupted=interrupted)
-    solved, balance = _solved(prepared, control, start)
+    with prepared.timer("solve"):
+        solved, balance = _solved(prepared, control, start)
     prepared = replace(prepared, system=solved.system)
     result, examination, warnings = _examined(prepared, solved.result, solved.levels)
     errors = None

@@ -18,7 +18,7 @@ from ..problem.contact_surface import Surface
 from ..problem.problem import Bounds, Problem
 from ..problem.references import References
 from ..problem.rigid_part import strained
-from ..problem.vectors import nodal
+from ..problem.vectors import nodal_values
 from ..typing import Array, Integers, Mask
 from . import force_attribution, law_state
 from .force_attribution import ForceAttribution
@@ -116,8 +116,8 @@ def forces(problem: Problem, u: fem.Function) -> Forces:
     """
     internal = _internal(problem, u)
     pushing, strains = np.zeros_like(internal), np.zeros_like(internal)
-    for name, form in problem.linear.items():
-        (strains if name in problem.bulk.strains else pushing)[:] += nodal(form)
+    for name, form in problem.loads.items():
+        (strains if name in problem.bulk.strains else pushing)[:] += nodal_values(form)
     load = pushing + strains
     return Forces(*(problem.combined(force) for force in (internal - load, load, pushing)))
 

@@ -13,7 +13,7 @@ from mpi4py import MPI
 from ..effects import Place
 from ..problem.contact_surface import Surface
 from ..problem.problem import Problem
-from ..problem.vectors import nodal
+from ..problem.vectors import nodal, nodal_values
 from ..typing import Array, Entities
 from .contact_state import ContactState, Forces
 
@@ -89,9 +89,9 @@ def loads(problem: Problem) -> dict[str, NodalForces]:
         problem: what is solved.
     """
     found: dict[str, NodalForces] = {}
-    for name, form in problem.linear.items():
+    for name, form in problem.loads.items():
         if name not in problem.bulk.strains:
-            _add(found, name.rpartition(".")[0], NodalForces.of(nodal(form)))
+            _add(found, name.rpartition(".")[0], NodalForces.of(nodal_values(form)))
     return found
 
 

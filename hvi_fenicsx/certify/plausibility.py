@@ -20,6 +20,7 @@ from ..problem.problem import Problem
 from ..rigid import Solvability, kernel
 from ..runtime.mpi import largest, total
 from ..system import existence
+from ..typing import Array
 from .certificate import Examination
 from .contact_state import ContactState
 from .estimate.contact_errors import ratio
@@ -155,17 +156,34 @@ def _holds(problem: Problem, forces: Mapping[str, PETSc.Vec], term: LawTerm, rou
 
 def _strain(problem: Problem, u: fem.Function, thresholds: PlausibilityThresholds) -> Iterator[str]:
     """By the edges: of P1, the strain along an edge is its change of length over its length."""
-    scales, d = problem.scales, problem.scales.dimension
-    corners = problem.space.dofmap.list[:, : d + 1]
-    x, values = (np.take(v, corners, axis=0) for v in (problem.points[:, :d], u.x.array.reshape(-1, d)))
+    comm, scales, d = problem.domain.mesh.comm, problem.scales, problem.scales.dimension
+    values = u.x.array.reshape(-1, d)
+    size = np.sqrt(d) * largest(comm, float(np.max(np.abs(values), initial=0.0))) * scales.displacement
+    shortest = problem.once("shortest edge", None, lambda: _shortest_edge(problem))
+    if 2.0 * size <= thresholds.largest_strain * shortest:
+        return
     most = 0.0
-    for a, b in combinations(range(d + 1), 2):
-        edge, change = x[:, b] - x[:, a], values[:, b] - values[:, a]
+    for edge, change in zip(_along_edges(problem, problem.points[:, :d]), _along_edges(problem, values), strict=True):
         along = np.abs(np.einsum("nd,nd->n", edge, change)) / np.einsum("nd,nd->n", edge, edge)
         most = max(most, float(np.max(along, initial=0.0)))
-    strain = largest(problem.domain.mesh.comm, most) * scales.displacement
+    strain = largest(comm, most) * scales.displacement
     if strain > thresholds.largest_strain:
         yield f"the largest strain is {strain:.3g}, where small strains are assumed; is the modulus in N/m²?"
+
+
+def _shortest_edge(problem: Problem) -> float:
+    """Of all cells, m. Collective."""
+    edges = _along_edges(problem, problem.points[:, : problem.scales.dimension])
+    shortest = min(float(np.min(np.einsum("nd,nd->n", edge, edge), initial=np.inf)) for edge in edges)
+    return float(np.sqrt(-largest(problem.domain.mesh.comm, -shortest)))
+
+
+def _along_edges(problem: Problem, values: Array) -> Iterator[Array]:
+    """The difference of vectors (nodes, d) between the ends of each edge of the cells, (cells, d)."""
+    d = problem.scales.dimension
+    corners = np.take(values, problem.space.dofmap.list[:, : d + 1], axis=0)
+    for a, b in combinations(range(d + 1), 2):
+        yield corners[:, b] - corners[:, a]
 
 
 def _dips(problem: Problem, examination: Examination, size: float, thresholds: PlausibilityThresholds) -> Iterator[str]:

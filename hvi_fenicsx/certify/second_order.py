@@ -19,7 +19,6 @@ from ..problem.problem import Problem
 from ..problem.references import References
 from ..runtime.timing import Timer
 from ..solvers.law_models import Cells, ExactLaw
-from ..system.compiled_forms import compile_forms
 from ..system.system import System
 from ..typing import Array, Integers
 from .directional import Growth, growth
@@ -51,7 +50,7 @@ def status(references: References, u: fem.Function, forces: Array, tolerance: fl
 
 def _by_inertia(problem: Problem, u: fem.Function, found: Growth) -> str:
     """The status by one or two factorisations. Collective."""
-    system = System(problem, compile_forms(problem), Timer())
+    system = System(problem, Timer())
     x = system.unknowns(u)
     models = []
     for term in system.terms:

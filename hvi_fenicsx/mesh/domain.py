@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 from dolfinx import mesh as dmesh
@@ -15,7 +15,10 @@ from ..geometry import Curve
 from ..runtime import memory
 from ..runtime.mpi import agree
 from ..typing import Array, Entities
+from .shared import Shared
 from .transfer import Transfer
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,7 +35,7 @@ class Domain:
             sides are taken for the geometry itself.
         one_piece: whether the mesh is known to be connected; else :mod:`.bodies` finds out.
         coarsening: makes the next coarser domain of the mesh hierarchy; None where there is none.
-        shared: what several problems on this mesh have in common, by name; None where one problem is all.
+        shared: what several problems on this mesh have in common; None where one problem is all.
     """
 
     mesh: dmesh.Mesh
@@ -43,7 +46,7 @@ class Domain:
     curves: Mapping[str, Curve] = field(default_factory=dict)
     one_piece: bool = False
     coarsening: Coarsening | None = None
-    shared: dict[str, Any] | None = field(default=None, compare=False, repr=False)
+    shared: Shared | None = field(default=None, compare=False, repr=False)
 
     @classmethod
     def from_mesh(
@@ -93,6 +96,16 @@ class Domain:
     def coarser(self) -> tuple[Domain, Transfer] | None:
         """The next coarser domain and the transfer from it to this one; None where there is none. Collective."""
         return None if self.coarsening is None else self.coarsening()
+
+    def once(self, name: str, origin: Any, make: Callable[[], T]) -> T:
+        """What all problems on this mesh share: made once for each origin, where there may be several. Collective.
+
+        Args:
+            name: what it is.
+            origin: what it is made from besides the mesh, comparable.
+            make: makes it; nobody may change it afterwards. Collective.
+        """
+        return make() if self.shared is None else self.shared.get(self.mesh.comm, name, origin, make)
 
     def facets(self, names: Sequence[str]) -> Entities:
         """Local facets of the named sides together, sorted.

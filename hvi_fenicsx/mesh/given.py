@@ -47,6 +47,23 @@ def domain_of(
     return Domain.from_mesh(mesh, named_sides, _named(mesh, cells, d, regions))
 
 
+def check_tags(**given: Any) -> None:
+    """Refuse what is no mesh tags.
+
+    Args:
+        **given: tags, or None, by the name of the argument.
+
+    Raises:
+        InputError: another kind of object.
+    """
+    for name, tags in given.items():
+        if tags is not None and not isinstance(tags, dmesh.MeshTags):
+            raise InputError(
+                f"body: {name} are of the kind {type(tags).__name__}; give dolfinx.mesh.MeshTags, as "
+                "meshtags(mesh, dimension, entities, values) makes them"
+            )
+
+
 def tags_present(mesh: dmesh.Mesh, tags: Any) -> set[int]:
     """All tags that some entity of any rank has. Collective.
 

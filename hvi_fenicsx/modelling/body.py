@@ -20,6 +20,7 @@ from ..mesh import given
 from ..mesh.boundary_part import BoundaryPart, Inequalities
 from ..mesh.domain import Domain
 from ..mesh.shapes import Box, DomainShape, GivenMesh, MeshFile, Rectangle
+from ..mesh.shared import Shared
 from ..mesh.thresholds import DEFAULT
 from ..mesh.transfer import Transfer
 from ..problem.interface_sides import Sides
@@ -53,7 +54,10 @@ class Body:
     ) -> None:
         if not isinstance(mesh, dmesh.Mesh):
             raise InputError(f"body: {mesh!r} is no dolfinx mesh; a file is read by hvi.Body.file(path)")
-        sides, within = _sorted_out(mesh, facets, cells, dict(names or {}), regions)
+        given.check_tags(facets=facets, cells=cells)
+        named = _by_name("names", names or {})
+        within = None if regions is None else _by_name("regions", regions)
+        sides, within = _sorted_out(mesh, facets, cells, named, within)
         domain = given.domain_of(mesh, facets, cells, sides, within)
         self._set(GivenMesh(shape="given mesh", given=domain), mesh.comm)
 
@@ -201,12 +205,20 @@ class Body:
         return f"Body({self.shape.shape}, {self.dimension}D)"
 
 
+def _by_name(what: str, tags: Any) -> dict[str, int]:
+    """Tags by name, as a user gives them."""
+    numbers = isinstance(tags, Mapping) and all(isinstance(tag, (int, np.integer)) for tag in tags.values())
+    if not (numbers and all(isinstance(name, str) for name in tags)):
+        raise InputError(f'body: {what} are numbers of tags by name, such as {what}={{"wall": 1}}, not {tags!r}')
+    return {name: int(tag) for name, tag in tags.items()}
+
+
 def _sorted_out(
-    mesh: dmesh.Mesh, facets: Any, cells: Any, names: dict[str, int], regions: Mapping[str, int] | None
+    mesh: dmesh.Mesh, facets: Any, cells: Any, names: dict[str, int], regions: dict[str, int] | None
 ) -> tuple[dict[str, int], dict[str, int]]:
     """The sides and the regions among names. Collective."""
     if regions is not None:
-        return names, dict(regions)
+        return names, regions
     on_facets, on_cells = given.tags_present(mesh, facets), given.tags_present(mesh, cells)
     within = {name: tag for name, tag in names.items() if tag in on_cells}
     sides = {name: tag for name, tag in names.items() if tag in on_facets or tag not in on_cells}
@@ -215,7 +227,7 @@ def _sorted_out(
 
 def _remembering(domain: Domain) -> Domain:
     """The domain for many problems, whose coarser ones are made once."""
-    domain = replace(domain, shared={})
+    domain = replace(domain, shared=Shared())
     if domain.coarsening is None:
         return domain
     make = domain.coarsening

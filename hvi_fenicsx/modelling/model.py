@@ -45,6 +45,8 @@ class Model:
         for one in self.effects:
             _check_place(body, one)
         self._made = [(one, one.effect(body.mesh)) for one in self.effects]
+        if not any(effect.place is Place.MATERIAL for _, effect in self._made):
+            raise InputError("model: no effect is a material; add one, such as hvi.Isotropic(youngs_modulus=..., ...)")
         self.scene = _scene(body, [(one.where, effect) for one, effect in self._made], title)
 
     def replace(self, *effects: PlacedEffect) -> Model:

@@ -6,9 +6,9 @@ How the volumetric part is treated is known here and nowhere else; the element i
 from __future__ import annotations
 
 import functools
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 import basix.ufl
 import numpy as np
@@ -19,6 +19,7 @@ from petsc4py import PETSc
 
 from ..effects import Averaged, Contribution, Effect, Place
 from ..mesh import nodes
+from ..mesh.shared import Shared
 from ..runtime import forms
 from ..typing import Array
 from . import nodal_averaging, stress
@@ -26,6 +27,8 @@ from .nodal_averaging import Dilatation
 from .scaling import Scales
 from .strain_energy import feels_no_rigid_motion
 from .vectors import LinearForm, nodal, nodal_sum, nodal_values
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,7 +45,7 @@ class Bulk:
         strains: linear forms of ε(v) (thermal strain) by the name of their load; no rigid motion feels them.
         across: parts of ∫ σ_33 q dx in a plane body (:attr:`.Contribution.across`).
         origin: what the operator is made from: two bulks of one mesh with equal origins have equal matrices.
-        shared: where problems on one mesh share their matrix; None: each makes its own.
+        shared: where problems on one mesh share what an equal origin makes equal; None: each makes its own.
     """
 
     space: fem.FunctionSpace
@@ -54,16 +57,19 @@ class Bulk:
     strains: Mapping[str, Any]
     across: tuple[Any, ...]
     origin: tuple[Any, ...] = ()
-    shared: dict[str, Any] | None = None
+    shared: Shared | None = None
 
     @functools.cached_property
     def compiled(self) -> fem.Form:
         """The compiled ``form``. Collective when first used."""
-        return forms.compiled(self.form)
+        return self._once("elastic form", lambda: forms.compiled(self.form))
 
     @functools.cached_property
     def _internal(self) -> tuple[fem.Form, fem.Function]:
         """The compiled form a(u, ·), and its u: much quicker than to derive the form for each u."""
+        return self._once("elastic force", self._action)
+
+    def _action(self) -> tuple[fem.Form, fem.Function]:
         displacement = fem.Function(self.space)
         return forms.compiled(ufl.action(self.form, displacement)), displacement
 
@@ -83,11 +89,14 @@ class Bulk:
 
     def matrix(self) -> PETSc.Mat:
         """The stiffness matrix, a new one without conditions; block size d. Collective."""
+        return self._assembled() if self.shared is None else self._once("stiffness", self._assembled).copy()
+
+    def _once(self, name: str, make: Callable[[], T]) -> T:
+        """What all bulks of equal origin share. Collective."""
         if self.shared is None:
-            return self._assembled()
-        if self.shared.get("origin") != self.origin:
-            self.shared.update(origin=self.origin, matrix=self._assembled())
-        return self.shared["matrix"].copy()
+            return make()
+        name = f"{name} of degree {nodes.degree(self.space)}"
+        return self.shared.get(self.space.mesh.comm, name, self.origin, make)
 
     def _assembled(self) -> PETSc.Mat:
         matrix = assemble_matrix(self.compiled)
@@ -287,7 +296,7 @@ def make_bulk(
     scales: Scales,
     made: Sequence[tuple[str | None, Effect, Contribution]],
     strains: Mapping[str, Any],
-    shared: dict[str, Any] | None = None,
+    shared: Shared | None = None,
 ) -> Bulk:
     """The elastic operator that effects contribute. Collective.
 
@@ -298,7 +307,7 @@ def make_bulk(
         scales: what one unit is in SI.
         made: the effects, each with its place and what it contributes.
         strains: their linear forms of ε(v), by the name of the load.
-        shared: where problems on one mesh share their matrix; None: each makes its own.
+        shared: where problems on one mesh share what an equal origin makes equal; None: each makes its own.
     """
     elastic = tuple((where, effect) for where, effect, c in made if c.bilinear or c.averaged)
     brought = [(form, effect.place is Place.MATERIAL) for _, effect, c in made for form in c.bilinear]

@@ -45,22 +45,29 @@ def make_surfaces(
     """
     found = dict.fromkeys(w for w, _, c in contributions if w is not None and (c.bounds or c.laws))
     parts = [where for where in found if where not in interfaces]
-    surfaces = {
-        where: contact_surface.make_surface(
-            where,
-            context.space,
-            context.points,
-            context.part_facets[where],
-            context.boundary(where, **contact_rule(nodes.degree(context.space))),
-            context.length ** (context.dimension - 1),
-        )
-        for where in parts
-    }
+    surfaces = {where: _surface(context, where) for where in parts}
     towards = {w: b.towards for w, _, c in contributions for b in c.bounds if w in parts and b.towards is not None}
     stated = {name: _stated(context, surfaces[name], obstacle) for name, obstacle in towards.items()}
     if not context.domain.one_piece:
         facing_sides.refuse(context.domain.mesh.comm, surfaces.values(), context.length, thresholds)
     return contact_normals.decide(context.domain.mesh.comm, surfaces, stated, fixed, context.length, thresholds)
+
+
+def _surface(context: DomainForms, where: str) -> Surface:
+    """The surface of a part, with the mean normals of its facets. Collective."""
+    facets, degree = context.part_facets[where], nodes.degree(context.space)
+    return context.domain.once(
+        f"surface {where} of degree {degree}",
+        facets.tobytes(),
+        lambda: contact_surface.make_surface(
+            where,
+            context.space,
+            context.points,
+            facets,
+            context.boundary(where, **contact_rule(degree)),
+            context.length ** (context.dimension - 1),
+        ),
+    )
 
 
 def _stated(context: DomainForms, where: Surface, obstacle: Towards) -> Array:

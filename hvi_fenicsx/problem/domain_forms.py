@@ -118,12 +118,7 @@ class DomainForms:
 
 def _space(domain: Domain, degree: int) -> fem.FunctionSpace:
     """The displacements, one space for all problems of a degree on a shared mesh. Collective."""
-    if domain.shared is None:
-        return displacement_space(domain.mesh, degree)
-    key = f"space of degree {degree}"
-    if key not in domain.shared:
-        domain.shared[key] = displacement_space(domain.mesh, degree)
-    return domain.shared[key]
+    return domain.once(f"space of degree {degree}", None, lambda: displacement_space(domain.mesh, degree))
 
 
 class ScaledMeasure:

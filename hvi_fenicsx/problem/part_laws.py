@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from itertools import combinations
-from typing import Any
 
 import numpy as np
 import ufl
@@ -136,7 +135,7 @@ def _term(
             f'boundary.{where.part}: law = "{law.law.name}" jumps upwards at a length > 0 of a vector, which is a '
             "ring that bounds cannot follow; smooth it: [solver] smoothing and epsilon"
         )
-    density = fem.Function(context.space, name="clarke_derivative")
+    density = _density(context)
     return LawTerm(
         surface=where,
         direction=law.direction,
@@ -147,7 +146,7 @@ def _term(
         length=length,
         free=(~np.isin(where.dofs, fixed)).astype(np.float64),
         density=density,
-        residual=forms.compiled(_residual(context, where, density)) if by_rule and law.mixity is None else None,
+        residual=_residual(context, where, density) if by_rule and law.mixity is None else None,
         mixity=law.mixity,
         energies=np.ones(len(where.weights)),
     )
@@ -181,7 +180,18 @@ def _scaled(law: Superpotential, scales: Scales, place: str) -> Superpotential:
         raise InputError(f"{place}: {units} it cannot be computed with: {error}") from None
 
 
-def _residual(context: DomainForms, where: Surface, density: fem.Function) -> Any:
-    """∫ density·v ds over a part, nondimensional."""
-    area = context.number(context.length ** (1 - context.dimension))
-    return ufl.inner(density, context.test) * ScaledMeasure(area, context.boundary(where.part, **contact_rule(1)))
+def _density(context: DomainForms) -> fem.Function:
+    """Room for the tractions of any law, which are written before each use. Collective."""
+    name = f"tractions of degree {nodes.degree(context.space)}"
+    return context.domain.once(name, None, lambda: fem.Function(context.space, name="clarke_derivative"))
+
+
+def _residual(context: DomainForms, where: Surface, density: fem.Function) -> fem.Form:
+    """The compiled form ∫ density·v ds over a part, nondimensional. Collective."""
+
+    def make() -> fem.Form:
+        area = context.number(context.length ** (1 - context.dimension))
+        measure = ScaledMeasure(area, context.boundary(where.part, **contact_rule(1)))
+        return forms.compiled(ufl.inner(density, context.test) * measure)
+
+    return context.domain.once(f"forces of laws on {where.part}", where.facets.tobytes(), make)

@@ -7,17 +7,19 @@ SI; the forms contain the factors.
 from __future__ import annotations
 
 import functools
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 from dolfinx import fem
 
 from ..effects import Contribution, Effect
+from ..mesh import nodes
 from ..mesh.domain import Domain
 from ..rigid import AnyBody
+from ..runtime import forms
 from ..spatial_value import SpatialValue
 from ..typing import Array, Entities, Integers
 from . import bodies, contact_surface, coupling
@@ -28,6 +30,8 @@ from .coupling import Coupling
 from .interfaces import Interface
 from .law_term import LawTerm
 from .scaling import Scales
+
+T = TypeVar("T")
 
 
 class PlacedContribution(NamedTuple):
@@ -179,6 +183,15 @@ class Problem:
         """The scalar dofs that are prescribed and that this rank owns."""
         return self.fixed[self.fixed < self.space.dofmap.index_map.size_local * self.space.dofmap.index_map_bs]
 
+    @functools.cached_property
+    def loads(self) -> dict[str, fem.Form]:
+        """The compiled forms of ``linear``. Collective when first used."""
+        return {name: forms.compiled(form) for name, form in self.linear.items()}
+
+    def compile(self) -> None:
+        """Compile what its assembly needs, or take it from the cache. Collective."""
+        _ = self.bulk.compiled, self.loads
+
     @property
     def has_potential(self) -> bool:
         """Whether the laws are derivatives of an energy; else their energies of separation depend on the mode."""
@@ -187,7 +200,20 @@ class Problem:
     @functools.cached_property
     def bodies(self) -> MeshBodies:
         """The bodies, those that meet in an interface together. Collective when first used."""
-        return bodies.find(self.domain, self.space, self.points, [one.members for one in self.interfaces])
+        meetings = [one.members for one in self.interfaces]
+        return self.once("bodies", None, lambda: bodies.find(self.domain, self.space, self.points, meetings))
+
+    def once(self, name: str, origin: Any, make: Callable[[], T]) -> T:
+        """What problems of a degree without interfaces share on one mesh, as :meth:`.Domain.once` says. Collective.
+
+        Args:
+            name: what it is.
+            origin: what it is made from besides the mesh and the degree, comparable.
+            make: makes it; nobody may change it afterwards. Collective.
+        """
+        if self.interfaces:
+            return make()
+        return self.domain.once(f"{name} of degree {nodes.degree(self.space)}", origin, make)
 
     @functools.cached_property
     def coupling(self) -> Coupling | None:

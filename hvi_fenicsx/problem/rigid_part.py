@@ -40,15 +40,19 @@ class RigidPart:
     Args:
         comm: the ranks.
         bodies: the motions of each body, independent of each other; the same bodies on all ranks.
-        travel: of a body, relative to its deformation, beyond which it is taken off.
     """
 
-    def __init__(self, comm: MPI.Comm, bodies: Sequence[BodyMotions], travel: float = DEFAULT.travel) -> None:
-        self._comm, self._travel = comm, travel
+    def __init__(self, comm: MPI.Comm, bodies: Sequence[BodyMotions]) -> None:
+        self._comm = comm
         self._bodies = [_orthonormal(comm, body) for body in bodies]
 
-    def without(self, values: Array) -> Array:
-        """Local values (n,) without the travel of bodies that travel far, (n,). Collective."""
+    def without(self, values: Array, travel: float = DEFAULT.travel) -> Array:
+        """Values without the travel of bodies that travel far, (n,). Collective.
+
+        Args:
+            values: local ones, (n,).
+            travel: of a body, relative to its deformation, beyond which it is taken off.
+        """
         parts = [b.values[:, : b.owned] @ values[b.places[: b.owned]] for b in self._bodies]
         ends = np.cumsum([len(part) for part in parts])[:-1]
         shares = np.split(self._comm.allreduce(np.concatenate(parts)), ends)
@@ -57,7 +61,7 @@ class RigidPart:
         strained = self._comm.allreduce(np.array([rest @ rest for rest in owned]))
         found = values.copy()
         for body, share, rest, left in zip(self._bodies, shares, rests, strained, strict=True):
-            if share @ share > self._travel**2 * left:
+            if share @ share > travel**2 * left:
                 found[body.places] = rest
         return found
 
@@ -77,6 +81,14 @@ def strained(problem: Problem, u: fem.Function, travel: float = DEFAULT.travel) 
         u: nondimensional, ghosts updated.
         travel: of a body, relative to its deformation, beyond which it is far.
     """
+    found = fem.Function(problem.space)
+    rigid = problem.once("rigid part of displacements", None, lambda: _of_displacements(problem))
+    found.x.array[:] = rigid.without(u.x.array, travel)
+    return found
+
+
+def _of_displacements(problem: Problem) -> RigidPart:
+    """All rigid motions of all bodies. Collective."""
     points, d = np.asarray(problem.points / problem.scales.length), problem.scales.dimension
     here, every = problem.space.dofmap.index_map.size_local, list[BodyMotions]()
     for body in problem.bodies:
@@ -85,6 +97,4 @@ def strained(problem: Problem, u: fem.Function, travel: float = DEFAULT.travel) 
         places = (blocks[:, None] * d + np.arange(d)).ravel()
         owned = d * int(np.count_nonzero(blocks < here))
         every.append(BodyMotions(places=places, owned=owned, values=fields.reshape(len(fields), -1)))
-    found = fem.Function(problem.space)
-    found.x.array[:] = RigidPart(problem.domain.mesh.comm, every, travel).without(u.x.array)
-    return found
+    return RigidPart(problem.domain.mesh.comm, every)

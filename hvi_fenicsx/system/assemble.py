@@ -10,7 +10,6 @@ from ..mesh.domain import Domain
 from ..problem import scaling
 from ..problem.compose import Model, compose
 from ..runtime.timing import Timer
-from .compiled_forms import compile_forms
 from .system import System
 from .thresholds import DEFAULT, Thresholds
 
@@ -29,8 +28,8 @@ def assemble(domain: Domain, model: Model, timer: Timer, thresholds: Thresholds 
     """
     with timer("jit"):
         problem = compose(domain, model)
-        compiled = compile_forms(problem)
-    system = System(problem, compiled, timer, thresholds)
+        problem.compile()
+    system = System(problem, timer, thresholds)
     _require_finite(system)
     return system
 

@@ -69,7 +69,7 @@ def fields(problem: Problem, modes: Sequence[Mode]) -> list[fem.Function]:
     return found
 
 
-def rigid_part(problem: Problem, unknowns: Callable[[fem.Function], PETSc.Vec]) -> RigidPart | None:
+def rigid_part(problem: Problem, unknowns: Callable[[fem.Function], PETSc.Vec], *, cartesian: bool) -> RigidPart | None:
     """That of the motions which conditions leave and the elastic operator does not see; None for none. Collective.
 
     Across an interface they leave no strain only up to the rounding of its integrals, so they are not taken there.
@@ -77,9 +77,16 @@ def rigid_part(problem: Problem, unknowns: Callable[[fem.Function], PETSc.Vec]) 
     Args:
         problem: the problem.
         unknowns: makes the unknowns of a displacement field.
+        cartesian: whether these are Cartesian components at all vertices.
     """
     if problem.bulk.foundation is not None or problem.interfaces:
         return None
+    if not cartesian:
+        return _rigid_part(problem, unknowns)
+    return problem.once("rigid part of unknowns", problem.fixed.tobytes(), lambda: _rigid_part(problem, unknowns))
+
+
+def _rigid_part(problem: Problem, unknowns: Callable[[fem.Function], PETSc.Vec]) -> RigidPart | None:
     modes = existence.motions(problem, contact_closed=False)
     motions = [unknowns(field) for field in fields(problem, modes)]
     if not motions:

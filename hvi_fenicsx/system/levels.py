@@ -9,7 +9,9 @@ import numpy as np
 import numpy.typing as npt
 from petsc4py import PETSc
 
+from ..mesh import nodes
 from ..mesh.transfer import Transfer
+from ..problem.problem import Problem
 from ..typing import Array
 from .system import System
 
@@ -66,8 +68,7 @@ def prolongation(fine: System, coarse: System, transfer: Transfer) -> PETSc.Mat:
         coarse: the system on the next coarser mesh.
         transfer: the transfer from the coarser mesh to the finer one.
     """
-    points = fine.problem.points, coarse.problem.points
-    step = transfer.prolongation(fine.problem.space, coarse.problem.space, points)
+    step = _of_displacements(fine.problem, coarse.problem, transfer)
     if coarse.problem.coupling is not None:
         step = step.matMult(coarse.problem.coupling.matrix)
     if fine.problem.coupling is not None:
@@ -75,6 +76,12 @@ def prolongation(fine: System, coarse: System, transfer: Transfer) -> PETSc.Mat:
     if coarse.rotation is not None:
         step = step.matMult(coarse.rotation)
     return step if fine.rotation is None else fine.rotation.transposeMatMult(step)
+
+
+def _of_displacements(fine: Problem, coarse: Problem, transfer: Transfer) -> PETSc.Mat:
+    """The prolongation between displacements in Cartesian components. Collective."""
+    name, points = f"prolongation from degree {nodes.degree(coarse.space)}", (fine.points, coarse.points)
+    return fine.once(name, None, lambda: transfer.prolongation(fine.space, coarse.space, points))
 
 
 def with_coarser_system(finer: System, coarser: System, levels: Levels, step: PETSc.Mat) -> Levels:

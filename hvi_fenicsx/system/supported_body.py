@@ -42,12 +42,8 @@ class SupportedBody:
             problem: the problem.
             body: the body that moves.
         """
-        free = kernel(problem.domain.mesh.comm, body, [existence.prescribed_directions(problem, body)])
-        here = problem.space.dofmap.index_map.size_local
-        mine = np.flatnonzero(problem.bodies.labels[:here] == body.index).astype(np.int32)
-        fields = np.zeros((free.shape[1], here, problem.scales.dimension))
-        fields[:, mine] = np.moveaxis(np.tensordot(problem.motions_at(mine, body), free, (1, 0)), 2, 0)
-        return cls(problem, body, free, fields)
+        name, origin = f"supported motions of body {body.index}", problem.fixed.tobytes()
+        return cls(problem, body, *problem.once(name, origin, lambda: _supported(problem, body)))
 
     def in_components(self, components: Callable[[Array], Array]) -> Self:
         """The same, its fields in other components; ``components`` makes them of vectors (vertices, d)."""
@@ -99,6 +95,16 @@ class Motions:
     def squares(self) -> Array:
         """The square of the length of each on this rank, (j,)."""
         return np.asarray(np.einsum("nj,nk,kj->j", self.combined, self.of.products, self.combined))
+
+
+def _supported(problem: Problem, body: AnyBody) -> tuple[Array, Array]:
+    """The motions that the supports of a body leave, as coefficients, and at this rank's vertices. Collective."""
+    free = kernel(problem.domain.mesh.comm, body, [existence.prescribed_directions(problem, body)])
+    here = problem.space.dofmap.index_map.size_local
+    mine = np.flatnonzero(problem.bodies.labels[:here] == body.index).astype(np.int32)
+    fields = np.zeros((free.shape[1], here, problem.scales.dimension))
+    fields[:, mine] = np.moveaxis(np.tensordot(problem.motions_at(mine, body), free, (1, 0)), 2, 0)
+    return free, fields
 
 
 def _normals(problem: Problem, body: AnyBody, surface: Surface, closed: Mask) -> FixedDirections:

@@ -24,7 +24,6 @@ from ..rigid import Mode
 from ..runtime.timing import Timer
 from ..typing import Array, Entities
 from . import existence, free_motions, local_frames, near_null_space
-from .compiled_forms import CompiledForms
 from .free_motions import FreeMotions
 from .holding_forces import HoldingForces
 from .jacobian import Jacobian
@@ -37,7 +36,6 @@ class System:
 
     Args:
         problem: the problem.
-        compiled: its forms.
         timer: where time goes.
         thresholds: what counts as rounding, and how unknowns are held.
 
@@ -60,17 +58,15 @@ class System:
         holding: the rows of the elastic operator at prescribed unknowns.
     """
 
-    def __init__(
-        self, problem: Problem, compiled: CompiledForms, timer: Timer, thresholds: Thresholds = DEFAULT
-    ) -> None:
+    def __init__(self, problem: Problem, timer: Timer, thresholds: Thresholds = DEFAULT) -> None:
         self.problem, self.thresholds = problem, thresholds
         self.frames = local_frames.frames_of(problem, thresholds)
         self.free_motions: FreeMotions | None = None
         with timer("assembly"):
-            self.forces = {name: assembled(form) for name, form in compiled.linear.items()}
+            self.forces = {name: assembled(form) for name, form in problem.loads.items()}
             stiffness, self.load = self._constrained()
             stiffness, self.rotation, self.terms, self.bounds = self._in_local_components(stiffness)
-            rigid = free_motions.rigid_part(problem, self.unknowns)
+            rigid = free_motions.rigid_part(problem, self.unknowns, cartesian=self.frames is None)
             self.jacobian = Jacobian(stiffness, self.terms, self.bounds, thresholds, rigid)
             self.references = references.of(problem, self._sum_of(self.forces))
             self.pushing = self._sum_of(existence.loads_of_rigid_motions(problem, self.forces))

@@ -239,6 +239,8 @@ def test_what_is_wrong_with_a_mesh_or_its_tags_is_said() -> None:
         (lambda: hvi.Body(square, inner, names={"all": 7}), "'all' has facets inside of the body"),
         (lambda: hvi.Body(square, names={"wall": 1}), "'wall' is a side, but no tags of facets are given"),
         (lambda: hvi.Body(square, cells=tags, regions={"steel": 1}), "cells are tags of dimension 1"),
+        (lambda: hvi.Body(square, np.array([1, 2])), "facets are of the kind ndarray; give dolfinx.mesh.MeshTags"),
+        (lambda: hvi.Body(square, tags, names=["wall"]), r'names are numbers of tags by name, .*"wall": 1'),  # type: ignore[arg-type]
     ]
     for make, reason in wrong:
         with pytest.raises(hvi.InputError, match=reason):
@@ -252,7 +254,7 @@ def test_wrong_words_are_refused_as_in_a_scene_file(body: hvi.Body) -> None:
             lambda: hvi.Model(body, [STEEL, hvi.Traction("pull", [0.0])]),
             "traction has 1 components; a 2D scene wants 2",
         ),
-        (lambda: hvi.Model(body, [hvi.Traction("pull", [0.0, 0.0])]), "material: is empty"),
+        (lambda: hvi.Model(body, [hvi.Traction("pull", [0.0, 0.0])]), "no effect is a material; add one"),
         (lambda: hvi.Model(body, [hvi.Isotropic(youngs_modulus=-1, poisson_ratio=0.3)]), "youngs_modulus|greater"),
         (lambda: hvi.solve(steel_square(body=body), tolerence=1), 'unknown key "tolerence"; did you mean "tolerance"'),
         (lambda: hvi.Body.rectangle([1.0, -1.0], [2, 2]), r"size\.1: must be 1e-09 or more"),
@@ -371,6 +373,26 @@ def test_a_changed_material_is_not_the_kept_one(body: hvi.Body) -> None:
     held = model.replace(hvi.Displacement("wall", [1e-6, None]))
     alone = hvi.solve(steel_square(body=own_square()).replace(hvi.Displacement("wall", [1e-6, None])))
     assert hvi.solve(held).energy == pytest.approx(alone.energy, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        hvi.Displacement("wall", [0.0, 0.0]),
+        hvi.Displacement("wall", [-1e-6, None]),
+        hvi.Friction("floor", hvi.laws.QuadraticLinear(gamma1=2e6, gamma2=1e6, delta=9e-6)),
+        hvi.Contact("floor", gap=1e-6),
+        hvi.Traction("pull", [1e6, "2e5*y"]),
+    ],
+)
+def test_what_a_body_keeps_is_that_of_the_model(body: hvi.Body, other: Any) -> None:
+    """Supports, laws, gaps and loads change between two solves of one body; a body of its own gives the same."""
+    hvi.solve(steel_square(body=body), estimate=False)
+    kept = hvi.solve(steel_square(body=body).replace(other))
+    alone = hvi.solve(steel_square(body=own_square()).replace(other))
+    assert kept.energy == pytest.approx(alone.energy, rel=1e-12)
+    assert kept.estimate.relative == pytest.approx(alone.estimate.relative, rel=1e-8)
+    np.testing.assert_allclose(kept.u.x.array, alone.u.x.array, atol=1e-11 * np.abs(alone.u.x.array).max())
 
 
 def test_a_loop_over_loads_may_begin_at_the_last_solution(body: hvi.Body) -> None:
