@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from mpi4py import MPI
@@ -30,6 +31,7 @@ from ..rigid import (
     null_space,
 )
 from ..typing import Array, Entities, Mask
+from . import parting
 
 
 def solvability(problem: Problem, forces: Mapping[str, PETSc.Vec]) -> Solvability:
@@ -40,7 +42,8 @@ def solvability(problem: Problem, forces: Mapping[str, PETSc.Vec]) -> Solvabilit
         forces: its load vectors by name.
     """
     comm = problem.domain.mesh.comm
-    return combine([analyse(comm, body) for body in rigid_problems(problem, forces)])
+    found = combine([analyse(comm, body) for body in rigid_problems(problem, forces)])
+    return replace(found, direction=parting.named(problem, found.direction))
 
 
 def load_factors(problem: Problem, forces: Mapping[str, PETSc.Vec], load: str | None = None) -> LoadFactors:
@@ -56,7 +59,9 @@ def load_factors(problem: Problem, forces: Mapping[str, PETSc.Vec], load: str | 
     """
     name = None if load is None else load_name(list(loads_of_rigid_motions(problem, forces)), load)
     comm = problem.domain.mesh.comm
-    return rigid.combine_factors([rigid.load_factors(comm, body, name) for body in rigid_problems(problem, forces)])
+    found = rigid.combine_factors([rigid.load_factors(comm, body, name) for body in rigid_problems(problem, forces)])
+    mode, peak = (parting.named(problem, limiting) for limiting in (found.mode, found.peak_mode))
+    return replace(found, mode=mode, peak_mode=peak)
 
 
 def load_name(known: list[str], wanted: str) -> str:

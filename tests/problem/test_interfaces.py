@@ -161,7 +161,7 @@ def test_a_block_slides_off_the_other_at_the_load_of_statics(degree: int) -> Non
     escaped = solve(pushed(1.3e6, degree, friction=friction))
     assert escaped.solvability.state == "escapes"
     assert escaped.solvability.direction is not None
-    assert escaped.solvability.direction.name == 'translation along +x of body "upper"'
+    assert escaped.solvability.direction.name == 'translation along +x of body "upper": it slides off body "lower"'
 
 
 @BOTH
@@ -169,6 +169,9 @@ def test_a_block_tips_over_on_the_other_at_the_load_of_statics(degree: int) -> N
     stuck = {"law": "graph", "points": [[0, 0], [1e-6, 1e9]]}
     factors = prepare(pushed(1e6, degree, friction=stuck)).load_factors("push")
     assert factors.held == pytest.approx(1e6 * 0.6 * 0.3 / (1e6 * 0.4 * 0.2), rel=1e-9)
+    assert factors.mode is not None
+    assert factors.mode.name.startswith("rotation about (0.8, 0.5)")
+    assert factors.mode.name.endswith('of body "upper": it comes off body "lower"')
 
 
 def test_bodies_that_only_hold_each_other_separate_or_not() -> None:
@@ -277,6 +280,23 @@ def test_three_blocks_in_a_row_pass_a_pressure_on() -> None:
     assert found.examination is not None
     for state in found.examination.states:
         assert state.pressure * found.problem.scales.stress == pytest.approx(-1e6, rel=1e-9)
+
+
+def test_words_say_which_of_three_blocks_leaves_which() -> None:
+    """The middle one is driven out between the others; the top one is pushed off."""
+    row = {name: rectangle([1.0, 0.3], [4, 2], [0.0, 0.3 * i]) for i, name in enumerate(("low", "mid", "top"))}
+    held = {"base": {"on": ["low.bottom"], "displacement": [0.0, 0.0]}}
+    meets = {
+        "a": {"between": ["mid.bottom", "low.top"], **CONTACT},
+        "b": {"between": ["top.bottom", "mid.top"], **CONTACT},
+    }
+    for push, others in (("mid", 'body "low" and body "top"'), ("top", 'body "mid"')):
+        boundary = {**held, "push": {"on": f"{push}.left", "traction": [1e6, 0.0]}}
+        found = prepare(
+            Scene.model_validate({"domain": row, "material": MATERIAL, "boundary": boundary, "interface": meets})
+        )
+        assert found.solvability.direction is not None
+        assert found.solvability.direction.name == f'translation along +x of body "{push}": it slides off {others}'
 
 
 def test_a_scene_with_bodies_and_interfaces_is_written_and_read_again() -> None:

@@ -149,13 +149,13 @@ def test_words_say_which_block_leaves_and_how() -> None:
     escaped = solved(pushed(1.3e6, friction=friction))
     assert escaped.solvability.state == "escapes"
     assert escaped.solvability.direction is not None
-    assert escaped.solvability.direction.name == 'translation along +x of body "upper"'
+    assert escaped.solvability.direction.name == 'translation along +x of body "upper": it slides off body "lower"'
     lifted = pushed(0.0).model_dump(exclude_none=True)
     lifted["boundary"]["press"]["traction"] = [0.0, 0.0, 1e5]
     away = solved(Scene.model_validate(lifted)).solvability
     assert away.state == "escapes"
     assert away.direction is not None
-    assert away.direction.name == 'translation along +z of body "upper"'
+    assert away.direction.name == 'translation along +z of body "upper": it lifts off body "lower"'
 
 
 @pytest.mark.long

@@ -1,11 +1,15 @@
 """Sliding, tipping, lift-off: the load factors of whole scenes against statics, and what a run does on either side.
 
+Each on the rigid floor, and on a second body in its place whose mesh does not match.
+
 Run as a script under mpirun this file prints what `told` says.
 """
 
 from __future__ import annotations
 
+import itertools
 import json
+from collections.abc import Callable
 from typing import Any
 
 import pytest
@@ -30,6 +34,31 @@ def scene(dimension: int, cells: int, boundary: Table) -> Table:
         "domain": {"shape": shape, "size": list(SIZE[dimension]), "cells": [cells * int(s) for s in SIZE[dimension]]},
         "material": {"model": model, "youngs_modulus": E, "poisson_ratio": NU},
         "boundary": {"press": press, **boundary},
+    }
+
+
+def on_a_body(table: Table) -> Table:
+    """The same block on an elastic one that is held below, in the floor's place; it is larger and cut otherwise."""
+    size, dimension = table["domain"]["size"], len(table["domain"]["size"])
+    below = [-0.5] * (dimension - 1) + [-0.5]
+    ground = {
+        "shape": table["domain"]["shape"],
+        "size": [*(s + 1.0 for s in size[:-1]), 0.5],
+        "cells": [5, 3, 1][:dimension],
+        "origin": below,
+    }
+    boundary = {
+        name: {**effects, "on": [f"block.{side}" for side in effects["on"]]}
+        for name, effects in table["boundary"].items()
+        if name != "floor"
+    }
+    floor = {key: value for key, value in table["boundary"]["floor"].items() if key != "on"}
+    held = {"base": {"on": ["ground.bottom"], "displacement": [0.0] * dimension}}
+    return {
+        **table,
+        "domain": {"block": table["domain"], "ground": ground},
+        "boundary": {**boundary, **held},
+        "interface": {"floor": {"between": ["block.bottom", "ground.top"], **floor}},
     }
 
 
@@ -73,17 +102,23 @@ CASES = {
 }
 """Scene by load, name of the load, its held and its peak value, direction of escape."""
 LOAD = 0.7e6
+FLOORS: dict[str, Callable[[Table], Table]] = {"rigid": lambda table: table, "body": on_a_body}
+
+
+def scene_of(name: str, dimension: int, load: float, floor: str) -> Scene:
+    """A case at a load, on a floor."""
+    return Scene.model_validate(FLOORS[floor](CASES[name][0](dimension, load)))
 
 
 def told(comm: MPI.Comm) -> dict[str, Any]:
     """The load factors of each case at one load, and the states just around them."""
     found: dict[str, Any] = {}
-    for name, (make, load, held, peak, _) in CASES.items():
-        for dimension in (2, 3):
-            factors = prepare(Scene.model_validate(make(dimension, LOAD)), comm).load_factors(load)
-            around = [held * (1 - 1e-6), held * (1 + 1e-6), peak * (1 - 1e-6), peak * (1 + 1e-6)]
-            states = [prepare(Scene.model_validate(make(dimension, at)), comm).solvability.state for at in around]
-            found[f"{name}-{dimension}"] = {"held": factors.held, "peak": factors.peak, "states": states}
+    for floor, (name, case), dimension in itertools.product(FLOORS, CASES.items(), (2, 3)):
+        _, load, held, peak, _ = case
+        factors = prepare(scene_of(name, dimension, LOAD, floor), comm).load_factors(load)
+        around = [held * (1 - 1e-6), held * (1 + 1e-6), peak * (1 - 1e-6), peak * (1 + 1e-6)]
+        states = [prepare(scene_of(name, dimension, at, floor), comm).solvability.state for at in around]
+        found[f"{name}-{dimension}-{floor}"] = {"held": factors.held, "peak": factors.peak, "states": states}
     return found
 
 
@@ -96,11 +131,12 @@ def answers(request: pytest.FixtureRequest) -> dict[str, Any]:
 
 @pytest.mark.parametrize("name", CASES)
 @pytest.mark.parametrize("dimension", [2, 3])
+@pytest.mark.parametrize("floor", FLOORS)
 def test_the_factors_are_those_of_statics_and_the_states_flip_there(
-    name: str, dimension: int, answers: dict[str, Any]
+    name: str, dimension: int, floor: str, answers: dict[str, Any]
 ) -> None:
     _, _, held, peak, _ = CASES[name]
-    found = answers[f"{name}-{dimension}"]
+    found = answers[f"{name}-{dimension}-{floor}"]
     assert found["held"] == pytest.approx(held / LOAD, rel=1e-8)
     assert found["peak"] == pytest.approx(peak / LOAD, rel=1e-8)
     between = ["metastable", "metastable"] if held < peak else ["escapes", "held"]
@@ -109,20 +145,24 @@ def test_the_factors_are_those_of_statics_and_the_states_flip_there(
 
 @pytest.mark.parametrize("name", CASES)
 @pytest.mark.parametrize("dimension", [2, 3])
-def test_a_run_is_certified_just_below_and_ends_without_solution_just_above(name: str, dimension: int) -> None:
-    make, _, held, peak, words = CASES[name]
-    below = solve(Scene.model_validate(make(dimension, held * (1 - 1e-4))))
+@pytest.mark.parametrize("floor", ["rigid", pytest.param("body", marks=pytest.mark.long)])
+def test_a_run_is_certified_just_below_and_ends_without_solution_just_above(
+    name: str, dimension: int, floor: str
+) -> None:
+    _, _, held, peak, words = CASES[name]
+    below = solve(scene_of(name, dimension, held * (1 - 1e-4), floor))
     assert (below.exit_code, below.solvability.state) == (0, "held")
-    above = solve(Scene.model_validate(make(dimension, peak * (1 + 1e-6))))
+    above = solve(scene_of(name, dimension, peak * (1 + 1e-6), floor))
     assert (above.exit_code, above.solvability.state) == (3, "escapes")
     assert above.solvability.direction is not None
     assert above.solvability.direction.name.startswith(words)
 
 
 @pytest.mark.parametrize("name", ["sliding", "lifting"])
-def test_between_the_two_a_local_minimiser_is_certified(name: str) -> None:
-    make, _, held, _, _ = CASES[name]
-    between = solve(Scene.model_validate(make(2, 1.02 * held)))
+@pytest.mark.parametrize("floor", ["rigid", pytest.param("body", marks=pytest.mark.long)])
+def test_between_the_two_a_local_minimiser_is_certified(name: str, floor: str) -> None:
+    _, _, held, _, _ = CASES[name]
+    between = solve(scene_of(name, 2, 1.02 * held, floor))
     assert (between.exit_code, between.solvability.state) == (0, "metastable")
     assert between.examination is not None
     assert between.examination.certificate.second_order == "local minimiser"
