@@ -22,7 +22,7 @@ from ..runtime.signals import Interrupt
 from ..runtime.timing import Timer
 from ..scene import Scene, read_scene
 from ..stationary_points.bodies import Equilibria
-from ..stationary_points.search import Found, Saved
+from ..stationary_points.found import Found, Saved
 from ..system import petsc_options
 from . import equilibria_files as files
 from . import search_file, telling

@@ -20,7 +20,8 @@ from ..scene import Scene, dump_scene
 from ..solution import Solution
 from ..stationary_points.all_points import StationaryPoint
 from ..stationary_points.bodies import Equilibria
-from ..stationary_points.search import Found, falls_passed
+from ..stationary_points.found import Found
+from ..stationary_points.search import falls_passed
 
 TABLE = "equilibria.csv"
 COLUMNS = ("index", "energy", "kind", "max_slip", "max_opening", "broken", "folder")

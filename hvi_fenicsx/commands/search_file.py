@@ -17,7 +17,7 @@ from ..errors import InputError
 from ..results.folder import inputs_of
 from ..runtime.versions import __version__
 from ..scene import Scene, dump_scene
-from ..stationary_points.search import Saved
+from ..stationary_points.found import Saved
 from . import telling
 from .telling import COMM
 

@@ -14,8 +14,8 @@ from ..errors import InputError
 from ..scene import Scene
 from ..solution import Solution
 from ..stationary_points import bodies
+from ..stationary_points.found import Found
 from ..stationary_points.passes import Pass
-from ..stationary_points.search import Found
 from .model import Model
 from .solution import ModelSolution
 from .solving import check
@@ -63,7 +63,8 @@ def equilibria(
     """All equilibria of a model or a scene, or the lowest with a proof; at level DEBUG progress is logged. Collective.
 
     Args:
-        model: what to search; for all equilibria the tractions of its laws are polylines of one component each.
+        model: what to search; that all equilibria were found can be proven where the tractions of its laws are
+            polylines of one component each.
         comm: the ranks; by default those of the body, for a scene all.
         lowest: the lowest energy with a proof, instead of all equilibria.
         gap: what that proof may leave open, relative to the energy.

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..errors import InputError, SolverError
+from ..errors import SolverError
 from ..preparation import Preparation
 from ..solution import Solution
 from ..solvers import obstacle_force
@@ -16,9 +16,10 @@ from ..system.condensation import Condensation
 from ..workflow import certified, finish
 from .all_points import StationaryPoint
 from .condensed_form import scalar_problem
+from .found import Found, Keep, Saved, Wanted, forget
 from .progress_words import Unit
 from .scalar_problem import ScalarProblem
-from .search import Found, Keep, Saved, Wanted, begun, find, forget
+from .search import begun, find
 
 COARSE_GAP = 1e-3
 """Gap of the first search where laws are curved, from which the error of their polylines is chosen."""
@@ -72,7 +73,7 @@ class Equilibria:
             keep: keeps what is left while the search goes on.
 
         Raises:
-            InputError: an earlier search was for something else, or all are wanted and a law is curved.
+            InputError: an earlier search was for something else.
         """
         if self.problem is None:
             return NONE
@@ -84,7 +85,7 @@ class Equilibria:
             energies=Unit(size=scales.energy, name="J/m" if scales.dimension == 2 else "J"),
         )
         with self._prepared.timer("solve"):
-            if self.problem.error:
+            if self.problem.error and lowest:
                 wanted = self._refined(self.problem, wanted, stop, report)
             return find(self.problem, wanted, stop, report, saved, keep)
 
@@ -92,11 +93,6 @@ class Equilibria:
         self, coarse: ScalarProblem, wanted: Wanted, stop: Callable[[], bool], report: Callable[[str], None]
     ) -> Wanted:
         """Polylines of curved laws as near as the gap needs, and a point of low energy to begin at. Collective."""
-        if not wanted.lowest:
-            raise InputError(
-                "a law's traction is curved: all equilibria are found where tractions are polylines, also with "
-                'smoothing = "quadratic". `--lowest` proves the lowest energy of curved laws too'
-            )
         start = begun(coarse, COARSE_GAP, stop, report)
         if start is None:
             return wanted

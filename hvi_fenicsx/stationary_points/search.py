@@ -1,65 +1,28 @@
-"""The two searches behind one face: what was found, how much of it is proven, and what is needed to go on."""
+"""The searches behind one face: all stationary points, the lowest energy, and what can be found without a proof."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..errors import InputError, SolverError
 from ..typing import Array
+from . import systematic
 from .all_points import Enumeration, StationaryPoint
+from .found import Found, Keep, Saved, Start, Wanted, forget
 from .length_kinds import kind_of
 from .lowest import LowestSearch, Progress, fresh_box
-from .passes import Pass, passes
-from .progress_words import Clock, Unit, all_in_words, lowest_in_words
+from .passes import passes
+from .progress_words import Clock, all_in_words, lowest_in_words
 from .scalar_problem import ScalarProblem
 from .stationarity import Kind
 
+MOST_BOXES = 50
+"""Boxes that are bounded for the gap where what was asked for is not proven."""
 OWN_GAP = 0.85
 """Share of the gap that a search may leave where the laws are curved; the rest is for what their polylines differ."""
-
-Saved = Mapping[str, Array]
-"""What is left of an unfinished search: arrays, by name."""
-Keep = Callable[[Callable[[], Saved]], None]
-"""Is given, after each box, what makes the state to go on from."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Start:
-    """What an earlier search of nearly the same problem knows of its lowest point.
-
-    Attributes:
-        x: a point of low energy, (n,).
-        energy: there.
-        low: of a box that holds all points of lower energy, (n,).
-        high: of that box, (n,).
-    """
-
-    x: Array
-    energy: float
-    low: Array
-    high: Array
-
-
-@dataclass(frozen=True, kw_only=True)
-class Wanted:
-    """What is asked for.
-
-    Attributes:
-        lowest: the lowest energy with a proof; else all equilibria.
-        gap: relative gap that the proof of the lowest may leave.
-        bounded: whether the energy is known to be bounded from below.
-        start: where the lowest is, as far as that is known.
-        energies: the unit of energies in reports.
-    """
-
-    lowest: bool = False
-    gap: float = 1e-8
-    bounded: bool = True
-    start: Start | None = None
-    energies: Unit = field(default_factory=Unit)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,47 +35,6 @@ class _Task:
     report: Callable[[str], None]
     saved: Saved | None
     keep: Keep
-
-
-def forget(state: Callable[[], Saved]) -> None:
-    """Keep nothing.
-
-    Args:
-        state: makes what could be kept.
-    """
-
-
-@dataclass(frozen=True, kw_only=True)
-class Found:
-    """What a search found.
-
-    Attributes:
-        points: by energy.
-        complete: whether these are all stationary points.
-        lower_bound: no point has a lower energy; None where none is known.
-        proven: whether what was asked for is proven.
-        nodes: boxes that were bounded or tested.
-        reason: how it ended, for people.
-        left: what is needed to go on; empty if there is nothing left.
-        passes: the saddles that join two of the minimisers, numbers of the points; none where points may be missing.
-    """
-
-    points: tuple[StationaryPoint, ...]
-    complete: bool
-    lower_bound: float | None
-    proven: bool
-    nodes: int
-    reason: str
-    left: Saved = field(default_factory=dict)
-    passes: tuple[Pass, ...] = ()
-
-    @property
-    def gap(self) -> float | None:
-        """Lowest energy found minus lower bound, relative to that energy; None where there is no bound."""
-        if self.lower_bound is None or not self.points:
-            return None
-        lowest = self.points[0].energy
-        return max(lowest - self.lower_bound, 0.0) / (abs(lowest) or 1.0)
 
 
 def find(
@@ -134,7 +56,7 @@ def find(
         keep: keeps what is left while the search goes on.
 
     Raises:
-        InputError: an earlier search was for something else, or all are wanted and a law acts on a length.
+        InputError: an earlier search was for something else.
     """
     if not problem.size:
         return _only(problem)
@@ -142,13 +64,10 @@ def find(
         raise InputError(
             "--resume: the search there was for something else: give or leave --lowest as then, or --force"
         )
-    if len(problem.lengths) and not wanted.lowest:
-        raise InputError(
-            "a law acts on the length of a slip in space, or on opening and slip together: all equilibria are found "
-            "where each law has one component. `--lowest` proves the lowest energy of such laws too"
-        )
     task = _Task(problem=problem, wanted=wanted, stop=stop, report=report, saved=saved, keep=keep)
-    return _lowest(task) if wanted.lowest else _all(task)
+    if wanted.lowest:
+        return _lowest(task)
+    return _without_proof(task) if len(problem.lengths) or problem.error else _all(task)
 
 
 def _only(problem: ScalarProblem) -> Found:
@@ -252,6 +171,8 @@ def _all(task: _Task) -> Found:
     problem, saved = task.problem, task.saved
     search = Enumeration(problem=problem)
     if saved is None:
+        for x in systematic.candidates(problem, search.points, task.stop):
+            search.enter(x)
         search.start()
     else:
         for x in saved["x"]:
@@ -267,8 +188,12 @@ def _all(task: _Task) -> Found:
         task.keep(lambda: _left_of_all(search))
 
     complete = search.run(task.stop, tell)
+    below = None if complete else _bounded(task, [p.x for p in search.points])
+    if below is not None:
+        search.enter(below.x)
     points = tuple(sorted(search.points, key=lambda p: p.energy))
     bound = points[0].energy if complete and points and task.wanted.bounded else None
+    bound = bound if below is None else below.progress().lower
     return Found(
         points=points,
         complete=complete,
@@ -279,6 +204,34 @@ def _all(task: _Task) -> Found:
         left={} if complete else _left_of_all(search),
         passes=passes(problem, points) if complete else (),
     )
+
+
+def _without_proof(task: _Task) -> Found:
+    """What is found where it cannot be proven that these are all: laws of lengths, or curved ones."""
+    problem = task.problem
+    task.report("a search without a proof that nothing is missed")
+    below = _bounded(task, [])
+    points = tuple(systematic.near_stationary(problem, [] if below is None else [below.x], task.stop))
+    return Found(
+        points=points,
+        complete=False,
+        lower_bound=None if below is None else below.progress().lower - problem.error,
+        proven=False,
+        nodes=0 if below is None else below.boxes,
+        reason=f"{len(points)} found, and there may be more: of laws that "
+        f"{'act on a length' if len(problem.lengths) else 'are curved'} it cannot be proven that these are all",
+    )
+
+
+def _bounded(task: _Task, points: list[Array]) -> LowestSearch | None:
+    """A search for the lowest energy of a few boxes, for its bound; None where there is none."""
+    search = LowestSearch(problem=task.problem, gap=task.wanted.gap)
+    try:
+        search.start(points)
+    except SolverError:
+        return None
+    search.run(lambda: search.boxes > MOST_BOXES or task.stop(), lambda _: None)
+    return search
 
 
 def _in_words(points: tuple[StationaryPoint, ...]) -> str:

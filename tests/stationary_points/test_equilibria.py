@@ -19,7 +19,7 @@ from hvi_fenicsx.cli import main
 from hvi_fenicsx.commands import search_file
 from hvi_fenicsx.commands.search_file import SearchFile
 from hvi_fenicsx.report.pictures.style import BLUE, ORANGE, PALE, VERMILION
-from hvi_fenicsx.stationary_points.search import Saved
+from hvi_fenicsx.stationary_points.found import Saved
 
 GAMMA = 3e6
 STRONG = quadratic_linear(GAMMA)

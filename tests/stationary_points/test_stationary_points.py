@@ -19,11 +19,11 @@ from hvi_fenicsx.laws.traction_graph import TractionGraph
 from hvi_fenicsx.stationary_points.all_points import Enumeration
 from hvi_fenicsx.stationary_points.arcs import FREE, chain, energy, envelope, total
 from hvi_fenicsx.stationary_points.condensed_form import scalar_problem
+from hvi_fenicsx.stationary_points.found import Wanted
 from hvi_fenicsx.stationary_points.lowest import LowestSearch, fresh_box
 from hvi_fenicsx.stationary_points.progress_words import Clock, Unit, lowest_in_words
 from hvi_fenicsx.stationary_points.relaxation import Relaxation
 from hvi_fenicsx.stationary_points.scalar_problem import ScalarProblem
-from hvi_fenicsx.stationary_points.search import Wanted
 from hvi_fenicsx.stationary_points.stationarity import Kind
 from hvi_fenicsx.system.condensation import Condensation
 

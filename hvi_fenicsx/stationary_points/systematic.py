@@ -1,0 +1,148 @@
+"""A systematic search without a proof: loading from several loads, pieces of the laws, and deflation from each.
+
+The starts are the ends of loading in steps from no load, from twice and four times the load, and from the opposite one;
+every unknown on the same piece of its law; and fronts: the pieces beyond for the unknowns that moved most. From each
+start the energy is lowered, and Newton's method looks for further points until it finds none, then from each point
+that is known (:mod:`.deflation`).
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ..typing import Array
+from .all_points import StationaryPoint
+from .deflation import DeflatedNewton
+from .descent import descend
+from .length_kinds import kind_of
+from .scalar_problem import ScalarProblem
+
+PROGRAMMES = ((0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875, 1.0), (2.0, 1.5, 1.0), (4.0, 2.0, 1.0), (-1.0, 0.0, 1.0))
+"""Load factors, one after the other; each programme begins at rest."""
+MULTIPLES = (0.0, 0.5, 2.0, 5.0, 20.0)
+"""Of the state that loading leads to."""
+MOST_SHIFTS = 16
+"""By how many different numbers of pieces unknowns are moved."""
+FRONTS = 8
+"""How many fronts are tried on each piece of the laws."""
+REACHES = (0.1, 1.0, 10.0)
+"""How far known points push away in deflation."""
+MOST_POINTS = 100
+"""Points from which further ones are looked for, one after the other."""
+FAILURES = 3
+"""Attempts without a new point after which a start is given up."""
+SAME = 1e-4
+"""Where points are not exact, those nearer than this share of the displacements are one."""
+
+
+def candidates(problem: ScalarProblem, known: Sequence[StationaryPoint], stop: Callable[[], bool]) -> Iterator[Array]:
+    """Points that may be stationary, one after the other.
+
+    Args:
+        problem: the problem.
+        known: the points found, to which the caller adds those that are.
+        stop: asked before each attempt.
+    """
+    exact = not len(problem.lengths) and not problem.error
+    newton = DeflatedNewton(problem) if exact else None
+    for start in _starts(problem):
+        if stop():
+            return
+        yield _descended(problem, start)
+        if newton is not None:
+            yield from _deflated(newton, start, known, stop)
+    tried = 0
+    while newton is not None and tried < len(known) < MOST_POINTS:
+        yield from _deflated(newton, known[tried].x, known, stop)
+        tried += 1
+
+
+def _deflated(
+    newton: DeflatedNewton, start: Array, known: Sequence[StationaryPoint], stop: Callable[[], bool]
+) -> Iterator[Array]:
+    """Points from near one start, for each reach until several attempts find no new one."""
+    for reach in REACHES:
+        failures = attempt = 0
+        while failures < FAILURES and not stop():
+            before, attempt = len(known), attempt + 1
+            found = newton.root(start, [p.x for p in known], reach, attempt)
+            if found is not None:
+                yield found
+            failures += len(known) == before
+
+
+def near_stationary(problem: ScalarProblem, known: Sequence[Array], stop: Callable[[], bool]) -> list[StationaryPoint]:
+    """Points, by energy, where laws act on lengths or are curved; a solver is to make them exact.
+
+    Args:
+        problem: the problem.
+        known: points of low energy, each (n,).
+        stop: asked before each attempt.
+    """
+    points = list[StationaryPoint]()
+    for x in itertools.chain(known, candidates(problem, points, stop)):
+        near = SAME * (1.0 + float(np.max(np.abs(x), initial=0.0)))
+        if any(np.max(np.abs(p.x - x)) < near for p in points) or _far(problem, x):
+            continue
+        energy = problem.energy(x) + problem.error
+        points.append(StationaryPoint(x=x, energy=energy, kind=kind_of(problem, x), isolated=True))
+    return sorted(points, key=lambda p: p.energy)
+
+
+def _starts(problem: ScalarProblem) -> Iterator[Array]:
+    loaded = [_loaded(problem, programme) for programme in PROGRAMMES]
+    yield from loaded
+    yield from (factor * loaded[0] for factor in MULTIPLES)
+    yield from _on_pieces(problem, loaded[0])
+
+
+def _loaded(problem: ScalarProblem, programme: Sequence[float]) -> Array:
+    """The state that a programme of loads leads to from rest."""
+    x = np.clip(np.zeros(problem.size), problem.lower, problem.upper)
+    for factor in programme:
+        x = _descended(replace(problem, force=factor * problem.force), x)
+    return x
+
+
+def _on_pieces(problem: ScalarProblem, loaded: Array) -> Iterator[Array]:
+    """The balance of forces with laws of one component on one piece each, those that moved most beyond."""
+    n, arcs = problem.size, problem.arcs
+    here, last = arcs.at(problem.arguments(loaded))[:n], np.array([len(c) - 1 for c in problem.chains[:n]])
+    order = np.argsort(-np.abs(loaded) * (last > 0), kind="stable")
+    moved = int(np.count_nonzero(last))
+    most = int(last.max(initial=0))
+    for beyond in sorted({round(shift) for shift in np.linspace(-most, most, min(2 * most, MOST_SHIFTS) + 1)} - {0}):
+        for count in sorted({round(moved * share) for share in np.linspace(0.0, 1.0, FRONTS + 1)} - {0}):
+            pieces = here.copy()
+            pieces[order[:count]] += beyond
+            start = _balanced(problem, np.clip(pieces, 0, last))
+            if start is not None:
+                yield start
+
+
+def _balanced(problem: ScalarProblem, pieces: Array) -> Array | None:
+    """Where forces are in balance if each law was the parabola of one piece; None where nothing holds the body."""
+    rows, arcs = np.arange(problem.size), problem.arcs
+    slopes = np.maximum(arcs.slopes[rows, pieces], 0.0)
+    offset = arcs.tractions[rows, pieces] - slopes * arcs.anchors[rows, pieces]
+    try:
+        x = np.linalg.solve(problem.stiffness + np.diag(slopes), problem.force - offset)
+    except np.linalg.LinAlgError:
+        return None
+    return np.clip(x, np.maximum(problem.lower, -problem.far), np.minimum(problem.upper, problem.far))
+
+
+def _descended(problem: ScalarProblem, x: Array) -> Array:
+    far = problem.far
+    low, high = problem.with_lengths(np.maximum(problem.lower, -far), np.minimum(problem.upper, far))
+    n = problem.size
+    return descend(problem, low, high, np.clip(x, low[:n], high[:n]))[0]
+
+
+def _far(problem: ScalarProblem, x: Array) -> bool:
+    """Whether a descent ended at the end of what is searched: a body comes off."""
+    return bool(np.max(np.abs(x), initial=0.0) >= problem.far)

@@ -1,0 +1,66 @@
+"""The search without a proof: it finds what brute force finds on small floors, and says what it leaves open."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+from test_stationary_points import FAST, Case, found, oracle, problem_of
+
+from hvi_fenicsx.stationary_points import stationarity
+from hvi_fenicsx.stationary_points.all_points import Enumeration
+from hvi_fenicsx.stationary_points.deflation import DeflatedNewton, Graphs
+from hvi_fenicsx.stationary_points.found import Wanted
+from hvi_fenicsx.stationary_points.search import find
+from hvi_fenicsx.stationary_points.systematic import candidates
+
+
+def never() -> bool:
+    return False
+
+
+@pytest.mark.parametrize("case", FAST, ids=str)
+def test_it_finds_all_points_of_small_floors(case: Case) -> None:
+    """Their number and energies are those of the independent enumeration."""
+    problem, unit = problem_of(case)
+    search = Enumeration(problem=problem)
+    for x in candidates(problem, search.points, never):
+        search.enter(x)
+    wanted = oracle(case).stationary()
+    energies = sorted(p.energy * unit for p in search.points)
+    np.testing.assert_allclose(energies, [p.energy for p in wanted], rtol=1e-9)
+
+
+@pytest.mark.parametrize("case", FAST, ids=str)
+def test_points_are_on_the_graphs_and_roots_of_the_equations_there(case: Case) -> None:
+    problem, _ = problem_of(case)
+    graphs, stiffness = Graphs.of(problem), np.diag(problem.stiffness)
+    for point in found(problem).points:
+        force = problem.force - problem.stiffness @ point.x
+        x, t, dx, dt = graphs.at(graphs.nearest(point.x, force, stiffness))
+        np.testing.assert_allclose(x, point.x, atol=1e-12 * np.max(np.abs(point.x)))
+        np.testing.assert_allclose(t, force, atol=1e-9 * np.max(np.abs(problem.force)))
+        np.testing.assert_allclose(stiffness * np.abs(dx) + np.abs(dt), 1.0, rtol=1e-12)
+
+
+def test_newton_keeps_away_from_what_is_known() -> None:
+    problem, _ = problem_of(FAST[0])
+    newton, points = DeflatedNewton(problem), found(problem).points
+    for point in points:
+        others = [p.x for p in points if p is not point]
+        roots = [newton.root(x, others, 0.1, k) for x, k in itertools.product(others, range(20))]
+        reached = [x for x in roots if x is not None]
+        assert all(stationarity.imbalance(problem, x) < 1e-9 for x in reached)
+        assert any(np.max(np.abs(x - point.x)) < 1e-9 for x in reached)
+
+
+def test_a_search_that_is_stopped_has_what_was_found_without_proof_and_a_gap() -> None:
+    problem, unit = problem_of(FAST[0])
+    least = oracle(FAST[0]).stationary()[0].energy / unit
+    one = find(problem, Wanted(), lambda: True, lambda _: None)
+    assert (one.proven, one.complete) == (False, False)
+    assert one.left
+    assert one.lower_bound is not None
+    assert one.lower_bound <= least * (1.0 - 1e-12 * np.sign(least))
+    assert one.gap == pytest.approx((one.points[0].energy - one.lower_bound) / abs(one.points[0].energy))
