@@ -1,6 +1,7 @@
 """The hard-case matrix: run it, and write its table and picture.
 
-    python3 benchmarks/hard_cases.py run [--method auto ...] [--only KEY ...] [--cells N] [--limit SECONDS] [--out FILE]
+    python3 benchmarks/hard_cases.py run [--method auto ...] [--only KEY ...] [--cells N] [--limit SECONDS]
+        [--sample NUMBER SEED] [--out FILE]
     python3 benchmarks/hard_cases.py report [--out results/hard_cases.jsonl]
     python3 benchmarks/hard_cases.py list
 
@@ -14,6 +15,7 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import random
 import signal
 import subprocess
 import sys
@@ -39,7 +41,7 @@ def main() -> int:
     options = _options(table)
     listed = [c for c in cases(table) if not options.only or c.key in options.only]
     if options.command == "run":
-        listed = [c for c in listed if c["cells"] <= options.cells]
+        listed = _sampled([c for c in listed if c["cells"] <= options.cells], options.sample)
     if options.command == "list":
         print("\n".join(f"{c.number:3} {c.key} {c.values}" for c in listed))
     elif options.command == "report":
@@ -54,12 +56,22 @@ def main() -> int:
     return 0
 
 
+def _sampled(listed: list[Case], sample: list[int] | None) -> list[Case]:
+    """So many cases in the random order of a seed: a larger sample has those of a smaller one, too."""
+    if sample is None:
+        return listed
+    number, seed = sample
+    return random.Random(seed).sample(listed, len(listed))[:number]
+
+
 def _options(table: Table) -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("command", choices=["run", "report", "list"])
     parser.add_argument("--method", nargs="+", help="methods, by default all there are")
     parser.add_argument("--only", nargs="+", metavar="KEY", help="cases, by default all there are")
     parser.add_argument("--cells", type=int, default=max(table.axes["cells"]), help="run no larger cases")
+    sample = "so many of them, drawn with a seed"
+    parser.add_argument("--sample", type=int, nargs=2, metavar=("NUMBER", "SEED"), help=sample)
     limit = "processor time for one case and one method, by default the table's"
     parser.add_argument("--limit", type=float, metavar="SECONDS", default=table.data["limit"], help=limit)
     parser.add_argument("--out", type=Path, default=RESULTS, help="file of results (results/hard_cases.jsonl)")
