@@ -29,7 +29,7 @@ from mpi4py import MPI
 
 from .. import compat
 from ..errors import HviError, InputError
-from . import log
+from . import log, processes
 from .mpi import agree, on_root
 
 _LOG = log.logger("runtime")
@@ -173,7 +173,9 @@ class FormCache:
             time.sleep(self._thresholds.pause)
 
     def _in_temporary_folder(self, entry: _Entry, reason: HviError) -> fem.Form:
-        """Compile where the cache did not allow it. Collective."""
+        """Compile where the cache did not allow it, and no signal that ended the compiler. Collective."""
+        if any(agree(entry.comm, processes.stop_asked())):
+            raise KeyboardInterrupt
         temporary = _Entry(entry.form, entry.comm, on_root(entry.comm, self._temporary_folder), entry.name)
         if temporary.cache == entry.cache:
             raise reason

@@ -36,6 +36,8 @@ _USER_SETTINGS = (
     "PRTE_MCA_rmaps_default_mapping_policy",
 )
 """Variables by which users (and `./hvi`) set up every mpirun; the others with these beginnings belong to one run."""
+_CAUGHT: list[int] = []
+"""The signals that were caught since the command began."""
 
 
 def environment() -> dict[str, str]:
@@ -60,9 +62,19 @@ def catch(numbers: Iterable[signal.Signals], handler: Callable[[int, FrameType |
         numbers: of the signals.
         handler: called for each.
     """
+
+    def caught(number: int, frame: FrameType | None) -> None:
+        _CAUGHT.append(number)
+        handler(number, frame)
+
     for number in numbers:
         if number != signal.SIGHUP or signal.getsignal(number) is not signal.SIG_IGN:
-            signal.signal(number, handler)
+            signal.signal(number, caught)
+
+
+def stop_asked() -> bool:
+    """Whether a signal has been caught since the command began: what fails then has failed by it, as children do."""
+    return bool(_CAUGHT)
 
 
 def raise_on_stop() -> Callable[[], bool]:
@@ -71,6 +83,7 @@ def raise_on_stop() -> Callable[[], bool]:
     Returns:
         Whether one has raised it: a library that it passes through may make another error of it.
     """
+    _CAUGHT.clear()
     raised: list[int] = []
 
     def stop(number: int, frame: FrameType | None) -> None:

@@ -8,6 +8,7 @@ import logging
 import os
 import signal
 import subprocess
+import tempfile
 import threading
 import time
 from pathlib import Path
@@ -21,7 +22,7 @@ from runs import ROOT, command, process, summary, write_scene
 from scenes import model, quadratic_linear
 
 from hvi_fenicsx.errors import HviError
-from hvi_fenicsx.runtime import forms
+from hvi_fenicsx.runtime import forms, processes
 from hvi_fenicsx.runtime.forms import FormCache, Thresholds
 
 
@@ -102,6 +103,27 @@ def test_a_cache_that_cannot_be_written_is_replaced_with_a_warning(
     assert [r.getMessage().partition(" (")[0] for r in caplog.records] == [
         f"compiled forms cannot be kept in {tmp_path / 'file' / 'cache'}"
     ]
+
+
+def test_a_compiler_that_a_signal_ended_is_not_started_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A run that is ended with it has no time to remove a temporary folder."""
+
+    def ended(*_: Any, **__: Any) -> None:
+        os.kill(os.getpid(), signal.SIGUSR1)
+        raise OSError("the compiler was ended")
+
+    monkeypatch.setattr(fem, "form", ended)
+    monkeypatch.setattr(processes, "_CAUGHT", [])
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "t"))
+    (tmp_path / "t").mkdir()
+    before = signal.getsignal(signal.SIGUSR1)
+    processes.catch([signal.SIGUSR1], lambda *_: None)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            FormCache(tmp_path / "cache").compiled(area())
+    finally:
+        signal.signal(signal.SIGUSR1, before)
+    assert list((tmp_path / "t").iterdir()) == []
 
 
 def test_a_form_that_cannot_be_compiled_is_one_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
