@@ -47,7 +47,7 @@ def _numbers(result: EquilibriaResult) -> Iterator[tuple[str, str]]:
     known = result.known
     yield "equilibria found", f"{known['count']}, {'all there are' if known['complete'] else 'there may be others'}"
     if known["lowest_energy"] is not None:
-        yield "lowest energy", f"{known['lowest_energy']:.10g} {result.unit}"
+        yield "lowest energy found", f"{known['lowest_energy']:.10g} {result.unit}"
     if known["lower_bound"] is not None:
         yield "no displacement has an energy below", f"{known['lower_bound']:.10g} {result.unit}"
     if known["gap"] is not None:

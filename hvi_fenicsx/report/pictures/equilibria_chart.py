@@ -24,8 +24,8 @@ from .style import BLUE, GREEN, GREY, HEADING, INK, ORANGE, PALE, PURPLE, VERMIL
 MOST = 16
 """Equilibria in the picture, those of lowest energy."""
 CAPTION = (
-    "The equilibria that were found, the lowest at the top. Left: the energy above the lowest; a saddle is joined to "
-    "the two minimisers below it. Right: the state of each along the contact parts, vertex by vertex."
+    "The equilibria that were found, the lowest at the top. Left: the energy above the lowest found; a saddle is "
+    "joined to the two minimisers below it. Right: the state of each along the contact parts, vertex by vertex."
 )
 ROW = 0.62
 """Height of a row, inches."""
@@ -56,7 +56,7 @@ def _subject(result: EquilibriaResult, shown: int) -> tuple[str, str]:
     below += f", the {shown} lowest shown" if shown < count else ""
     if known["complete"]:
         return below, "all, proven"
-    return below, "the lowest, proven" if known["proven"] else "the search is open"
+    return below, "the lowest, proven" if known["proven"] else "there may be others"
 
 
 def _energies(axes: Axes, result: EquilibriaResult, rows: Sequence[Row]) -> None:
@@ -75,7 +75,7 @@ def _energies(axes: Axes, result: EquilibriaResult, rows: Sequence[Row]) -> None
     axes.set_yticks(range(len(rows)), [row["index"] for row in rows])
     axes.xaxis.set_major_locator(MaxNLocator(2))
     axes.tick_params(axis="y", length=0)
-    axes.set_xlabel(f"energy above the lowest\n{result.energies[0]:.6g} ({result.unit})")
+    axes.set_xlabel(f"energy above the lowest\nfound, {result.energies[0]:.6g} ({result.unit})")
 
 
 def _strips(axes: Axes, rows: Sequence[Row], states: Sequence[Sequence[Row]]) -> None:
