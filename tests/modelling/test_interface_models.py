@@ -89,3 +89,60 @@ def test_glued_sides_are_one_body() -> None:
 def test_what_does_not_fit_is_refused(first: str, second: str, effects: list[hvi.Contact], words: str) -> None:
     with pytest.raises(hvi.InputError, match=words):
         hvi.check(hvi.Model(two_block_body().interface("seam", first, second), [*LOADS, *effects]))
+
+
+def halves() -> tuple[hvi.Body, hvi.Body]:
+    """A block above the plane y = 0, and with it its mirror image: meshes, sides and numbers of vertices alike."""
+    half = mesh.create_rectangle(MPI.COMM_SELF, ((0.0, 0.0), (1.0, 0.4)), (9, 4))
+    points, cells = half.geometry.x[:, :2], compat.geometry_dofmap(half).astype(np.int64)
+    every = np.vstack([cells, cells + len(points)]), np.vstack([points, points * [1.0, -1.0]])
+    both = compat.simplex_mesh(MPI.COMM_SELF, *every, "triangle")
+    return tagged_halves(half), tagged_halves(both).interface("seam", "foot", "seat")
+
+
+def tagged_halves(whole: mesh.Mesh) -> hvi.Body:
+    """Sides top and foot of the half above; of its mirror image top_ and seat."""
+    whole.topology.create_connectivity(1, 2)
+    outer, of_facet = mesh.exterior_facet_indices(whole.topology), whole.topology.connectivity(1, 2)
+    y = mesh.compute_midpoints(whole, 1, outer)[:, 1]
+    above = mesh.compute_midpoints(whole, 2, of_facet.array[of_facet.offsets[outer]])[:, 1] > 0.0
+    top, flat = np.isclose(np.abs(y), 0.4), np.isclose(y, 0.0)
+    places = {"top": top & above, "foot": flat & above, "top_": top & ~above, "seat": flat & ~above}
+    names = {name: tag for tag, (name, here) in enumerate(places.items(), start=1) if here.any()}
+    values = sum(tag * places[name].astype(np.int32) for name, tag in names.items())
+    facets = mesh.meshtags(whole, 1, outer[values > 0], values[values > 0].astype(np.int32))
+    return hvi.Body(whole, facets=facets, names=names)
+
+
+BOND = [(0.0, 0.0), (1e-6, 1e6), (6e-6, 0.0)]
+
+
+def twice(points: list[tuple[float, float]]) -> list[tuple[float, float]]:
+    """A graph of twice the displacement."""
+    return [(2 * x, y) for x, y in points]
+
+
+@pytest.mark.parametrize("mode", ["opening", "slip"])
+def test_two_equal_bodies_are_one_by_symmetry(mode: str) -> None:
+    """Opening, and contact: the law is stated in half of it. Slip: what is normal to the plane of symmetry is free."""
+    half, both = halves()
+    steel = hvi.Isotropic(youngs_modulus=E, poisson_ratio=NU)
+    if mode == "opening":
+        moved, mirrored = [0.0, "8e-6*(x - 0.4)"], [0.0, "-8e-6*(x - 0.4)"]
+        own = [hvi.Contact("foot"), hvi.Adhesion("foot", hvi.laws.Graph(points=BOND, one_sided=True))]
+        seam = [hvi.Contact("seam"), hvi.Adhesion("seam", hvi.laws.Graph(points=twice(BOND), one_sided=True))]
+    else:
+        moved, mirrored = ["5e-6*(0.3 + x)", 0.0], ["-5e-6*(0.3 + x)", 0.0]
+        own = [hvi.Friction("foot", hvi.laws.Graph(points=BOND))]
+        seam = [hvi.Friction("seam", hvi.laws.Graph(points=twice(BOND)))]
+    shift = [hvi.Displacement("top", moved), hvi.Displacement("top_", mirrored)]
+    one = hvi.solve(hvi.Model(half, [steel, shift[0], *own]), tolerance=1e-10)
+    two = hvi.solve(hvi.Model(both, [steel, *shift, *seam]), tolerance=1e-10)
+    assert one.converged
+    assert two.converged
+    assert two.energy == pytest.approx(2 * one.energy, rel=1e-9)
+    mine, theirs = one.contact["foot"], two.contact["seam"]
+    assert theirs.pressure == pytest.approx(mine.pressure, rel=1e-7, abs=1.0)
+    if mode == "slip":
+        assert theirs.friction == pytest.approx(mine.friction, rel=1e-7, abs=1.0)
+    assert {0, 1} <= set(np.ravel(theirs.branch))

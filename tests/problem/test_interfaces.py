@@ -8,7 +8,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pytest
-from joint_scenes import away_from_affine, seam, seam_scene
+from dolfinx import fem
+from joint_scenes import away_from_affine, differences_by_side, seam, seam_scene
+from petsc4py import PETSc
 from scenes import NESTED, Table, quadratic_linear
 
 from hvi_fenicsx import InputError, Scene, prepare, solve
@@ -81,6 +83,24 @@ def test_affine_fields_do_not_open_a_flat_seam(upper: tuple[float, float], degre
     for field in (np.ones_like(x), x @ np.array([[0.0, 1.0], [-1.0, 0.0]]), x @ np.array([[1.3, -0.2], [0.7, 2.1]])):
         opened = problem.relative(np.ascontiguousarray(field).ravel())
         assert np.abs(problem.surfaces[0].values(opened)).max() < 1e-13
+
+
+@BOTH
+@pytest.mark.parametrize(("between", "bodies"), [(CONTACT, 2), ({"tied": True}, 1)])
+def test_rigid_motions_are_in_the_kernel(between: Table, bodies: int, degree: int) -> None:
+    """Of each body by itself where contact is open, of both together where they are glued."""
+    system = prepare(stacked(pulled(25.0, np.diag([0.0, -1e6])), between, 25.0, degree=degree)).system
+    problem, matrix = system.problem, system.jacobian.matrix
+    x, u = problem.points[:, :2], fem.Function(problem.space)
+    members = problem.bodies.members if bodies == 2 else 0 * problem.bodies.members
+    for body in range(bodies):
+        for field in (0 * x + [1.0, 0.0], 0 * x + [0.0, 1.0], x @ np.array([[0.0, 1.0], [-1.0, 0.0]])):
+            u.x.array[:] = np.where(members[:, None] == body, field, 0.0).ravel()
+            motion = system.unknowns(u)
+            forces = motion.duplicate()
+            matrix.mult(motion, forces)
+            size = forces.norm() / (matrix.norm(PETSc.NormType.INFINITY) * motion.norm())
+            assert size < 1e-15
 
 
 @pytest.mark.parametrize("upper", [(0.0, 1.0), (0.23, 0.5), (-0.31, 1.7), (0.4, 1.1)])
@@ -357,3 +377,20 @@ def test_sides_exchanged_change_less_than_a_finer_mesh_does() -> None:
             energies.append(found.examination.energy)
     values = np.array(energies).reshape(3, 2)
     assert np.all(np.abs(values[:2, 0] - values[:2, 1]) < np.abs(np.diff(values[:, 0])))
+
+
+def covering() -> Scene:
+    """Blocks that cover each other, pressed askew and pushed."""
+    boundary = {
+        "base": {"on": "lower.bottom", "displacement": [0.0, 0.0]},
+        "press": {"on": "upper.top", "traction": [0.0, "-1e6*(2.4 - 2.6*x)"]},
+        "push": {"on": "upper.left", "traction": [4e5, 0.0]},
+    }
+    return stacked(boundary, {**CONTACT, "friction": quadratic_linear(1e6, 1e-6)})
+
+
+def test_exchanging_the_sides_changes_less_with_each_mesh() -> None:
+    """Energies, so at least the second order in the mesh width."""
+    differences = differences_by_side(covering().model_dump(), (2, 4, 8))
+    assert np.all(differences[:-1] / differences[1:] > 4.0)
+    assert differences[-1] < 1e-5

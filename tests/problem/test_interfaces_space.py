@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pytest
-from joint_scenes import away_from_affine, seam, seam_scene
+from joint_scenes import away_from_affine, differences_by_side, seam, seam_scene
 from mpi4py import MPI
 from scenes import Table, quadratic_linear
 from scipy.spatial import Delaunay
@@ -224,3 +224,39 @@ def test_what_lies_behind_a_nearer_facet_is_not_met() -> None:
     found = facet_polygons.in_space(first, both)
     assert found.second.min() >= len(far.nodes)
     assert found.areas.sum() == pytest.approx(1.0, rel=1e-12)
+
+
+@pytest.mark.long
+def test_exchanging_the_sides_changes_less_with_finer_meshes() -> None:
+    """Energies, so at least the second order over two refinements."""
+    boundary = {
+        "base": {"on": "lower.bottom", "displacement": [0.0, 0.0, 0.0]},
+        "press": {"on": "upper.top", "traction": [0.0, 0.0, "-1e6*(2.4 - 2.6*x)"]},
+        "push": {"on": "upper.left", "traction": [4e5, 0.0, 0.0]},
+    }
+    scene = stacked(boundary, {**CONTACT, "friction": quadratic_linear(1e6, 1e-6)})
+    differences = differences_by_side(scene.model_dump(exclude_none=True), (1, 4))
+    assert differences[0] / differences[1] > 16.0
+
+
+@pytest.mark.long
+def test_three_blocks_in_a_row_pass_a_pressure_on() -> None:
+    """The middle one is in two interfaces; no two meshes match."""
+    box = {"shape": "box", "size": [1.0, 1.0, 0.3]}
+    cells = {"low": [4, 3, 2], "mid": [3, 4, 2], "top": [2, 3, 1]}
+    boundary = {
+        "base": {"on": "low.bottom", "displacement": ["free", "free", 0.0]},
+        "press": {"on": "top.top", "traction": [0.0, 0.0, -1e6]},
+    }
+    interface = {
+        "a": {"between": ["mid.bottom", "low.top"], **CONTACT},
+        "b": {"between": ["mid.top", "top.bottom"], **CONTACT},
+    }
+    domain = {n: {**box, "cells": c, "origin": [0.0, 0.0, 0.3 * i]} for i, (n, c) in enumerate(cells.items())}
+    table = {"domain": domain, "material": MATERIAL, "boundary": boundary, "interface": interface}
+    found = solve(Scene.model_validate(table))
+    assert found.exit_code == 0
+    assert found.examination is not None
+    assert len(found.examination.states) == 2
+    for state in found.examination.states:
+        assert state.pressure * found.problem.scales.stress == pytest.approx(-1e6, rel=1e-8)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from scenes import Table
+from scenes import Array, Table
 
-from hvi_fenicsx import Scene, Solution
+from hvi_fenicsx import Scene, Solution, solve
 
 
 def seam_scene(low: Table, high: Table, material: Table, boundary: Table, between: Table, **solver: Any) -> Scene:
@@ -41,3 +42,19 @@ def away_from_affine(found: Solution) -> float:
         fitted = np.linalg.lstsq(x[mine], u[mine], rcond=None)[0]
         worst = max(worst, float(np.abs(x[mine] @ fitted - u[mine]).max()))
     return worst / float(np.abs(u).max())
+
+
+def differences_by_side(table: Table, finer: Sequence[int]) -> Array:
+    """By how much the energy changes, relatively, when the sides of the seam are exchanged; on each of some meshes."""
+    found = []
+    for times in finer:
+        bodies = {n: {**b, "cells": [times * c for c in b["cells"]]} for n, b in table["domain"].items()}
+        between = table["interface"]["seam"]["between"]
+        energies = []
+        for sides in (between, between[::-1]):
+            interface = {"seam": {**table["interface"]["seam"], "between": sides}}
+            solution = solve(Scene.model_validate({**table, "domain": bodies, "interface": interface}))
+            assert solution.examination is not None
+            energies.append(solution.examination.energy)
+        found.append(abs(energies[0] / energies[1] - 1.0))
+    return np.array(found)
