@@ -70,7 +70,12 @@ def _add_scene_options(command: argparse.ArgumentParser) -> None:
 def _add_solve_options(command: argparse.ArgumentParser, result: str, *, resume: str) -> None:
     """What all commands have that solve a scene into a folder."""
     _add_folder_options(command, result, resume=resume)
-    command.add_argument("--petsc", default="", metavar="OPTIONS", help='PETSc options, like "-hvi_ksp_monitor"')
+    command.add_argument(
+        "--petsc",
+        default="",
+        metavar="OPTIONS",
+        help='PETSc options, like "-hvi_ksp_monitor"; those of the solvers begin with -hvi_',
+    )
     command.add_argument("--no-pictures", action="store_true", help="write no pictures")
 
 

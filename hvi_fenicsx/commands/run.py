@@ -93,7 +93,8 @@ def _run(request: RunRequest) -> int:
             record = write_whole(folder, solution, request.timer, given, telling.LOG.info, request.wanted)
         on_root(COMM, lambda: telling.finish(run_logs))
         folder.commit(request.scene)
-        telling.say([*(f"warning: {text}" for text in folder.kept), on_root(COMM, lambda: _where(request))])
+        kept = [*folder.kept, *petsc_options.unread(str(request.given["petsc"]))]
+        telling.say([*(f"warning: {text}" for text in kept), on_root(COMM, lambda: _where(request))])
     return int(record["exit_code"])
 
 

@@ -165,3 +165,17 @@ def insert(text: str) -> None:
     PETSc.Options().insertString(text)
     if any(word.startswith("-log_view") for word in words):
         PETSc.Log.begin()  # PETSc itself asks for this option when it starts
+
+
+def unread(text: str) -> Iterator[str]:
+    """Warnings of options in a user's string that no solver has asked for, in sentences.
+
+    Args:
+        text: as given to :func:`insert`.
+    """
+    for word in text.split():
+        if _OPTION.match(word) and not word.startswith("-log_view") and not _is_read(word[1:]):
+            yield (
+                f"--petsc: nothing has read {word}; options of this program's solvers begin with -{prefix()}, like "
+                f"-{prefix()}ksp_type, and each is read only where such a solver is in use (docs/cluster.md)"
+            )

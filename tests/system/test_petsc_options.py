@@ -61,6 +61,19 @@ def test_a_word_without_dash_is_refused(text: str) -> None:
         petsc_options.insert(text)
 
 
+def test_options_that_nothing_has_read_are_told_with_the_prefix() -> None:
+    petsc_options.insert("-ksp_type cg -hvi_ksp_max_it 7")
+    try:
+        petsc_options.configure(PETSc.KSP().create(MPI.COMM_SELF), {})
+        told = list(petsc_options.unread("-ksp_type cg -hvi_ksp_max_it 7"))
+        assert len(told) == 1
+        assert "-ksp_type" in told[0]
+        assert "-hvi_" in told[0]
+    finally:
+        for name in ("ksp_type", "hvi_ksp_max_it"):
+            PETSc.Options().delValue(name)
+
+
 def test_petscs_own_times_are_printed_where_they_are_asked_for() -> None:
     """PETSc asks for this option when it starts, and fails at its end where it comes later."""
     script = "from hvi_fenicsx.system import petsc_options; petsc_options.insert('-log_view')"
