@@ -147,9 +147,10 @@ def judged(prepared: Preparation, found: SolveResult, levels: Levels = ()) -> tu
         levels: the coarser levels of the system.
     """
     options = prepared.options
+    inertia = options.decides_stability(prepared.system)
 
     def examined(u: fem.Function) -> Examination:
-        return certificate.examine(prepared.problem, u, options.tolerance, inertia=options.second_order)
+        return certificate.examine(prepared.problem, u, options.tolerance, inertia=inertia)
 
     examination = examined(found.u)
     if not (found.converged and correction.may_help(examination.certificate)):

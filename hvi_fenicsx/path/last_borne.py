@@ -87,7 +87,8 @@ def _shown(prepared: Preparation, problem: Problem, borne: Borne, failed: Soluti
     assert failed.solve_result is not None
     options, u = prepared.options, borne.u
     frozen_mixity.freeze(problem, u)
-    found = certificate.examine(problem, u, options.tolerance, inertia=options.second_order)
+    inertia = options.decides_stability(prepared.system)
+    found = certificate.examine(problem, u, options.tolerance, inertia=inertia)
     return replace(
         failed,
         problem=problem,

@@ -61,8 +61,9 @@ class SolverTable(Table):
     """the iteration ends when the relative residual of the inequality is below it"""
     linear_solver: Literal["auto", "lu", "gamg"] = "auto"
     """the linear solver; auto chooses by the number of unknowns; PETSc options override it"""
-    second_order: bool = False
-    """true: if a softening law leaves open whether the solution is a local minimiser, factorise the Hessian"""
+    second_order: bool | None = None
+    """if a softening law leaves open whether the solution is a local minimiser, factorise the Hessian; by default up to
+    50,000 unknowns in the plane and 5,000 in space, where that takes less than 5 % of a run"""
     max_iterations: Count = 100
     """the largest number of Newton iterations"""
 

@@ -28,7 +28,8 @@ class SolverOptions:
         start: the pieces of the laws on which the branch iteration begins.
         tolerance: relative residual of the inequality.
         linear_solver: what the user wants; auto chooses by size.
-        second_order: whether to factorise the Hessian where a falling law leaves open if u is a local minimum.
+        second_order: whether to factorise the Hessian where a falling law leaves open if u is a local minimum; None:
+            where that takes little of a run.
         max_iterations: Newton iterations of one solve at most.
         thresholds: the numbers that tune the methods.
     """
@@ -39,7 +40,7 @@ class SolverOptions:
     start: Start = "unbroken"
     tolerance: float = 1e-8
     linear_solver: Literal["auto", "lu", "gamg"] = "auto"
-    second_order: bool = False
+    second_order: bool | None = None
     max_iterations: int = 100
     thresholds: Thresholds = DEFAULT
 
@@ -49,3 +50,14 @@ class SolverOptions:
             return self.epsilon
         scales = system.problem.scales
         return self.epsilon_absolute / (system.terms[0].exact.energy_scale * scales.stress * scales.displacement)
+
+    def decides_stability(self, system: System) -> bool:
+        """Whether the Hessian is factorised where a falling law leaves open if u is a local minimum.
+
+        Args:
+            system: that was solved.
+        """
+        if self.second_order is not None:
+            return self.second_order
+        plane = system.problem.scales.dimension == 2
+        return system.dofs <= (self.thresholds.inertia_plane if plane else self.thresholds.inertia_space)

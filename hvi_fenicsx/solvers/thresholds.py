@@ -159,6 +159,8 @@ class Thresholds:
         branch: of the branch iteration.
         path: of the start from the load path.
         nested_from: unknowns from which a coarser level pays.
+        inertia_plane: unknowns in the plane up to which a factorisation of the Hessian takes little of a run.
+        inertia_space: the same in space.
         coarse_tolerance: tolerance of the solution on a coarser level.
         start_tolerance: relative tolerance of a start's linear solve: enough for its active set; an exact solution
             of the laws at rest would be no better start.
@@ -183,6 +185,8 @@ class Thresholds:
     branch: BranchThresholds = field(default_factory=BranchThresholds)
     path: PathThresholds = field(default_factory=PathThresholds)
     nested_from: int = 5_000
+    inertia_plane: int = 50_000
+    inertia_space: int = 5_000
     coarse_tolerance: float = 1e-4
     start_tolerance: float = 1e-2
     linear_margin: float = 0.5

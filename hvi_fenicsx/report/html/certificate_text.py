@@ -23,7 +23,7 @@ _UNEXCUSED = "net_force"
 _SECOND_ORDER = {
     "local minimiser": "The solution is a local minimiser of the energy: a stable equilibrium.",
     "not a minimiser": "The solution is an equilibrium, but not a minimiser of the energy: it is unstable.",
-    "undecided": "Whether the equilibrium is stable was left undecided; second_order = true in [solver] asks for it.",
+    "undecided": "Whether the equilibrium is stable was left open; second_order = true in [solver] asks for it.",
 }
 _OTHERS = {
     "unique": "It is the only equilibrium.",
