@@ -128,11 +128,11 @@ def test_two_equal_bodies_are_one_by_symmetry(mode: str) -> None:
     half, both = halves()
     steel = hvi.Isotropic(youngs_modulus=E, poisson_ratio=NU)
     if mode == "opening":
-        moved, mirrored = [0.0, "8e-6*(x - 0.4)"], [0.0, "-8e-6*(x - 0.4)"]
+        moved, mirrored = [0.0, "1.2e-5*(x - 0.4)"], [0.0, "-1.2e-5*(x - 0.4)"]
         own = [hvi.Contact("foot"), hvi.Adhesion("foot", hvi.laws.Graph(points=BOND, one_sided=True))]
         seam = [hvi.Contact("seam"), hvi.Adhesion("seam", hvi.laws.Graph(points=twice(BOND), one_sided=True))]
     else:
-        moved, mirrored = ["5e-6*(0.3 + x)", 0.0], ["-5e-6*(0.3 + x)", 0.0]
+        moved, mirrored = ["9e-6*(0.3 + x)", 0.0], ["-9e-6*(0.3 + x)", 0.0]
         own = [hvi.Friction("foot", hvi.laws.Graph(points=BOND))]
         seam = [hvi.Friction("seam", hvi.laws.Graph(points=twice(BOND)))]
     shift = [hvi.Displacement("top", moved), hvi.Displacement("top_", mirrored)]
@@ -145,4 +145,4 @@ def test_two_equal_bodies_are_one_by_symmetry(mode: str) -> None:
     assert theirs.pressure == pytest.approx(mine.pressure, rel=1e-7, abs=1.0)
     if mode == "slip":
         assert theirs.friction == pytest.approx(mine.friction, rel=1e-7, abs=1.0)
-    assert {0, 1} <= set(np.ravel(theirs.branch))
+    assert {0, 1} <= set((theirs.branch if mode == "slip" else theirs.normal_branch).tolist())
