@@ -76,6 +76,13 @@ class ContactArrays:
         return f"ContactArrays({len(self)} vertices, {closed} in contact)"
 
 
+class ContactParts(dict[str, ContactArrays]):
+    """The arrays of all parts by name."""
+
+    def __missing__(self, part: str) -> ContactArrays:
+        raise KeyError(f"no contact and no law acts on {part!r}; there are: {', '.join(self) or 'none'}")
+
+
 def _tangential(columns: Mapping[str, Array], name: str) -> Array:
     first = columns[f"{name}1"]
     return np.column_stack([first, columns[f"{name}2"]]) if f"{name}2" in columns else first

@@ -6,7 +6,6 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from html import escape
 from pathlib import Path
 
 from dolfinx import fem
@@ -17,12 +16,12 @@ from ..errors import InputError
 from ..results import ResultFolder, gathering
 from ..results.output_folder import Existing
 from ..results.whole import Wanted, write_whole
-from ..runtime import log
+from ..runtime import log, notebook
 from ..solution import Solution
 from ..solvers.result import SolveResult
 from ..typing import Array
 from . import plotting
-from .contact_arrays import ContactArrays
+from .contact_arrays import ContactArrays, ContactParts
 
 _LOG = log.logger("modelling")
 _GIVEN = {"command": None, "petsc": None}
@@ -79,8 +78,8 @@ class ModelSolution(Solution):
             InputError: on all ranks alike: nothing was solved, since no solution exists.
         """
         parts = gathering.part_arrays(self.problem, self._examined.states)
-        made = {name: ContactArrays.of(part) for name, part in parts.items()}
-        found: dict[str, ContactArrays] = self.problem.domain.mesh.comm.bcast(made, root=0)
+        made = ContactParts((name, ContactArrays.of(part)) for name, part in parts.items())
+        found: ContactParts = self.problem.domain.mesh.comm.bcast(made, root=0)
         return found
 
     @cached_property
@@ -111,17 +110,17 @@ class ModelSolution(Solution):
             raise InputError(f"nothing acts on {part!r}; there are: {', '.join(self.resultants)}")
         return self.resultants[part]
 
-    def plot(self, picture: str = "body") -> Figure | None:
+    def plot(self, picture: str | None = None) -> Figure | None:
         """A picture of it as a matplotlib figure, which a notebook shows. Collective; None on ranks other than 0.
 
         Args:
             picture: one of those that a result folder has: body, stress, scene, contact, escape; with several contact
-                parts contact_NAME.
+                parts contact_NAME. None: body, or escape where no solution exists.
 
         Raises:
             InputError: on all ranks alike: there is no such picture of it.
         """
-        return plotting.draw(self, picture)
+        return plotting.draw(self, picture or ("escape" if self.solve_result is None else "body"))
 
     def write(self, folder: str | os.PathLike[str], *, force: bool = False, pictures: bool = True) -> None:
         """Write the folder that ``hvi run`` writes. Collective.
@@ -175,5 +174,4 @@ class ModelSolution(Solution):
         return "\n".join(f"{name}: {text}" for name, text in self._rows())
 
     def _repr_html_(self) -> str:
-        rows = "".join(f"<tr><th>{escape(name)}</th><td>{escape(text)}</td></tr>" for name, text in self._rows())
-        return f"<table>{rows}</table>"
+        return notebook.table(self._rows())

@@ -23,7 +23,7 @@ from .solving import check
 _LOG = logging.getLogger(__name__)
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class Equilibria:
     """What :func:`equilibria` found.
 
@@ -49,6 +49,10 @@ class Equilibria:
     nodes: int
     reason: str
     passes: tuple[Pass, ...]
+
+    def __repr__(self) -> str:
+        found = [f"{kind}: energy {one.energy:.10g}" for one, kind in zip(self.solutions, self.kinds, strict=True)]
+        return "\n".join([self.reason, *found])
 
 
 def equilibria(

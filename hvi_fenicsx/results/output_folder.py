@@ -29,7 +29,10 @@ from .moving import is_folder, move_in
 
 Existing = Literal["refuse", "replace", "resume"]
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-_WAYS = {"result": "--force replaces it", "study": "--resume keeps its finished points, --force begins anew"}
+_WAYS = {
+    "result": "--force (force=True in Python) replaces it",
+    "study": "--resume keeps its finished points, --force begins anew",
+}
 """What a user may do with a folder that is there, by its kind."""
 _UNFINISHED = "--resume goes on with it, --force begins anew"
 """And with one that a killed process has left."""

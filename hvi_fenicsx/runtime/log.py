@@ -16,6 +16,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
+from ..errors import InputError
 from . import terminal
 from .newton_step import NewtonStep
 
@@ -51,8 +52,11 @@ def set_log_level(level: int | str = logging.INFO) -> None:
         level: such as ``"INFO"``; ``"DEBUG"`` tells every Newton step.
 
     Raises:
-        ValueError: there is no such level.
+        InputError: there is no such level.
     """
+    known = logging.getLevelNamesMapping()
+    if isinstance(level, str) and level not in known:
+        raise InputError(f"log level: there is no {level!r}; there are: {', '.join(known)}")
     package = logging.getLogger(PACKAGE)
     package.setLevel(level)
     if not any(type(handler) is logging.StreamHandler for handler in package.handlers):

@@ -300,6 +300,7 @@ def test_a_body_that_escapes_has_no_displacement_and_says_so(body: hvi.Body) -> 
     for wanted in ("u", "stress", "energy", "contact"):
         with pytest.raises(hvi.InputError, match=r"nothing was solved: .*translation along \+y"):
             getattr(gone, wanted)
+    assert gone.plot() is not None  # the escape
 
 
 def test_it_is_short_to_read_and_can_be_seen(found: hvi.Solution) -> None:
@@ -310,6 +311,10 @@ def test_it_is_short_to_read_and_can_be_seen(found: hvi.Solution) -> None:
     assert prepared[0] == "untitled: 162 unknowns on 1 rank"
     assert prepared[1].startswith("existence: held")
     assert found._repr_html_().startswith("<table><tr><th>result</th><td>certified</td></tr>")
+    assert "<tr><th>passed</th><td>True</td></tr>" in found.certificate._repr_html_()
+    assert f"<td>{found.estimate.relative:.3g}</td>" in found.estimate._repr_html_()
+    with pytest.raises(KeyError, match="no contact and no law acts on 'wall'; there are: floor"):
+        found.contact["wall"]
     figure = found.plot("stress")
     assert figure is not None
     assert figure._repr_png_()[:4] == b"\x89PNG"  # type: ignore[attr-defined]
@@ -346,7 +351,7 @@ def test_a_solution_writes_the_folder_of_a_run(found: hvi.Solution, tmp_path: Pa
     assert {"contact.csv", "displacement.pvd", "report.html", "scene.toml"} < {f.name for f in folder.iterdir()}
     page = (folder / "report.html").read_text(encoding="utf-8")
     assert "made by a Python program" in page
-    with pytest.raises(hvi.InputError, match="already holds a result"):
+    with pytest.raises(hvi.InputError, match=r"already holds a result; .*force=True in Python"):
         found.write(folder)
     found.write(folder, force=True, pictures=False)
 
