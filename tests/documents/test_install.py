@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import configparser
+import os
 import re
 import shutil
 import subprocess
@@ -109,3 +110,12 @@ def test_its_command_runs_a_scene_elsewhere(wheel: zipfile.ZipFile, tmp_path: Pa
         assert done.stdout.startswith(str(tmp_path / "site"))
         names = {file.name for file in (tmp_path / f"r{ranks}").iterdir()}
         assert {"report.html", "summary.json", "contact.png", "body.png"} <= names
+
+
+@pytest.mark.parametrize(("sections", "jupyter"), [("", False), ("notebook", True)])
+def test_further_sections_of_packages_are_installed_where_they_are_asked_for(sections: str, jupyter: bool) -> None:
+    script = 'root=$PWD; eval "$(sed -n "/^packages()/,/^}/p" hvi)"; packages run tests'
+    wanted = {**os.environ, "HVI_SECTIONS": sections}
+    done = subprocess.run(["bash", "-c", script], cwd=ROOT, env=wanted, capture_output=True, text=True, check=True)
+    assert "python3-dolfinx" in done.stdout.split()
+    assert ("jupyter-notebook" in done.stdout.split()) == jupyter
