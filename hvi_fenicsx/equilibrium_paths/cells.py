@@ -12,6 +12,7 @@ from scipy.linalg.lapack import dpotrf
 
 from ..typing import Array, Integers, Mask
 from .segments import Kind, Segment
+from .spectrum import negative_directions
 
 
 class Cells:
@@ -135,11 +136,8 @@ class Cells:
         Args:
             negligible: an eigenvalue that is zero, relative to the greatest.
         """
-        matrix, free = self.tangent()
-        values = np.linalg.eigvalsh(matrix) if free.size else np.empty(0)
-        size = float(np.max(np.abs(values), initial=0.0))
         drops = np.count_nonzero((self.rise < 0.0) & ~self.bound)
-        return int(np.count_nonzero(values < -negligible * size) + drops)
+        return negative_directions(self.tangent()[0], negligible) + int(drops)
 
     def is_stable(self, negligible: float = 1e-12) -> bool:
         """Whether the energy falls in no direction at constant loads.

@@ -1,8 +1,9 @@
-"""Whether a stiffness holds a body, by its least eigenvalue."""
+"""Whether a stiffness holds a body, and in how many directions it does the opposite."""
 
 from __future__ import annotations
 
 import numpy as np
+from scipy.linalg.lapack import dsytrf
 
 from ..typing import Array
 
@@ -18,3 +19,18 @@ def is_singular(stiffness: Array) -> bool:
     """
     values = np.linalg.eigvalsh(stiffness) if len(stiffness) else np.ones(1)
     return bool(values[0] <= _ZERO * values[-1])
+
+
+def negative_directions(stiffness: Array, negligible: float) -> int:
+    """The number of negative eigenvalues, by the signs of the pivots of LDLᵀ (Sylvester's law of inertia).
+
+    Args:
+        stiffness: symmetric, (n, n).
+        negligible: an eigenvalue that is zero, relative to the largest sum of a row.
+    """
+    if not len(stiffness):
+        return 0
+    size = float(np.max(np.sum(np.abs(stiffness), axis=0)))
+    factors, pivots, _ = dsytrf(stiffness + negligible * size * np.eye(len(stiffness)), lower=1)
+    pairs = pivots < 0  # a block of two pivots has one negative eigenvalue and one positive
+    return int(np.count_nonzero(np.diag(factors)[~pairs] < 0.0) + np.count_nonzero(pairs) // 2)

@@ -5,9 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.sparse import csr_array
 
 from ...typing import Array
 from ..segments import Kind
+from ..spectrum import negative_directions
 from .site_graphs import SiteGraphs
 
 
@@ -163,10 +165,9 @@ class Sites(SiteGraphs):
             negligible: an eigenvalue that is zero, relative to the greatest.
         """
         basis, slopes = self.motions(values)
-        matrix = basis.T @ self.stiffness @ basis + np.diag(slopes)
-        found = np.linalg.eigvalsh(matrix) if len(slopes) else np.empty(0)
-        size = float(np.max(np.abs(found), initial=0.0))
-        return int(np.count_nonzero(found < -negligible * size)) + len(self.on_drops())
+        ways = csr_array(basis.T)
+        matrix = ways @ (ways @ self.stiffness).T + np.diag(slopes)
+        return negative_directions(matrix, negligible) + len(self.on_drops())
 
     def motions(self, values: Values) -> tuple[Array, Array]:
         """The displacements that can change, as orthonormal columns (n, q), and the slopes of their forces, (q,)."""
