@@ -78,8 +78,9 @@ class Certifier:
         return Verdict(certified=on_surface and (not whole or examined(state)), whole=whole)
 
     def _load(self, factor: float) -> float:
-        """The Euclidean norm of loads, and of what prescribed displacements pull. Collective."""
-        return float(self._condensation.load(factor).norm())
+        """The Euclidean norm of loads, of what prescribed displacements pull and obstacles push. Collective."""
+        felt = float(np.linalg.norm(self._condensation.problem.load(factor)))
+        return max(felt, float(self._condensation.load(factor).norm()))
 
     def _is_unloaded(self, state: PathState) -> bool:
         """Whether the loads are less than the tolerance of those of the whole programme. Collective."""

@@ -104,6 +104,9 @@ class _Term:
             factor = term.length.factors[-1]
             law = law if factor == 1.0 else law.scaled(factor, 1.0 / factor)
             signs = np.asarray(signs / factor, dtype=np.float64)
+        if term.is_linear and not opens:  # the energy of a spring on a length is that of springs on its components
+            weights, points = (np.repeat(part, components, axis=0) for part in (weights, points))
+            unknowns, signs = unknowns.reshape(-1, 1), signs.reshape(-1, 1)
         found = Bonds(
             law=law,
             unknowns=unknowns,

@@ -94,7 +94,7 @@ class Deviations:
             sign, (at, start, chord) = group.signs[rows], group.chords[rows].T
             argument = sign * inside
             slope = group.law.convex.second(argument) - group.law.concave.second(argument)
-            value = sign * 0.5 * (group.law.left(argument) + group.law.right(argument)) + slope * (x[sites] - inside)
+            value = sign * group.law.right(argument) + slope * (x[sites] - inside)
             lacking = value - start - chord * (x[sites] - at)
             np.add.at(found, sites, group.weights[rows] * lacking)
             np.add.at(slopes, sites, group.weights[rows] * (slope - chord))

@@ -78,6 +78,8 @@ class Balance:
     def _bonds(self, values: Values) -> tuple[float, float]:
         """What bonds with memory give back, and what they have lost."""
         back = lost = 0.0
+        if not self._in_sites:
+            return back, lost
         for k, laws in enumerate(self._sites.laws):
             if not any(law.group in self._in_sites for law in laws):
                 continue

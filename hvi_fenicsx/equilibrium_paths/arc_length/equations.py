@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg.lapack import dgesv
@@ -203,3 +203,11 @@ class Equations:
             tangent: of length 1, (n + 1,).
         """
         self.here = Place(y=y, tangent=tangent, values=self.sites.values(y[:-1]))
+
+    def head(self, tangent: Array) -> None:
+        """Set out from the present point.
+
+        Args:
+            tangent: of length 1, (n + 1,).
+        """
+        self.here = replace(self.here, tangent=tangent)

@@ -160,7 +160,7 @@ class ArcLengthFollower(Follower):
 
     def _head(self, row: Array, sign: float) -> None:
         curve = self._curve
-        curve.place(curve.here.y, curve.tangent(curve.here.values, row, sign))
+        curve.head(curve.tangent(curve.here.values, row, sign))
         self._trend()
 
     def _trend(self) -> None:
@@ -176,6 +176,8 @@ class ArcLengthFollower(Follower):
         if move.outcome is Outcome.STEP:
             self._unstable = self._sites.unstable_directions(self._curve.here.values)
             return self._state(Event.STEP)
+        if self._floats and self._is_off():  # all bonds are broken at once: nothing is left to pass
+            return self._state(Event.KINK)
         before = self._curve.trend
         passages = self._crossed(move.site, turned=move.outcome is Outcome.TURNED)
         self._trend()

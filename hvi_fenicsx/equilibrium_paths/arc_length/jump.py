@@ -181,7 +181,7 @@ def _followed(
     """Along the curve of one restraint; None where it leads to no end."""
     curve = Curve(load, restraint * float(np.mean(sites.forces)), sites, here.y[:-1].copy(), 0.0)
     try:
-        curve.place(curve.here.y, curve.tangent(curve.here.values, row))
+        curve.head(curve.tangent(curve.here.values, row))
         if curve.factor_rate > 1e-7:
             return None
         Crossing(curve, lag).run()

@@ -147,7 +147,7 @@ class Crossing:
         slow = abs(rates[k]) <= _SLOW * float(np.max(np.abs(curve.here.tangent)))
         row = curve.here.tangent if slow else curve.row(k)
         sign = 1.0 if slow or forward else -1.0
-        curve.place(curve.here.y, curve.tangent(curve.here.values, row, sign))
+        curve.head(curve.tangent(curve.here.values, row, sign))
         self.passages.append(Passage(site=k, before=before, after=sites.segment(k)))
 
     def _unmoved(self, k: int) -> bool:

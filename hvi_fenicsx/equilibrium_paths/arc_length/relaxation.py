@@ -102,7 +102,7 @@ class Relaxation:
         held = sites.stiffness @ values.x + values.force
         curve = Curve(held, left, sites, self.z, 0.0)
         row = np.eye(1, len(self.z) + 1, len(self.z))[0]
-        curve.place(curve.here.y, curve.tangent(curve.here.values, row))
+        curve.head(curve.tangent(curve.here.values, row))
         Crossing(curve, self._lag).run()
         for _ in range(50 + 4 * len(sites)):
             if curve.here.tangent[-1] < 0.0 or sites.on_drops():
