@@ -14,6 +14,7 @@ from runs import LONG_RANKS, on_ranks
 from scenes import DELTA, NU, E, Table, block, model, quadratic_linear
 
 from hvi_fenicsx import Scene, prepare
+from hvi_fenicsx.equilibrium_paths.bonds import is_piecewise_linear
 from hvi_fenicsx.errors import InputError
 from hvi_fenicsx.system.condensation import Condensation
 from hvi_fenicsx.system.system import System
@@ -55,6 +56,13 @@ def in_space() -> Table:
     return table
 
 
+def on_springs() -> Table:
+    """The same with a spring on |u_t|."""
+    table = in_space()
+    table["boundary"]["floor"]["friction"] = {"law": "linear_spring", "stiffness": 1e11}
+    return table
+
+
 def slanted() -> Table:
     """The floor is an obstacle that slants, so unknowns have local components."""
     table = model(4, friction=STRONG)
@@ -63,7 +71,7 @@ def slanted() -> Table:
     return table
 
 
-SCENES = {f.__name__: f for f in (pulled, corner, frictionless, in_space, slanted)} | {
+SCENES = {f.__name__: f for f in (pulled, corner, frictionless, in_space, on_springs, slanted)} | {
     "wall": functools.partial(model, 4, 6e6, friction=STRONG),
     "block": functools.partial(block, 4, 3e5, friction=STRONG),
 }
@@ -134,6 +142,11 @@ def test_only_what_carries_a_bound_or_a_law_is_kept(name: str) -> None:
         carrying[bonds.unknowns] = True
     assert np.all(carrying)
     assert np.array_equal([bool(p) for p in problem.parts], np.isfinite(problem.lower) | np.isfinite(problem.upper))
+
+
+def test_a_spring_on_a_length_is_springs_on_its_components() -> None:
+    assert any(bonds.radial for bonds in condensed("in_space")[1].problem.bonds)
+    assert is_piecewise_linear(condensed("on_springs")[1].problem)
 
 
 def test_a_body_that_could_leave_keeps_one_unknown_for_each_such_motion() -> None:
