@@ -114,7 +114,12 @@ def effects(prepared: Preparation) -> Iterator[str]:
 def solver(prepared: Preparation) -> str:
     """The solver that the effects call for."""
     kind = nested_iteration.linear_settings(prepared.system, prepared.options).kind
-    linear = {"lu": "MUMPS", "gamg": "CG with GAMG", "mg": "CG with geometric multigrid on the mesh hierarchy"}[kind]
+    linear = {
+        "lu": "MUMPS",
+        "gamg": "CG with GAMG",
+        "mg": "CG with geometric multigrid on the mesh hierarchy",
+        "mixed": "MINRES for displacements and pressures with geometric multigrid on the mesh hierarchy",
+    }[kind]
     bounds = "" if prepared.problem.bounds else ", no bounds"
     return f"{registry.choose(prepared.options, prepared.system).description}{bounds}, {linear}"
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
 import basix.ufl
@@ -74,8 +74,13 @@ class Bulk:
         return forms.compiled(ufl.action(self.form, displacement)), displacement
 
     @functools.cached_property
-    def _dilatations(self) -> list[Dilatation]:
+    def dilatations(self) -> list[Dilatation]:
+        """The regions in ``averaged``, assembled. Collective when first used."""
         return nodal_averaging.assemble(self.averaged)
+
+    def without_dilatation(self) -> Bulk:
+        """The operator without what is averaged by vertex."""
+        return replace(self, averaged=(), shared=None)
 
     @property
     def averages_dilatation(self) -> bool:
@@ -101,7 +106,7 @@ class Bulk:
     def _assembled(self) -> PETSc.Mat:
         matrix = assemble_matrix(self.compiled)
         matrix.assemble()
-        return nodal_averaging.add(matrix, self._dilatations)
+        return nodal_averaging.add(matrix, self.dilatations)
 
     def between(self, u: Any, v: Any) -> Any:
         """The UFL form a(u, v), without what is averaged by vertex.
@@ -118,7 +123,7 @@ class Bulk:
         form, displacement = self._internal
         displacement.x.array[:] = u.x.array
         internal = nodal_values(form)
-        for part in self._dilatations:
+        for part in self.dilatations:
             internal += part.force(u).reshape(internal.shape)
         return internal
 
@@ -152,7 +157,7 @@ class Bulk:
         form = -self.between(u, v)
         for load in loads:
             form += ufl.replace(load, {test: v})
-        for part in self._dilatations:
+        for part in self.dilatations:
             form -= part.work(part.pressure(u), v)
         return nodal_sum(form)
 
@@ -191,7 +196,7 @@ class Bulk:
         u, v = ufl.dot(one, place), q * ufl.dot(other, place)
         form = ufl.replace(self.material, {test: v, trial: u})
         return form + sum(
-            (part.work(part.averaged.modulus * ufl.tr(one), v) for part in self._dilatations), ufl.Form([])
+            (part.work(part.averaged.modulus * ufl.tr(one), v) for part in self.dilatations), ufl.Form([])
         )
 
     def energy_in_cells(self, v: Any) -> LinearForm:
@@ -212,7 +217,7 @@ class Bulk:
 
     def pressures(self, u: fem.Function) -> list[fem.Function]:
         """The averaged volumetric stress of each region in ``averaged``, P1 fields. Collective."""
-        return [part.pressure(u) for part in self._dilatations]
+        return [part.pressure(u) for part in self.dilatations]
 
     def dilated(self, v: Any) -> list[Any]:
         """The UFL forms ∫ φ_i div v dx of the regions in ``averaged``, φ_i being scalar P1.
@@ -220,11 +225,7 @@ class Bulk:
         Args:
             v: a displacement of any space, or a sum of such.
         """
-        return [part.dilated(v) for part in self._dilatations]
-
-    def volumetric_rates(self) -> list[Array]:
-        """The averaged volumetric stress by unit of :meth:`dilated` at the owned vertices, by region."""
-        return [np.array(part.stiffness.array_r) for part in self._dilatations]
+        return [part.dilated(v) for part in self.dilatations]
 
     def pressed(self, pressures: Sequence[fem.Function], v: Any) -> Any:
         """The UFL form of the work of averaged volumetric stresses in v.
@@ -233,7 +234,7 @@ class Bulk:
             pressures: P1 fields, by region in ``averaged``.
             v: a displacement or test function of any space.
         """
-        return sum((part.work(p, v) for part, p in zip(self._dilatations, pressures, strict=True)), ufl.Form([]))
+        return sum((part.work(p, v) for part, p in zip(self.dilatations, pressures, strict=True)), ufl.Form([]))
 
     def pressure_energy(self, pressures: Sequence[fem.Function]) -> Array:
         """∫ p²/λ of every owned cell, (cells,). Collective.
@@ -242,7 +243,7 @@ class Bulk:
             pressures: P1 fields p, by region in ``averaged``.
         """
         q = ufl.TestFunction(self._constants)
-        pairs = zip(self._dilatations, pressures, strict=True)
+        pairs = zip(self.dilatations, pressures, strict=True)
         found = [nodal_sum(part.across(p, p * q))[:, 0] / part.averaged.modulus for part, p in pairs]
         return np.asarray(sum(found))
 
@@ -252,7 +253,7 @@ class Bulk:
         It is the residual of the equation that says what p is, by the least shear energy of a strain with that trace.
         """
         cells = self.space.mesh.topology.index_map(self.scales.dimension).size_local
-        return sum((part.error(u) for part in self._dilatations), np.zeros(cells))
+        return sum((part.error(u) for part in self.dilatations), np.zeros(cells))
 
     def stress(self, u: fem.Function) -> Array:
         """The mean stress of every owned cell, N/m², tension positive; shape (cells, 3, 3). Collective.
@@ -279,7 +280,7 @@ class Bulk:
         form = ufl.replace(self.material, {test: v, trial: u})
         for name in sorted(self.strains):
             form -= ufl.replace(self.strains[name], {test: v})
-        for part, pressure in zip(self._dilatations, pressures, strict=True):
+        for part, pressure in zip(self.dilatations, pressures, strict=True):
             form += part.work(pressure, v)
         return form
 
@@ -288,7 +289,7 @@ class Bulk:
         if self.scales.dimension == 3:
             return []
         found = [ufl.replace(form, dict(zip(form.arguments(), (q, u), strict=False))) for form in self.across]
-        return found + [part.across(p, q) for part, p in zip(self._dilatations, pressures, strict=True)]
+        return found + [part.across(p, q) for part, p in zip(self.dilatations, pressures, strict=True)]
 
 
 def make_bulk(

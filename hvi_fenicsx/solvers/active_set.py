@@ -200,11 +200,12 @@ class _SnesRun:
         self.last, self.linear, self.iterations, self.reason = float("inf"), 0, 0, 0
         self.sizes = NOT_MEASURED
         self._stalled = self._slow = 0
+        self._inner = owner.held.inner_iterations
         self.stopped = False
 
     def create(self, line_search: str, max_iterations: int) -> PETSc.SNES:
         """The configured SNES."""
-        system, linear = self.owner.system, self.owner.settings.thresholds
+        system, linear = self.owner.system, self.owner.settings
         snes = PETSc.SNES().create(system.comm)
         snes.setType("vinewtonrsls")
         snes.setFunction(self._function, system.load.duplicate())
@@ -213,7 +214,7 @@ class _SnesRun:
         snes.setObjective(lambda _, x: system.energy(x, self.models))
         snes.setConvergenceTest(self._converged)
         snes.setTolerances(max_it=max_iterations)
-        snes.getKSP().setTolerances(rtol=self.thresholds.finest_accuracy, atol=0.0, max_it=linear.krylov_iterations)
+        snes.getKSP().setTolerances(rtol=self.thresholds.finest_accuracy, atol=0.0, max_it=linear.iterations)
         near = self.thresholds.on_bound * float(np.min(system.references.scale))
         defaults = {"snes_linesearch_type": line_search, "snes_vi_zero_tolerance": near}
         configure(snes, {**defaults, **self.owner.settings.ksp})
@@ -237,7 +238,7 @@ class _SnesRun:
     def finish(self, snes: PETSc.SNES) -> None:
         """Take iterations and reason from the SNES, and free it."""
         self.iterations, self.reason = snes.getIterationNumber(), snes.getConvergedReason()
-        self.linear = snes.getLinearSolveIterations()
+        self.linear = snes.getLinearSolveIterations() + self.owner.held.inner_iterations - self._inner
         if self.reason == PETSc.SNES.ConvergedReason.DIVERGED_LINEAR_SOLVE:
             self.owner.held.report(snes.getKSP().getIterationNumber(), failed=True)
         snes.destroy()

@@ -72,7 +72,7 @@ class _SnesRun(SolverRun):
         snes.setVariableBounds(self.system.lower, self.system.upper)
         snes.setConvergenceTest(self._converged)
         snes.setTolerances(max_it=self.options.max_iterations)
-        linear = _DIRECT if self.solver.settings.kind == "lu" else _KRYLOV
+        linear = _DIRECT if self.solver.settings.kind in ("lu", "mixed") else _KRYLOV
         configure(snes, {"snes_linesearch_type": "bt", **linear})
         return snes
 

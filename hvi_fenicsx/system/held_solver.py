@@ -20,14 +20,16 @@ from petsc4py import PETSc
 from ..mesh import nodes
 from ..runtime.timing import Timer
 from ..typing import Array, Entities
-from . import multigrid, schur
+from . import schur
 from .levels import Levels
 from .matrix_copy import MatrixCopy
+from .mixed_multigrid import MixedMultigrid
+from .multigrid import Multigrid
 from .petsc_options import CHOLESKY, configure
 from .system import System
 from .thresholds import DEFAULT, Thresholds
 
-Kind = Literal["lu", "gamg", "mg"]
+Kind = Literal["lu", "gamg", "mg", "mixed"]
 _GAMG: dict[str, object] = {
     "pc_type": "gamg",
     "pc_gamg_threshold": 0.01,
@@ -52,7 +54,8 @@ class LinearSettings:
     """How linear systems are solved.
 
     Attributes:
-        kind: a factorisation (lu), algebraic multigrid (gamg) or geometric multigrid (mg).
+        kind: a factorisation (lu), algebraic multigrid (gamg), geometric multigrid (mg), or that with averaged
+            pressures as unknowns (mixed).
         thresholds: when another kind takes over, and when a preconditioner is made anew.
     """
 
@@ -78,10 +81,12 @@ class LinearSettings:
         """
         if wanted != "auto":
             return cls(wanted, thresholds)
-        stiff = system.problem.bulk.volumetric_ratio
-        most = thresholds.volumetric_ratio[nodes.degree(system.problem.space)]
-        if levels and system.free_motions is None and stiff <= most:
-            return cls("mg", thresholds)
+        stiff, degree = system.problem.bulk.volumetric_ratio, nodes.degree(system.problem.space)
+        if levels and system.free_motions is None:
+            if stiff <= thresholds.volumetric_ratio[degree]:
+                return cls("mg", thresholds)
+            if degree > 1:
+                return cls("mixed", thresholds)
         if stiff > 0.0:
             return cls("lu", thresholds)
         return cls("lu" if _small(system, thresholds) else "gamg", thresholds)
@@ -89,12 +94,19 @@ class LinearSettings:
     @property
     def ksp(self) -> dict[str, str]:
         """Default options of the Krylov method."""
-        return {"ksp_type": "preonly"} if self.kind == "lu" else {"ksp_type": "cg", "ksp_norm_type": "unpreconditioned"}
+        if self.kind == "lu":
+            return {"ksp_type": "preonly"}
+        return {"ksp_type": "fcg" if self.kind == "mixed" else "cg", "ksp_norm_type": "unpreconditioned"}
+
+    @property
+    def iterations(self) -> int:
+        """Iterations of the Krylov method at most."""
+        return self.thresholds.refinements if self.kind == "mixed" else self.thresholds.krylov_iterations
 
     @property
     def pc(self) -> Mapping[str, object]:
         """Default options of the preconditioner."""
-        return {"lu": CHOLESKY, "gamg": _GAMG, "mg": _MG}[self.kind]
+        return {"lu": CHOLESKY, "gamg": _GAMG, "mg": _MG, "mixed": _MG}[self.kind]
 
 
 def _small(system: System, thresholds: Thresholds) -> bool:
@@ -145,7 +157,7 @@ class HeldPreconditioner:
 
     def prepare(self, held: Entities) -> None:
         """Make it suit these held unknowns (local, owned, sorted). Collective."""
-        self.system.jacobian.hold(held if self.settings.kind == "mg" else held[:0])
+        self.system.jacobian.hold(held if self.settings.kind in ("mg", "mixed") else held[:0])
         if self.system.comm.allreduce(self._fits(held), op=MPI.LAND):
             return
         with self._timer("setup"):
@@ -157,7 +169,7 @@ class HeldPreconditioner:
         if self._held is None or self._outdated:
             return False
         changed, drift = len(np.setxor1d(held, self._held, assume_unique=True)), self.system.jacobian.drift(self._rates)
-        if self.settings.kind == "lu":
+        if self.settings.kind in ("lu", "mixed"):
             return changed == 0 and drift == 0.0
         thresholds = self.settings.thresholds
         most = 0 if self.settings.kind == "mg" else max(2, thresholds.changed_held * len(held))
@@ -186,6 +198,11 @@ class HeldPreconditioner:
         self._factorised += 1
 
     @property
+    def inner_iterations(self) -> int:
+        """Iterations so far of the solves that one application of the preconditioner consists of."""
+        return self._preconditioner.iterations if isinstance(self._preconditioner, MixedMultigrid) else 0
+
+    @property
     def _condensed(self) -> bool:
         return isinstance(self._preconditioner, schur.SchurDirect)
 
@@ -194,7 +211,9 @@ class HeldPreconditioner:
         if condensing:
             return schur.SchurDirect(self.system, self.settings.pc)
         if self.settings.kind == "mg":
-            return multigrid.Multigrid(self.system, self.levels, self.settings.pc)
+            return Multigrid(self.system, self.levels, self.settings.pc)
+        if self.settings.kind == "mixed":
+            return MixedMultigrid(self.system, self.levels, self.settings.pc)
         return MatrixCopy(self.system, self.settings.pc, direct=self.settings.kind == "lu")
 
     def destroy(self) -> None:
@@ -257,17 +276,20 @@ class HeldPreconditioner:
         assert self._preconditioner is not None
         ksp.setOperators(self._preconditioner.matrix)
         ksp.setPC(self._preconditioner.pc)
-        ksp.setTolerances(rtol=rtol, max_it=self.settings.thresholds.krylov_iterations)
+        ksp.setTolerances(rtol=rtol, max_it=self.settings.iterations)
         ksp.setInitialGuessNonzero(self.settings.kind != "lu")
         configure(ksp, self.settings.ksp)
+        if isinstance(self._preconditioner, MixedMultigrid):
+            self._preconditioner.accuracy = min(rtol, self.settings.thresholds.mixed_accuracy)
+        before = self.inner_iterations
         with self._timer("solve"):
             ksp.solve(load, x)
         if self.system.free_motions is not None:
             self.system.free_motions.null_space.remove(x)
-        result = int(ksp.getIterationNumber()), int(ksp.getConvergedReason())
+        iterations, reason = int(ksp.getIterationNumber()), int(ksp.getConvergedReason())
         ksp.destroy()
-        self.report(result[0])
-        return result
+        self.report(iterations)
+        return iterations + self.inner_iterations - before, reason
 
 
 def consecutive_runs(chosen: Entities) -> Iterator[tuple[slice, slice]]:

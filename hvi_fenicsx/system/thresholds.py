@@ -12,8 +12,15 @@ class Thresholds:
 
     Attributes:
         largest_direct: unknowns up to which a direct solve is the faster one, by dimension (docs/benchmarks.md).
-        volumetric_ratio: λ/μ where dilatation is averaged, up to which geometric multigrid is used, by degree; 600 is
-            that of ν = 0.4992 (docs/degree-2.md).
+        volumetric_ratio: λ/μ where dilatation is averaged, up to which displacements alone are the unknowns of
+            geometric multigrid, by degree; 50 is that of ν = 0.4902 (docs/degree-2.md).
+        mixed_accuracy: relative residual that a solve for displacements and pressures leaves.
+        mixed_margin: factor of that residual, over λ/μ, to which the equations of displacements and pressures are
+            solved.
+        mixed_margin: float = 0.05
+    mixed_iterations: int = 1_000
+    refinements: int = 20
+    least_mixed_accuracy: relative residual of its own equations that rounding allows.
         drift: change of a law's nodal stiffness, relative to an elastic one (about 1), up to which a Krylov method
             keeps its preconditioner.
         changed_held: part of the held unknowns that may change while algebraic multigrid keeps its preconditioner.
@@ -37,7 +44,12 @@ class Thresholds:
     """
 
     largest_direct: Mapping[int, int] = field(default_factory=lambda: {2: 60_000, 3: 15_000})
-    volumetric_ratio: Mapping[int, float] = field(default_factory=lambda: {1: 0.0, 2: 600.0})
+    volumetric_ratio: Mapping[int, float] = field(default_factory=lambda: {1: 0.0, 2: 50.0})
+    mixed_accuracy: float = 1e-2
+    mixed_margin: float = 0.05
+    mixed_iterations: int = 1_000
+    refinements: int = 20
+    least_mixed_accuracy: float = 1e-13
     drift: float = 0.3
     changed_held: float = 0.1
     slow: int = 50

@@ -78,11 +78,10 @@ class CondensedStiffness(BubbleStiffness):
 
     def _press(self) -> None:
         """The pressures of the bubbles and the nodes as they are. Collective."""
-        for pressure, dilated, rate in zip(
-            self.pressures, self._dilated, self.problem.bulk.volumetric_rates(), strict=True
-        ):
+        parts = self.problem.bulk.dilatations
+        for pressure, dilated, part in zip(self.pressures, self._dilated, parts, strict=True):
             average = _assembled(dilated, pressure).ravel()
-            pressure.x.array[: len(average)] = rate * average
+            pressure.x.array[: len(average)] = part.stiffness.array_r * average
             pressure.x.scatter_forward()
 
     def on_bubbles(self, unmet: Array) -> Array:
