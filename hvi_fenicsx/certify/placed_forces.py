@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -133,6 +133,29 @@ def _on_bodies(problem: Problem, surface: Surface, own: Array) -> Iterator[tuple
     first[_owned_on(problem, surface.facets)] = True
     yield surface.part, NodalForces.of(np.where(first[:, None], acting, 0.0))
     yield f"{surface.part}{SECOND}", NodalForces.of(np.where(first[:, None], 0.0, acting))
+
+
+def second_tractions(problem: Problem, states: Sequence[ContactState]) -> Array:
+    """The tractions on the second sides of interfaces at the vertices that this rank owns, NaN elsewhere, (n, d).
+
+    Nodal forces over what the first side covers of the vertex's area. Collective.
+
+    Args:
+        problem: what was solved.
+        states: of the parts of Γc.
+    """
+    found = np.full((problem.space.dofmap.index_map.size_local, problem.scales.dimension), np.nan)
+    for state in states:
+        interface = problem.interface_of(state.surface)
+        if interface is not None:
+            areas, forces = np.zeros_like(found), np.zeros_like(found)
+            areas[state.surface.blocks] = state.surface.weights[:, None]
+            forces[state.surface.blocks] = traction(state) * state.surface.weights[:, None]
+            covered, acting = -problem.on_bodies(areas), problem.on_bodies(forces)
+            here = _owned_on(problem, problem.domain.facets([interface.sides.second]))
+            here = here[covered[here, 0] > 0.0]
+            found[here] = acting[here] / covered[here]
+    return found
 
 
 def _owned_on(problem: Problem, facets: Entities) -> Entities:

@@ -15,7 +15,7 @@ from ..certify.placed_forces import NodalForces
 from ..problem import part_areas, spaces
 from ..problem.problem import Problem
 from ..solution import Solution
-from ..typing import Array
+from ..typing import Array, Entities
 
 QUANTITIES = ("", "u_", "traction_", "reaction_")
 """The vertex, its displacement, the part's load there, what the part's support, contact and laws put on the body."""
@@ -30,13 +30,20 @@ def rows(solution: Solution) -> dict[str, Array]:
     """
     problem = solution.problem
     loads = placed_forces.loads(problem) if solution.forces is None else solution.forces.loads
-    return {name: _gathered(problem, _columns(solution, loads, name)) for name in solution.scene.parts}
+    return {n: _gathered(problem, _columns(solution, loads, n, facets)) for n, facets in _places(solution).items()}
 
 
-def _columns(solution: Solution, loads: Mapping[str, NodalForces], part: str) -> Array:
+def _places(solution: Solution) -> dict[str, Entities]:
+    """The local facets of the boundary tables and of the sides of interfaces, by name."""
+    problem = solution.problem
+    found = {name: problem.part_facets[name] for name in solution.scene.parts}
+    sides = {f"{one.name}{placed_forces.SECOND}": one.sides.second for one in problem.interfaces}
+    return found | {name: problem.domain.facets([side]) for name, side in sides.items()}
+
+
+def _columns(solution: Solution, loads: Mapping[str, NodalForces], part: str, facets: Entities) -> Array:
     """The columns at the vertices of a part that this rank owns, in the order of the table, (m, 12). Collective."""
     problem, forces = solution.problem, solution.forces
-    facets = problem.part_facets[part]
     blocks = part_areas.vertices(problem, facets)
     d, scales = problem.scales.dimension, problem.scales
     found = np.full((len(blocks), len(QUANTITIES), 3), np.nan)

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 from dolfinx import fem, la
 
+from ..certify import placed_forces
 from ..certify.contact_state import ContactState
 from ..mesh import nodes
 from ..problem import spaces
@@ -18,12 +19,12 @@ from ..problem.problem import Problem
 from ..problem.stress import von_mises
 from ..rigid import Mode
 from ..solution import Solution
-from ..typing import Array, Integers
+from ..typing import Array, Entities, Integers
 from . import vtk_files
 from .vtk_files import Grid
 
 _LENGTHS = ("displacement", "u_n", "u_t1", "u_t2", "gap")
-_STRESSES = ("stress", "von_mises", "sigma_n", "friction_t1", "friction_t2", "inclusion_distance")
+_STRESSES = ("stress", "von_mises", "sigma_n", "friction_t1", "friction_t2", "inclusion_distance", "traction")
 _UNITS = dict.fromkeys(_LENGTHS, "m") | dict.fromkeys(_STRESSES, "N/m²")
 
 
@@ -191,6 +192,8 @@ def write_escape(path: Path, problem: Problem, mode: Mode) -> None:
 def write_contact(path: Path, problem: Problem, states: Sequence[ContactState]) -> None:
     """Write Γc as a mesh of its own with nodal values; a vertex of two parts has those of the later one. Collective.
 
+    The second sides of interfaces are a block of their own, with the tractions there.
+
     Args:
         path: the file.
         problem: what was solved.
@@ -199,19 +202,37 @@ def write_contact(path: Path, problem: Problem, states: Sequence[ContactState]) 
     Raises:
         InputError: it cannot be written, on all ranks alike.
     """
-    mesh, d = problem.domain.mesh, problem.scales.dimension
     facets = np.unique(np.concatenate([s.facets for s in (state.surface for state in states)])).astype(np.int32)
+    first = _on_facets(problem, facets, _nodal(problem, states))
+    second = {}
+    if problem.interfaces:
+        facets = problem.domain.facets([interface.sides.second for interface in problem.interfaces])
+        second["second"] = _on_facets(problem, facets, {"traction": _second_tractions(problem, states)})
+    vtk_files.write(path, problem.domain.mesh.comm, first, **second)
+
+
+def _on_facets(problem: Problem, facets: Entities, nodal: Mapping[str, Array]) -> Grid:
+    """This rank's facets as a mesh of their own, with some values at all local nodes of the body."""
+    mesh, d = problem.domain.mesh, problem.scales.dimension
     owned = facets[facets < mesh.topology.index_map(d - 1).size_local]
     cells = nodes.linear_facets(problem.space, owned).astype(np.int64)
     used, numbered = np.unique(cells, return_inverse=True)
-    grid = Grid(
+    return Grid(
         points=problem.points[used],
         cells=numbered.reshape(cells.shape),
-        at_points={name: values[used] for name, values in _nodal(problem, states).items()},
+        at_points={name: values[used] for name, values in nodal.items()},
         in_cells={},
         units=_units(problem),
     )
-    vtk_files.write(path, mesh.comm, grid)
+
+
+def _second_tractions(problem: Problem, states: Sequence[ContactState]) -> Array:
+    """The tractions on the second sides of interfaces at all local nodes, N/m², (n, 3). Collective."""
+    owned = _spatial(placed_forces.second_tractions(problem, states)) * problem.scales.stress
+    found = la.vector(problem.space.dofmap.index_map, 3)
+    found.array[: owned.size] = owned.ravel()
+    found.scatter_forward()
+    return found.array.reshape(-1, 3)
 
 
 def _nodal(problem: Problem, states: Sequence[ContactState]) -> dict[str, Array]:

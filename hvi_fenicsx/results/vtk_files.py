@@ -44,7 +44,7 @@ class Grid:
     units: Mapping[str, str]
 
 
-def write(path: Path, comm: MPI.Comm, grid: Grid) -> None:
+def write(path: Path, comm: MPI.Comm, grid: Grid, **others: Grid) -> None:
     """Write NAME.pvd, its NAME.pvtu, and NAME_RANK.vtu of each rank. Collective.
 
     Without VTK nothing is written, and a warning says so.
@@ -53,13 +53,17 @@ def write(path: Path, comm: MPI.Comm, grid: Grid) -> None:
         path: the first of them.
         comm: the ranks.
         grid: this rank's part.
+        others: further blocks, as NAME-KEY.pvtu.
 
     Raises:
         InputError: a file cannot be written, on all ranks alike.
     """
     if _is_there(path, comm):
-        _write_parallel(path.with_suffix(".pvtu"), comm, grid)
-        on_root(comm, lambda: _write_collection(path, [(0.0, path.with_suffix(".pvtu").name)]))
+        files = {path.with_suffix(".pvtu"): grid}
+        files |= {path.with_name(f"{path.stem}-{name}.pvtu"): other for name, other in others.items()}
+        for file, block in files.items():
+            _write_parallel(file, comm, block)
+        on_root(comm, lambda: _write_collection(path, [(0.0, i, file.name) for i, file in enumerate(files)]))
 
 
 def write_series(path: Path, comm: MPI.Comm, series: Iterable[tuple[float, Grid]]) -> None:
@@ -81,7 +85,7 @@ def write_series(path: Path, comm: MPI.Comm, series: Iterable[tuple[float, Grid]
     for number, (time, grid) in enumerate(series):
         file = path.with_name(f"{path.stem}-{number:05d}.pvtu")
         _write_parallel(file, comm, grid)
-        entries.append((time, file.name))
+        entries.append((time, 0, file.name))
     on_root(comm, lambda: _write_collection(path, entries))
 
 
@@ -152,12 +156,12 @@ def _write_pieces(path: Path, grid: Grid, pieces: list[Path]) -> None:
     _write_xml(path, parallel)
 
 
-def _write_collection(path: Path, entries: Iterable[tuple[float, str]]) -> None:
-    """The file that ParaView opens: the files by their times. Rank 0 only."""
+def _write_collection(path: Path, entries: Iterable[tuple[float, int, str]]) -> None:
+    """The file that ParaView opens: the files by their times and blocks. Rank 0 only."""
     root = Xml.Element("VTKFile", type="Collection", version="0.1")
     collection = Xml.SubElement(root, "Collection")
-    for time, name in entries:
-        Xml.SubElement(collection, "DataSet", timestep=f"{time:g}", part="0", file=name)
+    for time, block, name in entries:
+        Xml.SubElement(collection, "DataSet", timestep=f"{time:g}", part=str(block), file=name)
     _write_xml(path, root)
 
 

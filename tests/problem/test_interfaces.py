@@ -64,6 +64,17 @@ def test_uniform_pressure_crosses_meshes_that_do_not_match(angle: float, degree:
 
 
 @AT
+def test_the_second_side_has_the_traction_of_the_first(angle: float, degree: int) -> None:
+    """Pressure and shear, as boundary.csv and contact.pvd have it."""
+    found = solve(stacked(pulled(angle, np.array([[0.0, 1e6], [1e6, -2e6]])), {"tied": True}, angle, degree=degree))
+    assert found.examination is not None
+    acting = placed_forces.second_tractions(found.problem, found.examination.states) * found.problem.scales.stress
+    there = ~np.isnan(acting[:, 0])
+    assert np.count_nonzero(there) == 7 * degree + 1
+    assert acting[there] == pytest.approx(np.tile(turned(angle, 1e6, -2e6), (7 * degree + 1, 1)), rel=1e-10)
+
+
+@AT
 def test_uniform_shear_crosses_a_glued_seam(angle: float, degree: int) -> None:
     found = solve(stacked(pulled(angle, np.array([[0.0, 1e6], [1e6, 0.0]])), {"tied": True}, angle, degree=degree))
     assert seam(found).friction * found.problem.scales.stress == pytest.approx(1e6, rel=1e-10)

@@ -13,7 +13,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from mpi4py import MPI
 from runs import ROOT, hvi
+from scenes import two_blocks
+
+import hvi_fenicsx
 
 pyvista = pytest.importorskip("pyvista")
 MACRO = ROOT / "docs" / "open_result.py"
@@ -106,3 +110,25 @@ def test_the_macro_runs(result: tuple[int, Path], tmp_path: Path) -> None:
     assert done.returncode == 0
     assert "ERR" not in done.stdout + done.stderr
     assert picture.stat().st_size > 10_000
+
+
+def test_both_sides_of_an_interface_are_written(tmp_path: Path) -> None:
+    """The forces on the two sides, in boundary.csv and by the tractions of contact.pvd, are opposite."""
+    scene = two_blocks("rectangle", [1.0], [[9, 4], [7, 3]], "plane_stress")
+    found = hvi_fenicsx.solve(hvi_fenicsx.Scene.model_validate(scene), MPI.COMM_SELF)
+    found.write(tmp_path / "r")
+    first, second = pyvista.get_reader(tmp_path / "r" / "contact.pvd").read()
+    assert "sigma_n" in first.point_data
+    assert (second.n_points, second.point_data.keys()) == (10, ["traction"])
+    with (tmp_path / "r" / "boundary.csv").open(encoding="utf-8") as stream:
+        rows = list(csv.DictReader(stream))
+    sums = {
+        part: [sum(float(row[f"reaction_{axis}"]) for row in rows if row["part"] == part) for axis in "xy"]
+        for part in ("seam", "seam.second")
+    }
+    assert sums["seam"] == pytest.approx([-found.resultant("seam.second")[i] for i in range(2)], rel=1e-9)
+    assert sums["seam.second"] == pytest.approx([-force for force in sums["seam"]], rel=1e-9)
+    traction = second.point_data["traction"]
+    there = ~np.isnan(traction[:, 0])
+    assert 8 <= np.count_nonzero(there) <= 9  # the upper block begins at 0.21, in the second facet
+    assert np.all(np.sign(traction[there].sum(axis=0)[:2]) == np.sign(sums["seam.second"]))
