@@ -87,7 +87,7 @@ def _on_first_rank(system: System, problem: CondensedProblem, thresholds: PathTh
     """Where the path leads, the same on all ranks to the last digit. Collective."""
     found = None
     if system.comm.rank == 0 and _is_short(system, problem, thresholds):
-        with suppress(np.linalg.LinAlgError):
+        with suppress(np.linalg.LinAlgError, InputError):  # some edges in space have no path
             found = at_full_load(problem, thresholds.most_events)
     return system.comm.bcast(found)
 

@@ -19,6 +19,8 @@ AGREES, CONTRADICTS, MISSED, UNDECIDED = "agrees", "contradicts", "missed", "und
 Table = dict[str, Any]
 SHARP, LOST = 1e-7, 1e-3
 """Where rounding moves tractions by less than the first a point can be judged; from the second on it says nothing."""
+REFUSALS = ("orthogonal or equal", "that differ", "would have to be", "violates the contact bound")
+"""What is said of scenes that are drawn at random and mean nothing; every other scene is to be answered."""
 SMALLEST_FACTOR = 1e-3
 """A load factor below this is not compared: beside the rest of the load its work is within our tie."""
 
@@ -93,7 +95,8 @@ def displacement(mesh: Mesh, answer: Answer) -> Array | None:
 def judge(scene: Table, drawn: Mesh | None, answer: Answer, seed: int = 0) -> Verdict:
     """Compare an answer with what the referee finds."""
     if answer.code == 2:
-        return Verdict(UNDECIDED, f"refused: {answer.text[:160]}")
+        asked = any(words in answer.text for words in REFUSALS)
+        return Verdict(UNDECIDED if asked else CONTRADICTS, f"refused: {answer.text[:160]}")
     if answer.code == 130:
         return Verdict(UNDECIDED, "took too long")
     if answer.code == 1:

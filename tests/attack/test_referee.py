@@ -13,7 +13,7 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parent))
 
 from generator.kinds import draw
-from judge import CONTRADICTS, MISSED, blurred, judge
+from judge import CONTRADICTS, MISSED, UNDECIDED, blurred, judge
 from program import Answer
 from referee.assembly import assemble
 from referee.coordinates import Floor
@@ -88,6 +88,11 @@ def test_a_false_claim_is_found(claim: dict[str, Any]) -> None:
     table = scene()
     u = closed_form(block([1.0, 1.0], [2, 2]).points)
     assert judge(table, None, answer_of(table, u, **claim)).word == CONTRADICTS
+
+
+def test_a_refusal_wants_a_reason_in_the_scene() -> None:
+    for words, wanted in (("prescribe displacements that differ", UNDECIDED), ("no path is known", CONTRADICTS)):
+        assert judge(scene(), None, Answer(2, words)).word == wanted
 
 
 def test_a_solution_that_is_not_found_is_missed() -> None:

@@ -154,3 +154,20 @@ def test_a_problem_without_fixed_unknowns_has_the_same_energy_and_work(gap: floa
         assert fewer.potential(x[kept], factor) == pytest.approx(whole.potential(x, factor), rel=1e-12)
         slope = whole.stiffness @ x - whole.load(factor)
         assert fewer.stiffness @ x[kept] - fewer.load(factor) == pytest.approx(slope[kept], rel=1e-10)
+
+
+def test_an_edge_that_has_no_path_is_no_bad_input() -> None:
+    """In space, where a law on |u_t| and a wall meet, a path is not known; the other starts are tried."""
+    soft = {"law": "graph", "points": [[0, 0], [1e-6, 1e6], [1e-5, 2e5]]}
+    table = anchor(0.0) | {
+        "domain": {"shape": "box", "size": [1.0, 1.0, 1.0], "cells": [1, 1, 1]},
+        "boundary": {
+            "press": {"on": "top", "traction": [0.0, 0.0, -1e6]},
+            "push": {"on": "left", "traction": [1.5e6, 0.0, 0.0]},
+            "floor": {"on": "bottom", "contact": {"gap": 0.0}, "friction": soft},
+            "wall": {"on": "back", "contact": {"gap": 0.0}, "friction": soft},
+        },
+    }
+    found = solved(table)
+    assert (found.exit_code, found.solvability.state) == (4, "metastable")
+    assert found.solve_result is not None
