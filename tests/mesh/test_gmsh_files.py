@@ -195,3 +195,15 @@ def test_a_file_of_another_kind_is_told_how_to_convert(name: str, way: str, tmp_
 def test_a_file_without_a_mesh_says_so(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="neither a mesh nor a geometry"):
         read(written(tmp_path / "m.geo", "a = 1;\n"))
+
+
+@pytest.mark.parametrize(
+    ("group", "said"),
+    [("", "no physical group holds cells .*put every"), ('Physical Surface("body") = {7};', "body|no physical group")],
+    ids=["forgotten", "renumbered"],
+)
+def test_a_group_of_cells_that_is_missing_is_told_so(group: str, said: str, tmp_path: Path) -> None:
+    text = TRIANGLE.replace('Physical Surface("body") = {1};', group)
+    with pytest.raises(InputError, match=said) as refused:
+        read(written(tmp_path / "sides.geo", f"{text} Mesh.MeshSizeMax = 2;"))
+    assert "lies on no cell" not in str(refused.value)
