@@ -106,20 +106,23 @@ class Solution:
 
     @property
     def certificate(self) -> Certificate | None:
-        """How far the conditions of a solution under the whole load are met; None where nothing was solved."""
+        """How far the conditions of a solution under the whole load are met; None where nothing was solved.
+
+        The same on all ranks; not collective.
+        """
         if self.last_borne is not None:
             return self.last_borne.whole_load.certificate
         return None if self.examination is None else self.examination.certificate
 
     @property
     def converged(self) -> bool:
-        """Certified within the tolerance, under the whole load."""
+        """Certified within the tolerance, under the whole load; the same on all ranks, not collective."""
         borne = self.balance is None or self.balance.passed
         return borne and self.certificate is not None and self.certificate.passed
 
     @property
     def obstacle(self) -> PressedObstacle | None:
-        """The obstacle that a force presses, SI; None without one."""
+        """The obstacle that a force presses, SI; None without one; the same on all ranks, not collective."""
         if self.balance is None:
             return None
         found, scales = self.balance, self.problem.scales
@@ -133,7 +136,7 @@ class Solution:
 
     @property
     def exit_code(self) -> int:
-        """By the contract: certified, no solution exists, or not converged."""
+        """By the contract: certified, no solution exists, or not converged; not collective."""
         if self.converged:
             return ExitCode.CERTIFIED
         if self.solve_result is None:
@@ -142,7 +145,7 @@ class Solution:
 
     @property
     def reason(self) -> str:
-        """Why it ended, for people."""
+        """Why it ended, for people; the same on all ranks, not collective."""
         if self.last_borne is not None:
             shown = f"the last state that is borne is shown, at load factor {self.last_borne.factor:.6g}"
             return f"{self.last_borne.whole_load.reason}; {shown}"

@@ -70,6 +70,8 @@ class Body:
     def from_shape(cls, shape: DomainShape, comm: MPI.Comm = MPI.COMM_WORLD) -> Self:
         """A body of one of the program's shapes, or of your own.
 
+        Not collective: the mesh is made when it is first used.
+
         Args:
             shape: the shape with its mesh.
             comm: the ranks that share the mesh.
@@ -81,6 +83,8 @@ class Body:
     @classmethod
     def rectangle(cls, size: Sequence[float], cells: Sequence[int], comm: MPI.Comm = MPI.COMM_WORLD) -> Self:
         """A rectangle [0, size] with the sides left, right, bottom and top.
+
+        Not collective: the mesh is made when it is first used.
 
         Args:
             size: width and height, m.
@@ -95,6 +99,8 @@ class Body:
     @classmethod
     def box(cls, size: Sequence[float], cells: Sequence[int], comm: MPI.Comm = MPI.COMM_WORLD) -> Self:
         """A box [0, size] with the sides left, right, front, back, bottom and top.
+
+        Not collective: the mesh is made when it is first used.
 
         Args:
             size: along x, y, z, m.
@@ -118,6 +124,8 @@ class Body:
     ) -> Self:
         """A gmsh file; its physical groups are the sides and regions.
 
+        Not collective: the mesh is made when it is first used.
+
         Args:
             path: the .msh or .geo file.
             scale: m per unit of the file's coordinates.
@@ -134,7 +142,7 @@ class Body:
         return body
 
     def piece(self, name: str, side: str, where: str) -> Self:
-        """The body with one more side: a piece of a side, of the facets whose midpoints lie in it.
+        """The body with one more side: a piece of a side, of the facets whose midpoints lie in it. Collective.
 
         Args:
             name: of the piece.
@@ -150,7 +158,7 @@ class Body:
         return body
 
     def interface(self, name: str, first: str, second: str, *, tied: bool = False) -> Self:
-        """The body with one more place: where two of its sides meet, which no cells or vertices join.
+        """The body with one more place: where two of its sides meet, which no cells or vertices join. Collective.
 
         Effects there act on the displacement of the first side relative to the second.
 
@@ -178,7 +186,7 @@ class Body:
 
     @cached_property
     def dimension(self) -> int:
-        """2 or 3."""
+        """2 or 3; not collective."""
         return self.shape.space_dimension() or 2
 
     @cached_property

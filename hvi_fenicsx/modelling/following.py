@@ -34,7 +34,7 @@ _LOG = log.logger("modelling")
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class ModelPath(LoadPath):
-    """A load path with its columns as arrays, in SI.
+    """A load path with its columns as arrays, in SI; the same on all ranks. Calls that are collective say so.
 
     Attributes:
         run: what found it.

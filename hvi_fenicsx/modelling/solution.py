@@ -63,7 +63,7 @@ class ModelSolution(Solution):
 
     @property
     def energy(self) -> float:
-        """The potential energy, J/m in 2D, J in 3D.
+        """The potential energy, J/m in 2D, J in 3D; the same on all ranks, not collective.
 
         Raises:
             InputError: on all ranks alike: nothing was solved, since no solution exists.

@@ -25,7 +25,7 @@ _LOG = logging.getLogger(__name__)
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Equilibria:
-    """What :func:`equilibria` found.
+    """What :func:`equilibria` found; the same on all ranks, not collective.
 
     Attributes:
         solutions: by energy, each certified; their kind is in ``kinds``.

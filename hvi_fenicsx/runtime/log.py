@@ -46,7 +46,7 @@ def warn(log: logging.Logger, sentences: Iterable[str]) -> None:
 
 
 def set_log_level(level: int | str = logging.INFO) -> None:
-    """Show what the program does on the terminal (rank 0), as ``logging`` does it.
+    """Show what the program does on the terminal (rank 0), as ``logging`` does it. Not collective.
 
     Args:
         level: such as ``"INFO"``; ``"DEBUG"`` tells every Newton step.

@@ -32,7 +32,7 @@ _Place = tuple[str | int, ...]
 
 
 def read_scene(path: str | os.PathLike[str], overrides: Sequence[str] = ()) -> Scene:
-    """The scene of a file, with single values overridden.
+    """The scene of a file, with single values overridden; not collective, each rank reads it.
 
     Args:
         path: a TOML file; a mesh file that it names is looked for beside it.

@@ -10,7 +10,7 @@ from .scene import Scene
 
 
 def dump_scene(scene: Scene, folder: Path | None = None) -> str:
-    """The resolved scene as TOML; read again from that folder it gives an equal scene.
+    """The resolved scene as TOML; read again from that folder it gives an equal scene. Not collective.
 
     Args:
         scene: the scene.

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+import inspect
 import json
 import pickle
 import pydoc
@@ -330,6 +332,15 @@ def test_what_python_offers_for_help(found: hvi.Solution) -> None:
         assert typing.get_type_hints(offered)
     numbers = pickle.loads(pickle.dumps((found.energy, found.certificate, found.estimate, dict(found.contact))))
     assert numbers[1] == found.certificate
+
+
+@pytest.mark.parametrize("kind", [hvi, hvi.Body, hvi.Model, hvi.Solution])
+def test_calls_and_properties_say_whether_they_are_collective(kind: Any) -> None:
+    every = [(n, getattr(kind, n)) for n in (hvi.__all__ if kind is hvi else dir(kind)) if not n.startswith("_")]
+    calls = [(n, c) for n, c in every if inspect.isroutine(c) or isinstance(c, (property, functools.cached_property))]
+    assert calls
+    silent = [n for n, call in calls if "collective" not in call.__doc__.lower()]
+    assert not silent
 
 
 def test_the_slip_of_a_part_turns_with_its_tangents() -> None:
