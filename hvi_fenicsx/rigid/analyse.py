@@ -18,7 +18,7 @@ from ..errors import HviError, InputError, SolverError
 from .kernel import modes
 from .limit_analysis import Analysis
 from .reduction import ReducedProblem, RigidProblem, reduce
-from .solvability import LoadFactors, Solvability, undecided, unmovable
+from .solvability import ExistenceState, LoadFactors, Solvability, undecided, unmovable
 from .thresholds import DEFAULT, Thresholds
 
 Result = TypeVar("Result")
@@ -36,6 +36,27 @@ def analyse(comm: MPI.Comm, problem: RigidProblem, thresholds: Thresholds = DEFA
     if basis.shape[1] == 0:
         return unmovable()
     return _on_root(comm, reduced, lambda found: _verdict(problem, found))
+
+
+def state_of(comm: MPI.Comm, problem: RigidProblem, thresholds: Thresholds = DEFAULT) -> ExistenceState:
+    """The state alone, without load factors. Collective; the same on all ranks.
+
+    Args:
+        comm: the ranks of the mesh.
+        problem: the body and what it meets.
+        thresholds: what counts as zero, and when to give up.
+    """
+    basis, reduced = reduce(comm, problem, thresholds)
+    if basis.shape[1] == 0:
+        return unmovable().state
+    return _on_root(comm, reduced, lambda found: _state(problem, found))
+
+
+def _state(problem: RigidProblem, reduced: ReducedProblem) -> ExistenceState:
+    try:
+        return Analysis(problem, reduced).state
+    except SolverError:
+        return "undecided"
 
 
 def _verdict(problem: RigidProblem, reduced: ReducedProblem) -> Solvability:

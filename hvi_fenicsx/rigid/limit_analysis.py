@@ -69,6 +69,11 @@ class Analysis:
         work = self.work @ loose
         return loose if np.abs(work).max(initial=0.0) <= self.tie else loose @ null_space(work[None], self.thresholds)
 
+    @property
+    def state(self) -> ExistenceState:
+        """Whether the body is held."""
+        return self._state(self._margin(self.growth))
+
     def solvability(self) -> Solvability:
         """The whole verdict."""
         still = np.zeros_like(self.work)
