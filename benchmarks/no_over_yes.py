@@ -130,7 +130,8 @@ def row(name: str, limit: float) -> tuple[Any, ...]:
     borne = "" if last is None else f"{last['factor'] * case.above:.5g}"
     reason = no["summary"].get("reason", f"none in {limit:g} s")
     figures = (case.below, f"{yes['seconds']:.1f}", case.above, f"{no['seconds']:.1f}", f"{ratio:.1f}", borne)
-    return (name, yes["summary"]["dofs"], *figures, f"{no['code']}: {reason}")
+    short = reason.split(" (")[0].split("; ")[0]
+    return (name, yes["summary"]["dofs"], *figures, f"{no['code']}: {short}")
 
 
 def main() -> None:
