@@ -188,7 +188,7 @@ def test_a_stiff_partner_is_a_rigid_floor() -> None:
 
 
 def test_bodies_that_overlap_or_do_not_meet_are_refused() -> None:
-    for origin, words in (([0.2, 0.1, 0.3], "inside of the body"), ([1.2, 0.1, 0.5], "do not face each other")):
+    for origin, words in (([0.2, 0.1, 0.3], "it overlaps the body"), ([1.2, 0.1, 0.5], "do not face each other")):
         table = pushed(3e5).model_dump(exclude_none=True)
         table["domain"]["upper"]["origin"] = origin
         with pytest.raises(InputError, match=words):

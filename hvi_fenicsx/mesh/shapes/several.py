@@ -164,9 +164,12 @@ class SeveralBodies(DomainShape):
         return self._joined(comm, lambda form: form.build_hierarchy(comm, dimension, thresholds))
 
     def _joined(self, comm: MPI.Comm, build: Callable[[DomainShape], Domain]) -> Domain:
+        from .. import body_overlaps
         from ..joined import joined
 
-        return joined(comm, [body.placed(name, build(body.form)) for name, body in self.bodies.items()])
+        placed = [body.placed(name, build(body.form)) for name, body in self.bodies.items()]
+        body_overlaps.check(comm, placed)
+        return joined(comm, placed)
 
     def _with_forms(self, forms: Mapping[str, DomainShape]) -> Self:
         return self.changed(bodies={name: body.changed(form=forms[name]) for name, body in self.bodies.items()})
