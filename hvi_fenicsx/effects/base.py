@@ -231,6 +231,10 @@ class Effect(BaseModel):
         """The displacement components, from 0, that it prescribes."""
         return ()
 
+    def displaces_obstacle(self) -> bool:
+        """Whether it gives an obstacle a displacement, which a load path may multiply."""
+        return False
+
     def obstacle_moved(self, way: float) -> Effect:
         """Itself, with its obstacle moved if a force presses one.
 

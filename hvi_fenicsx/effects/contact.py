@@ -120,6 +120,10 @@ class Contact(Effect):
         return max(strained, pressed)
 
     @override
+    def displaces_obstacle(self) -> bool:
+        return self.obstacle is not None and self.obstacle.displacement is not None
+
+    @override
     def obstacle_moved(self, way: float) -> Contact:
         """With the obstacle, if a force presses it, moved by so much, m."""
         if self.obstacle is None or self.obstacle.force is None:

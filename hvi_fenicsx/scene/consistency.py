@@ -158,11 +158,14 @@ def _start(scene: Tables) -> Iterator[Mistake]:
 
 def _path(scene: Tables) -> Iterator[Mistake]:
     """What the factor of the load path multiplies must be there."""
-    driving = [one for one in scene.effects() if one[2].drive is not Drive.RESISTANCE and not one[2].bounds_normal]
-    known = list(dict.fromkeys(load_name(where, effect) for _, where, effect in driving))
+    known = list(dict.fromkeys(load_name(where, effect) for _, where, effect in scene.effects() if _drives(effect)))
     for name in (scene.path.scaled if scene.path else None) or ():
         if name not in known:
-            yield Mistake(("path", "scaled"), unknown("load or prescribed displacement", name, known))
+            yield Mistake(("path", "scaled"), unknown("load, prescribed displacement or moved obstacle", name, known))
+
+
+def _drives(effect: Effect) -> bool:
+    return effect.displaces_obstacle() or (effect.drive is not Drive.RESISTANCE and not effect.bounds_normal)
 
 
 def _on_boundary(boundary: Mapping[str, BoundaryTable]) -> Iterator[_Item]:

@@ -64,6 +64,16 @@ def test_a_plate_that_goes_down_and_up_compresses_a_column() -> None:
     np.testing.assert_allclose([row.work for row in path.rows], energies, atol=1e-9 * energies.max())
 
 
+def test_a_scene_names_the_obstacle_that_its_path_moves() -> None:
+    table = column().model_dump(mode="json") | {"path": {"to": 1.0, "scaled": ["lid.contact"]}}
+    path = hvi.follow(hvi.Scene.model_validate(table))
+    assert path.scaled == ("lid.contact",)
+    assert path.force("lid")[-1, 2] == pytest.approx(-E * 0.12 / 0.5 * WAY, rel=1e-9)
+    table["boundary"]["lid"]["contact"]["obstacle"].pop("displacement")
+    with pytest.raises(ValueError, match=r'moved obstacle "lid\.contact"; allowed: base\.displacement'):
+        hvi.Scene.model_validate(table)
+
+
 def test_a_plate_that_stands_still_presses_from_the_start() -> None:
     path = hvi.follow(column(), scaled=["base.displacement"])
     np.testing.assert_allclose(path.force("lid")[:, 2], -E * 0.12 / 0.5 * WAY, rtol=1e-9)

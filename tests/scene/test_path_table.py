@@ -49,9 +49,9 @@ REFUSED = {
     "path={to=[1, 0.5, 0.5]}": "path.to: goes from 0.5 to 0.5, which is no way",
     "path={to=true}": "path.to: must be a number, or a list of numbers like [1.0, 0.2, 1.5] (is true)",
     "path={to=inf}": "path.to: must be a number",
-    "path={scaled='pull'}": 'path.scaled: unknown load or prescribed displacement "pull"; allowed: '
+    "path={scaled='pull'}": 'path.scaled: unknown load, prescribed displacement or moved obstacle "pull"; allowed: '
     "wall.displacement, pull.traction, press.traction",
-    "path={scaled='floor.friction'}": 'path.scaled: unknown load or prescribed displacement "floor.friction"',
+    "path={scaled='floor.friction'}": 'prescribed displacement or moved obstacle "floor.friction"',
     "path={follow='slowly'}": 'path.follow: unknown value "slowly"',
     "path={memory=1}": "path.memory: must be true or false",
     "path={steps=3}": "path.steps: unknown key",
