@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from dolfinx import mesh
@@ -75,6 +77,46 @@ def test_glued_sides_are_one_body() -> None:
     found = hvi.solve(glued, tolerance=1e-10)
     assert found.converged
     assert found.solvability.state == "held"
+
+
+class Fading(hvi.laws.SampledLaw):
+    """A law of a user's own: a parabola, then an exponential tail."""
+
+    name = "fading_of_the_tests"
+
+    def traction(self, x: Any) -> Any:
+        z = x / 2e-6
+        return 1.2e6 * np.where(z < 1, z * (2 - z), np.exp(1 - z))
+
+    def ends(self) -> tuple[float, ...]:
+        return 2e-6, 60e-6
+
+
+LAWS = [
+    LAW,
+    hvi.laws.QuadraticLinearLiteral(gamma1=2e6, gamma2=1e6, delta=1e-6),
+    hvi.laws.Tresca(3.2e5),
+    hvi.laws.LinearSpring(1e12),
+    hvi.laws.Sawtooth(1e6, 6e5, 5e-7, 3),
+    hvi.laws.Exponential(4.5e5, 4e5, 2e-6),
+    hvi.laws.Graph(points=((0.0, 0.0), (1e-6, 1.2e6), (8e-6, 4e5))),
+    Fading(),
+]
+
+
+@pytest.mark.parametrize("law", LAWS, ids=lambda law: law.name)
+def test_each_law_acts_on_an_interface(law: hvi.laws.Superpotential) -> None:
+    """The traction that balances the bodies is that of the law at the relative slip, or between its limits there."""
+    body = two_block_body().interface("seam", "foot", "seat")
+    found = hvi.solve(hvi.Model(body, [*LOADS, hvi.Contact("seam"), hvi.Friction("seam", law)]))
+    assert found.converged
+    seam = found.contact["seam"]
+    slip = np.ravel(seam.slip)
+    below, above = (law.left(slip + step) for step in (-1e-13, 1e-13))
+    low, high = np.minimum(below, above), np.maximum(below, above)
+    assert np.abs(seam.friction).max() > 1e5
+    assert np.all(np.ravel(seam.friction) >= low - 10.0)
+    assert np.all(np.ravel(seam.friction) <= high + 10.0)
 
 
 @pytest.mark.parametrize(
