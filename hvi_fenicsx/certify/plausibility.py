@@ -14,6 +14,7 @@ from dolfinx import fem
 from petsc4py import PETSc
 
 from ..effects import Direction
+from ..mesh import facet_sizes, nodes
 from ..problem.contact_normals import largest_turn
 from ..problem.law_term import LawTerm
 from ..problem.problem import Problem
@@ -43,6 +44,7 @@ def before_solving(
         *problem.implausible,
         *_scales(problem, thresholds),
         *_uneven_parts(problem, thresholds),
+        *_polygons(problem, thresholds),
         *_weak_laws(problem, forces, thresholds),
     )
 
@@ -124,6 +126,25 @@ def _uneven_parts(problem: Problem, thresholds: PlausibilityThresholds) -> Itera
                 f"{_place_of_bounds(problem, surface.part)}: the part is nearly flat, its normals turn by up to "
                 f"{turn:.1e} rad; this unevenness is part of the problem. If it is rounding of the mesh's coordinates, "
                 "state the flat part: contact = { obstacle = { point = [...], normal = [...] } }"
+            )
+
+
+def _polygons(problem: Problem, thresholds: PlausibilityThresholds) -> Iterator[str]:
+    """Contact parts of degree 2 whose facets seem to be those of a curve that the program does not know. Collective."""
+    domain, comm = problem.domain, problem.domain.mesh.comm
+    if nodes.degree(problem.space) == 1:
+        return
+    known = np.concatenate([np.empty(0, np.int32), *(domain.sides[name] for name in domain.curves)])
+    for surface in (bounds.surface for bounds in problem.bounds):
+        turns = facet_sizes.turns(domain.mesh, np.setdiff1d(surface.facets, known).astype(np.int32))
+        bent = turns[(turns > thresholds.straight) & (turns < thresholds.corner)]
+        if total(comm, len(bent)) > thresholds.mostly_bent * total(comm, len(turns)):
+            most = np.degrees(largest(comm, float(np.max(bent, initial=0.0))))
+            yield (
+                f"{_place_of_bounds(problem, surface.part)}: nearly all facets turn from one to the next, by up to "
+                f"{most:.2g}°, as those of a curved side. They are taken for a polygon, and the pressure of degree 2 "
+                "shows its corners: give a mesh file of second order (gmsh: Mesh.ElementOrder = 2), or use "
+                "solver.degree = 1"
             )
 
 

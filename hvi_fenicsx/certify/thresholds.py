@@ -57,6 +57,9 @@ class PlausibilityThresholds:
         rounding: displacement or work of a rigid motion, nondimensional, up to which it is none.
         flat: angle (rad) between the normals of a part, up to which the part is flat.
         uneven: angle up to which it may be meant to be flat.
+        straight: angle (rad) between facets at a vertex, up to which they are one plane, with its rounding.
+        corner: angle from which on it is a corner of the body.
+        mostly_bent: share of the vertices with an angle between the two from which on a part is a curve's polygon.
         dip: penetration between nodes over the largest displacement that matters.
     """
 
@@ -72,6 +75,9 @@ class PlausibilityThresholds:
     rounding: float = 1e-10
     flat: float = 1e-8
     uneven: float = 0.02
+    straight: float = 1e-3
+    corner: float = 0.6
+    mostly_bent: float = 0.5
     dip: float = 1e-2
 
 

@@ -1,4 +1,4 @@
-"""Corners and sizes of the facets of a boundary part, each counted on one rank."""
+"""Corners, sizes and turns of the facets of a boundary part, each counted on one rank."""
 
 from __future__ import annotations
 
@@ -43,3 +43,26 @@ def areas(points: Array) -> Array:
     edges = points[:, 1:] - points[:, :1]
     gram = np.einsum("fki,fli->fkl", edges, edges)
     return np.asarray(np.sqrt(np.maximum(np.linalg.det(gram), 0.0)) / math.factorial(edges.shape[1]))
+
+
+def turns(mesh: dolfinx.mesh.Mesh, facets: Entities) -> Array:
+    """The largest angle (rad, up to a right one) between a vertex's first facet and its others, by vertex.
+
+    Args:
+        mesh: of simplices.
+        facets: local facets.
+
+    Returns:
+        Of the vertices that have several of the facets, (n,).
+    """
+    points, d = corners(mesh, facets), mesh.topology.dim
+    edges = points[:, 1:] - points[:, :1]
+    normals = edges[:, 0, ::-1] * [1.0, -1.0] if d == 2 else np.cross(edges[:, 0], edges[:, 1])
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    nodes = dolfinx.mesh.entities_to_geometry(mesh, d - 1, facets).ravel() if len(facets) else np.empty(0, np.int32)
+    _, first, vertex, count = np.unique(nodes, return_index=True, return_inverse=True, return_counts=True)
+    own = np.repeat(normals, d, axis=0)
+    along = np.abs(np.sum(own * own[first][vertex], axis=1))
+    least = np.ones(len(first))
+    np.minimum.at(least, vertex, along)
+    return np.asarray(np.arccos(np.minimum(least, 1.0))[count > 1])

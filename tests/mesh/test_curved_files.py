@@ -14,8 +14,8 @@ from dolfinx import mesh as dmesh
 from mpi4py import MPI
 from runs import hvi, summary
 
-from hvi_fenicsx import InputError, Scene, read_scene
-from hvi_fenicsx.mesh import gmsh_file, refinement
+from hvi_fenicsx import InputError, Scene, prepare, read_scene
+from hvi_fenicsx.mesh import facet_sizes, gmsh_file, refinement
 from hvi_fenicsx.mesh.curved_facets import CurvedFacets
 from hvi_fenicsx.mesh.domain import Domain
 from hvi_fenicsx.modelling import solve
@@ -112,6 +112,29 @@ def test_a_side_is_moved_with_its_body() -> None:
 
 def hertz(domain: str) -> Scene:
     return read_scene(DEMOS / "hertz.toml", ["solver.degree=2", f"domain={domain}"])
+
+
+@pytest.mark.parametrize(("order", "degree", "warned"), [(1, 2, True), (2, 2, False), (1, 1, False)])
+def test_curved_sides_of_first_order_are_warned_of(order: int, degree: int, warned: bool, tmp_path: Path) -> None:
+    file = meshes.make(tmp_path / "half.msh", HALF.format(order=order))
+    scene = hertz(f'{{shape="file", file="{file}"}}').with_solver(degree=degree)
+    found = [text for text in prepare(scene).warnings if "of a curved side" in text]
+    assert [text.startswith("boundary.floor.contact") for text in found] == [True] * warned
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_angles_between_facets_are_those_of_the_body(dimension: int) -> None:
+    """Of a square or cube a right one at corners and edges, and none elsewhere; no vertex counts that has one facet."""
+    mesh = (dmesh.create_unit_square, dmesh.create_unit_cube)[dimension - 2](MPI.COMM_SELF, *[4] * dimension)
+    mesh.topology.create_connectivity(dimension - 1, dimension)
+    everywhere = dmesh.exterior_facet_indices(mesh.topology)
+    angles = facet_sizes.turns(mesh, everywhere)
+    assert len(angles) == (16, 98)[dimension - 2]
+    assert np.sum(np.isclose(angles, np.pi / 2)) == (4, 44)[dimension - 2]
+    assert np.sum(angles < 1e-7) == len(angles) - (4, 44)[dimension - 2]
+    floor = dmesh.locate_entities_boundary(mesh, dimension - 1, lambda x: np.isclose(x[0], 0.0))
+    assert np.all(facet_sizes.turns(mesh, floor) < 1e-7)
+    assert len(facet_sizes.turns(mesh, floor[:1])) == 0
 
 
 @pytest.mark.long
