@@ -96,7 +96,8 @@ class LinearSettings:
         """Default options of the Krylov method."""
         if self.kind == "lu":
             return {"ksp_type": "preonly"}
-        return {"ksp_type": "fcg" if self.kind == "mixed" else "cg", "ksp_norm_type": "unpreconditioned"}
+        # where a start is already a solution, PETSc's flexible CG (fcg) is freed without having been set up, and fails
+        return {"ksp_type": "fgmres" if self.kind == "mixed" else "cg", "ksp_norm_type": "unpreconditioned"}
 
     @property
     def iterations(self) -> int:
