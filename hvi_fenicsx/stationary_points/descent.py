@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -14,6 +15,8 @@ from .scalar_problem import ScalarProblem
 
 MOST_STEPS = 60
 """Convex programmes of one descent."""
+REACH = 10.0
+"""Falls as large as the last one with which an energy is reached at most."""
 SLOW = 1e-12
 """Where laws act on lengths, a fall of the energy below this share of its parts is the last."""
 ROUNDING = 1e-13
@@ -42,7 +45,7 @@ def majorant(arcs: Chain, low: float, high: float, x: float) -> Sequence[Arc]:
     return result
 
 
-def descend(problem: ScalarProblem, low: Array, high: Array, x: Array) -> tuple[Array, float]:
+def descend(problem: ScalarProblem, low: Array, high: Array, x: Array, goal: float = math.inf) -> tuple[Array, float]:
     """A point of a box at which no convex step lowers the energy, and its energy.
 
     Args:
@@ -50,6 +53,7 @@ def descend(problem: ScalarProblem, low: Array, high: Array, x: Array) -> tuple[
         low: of the box, (n + m,), finite.
         high: of the box, (n + m,), finite.
         x: where to begin, (n,).
+        goal: a descent that comes down too slowly to reach this energy is given up.
     """
     energy = problem.energy(x)
     for _ in range(MOST_STEPS):
@@ -62,7 +66,7 @@ def descend(problem: ScalarProblem, low: Array, high: Array, x: Array) -> tuple[
         if not fall > ROUNDING * size:
             break
         x, energy = found, after
-        if len(problem.lengths) and fall <= SLOW * size:
+        if energy - goal > REACH * fall or (len(problem.lengths) and fall <= SLOW * size):
             break
     return np.asarray(x), energy
 

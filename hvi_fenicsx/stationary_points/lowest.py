@@ -30,6 +30,8 @@ MOST_ROUNDS = 6
 """How often a box is tightened and bounded before it is divided."""
 WORTHWHILE = 0.15
 """A round that closes less than this share of a box's gap is the last."""
+MOST_SKIPPED = 10
+"""Boxes from which no descent is made, between two from which one is."""
 ROUNDING = 1e-13
 """Energies that differ by less than this share of their parts are equal."""
 
@@ -79,6 +81,7 @@ class LowestSearch:
     def __post_init__(self) -> None:
         self._relaxation = Relaxation(self.problem)
         self._forces = ForceIntervals(self.problem)
+        self._in_vain = self._next_descent = 0
 
     def start(self, points: Iterable[Array] = ()) -> None:
         """Bound the whole problem.
@@ -215,7 +218,7 @@ class LowestSearch:
                 if self._closed(box):
                     return None
                 if part == PARTS[-1] and round_ == 0:
-                    self._try(box.x)
+                    self._try_at_times(box.x)
                     if self._closed(box):
                         return None
                 reach = curvature.radii * math.sqrt(2.0 * max(self.upper - box.bound, 0.0))
@@ -228,9 +231,18 @@ class LowestSearch:
     def _closed(self, box: Box) -> bool:
         return box.bound >= self.upper - self._allowed
 
+    def _try_at_times(self, x: Array) -> None:
+        """Descend from a point, the more seldom the more often in a row nothing lower was found."""
+        if self.boxes < self._next_descent:
+            return
+        before = self.upper
+        self._try(x)
+        self._in_vain = 0 if self.upper < before else min(self._in_vain + 1, MOST_SKIPPED)
+        self._next_descent = self.boxes + self._in_vain
+
     def _try(self, x: Array) -> None:
         """Descend from a point."""
-        found, energy = descend(self.problem, self._low, self._high, x)
+        found, energy = descend(self.problem, self._low, self._high, x, self.upper)
         if energy < self.upper:
             self.x, self.upper = found, energy
 
