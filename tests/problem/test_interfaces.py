@@ -402,6 +402,7 @@ def covering() -> Scene:
     return stacked(boundary, {**CONTACT, "friction": quadratic_linear(1e6, 1e-6)})
 
 
+@pytest.mark.long
 def test_exchanging_the_sides_changes_less_with_each_mesh() -> None:
     """Energies, so at least the second order in the mesh width."""
     differences = differences_by_side(covering().model_dump(), (2, 4, 8))
