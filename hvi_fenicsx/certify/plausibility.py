@@ -193,7 +193,7 @@ def _strain(problem: Problem, u: fem.Function, thresholds: PlausibilityThreshold
 
 
 def _shortest_edge(problem: Problem) -> float:
-    """Of all cells, m. Collective."""
+    """The shortest edge of all cells, m. Collective."""
     edges = _along_edges(problem, problem.points[:, : problem.scales.dimension])
     shortest = min(float(np.min(np.einsum("nd,nd->n", edge, edge), initial=np.inf)) for edge in edges)
     return float(np.sqrt(-largest(problem.domain.mesh.comm, -shortest)))

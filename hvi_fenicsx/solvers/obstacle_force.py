@@ -59,7 +59,7 @@ class ObstacleBalance:
 
     @property
     def difference(self) -> float:
-        """Of both, relative to the force."""
+        """The difference of both, relative to the force."""
         return abs(self.borne - self.force) / self.force
 
     @property

@@ -21,7 +21,7 @@ from .scalar_problem import ScalarProblem
 MOST_STEPS = 40
 """Newton steps of one attempt."""
 ACCURACY = 1e-11
-"""Of a root, relative to the largest force."""
+"""Residual of a root, relative to the largest force."""
 LONGEST = 10.0
 """How much longer or shorter a step becomes by deflation at most."""
 

@@ -24,7 +24,7 @@ from .scalar_problem import ScalarProblem
 PROGRAMMES = ((0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875, 1.0), (2.0, 1.5, 1.0), (4.0, 2.0, 1.0), (-1.0, 0.0, 1.0))
 """Load factors, one after the other; each programme begins at rest."""
 MULTIPLES = (0.0, 0.5, 2.0, 5.0, 20.0)
-"""Of the state that loading leads to."""
+"""Multiples of the state that loading leads to."""
 MOST_SHIFTS = 16
 """By how many different numbers of pieces unknowns are moved."""
 FRONTS = 8
