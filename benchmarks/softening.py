@@ -98,6 +98,7 @@ SMOOTHED = {"smoothing": "quadratic", "epsilon": 0.01}
 CASES: dict[str, tuple[Table, Table]] = {
     # the scene; what stands in the column of springs
     "peeling, 30,050": (peeling([600, 24]), peeling([600, 24])),
+    "peeling, 465,794": (peeling([2400, 96]), peeling([2400, 96])),
     "glued bar, 0.98 of its strength": (bar([380, 2], 0.98), bar([380, 2], 0.98)),
     "single lap, load x 3": (lap(3.0), lap(3.0)),
     "plate in space": (plate([24, 10, 3], 1e-4), plate([24, 10, 3], 1e-4)),
