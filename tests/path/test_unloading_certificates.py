@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from runs import ROOT
+from scenes import model
 
 import hvi_fenicsx as hvi
 from hvi_fenicsx import prepare
@@ -66,3 +67,15 @@ def test_a_force_inside_the_body_that_nothing_carries_is_seen(demo: str) -> None
         size = float(np.linalg.norm(forces.load))
         assert (left < 1e-8 * float(np.linalg.norm(forces.reaction))) is balanced
         assert balanced or left > 0.01 * size
+
+
+def test_a_smoothed_law_unloaded_to_nothing_is_loaded_again() -> None:
+    """At no load a body on its floor is at rest, not off; without memory it comes to where it was."""
+    table = model(4, pull=4e6, press=1e6, friction={"law": "graph", "points": [[0, 0], [2e-6, 3e6], [1.6e-5, 0]]})
+    table["solver"] = {"smoothing": "quadratic", "epsilon": 0.05}
+    scene = hvi.Scene.model_validate(table)
+    path = hvi.follow(scene, to=[0.9, 0.0, 1.2], memory=False)
+    assert path.end == "reached"
+    assert path.uncertified == 0
+    once = hvi.follow(scene, to=1.2, memory=False)
+    assert path.displacement("pull")[-1] == pytest.approx(once.displacement("pull")[-1], rel=1e-9)

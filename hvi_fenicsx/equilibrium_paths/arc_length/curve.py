@@ -137,7 +137,8 @@ class Curve(Equations):
         ways, ends = self._ends()
         first, until, safe = float(np.min(ways, initial=np.inf)), self._until(aim), self._safe()
         way = min(first, until, safe)
-        if way == until:
+        if until <= way * (1.0 + 0.1 * ROUNDING):  # what ends with the factor at its aim goes on from there, if at all
+            way = until
             outcome, site, condition = Outcome.FACTOR, None, self.at_factor(aim)
         elif way == first:
             site = int(np.argmin(ways))
