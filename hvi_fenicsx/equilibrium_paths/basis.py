@@ -17,7 +17,7 @@ from .step import FACTOR
 
 _KEPT = 1e-6
 """What an inverse that is kept may leave of a column; one step of refinement takes this out."""
-_WEAK = 1e-3
+WEAK = 1e-3
 """A pivot that is so small beside its column costs digits."""
 
 
@@ -98,10 +98,10 @@ class Basis:
             0 where that, or an exchange, costs no fewer digits: nothing is done; else the direction in which the
             driving variable goes on, relative to before, for the coordinate to go on as it did.
         """
-        if _strength(self.column, changed) >= _WEAK:
+        if _strength(self.column, changed) >= WEAK:
             return 0
         spread = self.roughly(self._cells.column(changed))
-        if _strength(spread, changed) < _WEAK:
+        if _strength(spread, changed) < WEAK:
             return 0
         self._inverse = _exchanged(self._inverse, spread, changed)
         return 1 if spread[changed] > 0.0 else -1
