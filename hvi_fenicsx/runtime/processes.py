@@ -77,13 +77,18 @@ def stop_asked() -> bool:
     return bool(_CAUGHT)
 
 
+def forget_signals() -> None:
+    """A new command begins: the signals that were caught before do not concern it."""
+    _CAUGHT.clear()
+
+
 def raise_on_stop() -> Callable[[], bool]:
     """Have the signals of a stop raise KeyboardInterrupt, until a command catches them itself.
 
     Returns:
         Whether one has raised it: a library that it passes through may make another error of it.
     """
-    _CAUGHT.clear()
+    forget_signals()
     raised: list[int] = []
 
     def stop(number: int, frame: FrameType | None) -> None:

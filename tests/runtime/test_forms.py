@@ -113,16 +113,17 @@ def test_a_compiler_that_a_signal_ended_is_not_started_again(tmp_path: Path, mon
         raise OSError("the compiler was ended")
 
     monkeypatch.setattr(fem, "form", ended)
-    monkeypatch.setattr(processes, "_CAUGHT", [])
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "t"))
     (tmp_path / "t").mkdir()
     before = signal.getsignal(signal.SIGUSR1)
+    processes.forget_signals()
     processes.catch([signal.SIGUSR1], lambda *_: None)
     try:
         with pytest.raises(KeyboardInterrupt):
             FormCache(tmp_path / "cache").compiled(area())
     finally:
         signal.signal(signal.SIGUSR1, before)
+        processes.forget_signals()
     assert list((tmp_path / "t").iterdir()) == []
 
 
