@@ -225,4 +225,5 @@ def _solved(
         u = fem.Function(prepared.problem.space, name="displacement")
         result = SolveResult(u=u, method=options.method, converged=False, reason=str(error))
         levels = start.levels if isinstance(start, CoarseStart) else ()
-        return LevelSolution(system=system, levels=levels, result=result), balance
+        nothing = obstacle_force.unsolved(prepared.problem, options.tolerance)
+        return LevelSolution(system=system, levels=levels, result=result), nothing

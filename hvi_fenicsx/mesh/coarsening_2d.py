@@ -39,7 +39,7 @@ def coarsen(domain: Domain, factor: float, thresholds: Thresholds = DEFAULT) -> 
             return None
         mesh, found, within = gmsh_model.distribute(comm, gmsh and gmsh_arrays.extract(gmsh, 2), 2, names)
     mesh.geometry.x[:] *= domain.length
-    return replace(domain, mesh=mesh, sides=found, regions={name: within[name] for name in regions})
+    return replace(domain, mesh=mesh, sides=found, regions={name: within[name] for name in regions}, shared=None)
 
 
 def _half_edges(domain: Domain, sides: Sequence[str], regions: Sequence[str]) -> HalfEdges:

@@ -78,7 +78,8 @@ def coarsen(domain: Domain, factor: float, thresholds: Thresholds = DEFAULT) -> 
     if min(agree(comm, len(mine))) == 0:
         return None
     mesh = compat.simplex_mesh(comm, mine, points if comm.rank == 0 else points[:0], "tetrahedron")
-    found = replace(domain, mesh=mesh, sides=_sides(domain, mesh, surface), regions=_regions(domain, mesh, cells))
+    sides, regions = _sides(domain, mesh, surface), _regions(domain, mesh, cells)
+    found = replace(domain, mesh=mesh, sides=sides, regions=regions, shared=None)
     return found if _similar(domain, found, thresholds.remeshed_size) else None
 
 

@@ -100,7 +100,7 @@ def _refined(domain: Domain, edges: Entities | None) -> Refinement:
     sides = _sides(domain, mesh, parents, halves)
     regions = {name: np.flatnonzero(np.isin(parents, cells)).astype(np.int32) for name, cells in domain.regions.items()}
     _bend(mesh, sides, domain.curves)
-    fine = replace(domain, mesh=mesh, sides=sides, regions=regions, coarsening=None)
+    fine = replace(domain, mesh=mesh, sides=sides, regions=regions, coarsening=None, shared=None)
     return Refinement(fine, ParentCellTransfer(parents, halves))
 
 

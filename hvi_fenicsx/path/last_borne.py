@@ -1,6 +1,7 @@
 """Above the limit load: the last state that is borne, in the place of a body on its way off.
 
-Where ``auto`` has followed the load path to its end, that state is known; else the path is followed here.
+Where ``auto`` has followed the load path to its end, that state is known; else the path is followed here, as where
+obstacles are moved: on the path of ``auto`` they stay where they have been moved to.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from ..problem.problem import Problem
 from ..runtime.log import logger
 from ..scene import PathTable
 from ..solution import LastBorne, Solution
-from ..solvers import frozen_mixity
+from ..solvers import frozen_mixity, obstacle_force
 from ..solvers.context import never
 from ..solvers.result import Borne
 from ..system import loading
@@ -30,7 +31,7 @@ _LOG = logger("path")
 def in_place_of(prepared: Preparation, failed: Solution, interrupted: Callable[[], bool] = never) -> Solution:
     """The last state that is borne, where no solution was found and the body may come off; else what was found.
 
-    The factor of all loads and prescribed displacements grows from 0; bonds have no memory. Collective.
+    The factor of loads, prescribed displacements and moved obstacles grows from 0; bonds have no memory. Collective.
 
     Args:
         prepared: the scene.
@@ -40,7 +41,8 @@ def in_place_of(prepared: Preparation, failed: Solution, interrupted: Callable[[
     if not _may_come_off(prepared, failed):
         return failed
     assert failed.solve_result is not None
-    if (known := failed.solve_result.borne) is not None:
+    moved = any(bounds.move is not None for bounds in prepared.problem.bounds)  # which `auto` does not scale
+    if (known := failed.solve_result.borne) is not None and not moved:
         factored = FactoredProblem(prepared.problem, loading.names(prepared.system))
         return _shown(prepared, factored.at(known.factor), known, failed)
     _LOG.info("no equilibrium found under the whole load: the load is followed from 0 to the last state that is borne")
@@ -75,6 +77,8 @@ def _may_come_off(prepared: Preparation, failed: Solution) -> bool:
         return False
     system = prepared.system
     if failed.solvability.state == "held" or not prepared.problem.has_potential:
+        return False
+    if obstacle_force.pressed(prepared.problem) is not None:
         return False
     if system.comm.allreduce(len(system.jacobian.rows.dofs)) > prepared.options.thresholds.path.vertex_unknowns:
         return False

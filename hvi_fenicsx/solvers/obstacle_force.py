@@ -84,6 +84,20 @@ def pressed(problem: Problem) -> BoundsForce | None:
     return found[0] if found else None
 
 
+def unsolved(problem: Problem, tolerance: float) -> ObstacleBalance | None:
+    """Where nothing was found: the obstacle as it is described, contact bears nothing; None where no force presses one.
+
+    Args:
+        problem: the problem.
+        tolerance: relative, of what contact is to bear.
+    """
+    if (force := pressed(problem)) is None:
+        return None
+    return ObstacleBalance(
+        name=force.name, way=0.0, direction=force.direction, force=force.force, borne=0.0, tolerance=tolerance
+    )
+
+
 def refuse(problem: Problem, what: str) -> None:
     """Refuse a problem with such an obstacle.
 
@@ -245,6 +259,8 @@ class _Ways:
             way: that was tried last.
             borne: what was found there.
         """
+        if way == self._points[-1][0]:  # as near as rounding allows
+            return None
         self._points.append((way, borne))
         if borne < self._force:
             self._low = max(self._low, way)

@@ -56,7 +56,8 @@ class MixedMultigrid:
         self._shear, below = _without_dilatation(system, levels)
         self._multigrid = Multigrid(self._shear, below, options)
         self._saddle_point = _saddle_point(system, self._shear, self._parts)
-        self._given = PETSc.Vec().createNest([system.load.duplicate(), *(p.stiffness.duplicate() for p in self._parts)])
+        vectors = [system.load.duplicate(), *(p.stiffness.duplicate() for p in self._parts)]
+        self._given = PETSc.Vec().createNest(vectors, comm=system.comm)
         self._found = self._given.duplicate()
         self._minres = self._solver()
         self.accuracy, self.iterations = system.thresholds.mixed_accuracy, 0

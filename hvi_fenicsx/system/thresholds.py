@@ -17,10 +17,9 @@ class Thresholds:
         mixed_accuracy: relative residual that a solve for displacements and pressures leaves.
         mixed_margin: factor of that residual, over λ/μ, to which the equations of displacements and pressures are
             solved.
-        mixed_margin: float = 0.05
-    mixed_iterations: int = 1_000
-    refinements: int = 20
-    least_mixed_accuracy: relative residual of its own equations that rounding allows.
+        mixed_iterations: iterations of that solve at most.
+        refinements: iterations at most of the Krylov method around it.
+        least_mixed_accuracy: relative residual of its own equations that rounding allows.
         drift: change of a law's nodal stiffness, relative to an elastic one (about 1), up to which a Krylov method
             keeps its preconditioner.
         changed_held: part of the held unknowns that may change while algebraic multigrid keeps its preconditioner.

@@ -61,3 +61,17 @@ def test_below_the_limit_nothing_is_followed() -> None:
     found = hvi.solve(Scene.model_validate(block(CELLS, 0.7 * P, P, quadratic_linear(STRENGTH))))
     assert found.converged
     assert found.last_borne is None
+
+
+@pytest.mark.parametrize("method", ["auto", "branch"])
+def test_moved_obstacles_are_scaled_as_on_a_path(method: str) -> None:
+    """A plate that goes down presses the block in the place of a load."""
+    table = block(CELLS, ABOVE, P, quadratic_linear(STRENGTH), method=method)
+    plate = {"point": [0.0, 1.0], "normal": [0.0, -1.0], "displacement": [0.0, -1e-5]}
+    table["boundary"]["press"] = {"on": "top", "contact": {"obstacle": plate}}
+    scene = Scene.model_validate(table)
+    found, path = hvi.solve(scene), hvi.follow(scene, memory=False)
+    assert found.last_borne is not None
+    assert found.examination is not None
+    assert found.examination.certificate.passed
+    assert found.last_borne.factor == pytest.approx(float(path.factors.max()), rel=1e-9)
