@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 
 from ..certify.certificate import Examination
 from ..errors import InputError
+from ..problem.cell_stress import mean_stress
 from ..results import ResultFolder, gathering
 from ..results.output_folder import Existing
 from ..results.whole import Wanted, write_whole
@@ -56,7 +57,7 @@ class ModelSolution(Solution):
         """
         space = fem.functionspace(self.problem.domain.mesh, ("Discontinuous Lagrange", 0, (3, 3)))
         field = fem.Function(space, name="stress")
-        values = self.problem.bulk.stress(self._solved.u)
+        values = mean_stress(self.problem.bulk, self._solved.u)
         field.x.array[: values.size] = values.ravel()
         field.x.scatter_forward()
         return field

@@ -10,7 +10,6 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
-import basix.ufl
 import numpy as np
 import ufl
 from dolfinx import fem
@@ -22,7 +21,7 @@ from ..mesh import nodes
 from ..mesh.shared import Shared
 from ..runtime import forms
 from ..typing import Array
-from . import nodal_averaging, stress
+from . import nodal_averaging
 from .nodal_averaging import Dilatation
 from .scaling import Scales
 from .strain_energy import feels_no_rigid_motion
@@ -254,42 +253,6 @@ class Bulk:
         """
         cells = self.space.mesh.topology.index_map(self.scales.dimension).size_local
         return sum((part.error(u) for part in self.dilatations), np.zeros(cells))
-
-    def stress(self, u: fem.Function) -> Array:
-        """The mean stress of every owned cell, N/m², tension positive; shape (cells, 3, 3). Collective.
-
-        It follows from the energy itself, so a new material needs nothing here: with v = q·x, q being constant in one
-        cell and zero elsewhere, ε(v) is the symmetric part of q, and the stress does the work |K| σ:q in it. σ_33 is
-        zero in plane stress, and what holds the thickness in plane strain. Where div u is averaged by vertex, so is the
-        volumetric stress.
-        """
-        mesh, scales = self.space.mesh, self.scales
-        one = basix.ufl.element("Discontinuous Lagrange", mesh.topology.cell_name(), 0)
-        count = len(stress.COMPONENTS[scales.dimension]) + 2
-        *q, across, volume = ufl.TestFunction(fem.functionspace(mesh, basix.ufl.blocked_element(one, (count,))))
-        pressures = self.pressures(u)
-        v = stress.linear_field(q, ufl.SpatialCoordinate(mesh)) / scales.length
-        found = nodal_sum(sum(self._across(u, pressures, across), self._work(u, pressures, v)))
-        found /= nodal_sum(volume * ufl.dx)[:, -1:]
-        sigma = stress.tensors(found[:, :-2], found[:, -2])
-        return np.asarray(sigma * scales.stress * scales.length**scales.dimension)
-
-    def _work(self, u: fem.Function, pressures: Sequence[fem.Function], v: Any) -> Any:
-        """The UFL form of the work of the stresses in v."""
-        test, trial = self.form.arguments()
-        form = ufl.replace(self.material, {test: v, trial: u})
-        for name in sorted(self.strains):
-            form -= ufl.replace(self.strains[name], {test: v})
-        for part, pressure in zip(self.dilatations, pressures, strict=True):
-            form += part.work(pressure, v)
-        return form
-
-    def _across(self, u: fem.Function, pressures: Sequence[fem.Function], q: Any) -> list[Any]:
-        """Forms of ∫ σ_33 q dx, which the energy of a plane body does not know; none in space and in plane stress."""
-        if self.scales.dimension == 3:
-            return []
-        found = [ufl.replace(form, dict(zip(form.arguments(), (q, u), strict=False))) for form in self.across]
-        return found + [part.across(p, q) for part, p in zip(self.dilatations, pressures, strict=True)]
 
 
 def make_bulk(

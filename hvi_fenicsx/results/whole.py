@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import HviError
+from ..problem.cell_stress import mean_stress
 from ..report.html import render
 from ..report.pictures.draw import drawing
 from ..runtime.mpi import on_root
@@ -61,7 +62,7 @@ def write_whole(
     """
     work, comm, solved = folder.work, folder.comm, solution.solve_result
     with timer("output"):
-        sigma = None if solved is None else solution.problem.bulk.stress(solved.u)
+        sigma = None if solved is None else mean_stress(solution.problem.bulk, solved.u)
         record = {**write_basis(work, solution, folder.target, sigma), **given}
         on_root(comm, lambda: write_record(work, record))
         with _drawn(work, tell, wanted=wanted.pictures and comm.rank == 0):
