@@ -18,7 +18,8 @@ from ..typing import Array
 from .base import Drive, Effect, Evaluate, FormContext, Place, Sizes
 from .contribution import Contribution, NormalBounds, ObstacleForce, ObstacleMove
 from .formula_field import FormulaField, as_formula, require_components
-from .obstacles import Obstacle, ObstacleField, ObstacleGap, Vector, unit
+from .obstacle_field import ObstacleField, ObstacleGap
+from .obstacles import Obstacle, Vector, unit
 
 MEASURED = "measured"
 """The gap between two bodies is the distance of their sides as they are meshed."""

@@ -167,7 +167,8 @@ def _left_of_all(search: Enumeration) -> Saved:
     return {"lowest": np.array(False), "x": found, **_stacked(listed)}
 
 
-def _all(task: _Task) -> Found:
+def _enumeration(task: _Task) -> Enumeration:
+    """The search for all points: a new one, with what is found without a proof, or one to go on with."""
     problem, saved = task.problem, task.saved
     search = Enumeration(problem=problem)
     if saved is None:
@@ -180,8 +181,11 @@ def _all(task: _Task) -> Found:
         low, high = saved["low"], saved["high"]
         cells = [fresh_box(low[i], high[i], 0.5 * (low[i] + high[i])) for i in range(len(low))]
         search.waiting = [replace(cell, share=1.0 / len(cells)) for cell in cells]
+    return search
 
-    clock = Clock()
+
+def _all(task: _Task) -> Found:
+    search, clock = _enumeration(task), Clock()
 
     def tell(now: Enumeration) -> None:
         task.report(all_in_words(now, clock))
@@ -202,7 +206,7 @@ def _all(task: _Task) -> Found:
         nodes=search.cells,
         reason=_in_words(points) if complete else f"{len(points)} found, and {len(search.waiting)} cells are open",
         left={} if complete else _left_of_all(search),
-        passes=passes(problem, points) if complete else (),
+        passes=passes(task.problem, points) if complete else (),
     )
 
 
