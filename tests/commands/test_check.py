@@ -53,6 +53,17 @@ def test_the_sizes_are_those_of_the_scene(ranks: int) -> None:
     assert "sum of wind.traction: (2e+04, 0) N/m" in hvi("check", TOWER, ranks=ranks).stdout
 
 
+@pytest.mark.parametrize("ranks", [1, pytest.param(2, marks=pytest.mark.long)])
+def test_the_force_on_an_obstacle_is_told_in_the_units_of_the_scene(tmp_path: Path, ranks: int) -> None:
+    table = model(4)
+    plate = {"point": [0.0, 1.0], "normal": [0.0, -1.0], "force": [300.0, -2e4]}
+    table["boundary"]["lid"] = {"on": "top", "contact": {"obstacle": plate}}
+    file = write_scene(tmp_path / "pressed.toml", table)
+    sizes = json.loads(hvi("check", file, "--json", ranks=ranks).stdout)["sizes"]
+    assert sizes["obstacle_forces"] == {"lid.contact": pytest.approx([300.0, -2e4])}
+    assert "force on the obstacle of lid.contact: (300, -2e+04) N/m" in hvi("check", file, ranks=ranks).stdout
+
+
 def test_a_load_that_is_not_there_is_told_with_those_that_are() -> None:
     done = hvi("check", TOWER, "--load", "snow")
     assert done.returncode == 2

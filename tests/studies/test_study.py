@@ -485,3 +485,26 @@ def test_an_interrupted_study_keeps_its_points_and_goes_on(tmp_path: Path, numbe
     assert hvi(*words, "--resume").returncode == 0
     assert {p: p.stat().st_mtime_ns for p in kept} == kept
     assert len(data(tmp_path / "out")["points"]) == 5
+
+
+def test_each_point_of_a_study_presses_its_obstacle_by_the_force(tmp_path: Path) -> None:
+    """A column without lateral contraction is exact on each mesh: energy F² h/(2 E b), and nothing is off."""
+    force, height, modulus = 2e4, 0.5, 1e9
+    plate = {"point": [0.0, height + 1e-4], "normal": [0.0, -1.0], "force": [0.0, -force]}
+    table = {
+        "domain": {"shape": "rectangle", "size": [1.0, height], "cells": [4, 2]},
+        "material": {"model": "plane_strain", "youngs_modulus": modulus, "poisson_ratio": 0.0},
+        "boundary": {
+            "base": {"on": "bottom", "displacement": [0.0, 0.0]},
+            "lid": {"on": "top", "contact": {"obstacle": plate}},
+        },
+    }
+    file = write_scene(tmp_path / "column.toml", table)
+    done = hvi("study", file, "--axis", "mesh=4,8", "--out", tmp_path / "out", "--repeat", 1)
+    assert done.returncode == 0, done.stderr
+    rows = list(csv.DictReader((tmp_path / "out" / "study.csv").open(encoding="utf-8")))
+    assert len(rows) == 2
+    for row in rows:
+        assert row["reason"] == "certified"
+        assert float(row["energy"]) == pytest.approx(force**2 * height / (2 * modulus), rel=1e-7)
+        assert max(float(row[f"error_{name}"]) for name in ("energy_norm", "pressure_l2", "resultant")) < 1e-6
