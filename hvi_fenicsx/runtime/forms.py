@@ -30,6 +30,7 @@ from mpi4py import MPI
 from .. import compat
 from ..errors import HviError, InputError
 from . import log, processes
+from .facet_numbers import renumbered
 from .mpi import agree, on_root
 
 _LOG = log.logger("runtime")
@@ -104,7 +105,7 @@ class FormCache:
         Raises:
             CompilationError: it cannot be compiled, on all ranks alike.
         """
-        comm = compat.comm_of(form)
+        form, comm = renumbered(form), compat.comm_of(form)
         entry = _Entry(form, comm, on_root(comm, self._current), _name(form))
         try:
             return self._found(entry)

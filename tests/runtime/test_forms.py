@@ -14,6 +14,7 @@ import time
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import ufl
 from dolfinx import fem, mesh
@@ -21,6 +22,7 @@ from mpi4py import MPI
 from runs import ROOT, command, process, summary, write_scene
 from scenes import model, quadratic_linear
 
+from hvi_fenicsx import Scene, prepare
 from hvi_fenicsx.errors import HviError
 from hvi_fenicsx.runtime import forms, processes
 from hvi_fenicsx.runtime.forms import FormCache, Thresholds
@@ -52,6 +54,51 @@ def test_a_form_is_compiled_once(kept: Path) -> None:
     before = sorted((f.name, f.stat().st_mtime_ns) for f in entry(kept).iterdir())
     assert value(FormCache(kept).compiled(area())) == pytest.approx(3.0)
     assert sorted((f.name, f.stat().st_mtime_ns) for f in entry(kept).iterdir()) == before
+
+
+def test_parts_of_a_boundary_share_a_compiled_form_and_keep_their_own_facets(tmp_path: Path) -> None:
+    """70 parts of one facet each along a square's lower side: ∫ v ds is the part's length; and two that overlap."""
+    square = mesh.create_unit_square(MPI.COMM_SELF, 70, 1)
+    facets = mesh.locate_entities_boundary(square, 1, lambda x: np.isclose(x[1], 0.0))
+    middles = mesh.compute_midpoints(square, 1, facets)[:, 0]
+    tags = mesh.meshtags(square, 1, facets, np.floor(70 * middles).astype(np.int32))
+    v, ds = ufl.TestFunction(fem.functionspace(square, ("Lagrange", 1))), ufl.Measure("ds", square, subdomain_data=tags)
+    cache, x = FormCache(tmp_path), square.geometry.x[:, 0]
+    for part in range(70):
+        found = fem.assemble_vector(cache.compiled(v * ds(part))).array
+        assert found.sum() == pytest.approx(1 / 70)
+        assert np.allclose(x[found != 0], np.array([part, part + 1]) / 70)
+    assert len([folder for folder in tmp_path.iterdir() if folder.is_dir()]) == 1
+    both = fem.assemble_vector(cache.compiled(v * ds((8, 5)) + 3.0 * v * ds((5, 31)))).array
+    assert both.sum() == pytest.approx((1 + 4 + 3) / 70)
+    assert both @ x == pytest.approx((8.5 + 4 * 5.5 + 3 * 31.5) / 70**2)
+
+
+def test_more_parts_compile_no_more_forms(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Loads, contact and laws on 3 pieces of a side and on 12."""
+    names: set[str] = set()
+    compile_form = fem.form
+
+    def noted(form: Any, *, jit_options: dict[str, Any]) -> fem.Form:
+        names.add(jit_options["cache_dir"].name.partition(".")[0])
+        return compile_form(form, jit_options=jit_options)
+
+    monkeypatch.setattr(fem, "form", noted)
+
+    def needed(pieces: int) -> set[str]:
+        names.clear()
+        table = model(12)
+        for i in range(pieces):
+            where = f"x > {i / pieces} and x < {(i + 1) / pieces}"
+            table["boundary"][f"loaded-{i}"] = {"on": "top", "where": where, "traction": [f"{i}*y", -1e3 * i]}
+            touching = {"contact": {"gap": 1e-6 * i}, "friction": quadratic_linear(1e6)}
+            table["boundary"][f"floor-{i}"] = {"on": "bottom", "where": where, **touching}
+        del table["boundary"]["floor"]
+        assert prepare(Scene.model_validate(table)).problem.loads
+        return set(names)
+
+    assert needed(12) == needed(3)
+    assert needed(3)
 
 
 def test_what_a_killed_run_left_is_removed(kept: Path, tmp_path: Path) -> None:

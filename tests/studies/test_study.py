@@ -487,6 +487,7 @@ def test_an_interrupted_study_keeps_its_points_and_goes_on(tmp_path: Path, numbe
     assert len(data(tmp_path / "out")["points"]) == 5
 
 
+@pytest.mark.long
 def test_each_point_of_a_study_presses_its_obstacle_by_the_force(tmp_path: Path) -> None:
     """A column without lateral contraction is exact on each mesh: energy F² h/(2 E b), and nothing is off."""
     force, height, modulus = 2e4, 0.5, 1e9
