@@ -140,7 +140,8 @@ def _with_options(scene: Scene, options: dict[str, Any]) -> Scene:
 
 
 def _domain(model: Model) -> Domain:
-    """The body's domain; without coarser meshes where an energy can be formed on its own mesh only."""
+    """The body's domain; where an energy has data of its mesh, they may change: nothing is kept, no mesh is coarser."""
     domain = model.body.domain
     own = [m.elasticity for m in model.scene.material.values() if isinstance(m.elasticity, UserEnergy)]
-    return domain if all(energy.is_portable(domain.mesh) for energy in own) else replace(domain, coarsening=None)
+    portable = all(energy.is_portable(domain.mesh) for energy in own)
+    return domain if portable else replace(domain, coarsening=None, shared=None)

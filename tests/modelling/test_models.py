@@ -165,8 +165,13 @@ def test_an_own_energy_with_data_on_the_mesh_is_solved_without_coarser_meshes(bo
     loads = [hvi.Displacement("wall", [0.0, None]), hvi.Traction("pull", [1e6, 0.0]), hvi.Contact("floor")]
     press = hvi.Traction("press", [0.0, -1e6])
     once = hvi.solve(hvi.Model(body, [STEEL, press, *loads]))
-    twice = hvi.solve(hvi.Model(body, [hvi.Energy(stiffer), press, *loads]))
+    model = hvi.Model(body, [hvi.Energy(stiffer), press, *loads])
+    twice = hvi.solve(model)
     np.testing.assert_allclose(2 * twice.u.x.array, once.u.x.array, atol=1e-15)
+    factor.x.array[:] = 1.0
+    again = hvi.solve(model, start=twice)
+    assert again.converged
+    np.testing.assert_allclose(again.u.x.array, once.u.x.array, atol=1e-15)
 
 
 @pytest.mark.parametrize(
