@@ -119,3 +119,15 @@ def test_further_sections_of_packages_are_installed_where_they_are_asked_for(sec
     done = subprocess.run(["bash", "-c", script], cwd=ROOT, env=wanted, capture_output=True, text=True, check=True)
     assert "python3-dolfinx" in done.stdout.split()
     assert ("jupyter-notebook" in done.stdout.split()) == jupyter
+
+
+def test_a_cache_that_cannot_be_written_is_named_where_no_environment_is_found(tmp_path: Path) -> None:
+    """It is why an environment that could have been made there was not found, or not made."""
+    (tmp_path / "file").touch()
+    cache = tmp_path / "file" / "cache"
+    kept = {name: value for name, value in os.environ.items() if not name.startswith("HVI_")}
+    chosen = {"HVI_WAY": "image", "XDG_CACHE_HOME": str(cache), "TMPDIR": str(tmp_path), "PATH": "/usr/bin:/bin"}
+    words = [ROOT / "hvi", "version"]
+    done = subprocess.run(words, env=kept | chosen, capture_output=True, text=True, check=False, timeout=60)
+    assert done.returncode == 1
+    assert f"the cache {cache}/hvi_fenicsx cannot be written to; no docker or podman engine" in done.stderr

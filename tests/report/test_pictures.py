@@ -5,12 +5,15 @@ Synthetic folders, written as the solver writes them, so that this fails for rea
 
 from __future__ import annotations
 
+import csv
 import json
 import os
+import re
 import subprocess
 import sys
 import time
 import uuid
+from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -21,6 +24,8 @@ import numpy.typing as npt
 import pytest
 import tomli_w
 from dolfinx import mesh
+from matplotlib.figure import Figure
+from matplotlib.text import Text
 from mpi4py import MPI
 from runs import hvi, write_scene
 from scenes import model
@@ -29,9 +34,12 @@ from hvi_fenicsx import compat
 from hvi_fenicsx.errors import HviError
 from hvi_fenicsx.report import png_file, reader, units
 from hvi_fenicsx.report.body_mesh import BodyMesh, body_mesh
+from hvi_fenicsx.report.html import numbers
 from hvi_fenicsx.report.pictures import draw, loads_supports
+from hvi_fenicsx.report.pictures.kinds import body_plane, body_space, contact_curves, contact_maps
 from hvi_fenicsx.report.pictures.raster import shade
 from hvi_fenicsx.report.solution_arrays import FILE, PartArrays, SolutionArrays, load, save
+from hvi_fenicsx.results import contact_table
 
 Array = npt.NDArray[np.float64]
 E, NU, LOAD = 2.15e11, 0.29, 1.0e6
@@ -479,3 +487,46 @@ def test_the_papers_figures_are_drawn_and_their_captions_tell_what_epsilon_does(
 @pytest.mark.long
 def test_the_papers_figures_are_the_same_on_two_ranks(tmp_path: Path) -> None:
     assert paper_figures(tmp_path / "p", 2)[1] == paper_figures(tmp_path / "q", 1)[1]
+
+
+def said_of_lifting(figure: Figure) -> set[str]:
+    """The sizes of gaps that a picture states."""
+    texts = [text.get_text().replace("\n", " ") for text in figure.findobj(Text)]
+    return {found[1] for text in texts if (found := re.search(r"lifted,? up to ([-\d.e]+\s\w+)", text))}
+
+
+@pytest.mark.parametrize("body", [square, box], ids=["plane", "space"])
+def test_the_pictures_of_body_and_contact_state_one_gap(
+    tmp_path: Path, body: Callable[[], mesh.Mesh], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The largest of a lifted vertex, also where that one still adheres; rounding in contact is no gap."""
+    folder = result(tmp_path / "r", body(), peeled)
+    part = load(folder / FILE).parts["floor"]
+    gap, lifted = part.columns["gap"].copy(), part.columns["contact"] == 0.0
+    gap[~lifted] = 15.8e-12
+    sigma = part.columns["sigma_n"].copy()
+    farthest = np.flatnonzero(gap == gap.max())
+    sigma[farthest] = LOAD
+    change(folder, parts={"floor": replace(part, columns={**part.columns, "gap": gap, "sigma_n": sigma})})
+    found = reader.read(folder)
+    monkeypatch.setattr(body_space, "render", lambda *_: None)
+    if found.body.dimension == 2:
+        drawn = [body_plane.draw(found), contact_curves.draw(found, found.parts[0])]
+    else:
+        drawn = [body_space.draw(found), contact_maps.draw(found, found.parts[0])]
+    assert [said_of_lifting(figure) for figure in drawn] == 2 * [{units.quantity(float(gap.max()), "m")}]
+    assert float(gap.max()) == pytest.approx(2e-6, rel=1e-2)
+
+
+def test_pieces_are_counted_alike_in_the_table_and_on_the_page(tmp_path: Path) -> None:
+    folder = result(tmp_path / "r", square(4), peeled)
+    part = load(folder / FILE).parts["floor"]
+    part = replace(part, columns={**part.columns, "branch_t": np.array([0.0, 2.0, 2.0, -1.0, 0.0])})
+    change(folder, parts={"floor": part})
+    contact_table.write_csv(tmp_path / "contact.csv", {"floor": part})
+    with (tmp_path / "contact.csv").open(encoding="utf-8") as stream:
+        table = Counter(int(row["branch_t"]) for row in csv.DictReader(stream))
+    assert table == {0: 2, 2: 2, -1: 1}
+    page = dict(numbers.contact(reader.read(folder).parts[0])["rows"])["pieces of the friction law in use, from 0"]
+    wanted = {f"{n} on piece {piece}" if piece >= 0 else f"{n} on a kink" for piece, n in table.items()}
+    assert set(page.split(", ")) == wanted

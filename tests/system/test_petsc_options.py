@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from pathlib import Path
 from typing import Any
 
 import pytest
 from mpi4py import MPI
 from petsc4py import PETSc
+from runs import command, hvi, summary, write_scene
+from scenes import model
 
 from hvi_fenicsx import InputError
 from hvi_fenicsx.system import petsc_options
@@ -85,3 +88,15 @@ def test_petscs_own_times_are_printed_where_they_are_asked_for() -> None:
 def test_an_error_that_no_option_can_have_made_stays() -> None:
     with pytest.raises(PETSc.Error), petsc_options.refusals_told():
         PETSc.PC().create().setType("luu")
+
+
+def test_algebraic_multigrid_by_options_solves_a_system_of_few_unknowns(tmp_path: Path) -> None:
+    """Its coarsest mesh is the whole system."""
+    file = write_scene(tmp_path / "square.toml", model(2))
+    options = ["--petsc", "-hvi_ksp_type cg -hvi_pc_type gamg", "--no-pictures", "--out"]
+    words = command("run", file, *options, tmp_path / "gamg")  # in a process of its own, which alone has the options
+    done = subprocess.run(words, capture_output=True, text=True, check=False, timeout=120)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert hvi("run", file, "--no-pictures", "--out", tmp_path / "lu").returncode == 0
+    energies = [summary(tmp_path / name)["energy"] for name in ("gamg", "lu")]
+    assert energies[0] == pytest.approx(energies[1], rel=1e-7)

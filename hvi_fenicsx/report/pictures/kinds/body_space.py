@@ -124,7 +124,7 @@ def _foot(fig: Figure, shape: DeformedBody, shown: list[Footprint], scale: tuple
 
 def _remark(shown: list[Footprint]) -> str:
     """Where the footprints are, and what grey means on them."""
-    gaps = [float(np.max(s.geometry.part["gap"][s.geometry.part.idle])) for s in shown if s.geometry.part.idle.any()]
+    gaps = [s.geometry.part.largest_gap for s in shown if s.geometry.part.idle.any()]
     lifted = [f"grey: lifted, up to {quantity(max(gaps), 'm')}"] if gaps else []
     away = [s.geometry.part.name for s in shown if s.away.any()]
     return lifted[0] if lifted else f"“{'”, “'.join(away)}” drawn apart" if away else ""

@@ -202,7 +202,7 @@ def _notes(fig: Figure, result: Result, part: ContactPart, flat: FlatPart) -> No
         else:
             said.append(f"the law drops at {quantity(float(kink), 'm')}, not reached")
     if part.idle.any():
-        said.append(f"grey: lifted, up to {quantity(float(np.nanmax(part['gap'])), 'm')}")
+        said.append(f"grey: lifted, up to {quantity(part.largest_gap, 'm')}")
     _say(fig, axes, said[-2:])
 
 
