@@ -179,6 +179,8 @@ class HeldPreconditioner:
     def report(self, iterations: int, *, failed: bool = False) -> None:
         """Report how a solve went: where iterations grow or it fails, the preconditioner is outdated.
 
+        A direct solver takes over on small systems where a solve is slow or algebraic multigrid is made again and again.
+
         Args:
             iterations: of the solve, the same on all ranks.
             failed: whether it broke down.
@@ -186,7 +188,8 @@ class HeldPreconditioner:
         thresholds = self.settings.thresholds
         self._first_iterations = self._first_iterations or iterations
         self._outdated = failed or iterations > thresholds.slower * self._first_iterations + 5
-        if (failed or iterations > thresholds.slow) and _small(self.system, thresholds):
+        rebuilt = self.settings.kind == "gamg" and self._factorised > thresholds.rebuilt
+        if (failed or rebuilt or iterations > thresholds.slow) and _small(self.system, thresholds):
             self.settings, self._outdated = LinearSettings("lu", thresholds), True
 
     def _build(self, held: Entities) -> None:

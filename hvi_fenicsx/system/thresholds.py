@@ -25,6 +25,8 @@ class Thresholds:
         changed_held: part of the held unknowns that may change while algebraic multigrid keeps its preconditioner.
         slow: iterations from which a direct solver takes over where it can: at 65 a Newton step costs twice as much
             as with it.
+        rebuilt: times that algebraic multigrid is made before a direct solver takes over where it can: most of its cost
+            is then in its setup (on cells 1000 times as long as high, ten times that of a factorisation).
         slower: factor of the first iterations from which a preconditioner is made anew.
         krylov_iterations: iterations of a Krylov method at most.
         condensing: unknowns of Γc for which condensing costs as much as one factorisation of the whole matrix
@@ -52,6 +54,7 @@ class Thresholds:
     drift: float = 0.3
     changed_held: float = 0.1
     slow: int = 50
+    rebuilt: int = 30
     slower: float = 1.5
     krylov_iterations: int = 2_000
     condensing: int = 30

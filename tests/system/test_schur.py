@@ -48,6 +48,20 @@ def test_condensed_it_solves_what_a_factorisation_of_the_whole_solves(every: int
     assert found.norm() < 1e-10 * expected.norm()
 
 
+def test_algebraic_multigrid_that_is_made_again_and_again_gives_way_to_a_direct_solver() -> None:
+    """Its setup took 0.6 s in each of 300 Newton steps on long cells, where factorising takes 0.05 s."""
+    system = assembled()
+    solver = HeldPreconditioner(system, (), LinearSettings("gamg", LinearThresholds(rebuilt=3)), Timer())
+    dofs, x = system.jacobian.rows.dofs.astype(np.int32), system.load.duplicate()
+    kinds = []
+    for step in range(5):
+        solver.prepare(dofs[step % 2 :: 2])
+        x.set(0.0)
+        solver.solve(system.load.copy(), x, 1e-2)
+        kinds.append(solver.settings.kind)
+    assert kinds == ["gamg"] * 3 + ["lu"] * 2
+
+
 def test_a_run_that_condenses_ends_where_one_that_does_not_ends(monkeypatch: pytest.MonkeyPatch) -> None:
     made: list[schur.SchurDirect] = []
     begin = schur.SchurDirect.__init__
