@@ -179,7 +179,7 @@ class HeldPreconditioner:
     def report(self, iterations: int, *, failed: bool = False) -> None:
         """Report how a solve went: where iterations grow or it fails, the preconditioner is outdated.
 
-        A direct solver takes over on small systems where a solve is slow or algebraic multigrid is made again and again.
+        A direct solver takes over on small systems where a solve is slow, or algebraic multigrid is made too often.
 
         Args:
             iterations: of the solve, the same on all ranks.
