@@ -24,6 +24,8 @@ ACCURACY = 1e-11
 """Residual of a root, relative to the largest force."""
 LONGEST = 10.0
 """How much longer or shorter a step becomes by deflation at most."""
+LEAST_WEIGHT = 1e-12
+"""Weight of a displacement that meets no stiffness, over the largest; so a flat piece of its law has a length."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,7 +38,8 @@ class Graphs:
         x: displacements there.
         t: tractions there.
         dx: change of x by s.
-        dt: change of t by s; with the diagonal of S, S_ii |dx| + |dt| = 1.
+        dt: change of t by s; weight |dx| + |dt| = 1.
+        weight: of displacements beside tractions: the diagonal of S, hardly anything where a body moves freely, (n,).
     """
 
     begin: Array
@@ -45,16 +48,19 @@ class Graphs:
     t: Array
     dx: Array
     dt: Array
+    weight: Array
 
     @classmethod
     def of(cls, problem: ScalarProblem) -> Graphs:
         """The graphs of a problem without laws of lengths."""
-        stiffness = np.diag(problem.stiffness)
-        ends = zip(problem.chains, problem.lower, problem.upper, stiffness, strict=True)
+        diagonal = np.diag(problem.stiffness)
+        weight = np.maximum(diagonal, LEAST_WEIGHT * (float(np.max(diagonal)) or 1.0))
+        ends = zip(problem.chains, problem.lower, problem.upper, weight, strict=True)
         rows = [_polyline(chain, float(low), float(high), float(k)) for chain, low, high, k in ends]
         most = max(map(len, rows))
         table = np.array([row + [row[-1]] * (most - len(row)) for row in rows])
-        return cls(**dict(zip(("begin", "anchor", "x", "t", "dx", "dt"), np.moveaxis(table, 2, 0), strict=True)))
+        names = ("begin", "anchor", "x", "t", "dx", "dt")
+        return cls(**dict(zip(names, np.moveaxis(table, 2, 0), strict=True)), weight=weight)
 
     def at(self, s: Array) -> tuple[Array, Array, Array, Array]:
         """x, t, and their changes by s, (n,) each."""
@@ -64,16 +70,15 @@ class Graphs:
         away = s - self.anchor[rows, k]
         return x + dx * away, t + dt * away, dx, dt
 
-    def nearest(self, x: Array, t: Array, stiffness: Array) -> Array:
+    def nearest(self, x: Array, t: Array) -> Array:
         """The parameters of the points nearest to given ones, (n,).
 
         Args:
             x: displacements, (n,).
             t: tractions, (n,).
-            stiffness: the diagonal of S, (n,).
         """
         end = np.concatenate([self.begin[:, 1:], np.full((len(x), 1), np.inf)], axis=1)
-        k = stiffness[:, None]
+        k = self.weight[:, None]
         along = k**2 * self.dx * (x[:, None] - self.x) + self.dt * (t[:, None] - self.t)
         s = np.clip(self.anchor + along / (k**2 * self.dx**2 + self.dt**2), self.begin, np.maximum(end, self.begin))
         away = s - self.anchor
@@ -81,7 +86,7 @@ class Graphs:
         return np.asarray(np.take_along_axis(s, np.argmin(off, axis=1)[:, None], axis=1)[:, 0])
 
 
-def _polyline(chain: Chain, low: float, high: float, stiffness: float) -> list[tuple[float, ...]]:
+def _polyline(chain: Chain, low: float, high: float, weight: float) -> list[tuple[float, ...]]:
     """The pieces of one unknown's graph: begin, anchor, x, t, dx and dt."""
     arcs = on_interval(chain, low, high)
     corners = [(x, a.rate(x)) for a in arcs for x in (a.low, a.high) if np.isfinite(x)] or [(0.0, arcs[0].rate(0.0))]
@@ -89,10 +94,10 @@ def _polyline(chain: Chain, low: float, high: float, stiffness: float) -> list[t
     first = (0.0, 1.0) if np.isfinite(low) else (1.0, arcs[0].slope)
     last = (0.0, 1.0) if np.isfinite(high) else (1.0, arcs[-1].slope)
     moves = [(b[0] - a[0], b[1] - a[1]) for a, b in itertools.pairwise(corners)]
-    lengths = [stiffness * abs(dx) + abs(dt) for dx, dt in moves]
+    lengths = [weight * abs(dx) + abs(dt) for dx, dt in moves]
     places = np.concatenate([[0.0], np.cumsum(lengths)])
     starts = [(-np.inf, 0.0, *corners[0])] + [(s, s, *c) for s, c in zip(places, corners, strict=True)]
-    ways = [(dx / size, dt / size) for dx, dt in [first, *moves, last] if (size := stiffness * abs(dx) + abs(dt))]
+    ways = [(dx / size, dt / size) for dx, dt in [first, *moves, last] if (size := weight * abs(dx) + abs(dt))]
     return [(*start, *way) for start, way in zip(starts, ways, strict=True)]
 
 
@@ -104,7 +109,7 @@ class DeflatedNewton:
     """
 
     def __init__(self, problem: ScalarProblem) -> None:
-        self._problem, self._graphs = problem, Graphs.of(problem)
+        self.problem, self._graphs = problem, Graphs.of(problem)
         self._size = float(np.max(np.abs(problem.force), initial=0.0)) or 1.0
 
     def root(self, start: Array, known: Iterable[Array], reach: float, attempt: int) -> Array | None:
@@ -116,7 +121,7 @@ class DeflatedNewton:
             reach: how far these push away, relative to the largest force.
             attempt: the method begins near the start, at another place for each number.
         """
-        problem, s, size = self._problem, self._parameters(start), reach * self._size
+        problem, s, size = self.problem, self._parameters(start), reach * self._size
         away = np.array([self._parameters(x) for x in known]).reshape(-1, problem.size)
         s = s + size * np.random.default_rng(attempt).uniform(-1.0, 1.0, problem.size)
         for _ in range(MOST_STEPS):
@@ -134,9 +139,9 @@ class DeflatedNewton:
         return None
 
     def _parameters(self, x: Array) -> Array:
-        problem = self._problem
+        problem = self.problem
         forces = problem.force - problem.stiffness @ x
-        return self._graphs.nearest(x, forces, np.diag(problem.stiffness))
+        return self._graphs.nearest(x, forces)
 
 
 def _stretch(apart: Array, step: Array) -> float:

@@ -70,7 +70,7 @@ def _deflated(
         while failures < FAILURES and not stop():
             before, attempt = len(known), attempt + 1
             found = newton.root(start, [p.x for p in known], reach, attempt)
-            if found is not None:
+            if found is not None and not _far(newton.problem, found):
                 yield found
             failures += len(known) == before
 
@@ -144,5 +144,5 @@ def _descended(problem: ScalarProblem, x: Array) -> Array:
 
 
 def _far(problem: ScalarProblem, x: Array) -> bool:
-    """Whether a descent ended at the end of what is searched: a body comes off."""
+    """Whether it is at the end of what is searched, or beyond: a body comes off."""
     return bool(np.max(np.abs(x), initial=0.0) >= problem.far)

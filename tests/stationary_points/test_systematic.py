@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
 
 import numpy as np
@@ -38,10 +39,18 @@ def test_points_are_on_the_graphs_and_roots_of_the_equations_there(case: Case) -
     graphs, stiffness = Graphs.of(problem), np.diag(problem.stiffness)
     for point in found(problem).points:
         force = problem.force - problem.stiffness @ point.x
-        x, t, dx, dt = graphs.at(graphs.nearest(point.x, force, stiffness))
+        x, t, dx, dt = graphs.at(graphs.nearest(point.x, force))
         np.testing.assert_allclose(x, point.x, atol=1e-12 * np.max(np.abs(point.x)))
         np.testing.assert_allclose(t, force, atol=1e-9 * np.max(np.abs(problem.force)))
         np.testing.assert_allclose(stiffness * np.abs(dx) + np.abs(dt), 1.0, rtol=1e-12)
+
+
+def test_graphs_of_a_body_that_moves_freely_are_followed_too() -> None:
+    """Along a free motion S is zero: a flat piece of a law has a length all the same."""
+    problem, _ = problem_of(FAST[0])
+    graphs = Graphs.of(dataclasses.replace(problem, stiffness=np.zeros_like(problem.stiffness)))
+    _, _, dx, dt = graphs.at(graphs.nearest(np.linspace(0.0, 1.0, problem.size), np.zeros(problem.size)))
+    np.testing.assert_allclose(graphs.weight * np.abs(dx) + np.abs(dt), 1.0, rtol=1e-12)
 
 
 def test_newton_keeps_away_from_what_is_known() -> None:
