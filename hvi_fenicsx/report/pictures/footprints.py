@@ -5,18 +5,17 @@ A part that looks away from the eye, as the underside does, is moved along its n
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from matplotlib.axes import Axes
 
 from ...typing import Array
+from . import apart
 from .deformed import DeformedBody, PartGeometry
 from .style import GREY
 from .vtk_view import View
-
-FACING = 0.15
-"""Cosine from which a part is drawn where it is."""
 
 
 @dataclass(frozen=True)
@@ -42,24 +41,26 @@ class Footprint:
         return values
 
 
-def footprint(shape: DeformedBody, view: View, geometry: PartGeometry, normal: Array) -> Footprint:
-    """A part where it is if it is seen there, else so far out along its normal that the body does not hide it.
+def footprints(
+    shape: DeformedBody, view: View, parts: Sequence[PartGeometry], normals: Iterable[Array]
+) -> list[Footprint]:
+    """Each part where it is if it is seen there, else so far out along its normal that nothing covers it.
 
     Args:
         shape: the deformed body.
         view: from where it is seen.
-        geometry: where the part lies on the body.
-        normal: outward normal of the part, of any length, (3,).
+        parts: where the parts lie on the body.
+        normals: outward normals of the parts, of any length, (3,) each.
     """
-    unit = np.asarray(normal / (float(np.linalg.norm(normal)) or 1.0), dtype=np.float64)
-    if float(unit @ view.toward) > FACING:
-        return Footprint(geometry, shape.points + 1e-3 * shape.body.size * view.toward, np.zeros(3))
-    seen = view.project(unit[None])[0]
-    across = seen / float(np.linalg.norm(seen))
-    everything = view.project(np.concatenate([shape.points, shape.body.points])) @ across
-    own = view.project(shape.points[geometry.vertices]) @ across
-    way = (everything.max() - own.min() + 0.05 * shape.body.size) / float(np.linalg.norm(seen)) * unit
-    return Footprint(geometry, shape.points + way, way)
+    body, size = np.concatenate([shape.points, shape.body.points]), shape.body.size
+    units = (np.asarray(n / (float(np.linalg.norm(n)) or 1.0), dtype=np.float64) for n in normals)
+    places = ((shape.points[part.vertices], unit) for part, unit in zip(parts, units, strict=True))
+    ways = apart.ways(view, body, places, 0.05 * size)
+    nearer = 1e-3 * size * view.toward
+    return [
+        Footprint(part, shape.points + (way if way.any() else nearer), way)
+        for part, way in zip(parts, ways, strict=True)
+    ]
 
 
 def guides(axes: Axes, view: View, shape: DeformedBody, patch: Footprint) -> None:

@@ -18,6 +18,9 @@ from ..solution_arrays import LoadArrays
 from .outline import normals
 from .vtk_view import area_vectors
 
+CLOSED = 0.1
+"""Length of the mean of a side's unit normals below which it closes on itself."""
+
 
 @dataclass(frozen=True)
 class Side:
@@ -37,9 +40,10 @@ class Side:
 
     @property
     def normal(self) -> Array:
-        """The mean outward normal (3,), of unit length; zero for a side that closes on itself."""
+        """The mean outward normal (3,), of unit length; zero for a side that closes on itself, as a hole's does."""
         mean = self.normals.mean(axis=0)
-        return np.asarray(mean / (float(np.linalg.norm(mean)) or 1.0))
+        length = float(np.linalg.norm(mean))
+        return np.asarray(mean / length if length > CLOSED else np.zeros_like(mean))
 
 
 @dataclass(frozen=True)

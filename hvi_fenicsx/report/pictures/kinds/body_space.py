@@ -14,7 +14,7 @@ from ...reader import Result
 from ...units import quantity, times, unit_for
 from .. import vtk_loads
 from ..deformed import DeformedBody, PartGeometry, deform, largest_stress, part_geometries
-from ..footprints import Footprint, footprint, guides
+from ..footprints import Footprint, footprints, guides
 from ..legend import colour_bar
 from ..loads_supports import borne_loads
 from ..plane_canvas import canvas
@@ -42,7 +42,7 @@ def draw(result: Result) -> Figure:
     shape = deform(body, parts)
     normals = [area_vectors(body.points, geometry.facets).sum(axis=0) for geometry in parts]
     view = best_view(normals)
-    shown = [footprint(shape, view, geometry, normal) for geometry, normal in zip(parts, normals, strict=True)]
+    shown = footprints(shape, view, parts, normals)
     arrows = [vtk_loads.arrows(shape, load) for load in pulled]
     reached = [shape.points, body.points, *(s.points[s.geometry.vertices] for s in shown)]
     reached += [end for tails, ways in arrows for end in (tails, tails + ways)]

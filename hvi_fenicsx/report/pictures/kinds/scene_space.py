@@ -15,9 +15,8 @@ from matplotlib.patches import Patch
 from ....typing import Array
 from ...body_mesh import BodyMesh
 from ...reader import Result
-from .. import vtk_loads
+from .. import apart, vtk_loads
 from ..deformed import DeformedBody
-from ..footprints import FACING
 from ..legend import legend
 from ..loads_supports import Side, held_sides, loaded_sides, roles_by_side
 from ..plane_canvas import canvas
@@ -64,7 +63,9 @@ def draw(result: Result) -> Figure:
     view = best_view([area_vectors(body.points, side.facets).sum(axis=0) for side, roles in found if touches(roles)])
     held = {support.side.part for support in held_sides(result)}
     colours = [CONTACT if touches(t) else SUPPORT if s.part in held else LOADED for s, t in found]
-    shown = [ColouredSide(s, c, _away(view, body, s)) for (s, _), c in zip(found, colours, strict=True)]
+    sides = [side for side, _ in found]
+    ways = apart.ways(view, body.points, ((body.points[s.vertices], s.normal) for s in sides), 0.05 * body.size)
+    shown = [ColouredSide(s, c, way) for s, c, way in zip(sides, colours, ways, strict=True)]
     arrows = [vtk_loads.arrows(rest, load) for load in pulled]
     reached = [body.points, *(body.points[s.side.vertices] + s.away for s in shown)]
     everything = np.concatenate([*reached, *(end for tails, ways in arrows for end in (tails, tails + ways))])
@@ -86,17 +87,6 @@ def keys(shown: list[ColouredSide]) -> list[Artist]:
     """What the colours mean that are there."""
     words = {CONTACT: "contact, friction or adhesion", SUPPORT: "support", LOADED: "loaded"}
     return [Patch(fc=c, ec=INK, label=w) for c, w in words.items() if c in {s.colour for s in shown}]
-
-
-def _away(view: View, body: BodyMesh, side: Side) -> Array:
-    """Nothing for a part that is seen; a hidden one is moved out along its normal until the body hides it no more."""
-    seen = view.project(side.normal[None])[0]
-    if float(side.normal @ view.toward) > FACING or not np.any(np.abs(seen) > 1e-6):
-        return np.zeros(3)
-    across = seen / float(np.linalg.norm(seen))
-    own = view.project(body.points[side.vertices]) @ across
-    reach = float((view.project(body.points) @ across).max() - own.min()) + 0.05 * body.size
-    return np.asarray(reach / float(np.linalg.norm(seen)) * side.normal)
 
 
 def _fill(

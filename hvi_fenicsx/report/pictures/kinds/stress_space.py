@@ -13,7 +13,7 @@ from ...reader import Result
 from ...units import times
 from .. import vtk_loads
 from ..deformed import DeformedBody, deform, part_geometries
-from ..footprints import Footprint, footprint, guides
+from ..footprints import Footprint, footprints, guides
 from ..loads_supports import borne_loads
 from ..plane_canvas import canvas
 from ..registry import picture
@@ -39,7 +39,7 @@ def draw(result: Result) -> Figure:
     shape, values = deform(body, parts), body.von_mises
     normals = [area_vectors(body.points, geometry.facets).sum(axis=0) for geometry in parts]
     view = best_view(normals)
-    apart = [p for p in map(partial(footprint, shape, view), parts, normals) if p.away.any()]
+    apart = [patch for patch in footprints(shape, view, parts, normals) if patch.away.any()]
     arrows = [vtk_loads.arrows(shape, load) for load in pulled]
     reached = [shape.points, body.points, *(p.points[p.geometry.vertices] for p in apart)]
     everything = np.concatenate([*reached, *(end for tails, ways in arrows for end in (tails, tails + ways))])
