@@ -29,17 +29,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _run_command(words: Sequence[str]) -> int:
-    stopped = processes.raise_on_stop()
+    processes.raise_on_stop()
     try:
-        with log.Handlers(log.WarningDisplay()):
+        with log.Handlers(log.WarningDisplay()), processes.stop_unmasked():
             return _told(lambda: _dispatch(_parsed(words), words))
     except KeyboardInterrupt:
-        pass
-    except Exception:
-        if not stopped():
-            raise
-    _print_error("hvi: interrupted; nothing was written")
-    return ExitCode.INTERRUPTED
+        _print_error("hvi: interrupted; nothing was written")
+        return ExitCode.INTERRUPTED
 
 
 def _told(command: Callable[[], int]) -> int:
@@ -104,7 +100,7 @@ def _run_on_ranks(options: argparse.Namespace) -> int:
         from .system.petsc_options import refusals_told
 
         command = importlib.import_module(f".commands.{options.command}", __package__)
-    with ended_together(MPI.COMM_WORLD), _placed(options), refusals_told():
+    with ended_together(MPI.COMM_WORLD), _placed(options), refusals_told(), processes.stop_unmasked():
         return int(command.execute(options))
 
 

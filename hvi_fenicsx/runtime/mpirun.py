@@ -61,7 +61,7 @@ def run(ranks: int, words: Sequence[str]) -> int:
     if signalled and ended and not agreed:  # before the ranks could catch it; mpirun's notice of that helps nobody
         raise KeyboardInterrupt
     errors.tell_held()
-    if ended and not errors.any:
+    if ended and not errors.any and not signalled:
         raise HviError(
             f"--np: mpirun ended with code {ended} and without a word, as it does where the folder for temporary files "
             f"({tempfile.gettempdir()}) is full; make room there, or set TMPDIR to another folder"

@@ -13,7 +13,7 @@ import signal
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from types import FrameType
 
@@ -38,6 +38,8 @@ _USER_SETTINGS = (
 """Variables by which users (and `./hvi`) set up every mpirun; the others with these beginnings belong to one run."""
 _CAUGHT: list[int] = []
 """The signals that were caught since the command began."""
+_RAISED: list[int] = []
+"""Those of them that have raised KeyboardInterrupt."""
 
 
 def environment() -> dict[str, str]:
@@ -65,7 +67,11 @@ def catch(numbers: Iterable[signal.Signals], handler: Callable[[int, FrameType |
 
     def caught(number: int, frame: FrameType | None) -> None:
         _CAUGHT.append(number)
-        handler(number, frame)
+        try:
+            handler(number, frame)
+        except KeyboardInterrupt:
+            _RAISED.append(number)
+            raise
 
     for number in numbers:
         if number != signal.SIGHUP or signal.getsignal(number) is not signal.SIG_IGN:
@@ -80,23 +86,34 @@ def stop_asked() -> bool:
 def forget_signals() -> None:
     """A new command begins: the signals that were caught before do not concern it."""
     _CAUGHT.clear()
+    _RAISED.clear()
 
 
-def raise_on_stop() -> Callable[[], bool]:
-    """Have the signals of a stop raise KeyboardInterrupt, until a command catches them itself.
-
-    Returns:
-        Whether one has raised it: a library that it passes through may make another error of it.
-    """
+def raise_on_stop() -> None:
+    """Have the signals of a stop raise KeyboardInterrupt, until a command catches them itself."""
     forget_signals()
-    raised: list[int] = []
 
     def stop(number: int, frame: FrameType | None) -> None:
-        raised.append(number)
         raise KeyboardInterrupt
 
     catch(STOP, stop)
-    return lambda: bool(raised)
+
+
+@contextlib.contextmanager
+def stop_unmasked() -> Iterator[None]:
+    """Raise the KeyboardInterrupt of a signal again where a library that it passed through made another error of it.
+
+    An import in C does so. What fails after such a signal has failed by it.
+
+    Raises:
+        KeyboardInterrupt: instead of any other error, once a handler of a signal has raised it.
+    """
+    try:
+        yield
+    except Exception:
+        if _RAISED:
+            raise KeyboardInterrupt from None
+        raise
 
 
 def launcher(ranks: int) -> list[str]:

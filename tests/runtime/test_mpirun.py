@@ -81,6 +81,21 @@ def test_after_a_signal_the_ranks_are_heard_at_once_and_mpiruns_notices_are_not(
         assert "mpirun noticed" not in process.stderr.read()
 
 
+def test_ranks_that_were_interrupted_are_so_when_mpirun_is_ended_without_a_word(scene: Path, tmp_path: Path) -> None:
+    """The second signal comes between the last rank's end and mpirun's own."""
+    code = "trap 'echo -n 130 > $HVI_EXIT_CODE_FILE; echo written' USR1; trap 'exit 1' TERM"
+    path = on_path(tmp_path, f"{code}; echo ready; while true; do sleep 0.1; done")
+    words = [sys.executable, "-m", "hvi_fenicsx", "run", str(scene), "--np", "2", "--out", str(tmp_path / "r")]
+    pipes: dict[str, Any] = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    with subprocess.Popen(words, cwd=ROOT, env=os.environ | {"PATH": path}, **pipes) as process:
+        assert process.stdout.readline() == "ready\n"
+        process.send_signal(signal.SIGTERM)
+        assert process.stdout.readline() == "written\n"
+        process.send_signal(signal.SIGTERM)
+        assert process.wait(60) == 130
+        assert process.stderr.read() == ""
+
+
 def test_a_name_with_a_line_end_is_told_in_one_line(scene: Path, tmp_path: Path) -> None:
     out = tmp_path / "two\nlines"
     out.mkdir()
