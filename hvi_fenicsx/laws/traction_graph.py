@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from ..typing import Array, Integers
+from .arc import Arc
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,13 +132,12 @@ class TractionGraph:
         with np.errstate(over="ignore"):
             return np.asarray(self._energy[anchor] + (self._start[piece] + (0.5 * self.slopes[piece]) * d) * d)
 
-    def parabolas(self) -> Iterator[tuple[float, float, float, float, float, float]]:
-        """The pieces of the primitive: begin, end, anchor, and at the anchor value, traction and slope."""
+    def arcs(self) -> Iterator[Arc]:
+        """The pieces of the primitive."""
         ends = np.concatenate([[-np.inf], self.breaks, [np.inf]])
         anchors = self.breaks[self._anchor]
         columns = (ends[:-1], ends[1:], anchors, self.primitive(anchors), self._start, self.slopes)
-        low, high, anchor, value, traction, slope = (map(float, c) for c in columns)
-        yield from zip(low, high, anchor, value, traction, slope, strict=True)
+        yield from map(Arc._make, np.column_stack(columns).tolist())
 
     def split(self) -> tuple[TractionGraph, TractionGraph]:
         """H' and G': rising parts and upward jumps, and falling parts and downward jumps, turned round."""

@@ -32,10 +32,7 @@ def analyse(comm: MPI.Comm, problem: RigidProblem, thresholds: Thresholds = DEFA
         problem: the body and what it meets.
         thresholds: what counts as zero, and when to give up.
     """
-    basis, reduced = reduce(comm, problem, thresholds)
-    if basis.shape[1] == 0:
-        return unmovable()
-    return _on_root(comm, reduced, lambda found: _verdict(problem, found))
+    return _judged(comm, problem, thresholds, unmovable(), lambda found: _verdict(problem, found))
 
 
 def state_of(comm: MPI.Comm, problem: RigidProblem, thresholds: Thresholds = DEFAULT) -> ExistenceState:
@@ -46,10 +43,7 @@ def state_of(comm: MPI.Comm, problem: RigidProblem, thresholds: Thresholds = DEF
         problem: the body and what it meets.
         thresholds: what counts as zero, and when to give up.
     """
-    basis, reduced = reduce(comm, problem, thresholds)
-    if basis.shape[1] == 0:
-        return unmovable().state
-    return _on_root(comm, reduced, lambda found: _state(problem, found))
+    return _judged(comm, problem, thresholds, unmovable().state, lambda found: _state(problem, found))
 
 
 def _state(problem: RigidProblem, reduced: ReducedProblem) -> ExistenceState:
@@ -84,10 +78,20 @@ def load_factors(
     """
     if load is not None and load not in problem.loads:
         raise InputError(f"there is no load {load!r}; there are: {', '.join(problem.loads) or 'none'}")
+    unmoved = LoadFactors(-np.inf, np.inf, np.inf, None, None)
+    return _judged(comm, problem, thresholds, unmoved, lambda found: Analysis(problem, found).load_factors(load))
+
+
+def _judged(
+    comm: MPI.Comm,
+    problem: RigidProblem,
+    thresholds: Thresholds,
+    unmoved: Result,
+    work: Callable[[ReducedProblem], Result],
+) -> Result:
+    """What the work finds of the reduced problem; the given result where no rigid motion is left. Collective."""
     basis, reduced = reduce(comm, problem, thresholds)
-    if basis.shape[1] == 0:
-        return LoadFactors(-np.inf, np.inf, np.inf, None, None)
-    return _on_root(comm, reduced, lambda found: Analysis(problem, found).load_factors(load))
+    return unmoved if basis.shape[1] == 0 else _on_root(comm, reduced, work)
 
 
 def _on_root(comm: MPI.Comm, reduced: ReducedProblem | None, work: Callable[[ReducedProblem], Result]) -> Result:

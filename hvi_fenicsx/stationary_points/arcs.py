@@ -10,46 +10,13 @@ import itertools
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
+from ..laws.arc import Arc
 from ..laws.traction_graph import TractionGraph
 
 INF = math.inf
 ROUNDING = 1e-13
 """Drops of the traction of this relative size are rounding."""
-
-
-class Arc(NamedTuple):
-    """The parabola value + traction (x - anchor) + ½ slope (x - anchor)² on low ≤ x ≤ high."""
-
-    low: float
-    high: float
-    anchor: float
-    value: float
-    traction: float
-    slope: float
-
-    def at(self, x: float) -> float:
-        """The value at x."""
-        d = x - self.anchor
-        return self.value + (self.traction + 0.5 * self.slope * d) * d
-
-    def rate(self, x: float) -> float:
-        """The derivative at x."""
-        return self.traction + self.slope * (x - self.anchor)
-
-    def toucher(self, p: float) -> float:
-        """Where a line of slope p supports the arc, which is convex, from below."""
-        if self.low == self.high:
-            return self.low
-        if self.slope > 0.0:
-            return min(max(self.anchor + (p - self.traction) / self.slope, self.low), self.high)
-        return self.low if p < self.traction else self.high
-
-    def moved(self, d: float) -> Arc:
-        """The arc with ½ d x² added."""
-        a = self.anchor
-        return Arc(self.low, self.high, a, self.value + 0.5 * d * a * a, self.traction + d * a, self.slope + d)
 
 
 Chain = tuple[Arc, ...]
@@ -65,7 +32,7 @@ def chain(graph: TractionGraph, weight: float, sign: float) -> Chain:
         weight: lumped area.
         sign: +1 or -1 (or a factor of the argument).
     """
-    arcs = [_bond(Arc(*row), weight, sign) for row in graph.parabolas()]
+    arcs = [_bond(arc, weight, sign) for arc in graph.arcs()]
     return tuple(arcs if sign > 0 else arcs[::-1])
 
 

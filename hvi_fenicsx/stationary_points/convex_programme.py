@@ -13,8 +13,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
+from ..laws.arc import Arc
 from ..typing import Array, Integers
-from .arcs import Arc
 
 MOST_STEPS = 40
 """State changes before a proximal term is added."""

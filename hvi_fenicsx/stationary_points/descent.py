@@ -7,8 +7,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ..laws.arc import Arc
 from ..typing import Array
-from .arcs import Arc, Chain, on_interval
+from .arcs import Chain, on_interval
 from .convex_programme import Chains, minimise
 from .length_programme import LengthProgramme
 from .scalar_problem import ScalarProblem

@@ -6,8 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..laws.arc import Arc
 from ..typing import Array
-from .arcs import FREE, INF, Arc, Chain
+from .arcs import FREE, INF, Chain
 from .length_frames import Frames, left_out
 from .lengths import Lengths
 from .scalar_problem import ScalarProblem

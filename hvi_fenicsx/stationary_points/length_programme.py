@@ -12,8 +12,8 @@ from functools import cached_property
 
 import numpy as np
 
+from ..laws.arc import Arc
 from ..typing import Array, Mask
-from .arcs import Arc
 from .convex_programme import Chains, minimise
 from .length_frames import Frames, left_out, parts, unknowns_of
 from .lengths import Lengths

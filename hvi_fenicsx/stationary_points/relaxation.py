@@ -6,8 +6,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..laws.arc import Arc
 from ..typing import Array, Integers
-from .arcs import Arc, envelope
+from .arcs import envelope
 from .convex_programme import Chains, minimise
 from .curvature import Curvature, CurvatureShare
 from .dual_bound import DualBound

@@ -11,8 +11,9 @@ from functools import cached_property
 
 import numpy as np
 
+from ..laws.arc import Arc
 from ..typing import Array, Integers, Mask
-from .arcs import INF, ROUNDING, Arc, Chain
+from .arcs import INF, ROUNDING, Chain
 from .lengths import Lengths
 
 FAR = 1e6
