@@ -57,8 +57,9 @@ def _attempt(case: Case, data: Mapping[str, Any], method: str, late: Callable[[]
     about = {"state": known.state, "margin": known.margin, "dofs": prepared.system.dofs}
     if known.state == "escapes":
         return {**about, "outcome": "escapes", "reason": "no solution exists"}
-    found = _solved(case, data, prepared, late)
-    found, proof = workflow.judged(prepared, found)
+    control = RunControl(timer=prepared.timer, interrupted=late)
+    found = _solved(case, data, prepared, control)
+    found, proof = workflow.judged(prepared, found, control=control)
     outcome = "certified" if proof.certificate.passed else _unsolved(known.state, found)
     return {
         **about,
@@ -79,11 +80,8 @@ def _unsolved(state: str, found: SolveResult) -> str:
     return "no_equilibrium" if state in UNDECIDED and not broken else "failed"
 
 
-def _solved(
-    case: Case, data: Mapping[str, Any], prepared: preparation.Preparation, late: Callable[[], bool]
-) -> SolveResult:
+def _solved(case: Case, data: Mapping[str, Any], prepared: preparation.Preparation, control: RunControl) -> SolveResult:
     """The method's result; the case's start is for the methods that begin on pieces of the laws."""
-    control = RunControl(timer=prepared.timer, interrupted=late)
     context = SolveContext.create(prepared.system, (), prepared.solvability, prepared.options, control)
     method = registry.choose(prepared.options, prepared.system)(context)
     begin = hard_scenes.branches(case, prepared, data)

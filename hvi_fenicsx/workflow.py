@@ -18,7 +18,7 @@ from .runtime.log import logger, newton_step, warn
 from .runtime.timing import Timer
 from .scene import Scene
 from .solution import Solution
-from .solvers import frozen_mixity, nested_iteration, obstacle_force
+from .solvers import frozen_mixity, nested_iteration, obstacle_force, refinement
 from .solvers.coarse_start import CoarseStart
 from .solvers.context import Progress, RunControl, never
 from .solvers.nested_iteration import LevelSolution
@@ -96,7 +96,7 @@ def finish_with_levels(
     with prepared.timer("solve"):
         solved, balance = _solved(prepared, control, start)
     prepared = replace(prepared, system=solved.system)
-    result, examination, warnings = _examined(prepared, solved.result, solved.levels)
+    result, examination, warnings = _examined(prepared, solved.result, solved.levels, control)
     errors = None
     if estimating and examination.certificate.passed and prepared.problem.has_potential and balance is None:
         with prepared.timer("estimate"):
@@ -127,36 +127,58 @@ def _uniqueness(prepared: Preparation, found: SolveResult, examination: Examinat
 
 
 def _examined(
-    prepared: Preparation, found: SolveResult, levels: Levels = ()
+    prepared: Preparation, found: SolveResult, levels: Levels = (), control: RunControl | None = None
 ) -> tuple[SolveResult, Examination, tuple[str, ...]]:
     """The result, its certificate, and warnings about the solution. Collective."""
     with prepared.timer("certificate"):
-        result, examination = judged(prepared, found, levels)
+        result, examination = judged(prepared, found, levels, control)
         warnings = plausibility.of_solution(prepared.problem, examination, result.u)
     warn(_LOG, warnings)
     _log_certificate(examination.certificate)
     return result, examination, warnings
 
 
-def judged(prepared: Preparation, found: SolveResult, levels: Levels = ()) -> tuple[SolveResult, Examination]:
+def judged(
+    prepared: Preparation, found: SolveResult, levels: Levels = (), control: RunControl | None = None
+) -> tuple[SolveResult, Examination]:
     """A result and what the certificate says of it; corrected where rounding alone may speak against it. Collective.
 
     Args:
         prepared: the scene.
         found: the result.
         levels: the coarser levels of the system.
+        control: of a solve that may follow, if the correction moves what touches; None: none may.
     """
+    first = _examine(prepared, found.u)
+    if not (found.converged and correction.may_help(first.certificate)):
+        return found, first
+    result, examined = _corrected(prepared, found, levels, first)
+    if examined.certificate.passed or control is None or obstacle_force.pressed(prepared.problem) is not None:
+        return result, examined
+    again = refinement.refined(
+        prepared.system, levels, found, first.forces.reaction, prepared.solvability, prepared.options, control
+    )
+    if again is None:
+        return found, first
+    result, examined = _corrected(prepared, again, levels, _examine(prepared, again.u))
+    return (result, examined) if examined.certificate.passed else (found, first)
+
+
+def _examine(prepared: Preparation, u: fem.Function) -> Examination:
+    """What the certificate says of a displacement. Collective."""
     options = prepared.options
     inertia = options.decides_stability(prepared.system)
+    return certificate.examine(prepared.problem, u, options.tolerance, inertia=inertia)
 
-    def examined(u: fem.Function) -> Examination:
-        return certificate.examine(prepared.problem, u, options.tolerance, inertia=inertia)
 
-    examination = examined(found.u)
-    if not (found.converged and correction.may_help(examination.certificate)):
+def _corrected(
+    prepared: Preparation, found: SolveResult, levels: Levels, examination: Examination
+) -> tuple[SolveResult, Examination]:
+    """A result with the step that takes the rounding of the matrix out, where that certifies it. Collective."""
+    if not correction.may_help(examination.certificate):
         return found, examination
     u = correction.corrected(prepared.system, levels, found.u, examination)
-    again = examined(u)
+    again = _examine(prepared, u)
     return (replace(found, u=u), again) if again.certificate.passed else (found, examination)
 
 

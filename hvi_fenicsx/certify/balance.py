@@ -6,17 +6,15 @@ Rounding of the stresses excuses no net force: only what rounding makes of the s
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 
 import numpy as np
 from dolfinx import fem
 
 from ..problem.problem import Problem
 from ..problem.references import References
-from ..problem.rigid_part import strained
 from ..system import net_forces as rigid_balance
 from ..system.net_forces import ActingForces, Holder, PartForces
-from ..system.supported_body import Motions, SupportedBody
+from ..system.supported_body import SupportedBody
 from ..typing import Array
 from .contact_state import ContactState, Forces
 from .thresholds import DEFAULT, Thresholds
@@ -62,35 +60,24 @@ def net_forces(
     forces: Forces,
     states: Sequence[ContactState],
     u: fem.Function,
-    tolerance: float,
     thresholds: Thresholds = DEFAULT,
 ) -> Array:
     """The largest net force or moment along a rigid motion that nothing carries, by body. Collective.
 
     It is relative to the loads' net force along the same motion, or to what contact and laws carry or could carry
-    there. Where it is above the tolerance, what rounding makes of the sum of these forces is taken off.
+    there. What rounding makes of the sum of these forces is taken off; what it makes of the stresses is not.
 
     Args:
         references: of the problem that was solved.
         forces: at u.
         states: of the parts of Γc at u.
         u: nondimensional, ghosts updated.
-        tolerance: relative.
         thresholds: what rounding is.
     """
     problem, acting = references.problem, _acting(references, forces, states, u, thresholds)
     closed = [(state.surface, state.contact) for state in states]
-    motions = [SupportedBody.of(problem, body).motions(closed) for body in problem.bodies]
-    found = _beyond_rounding(references, motions, acting, thresholds)
-    if np.all(found <= tolerance):
-        return found
-    return _beyond_rounding(references, motions, _with_noise(references, acting, u, thresholds), thresholds)
-
-
-def _beyond_rounding(
-    references: References, motions: Sequence[Motions], acting: ActingForces, thresholds: Thresholds
-) -> Array:
-    nets = (rigid_balance.along(references, one, acting) for one in motions)
+    motions = (SupportedBody.of(problem, body).motions(closed) for body in problem.bodies)
+    nets = [rigid_balance.along(references, one, acting) for one in motions]
     return np.array([net.beyond_rounding(thresholds.nothing_acts) for net in nets])
 
 
@@ -117,14 +104,6 @@ def _acting(
         summation=thresholds.summation,
         tiny=thresholds.along,
     )
-
-
-def _with_noise(references: References, acting: ActingForces, u: fem.Function, thresholds: Thresholds) -> ActingForces:
-    """With the rounding errors of the stresses. Collective."""
-    problem = references.problem
-    noise = references.norms(rounding_sample(problem, strained(problem, u, travel=0.0).x.array))
-    unknowns = references.vertices * problem.scales.dimension
-    return replace(acting, noise=thresholds.rounding_safety * noise / np.sqrt(unknowns))
 
 
 def _holders(state: ContactState) -> Iterator[Holder]:

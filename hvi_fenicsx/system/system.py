@@ -137,6 +137,24 @@ class System:
         found.lower, found.upper = found._box()
         return found
 
+    def with_elastic_residual(self, x: PETSc.Vec, residual: Array) -> System:
+        """The system in which A u - b is a given one at some u: the load is moved; all matrices are shared. Collective.
+
+        Args:
+            x: the unknowns u.
+            residual: as bounds and laws balance it, Cartesian, (vertices, d); not read at prescribed unknowns.
+        """
+        found, given = copy.copy(self), new_vector(self.problem.space)
+        given.array[:] = residual.ravel()
+        turn(given, self.rotation)
+        found.load, fixed = self.load.duplicate(), self.problem.fixed_here
+        self.jacobian.elastic_product(x, found.load)
+        found.load.axpy(-1.0, given)
+        found.load.array[fixed] = self.load.array_r[fixed]
+        if self.free_motions is not None:
+            self.free_motions.null_space.remove(found.load)
+        return found
+
     def displacement(self, x: PETSc.Vec) -> fem.Function:
         """The displacement field of unknowns x: Cartesian, in units of u0, ghosts updated. Collective."""
         u = fem.Function(self.problem.space, name="displacement")

@@ -6,6 +6,7 @@ The cases are taken from the committed list by their size and place in it, not b
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,10 @@ import numpy as np
 import pytest
 from enumeration import Floor, polyline
 from scenes import DELTA, model, quadratic_linear, solved
+
+from hvi_fenicsx.solvers import refinement
+from hvi_fenicsx.solvers.refinement import refined
+from hvi_fenicsx.solvers.result import SolveResult
 
 BENCHMARKS = Path(__file__).resolve().parents[2] / "benchmarks"
 sys.path.insert(0, str(BENCHMARKS))
@@ -58,6 +63,36 @@ def test_auto_solves_a_small_case_at_degree_two(case: Case) -> None:
 @pytest.mark.parametrize("case", parameters(REST))
 def test_auto_solves_a_case(case: Case) -> None:
     solve_and_judge(case)
+
+
+TURNED = next(case for case in LISTED if case.key == "9e6b0c4cab")
+"""A body a hundred times as high as wide, which turns by 90 times its strain: the rows of the matrix round alike, and
+left a net force of 5e-6 that contact and laws had to carry."""
+
+
+def refinements(monkeypatch: pytest.MonkeyPatch) -> list[SolveResult | None]:
+    """What iterative refinement finds from now on."""
+    found: list[SolveResult | None] = []
+
+    def noted(*arguments: Any) -> SolveResult | None:
+        found.append(refined(*arguments))
+        return found[-1]
+
+    monkeypatch.setattr(refinement, "refined", noted)
+    return found
+
+
+@pytest.mark.parametrize(
+    ("cells", "slenderness"), [(32, 1e-3), pytest.param(128, TURNED["stretch"], marks=pytest.mark.long)]
+)
+def test_a_body_that_turns_far_balances(cells: int, slenderness: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The net force has no excuse: it is within the tolerance itself."""
+    found = refinements(monkeypatch)
+    case = replace(TURNED, values={**TURNED.values, "cells": cells, "stretch": slenderness})
+    record = hard_run.attempt(case, TABLE.data, "auto", TABLE.data["limit"])
+    assert record["outcome"] == "certified"
+    assert record["certificate"]["net_force"] < 1e-9
+    assert len(found) == 1
 
 
 def test_the_list_covers_what_it_promises() -> None:

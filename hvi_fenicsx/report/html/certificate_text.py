@@ -58,7 +58,7 @@ def _demand(tolerance: float, limit: float) -> str:
         return f"Each number must be at most {number(tolerance)}."
     return (
         f"Each number must be at most {_two_digits(limit)}: the tolerance {number(tolerance)} is below the rounding "
-        f"errors at this displacement. The net force must be at most {number(tolerance)} beyond its rounding error."
+        f"errors at this displacement. The net force must be at most {number(tolerance)}."
     )
 
 
