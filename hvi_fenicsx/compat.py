@@ -123,6 +123,27 @@ def mesh_of_entities(comm: Any, points: Array, cells: Entities, facets: Entities
     return _mesh.Mesh(_cpp.mesh.Mesh_float64(comm, topology, geometry), ufl.Mesh(element))
 
 
+def quadratic_mesh(mesh: _mesh.Mesh, dofmap: Any, points: Array) -> _mesh.Mesh:
+    """A mesh of the same topology whose cells are of second order. Collective.
+
+    Args:
+        mesh: of straight simplices.
+        dofmap: of the scalar functions of degree 2 on it.
+        points: the local nodes by this dofmap, m, (n, 3).
+    """
+    import basix.ufl
+    import ufl
+
+    d, index_map = mesh.geometry.dim, dofmap.index_map
+    element = basix.ufl.element("Lagrange", mesh.topology.cell_name(), 2, shape=(d,))
+    shape = fem.coordinate_element(element.basix_element)._cpp_object
+    numbers = index_map.local_to_global(np.arange(len(points), dtype=np.int32))
+    nodes = np.ascontiguousarray(points[:, :d])
+    geometry = _cpp.mesh.Geometry_float64(index_map, dofmap.list, shape, nodes, numbers)
+    topology = getattr(mesh.topology, "_cpp_object", mesh.topology)
+    return _mesh.Mesh(_cpp.mesh.Mesh_float64(mesh.comm, topology, geometry), ufl.Mesh(element))
+
+
 def comm_of(form: Any) -> Any:
     """The ranks of the mesh that a UFL form is integrated over."""
     return next(iter(form.subdomain_data())).ufl_cargo().comm

@@ -27,7 +27,7 @@ def unresolved(problem: Problem, thresholds: ControlThresholds = CONTROL) -> Ent
         thresholds: which deviation is too much.
     """
     space, found = (
-        bubbles.space(problem.domain.mesh, nodes.degree(problem.space)),
+        bubbles.space(problem.space.mesh, nodes.degree(problem.space)),
         list[Entities]([np.empty(0, dtype=np.int32)]),
     )
     for facets, value in boundary_data.everything(problem):

@@ -62,7 +62,7 @@ def of(prepared: Preparation) -> Sizes:
     sums = {name: force.array_r.reshape(-1, d).sum(axis=0) for name, force in _loads(prepared).items()}
     return Sizes(
         body=tuple(map(float, problem.domain.upper - problem.domain.lower)),
-        parts={name: side_moments.of(problem.domain, facets).area for name, facets in problem.part_facets.items()},
+        parts={name: side_moments.of(problem.space, facets).area for name, facets in problem.part_facets.items()},
         loads={name: _rounded(comm.allreduce(found) * unit) for name, found in sums.items()},
         obstacle_forces=_obstacle_forces(problem),
     )

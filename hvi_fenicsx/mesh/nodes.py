@@ -59,6 +59,7 @@ def points(space: fem.FunctionSpace) -> Array:
     """
     count = space.mesh.topology.index_map(space.mesh.topology.dim)
     corners = compat.geometry_dofmap(space.mesh)[: count.size_local + count.num_ghosts]
+    corners = corners[:, : space.dofmap.list.shape[1]]  # of curved cells the nodes of degree 2 are the geometry's
     dofs, vertices = space.dofmap.list[: len(corners)], corners.shape[1]
     index_map = space.dofmap.index_map
     size = index_map.size_local + index_map.num_ghosts
@@ -79,7 +80,7 @@ def reference_points(space: fem.FunctionSpace) -> Array:
 
 
 def dof_of_node(space: fem.FunctionSpace) -> Entities:
-    """The (block) dof at each geometry node of the mesh, whose nodes are its vertices, (nodes,)."""
+    """The (block) dof at each vertex of the straight mesh, by its geometry nodes, (nodes,)."""
     count = space.mesh.topology.index_map(space.mesh.topology.dim)
     corners = compat.geometry_dofmap(space.mesh)[: count.size_local + count.num_ghosts]
     result = np.zeros(space.mesh.geometry.x.shape[0], dtype=np.int32)

@@ -11,12 +11,12 @@ from dataclasses import dataclass, replace
 
 import basix
 import numpy as np
-from dolfinx import la
 from dolfinx import mesh as dmesh
 
 from .. import compat
 from ..geometry import Curve
 from ..typing import Array, Entities
+from . import curved_cells
 from .domain import Domain, check_affordable
 from .thresholds import DEFAULT, Thresholds
 from .transfer import Halves, ParentCellTransfer, Transfer
@@ -159,17 +159,9 @@ def _sides(domain: Domain, fine: dmesh.Mesh, parents: Entities, halves: Halves) 
 
 def _bend(mesh: dmesh.Mesh, sides: Mapping[str, Entities], curves: Mapping[str, Curve]) -> None:
     """Move the vertices of curved sides onto their curves, on all ranks that have them. Collective."""
-    d = mesh.geometry.dim
-    for name, curve in curves.items():
-        nodes = np.empty(0, dtype=np.int32)
+    d, on = mesh.geometry.dim, {}
+    for name in curves:
+        on[name] = np.empty(0, dtype=np.int32)
         if len(sides[name]):  # dolfinx divides by their number
-            nodes = np.unique(dmesh.entities_to_geometry(mesh, mesh.topology.dim - 1, sides[name]))
-        x = mesh.geometry.x[nodes, :d]
-        shifts = np.column_stack([curve.nearest(x) - x, np.ones(len(nodes))])
-        shared = la.vector(mesh.geometry.index_map(), d + 1)
-        shared.array[:] = 0.0
-        shared.array.reshape(-1, d + 1)[nodes] = shifts
-        shared.scatter_reverse(la.InsertMode.add)
-        shared.scatter_forward()
-        total = shared.array.reshape(-1, d + 1)
-        mesh.geometry.x[:, :d] += total[:, :d] / np.maximum(total[:, d:], 1.0)
+            on[name] = np.unique(dmesh.entities_to_geometry(mesh, mesh.topology.dim - 1, sides[name]))
+    mesh.geometry.x[:, :d] = curved_cells.onto_curves(mesh.geometry.index_map(), mesh.geometry.x[:, :d], on, curves)

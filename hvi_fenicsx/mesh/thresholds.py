@@ -31,6 +31,7 @@ class Thresholds:
         gmsh_seconds_per_triangle: seconds more for each triangle of its surface; it takes some 1e-4.
         barycentric_rounding: a barycentric weight that is rounding: the point lies on the facet opposite to that
             vertex.
+        least_jacobian: part of its straight size to which a curved cell may shrink anywhere.
     """
 
     coarsest_block: int = 8
@@ -47,6 +48,7 @@ class Thresholds:
     gmsh_seconds: float = 5.0
     gmsh_seconds_per_triangle: float = 1e-3
     barycentric_rounding: float = 1e-9
+    least_jacobian: float = 0.2
 
 
 DEFAULT = Thresholds()

@@ -55,7 +55,7 @@ class ModelSolution(Solution):
         Raises:
             InputError: on all ranks alike: nothing was solved, since no solution exists.
         """
-        space = fem.functionspace(self.problem.domain.mesh, ("Discontinuous Lagrange", 0, (3, 3)))
+        space = fem.functionspace(self.problem.space.mesh, ("Discontinuous Lagrange", 0, (3, 3)))
         field = fem.Function(space, name="stress")
         values = mean_stress(self.problem.bulk, self._solved.u)
         field.x.array[: values.size] = values.ravel()

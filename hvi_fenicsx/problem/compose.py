@@ -27,6 +27,7 @@ from .interface_sides import Sides
 from .part_laws import Modification, unchanged
 from .problem import PlacedContribution, PrescribedComponent, Problem
 from .scaling import Placed, Scales
+from .spaces import coefficients_of
 from .thresholds import DEFAULT, Thresholds
 
 
@@ -65,10 +66,15 @@ def compose(domain: Domain, model: Model, thresholds: Thresholds = DEFAULT) -> P
     facets = part_facets.find(domain, model.parts, effects)
     sizes, evaluate = scaling.sizes(domain.length, effects), functools.partial(_evaluation, domain, facets)
     scales = scaling.choose(sizes, domain.dimension, effects, evaluate, thresholds)
-    context = DomainForms(domain, facets, scales, effects, model.degree)
+    context = DomainForms(domain, facets, scales, effects, model.degree, _straight(model))
     contributions = [PlacedContribution(where, effect, effect.contribute(context, where)) for where, effect in effects]
     implausible = [f"{scaling.place(e)}: {text}" for e in effects for text in e[1].implausible(evaluate(e), sizes)]
     return _problem(context, scales, contributions, model, tuple(implausible), thresholds)
+
+
+def _straight(model: Model) -> set[str]:
+    """The sides that stay as they are meshed: where two bodies meet, the facets' intersections are those of planes."""
+    return {side for sides in model.interfaces.values() for side in (sides.first, sides.second)}
 
 
 def _evaluation(domain: Domain, facets: Mapping[str, Entities], placed: Placed) -> Evaluate:
@@ -134,7 +140,7 @@ def _problem(
         domain=context.domain,
         scales=scales,
         space=context.space,
-        points=context.points,
+        points=coefficients_of(context.space, context.points),
         bulk=bulk.make_bulk(context.space, scales, contributions, strains, context.domain.shared),
         linear={**linear, **strains},
         conditions=conditions,

@@ -58,13 +58,13 @@ def _surface(context: DomainForms, where: str) -> Surface:
     facets, degree = context.part_facets[where], nodes.degree(context.space)
     return context.domain.once(
         f"surface {where} of degree {degree}",
-        facets.tobytes(),
+        (facets.tobytes(), context.straight),
         lambda: contact_surface.make_surface(
             where,
             context.space,
             context.points,
             facets,
-            context.boundary(where, **contact_rule(degree)),
+            context.boundary(where, **contact_rule(context.space)),
             context.length ** (context.dimension - 1),
         ),
     )

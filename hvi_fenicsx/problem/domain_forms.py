@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 import dolfinx
@@ -13,7 +13,7 @@ from dolfinx import fem
 from petsc4py import PETSc
 
 from ..effects import Place, SideMoments
-from ..mesh import nodes
+from ..mesh import curved_cells, nodes
 from ..mesh.domain import Domain
 from ..runtime.mpi import agree
 from ..spatial_value import SpatialValue
@@ -33,12 +33,14 @@ class DomainForms:
         scales: Scales,
         effects: Sequence[Placed],
         degree: int = 1,
+        straight: Collection[str] = (),
     ) -> None:
         self.domain, self.dimension = domain, domain.dimension
         self.length, self.stress, self.modulus = scales.length, scales.stress, scales.modulus
-        self.space = _space(domain, degree)
+        self.space = _space(domain, degree, straight)
+        self.mesh, self.straight = self.space.mesh, frozenset(straight)
         self.trial, self.test = ufl.TrialFunction(self.space), ufl.TestFunction(self.space)
-        self.normal = ufl.FacetNormal(domain.mesh)
+        self.normal = ufl.FacetNormal(self.mesh)
         self.materials = [placed for placed in effects if placed[1].place is Place.MATERIAL]
         self.part_facets = dict(part_facets)
 
@@ -59,34 +61,34 @@ class DomainForms:
     @functools.cached_property
     def scalar_test(self) -> Any:
         """A test function of scalar P1; few effects want it, and its space takes time."""
-        return ufl.TestFunction(pressure_space(self.domain.mesh))
+        return ufl.TestFunction(pressure_space(self.mesh))
 
     def number(self, value: float) -> Any:
         """A constant that is not compiled into the form."""
-        return fem.Constant(self.domain.mesh, PETSc.ScalarType(value))
+        return fem.Constant(self.mesh, PETSc.ScalarType(value))
 
     def render(self, value: SpatialValue) -> Any:
         """A value in UFL, in SI coordinates."""
-        return value.in_ufl(self.domain.mesh, self.number)
+        return value.in_ufl(self.mesh, self.number)
 
     @functools.cached_property
     def _facet_tags(self) -> tuple[Any, dict[str, tuple[int, ...]]]:
-        return _tags(self.domain.mesh, self.dimension - 1, self.part_facets)
+        return _tags(self.mesh, self.dimension - 1, self.part_facets)
 
     @functools.cached_property
     def _cell_tags(self) -> tuple[Any, dict[str, tuple[int, ...]]]:
-        return _tags(self.domain.mesh, self.dimension, dict(self.domain.regions))
+        return _tags(self.mesh, self.dimension, dict(self.domain.regions))
 
     def cells(self, *regions: str | None) -> Any:
         """dx/L^d over what the regions share; None where that is nothing."""
         scale = self.number(self.length**-self.dimension)
         named = [region for region in regions if region is not None]
         if not named:
-            return ScaledMeasure(scale, ufl.dx(domain=self.domain.mesh))
+            return ScaledMeasure(scale, ufl.dx(domain=self.mesh))
         self.domain.cells(named)
         tags, ids = self._cell_tags
         shared = tuple(sorted(set.intersection(*(set(ids[region]) for region in named))))
-        measure = ufl.Measure("dx", domain=self.domain.mesh, subdomain_data=tags)
+        measure = ufl.Measure("dx", domain=self.mesh, subdomain_data=tags)
         return ScaledMeasure(scale, measure(shared)) if shared else None
 
     def facets(self, part: str, *values: SpatialValue) -> Any:
@@ -102,7 +104,7 @@ class DomainForms:
 
     def side_moments(self, part: str) -> SideMoments:
         """Area, centroid and second moments of a boundary part. Collective."""
-        return side_moments.of(self.domain, self.part_facets[part])
+        return side_moments.of(self.space, self.part_facets[part])
 
     def boundary(self, part: str, **metadata: Any) -> Any:
         """The measure ds over a part, SI.
@@ -112,13 +114,17 @@ class DomainForms:
             **metadata: of the measure, like the quadrature rule.
         """
         tags, ids = self._facet_tags
-        measure = ufl.Measure("ds", domain=self.domain.mesh, subdomain_data=tags, metadata=metadata)
+        measure = ufl.Measure("ds", domain=self.mesh, subdomain_data=tags, metadata=metadata)
         return measure(ids[part])
 
 
-def _space(domain: Domain, degree: int) -> fem.FunctionSpace:
+def _space(domain: Domain, degree: int, straight: Collection[str]) -> fem.FunctionSpace:
     """The displacements, one space for all problems of a degree on a shared mesh. Collective."""
-    return domain.once(f"space of degree {degree}", None, lambda: displacement_space(domain.mesh, degree))
+    return domain.once(
+        f"space of degree {degree}",
+        frozenset(straight),
+        lambda: displacement_space(curved_cells.mesh_of(domain, degree, straight), degree),
+    )
 
 
 class ScaledMeasure:

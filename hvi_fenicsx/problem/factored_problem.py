@@ -40,7 +40,7 @@ class FactoredProblem:
     """
 
     def __init__(self, problem: Problem, scaled: Collection[str]) -> None:
-        self._factor = fem.Constant(problem.domain.mesh, PETSc.ScalarType(1.0))
+        self._factor = fem.Constant(problem.space.mesh, PETSc.ScalarType(1.0))
         self._moved = _scaled_conditions(problem, scaled)
         conditions = list(problem.conditions)
         for number, moved in self._moved.items():

@@ -7,7 +7,7 @@ from dolfinx import fem, la
 
 from ..mesh import facet_sizes, nodes
 from ..typing import Array, Entities
-from . import spaces
+from . import facet_integrals, spaces
 from .problem import Problem
 
 
@@ -29,11 +29,17 @@ def lumped(problem: Problem, facets: Entities) -> Array:
         problem: the problem.
         facets: local facets.
     """
-    mesh = problem.domain.mesh
-    own = facet_sizes.owned(mesh, facets)
+    own = facet_sizes.owned(problem.domain.mesh, facets)
     found = la.vector(problem.space.dofmap.index_map)
     if len(own):
-        sizes = facet_sizes.areas(facet_sizes.corners(mesh, own))
-        np.add.at(found.array, nodes.facet_nodes(problem.space, own), spaces.facet_weights(problem.space, sizes))
+        np.add.at(found.array, nodes.facet_nodes(problem.space, own), _weights(problem.space, own))
     found.scatter_reverse(la.InsertMode.add)
     return np.asarray(found.array[: problem.space.dofmap.index_map.size_local], dtype=np.float64)
+
+
+def _weights(space: fem.FunctionSpace, facets: Entities) -> Array:
+    """The integrals of the basis functions over facets, m or m², (f, nodes)."""
+    if facet_integrals.is_curved(space):
+        _, weights, functions = facet_integrals.samples(space, facets)
+        return np.asarray(weights @ functions)
+    return spaces.facet_weights(space, facet_sizes.areas(facet_sizes.corners(space.mesh, facets)))

@@ -22,7 +22,7 @@ from ..rigid import AnyBody
 from ..runtime import forms
 from ..spatial_value import SpatialValue
 from ..typing import Array, Entities, Integers
-from . import bodies, contact_surface, coupling
+from . import bodies, contact_surface, coupling, spaces
 from .bodies import MeshBodies
 from .bulk import Bulk
 from .contact_surface import Surface
@@ -144,7 +144,8 @@ class Problem:
         domain: the body.
         scales: of length, stress and displacement.
         space: P1 vectors.
-        points: local vertices (owned and ghost), m, (n, 3).
+        points: the position's coefficients at the local nodes (owned and ghost), m, (n, 3); rigid motions are made of
+            them.
         bulk: the elastic operator, a(u, v).
         linear: UFL forms <g, v> by name of their place and effect.
         conditions: Dirichlet conditions, nondimensional values.
@@ -182,6 +183,11 @@ class Problem:
     def fixed_here(self) -> Entities:
         """The scalar dofs that are prescribed and that this rank owns."""
         return self.fixed[self.fixed < self.space.dofmap.index_map.size_local * self.space.dofmap.index_map_bs]
+
+    @functools.cached_property
+    def positions(self) -> Array:
+        """Where the local nodes (owned and ghost) are, m, (n, 3): ``points`` but for curved cells in space."""
+        return spaces.positions(self.space, self.points)
 
     @functools.cached_property
     def loads(self) -> dict[str, fem.Form]:

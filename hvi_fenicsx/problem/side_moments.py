@@ -2,24 +2,43 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
+from dolfinx import fem
 
 from ..effects import SideMoments
 from ..mesh import facet_sizes
-from ..mesh.domain import Domain
-from ..typing import Entities
+from ..typing import Array, Entities
+from . import facet_integrals
 
 
-def of(domain: Domain, facets: Entities) -> SideMoments:
+def of(space: fem.FunctionSpace, facets: Entities) -> SideMoments:
     """The moments of a part. Collective.
 
     Args:
-        domain: the body.
+        space: of the displacements.
         facets: the part's local facets (owned and ghost).
     """
-    d, comm = domain.dimension, domain.mesh.comm
-    corners = facet_sizes.corners(domain.mesh, facet_sizes.owned(domain.mesh, facets))
-    areas = facet_sizes.areas(corners)
+    own, d = facet_sizes.owned(space.mesh, facets), space.mesh.geometry.dim
+    comm = space.mesh.comm
+    if facet_integrals.is_curved(space):
+        points, weights, _ = facet_integrals.samples(space, own)
+        return _summed(comm, points.reshape(-1, d), weights.ravel())
+    return _of_corners(comm, facet_sizes.corners(space.mesh, own))
+
+
+def _summed(comm: Any, points: Array, weights: Array) -> SideMoments:
+    """The moments of weighted points of all ranks. Collective."""
+    area = float(comm.allreduce(float(weights.sum())))
+    centroid = comm.allreduce(weights @ points) / area
+    r = points - centroid
+    return SideMoments(area=area, centroid=centroid, second=comm.allreduce(np.einsum("p,pi,pj->ij", weights, r, r)))
+
+
+def _of_corners(comm: Any, corners: Array) -> SideMoments:
+    """The moments of plane facets of all ranks by their corners. Collective."""
+    d, areas = corners.shape[2], facet_sizes.areas(corners)
     area = float(comm.allreduce(float(areas.sum())))
     sums = comm.allreduce(np.einsum("f,fkd->d", areas, corners) / d)
     centroid = sums / area

@@ -19,23 +19,28 @@ import numpy as np
 from dolfinx import fem
 from dolfinx import mesh as dmesh
 
+from .. import compat
 from ..mesh import nodes
 from ..typing import Array
 
 EDGE_SHARE = {2: 0.0, 3: 0.125}
 """The share of an edge's function that goes to each of its ends at degree 2, by dimension (docs/degree-2.md)."""
 _VERTEX_RULE = {"quadrature_rule": "vertex", "quadrature_degree": 1}
+_CURVED_DEGREE = 6
+"""Degree of that rule on curved facets: normals times areas have degree 2, areas alone are not polynomials."""
 LOAD_DEGREE = {2: 20, 3: 12}
 """Degree of the quadrature of a traction that varies, by dimension: what a mesh cannot follow must not be missed."""
 
 
-def contact_rule(degree: int) -> dict[str, Any]:
-    """The quadrature of the basis functions on Γc, as UFL metadata.
+def contact_rule(space: fem.FunctionSpace) -> dict[str, Any]:
+    """The quadrature of the basis functions on Γc, and of their products with normals, as UFL metadata.
 
     Args:
-        degree: of the elements.
+        space: of the displacements.
     """
-    return _VERTEX_RULE if degree == 1 else {"quadrature_degree": degree}
+    if nodes.degree(space) == 1:
+        return _VERTEX_RULE
+    return {"quadrature_degree": 2 if compat.geometry_degree(space.mesh) == 1 else _CURVED_DEGREE}
 
 
 def displacement_space(mesh: dmesh.Mesh, degree: int = 1) -> fem.FunctionSpace:
@@ -72,10 +77,37 @@ def values(space: fem.FunctionSpace, coefficients: Array) -> Array:
         space: of the displacements.
         coefficients: at the local nodes, ghosts among them, of any shape that reshapes to (n, d).
     """
-    found, share = np.asarray(coefficients.reshape(-1, space.mesh.geometry.dim)), edge_share(space)
+    return _values(space, np.asarray(coefficients.reshape(-1, space.mesh.geometry.dim)))
+
+
+def _values(space: fem.FunctionSpace, found: Array) -> Array:
+    share = edge_share(space)
     if share == 0.0:
         return found
     return np.asarray((1 - 2 * share) * found + share * found[nodes.edge_ends(space)].sum(axis=1))
+
+
+def positions(space: fem.FunctionSpace, coefficients: Array) -> Array:
+    """Where the local nodes are, m, (n, 3): the inverse of :func:`coefficients_of` for the position.
+
+    Args:
+        space: of the displacements.
+        coefficients: of the position.
+    """
+    return coefficients if compat.geometry_degree(space.mesh) == 1 else _values(space, coefficients)
+
+
+def coefficients_of(space: fem.FunctionSpace, points: Array) -> Array:
+    """The coefficients of the position, m, (n, 3); on straight cells the nodes themselves, as of all linear functions.
+
+    Args:
+        space: of the displacements.
+        points: the local nodes, ghosts among them, m, (n, 3).
+    """
+    share = edge_share(space)
+    if share == 0.0 or compat.geometry_degree(space.mesh) == 1:
+        return points
+    return np.asarray((points - share * points[nodes.edge_ends(space)].sum(axis=1)) / (1 - 2 * share))
 
 
 def facet_weights(space: fem.FunctionSpace, sizes: Array) -> Array:

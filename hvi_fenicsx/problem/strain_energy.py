@@ -12,6 +12,7 @@ from ..mesh import nodes
 from ..rigid import RigidBody, rigid_fields
 from ..runtime import forms
 from ..typing import Array
+from .spaces import coefficients_of
 from .vectors import nodal_values
 
 ROUNDING = 1e-10
@@ -25,7 +26,7 @@ def feels_no_rigid_motion(form: Any, space: fem.FunctionSpace) -> bool:
         form: a(u, v) in UFL.
         space: of its arguments.
     """
-    points, d = nodes.points(space), space.mesh.geometry.dim
+    points, d = coefficients_of(space, nodes.points(space)), space.mesh.geometry.dim
     field = fem.Function(space)
     compiled = forms.compiled(ufl.action(form, field))
 

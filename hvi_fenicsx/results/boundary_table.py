@@ -47,7 +47,7 @@ def _columns(solution: Solution, loads: Mapping[str, NodalForces], part: str, fa
     blocks = part_areas.vertices(problem, facets)
     d, scales = problem.scales.dimension, problem.scales
     found = np.full((len(blocks), len(QUANTITIES), 3), np.nan)
-    found[:, 0, :d] = problem.points[blocks, :d]
+    found[:, 0, :d] = problem.positions[blocks, :d]
     if part in loads:
         found[:, 2, :d] = loads[part].at(blocks) * scales.force / part_areas.lumped(problem, facets)[blocks, None]
     if solution.solve_result is not None and forces is not None:

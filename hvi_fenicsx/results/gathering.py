@@ -36,7 +36,7 @@ def solution_arrays(solution: Solution, von_mises: Singles | None = None) -> Sol
     problem = solution.problem
     comm, d = problem.domain.mesh.comm, problem.scales.dimension
     owned = problem.space.dofmap.index_map.size_local
-    fields: dict[str, npt.NDArray[Any]] = {"points": problem.points[:owned, :d], "cells": _cells(problem)}
+    fields: dict[str, npt.NDArray[Any]] = {"points": problem.positions[:owned, :d], "cells": _cells(problem)}
     if solution.solve_result is not None:
         fields["displacement"] = _by_node(problem, solution.solve_result.u) * problem.scales.displacement
     elif solution.solvability.direction is not None:
@@ -108,9 +108,9 @@ def _load(problem: Problem, facets: Entities, loads: Sequence[SurfaceLoad]) -> L
     traction, pressure = np.zeros((len(local), d)), np.zeros(len(local))
     for load in loads:
         for i, component in enumerate(load.components):
-            traction[:, i] += component.at(problem.points[local])
+            traction[:, i] += component.at(problem.positions[local])
         if load.pressure is not None:
-            pressure += load.pressure.at(problem.points[local])
+            pressure += load.pressure.at(problem.positions[local])
     vertices, first = np.unique(_joined(comm, _globally(problem, local)), return_index=True)
     return LoadArrays(
         vertices=vertices, traction=_joined(comm, traction)[first], pressure=_joined(comm, pressure)[first]

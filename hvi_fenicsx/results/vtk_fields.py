@@ -114,7 +114,7 @@ def _grid(problem: Problem, at_points: Mapping[str, Array], in_cells: Mapping[st
     cells, parts = nodes.linear_cells(problem.space), nodes.parts_of_cell(problem.space)
     used, numbered = np.unique(cells, return_inverse=True)
     return Grid(
-        points=problem.points[used],
+        points=problem.positions[used],
         cells=numbered.reshape(cells.shape),
         at_points={name: _spatial(values[used]) for name, values in at_points.items()},
         in_cells={name: _flat(np.repeat(_rounded(values, 7), parts, axis=0)) for name, values in in_cells.items()},
@@ -218,7 +218,7 @@ def _on_facets(problem: Problem, facets: Entities, nodal: Mapping[str, Array]) -
     cells = nodes.linear_facets(problem.space, owned).astype(np.int64)
     used, numbered = np.unique(cells, return_inverse=True)
     return Grid(
-        points=problem.points[used],
+        points=problem.positions[used],
         cells=numbered.reshape(cells.shape),
         at_points={name: values[used] for name, values in nodal.items()},
         in_cells={},

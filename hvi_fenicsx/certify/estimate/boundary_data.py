@@ -117,4 +117,4 @@ def sample(problem: Problem, bubbles: fem.FunctionSpace, facets: Entities, thres
     """
     found, d = contact_facets(problem, bubbles, facets), problem.scales.dimension
     barycentric, weights = quadrature("interval" if d == 2 else "triangle", 2 * thresholds.data_degree[d])
-    return FacetSamples(found, problem.points[found.nodes], barycentric, weights)
+    return FacetSamples(found, problem.positions[found.nodes], barycentric, weights)

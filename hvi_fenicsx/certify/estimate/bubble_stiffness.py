@@ -152,7 +152,7 @@ class _Affine:
     """Elastic energies of functions affine on a cell that vanish at its middle. Creation is collective."""
 
     def __init__(self, problem: Problem) -> None:
-        mesh, d = problem.domain.mesh, problem.scales.dimension
+        mesh, d = problem.space.mesh, problem.scales.dimension
         space = fem.functionspace(mesh, ("Discontinuous Lagrange", 0, (d,)))
         middle, self._slopes, self._sums = fem.Function(space), fem.Constant(mesh, np.zeros(d)), fem.Function(space)
         cells = np.arange(len(space.dofmap.list), dtype=np.int32)

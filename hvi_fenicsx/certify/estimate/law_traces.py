@@ -142,7 +142,7 @@ class LawTraces:
     ) -> None:
         self.problem, self.u, self.states, self.thresholds, self.exact = problem, u, states, thresholds, exact
         self.degree = nodes.degree(problem.space)
-        self.bubbles = bubbles.space(problem.domain.mesh, self.degree)
+        self.bubbles = bubbles.space(problem.space.mesh, self.degree)
         self._interfaces: dict[str, InterfacePoints] = {}
         self._traces: dict[int, tuple[Array, Trace]] = {}
         self._solved: dict[int, tuple[LawState, _Solved]] = {}

@@ -1,0 +1,89 @@
+"""Cells with curved edges: at degree 2 the mesh of a body whose sides lie on known curves.
+
+It has the topology of the straight mesh, so that cells, facets and dofs have the same numbers, and one node more on
+each edge: on the curve where the edge lies on a curved side, else in the middle.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+
+import basix
+import numpy as np
+from dolfinx import common, fem, la
+from dolfinx import mesh as dmesh
+
+from .. import compat
+from ..geometry import Curve
+from ..runtime.mpi import agree
+from ..typing import Array, Entities
+from . import nodes
+from .domain import Domain
+from .thresholds import DEFAULT, Thresholds
+
+
+def mesh_of(
+    domain: Domain, degree: int, straight: Collection[str] = (), thresholds: Thresholds = DEFAULT
+) -> dmesh.Mesh:
+    """The mesh that displacements of a degree live on. Collective.
+
+    Args:
+        domain: the body.
+        degree: of the elements; at degree 1 cells are straight.
+        straight: sides that stay as they are meshed.
+        thresholds: how much a cell may be bent; where one would be bent more, the whole mesh is straight.
+    """
+    curved, flattened = set(domain.curves) - set(straight), set(domain.curves) & set(straight)
+    if degree == 1 or not curved or (domain.dimension == 3 and flattened):  # in space sides share edges
+        return domain.mesh
+    return domain.once(
+        "curved cells", frozenset(curved), lambda: _curved(domain, sorted(curved), thresholds.least_jacobian)
+    )
+
+
+def _curved(domain: Domain, names: Collection[str], least: float) -> dmesh.Mesh:
+    space = fem.functionspace(domain.mesh, ("Lagrange", 2))
+    before, d = nodes.points(space)[:, : domain.dimension], domain.dimension
+    on = {name: np.unique(nodes.facet_nodes(space, domain.sides[name])) for name in names}
+    after = onto_curves(space.dofmap.index_map, before, on, domain.curves)
+    moved = np.flatnonzero(np.any((after != before)[space.dofmap.list], axis=(1, 2)))
+    cells = space.dofmap.list[moved]
+    kept = bool(np.all(_jacobians(after[cells]) >= least * _jacobians(before[cells])))
+    if not all(agree(domain.mesh.comm, kept)):
+        return domain.mesh
+    points = np.pad(after, ((0, 0), (0, 3 - d)))
+    return compat.quadratic_mesh(domain.mesh, space.dofmap, points)
+
+
+def onto_curves(
+    index_map: common.IndexMap, points: Array, on: Mapping[str, Entities], curves: Mapping[str, Curve]
+) -> Array:
+    """Points, those of curved sides moved onto their curves, on all ranks that have them. Collective.
+
+    Args:
+        index_map: of the points.
+        points: all local ones, m, (n, d).
+        on: the local points of curved sides that this rank knows of, by name.
+        curves: by name; the others are left out.
+    """
+    found, d = points.copy(), points.shape[1]
+    for name, nodes_of in on.items():
+        x = found[nodes_of]
+        shared = la.vector(index_map, d + 1)
+        shared.array[:] = 0.0
+        shared.array.reshape(-1, d + 1)[nodes_of] = np.column_stack([curves[name].nearest(x) - x, np.ones(len(x))])
+        shared.scatter_reverse(la.InsertMode.add)
+        shared.scatter_forward()
+        total = shared.array.reshape(-1, d + 1)
+        found += total[:, :d] / np.maximum(total[:, d:], 1.0)
+    return found
+
+
+def _jacobians(points: Array) -> Array:
+    """The determinants of the maps of cells (c, n, d) from the reference cell, at its nodes, (c, n); positive if straight."""
+    kind = {6: basix.CellType.triangle, 10: basix.CellType.tetrahedron}[points.shape[1]]
+    element = basix.create_element(basix.ElementFamily.P, kind, 2, basix.LagrangeVariant.gll_warped)
+    slopes = np.asarray(element.tabulate(1, element.points))[1:, :, :, 0]
+    straight = np.linalg.det(points[:, 1 : points.shape[2] + 1] - points[:, :1])
+    signed = np.linalg.det(np.einsum("iqn,cnd->cqid", slopes, points))
+    return np.asarray(signed * np.sign(straight)[:, None])
