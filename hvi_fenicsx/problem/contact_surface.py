@@ -15,6 +15,7 @@ from mpi4py import MPI
 
 from ..errors import InputError
 from ..typing import Array, Entities, Integers
+from . import facet_integrals
 from .vectors import nodal
 
 
@@ -82,8 +83,7 @@ def make_surface(
     blocks = np.unique(dofs[dofs < space.dofmap.index_map.size_local]).astype(np.int32)
     test = ufl.TestFunction(space)
     normal = nodal(ufl.inner(ufl.FacetNormal(space.mesh), test) * measure)[blocks]
-    ones = ufl.as_vector([fem.Constant(space.mesh, 1.0)] * dimension)
-    weights = nodal(ufl.inner(ones, test) * measure)[blocks, 0] / area
+    weights = _weights(space, normal, test, measure, blocks) / area
     if space.mesh.comm.allreduce(bool(np.any(weights == 0.0)), op=MPI.LOR):
         raise InputError(f"boundary.{part}: contact and laws act on the body's surface, and facets of it lie inside")
     normals = normal / np.linalg.norm(normal, axis=1, keepdims=True)
@@ -97,6 +97,17 @@ def make_surface(
         tangents=tangents(normals),
         weights=weights,
     )
+
+
+def _weights(space: fem.FunctionSpace, normal: Array, test: Any, measure: Any, blocks: Entities) -> Array:
+    """The integrals of the basis functions, (m,); of curved cells the sizes of those times the normal.
+
+    With the latter a uniform pressure has exactly the forces of its nodal values, whatever the curve.
+    """
+    if facet_integrals.is_curved(space):
+        return np.asarray(np.linalg.norm(normal, axis=1))
+    ones = ufl.as_vector([fem.Constant(space.mesh, 1.0)] * space.mesh.geometry.dim)
+    return np.asarray(nodal(ufl.inner(ones, test) * measure)[blocks, 0])
 
 
 def tangents(normals: Array) -> Array:

@@ -191,7 +191,7 @@ def _residual(context: DomainForms, where: Surface, density: fem.Function) -> fe
 
     def make() -> fem.Form:
         area = context.number(context.length ** (1 - context.dimension))
-        measure = ScaledMeasure(area, context.boundary(where.part, **contact_rule(1)))
+        measure = ScaledMeasure(area, context.boundary(where.part, **contact_rule(context.space)))
         return forms.compiled(ufl.inner(density, context.test) * measure)
 
     return context.domain.once(f"forces of laws on {where.part}", where.facets.tobytes(), make)
