@@ -45,6 +45,7 @@ def before_solving(
         *_scales(problem, thresholds),
         *_uneven_parts(problem, thresholds),
         *_polygons(problem, thresholds),
+        *_straightened(problem),
         *_weak_laws(problem, forces, thresholds),
     )
 
@@ -145,6 +146,18 @@ def _polygons(problem: Problem, thresholds: PlausibilityThresholds) -> Iterator[
                 f"{most:.2g}°, as those of a curved side. They are taken for a polygon, and the pressure of degree 2 "
                 "shows its corners: give a mesh file of second order (gmsh: Mesh.ElementOrder = 2), or use "
                 "solver.degree = 1"
+            )
+
+
+def _straightened(problem: Problem) -> Iterator[str]:
+    """A mesh of degree 2 whose cells are straight although curves are known."""
+    domain = problem.domain
+    if nodes.degree(problem.space) == 2 and domain.curves and not problem.interfaces:
+        if problem.space.mesh is domain.mesh:
+            sides = ", ".join(repr(name) for name in sorted(domain.curves))
+            yield (
+                f"domain: the mesh is too coarse for its curve ({sides}): cells would turn over, so all stay straight, "
+                "and the error of this polygon is not estimated; use smaller cells there"
             )
 
 

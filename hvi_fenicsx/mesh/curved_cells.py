@@ -21,6 +21,9 @@ from . import nodes
 from .domain import Domain
 from .thresholds import DEFAULT, Thresholds
 
+_MORE_SWEEPS = 2
+"""Projections, from one side to the next, that bring a node of two sides onto both; each gains some digits."""
+
 
 def mesh_of(
     domain: Domain, degree: int, straight: Collection[str] = (), thresholds: Thresholds = DEFAULT
@@ -46,6 +49,8 @@ def _curved(domain: Domain, names: Collection[str], least: float) -> dmesh.Mesh:
     before, d = nodes.points(space)[:, : domain.dimension], domain.dimension
     on = {name: np.unique(nodes.facet_nodes(space, domain.sides[name])) for name in names}
     after = onto_curves(space.dofmap.index_map, before, on, domain.curves)
+    for _ in range(_MORE_SWEEPS if domain.dimension == 3 else 0):  # in space sides share edges
+        after = onto_curves(space.dofmap.index_map, after, _shared(on), domain.curves)
     moved = np.flatnonzero(np.any((after != before)[space.dofmap.list], axis=(1, 2)))
     cells = space.dofmap.list[moved]
     kept = bool(np.all(_jacobians(after[cells]) >= least * _jacobians(before[cells])))
@@ -53,6 +58,12 @@ def _curved(domain: Domain, names: Collection[str], least: float) -> dmesh.Mesh:
         return domain.mesh
     points = np.pad(after, ((0, 0), (0, 3 - d)))
     return compat.quadratic_mesh(domain.mesh, space.dofmap, points)
+
+
+def _shared(on: Mapping[str, Entities]) -> dict[str, Entities]:
+    """Those of the nodes of each side that are on several of them."""
+    found, count = np.unique(np.concatenate(list(on.values())), return_counts=True)
+    return {name: np.intersect1d(nodes_of, found[count > 1]) for name, nodes_of in on.items()}
 
 
 def onto_curves(

@@ -1,6 +1,6 @@
 """Curved sides by facets of second order, as a mesh file has them: the points nearest to others.
 
-The mesh itself has straight cells. A side of second order tells where its nodes and refined vertices belong.
+The mesh of a domain has straight cells; those of degree 2 are made of it (:mod:`.curved_cells`). A side of second order tells where its nodes and refined vertices belong.
 """
 
 from __future__ import annotations
@@ -14,6 +14,8 @@ from scipy.spatial import KDTree
 from ..typing import Array, Integers
 from . import point_location
 
+_ROUNDING = 1e-12
+"""Distance from the middle of an edge, over the size of the side, that is rounding."""
 _STEPS = 12
 """Gauss-Newton steps from the projection onto the straight facet; the bend of a facet is a small part of its size."""
 
@@ -29,12 +31,19 @@ class CurvedFacets:
     points: Array
 
     def nearest(self, x: Array) -> Array:
-        """The points of the side nearest to the points x, both (m, d), m."""
+        """The points of the side nearest to the points x, both (m, d), m; of the middle of an edge its own node.
+
+        So an edge between two sides stays on both.
+        """
         facet, point = self._pairs(x)
         found, away = self._projected(facet, x[point])
         order = np.argsort(-away, kind="stable")  # of several facets of one point, the last one stays
         result = np.array(x, dtype=np.float64)
         result[point[order]] = found[order]
+        straight, own = self._middles()
+        away, number = KDTree(straight).query(x) if len(x) else (np.empty(0), np.empty(0, np.int64))
+        same = away <= _ROUNDING * np.linalg.norm(np.ptp(self.points, axis=(0, 1)))
+        result[same] = own[number[same]]
         return result
 
     def moved(self, origin: Array, rotation: Array) -> CurvedFacets:
@@ -45,6 +54,13 @@ class CurvedFacets:
             rotation: (d, d).
         """
         return CurvedFacets(self.points @ rotation.T + origin)
+
+    def _middles(self) -> tuple[Array, Array]:
+        """The middles of the edges if they were straight, and their nodes, (e, d) both."""
+        d = self.points.shape[2]
+        kind = {2: basix.CellType.interval, 3: basix.CellType.triangle}[d]
+        ends = np.array(basix.topology(kind)[1])
+        return self.points[:, ends].mean(axis=2).reshape(-1, d), self.points[:, d:].reshape(-1, d)
 
     def _pairs(self, x: Array) -> tuple[Integers, Integers]:
         """Facets, and points that may be nearest to them; all facets for points that are near none."""

@@ -80,7 +80,7 @@ def reference_points(space: fem.FunctionSpace) -> Array:
 
 
 def dof_of_node(space: fem.FunctionSpace) -> Entities:
-    """The (block) dof at each vertex of the straight mesh, by its geometry nodes, (nodes,)."""
+    """The (block) dof at each geometry node of the mesh, whose nodes are its vertices, (nodes,)."""
     count = space.mesh.topology.index_map(space.mesh.topology.dim)
     corners = compat.geometry_dofmap(space.mesh)[: count.size_local + count.num_ghosts]
     result = np.zeros(space.mesh.geometry.x.shape[0], dtype=np.int32)
@@ -96,19 +96,6 @@ def edge_ends(space: fem.FunctionSpace) -> Entities:
     for number, ends in enumerate(edges(space) if cells.shape[1] > corners else ()):
         found[cells[:, corners + number]] = cells[:, list(ends)]
     return found
-
-
-def between(space: fem.FunctionSpace, ends: Entities) -> Entities:
-    """The local nodes that are the middles of pairs of vertices (k, 2), or the vertex that is named twice, (k,).
-
-    Args:
-        space: whose nodes are sought.
-        ends: vertices, by their numbers among the nodes.
-    """
-    known = np.sort(edge_ends(space).astype(np.int64), axis=1)
-    keys, wanted = (pairs[:, 0] * len(known) + pairs[:, 1] for pairs in (known, np.sort(ends.astype(np.int64), axis=1)))
-    order = np.argsort(keys)
-    return np.asarray(order[np.searchsorted(keys[order], wanted)], dtype=np.int32)
 
 
 def linear_cells(space: fem.FunctionSpace) -> Entities:

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import dolfinx
 import numpy as np
 import numpy.typing as npt
 
-from .. import compat
 from ..geometry import chains
 from ..mesh import nodes
 from ..problem.contact_surface import Surface
@@ -38,20 +36,17 @@ def edges(problem: Problem, surface: Surface) -> Integers:
     facets = np.asarray(surface.facets, dtype=np.int32)
     if not len(facets):
         return np.empty((0, 2), dtype=np.int64)
-    corners = dolfinx.mesh.entities_to_geometry(mesh, 1, facets)
+    on = nodes.facet_nodes(space, facets)
     mesh.topology.create_connectivity(1, 2)
     cells = [mesh.topology.connectivity(1, 2).links(f)[0] for f in facets]
-    x = mesh.geometry.x[:, :2]
-    first, last = x[corners[:, 0]], x[corners[:, 1]]
-    inwards = x[compat.geometry_dofmap(mesh)[cells]].mean(axis=1) - first
+    x = problem.points[:, :2]
+    first, last = x[on[:, 0]], x[on[:, 1]]
+    inwards = x[space.dofmap.list[cells][:, :3]].mean(axis=1) - first
     along = last - first
     left = along[:, 0] * inwards[:, 1] - along[:, 1] * inwards[:, 0] > 0
-    corners = np.where(left[:, None], corners, corners[:, ::-1])
-    ends = nodes.dof_of_node(space)[corners]
-    dofs = ends
+    dofs = np.where(left[:, None], on[:, :2], on[:, 1::-1])
     if nodes.degree(space) == 2:
-        middle = nodes.between(space, ends)
-        dofs = np.vstack([np.column_stack([ends[:, 0], middle]), np.column_stack([middle, ends[:, 1]])])
+        dofs = np.vstack([np.column_stack([dofs[:, 0], on[:, 2]]), np.column_stack([on[:, 2], dofs[:, 1]])])
     found = space.dofmap.index_map.local_to_global(dofs.ravel().astype(np.int32))
     return np.asarray(found, dtype=np.int64).reshape(-1, 2)
 
