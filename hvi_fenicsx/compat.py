@@ -144,6 +144,16 @@ def quadratic_mesh(mesh: _mesh.Mesh, dofmap: Any, points: Array) -> _mesh.Mesh:
     return _mesh.Mesh(_cpp.mesh.Mesh_float64(mesh.comm, topology, geometry), ufl.Mesh(element))
 
 
+def same_topology(one: _mesh.Mesh, other: _mesh.Mesh) -> bool:
+    """Whether two meshes share their cells and facets, and so the numbers of them.
+
+    Args:
+        one: a mesh.
+        other: another.
+    """
+    return bool(one._cpp_object.topology is other._cpp_object.topology)
+
+
 def comm_of(form: Any) -> Any:
     """The ranks of the mesh that a UFL form is integrated over."""
     return next(iter(form.subdomain_data())).ufl_cargo().comm

@@ -152,13 +152,13 @@ def _polygons(problem: Problem, thresholds: PlausibilityThresholds) -> Iterator[
 def _straightened(problem: Problem) -> Iterator[str]:
     """A mesh of degree 2 whose cells are straight although curves are known."""
     domain = problem.domain
-    if nodes.degree(problem.space) == 2 and domain.curves and not problem.interfaces:
-        if problem.space.mesh is domain.mesh:
-            sides = ", ".join(repr(name) for name in sorted(domain.curves))
-            yield (
-                f"domain: the mesh is too coarse for its curve ({sides}): cells would turn over, so all stay straight, "
-                "and the error of this polygon is not estimated; use smaller cells there"
-            )
+    straight = nodes.degree(problem.space) == 2 and problem.space.mesh is domain.mesh
+    if straight and domain.curves and not problem.interfaces:
+        sides = ", ".join(repr(name) for name in sorted(domain.curves))
+        reason, remedy = f"the mesh is too coarse for its curve ({sides}): cells would turn over", "use smaller cells"
+        if not domain.bends:
+            reason, remedy = "the energy has data of the straight mesh", "write them as formulas of the position"
+        yield f"domain: {reason}, so all cells stay straight, and the error of this polygon is not estimated; {remedy}"
 
 
 def _weak_laws(problem: Problem, forces: Mapping[str, PETSc.Vec], thresholds: PlausibilityThresholds) -> Iterator[str]:

@@ -37,7 +37,7 @@ def mesh_of(
         thresholds: how much a cell may be bent; where one would be bent more, the whole mesh is straight.
     """
     curved, flattened = set(domain.curves) - set(straight), set(domain.curves) & set(straight)
-    if degree == 1 or not curved or (domain.dimension == 3 and flattened):  # in space sides share edges
+    if degree == 1 or not (curved and domain.bends) or (domain.dimension == 3 and flattened):  # in space sides share edges
         return domain.mesh
     return domain.once(
         "curved cells", frozenset(curved), lambda: _curved(domain, sorted(curved), thresholds.least_jacobian)

@@ -140,8 +140,11 @@ def _with_options(scene: Scene, options: dict[str, Any]) -> Scene:
 
 
 def _domain(model: Model) -> Domain:
-    """The body's domain; where an energy has data of its mesh, they may change: nothing is kept, no mesh is coarser."""
+    """The body's domain; where an energy has data of its mesh, nothing is kept, no mesh is coarser, no cell is bent.
+
+    The data may change between two solves.
+    """
     domain = model.body.domain
     own = [m.elasticity for m in model.scene.material.values() if isinstance(m.elasticity, UserEnergy)]
     portable = all(energy.is_portable(domain.mesh) for energy in own)
-    return domain if portable else replace(domain, coarsening=None, shared=None)
+    return domain if portable else replace(domain, coarsening=None, shared=None, bends=False)

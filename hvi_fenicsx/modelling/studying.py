@@ -161,7 +161,7 @@ def _scene(model: Model) -> Scene:
     if portable and not any(_is_of_one_mesh(placed.effect) for placed in model.scene.effects()):
         return model.scene
     domain = replace(model.body.domain, shared=None)
-    only = domain if portable else replace(domain, coarsening=None)
+    only = domain if portable else replace(domain, coarsening=None, bends=False)
     return model.scene.changed(domain=OnlyMesh(shape="given mesh", given=only))
 
 

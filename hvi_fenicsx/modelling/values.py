@@ -52,7 +52,7 @@ class PythonFunction(SpatialValue):
 class Expression(SpatialValue):
     """A scalar UFL expression, or fem.Function, on the body's own mesh.
 
-    On the mesh itself it stands in forms as it is. At vertices, and on coarser meshes, which only give start values, it
+    On the mesh itself it stands in forms as it is, on curved cells of degree 2 as it is at their nodes. At vertices, and on coarser meshes, which only give start values, it
     is sampled at the nearest vertex.
 
     Args:
@@ -85,8 +85,22 @@ class Expression(SpatialValue):
     def in_ufl(self, mesh: Any, number: Callable[[float], Any]) -> Any:
         if mesh is self._mesh:
             return self._expression
+        if compat.same_topology(mesh, self._mesh):
+            return self._on_curved_cells(mesh)
         found = fem.Function(fem.functionspace(mesh, ("Lagrange", 1)))
         found.interpolate(lambda x: self.at(x.T))
+        return found
+
+    def _on_curved_cells(self, mesh: dmesh.Mesh) -> fem.Function:
+        """The expression at the nodes of the curved mesh that belongs to the body's: their numbers are the same."""
+        straight, curved = (fem.functionspace(one, ("Lagrange", 2)) for one in (self._mesh, mesh))
+        d = mesh.geometry.dim
+        position = fem.Function(fem.functionspace(self._mesh, ("Lagrange", 2, (d,))))
+        position.x.array[:] = nodes.points(curved)[:, :d].ravel()
+        moved = ufl.replace(self._expression, {ufl.SpatialCoordinate(self._mesh): position})
+        sampled, found = fem.Function(straight), fem.Function(curved)
+        sampled.interpolate(compat.expression(moved, straight))
+        found.x.array[:] = sampled.x.array
         return found
 
 

@@ -7,15 +7,19 @@ is held to Lamé's thick walls and to uniform stresses, which curved cells repre
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import meshes
 import numpy as np
 import pytest
+import ufl
+from dolfinx import fem
+from mpi4py import MPI
 from runs import hvi as command
 from runs import summary
 
 import hvi_fenicsx as hvi
-from hvi_fenicsx.mesh import gmsh_file, refinement
+from hvi_fenicsx.mesh import gmsh_file, nodes, refinement
 from hvi_fenicsx.mesh.curved_cells import mesh_of
 from hvi_fenicsx.problem import spaces
 
@@ -182,11 +186,6 @@ def test_curved_bodies_are_the_same_on_ranks(tmp_path: Path) -> None:
 def test_nodes_of_edges_between_two_sides_stay_on_both(tmp_path: Path) -> None:
     """Of a flat side with a round edge too, refined or not; the file has the nodes of the coarse mesh."""
     file = meshes.make(tmp_path / "shell.msh", SHELL.format(size=0.5, order=2))
-    from dolfinx import fem
-    from mpi4py import MPI
-
-    from hvi_fenicsx.mesh import nodes
-
     coarse = gmsh_file.read(MPI.COMM_WORLD, file, 3)
     for domain, rounding in ((coarse, 1e-12), (refinement.uniform(coarse).domain, 1e-7)):
         mesh = mesh_of(domain, 2)
@@ -203,3 +202,29 @@ def test_cells_that_a_curve_would_turn_over_stay_straight_and_that_is_said(tmp_p
     effects = [rubber(3), *symmetry(FLAT[3]), hvi.Pressure("inner", P)]
     found = hvi.check(hvi.Model(hvi.Body.file(file, dimension=3), effects), degree=2)
     assert any("too coarse for its curve" in text for text in found.warnings)
+
+
+@pytest.mark.parametrize("given", ["ufl", "function"])
+def test_loads_of_a_program_meet_curved_cells(given: str, tmp_path: Path) -> None:
+    """An expression on the body's mesh, which is straight, is taken where the nodes of the curved cells are."""
+    energies = []
+    for kind in ("formula", given):
+        made = body(tmp_path, 2, 0.5)
+        x = ufl.SpatialCoordinate(made.mesh)
+        load = {"formula": "1e5*(1 + x)", "ufl": 1e5 * (1 + x[0]), "function": lambda x: 1e5 * (1 + x[0])}[kind]
+        effects = [rubber(2), *symmetry(FLAT[2]), hvi.Pressure("inner", load)]
+        energies.append(hvi.solve(hvi.Model(made, effects), degree=2, estimate=False).energy)
+    assert energies[1] == pytest.approx(energies[0], rel=1e-12)
+
+
+def test_an_energy_with_data_of_the_straight_mesh_keeps_its_cells_straight(tmp_path: Path) -> None:
+    made = body(tmp_path, 2, 0.5)
+    stiffness = fem.Function(fem.functionspace(made.mesh, ("Discontinuous Lagrange", 0)))
+    stiffness.x.array[:] = E
+
+    def energy(u: Any, v: Any) -> Any:
+        return stiffness * ufl.inner(ufl.sym(ufl.grad(u)), ufl.sym(ufl.grad(v))) * ufl.dx
+
+    effects = [hvi.Energy(energy), *symmetry(FLAT[2]), hvi.Pressure("inner", P)]
+    found = hvi.check(hvi.Model(made, effects), degree=2)
+    assert any("data of the straight mesh" in text for text in found.warnings)
