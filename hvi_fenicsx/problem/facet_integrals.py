@@ -12,7 +12,7 @@ from ..typing import Array, Entities
 from . import spaces
 
 _DEGREE = 12
-"""Of the quadrature: areas are square roots of polynomials, nearly constant ones."""
+"""Degree of the quadrature: areas are square roots of polynomials, nearly constant ones."""
 
 
 def is_curved(space: fem.FunctionSpace) -> bool:
