@@ -1,6 +1,7 @@
 """Curved sides by facets of second order, as a mesh file has them: the points nearest to others.
 
-The mesh of a domain has straight cells; those of degree 2 are made of it (:mod:`.curved_cells`). A side of second order tells where its nodes and refined vertices belong.
+The mesh of a domain has straight cells; those of degree 2 are made of it (:mod:`.curved_cells`). A side of second
+order tells where its nodes and refined vertices belong.
 """
 
 from __future__ import annotations

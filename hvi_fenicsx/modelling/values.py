@@ -52,8 +52,8 @@ class PythonFunction(SpatialValue):
 class Expression(SpatialValue):
     """A scalar UFL expression, or fem.Function, on the body's own mesh.
 
-    On the mesh itself it stands in forms as it is, on curved cells of degree 2 as it is at their nodes. At vertices, and on coarser meshes, which only give start values, it
-    is sampled at the nearest vertex.
+    On the mesh itself it stands in forms as it is, on curved cells of degree 2 as it is at their nodes. At vertices,
+    and on coarser meshes, which only give start values, it is sampled at the nearest vertex.
 
     Args:
         expression: in SI.

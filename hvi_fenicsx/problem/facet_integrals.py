@@ -28,8 +28,8 @@ def samples(space: fem.FunctionSpace, facets: Entities) -> tuple[Array, Array, A
         facets: local facets (f of them).
 
     Returns:
-        The points (q of them), m, (f, q, d), their weights, whose sum is the facet's size, (f, q), and the displacement's
-        basis functions there, (q, nodes).
+        The points (q of them), m, (f, q, d), their weights, whose sum is the facet's size, (f, q), and the
+        displacement's basis functions there, (q, nodes).
     """
     d = space.mesh.geometry.dim
     at = nodes.points(space)[nodes.facet_nodes(space, facets)][:, :, :d]
