@@ -37,7 +37,8 @@ def mesh_of(
         thresholds: how much a cell may be bent; where one would be bent more, the whole mesh is straight.
     """
     curved, flattened = set(domain.curves) - set(straight), set(domain.curves) & set(straight)
-    if degree == 1 or not (curved and domain.bends) or (domain.dimension == 3 and flattened):  # in space sides share edges
+    in_the_way = domain.dimension == 3 and flattened  # in space sides share edges
+    if degree == 1 or not (curved and domain.bends) or in_the_way:
         return domain.mesh
     return domain.once(
         "curved cells", frozenset(curved), lambda: _curved(domain, sorted(curved), thresholds.least_jacobian)
@@ -91,7 +92,7 @@ def onto_curves(
 
 
 def _jacobians(points: Array) -> Array:
-    """The determinants of the maps of cells (c, n, d) from the reference cell, at its nodes, (c, n); positive if straight."""
+    """The Jacobian determinants of cells (c, n, d) at their nodes, (c, n); positive where they are straight."""
     kind = {6: basix.CellType.triangle, 10: basix.CellType.tetrahedron}[points.shape[1]]
     element = basix.create_element(basix.ElementFamily.P, kind, 2, basix.LagrangeVariant.gll_warped)
     slopes = np.asarray(element.tabulate(1, element.points))[1:, :, :, 0]
