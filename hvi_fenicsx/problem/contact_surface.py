@@ -83,7 +83,7 @@ def make_surface(
     blocks = np.unique(dofs[dofs < space.dofmap.index_map.size_local]).astype(np.int32)
     test = ufl.TestFunction(space)
     normal = nodal(ufl.inner(ufl.FacetNormal(space.mesh), test) * measure)[blocks]
-    weights = _weights(space, normal, test, measure, blocks) / area
+    weights: Array = _weights(space, normal, test, measure, blocks) / area
     if space.mesh.comm.allreduce(bool(np.any(weights == 0.0)), op=MPI.LOR):
         raise InputError(f"boundary.{part}: contact and laws act on the body's surface, and facets of it lie inside")
     normals = normal / np.linalg.norm(normal, axis=1, keepdims=True)
@@ -99,7 +99,7 @@ def make_surface(
     )
 
 
-def _weights(space: fem.FunctionSpace, normal: Array, test: Any, measure: Any, blocks: Entities) -> Array:
+def _weights(space: fem.FunctionSpace, normal: Array, test: Any, measure: Any, blocks: Entities) -> Any:
     """The integrals of the basis functions, (m,); of curved cells the sizes of those times the normal.
 
     With the latter a uniform pressure has exactly the forces of its nodal values, whatever the curve.

@@ -44,7 +44,7 @@ def from_nodes(at: Array, share: float) -> tuple[Array, Array, Array]:
         share: of an edge's function that goes to each of its ends (:func:`.spaces.edge_share`).
     """
     kind = {2: basix.CellType.interval, 3: basix.CellType.triangle}[at.shape[2]]
-    places, weights = basix.make_quadrature(kind, _DEGREE)
+    places, weights = (np.asarray(part, dtype=np.float64) for part in basix.make_quadrature(kind, _DEGREE))
     element = basix.create_element(basix.ElementFamily.P, kind, 2, basix.LagrangeVariant.gll_warped)
     table = np.asarray(element.tabulate(1, places))[:, :, :, 0]
     slopes = np.einsum("iqn,fnd->fqid", table[1:], at)
