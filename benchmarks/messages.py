@@ -8,6 +8,7 @@ Nothing is timed, so ranks may share cores. The model is that of docs/scaling.md
 from __future__ import annotations
 
 import sys
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -23,32 +24,79 @@ from hvi_fenicsx.solvers import nested_iteration
 from hvi_fenicsx.solvers.active_set import ActiveSetSolver
 from hvi_fenicsx.solvers.closed_start import resting_start
 from hvi_fenicsx.solvers.context import RunControl
+from hvi_fenicsx.system.fewer_ranks import joined_ranks
 from hvi_fenicsx.system.held_solver import LinearSettings
+from hvi_fenicsx.system.levels import Levels
 from hvi_fenicsx.system.system import System
 
 COMM = MPI.COMM_WORLD
 
 
-def pairs(system: System) -> int:
-    """Pairs of ranks, in both directions, that send values to each other for a product with the matrix."""
-    known = np.zeros((COMM.size, COMM.size), dtype=np.int64)
-    known[COMM.rank, np.unique(system.problem.space.dofmap.index_map.owners)] = 1
-    known = COMM.allreduce(known)
-    return int(np.count_nonzero(known + known.T))
+@dataclass(frozen=True)
+class Ghosts:
+    """Of a level, by rank: how many numbers it owns; the vertices of others next to its own, and who owns these.
+
+    Attributes:
+        owned: numbers by rank.
+        known: by rank, of each vertex of another one: its number and its owner.
+        width: numbers by vertex.
+        joined: how many neighbouring ranks have given their rows to the first of them.
+    """
+
+    owned: list[int]
+    known: list[list[tuple[int, int]]]
+    width: int
+    joined: int
+
+    def place(self, rank: int) -> int:
+        """The rank that has the rows of this one."""
+        return rank // self.joined * self.joined
 
 
-def shared(system: System) -> int:
-    """Numbers that such an exchange sends: the vertices on cuts one way, those next to them the other way."""
+def ghosts(system: System, joined: int) -> Ghosts:
+    """Those of a level. Collective."""
     dofs = system.problem.space.dofmap
-    return int(2 * dofs.index_map_bs * COMM.allreduce(dofs.index_map.num_ghosts))
+    own = list(zip(dofs.index_map.ghosts.tolist(), dofs.index_map.owners.tolist(), strict=True))
+    owned = COMM.allgather(dofs.index_map.size_local * dofs.index_map_bs)
+    return Ghosts(owned, COMM.allgather(own), dofs.index_map_bs, joined)
 
 
-def modelled(systems: list[System]) -> tuple[float, float]:
+def exchange(rows: Ghosts, columns: Ghosts) -> tuple[int, int]:
+    """Messages and numbers of a product: vertices on cuts go one way, those next to them the other way.
+
+    Where the rows and the columns of a rank are in different places, all that it owns is sent too.
+    """
+    pairs: set[tuple[int, int]] = set()
+    wanted: set[tuple[int, int]] = set()
+    numbers = 0
+    for rank, known in enumerate(columns.known):
+        here, there = rows.place(rank), columns.place(rank)
+        if here != there:
+            pairs.add((here, there))
+            numbers += columns.owned[rank]
+        for vertex, owner in known:
+            for one, other in ((here, columns.place(owner)), (rows.place(owner), there)):
+                if one != other:
+                    pairs.add((one, other))
+            if here != rows.place(owner):
+                wanted.add((here, vertex))
+    return len(pairs), numbers + 2 * columns.width * len(wanted)
+
+
+def placed(system: System, levels: Levels) -> list[Ghosts]:
+    """The levels, finest first, as they are on their ranks. Collective."""
+    least = system.thresholds.rank_unknowns
+    joined = [joined_ranks(level.system.dofs, COMM.size, least) for level in levels[:-1]]
+    systems = [system, *(level.system for level in levels)]
+    return [ghosts(one, n) for one, n in zip(systems, [1, *joined, COMM.size], strict=True)]
+
+
+def modelled(levels: list[Ghosts]) -> tuple[float, float]:
     """Messages and numbers of an iteration: one product, and on each level a residual, two transfers and a sweep."""
-    above, ranks = systems[:-1], COMM.size
-    messages = pairs(above[0]) + sum(4 * pairs(one) for one in above) + ranks * (ranks - 1)
-    numbers = shared(above[0]) + sum(2 * shared(fine) + 2 * shared(coarse) for fine, coarse in pairwise(systems))
-    return messages, numbers + (ranks - 1) * systems[-1].dofs
+    parts = [exchange(levels[0], levels[0])]
+    for fine, coarse in pairwise(levels):
+        parts += 2 * [exchange(fine, fine)] + 2 * [exchange(fine, coarse)]
+    return sum(part[0] for part in parts), sum(part[1] for part in parts)
 
 
 def counted() -> tuple[float, float, float]:
@@ -77,7 +125,7 @@ def main() -> None:
         iterations = resting_start(solver, [term.law for term in system.terms], tolerance)[1]
         results.append((iterations, np.subtract(counted(), before)))
     (few, first), (many, second) = results
-    systems = [system, *(level.system for level in levels)]
+    systems = placed(system, levels)
     messages, numbers, reductions = (second - first) / (many - few)
     model = modelled(systems)
     if COMM.rank == 0:

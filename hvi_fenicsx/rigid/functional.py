@@ -15,6 +15,9 @@ import numpy as np
 from ..laws import Length
 from ..typing import Array
 
+_DIGITS = 12
+"""To which directions of rows are compared; all other errors of the programme are larger."""
+
 
 @dataclass(frozen=True)
 class SlipIntegral:
@@ -32,9 +35,34 @@ class SlipIntegral:
         """The integral at y, (k,)."""
         return float(self.length.of(self.rows @ y).sum())
 
+    def joined(self, other: SlipIntegral) -> SlipIntegral:
+        """The sum of two integrals of the same length, its rows merged (:func:`merged`).
+
+        Args:
+            other: the other one.
+        """
+        return SlipIntegral(merged(np.concatenate([self.rows, other.rows])), self.length)
+
     def subgradient(self, y: Array) -> Array:
         """One subgradient at y, (k,): a vertex without slip contributes the zero of its ball."""
         return np.asarray(np.tensordot(self.length.gradient(self.rows @ y), self.rows, axes=2))
+
+
+def merged(rows: Array) -> Array:
+    """Rows B_i that are positive multiples of one another as their sum: δ is positively homogeneous, so G stays.
+
+    The vertices of a flat part have one row in the plane, whatever the mesh. Vanishing rows are left out.
+
+    Args:
+        rows: (m, r, k).
+    """
+    flat = rows.reshape(len(rows), rows.shape[1] * rows.shape[2])
+    length = np.linalg.norm(flat, axis=1)
+    flat, length = flat[length > 0.0], length[length > 0.0]
+    directions, group = np.unique(np.round(flat / length[:, None], _DIGITS) + 0.0, axis=0, return_inverse=True)
+    found = np.zeros_like(directions)
+    np.add.at(found, group.ravel(), flat)
+    return found.reshape(-1, *rows.shape[1:])
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from ..errors import InputError
 from ..laws import Length
 from ..laws.convex_parts import Directional
 from ..typing import Array
-from .functional import Functional, SlipIntegral
+from .functional import Functional, SlipIntegral, merged
 from .kernel import FixedDirections, kernel
 from .motions import AnyBody, Places, fields_at, is_place
 from .thresholds import DEFAULT, Thresholds
@@ -180,6 +180,25 @@ class ReducedProblem:
         return unit_rows(rows.reshape(-1, rows.shape[2]), tiny)
 
 
+@dataclass(frozen=True, kw_only=True)
+class _Rows:
+    """What some ranks have of the reduced problem, as there."""
+
+    contact: Array
+    slips: tuple[SlipIntegral, ...]
+    areas: Array
+    traces: Array
+
+    def joined(self, other: _Rows) -> _Rows:
+        """What both have."""
+        return _Rows(
+            contact=np.unique(np.vstack([self.contact, other.contact]), axis=0),
+            slips=tuple(a.joined(b) for a, b in zip(self.slips, other.slips, strict=True)),
+            areas=self.areas + other.areas,
+            traces=self.traces + other.traces,
+        )
+
+
 def reduce(
     comm: MPI.Comm, problem: RigidProblem, thresholds: Thresholds = DEFAULT
 ) -> tuple[Array, ReducedProblem | None]:
@@ -193,29 +212,34 @@ def reduce(
     basis = kernel(comm, problem.body, problem.conditions(), thresholds)
     if basis.shape[1] == 0:
         return basis, None
-    normals = [_work(p.points, p.normals[:, None, :], problem.body, basis)[:, 0] for p in problem.cones()]
-    local = np.unique(unit_rows(np.vstack([np.zeros((0, basis.shape[1])), *normals]), thresholds.short_row), axis=0)
-    slips = [_work(p.points, p.directions, problem.body, basis) * p.weights[:, None, None] for p in problem.resistances]
-    traces = [_trace(p, problem.body, basis) for p in problem.resistances]
-    pieces = comm.gather((local, slips, [float(p.weights.sum()) for p in problem.resistances], traces), root=0)
-    if pieces is None:
+    rows = comm.reduce(_own_rows(problem, basis, thresholds), op=_Rows.joined, root=0)  # in a tree
+    if rows is None:
         return basis, None
-    integrals = tuple(
-        SlipIntegral(np.concatenate([piece[1][p] for piece in pieces]), part.measured)
-        for p, part in enumerate(problem.resistances)
-    )
-    moments = [g.rows[:, 0].sum(axis=0) if g.rows.shape[1] == 1 else np.zeros(basis.shape[1]) for g in integrals]
+    moments = [g.rows[:, 0].sum(axis=0) if g.rows.shape[1] == 1 else np.zeros(basis.shape[1]) for g in rows.slips]
     works = {name: np.asarray(work) @ basis for name, work in problem.loads.items()}
     return basis, ReducedProblem(
         frame=basis,
-        contact=np.unique(np.vstack([piece[0] for piece in pieces]), axis=0),
-        slips=integrals,
-        moments=np.array(moments).reshape(len(integrals), basis.shape[1]),
-        areas=np.sum([piece[2] for piece in pieces], axis=0) if integrals else np.zeros(0),
-        traces=np.sum([piece[3] for piece in pieces], axis=0),
+        contact=rows.contact,
+        slips=rows.slips,
+        moments=np.array(moments).reshape(len(rows.slips), basis.shape[1]),
+        areas=rows.areas,
+        traces=rows.traces,
         loads=works,
         load_scale=max(problem.force, sum(float(np.abs(work).max()) for work in problem.loads.values())),
         thresholds=thresholds,
+    )
+
+
+def _own_rows(problem: RigidProblem, basis: Array, thresholds: Thresholds) -> _Rows:
+    """What this rank has of the reduced problem."""
+    normals = [_work(p.points, p.normals[:, None, :], problem.body, basis)[:, 0] for p in problem.cones()]
+    contact = unit_rows(np.vstack([np.zeros((0, basis.shape[1])), *normals]), thresholds.short_row)
+    slips = [_work(p.points, p.directions, problem.body, basis) * p.weights[:, None, None] for p in problem.resistances]
+    return _Rows(
+        contact=np.unique(contact, axis=0),
+        slips=tuple(SlipIntegral(merged(w), p.measured) for w, p in zip(slips, problem.resistances, strict=True)),
+        areas=np.array([float(p.weights.sum()) for p in problem.resistances]),
+        traces=np.array([_trace(p, problem.body, basis) for p in problem.resistances]),
     )
 
 

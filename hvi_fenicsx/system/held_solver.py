@@ -45,7 +45,8 @@ _MG: dict[str, object] = {
     "mg_levels_pc_type": "sor",
     "mg_levels_pc_sor_local_symmetric": None,
     "mg_coarse_ksp_type": "preonly",
-    "mg_coarse_pc_type": "redundant",
+    "mg_coarse_pc_type": "bjacobi",
+    "mg_coarse_sub_pc_type": "lu",
 }
 
 

@@ -32,6 +32,7 @@ class Thresholds:
         condensing: unknowns of Γc for which condensing costs as much as one factorisation of the whole matrix
             (measured: 13 to 45).
         dense_columns: right-hand sides that are solved at once where a body is condensed.
+        rank_unknowns: unknowns of a rank, on average, from which a coarse level is on all ranks (docs/scaling.md).
         level_growth: factor by which unknowns grow from one level of a multigrid to the next, at least.
         held_weight: weight in the prolongation from which a coarse unknown is held with the fine one: of the unknowns
             that move a vertex, one in space has 1/4 or more.
@@ -59,6 +60,7 @@ class Thresholds:
     krylov_iterations: int = 2_000
     condensing: int = 30
     dense_columns: int = 64
+    rank_unknowns: int = 500
     level_growth: float = 3.0
     held_weight: float = 0.2
     whole_weight: float = 0.9

@@ -17,6 +17,7 @@ from runs import LONG_RANKS, on_ranks
 from scipy.optimize import linprog
 
 from hvi_fenicsx.errors import InputError
+from hvi_fenicsx.laws import Length
 from hvi_fenicsx.rigid import (
     ContactCone,
     Directional,
@@ -35,6 +36,7 @@ from hvi_fenicsx.rigid import (
     rigid_fields,
     state_of,
 )
+from hvi_fenicsx.rigid.functional import SlipIntegral
 from hvi_fenicsx.rigid.solvability import undecided
 
 Array = NDArray[np.float64]
@@ -691,6 +693,20 @@ def test_what_cannot_be_meant_is_refused() -> None:
             growth=Directional(np.nan, 0.0),
             peak=even(1.0),
         )
+
+
+@pytest.mark.parametrize("components", [1, 2])
+def test_an_integral_with_merged_rows_is_the_same(components: int) -> None:
+    """In any order, as ranks join them; the vertices of a flat part have one row, whatever their number."""
+    random = np.random.default_rng(components)
+    rows = random.normal(size=(5, components, 3))[random.integers(0, 5, 40)] * random.uniform(0.1, 2.0, (40, 1, 1))
+    rows[7], rows[8] = 0.0, -rows[9]
+    whole = SlipIntegral(rows, Length.plain(components))
+    first, second, third = (SlipIntegral(part, whole.length) for part in (rows[:13], rows[13:14], rows[14:]))
+    for joined in (first.joined(second).joined(third), first.joined(second.joined(third))):
+        assert len(joined.rows) == 6
+        for y in random.normal(size=(20, 3)):
+            assert joined.value(y) == pytest.approx(whole.value(y), rel=1e-12)
 
 
 def test_the_example_in_the_documents_prints_what_they_say(capsys: pytest.CaptureFixture[str]) -> None:

@@ -37,6 +37,7 @@ SCENES: dict[str, Table] = {
     "paper": model(16, friction=PAPER, smoothing="paper", epsilon_absolute=0.1),
     "exact": model(16, friction=PAPER),
     "lift-off": model(13, 6e6, 1e6, quadratic_linear(2.5e6) | {"multiplier": "1 + 0.4*x"}),
+    "levels": model(56, 6e6, 1e6, quadratic_linear(3e6)),  # solved by multigrid, its coarser level on one rank
     "gamg": model(24, 6e6, 1e6, quadratic_linear(3e6), linear_solver="gamg"),
     "tresca": model(10, 3e6, 1e6, {"law": "tresca", "yield_traction": 5e5}),
     "fewer-cells-than-ranks": model(1, friction=quadratic_linear(1e6)),
