@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 import pytest
 from condensed import bonds, chain, graph, problem
-from test_exact_paths import SOFTENING, bar, largest_imbalance, random_problem, spring
+from test_exact_paths import SOFTENING, bar, largest_imbalance, peeled, random_problem, spring
 
 from hvi_fenicsx.effects import Direction
 from hvi_fenicsx.equilibrium_paths.arc_length.distances import CurvedDistances
@@ -25,6 +26,7 @@ from hvi_fenicsx.system.condensed_problem import Bonds, CondensedProblem
 
 Array = npt.NDArray[np.float64]
 DROP = [(0, 0), (1, 1), (1, 0.4)]
+SMOOTHED = create("quadratic", graph(DROP), epsilon=1e-2)
 
 
 def path(
@@ -92,6 +94,60 @@ def test_piecewise_linear_paths_are_the_exact_ones(follow: Follow) -> None:
         assert states[-1].work == pytest.approx(wanted[-1].work, rel=1e-9)
 
 
+def mirrored(given: CondensedProblem) -> CondensedProblem:
+    """The same problem with all displacements of the other sign."""
+    return replace(
+        given,
+        force=-given.force,
+        force_rate=-given.force_rate,
+        lower=-given.upper,
+        upper=-given.lower,
+        bonds=tuple(replace(b, signs=-b.signs) for b in given.bonds),
+    )
+
+
+@pytest.mark.parametrize(
+    ("follow", "turned"),
+    [(Follow.STABLE, False), *(pytest.param(f, True, marks=pytest.mark.long) for f in Follow)],
+)
+def test_a_strip_that_is_peeled_off_is_the_exact_path(follow: Follow, turned: bool) -> None:
+    """Ahead of the crack vertices move by less and less: they still pass their ends where they come to these."""
+    given = mirrored(peeled()) if turned else peeled()
+    wanted = list(ExactFollower(given, PathOptions(follow=follow)).states())
+    follower, states = path(given, follow=follow)
+    assert follower.end is End.REACHED, follower.reason
+    assert folds(states) == pytest.approx(folds(wanted), rel=1e-9)
+    assert states[-1].x == pytest.approx(wanted[-1].x, abs=1e-9 * float(np.max(np.abs(wanted[-1].x))))
+    assert largest_distance(given, states) < 1e-8
+
+
+@pytest.mark.parametrize(
+    ("law", "turned"),
+    [
+        (graph([(0, 0), (1, 1), (1, 0.4), (3, 0)]), False),
+        pytest.param(Exponential(1.0, 0.0, 0.5), True, marks=pytest.mark.long),
+    ],
+)
+def test_a_body_comes_off_where_its_bonds_break_one_after_the_other(law: Superpotential, turned: bool) -> None:
+    """Along an axis, in either sense of it, and oblique in the plane."""
+    n = 4
+    given = mirrored(line(law, n)) if turned else line(law, n)
+    follower, states = path(given, programme=(100.0,))
+    other, turning = path(plate(law, n, 0.7), programme=(100.0,))
+    assert follower.end is other.end is End.ESCAPES
+    assert peak(turning) == pytest.approx(peak(states), rel=1e-9)
+
+
+def test_a_body_snaps_past_many_bonds() -> None:
+    """Twenty bonds reach their ends one after the other while the body comes off."""
+    law = graph([(0, 0), (1, 1), (1, 0.4), (3, 0)], one_sided=True)
+    given = problem(chain(20, 50.0), np.eye(1, 20, 19)[0], bonds(law, np.arange(20)))
+    wanted = list(ExactFollower(given, PathOptions(programme=(100.0,))).states())
+    follower, states = path(given, programme=(100.0,))
+    assert follower.end is End.ESCAPES
+    assert peak(states) == pytest.approx(peak(wanted), rel=1e-9)
+
+
 @pytest.mark.long
 @pytest.mark.parametrize("seed", range(40))
 def test_peaks_of_random_paths_are_the_exact_ones(seed: int) -> None:
@@ -154,7 +210,13 @@ def first_fold(follower: Follower) -> float:
 
 
 @pytest.mark.parametrize(
-    "law", [graph(SOFTENING), graph(DROP), pytest.param(Exponential(1.0, 0.1, 0.4), marks=pytest.mark.long)]
+    "law",
+    [
+        graph(SOFTENING),
+        graph(DROP),
+        pytest.param(SMOOTHED, marks=pytest.mark.long),
+        pytest.param(Exponential(1.0, 0.1, 0.4), marks=pytest.mark.long),
+    ],
 )
 def test_loading_and_unloading_in_the_plane_with_memory(law: Superpotential) -> None:
     """Slips turn; energies balance, nothing is dissipated twice, unloading is along the secant: |F| < the law's."""
@@ -173,7 +235,7 @@ def test_loading_and_unloading_in_the_plane_with_memory(law: Superpotential) -> 
 
 @pytest.mark.long
 @pytest.mark.parametrize(
-    "law", [graph(SOFTENING), graph(DROP), graph([(0, 0.3), (0.5, 0.1)]), Exponential(1.0, 0.1, 0.4)]
+    "law", [graph(SOFTENING), graph(DROP), graph([(0, 0.3), (0.5, 0.1)]), SMOOTHED, Exponential(1.0, 0.1, 0.4)]
 )
 def test_a_tenth_of_the_step_is_the_same_branch(law: Superpotential) -> None:
     given = oblique(law)

@@ -18,7 +18,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from ...typing import Array
-from .equations import ROUNDING, Equations, Place, Refused
+from .equations import ROUNDING, STANDING, Equations, Place, Refused
 from .sites import Sites
 
 _LARGEST_TURN = 0.9
@@ -114,13 +114,13 @@ class Curve(Equations):
         distances, _ = self._ends()
         if np.any(np.isfinite(distances)) or np.isfinite(self._until(aim)):
             return False
-        return not self.sites.bent or bool(np.max(self.here.values.s, initial=0.0) > _FAR * self._size)
+        return not self.sites.bent or bool(np.max(np.abs(self.here.values.s), initial=0.0) > _FAR * self._size)
 
     def _ends(self) -> tuple[Array, Array]:
         """Along the tangent, the ways of all sites to the ends of their segments, and these ends, (m,) each."""
         sites, s = self.sites, self.here.values.s
         rates = self.sites.rates(self.here.y[:-1], self.here.tangent[:-1])
-        moves = np.abs(rates) > ROUNDING * float(np.max(np.abs(self.here.tangent)))
+        moves = np.abs(rates) > STANDING * float(np.max(np.abs(self.here.tangent)))
         ends = np.where(rates > 0.0, sites.high, sites.low)
         found = np.full(len(sites), np.inf)
         found[moves] = np.maximum((ends - s)[moves] / rates[moves], 0.0)
@@ -142,6 +142,8 @@ class Curve(Equations):
             outcome, site, condition = Outcome.FACTOR, None, self.at_factor(aim)
         elif way == first:
             site = int(np.argmin(ways))
+            if way == 0.0:
+                return self._in_place(site)
             outcome, condition = Outcome.END, self.at_end(site, float(ends[site]))
         else:
             outcome, site, condition = Outcome.STEP, None, self.plane(way)
@@ -173,8 +175,8 @@ class Curve(Equations):
         self._next = max(size, self.length if grown > 1.0 else 0.0) * max(grown, 0.3)
 
     def _after(self, y: Array) -> Place:
-        values = self.sites.values(y[:-1])
-        return Place(y=y, tangent=self.tangent(values, self.here.tangent), values=values)
+        values, tangent = self.sites.values(y[:-1]), self.here.tangent
+        return Place(y=y, tangent=self.tangent(values, tangent) if self.sites.bent else tangent, values=values)
 
     def _earliest(self, move: Move, aim: float) -> Move:
         """The step up to the first event that it has passed."""
@@ -197,6 +199,8 @@ class Curve(Equations):
             guess = start.y + (1.0 - beyond) * (y - start.y)
             return self._moved(Outcome.FACTOR, None, self.correct(guess, self.at_factor(aim)))
         if shares.size and shares[site] < 1.0:
+            if shares[site] == 0.0:
+                return self._in_place(site)
             high = move.after.values.s[site] > self.sites.high[site]
             end = float((self.sites.high if high else self.sites.low)[site])
             guess = start.y + shares[site] * (y - start.y)
@@ -208,7 +212,8 @@ class Curve(Equations):
         sites, s0, s1 = self.sites, move.before.values.s, move.after.values.s
         found, way = np.ones(len(sites)), np.where(s1 != s0, s1 - s0, 1.0)
         allowed = ROUNDING * (1.0 + np.abs(s1))
-        for ends, beyond in ((sites.high, s1 > sites.high + allowed), (sites.low, s1 < sites.low - allowed)):
+        above, below = s1 > np.maximum(sites.high + allowed, s0), s1 < np.minimum(sites.low - allowed, s0)
+        for ends, beyond in ((sites.high, above), (sites.low, below)):
             found[beyond] = np.clip((ends[beyond] - s0[beyond]) / way[beyond], 0.0, 1.0 - 1e-12)
         return found
 
@@ -219,6 +224,18 @@ class Curve(Equations):
         if outcome is Outcome.END and not self._arrives(move):
             raise Refused
         return move
+
+    def settle(self) -> None:
+        """Take out what rounding has left in the equations: sites pass their ends a little before or after them."""
+        try:
+            y = self.correct(self.here.y, self.plane(0.0))
+        except Refused:
+            return
+        self.place(y, self.here.tangent)
+
+    def _in_place(self, site: int) -> Move:
+        """No step: a site that is slower than others passed its end by what rounding allows, and goes on from there."""
+        return Move(outcome=Outcome.END, site=site, before=self.here, after=self.here)
 
     def _arrives(self, move: Move) -> bool:
         """Whether the site at an end of its segment goes outwards there, and does not come back to it."""

@@ -12,7 +12,9 @@ from ...typing import Array
 from .sites import Sites, Values
 
 ROUNDING = 1e-10
-"""A coordinate this near to the end of its segment is there; a rate this small beside the largest is none."""
+"""A coordinate this near to the end of its segment is there; a factor whose rate is this small stands."""
+STANDING = 1e-11
+"""A site whose rate is this small beside the largest stands."""
 _ROUNDS = 40
 """Corrections of the directions in which vertices at rest set out, at most."""
 
@@ -144,9 +146,12 @@ class Equations:
         """
         value, gradient = condition
         size, last = 1.0 + float(np.max(np.abs(y))), np.inf
+        noise = max(1e-10, 1e-14 / self._sharpness(gradient(y))) * size
         for _ in range(10):
             values = self.sites.values(y[:-1])
             right = np.append(self.residual(y, values), value(y))
+            if not self.sites.bent and np.max(np.abs(right)) <= 1e-15 * size:
+                return y
             _, _, step, singular = dgesv(self._matrix(values, gradient(y)), right)
             if singular:
                 raise Refused
@@ -154,12 +159,17 @@ class Equations:
             if not np.isfinite(change) or (change > 2.0 * last and change > 1e-9 * size):
                 break
             y = y - step
-            if change <= 1e-14 * size or (change <= 1e-10 * size and change >= 0.1 * last):
+            if change <= 1e-14 * size or (change <= noise and change >= 0.1 * last):
                 return y
             last = change
-        if last <= 1e-10 * size:
+        if last <= noise:
             return y
         raise Refused
+
+    def _sharpness(self, gradient: Array) -> float:
+        """How fast a condition's value changes along the curve: what hardly changes fixes a point to few digits."""
+        found = abs(float(gradient @ self.here.tangent)) or 1.0
+        return min(max(found, 1e-10), 1.0)
 
     def plane(self, length: float) -> Condition:
         """The plane across the present tangent at a distance."""

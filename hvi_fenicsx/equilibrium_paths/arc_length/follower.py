@@ -180,6 +180,7 @@ class ArcLengthFollower(Follower):
             return self._state(Event.KINK)
         before = self._curve.trend
         passages = self._crossed(move.site, turned=move.outcome is Outcome.TURNED)
+        self._curve.settle()
         self._trend()
         self._unstable = self._sites.unstable_directions(self._curve.here.values)
         return self._state(_event(passages, folds=before * self._curve.trend < 0), passages)

@@ -16,7 +16,7 @@ from ...system.condensed_problem import CondensedProblem
 from ...typing import Array, Integers
 from .curve import Curve, Outcome
 from .energies import displacement_rate
-from .equations import Place, Refused
+from .equations import ROUNDING, Place, Refused
 from .passage import Crossing
 from .relaxation import Relaxation
 from .sites import Sites
@@ -26,7 +26,7 @@ _BEYOND = 1e-2
 _PUSH = 1e-6
 """How much larger the loads are that take a body off a state at which it would rest."""
 _MOST = 40
-"""Steps of such a curve at most."""
+"""Steps of such a curve at most, and twenty more for each site: it may zigzag where bonds break one after the other."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -132,11 +132,19 @@ def _motions(problem: CondensedProblem, sites: Sites, here: Place, path: Array) 
     found = [_after_drops(problem, sites, here, drops)] if drops else []
     lowest = None if drops else _lowest(problem, sites, here)
     if lowest is not None:
-        found += [lowest * (np.sign(float(lowest @ path)) or 1.0)]
+        found += [lowest * (np.sign(_into_cell(sites, here, lowest) or float(lowest @ path)) or 1.0)]
     for motion in (*found, path):
         size = float(np.max(np.abs(motion), initial=0.0))
         if size:
             yield np.asarray(motion / size)
+
+
+def _into_cell(sites: Sites, here: Place, motion: Array) -> float:
+    """How far a motion takes the sites at ends of their segments into these; 0 where there are none."""
+    s, moves = here.values.s, here.values.moves > 0.0
+    allowed = ROUNDING * (1.0 + np.abs(s))
+    low, high = moves & (s <= sites.low + allowed), moves & (s >= sites.high - allowed)
+    return float((low * 1.0 - high) @ sites.along(here.values, motion))
 
 
 def _after_drops(problem: CondensedProblem, sites: Sites, here: Place, drops: list[int]) -> Array:
@@ -192,7 +200,7 @@ def _followed(
 
 def _to_its_end(curve: Curve, lag: Array) -> Landing | None:
     start = curve.here.y
-    for _ in range(_MOST):
+    for _ in range(_MOST + 20 * len(curve.sites)):
         move = curve.advance(0.0)
         if move.outcome is Outcome.FACTOR:
             stable = curve.sites.unstable_directions(curve.here.values) == 0

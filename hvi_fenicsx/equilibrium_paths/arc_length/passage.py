@@ -17,7 +17,7 @@ from ...system.condensed_problem import CondensedProblem
 from ...typing import Array, Mask
 from ..segments import Kind, Segment
 from .curve import Curve
-from .equations import ROUNDING, Refused
+from .equations import ROUNDING, STANDING, Refused
 
 _SLOW = 1e-6
 """A rate at which a site stands, but for rounding, beside the largest."""
@@ -93,6 +93,7 @@ class Crossing:
         if arrived is not None:
             self._left[arrived] = 0.0
             rates = self._rates()
+            rates[arrived] = self._outwards(arrived)
             if turned:
                 rates[arrived] = -1e-9 * self._sites.outward[arrived]
             self._pass(arrived, rates)
@@ -107,10 +108,20 @@ class Crossing:
             self._pass(k, rates)
         raise Refused
 
-    def _rates(self) -> Array:
+    def _outwards(self, k: int) -> float:
+        """The rate of a site that is at an end of its segment, out of it."""
+        sites, s = self._sites, float(self._curve.here.values.s[k])
+        rate = abs(float(self._all_rates()[k])) or np.finfo(float).tiny
+        return rate if sites.high[k] - s < s - sites.low[k] else -rate
+
+    def _all_rates(self) -> Array:
         here = self._curve.here
-        rates = self._sites.rates(here.y[:-1], here.tangent[:-1])
-        rates[np.abs(rates) <= ROUNDING * np.max(np.abs(here.tangent))] = 0.0
+        return self._sites.rates(here.y[:-1], here.tangent[:-1])
+
+    def _rates(self) -> Array:
+        """How fast the sites go; 0 for those that stand but for rounding, (m,)."""
+        here, rates = self._curve.here, self._all_rates()
+        rates[np.abs(rates) <= STANDING * np.max(np.abs(here.tangent))] = 0.0
         return rates
 
     def _near(self) -> tuple[Mask, Mask]:

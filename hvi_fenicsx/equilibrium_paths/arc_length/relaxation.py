@@ -62,7 +62,7 @@ class Relaxation:
         for _ in range(200 + 20 * len(self._sites)):
             if self._at_rest():
                 return self._settled()
-            if float(np.max(self._sites.s(self.z), initial=0.0)) > _FAR * self._size:
+            if float(np.max(np.abs(self._sites.s(self.z)), initial=0.0)) > _FAR * self._size:
                 self.escapes = True
                 return True
             self._theta *= _FASTER if self._stepped_or_back() else _SLOWER
@@ -99,6 +99,8 @@ class Relaxation:
         """One step in time, up to the first drop; whether it went well."""
         sites, left, values = self._sites, self._left(), self._sites.values(self.z)
         sites.stiffness = self._problem.stiffness + self._theta * self._damping
+        if sites.unstable_directions(values):  # what holds back is less than what pushes on: the energy would rise
+            return False
         held = sites.stiffness @ values.x + values.force
         curve = Curve(held, left, sites, self.z, 0.0)
         row = np.eye(1, len(self.z) + 1, len(self.z))[0]

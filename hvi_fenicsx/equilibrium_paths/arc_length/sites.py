@@ -148,6 +148,21 @@ class Sites(SiteGraphs):
         found[radials.flat] = across * direction[radials.flat] + (more * along)[radials.owner] * values.directions
         return found
 
+    def along(self, values: Values, motion: Array) -> Array:
+        """What a motion is along the displacements of the sites, (m,).
+
+        Args:
+            values: at the point.
+            motion: by unknown, (n,).
+        """
+        return np.concatenate(
+            [
+                motion[self.one],
+                self.radials.along(values.directions, motion),
+                motion[self.radials.opening_unknowns],
+            ]
+        )
+
     def bond_force(self, k: int, values: Values) -> float:
         """The force of a site's laws alone, without that of a bound.
 
@@ -190,7 +205,7 @@ class Sites(SiteGraphs):
         axes = np.linalg.svd(e[None])[2].T if len(e) else np.zeros((0, 0))
         axes[:, :1] = e[:, None]
         moves, steep = bool(values.moves[k]), values.energies[k] * values.rises[k] / (values.moves[k] or 1.0)
-        if values.lengths[k]:
+        if values.lengths[k] > 0.0:
             across, turns = values.energies[k] * values.tractions[k] / values.lengths[k], True
         else:
             across, turns = steep, moves
