@@ -98,6 +98,16 @@ def edge_ends(space: fem.FunctionSpace) -> Entities:
     return found
 
 
+def middles(corners: Array) -> Array:
+    """The middles of the edges of cells or facets, in the order of their nodes, (c, edges, d).
+
+    Args:
+        corners: (c, corners, d).
+    """
+    pairs = basix.topology(basix.CellType[_BY_CORNERS[corners.shape[1]]])[1]
+    return np.asarray(corners[:, np.array(pairs)].mean(axis=2))
+
+
 def linear_cells(space: fem.FunctionSpace) -> Entities:
     """The parts of the cells that this rank owns, by their nodes, (c, d+1); those of a cell follow one another."""
     topology = space.mesh.topology

@@ -14,7 +14,7 @@ from dolfinx import fem, la
 from ..certify import placed_forces
 from ..certify.contact_state import ContactState
 from ..mesh import nodes
-from ..problem import spaces
+from ..problem import facet_integrals, spaces
 from ..problem.problem import Problem
 from ..problem.stress import von_mises
 from ..rigid import Mode
@@ -71,12 +71,9 @@ def _strain(problem: Problem, u: Array) -> Array:
     the linear function with these values at the vertices.
     """
     d, cells = problem.scales.dimension, _owned_cells(problem)
-    corners = cells[:, : d + 1]
-    points, values = problem.points[corners][:, :, :d], u[corners]
-    if nodes.degree(problem.space) == 2:
-        values = values * (4 / (d + 1) - 1)
-        for number, ends in enumerate(nodes.edges(problem.space)):
-            values[:, ends] += 4 / (d + 1) * u[cells[:, [d + 1 + number]]]
+    positions, values = problem.positions[:, :d], _linear_at_middle(problem, cells, u)
+    curved = facet_integrals.is_curved(problem.space)
+    points = _linear_at_middle(problem, cells, positions) if curved else positions[cells[:, : d + 1]]
     slopes = _slopes(points.transpose(1, 2, 0))
     rises = (values[:, 1:] - values[:, :1]).transpose(1, 2, 0)
     strain = np.zeros((len(cells), 3, 3))
@@ -84,6 +81,24 @@ def _strain(problem: Problem, u: Array) -> Array:
         products = [rises[k, i] * slopes[k, j] + rises[k, j] * slopes[k, i] for k in range(d)]
         strain[:, i, j] = strain[:, j, i] = np.sum(products, axis=0) / 2
     return strain
+
+
+def _linear_at_middle(problem: Problem, cells: Integers, values: Array) -> Array:
+    """The corners' values of linear functions with the gradients that functions have at the middle, (c, d+1, d).
+
+    Args:
+        problem: the space.
+        cells: by their nodes, (c, nodes).
+        values: of the functions at the nodes, (n, d).
+    """
+    d = problem.scales.dimension
+    found = values[cells[:, : d + 1]]
+    if nodes.degree(problem.space) == 1:
+        return found
+    found = found * (4 / (d + 1) - 1)
+    for number, ends in enumerate(nodes.edges(problem.space)):
+        found[:, ends] += 4 / (d + 1) * values[cells[:, [d + 1 + number]]]
+    return found
 
 
 def _slopes(corners: Array) -> Array:

@@ -18,6 +18,10 @@ from ..problem import spaces
 from ..typing import Array, Integers
 from .solution_fields import PartFields, SolutionFields
 
+_STEPS = 12
+"""Steps to a place in a curved cell."""
+_STRAIGHT = 1e-9
+"""Distance of a midpoint from the middle of its edge, over the size of the cell, that is rounding."""
 _PAIRS = 4_000_000
 """Pairs of vertices and facets that are looked at together."""
 
@@ -39,6 +43,8 @@ def body(source: SolutionFields, points: Array) -> sparse.csr_array:
     ]
     weights = point_location.barycentric_weights(source.points[source.corners[found]], points)
     degree = 1 if source.cells.shape[1] == d + 1 else 2
+    if degree == 2:
+        weights = _in_curved(source.points[source.cells[found]], points, weights)
     return _rows(source.cells[found], spaces.simplex_functions(degree, weights), len(source.points))
 
 
@@ -74,8 +80,32 @@ def surface(source: PartFields, points: Array) -> SurfaceTransfer:
     columns, weights = np.pad(linear[0], pad), np.pad(linear[1], pad)
     columns[there] = whole
     corners = source.points[whole[:, : points.shape[1]]]
-    weights[there] = spaces.simplex_functions(2, _weights(corners, points[there]))
+    inside = _in_curved(source.points[whole], points[there], _weights(corners, points[there]))
+    weights[there] = spaces.simplex_functions(2, inside)
     return SurfaceTransfer(transfer, _rows(columns, weights, len(source.points)))
+
+
+def _in_curved(cells: Array, points: Array, weights: Array) -> Array:
+    """The places of points in cells or facets with curved edges, from those in straight ones; barycentric, (m, c).
+
+    What is left of the way to a point is gone in the straight cell again and again. Each step gains the cell's bend.
+
+    Args:
+        cells: the nodes of the cell of each point, m, (m, n, d).
+        points: m, (m, d).
+        weights: in the straight cell, (m, c).
+    """
+    corners = cells[:, : weights.shape[1]]
+    sizes = np.ptp(corners, axis=1).max(axis=1)
+    straight = nodes.middles(corners)
+    bent = np.flatnonzero(np.abs(cells[:, weights.shape[1] :] - straight).max(axis=(1, 2)) > _STRAIGHT * sizes)
+    found, place = weights.copy(), weights[bent]
+    for _ in range(_STEPS):
+        reached = np.einsum("mn,mnd->md", spaces.simplex_functions(2, place), cells[bent])
+        wanted, now = (point_location.barycentric_weights(corners[bent], x) for x in (points[bent], reached))
+        place = place + wanted - now
+    found[bent] = place
+    return found
 
 
 def _facets_near(source: PartFields, points: Array) -> Integers:

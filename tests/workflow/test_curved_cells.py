@@ -22,6 +22,8 @@ import hvi_fenicsx as hvi
 from hvi_fenicsx.mesh import gmsh_file, nodes, refinement
 from hvi_fenicsx.mesh.curved_cells import mesh_of
 from hvi_fenicsx.problem import spaces
+from hvi_fenicsx.studies import interpolation
+from hvi_fenicsx.studies.solution_fields import SolutionFields
 
 E, NU, P = 1e7, 0.3, 1e5
 BULK, SHEAR = E / (3 * (1 - 2 * NU)), E / (2 * (1 + NU))
@@ -123,6 +125,11 @@ def test_a_uniform_pressure_on_a_flat_side_of_curved_cells_is_exact(dimension: i
     found = hvi.solve(hvi.Model(body(tmp_path, dimension, 0.5), effects), degree=2)
     assert found.certificate.passed
     np.testing.assert_allclose(found.contact["bottom"].pressure, P, rtol=1e-10)
+    pyvista = pytest.importorskip("pyvista")
+    found.write(tmp_path / "out", pictures=False)
+    strain = pyvista.read(next((tmp_path / "out").glob("displacement*.vtu"))).cell_data["strain"].reshape(-1, 3, 3)
+    uniform = -P / (3 * BULK) * np.eye(3) if dimension == 3 else -P * (1 + NU) * (1 - 2 * NU) / E * np.diag([1, 1, 0])
+    np.testing.assert_allclose(strain, [uniform] * len(strain), atol=1e-6 * P / E)
 
 
 @pytest.mark.parametrize("dimension", [2, pytest.param(3, marks=pytest.mark.long)])
@@ -228,3 +235,17 @@ def test_an_energy_with_data_of_the_straight_mesh_keeps_its_cells_straight(tmp_p
     effects = [hvi.Energy(energy), *symmetry(FLAT[2]), hvi.Pressure("inner", P)]
     found = hvi.check(hvi.Model(made, effects), degree=2)
     assert any("data of the straight mesh" in text for text in found.warnings)
+
+
+def test_fields_are_compared_at_places_of_curved_cells(tmp_path: Path) -> None:
+    """Positions on a finer mesh are found again, those beyond the straight cells too."""
+    file = tmp_path / "ring.geo"
+    file.write_text(RING.format(size=0.5, order=2))
+    domain = gmsh_file.read(MPI.COMM_WORLD, file, 2)
+    found = []
+    for mesh in (mesh_of(domain, 2), mesh_of(refinement.uniform(domain).domain, 2)):
+        space = fem.functionspace(mesh, ("Lagrange", 2))
+        x = nodes.points(space)[:, :2]
+        found.append(SolutionFields(points=x, cells=space.dofmap.list.astype(np.int64), u=x, parts={}))
+    coarse, fine = found
+    assert np.abs(interpolation.body(coarse, fine.points) @ coarse.points - fine.points).max() < 1e-9
