@@ -1,6 +1,6 @@
 """Which of the hard cases that are metastable or borderline have an equilibrium at all: searched with a proof.
 
-    ./hvi exec python3 benchmarks/hard_equilibria.py [--cells 16] [--limit SECONDS]
+    ./hvi exec python3 benchmarks/hard_equilibria.py [--cells 16] [--only KEY ...] [--limit SECONDS]
 
 Of each such case in which `auto` certifies nothing, all equilibria are searched (`hvi equilibria`); one line each.
 """
@@ -49,11 +49,13 @@ def _clock(limit: float) -> Callable[[], bool]:
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument("--cells", type=int, default=16)
+    parser.add_argument("--only", nargs="+", metavar="KEY", help="cases, by default all up to that size")
     parser.add_argument("--limit", type=float, default=60.0, help="seconds of processor time for each case and search")
     options = parser.parse_args()
     table = Table.read(AXES)
     for case in cases(table):
-        if case["cells"] <= options.cells and (words := decided(case, table, options.limit)):
+        wanted = case.key in options.only if options.only else case["cells"] <= options.cells
+        if wanted and (words := decided(case, table, options.limit)):
             print(
                 f"{case.number}\t{case.key}\t{case['law']}\t{case['smoothing']}\t{case['cells']}\t{words}", flush=True
             )

@@ -38,6 +38,10 @@ TABLE: dict[str, tuple[str, str]] = {
     "a gap that is not finite": ("boundary.floor.contact.gap='sqrt(x - 0.5)'", "is not finite everywhere there"),
     "a displacement that is not finite": ("boundary.wall.displacement=['log(y)', 'free']", "is not finite"),
     "contact excludes a support": ("boundary.wall.displacement=[0.0, -1e-5]", "violates the contact bound"),
+    "bounds that contradict each other at one vertex": (
+        "boundary.floor.contact={lower='2e-6*(x - 0.5)', upper='2e-6*(0.75 - x)'}",
+        "boundary.floor: at (0.75, 0.0, 0.0), u·n would have to be at least",
+    ),
     "contact on a support": ("boundary.floor.displacement=[0.0, 0.0]", "prescribed"),
     "supports that differ where they meet": (
         "boundary.press={on='top', displacement=[1e-3, 'free']}",
