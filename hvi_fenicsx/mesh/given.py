@@ -88,7 +88,10 @@ def _check_mesh(mesh: dmesh.Mesh) -> None:
             f"as dimensions, such as gdim={mesh.topology.dim} where the mesh is read"
         )
     if (degree := compat.geometry_degree(mesh)) != 1:
-        raise InputError(f"body: the cells are curved (degree {degree}); give straight ones, degree 1")
+        raise InputError(
+            f"body: the cells are curved (degree {degree}); give straight ones, degree 1, or the mesh file of second "
+            "order that gmsh saves: hvi.Body.file(...)"
+        )
     _check_folds(mesh)
 
 

@@ -26,6 +26,8 @@ SCENES: dict[str, Table] = {
     "smoothed": model(6, 6e6, Q, quadratic_linear(3e6), smoothing="quadratic", epsilon=0.01),
     "sawtooth": model(6, 3e6, Q, SAWTOOTH),
     "gap": model(6, 3e6, Q, {"law": "tresca", "yield_traction": 7e5, "reference_slip": 1e-6}, gap=2e-6),
+    "lift-off, degree 2": model(6, 6e6, Q, quadratic_linear(3e6), degree=2),
+    "drop, degree 2": model(6, 3e6, Q, quadratic_linear(1e6), degree=2),
 }
 LENGTHS = {"delta", "reference_slip", "gap"}
 STRESSES = {"gamma1", "gamma2", "yield_traction", "youngs_modulus", "traction"}
@@ -160,7 +162,7 @@ def image(file: Path, turn: Array, folder: Path) -> Path:
     "kind", ["mirrored", *(pytest.param(k, marks=pytest.mark.long) for k in IMAGES if k != "mirrored")]
 )
 def test_a_mesh_may_be_turned_and_mirrored_with_its_scene(kind: str, mesh: Path, tmp_path: Path) -> None:
-    for name in ("lift-off", "drop"):
+    for name in ("lift-off", "drop", "lift-off, degree 2"):
         one = solved(on_file(SCENES[name], mesh))
         file = image(mesh, IMAGES[kind], tmp_path)
         other = solved(on_file(turned(SCENES[name], None, IMAGES[kind]), file))
