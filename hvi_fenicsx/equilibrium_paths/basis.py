@@ -1,16 +1,14 @@
 """The basis of the linear equations of one cell: the columns of all variables but the one that drives, inverted.
 
-The variables are the coordinates of the unknowns and the factor. Where one of them enters and another leaves, the
-inverse is changed by a matrix of rank one; what it leaves of a column says when it has lost digits.
+The variables are the coordinates of the unknowns and the factor. Where one of them enters and another leaves, one
+column is exchanged; what the inverse leaves of a column says when it has lost digits.
 """
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from scipy.linalg.blas import dger
 
+from ..system.condensed_stiffness import CellInverse, CondensedStiffness
 from ..typing import Array
 from .cells import Cells
 from .step import FACTOR
@@ -25,11 +23,11 @@ class Basis:
     """The basis of a cell.
 
     Args:
-        stiffness: S, (n, n).
+        stiffness: S.
         rate: f1, (n,).
         cells: where all unknowns are; changed from outside.
         driver: the variable that drives.
-        inverse: of the cell's matrix, where it is known and the factor drives, (n, n).
+        inverse: of the cell's equations, where it is known and the factor drives.
 
     Attributes:
         driver: the variable that drives.
@@ -39,26 +37,24 @@ class Basis:
         numpy.linalg.LinAlgError: the tangent is singular.
     """
 
-    def __init__(self, stiffness: Array, rate: Array, cells: Cells, driver: int, inverse: Array | None = None) -> None:
+    def __init__(
+        self, stiffness: CondensedStiffness, rate: Array, cells: Cells, driver: int, inverse: CellInverse | None = None
+    ) -> None:
         self._stiffness, self._rate, self._cells, self.driver = stiffness, rate, cells, driver
-        self._inverse: Any = None
         if inverse is None or driver != FACTOR:
             self._factorise()
         else:
-            self._inverse = inverse.copy(order="F")
+            self._inverse = inverse.copy()
         self.column: Array = np.empty(0)
 
     def _factorise(self) -> None:
-        matrix = self._cells.matrix()
-        if self.driver != FACTOR:
-            matrix[:, self.driver] = -self._rate
-        found = np.asarray(np.asfortranarray(np.linalg.inv(matrix)), dtype=np.float64)
-        if not np.all(np.isfinite(found)):
-            raise np.linalg.LinAlgError("the tangent is singular")
-        self._inverse = found
+        driver = None if self.driver == FACTOR else self.driver
+        self._inverse = self._stiffness.inverse(self._cells.columns(driver, -self._rate))
 
     def renew(self) -> None:
         """Find :attr:`column` in the present cell."""
+        if self._inverse.is_long:
+            self._factorise()
         self.column = self._solved(-self._rate if self.driver == FACTOR else self._cells.column(self.driver))
 
     def _solved(self, right: Array) -> Array:
@@ -77,7 +73,7 @@ class Basis:
         Args:
             right: a column, (n,).
         """
-        return np.asarray(self._inverse @ right, dtype=np.float64)
+        return self._inverse.solve(right)
 
     def _product(self, values: Array, driver: int) -> Array:
         """The basis times values: of the coordinates, and of the factor in the place of the one that drives, (n,)."""
@@ -103,7 +99,7 @@ class Basis:
         spread = self.roughly(self._cells.column(changed))
         if _strength(spread, changed) < WEAK:
             return 0
-        self._inverse = _exchanged(self._inverse, spread, changed)
+        self._inverse.exchange(spread, changed)
         return 1 if spread[changed] > 0.0 else -1
 
     def exchange(self, leaving: int) -> None:
@@ -112,34 +108,22 @@ class Basis:
         Args:
             leaving: number of its unknown.
         """
-        self._inverse = _exchanged(self._inverse, self.column, leaving)
+        self._inverse.exchange(self.column, leaving)
         if self.driver != FACTOR:
-            pair = [leaving, self.driver]
-            self._inverse[pair] = self._inverse[pair[::-1]]
+            self._inverse.swap(leaving, self.driver)
         self.driver = leaving
 
-    def inverse(self) -> Array | None:
-        """The inverse of the cell's matrix, (n, n); None where it is not known to enough digits."""
-        found = self._inverse.copy(order="F")
-        if self.driver != FACTOR:
-            with np.errstate(all="ignore"):
-                found = _exchanged(found, self.column, self.driver)
-        return np.asarray(found) if self._inverts(found) else None
-
-    def _inverts(self, inverse: Array) -> bool:
+    def inverse(self) -> CellInverse | None:
+        """The inverse of the cell's equations with the factor driving; None where it is not known to enough digits."""
+        found = self._inverse.copy()
         with np.errstate(all="ignore"):
-            left = self._product(inverse @ self._rate, FACTOR) - self._rate
-            return bool(np.max(np.abs(left), initial=0.0) <= _KEPT * np.max(np.abs(self._rate), initial=0.0))
+            if self.driver != FACTOR:
+                found.exchange(self.column, self.driver)
+            left = self._product(found.solve(self._rate), FACTOR) - self._rate
+            known = bool(np.max(np.abs(left), initial=0.0) <= _KEPT * np.max(np.abs(self._rate), initial=0.0))
+        return found if known else None
 
 
 def _strength(column: Array, place: int) -> float:
     """The pivot at a place over the largest entry of its column."""
     return float(abs(column[place])) / (float(np.max(np.abs(column))) or 1.0)
-
-
-def _exchanged(inverse: Any, column: Array, place: int) -> Any:
-    """The inverse, overwritten, of the basis with another column at a place, of which the values are given."""
-    spread, row = column.copy(), inverse[place].copy()
-    pivot = spread[place]
-    spread[place] -= 1.0
-    return dger(-1.0 / pivot, spread, row, a=inverse, overwrite_a=1)

@@ -14,7 +14,6 @@ from .cells import Cells
 from .descent import Descent
 from .passing import go_on
 from .placing import place
-from .spectrum import is_singular
 from .step import FACTOR
 from .tracer import Tracer
 
@@ -50,13 +49,13 @@ def at_rest(problem: CondensedProblem, remember: Collection[int], aim: float) ->
     bonds = BondTable(problem, remember)
     chains = [bonds.chain(i) for i in range(problem.size)]
     x = np.clip(np.zeros(problem.size), problem.lower, problem.upper)
-    force = _nearest(bonds, x, problem.force - problem.stiffness @ x)
-    held = problem.stiffness @ x + force
+    force = _nearest(bonds, x, problem.force - problem.elastic @ x)
+    held = problem.elastic @ x + force
     away = problem.force - held
     size = float(np.max(np.abs(held), initial=0.0)) + float(np.max(np.abs(problem.force), initial=0.0))
     rate = away if np.max(np.abs(away), initial=0.0) > 1e-14 * size else aim * problem.force_rate
-    cells = place(problem.stiffness, chains, x, force)
-    if is_singular(cells.tangent()[0]):
+    cells = place(problem.elastic, chains, x, force)
+    if cells.is_singular():
         settled = _settled(bonds, replace(problem, force=held, force_rate=rate))
         if settled is None:
             return Beginning(cells=None, memory=bonds.memory, reason="nothing holds the body at rest")
@@ -84,8 +83,8 @@ def _settled(bonds: BondTable, problem: CondensedProblem) -> Cells | None:
     landing = Descent(bonds, load).land(start, start)
     if not landing.found:
         return None
-    cells = place(problem.stiffness, chains, landing.x, load - problem.stiffness @ landing.x)
-    tracer = Tracer(problem.stiffness, problem.force, problem.force_rate, cells, _FIRST, driver=FACTOR, heading=-1)
+    cells = place(problem.elastic, chains, landing.x, load - problem.elastic @ landing.x)
+    tracer = Tracer(problem.elastic, problem.force, problem.force_rate, cells, _FIRST, driver=FACTOR, heading=-1)
     while True:
         step = tracer.advance(0.0)
         if step.variable is None:

@@ -213,8 +213,9 @@ class BondTable:
         for number, bond in enumerate(self.bonds):
             if bond.passed is not None:
                 low, high, low_traction, high_traction = (float(memory[number, k]) for k in range(4))
-                bond.passed = Passed(displacements=(low, high), tractions=(low_traction, high_traction))
-                bond.present = remembering(bond.graph, bond.passed)
+                passed = Passed(displacements=(low, high), tractions=(low_traction, high_traction))
+                if passed != bond.passed:
+                    bond.passed, bond.present = passed, remembering(bond.graph, passed)
 
 
 def _on_break(x: float, bonds: list[Bond]) -> float:

@@ -44,7 +44,7 @@ class EnergyBalance:
         self._x, self._force, self._factor = x, force, factor
         self._recoverable = self._bonds.recoverable(x, force)
         self._potential = problem.potential(x, factor)
-        elastic = 0.5 * float(x @ (problem.stiffness @ x)) - float(problem.load(factor) @ x)
+        elastic = 0.5 * float(x @ (problem.elastic @ x)) - float(problem.load(factor) @ x)
         self._constant = problem.constant_at(factor)
         self.energy = elastic + self._constant + self._recoverable
 

@@ -8,18 +8,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.linalg.lapack import dpotrf
 
+from ..system.condensed_stiffness import CellColumns, CellInverse, CondensedStiffness
 from ..typing import Array, Integers, Mask
 from .segments import Kind, Segment
-from .spectrum import negative_directions
 
 
 class Cells:
     """The segments of all n unknowns and their coordinates.
 
     Args:
-        stiffness: S, (n, n).
+        stiffness: S.
         chains: the segments of each unknown.
         numbers: which of them it is on, (n,).
         coordinates: τ, (n,).
@@ -36,7 +35,11 @@ class Cells:
     """
 
     def __init__(
-        self, stiffness: Array, chains: Sequence[tuple[Segment, ...]], numbers: Integers, coordinates: Array
+        self,
+        stiffness: CondensedStiffness,
+        chains: Sequence[tuple[Segment, ...]],
+        numbers: Integers,
+        coordinates: Array,
     ) -> None:
         self._stiffness, self._chains, n = stiffness, list(chains), len(chains)
         self.numbers, self.tau = np.zeros(n, dtype=np.int64), np.zeros(n)
@@ -112,23 +115,31 @@ class Cells:
     def column(self, i: int) -> Array:
         """How the equations change with a coordinate, (n,)."""
         if self.rise[i]:
-            found = np.zeros(len(self))
-            found[i] = self.rise[i]
-            return found
-        found = self._stiffness[i].copy()
+            return np.asarray(self.rise[i] * np.eye(1, len(self), i)[0])
+        found = self._stiffness.column(i)
         found[i] += self.slope[i]
         return found
 
-    def matrix(self) -> Array:
-        """All columns, (n, n)."""
-        found = np.where(self.moving, self._stiffness, 0.0)
-        found[np.diag_indices(len(self))] += np.where(self.moving, self.slope, self.rise)
-        return np.asarray(found)
+    def columns(self, driver: int | None, factor: Array) -> CellColumns:
+        """The columns of the cell's equations.
 
-    def tangent(self) -> tuple[Array, Integers]:
-        """S + W K of the unknowns that move, and their numbers."""
-        free = np.flatnonzero(self.moving)
-        return self._stiffness[np.ix_(free, free)] + np.diag(self.slope[free]), free
+        Args:
+            driver: the unknown in whose place is the factor; None: all are in their own places.
+            factor: the factor's column, (n,).
+        """
+        return CellColumns(slope=self.slope.copy(), rise=self.rise.copy(), driver=driver, factor=factor)
+
+    def inverse(self) -> CellInverse:
+        """The inverse of the cell's equations.
+
+        Raises:
+            numpy.linalg.LinAlgError: they are singular.
+        """
+        return self._stiffness.inverse(self.columns(None, np.zeros(len(self))))
+
+    def is_singular(self) -> bool:
+        """Whether the unknowns that move can do so without any stiffness, or against a negative one."""
+        return self._stiffness.is_singular(self.moving, self.slope)
 
     def unstable_directions(self, negligible: float = 1e-12) -> int:
         """The number of directions in which the energy falls at constant loads.
@@ -137,7 +148,7 @@ class Cells:
             negligible: an eigenvalue that is zero, relative to the greatest.
         """
         drops = np.count_nonzero((self.rise < 0.0) & ~self.bound)
-        return negative_directions(self.tangent()[0], negligible) + int(drops)
+        return self._stiffness.negative_directions(self.moving, self.slope, negligible) + int(drops)
 
     def is_stable(self, negligible: float = 1e-12) -> bool:
         """Whether the energy falls in no direction at constant loads.
@@ -145,9 +156,4 @@ class Cells:
         Args:
             negligible: an eigenvalue that is zero, relative to the greatest.
         """
-        if np.any((self.rise < 0.0) & ~self.bound):
-            return False
-        matrix, free = self.tangent()
-        size = float(np.max(np.sum(np.abs(matrix), axis=0), initial=0.0))
-        matrix[np.diag_indices(free.size)] += negligible * size
-        return not free.size or dpotrf(matrix, lower=1)[1] == 0
+        return not np.any((self.rise < 0.0) & ~self.bound) and not self.unstable_directions(negligible)

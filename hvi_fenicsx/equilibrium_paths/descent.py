@@ -9,16 +9,17 @@ that cell, this is the equilibrium.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.linalg import eigh
 
 from ..typing import Array
 from .bonds import BondTable
 from .cells import Cells
 from .placing import place
 from .segments import Component, Segment, chain
+from .softest import softest
 from .tracer import Tracer
 
 
@@ -55,8 +56,9 @@ class Descent:
     ) -> None:
         self._bonds, self._load, self._most = bonds, load, most
         problem = bonds.problem
-        self._stiffness, self._n = problem.stiffness, problem.size
-        self._proximal = proximal * float(np.max(np.diag(self._stiffness), initial=1e-300))
+        self._stiffness, self._n = problem.elastic, problem.size
+        self._proximal = proximal * float(np.max(self._stiffness.diagonal, initial=1e-300))
+        self._held = self._stiffness.raised(self._proximal)
         self._true = [bonds.chain(i) for i in range(self._n)]
         self._split = [[(b.weight, *b.present.split()) for b in bonds.at(i)] for i in range(self._n)]
         self._convex = [self._convex_chain(i) for i in range(self._n)]
@@ -103,15 +105,13 @@ class Descent:
 
     def _pushes(self, cells: Cells, rates: Array) -> Iterator[Array]:
         """Directions in which the energy may fall, of length 1 in the maximum norm."""
-        matrix, free = cells.tangent()
         along = np.where(cells.moving, rates, 0.0)
         if np.any(along):
             yield along / np.max(np.abs(along))
-        if free.size:
-            _, vectors = eigh(matrix, subset_by_index=[0, 0])
-            found = np.zeros(self._n)
-            found[free] = vectors[:, 0] / np.max(np.abs(vectors[:, 0]))
-            yield found
+        with suppress(np.linalg.LinAlgError):
+            found = softest(cells, cells.inverse(), np.ones(self._n))
+            if np.any(found):
+                yield found / np.max(np.abs(found))
         for i in np.flatnonzero((cells.rise < 0.0) & ~cells.bound):
             yield np.eye(1, self._n, i)[0]
 
@@ -142,7 +142,7 @@ class Descent:
         size = float(np.max(np.abs(step), initial=0.0))
         stiff = float(np.max(np.abs(self._stiffness @ step), initial=0.0))
         return bool(np.max(np.abs(x), initial=0.0) > self._far) and stiff <= 1e-4 * size * float(
-            np.max(np.diag(self._stiffness), initial=0.0)
+            np.max(self._stiffness.diagonal, initial=0.0)
         )
 
     def _hastened(self, x: Array, step: Array) -> Array:
@@ -158,16 +158,12 @@ class Descent:
         return best
 
     def _curved(self, x: Array) -> Array:
-        """A Newton step in which negative curvatures count as positive ones: it leaves saddles fast."""
+        """A Newton step in which falling laws count as rising ones."""
         cells = self._cell(x)
-        matrix, free = cells.tangent()
-        step = np.zeros(self._n)
-        if free.size:
-            values, vectors = eigh(matrix)
-            least = 1e-9 * float(np.max(np.abs(values)))
-            slope = vectors.T @ (self._load - self._stiffness @ cells.x - cells.force)[free]
-            step[free] = vectors @ (slope / np.maximum(np.abs(values), least))
-        return step
+        columns = cells.columns(None, np.zeros(self._n))
+        force = np.where(cells.moving, self._load - self._stiffness @ cells.x - cells.force, 0.0)
+        step = self._held.inverse(replace(columns, slope=np.abs(columns.slope))).solve(force)
+        return np.where(cells.moving, step, 0.0)
 
     def _subtracted(self, x: Array, direction: Array) -> Array:
         """The traction of the subtracted convex parts, on the side where one is going, (n,)."""
@@ -178,7 +174,7 @@ class Descent:
 
     def _convex_minimiser(self, x: Array, direction: Array) -> Array:
         """The minimiser of the majorant at a point."""
-        stiffness = self._stiffness + self._proximal * np.eye(self._n)
+        stiffness = self._held
         load = self._load + self._subtracted(x, direction) + self._proximal * x
         force = np.clip(load - stiffness @ x, *self._convex_forces(x))
         held = stiffness @ x + force
@@ -224,14 +220,13 @@ class Descent:
         return Cells(self._stiffness, self._true, numbers, np.array(coordinates))
 
     def _solved(self, cells: Cells) -> Array | None:
-        matrix, free = cells.tangent()
         residual = self._stiffness @ cells.x + cells.force - self._load
+        if cells.unstable_directions(0.0):
+            return None
         try:
-            np.linalg.cholesky(matrix)
+            cells.tau -= np.where(cells.moving, cells.inverse().solve(residual), 0.0)
         except np.linalg.LinAlgError:
             return None
-        if free.size:
-            cells.tau[free] -= np.linalg.solve(matrix, residual[free])
         force = self._load - self._stiffness @ cells.x
         stands = ~cells.moving
         cells.tau[stands] = cells.rise[stands] * (force - cells.standing_force)[stands]

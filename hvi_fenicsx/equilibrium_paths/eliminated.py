@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..system.condensed_problem import Bonds, CondensedProblem, PrescribedBonds
+from ..system.condensed_stiffness import DenseStiffness
 from ..typing import Array, Integers, Mask
 
 
@@ -24,7 +25,7 @@ def without_fixed(problem: CondensedProblem) -> tuple[CondensedProblem, Integers
     held = [0.5 * at @ inside @ at - problem.force[gone] @ at, -problem.force_rate[gone] @ at, 0.0]
     fewer = replace(
         problem,
-        stiffness=problem.stiffness[np.ix_(kept, kept)],
+        elastic=DenseStiffness(problem.stiffness[np.ix_(kept, kept)]),
         force=problem.force[kept] - pull,
         force_rate=problem.force_rate[kept],
         lower=problem.lower[kept],

@@ -9,6 +9,7 @@ import numpy as np
 from typing_extensions import override
 
 from ..system.condensed_problem import CondensedProblem
+from ..system.condensed_stiffness import CellInverse
 from ..typing import Array, Integers
 from .beginning import Beginning, at_rest
 from .bonds import BondTable
@@ -21,7 +22,6 @@ from .placing import place
 from .programme import Follower
 from .rounds import Round, Rounds
 from .snap import snap
-from .spectrum import is_singular
 from .state import End, Event, Follow, PathOptions, PathState, Place, Position, place_of
 from .step import FACTOR
 from .tracer import Tracer
@@ -107,7 +107,7 @@ class ExactFollower(Follower):
         """The cell of an equilibrium."""
         problem = self._problem
         chains = [self._bonds.chain(i) for i in range(problem.size)]
-        return place(problem.stiffness, chains, x, problem.load(factor) - problem.stiffness @ x, numbers)
+        return place(problem.elastic, chains, x, problem.load(factor) - problem.elastic @ x, numbers)
 
     def _follow_from(
         self,
@@ -115,11 +115,11 @@ class ExactFollower(Follower):
         factor: float,
         position: Position | None = None,
         heading: int = 1,
-        inverse: Array | None = None,
+        inverse: CellInverse | None = None,
     ) -> None:
         given, problem = position, self._problem
         self.tracer = Tracer(
-            problem.stiffness,
+            problem.elastic,
             problem.force,
             problem.force_rate,
             cells,
@@ -168,7 +168,7 @@ class ExactFollower(Follower):
     @override
     def _is_off(self) -> bool:
         tracer = self.tracer
-        return self._peak > 0.0 and tracer.at_rest(self._peak) and is_singular(tracer.cells.tangent()[0])
+        return self._peak > 0.0 and tracer.at_rest(self._peak) and tracer.cells.is_singular()
 
     def _noted(self, state: PathState, aim: float) -> PathState:
         """The state after an event; where the path comes back to one, another way is taken, or the path ends."""
@@ -247,7 +247,7 @@ class ExactFollower(Follower):
         descent = Descent(self._bonds, self._problem.load(self.tracer.factor))
         return descent.land(descent.pushed(cells, rates), cells.x)
 
-    def _landed(self, cells: Cells, aim: float, inverse: Array | None = None) -> PathState:
+    def _landed(self, cells: Cells, aim: float, inverse: CellInverse | None = None) -> PathState:
         self._blocked = False
         self._follow_from(cells, self.tracer.factor, inverse=inverse)
         self._unstable = 0 if cells.is_stable() else cells.unstable_directions()

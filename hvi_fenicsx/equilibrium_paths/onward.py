@@ -114,7 +114,7 @@ def _stand(bonds: BondTable, cells: Cells, i: int, near: float) -> _Stand:
         x, force = float(cells.x[i]), float(cells.force[i])
         bonds.remember(i, x, force)
         chain = bonds.chain(i)
-        number = min(range(len(chain)), key=lambda k: chain[k].distance(x, force, bonds.problem.stiffness[i, i]))
+        number = min(range(len(chain)), key=lambda k: chain[k].distance(x, force, bonds.problem.elastic.diagonal[i]))
         at = chain[number].coordinate(x, force)
     here, backward, forward = chain[number], (number, at), (number, at)
     if here.high - at <= near and number + 1 < len(chain):
@@ -131,9 +131,9 @@ def _ways(problem: CondensedProblem, stands: list[_Stand], branching: list[int],
         taken[i] = stands[i].forward if direction > 0.0 else stands[i].backward
     numbers = np.array([number for number, _ in taken], dtype=np.int64)
     chains = [stand.chain for stand in stands]
-    cells = Cells(problem.stiffness, chains, numbers, np.array([at for _, at in taken]))
+    cells = Cells(problem.elastic, chains, numbers, np.array([at for _, at in taken]))
     try:
-        rates = np.linalg.solve(cells.matrix(), problem.force_rate)
+        rates = cells.inverse().solve(problem.force_rate)
     except np.linalg.LinAlgError:
         return
     for heading in (1, -1):

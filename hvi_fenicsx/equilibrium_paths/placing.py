@@ -6,13 +6,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ..system.condensed_stiffness import CondensedStiffness
 from ..typing import Array, Integers
 from .cells import Cells
 from .segments import Segment
 
 
 def place(
-    stiffness: Array,
+    stiffness: CondensedStiffness,
     chains: Sequence[tuple[Segment, ...]],
     x: Array,
     force: Array,
@@ -22,7 +23,7 @@ def place(
     """The cell of an equilibrium; of several segments that meet there the one that holds best.
 
     Args:
-        stiffness: S, (n, n).
+        stiffness: S.
         chains: the segments of each unknown.
         x: the displacements, (n,).
         force: of laws and bounds, (n,).
@@ -30,7 +31,7 @@ def place(
         rounding: distance from a segment that is none, relative to the greatest force.
     """
     size = float(np.max(np.abs(force), initial=0.0)) + float(np.max(np.abs(stiffness @ x), initial=0.0)) or 1.0
-    scale = np.diag(stiffness) if len(x) else np.empty(0)
+    scale = stiffness.diagonal
     numbers, coordinates = np.zeros(len(x), dtype=np.int64), np.zeros(len(x))
     for i, chain in enumerate(chains):
         at = float(x[i]), float(force[i])

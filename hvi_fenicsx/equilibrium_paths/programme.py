@@ -5,8 +5,9 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
 
+import numpy as np
+
 from ..system.condensed_problem import CondensedProblem
-from .spectrum import is_singular
 from .state import End, Event, PathOptions, PathState
 
 
@@ -34,7 +35,7 @@ class Follower(ABC):
         self._problem, self._options = problem, options
         self._resume, self._interrupted = resume, interrupted
         self._leg, self._events, self._unstable, self._peak = 0, 0, 0, 0.0
-        self._floats = is_singular(problem.stiffness)
+        self._floats = problem.elastic.is_singular(np.ones(problem.size, dtype=bool), np.zeros(problem.size))
         self.end: End | None = None
         self.reason = ""
 

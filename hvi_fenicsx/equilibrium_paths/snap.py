@@ -12,13 +12,14 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import eigh
 
+from ..system.condensed_stiffness import CellInverse
 from ..typing import Array
 from .bonds import BondTable
 from .cells import Cells
 from .passing import go_on
 from .placing import place
+from .softest import softest
 from .step import FACTOR
 from .tracer import Tracer
 
@@ -32,11 +33,11 @@ class Snap:
 
     Attributes:
         cells: the stable equilibrium; None: the body comes off.
-        inverse: of its matrix, (n, n); None where it is not known.
+        inverse: of its equations; None where it is not known.
     """
 
     cells: Cells | None
-    inverse: Array | None = None
+    inverse: CellInverse | None = None
 
 
 def snap(bonds: BondTable, load: Array, path: Tracer, moved: int, direction: int) -> Snap | None:
@@ -49,8 +50,12 @@ def snap(bonds: BondTable, load: Array, path: Tracer, moved: int, direction: int
         moved: the unknown whose passage made it so.
         direction: of that unknown along its graph, 1 or -1.
     """
-    memory, inverse, cells = bonds.memory, path.inverse(), path.cells
-    for restraint in _restraints(bonds, cells, moved, direction):
+    memory, cells = bonds.memory, path.cells
+    try:
+        inverse = path.inverse() or cells.inverse()
+    except np.linalg.LinAlgError:
+        return None
+    for restraint in _restraints(bonds, cells, inverse, moved, direction):
         held = _held_back(bonds, load, cells, restraint, inverse)
         if held is None or held.rates[moved] * direction <= 0.0:
             continue
@@ -61,18 +66,15 @@ def snap(bonds: BondTable, load: Array, path: Tracer, moved: int, direction: int
     return None
 
 
-def _restraints(bonds: BondTable, cells: Cells, moved: int, direction: int) -> Iterator[Array]:
+def _restraints(bonds: BondTable, cells: Cells, inverse: CellInverse, moved: int, direction: int) -> Iterator[Array]:
     """Forces against the unstable direction, of size 1: equal on all bonds that it moves, then as it is."""
-    matrix, free = cells.tangent()
-    unstable = np.zeros(len(cells))
+    own, free = np.eye(1, len(cells), moved)[0], cells.moving
     if cells.rise[moved]:  # on a drop: the unknown goes on, and all others follow
-        unstable[moved] = direction * cells.rise[moved]
-        if cells.rise[moved] < 0.0:
-            unstable[moved] = direction
-        unstable[free] = -np.linalg.lstsq(matrix, bonds.problem.stiffness[free, moved] * unstable[moved])[0]
-    elif free.size:
-        _, vectors = eigh(matrix, subset_by_index=[0, 0])
-        unstable[free] = vectors[:, 0]
+        way = direction if cells.rise[moved] < 0.0 else direction * cells.rise[moved]
+        pull = np.where(free, -way * bonds.problem.elastic.column(moved), 0.0)
+        unstable = np.where(free, inverse.solve(pull), way * own)
+    else:
+        unstable = softest(cells, inverse, own)
         unstable *= np.sign(unstable[moved]) * direction or 1.0
     size = float(np.max(np.abs(unstable), initial=0.0))
     if size == 0.0:
@@ -81,13 +83,13 @@ def _restraints(bonds: BondTable, cells: Cells, moved: int, direction: int) -> I
     if np.any(even):
         yield np.asarray(even / np.max(np.abs(even)))
     yield np.asarray(unstable / size)
-    yield np.eye(1, len(cells), moved)[0] * direction
+    yield own * direction
 
 
-def _held_back(bonds: BondTable, load: Array, cells: Cells, restraint: Array, inverse: Array | None) -> Tracer | None:
+def _held_back(bonds: BondTable, load: Array, cells: Cells, restraint: Array, inverse: CellInverse) -> Tracer | None:
     """The curve of one restraint; None where there is none."""
     chains = [cells.chain(i) for i in range(len(cells))]
-    stiffness = bonds.problem.stiffness
+    stiffness = bonds.problem.elastic
     here = place(stiffness, chains, cells.x, load - stiffness @ cells.x, cells.numbers)
     try:
         return Tracer(stiffness, load, restraint, here, 0.0, driver=FACTOR, heading=-1, inverse=inverse)

@@ -35,8 +35,8 @@ class StraightDistances:
             state: the state.
         """
         problem = self._problem
-        elastic, load = problem.stiffness @ state.x, problem.load(state.factor)
-        force, diagonal = load - elastic, np.diag(problem.stiffness)
+        elastic, load = problem.elastic @ state.x, problem.load(state.factor)
+        force, diagonal = load - elastic, problem.elastic.diagonal
         size = max(float(np.max(np.abs(f), initial=0.0)) for f in (elastic, load, problem.force_rate)) or 1.0
         chains = self._all_chains(state.memory)
         values = zip(chains, *(map(float, v) for v in (state.x, force, diagonal)), strict=True)

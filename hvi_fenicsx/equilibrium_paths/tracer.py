@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..system.condensed_stiffness import CellInverse, CondensedStiffness
 from ..typing import Array, Integers
 from .basis import Basis
 from .cells import Cells
@@ -28,7 +29,7 @@ class Tracer:
     """The curve from one of its points on.
 
     Args:
-        stiffness: S, (n, n).
+        stiffness: S.
         constant: f0, (n,).
         rate: f1, (n,).
         cells: where all unknowns are; changed.
@@ -36,7 +37,7 @@ class Tracer:
         driver: the variable that drives.
         heading: its direction, 1 or -1.
         small: parts of the order ε of the coordinates, (n,); by default at random.
-        inverse: of the cell's matrix, where it is known and the factor drives, (n, n).
+        inverse: of the cell's equations, where it is known and the factor drives.
 
     Attributes:
         factor: λ.
@@ -53,7 +54,7 @@ class Tracer:
 
     def __init__(
         self,
-        stiffness: Array,
+        stiffness: CondensedStiffness,
         constant: Array,
         rate: Array,
         cells: Cells,
@@ -62,7 +63,7 @@ class Tracer:
         driver: int = FACTOR,
         heading: int = 1,
         small: Array | None = None,
-        inverse: Array | None = None,
+        inverse: CellInverse | None = None,
     ) -> None:
         self._stiffness, self._constant, self._rate = stiffness, constant, rate
         self.cells, self.factor, self.heading, self._size = cells, factor, heading, 0.0
@@ -91,8 +92,8 @@ class Tracer:
         """The variable that drives."""
         return self._basis.driver
 
-    def inverse(self) -> Array | None:
-        """The inverse of the present cell's matrix, (n, n); None where it is not known to enough digits."""
+    def inverse(self) -> CellInverse | None:
+        """The inverse of the present cell's equations; None where it is not known to enough digits."""
         return self._basis.inverse()
 
     def _find_direction(self) -> None:
@@ -200,7 +201,7 @@ class Tracer:
         """
         moving = self.cells.moving
         kinds = [float(np.max(speed[kind], initial=0.0)) for kind in (moving, ~moving)]
-        elastic = 0.1 * float(np.max(np.diag(self._stiffness), initial=0.0)) * kinds[0]
+        elastic = 0.1 * float(np.max(self._stiffness.diagonal, initial=0.0)) * kinds[0]
         return np.asarray(np.where(moving, kinds[0], max(kinds[1], elastic)))
 
     def sizes(self) -> Array:
@@ -250,7 +251,7 @@ class Tracer:
         cells, rates = self.cells, self.rates
         moved = float(np.max(np.abs(np.where(cells.moving, rates, 0.0)), initial=0.0))
         forces = float(np.max(np.abs(np.where(cells.moving, cells.slope, cells.rise) * rates), initial=0.0))
-        size = float(np.max(np.diag(self._stiffness), initial=0.0)) * moved + forces
+        size = float(np.max(self._stiffness.diagonal, initial=0.0)) * moved + forces
         return abs(self.factor_rate) * float(np.max(np.abs(self._rate), initial=0.0)) <= 1e-10 * size
 
     def at_end(self, aim: float) -> bool:

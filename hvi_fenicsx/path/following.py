@@ -70,7 +70,8 @@ class PathRun:
         if not known:
             raise InputError("path: nothing drives the body; add a load or a prescribed displacement")
         with prepared.timer("setup"):
-            self._condensation = Condensation(system, self.scaled)
+            most = prepared.options.thresholds.path.largest_dense
+            self._condensation = Condensation(system, self.scaled, most)
             self._measures = Measures(system, self._condensation, self.scaled)
         self._remember = range(len(self._condensation.problem.bonds) if wanted.memory else 0)
         self._factored = FactoredProblem(system.problem, self.scaled)

@@ -131,7 +131,7 @@ class BranchThresholds:
 
 @dataclass(frozen=True, kw_only=True)
 class PathThresholds:
-    """When a load path is followed to find a start.
+    """When a load path is followed to find a start, and when with the condensed stiffness as an array.
 
     Attributes:
         quick_steps: Newton steps of the first start before a path is followed, where laws soften.
@@ -139,6 +139,8 @@ class PathThresholds:
         curved_unknowns: condensed unknowns up to which a path that is not straight between events is followed.
         whole_curve_unknowns: those up to which the curve of all equilibria is followed for a start, without jumps.
         most_events: of one path.
+        largest_dense: unknowns of Γc's vertices up to which the stiffness is formed for a load path of its own, where
+            solves with factors take longer.
     """
 
     quick_steps: int = 8
@@ -146,6 +148,7 @@ class PathThresholds:
     curved_unknowns: int = 200
     whole_curve_unknowns: int = 400
     most_events: int = 20_000
+    largest_dense: int = 5_000
 
 
 @dataclass(frozen=True, kw_only=True)

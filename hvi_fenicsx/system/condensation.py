@@ -8,41 +8,23 @@ are, one unknown for each such motion stays.
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import dataclass, replace
+from contextlib import suppress
+from dataclasses import replace
 
 import numpy as np
 from petsc4py import PETSc
 from scipy.linalg import cho_factor, cho_solve
 from scipy.linalg.lapack import dpstrf
 
-from ..errors import InputError
-from ..runtime.mpi import agree
+from ..errors import SolverError
 from ..typing import Array, Integers
-from . import condensed_laws, loading
+from . import carriers, condensed_laws, loading
+from .carriers import Carriers
 from .condensed_problem import CondensedProblem
+from .condensed_stiffness import CondensedStiffness, DenseStiffness
+from .factorised_stiffness import FactorisedStiffness
 from .interior import Interior
 from .system import System
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Carriers:
-    """The vertices' unknowns, the same on all ranks.
-
-    Attributes:
-        lower: bounds, (n,).
-        upper: bounds, (n,).
-        points: vertices, m, (n, 3).
-        parts: the part whose contact bounds the unknown, (n,).
-        carrying: numbers of those that carry a bound or a law.
-        shift: by how much obstacles that the factor moves have moved the bounds, which are those without, (n,).
-    """
-
-    lower: Array
-    upper: Array
-    shift: Array
-    points: Array
-    parts: tuple[str, ...]
-    carrying: Integers
 
 
 class Condensation:
@@ -52,6 +34,8 @@ class Condensation:
         system: the system, nothing held and without tangents of laws.
         scaled: names (``part.effect``) of the loads, prescribed displacements and obstacles that the factor scales;
             None: all but the obstacles, which stay where they have been moved to.
+        largest_dense: unknowns of Γc's vertices up to which S is formed, unless factors have far fewer numbers; None:
+            it is always formed.
 
     Attributes:
         problem: the arrays. Its unknowns x are those of Γc without λ times the obstacles' shift: their bounds stand.
@@ -61,50 +45,85 @@ class Condensation:
         SolverError: a body without contact is not held.
     """
 
-    def __init__(self, system: System, scaled: Collection[str] | None = None) -> None:
+    def __init__(self, system: System, scaled: Collection[str] | None = None, largest_dense: int | None = None) -> None:
         self._system, self._loading = system, loading.make(system, scaled)
         kept = np.setdiff1d(system.jacobian.rows.dofs, np.union1d(system.problem.fixed, system.pins))
-        self._interior = Interior(system, kept)
-        laws = condensed_laws.make(system, self._interior, self._loading.prescribed)
-        carriers = _carriers(system, self._interior, laws, loading.obstacle_shift(system, scaled or ()))
-        whole = self._interior.stiffness()
-        self._split(whole, carriers.carrying)
-        self.problem = self._condensed(whole, carriers, laws)
+        self._interior = interior = Interior(system, kept)
+        laws = condensed_laws.make(system, interior, self._loading.prescribed)
+        found = carriers.find(system, interior, laws, loading.obstacle_shift(system, scaled or ()))
+        if largest_dense is not None and self._is_large(largest_dense):
+            chosen = self._reduce(found.carrying)
+            found, laws = found.of(chosen), laws.renumbered(chosen, interior.size)
+            elastic = self._unformed()
+        else:
+            elastic = self._formed(interior.stiffness(), found.carrying)
+        self.problem = self._condensed(elastic, found, laws)
 
-    def _split(self, whole: Array, carrying: Integers) -> None:
-        """Which of Γc's unknowns are eliminated, and their factorised stiffness."""
+    def _is_large(self, most: int) -> bool:
+        """Whether S has more unknowns, or its products take longer than solves with the factors."""
+        entries = 2.0 * self._interior.entries + self._system.thresholds.solve_overhead
+        return self._interior.size > most or self._interior.size**2 > entries
+
+    def _reduce(self, carrying: Integers) -> Integers:
+        """Keep those unknowns alone that carry something, where they hold the body; which are kept. Collective."""
+        interior, every = self._interior, np.arange(self._interior.size)
+        own = np.isin(every[interior.first : interior.first + len(interior.kept)], carrying)
+        with suppress(SolverError):
+            fewer = Interior(self._system, interior.kept[own])
+            if fewer.is_held():
+                interior.free()
+                self._interior = fewer
+                return carrying
+            fewer.free()
+        return every
+
+    def _unformed(self) -> CondensedStiffness:
+        """S of all kept unknowns, by factorisations. Collective."""
+        every = np.arange(self._interior.size)
+        self._gone, self._stay, self._factor = every[:0], every, None
+        self._coupling = np.zeros((0, len(every)))
+        return FactorisedStiffness(self._system, self._interior)
+
+    def _formed(self, whole: Array, carrying: Integers) -> CondensedStiffness:
+        """S of the unknowns that stay, the others being eliminated."""
         rest = np.setdiff1d(np.arange(len(whole)), carrying)
         gone = rest[_regular(whole[np.ix_(rest, rest)], len(whole) * self._system.thresholds.rounding)]
         self._gone, self._stay = np.sort(gone), np.setdiff1d(np.arange(len(whole)), gone)
-        self._factor = cho_factor(whole[np.ix_(self._gone, self._gone)]) if self._gone.size else None
-        self._coupling = whole[np.ix_(self._gone, self._stay)]
+        if not self._gone.size:
+            self._factor, self._coupling = None, np.zeros((0, len(whole)))
+            return DenseStiffness(whole)
+        self._factor = cho_factor(whole[np.ix_(self._gone, self._gone)])
+        self._coupling = at = whole[np.ix_(self._gone, self._stay)]
+        found = whole[np.ix_(self._stay, self._stay)] - at.T @ self._eliminated(at)
+        return DenseStiffness(0.5 * (found + found.T))
 
     def _eliminated(self, right: Array) -> Array:
         """The inverse stiffness of the eliminated unknowns times columns."""
         return right if self._factor is None else np.asarray(cho_solve(self._factor, right))
 
-    def _condensed(self, whole: Array, carriers: _Carriers, laws: condensed_laws.CondensedLaws) -> CondensedProblem:
+    def _condensed(
+        self, elastic: CondensedStiffness, found: Carriers, laws: condensed_laws.CondensedLaws
+    ) -> CondensedProblem:
         """The problem on the unknowns that stay. Collective."""
-        stay, at = self._stay, self._coupling
-        stiffness = whole[np.ix_(stay, stay)] - at.T @ self._eliminated(at)
-        self._shift = carriers.shift[stay]
+        stay = self._stay
+        self._shift = found.shift[stay]
         force, applied, constant, applied_constant = self._loads()
-        laws = laws.renumbered(stay, len(whole))
+        laws = laws.renumbered(stay, self._interior.size)
         return _shifted(
             self._shift,
             CondensedProblem(
-                stiffness=0.5 * (stiffness + stiffness.T),
+                elastic=elastic,
                 force=force[:, 0],
                 force_rate=force[:, 1],
-                lower=carriers.lower[stay],
-                upper=carriers.upper[stay],
+                lower=found.lower[stay],
+                upper=found.upper[stay],
                 bonds=laws.bonds,
                 prescribed_bonds=laws.prescribed,
                 constant=constant,
                 applied=applied.T,
                 applied_constant=applied_constant,
-                points=carriers.points[stay],
-                parts=tuple(carriers.parts[i] for i in stay),
+                points=found.points[stay],
+                parts=tuple(found.parts[i] for i in stay),
             ),
         )
 
@@ -203,7 +222,7 @@ class Condensation:
             The Euclidean norm off the supports.
         """
         interior, carried = self._interior, np.zeros(self._interior.size)
-        carried[self._stay] = self.problem.stiffness @ x - self.problem.load(factor)
+        carried[self._stay] = self.problem.elastic @ x - self.problem.load(factor)
         left = reaction.array.copy()
         left[interior.kept] -= carried[interior.first : interior.first + len(interior.kept)]
         left[np.union1d(self._system.problem.fixed_here, self._system.pins)] = 0.0
@@ -224,7 +243,7 @@ def _regular(matrix: Array, tolerance: float) -> Integers:
 
 def _shifted(by: Array, problem: CondensedProblem) -> CondensedProblem:
     """The problem in the unknowns x of u = x + λ shift, from that in u."""
-    pull = problem.stiffness @ by
+    pull = problem.elastic @ by
     energy = [0.0, -float(problem.force @ by), float((0.5 * pull - problem.force_rate) @ by)]
     return replace(
         problem,
@@ -236,33 +255,3 @@ def _shifted(by: Array, problem: CondensedProblem) -> CondensedProblem:
 def _quadratic(products: Array) -> Array:
     """c0, c1, c2 of the bilinear form at (1, λ)."""
     return np.array([products[0, 0], products[0, 1] + products[1, 0], products[1, 1]])
-
-
-def _refuse_laws(laws: condensed_laws.CondensedLaws, shift: Array) -> None:
-    """Laws act on the body's own displacement, which is not that relative to an obstacle."""
-    for bonds in laws.bonds:
-        if np.any(shift[bonds.unknowns] != 0.0):
-            raise InputError(
-                f"boundary.{bonds.part}: the path moves an obstacle along the displacement that this "
-                "law acts on; leave the vertices that both parts share out of one of them (where)"
-            )
-
-
-def _carriers(system: System, interior: Interior, laws: condensed_laws.CondensedLaws, moved: Array) -> _Carriers:
-    """What the kept unknowns carry. Collective."""
-    lower, upper, shift = (interior.gathered(v) for v in (system.lower.array_r, system.upper.array_r, moved))
-    bounded = np.isfinite(lower) | np.isfinite(upper)
-    with_law = [b.unknowns.ravel() for b in laws.bonds]
-    d = system.problem.scales.dimension
-    named = np.full(system.load.local_size, "", dtype=object)
-    for bounds in system.bounds:
-        named[bounds.component()[0]] = bounds.surface.part
-    _refuse_laws(laws, shift)
-    return _Carriers(
-        lower=lower - shift,
-        upper=upper - shift,
-        shift=shift,
-        points=np.concatenate(agree(system.comm, system.problem.points[interior.kept // d])),
-        parts=tuple(str(p) if b else "" for p, b in zip(interior.gathered(named), bounded, strict=True)),
-        carrying=np.unique(np.concatenate([np.flatnonzero(bounded), *with_law])).astype(np.int64),
-    )

@@ -13,6 +13,7 @@ import numpy as np
 from ..effects import Direction
 from ..laws import Mixity, Superpotential
 from ..typing import Array, Integers
+from .condensed_stiffness import CondensedStiffness
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -94,7 +95,7 @@ class CondensedProblem:
     """The n unknowns of Γc that carry a bound or a law, and few others where a body could move about these.
 
     Attributes:
-        stiffness: S, symmetric, positive semidefinite, (n, n).
+        elastic: S, symmetric, positive semidefinite.
         force: f of constant loads and prescribed displacements, (n,).
         force_rate: f of those that the factor scales, (n,).
         lower: bounds, -inf where there is none, (n,).
@@ -109,7 +110,7 @@ class CondensedProblem:
         parts: the part whose contact bounds the unknown; empty where none does, (n,).
     """
 
-    stiffness: Array
+    elastic: CondensedStiffness
     force: Array
     force_rate: Array
     lower: Array
@@ -121,6 +122,11 @@ class CondensedProblem:
     applied_constant: Array
     points: Array
     parts: tuple[str, ...]
+
+    @property
+    def stiffness(self) -> Array:
+        """S as an array, (n, n). Collective."""
+        return self.elastic.array
 
     @property
     def size(self) -> int:
@@ -142,7 +148,7 @@ class CondensedProblem:
             x: the unknowns, (n,).
             factor: λ.
         """
-        elastic = 0.5 * float(x @ (self.stiffness @ x)) - float(self.load(factor) @ x) + self.constant_at(factor)
+        elastic = 0.5 * float(x @ (self.elastic @ x)) - float(self.load(factor) @ x) + self.constant_at(factor)
         return elastic + sum(bonds.energy(x) for bonds in self.bonds)
 
     def constant_at(self, factor: float) -> float:

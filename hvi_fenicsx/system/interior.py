@@ -116,14 +116,36 @@ class Interior:
         self._comm.Allreduce(MPI.IN_PLACE, found)
         return found
 
+    def own(self) -> csr_matrix:
+        """This rank's rows of A_kk, (kept unknowns here, n)."""
+        rows = self._system.jacobian.rows
+        return csr_matrix(self._columns(rows.bulk)[np.searchsorted(rows.dofs, self.kept)])
+
     def stiffness(self) -> Array:
         """The Schur complement S, (n, n). Collective."""
-        rows, bulk = self._system.jacobian.rows, self._columns(self._system.jacobian.rows.bulk)
         found = np.zeros((self.size, self.size))
-        found[self.first : self.first + len(self.kept)] = bulk[np.searchsorted(rows.dofs, self.kept)].toarray()
+        found[self.first : self.first + len(self.kept)] = self.own().toarray()
         self._comm.Allreduce(MPI.IN_PLACE, found)
         found -= self.response()
         return np.asarray(0.5 * (found + found.T))
+
+    @property
+    def entries(self) -> float:
+        """Numbers in the factors, over all ranks; infinite where the solver does not tell."""
+        if self.pc.getFactorSolverType() != "mumps":
+            return np.inf
+        count = self.pc.getFactorMatrix().getMumpsInfog(29)
+        return float(count if count >= 0 else -1e6 * count)
+
+    def is_held(self) -> bool:
+        """Whether the kept unknowns hold the body, other than by rounding (inverse iteration). Collective."""
+        largest = max(agree(self._comm, float(np.max(np.abs(self._system.jacobian.matrix.getDiagonal().array_r)))))
+        load = np.cos(np.arange(self._system.load.local_size) + 1.0)[:, None]
+        for _ in range(2):
+            load = self.solve(load)
+            growth = max(agree(self._comm, float(np.max(np.abs(load), initial=0.0)))) * largest
+            load *= largest / (growth or 1.0)
+        return bool(growth * self._system.thresholds.rounding < 1.0)
 
     def gathered(self, values: Array) -> Array:
         """The values at all kept unknowns of this rank's values at its unknowns. Collective.

@@ -33,6 +33,8 @@ class Thresholds:
             (measured: 13 to 45).
         dense_columns: right-hand sides that are solved at once where a body is condensed.
         rank_unknowns: unknowns of a rank, on average, from which a coarse level is on all ranks (docs/scaling.md).
+        exchanges: columns that are exchanged in factorised equations of a load path before these are factorised anew.
+        solve_overhead: entries of a dense matrix that a product reads while a sparse solve begins.
         level_growth: factor by which unknowns grow from one level of a multigrid to the next, at least.
         held_weight: weight in the prolongation from which a coarse unknown is held with the fine one: of the unknowns
             that move a vertex, one in space has 1/4 or more.
@@ -61,6 +63,8 @@ class Thresholds:
     condensing: int = 30
     dense_columns: int = 64
     rank_unknowns: int = 500
+    exchanges: int = 60
+    solve_overhead: float = 250_000.0
     level_growth: float = 3.0
     held_weight: float = 0.2
     whole_weight: float = 0.9

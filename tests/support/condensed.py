@@ -11,6 +11,7 @@ import numpy.typing as npt
 from hvi_fenicsx.effects import Direction
 from hvi_fenicsx.laws import Graph, Superpotential
 from hvi_fenicsx.system.condensed_problem import Bonds, CondensedProblem
+from hvi_fenicsx.system.condensed_stiffness import DenseStiffness
 
 Array = npt.NDArray[np.float64]
 
@@ -47,7 +48,7 @@ def problem(
     n = len(f1)
     f0, low, high = (np.broadcast_to(np.asarray(v, dtype=float), (n,)).copy() for v in (force, lower, upper))
     return CondensedProblem(
-        stiffness=s,
+        elastic=DenseStiffness(s),
         force=f0,
         force_rate=f1,
         lower=low,

@@ -10,6 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...system.condensed_problem import CondensedProblem
+from ...system.condensed_stiffness import DenseStiffness
 from ...typing import Array
 
 
@@ -36,7 +37,7 @@ def felt(problem: CondensedProblem, factors: Array) -> CondensedProblem:
     ends = np.sort(np.stack([problem.lower * factors, problem.upper * factors]), axis=0)
     return replace(
         problem,
-        stiffness=problem.stiffness / np.outer(factors, factors),
+        elastic=DenseStiffness(problem.stiffness / np.outer(factors, factors)),
         force=problem.force / factors,
         force_rate=problem.force_rate / factors,
         lower=ends[0],

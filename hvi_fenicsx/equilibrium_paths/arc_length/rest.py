@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...system.condensed_problem import CondensedProblem
+from ...system.spectrum import is_singular
 from ...typing import Array
 from ..segments import Kind, Segment
-from ..spectrum import is_singular
 from .sites import Sites
 
 

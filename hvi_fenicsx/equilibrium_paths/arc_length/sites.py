@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.sparse import csr_array
 
+from ...system.spectrum import negative_directions
 from ...typing import Array
 from ..segments import Kind
-from ..spectrum import negative_directions
 from .site_graphs import SiteGraphs
 
 

@@ -30,7 +30,8 @@ def negative_directions(stiffness: Array, negligible: float) -> int:
     """
     if not len(stiffness):
         return 0
-    size = float(np.max(np.sum(np.abs(stiffness), axis=0)))
-    factors, pivots, _ = dsytrf(stiffness + negligible * size * np.eye(len(stiffness)), lower=1)
+    shifted = np.array(stiffness, order="F")
+    shifted[np.diag_indices(len(shifted))] += negligible * float(np.linalg.norm(stiffness, 1))
+    factors, pivots, _ = dsytrf(shifted, lower=1, overwrite_a=1)
     pairs = pivots < 0  # a block of two pivots has one negative eigenvalue and one positive
     return int(np.count_nonzero(np.diag(factors)[~pairs] < 0.0) + np.count_nonzero(pairs) // 2)

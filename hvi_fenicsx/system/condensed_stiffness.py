@@ -1,0 +1,255 @@
+"""The stiffness S of a condensed problem, and the equations of one cell of its piecewise linear laws.
+
+In a cell some unknowns move, with a slope k of their laws' forces; the others stand, and their forces are unknown. The
+equations of the cell have the columns S e_i + k_i e_i of unknowns that move, and ± e_i of those that stand. One of
+these variables may drive; the factor then takes its column. Their inverse is kept, and changed where one column is
+exchanged.
+
+S is an array (:class:`DenseStiffness`), or known by factorisations of the whole body
+(:mod:`.factorised_stiffness`).
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import Any, Self
+
+import numpy as np
+from scipy.linalg.blas import dger
+from scipy.linalg.lapack import dpotrf, dpotri
+from typing_extensions import override
+
+from ..typing import Array, Integers, Mask
+from . import spectrum
+
+ZERO = 1e-11
+"""An eigenvalue so small beside the greatest is zero."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class CellColumns:
+    """What the columns of a cell's equations are.
+
+    Attributes:
+        slope: k of unknowns that move, (n,).
+        rise: ±1 of unknowns that stand, 0 of those that move, (n,).
+        driver: the unknown in whose place is the factor; None: all are in their own places.
+        factor: the factor's column, (n,).
+    """
+
+    slope: Array
+    rise: Array
+    driver: int | None
+    factor: Array
+
+    @property
+    def moving(self) -> Mask:
+        """The unknowns that move, (n,)."""
+        return np.asarray(self.rise == 0.0)
+
+
+class CellInverse(ABC):
+    """The inverse of a cell's equations."""
+
+    @abstractmethod
+    def solve(self, right: Array) -> Array:
+        """What all variables are for given right-hand sides, (n,). Collective.
+
+        Args:
+            right: of the equations, (n,).
+        """
+
+    @abstractmethod
+    def exchange(self, values: Array, place: int) -> None:
+        """Put another column in a place.
+
+        Args:
+            values: what :meth:`solve` finds for the new column, (n,).
+            place: where.
+        """
+
+    @abstractmethod
+    def swap(self, one: int, other: int) -> None:
+        """Swap the places of two variables."""
+
+    @abstractmethod
+    def copy(self) -> Self:
+        """The same, to be changed by itself."""
+
+    @property
+    @abstractmethod
+    def is_long(self) -> bool:
+        """Whether so many columns were exchanged that it had better be found anew."""
+
+
+class CondensedStiffness(ABC):
+    """S, symmetric and positive semidefinite, (n, n)."""
+
+    @property
+    @abstractmethod
+    def array(self) -> Array:
+        """S as an array, (n, n). Collective."""
+
+    @property
+    @abstractmethod
+    def diagonal(self) -> Array:
+        """What forces on single unknowns are measured by, (n,): of S, or greater."""
+
+    @abstractmethod
+    def __matmul__(self, x: Array) -> Array:
+        """S x, (n,). Collective."""
+
+    @abstractmethod
+    def column(self, i: int) -> Array:
+        """S e_i, (n,). Collective."""
+
+    @abstractmethod
+    def raised(self, by: float) -> CondensedStiffness:
+        """S + by I."""
+
+    @abstractmethod
+    def inverse(self, columns: CellColumns) -> CellInverse:
+        """The inverse of a cell's equations. Collective.
+
+        Args:
+            columns: what they are.
+
+        Raises:
+            numpy.linalg.LinAlgError: they are singular.
+        """
+
+    @abstractmethod
+    def negative_directions(self, moving: Mask, slope: Array, negligible: float) -> int:
+        """The number of negative eigenvalues of S + diag(slope) of the unknowns that move. Collective.
+
+        Args:
+            moving: the unknowns that move, (n,).
+            slope: of the laws' forces, (n,).
+            negligible: an eigenvalue that is zero, relative to the largest sum of a row.
+        """
+
+    def is_singular(self, moving: Mask, slope: Array) -> bool:
+        """Whether some displacement of the unknowns that move meets no stiffness, or a negative one. Collective.
+
+        Args:
+            moving: the unknowns that move, (n,).
+            slope: of the laws' forces, (n,).
+        """
+        return self.negative_directions(moving, slope, -ZERO) > 0
+
+
+class DenseStiffness(CondensedStiffness):
+    """S as an array.
+
+    Args:
+        array: S, (n, n).
+    """
+
+    def __init__(self, array: Array) -> None:
+        self._array = array
+
+    @property
+    @override
+    def array(self) -> Array:
+        return self._array
+
+    @property
+    @override
+    def diagonal(self) -> Array:
+        return np.diag(self._array)
+
+    @override
+    def __matmul__(self, x: Array) -> Array:
+        return np.asarray(self._array @ x)
+
+    @override
+    def column(self, i: int) -> Array:
+        return self._array[i].copy()
+
+    @override
+    def raised(self, by: float) -> CondensedStiffness:
+        return DenseStiffness(self._array + by * np.eye(len(self._array)))
+
+    @override
+    def inverse(self, columns: CellColumns) -> CellInverse:
+        found = None if columns.driver is not None else self._by_symmetry(columns)
+        return DenseInverse(np.asarray(np.linalg.inv(self._matrix(columns))) if found is None else found)
+
+    def _matrix(self, columns: CellColumns) -> Array:
+        """The equations, (n, n)."""
+        moving = columns.moving
+        matrix = np.where(moving, self._array, 0.0)
+        matrix[np.diag_indices(len(matrix))] += np.where(moving, columns.slope, columns.rise)
+        if columns.driver is not None:
+            matrix[:, columns.driver] = columns.factor
+        return matrix
+
+    def _by_symmetry(self, columns: CellColumns) -> Array | None:
+        """The inverse from that of the unknowns that move, by Cholesky's method; None where they are not stable."""
+        free, held = np.flatnonzero(columns.moving), np.flatnonzero(~columns.moving)
+        inner = self._moving(free, columns.slope)
+        if free.size:
+            inner, failed = dpotrf(inner, lower=1, overwrite_a=1)
+            if failed:
+                return None
+            inner = dpotri(inner, lower=1, overwrite_c=1)[0]
+            inner += np.tril(inner, -1).T
+        found = np.zeros(self._array.shape, order="F")
+        found[np.ix_(free, free)] = inner
+        found[held, held] = columns.rise[held]
+        found[np.ix_(held, free)] = -columns.rise[held, None] * (self._array[np.ix_(held, free)] @ inner)
+        return found
+
+    def _moving(self, free: Integers, slope: Array) -> Array:
+        """S + diag(slope) of the unknowns that move."""
+        found = np.array(self._array[np.ix_(free, free)], order="F")
+        found[np.diag_indices(free.size)] += slope[free]
+        return found
+
+    @override
+    def negative_directions(self, moving: Mask, slope: Array, negligible: float) -> int:
+        free = np.flatnonzero(moving)
+        return spectrum.negative_directions(self._moving(free, slope), negligible)
+
+
+class DenseInverse(CellInverse):
+    """The inverse as an array: a column that is exchanged changes it by a matrix of rank one.
+
+    Args:
+        array: the inverse, (n, n).
+
+    Raises:
+        numpy.linalg.LinAlgError: it is not finite.
+    """
+
+    def __init__(self, array: Array) -> None:
+        self._array: Any = np.asarray(array, dtype=np.float64, order="F")
+        if not np.all(np.isfinite(self._array)):
+            raise np.linalg.LinAlgError("the tangent is singular")
+
+    @override
+    def solve(self, right: Array) -> Array:
+        return np.asarray(self._array @ right, dtype=np.float64)
+
+    @override
+    def exchange(self, values: Array, place: int) -> None:
+        spread, row = values.copy(), self._array[place].copy()
+        pivot = spread[place]
+        spread[place] -= 1.0
+        self._array = dger(-1.0 / pivot, spread, row, a=self._array, overwrite_a=1)
+
+    @override
+    def swap(self, one: int, other: int) -> None:
+        self._array[[one, other]] = self._array[[other, one]]
+
+    @override
+    def copy(self) -> Self:
+        found = object.__new__(type(self))
+        found._array = self._array.copy(order="F")
+        return found
+
+    @property
+    @override
+    def is_long(self) -> bool:
+        return False

@@ -1,0 +1,270 @@
+"""The condensed stiffness S that is never formed: products and inverses by sparse factorisations of the whole body.
+
+With the body's stiffness A and the condensed unknowns c: S x = A_cc x - A_ci A_ii⁻¹ A_ic x, one solve with all of them
+held. The equations of a cell are those of A with the slopes of the laws on its diagonal and the unknowns that stand
+held: what a standing one feels is a row of A times the solution. So a cell is factorised as the whole body is. Columns
+that are exchanged afterwards are kept beside the factors (the product form of the inverse). By Sylvester's law and
+since A_ii is positive definite, A with slopes and held unknowns has as many negative pivots as S with them has
+negative eigenvalues.
+"""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Callable
+from typing import Self, TypeVar
+
+import numpy as np
+from petsc4py import PETSc
+from typing_extensions import override
+
+from ..runtime.mpi import agree
+from ..typing import Array, Mask
+from .condensed_stiffness import CellColumns, CellInverse, CondensedStiffness
+from .interior import Interior
+from .petsc_options import CHOLESKY, default_options, prefix
+from .system import System
+
+_T = TypeVar("_T")
+_KNOWN = 8
+"""So many products are remembered: events ask for the same ones again."""
+
+
+class FactorisedStiffness(CondensedStiffness):
+    """S by factorisations.
+
+    Args:
+        system: the system, nothing held and without tangents of laws.
+        interior: the body with the condensed unknowns held.
+        added: what is added to the diagonal of S.
+    """
+
+    def __init__(self, system: System, interior: Interior, added: float = 0.0) -> None:
+        self._system, self._interior, self._added = system, interior, added
+        self._matrix, self._own = system.jacobian.matrix.copy(), interior.own()
+        self._diagonal = self._everywhere(np.asarray(self._own_diagonal())) + added
+        sums = np.asarray(np.abs(self._own).sum(axis=1)).ravel()
+        self._size = float(np.max(self._everywhere(sums), initial=0.0)) + added
+        self._products: OrderedDict[bytes, Array] = OrderedDict()
+        self._counts: OrderedDict[bytes, int] = OrderedDict()
+
+    def _everywhere(self, own: Array) -> Array:
+        return np.concatenate(agree(self._system.comm, own))
+
+    @property
+    def _here(self) -> slice:
+        """The condensed unknowns of this rank."""
+        return slice(self._interior.first, self._interior.first + len(self._interior.kept))
+
+    def _own_diagonal(self) -> Array:
+        return np.asarray(self._own[:, self._here].diagonal())
+
+    @property
+    @override
+    def array(self) -> Array:
+        return self._interior.stiffness() + self._added * np.eye(self._interior.size)
+
+    @property
+    @override
+    def diagonal(self) -> Array:
+        return self._diagonal
+
+    @override
+    def __matmul__(self, x: Array) -> Array:
+        return _known(self._products, x.tobytes(), lambda: self._product(x)).copy()
+
+    def _product(self, x: Array) -> Array:
+        inner = self._interior.solve((self._interior.coupling @ x)[:, None])
+        elastic = self._everywhere(self._own @ x) - self._interior.pulled(inner)[:, 0]
+        return np.asarray(elastic + self._added * x)
+
+    @override
+    def column(self, i: int) -> Array:
+        return self @ np.eye(1, self._interior.size, i)[0]
+
+    @override
+    def raised(self, by: float) -> CondensedStiffness:
+        return FactorisedStiffness(self._system, self._interior, self._added + by)
+
+    @override
+    def inverse(self, columns: CellColumns) -> CellInverse:
+        return ProductInverse(
+            self.factorised(_moving(columns), columns.slope), columns, self._system.thresholds.exchanges
+        )
+
+    @override
+    def negative_directions(self, moving: Mask, slope: Array, negligible: float) -> int:
+        steepest = float(np.max(np.abs(slope[moving]), initial=0.0))
+        shift = negligible * (self._size + steepest)
+        key = np.concatenate([moving, np.where(moving, slope, 0.0), [shift]]).tobytes()
+        return _known(self._counts, key, lambda: self.factorised(moving, slope + shift).negative)
+
+    def factorised(self, moving: Mask, slope: Array) -> FactorisedCell:
+        """A with slopes, and the unknowns that stand held. Collective.
+
+        Args:
+            moving: the unknowns that move, (n,).
+            slope: of the laws' forces, (n,).
+
+        Raises:
+            numpy.linalg.LinAlgError: it is singular.
+        """
+        here = self._here
+        return FactorisedCell(self._system, self._interior, self._matrix, moving[here], slope[here] + self._added)
+
+
+class FactorisedCell:
+    """The stiffness of the whole body in one cell, factorised. Creation is collective.
+
+    Args:
+        system: the system.
+        interior: which unknowns are condensed.
+        stiffness: A.
+        moving: those of them that move, this rank's.
+        slope: of the laws' forces, this rank's.
+
+    Raises:
+        numpy.linalg.LinAlgError: it is singular.
+    """
+
+    def __init__(self, system: System, interior: Interior, stiffness: PETSc.Mat, moving: Mask, slope: Array) -> None:
+        self._system, self._interior, self._stiffness, self._moving = system, interior, stiffness, moving
+        PETSc.garbage_cleanup(system.comm)  # on several ranks factors that nothing refers to are freed together
+        self._pc = self._factorised(self._with(slope))
+        self._load, self._found, self._force = (system.load.duplicate() for _ in range(3))
+        if self._pc.getFailedReason():
+            raise np.linalg.LinAlgError("the tangent is singular")
+
+    def _with(self, slope: Array) -> PETSc.Mat:
+        """The matrix with slopes, and what stands held."""
+        system, kept, matrix = self._system, self._interior.kept, self._stiffness.copy()
+        added = system.load.duplicate()
+        added.array[kept] = np.where(self._moving, slope, 0.0)
+        matrix.setDiagonal(added, PETSc.InsertMode.ADD_VALUES)
+        rows = np.union1d(kept[~self._moving], system.pins) + system.load.owner_range[0]
+        matrix.zeroRowsColumns(rows.astype(PETSc.IntType), diag=1.0)
+        matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+        matrix.setOption(PETSc.Mat.Option.SPD, False)
+        return matrix
+
+    def _factorised(self, matrix: PETSc.Mat) -> PETSc.PC:
+        pc = PETSc.PC().create(self._system.comm)
+        pc.setOptionsPrefix(f"{prefix()}cell_")
+        pc.setOperators(matrix)
+        with default_options(_INDEFINITE, "cell_"):
+            pc.setFromOptions()
+            pc.setUp()
+        return pc
+
+    @property
+    def negative(self) -> int:
+        """The number of negative eigenvalues."""
+        return int(self._pc.getFactorMatrix().getInertia()[0])
+
+    @property
+    def is_singular(self) -> bool:
+        """Whether a pivot is zero."""
+        return bool(self._pc.getFactorMatrix().getInertia()[1])
+
+    def solve(self, right: Array) -> Array:
+        """Displacements of what moves, forces on what stands, (n,). Collective.
+
+        Args:
+            right: of the equations, (n,).
+        """
+        interior, moving = self._interior, self._moving
+        kept, first = interior.kept, interior.first
+        own = right[first : first + len(kept)]
+        self._load.set(0.0)
+        self._load.array[kept] = np.where(moving, own, 0.0)
+        self._pc.apply(self._load, self._found)
+        self._stiffness.mult(self._found, self._force)
+        felt = own - self._force.array_r[kept]
+        return np.concatenate(agree(self._system.comm, np.where(moving, self._found.array_r[kept], felt)))
+
+
+_INDEFINITE = {**CHOLESKY, "mat_mumps_icntl_13": 1, "mat_mumps_icntl_24": 1}
+"""Options of the factorisation: the pivots of the last block are counted too, and those that are zero are found."""
+
+
+class ProductInverse(CellInverse):
+    """A factorised cell, and the columns that were exchanged since.
+
+    Args:
+        cell: the cell; the unknown in whose place is the factor stands in it.
+        columns: what the equations are.
+        most: columns to exchange before it is long.
+
+    Raises:
+        numpy.linalg.LinAlgError: they are singular.
+    """
+
+    def __init__(self, cell: FactorisedCell, columns: CellColumns, most: int) -> None:
+        self._cell, self._most = cell, most
+        if cell.is_singular:
+            raise np.linalg.LinAlgError("the tangent is singular")
+        self._signs = np.where(_moving(columns), 1.0, columns.rise)
+        self._changes: tuple[_Change, ...] = ()
+        driver = columns.driver
+        if driver is not None:
+            self._signs[driver] = 1.0
+            values = self.solve(columns.factor)
+            if not values[driver] or not np.all(np.isfinite(values)):
+                raise np.linalg.LinAlgError("the tangent is singular")
+            self.exchange(values, driver)
+
+    @override
+    def solve(self, right: Array) -> Array:
+        found = self._signs * self._cell.solve(right)
+        for change in self._changes:
+            change(found)
+        return found
+
+    @override
+    def exchange(self, values: Array, place: int) -> None:
+        spread, pivot = values.copy(), float(values[place])
+        spread[place] -= 1.0
+
+        def change(found: Array) -> None:
+            found -= (found[place] / pivot) * spread
+
+        self._changes = (*self._changes, change)
+
+    @override
+    def swap(self, one: int, other: int) -> None:
+        def change(found: Array) -> None:
+            found[[one, other]] = found[[other, one]]
+
+        self._changes = (*self._changes, change)
+
+    @override
+    def copy(self) -> Self:
+        found = object.__new__(type(self))
+        found._cell, found._most, found._signs = self._cell, self._most, self._signs
+        found._changes = self._changes
+        return found
+
+    @property
+    @override
+    def is_long(self) -> bool:
+        return len(self._changes) > self._most
+
+
+_Change = Callable[[Array], None]
+
+
+def _moving(columns: CellColumns) -> Mask:
+    """The unknowns that move in a cell; the one in whose place is the factor stands."""
+    moving = columns.moving.copy()
+    if columns.driver is not None:
+        moving[columns.driver] = False
+    return moving
+
+
+def _known(known: OrderedDict[bytes, _T], key: bytes, made: Callable[[], _T]) -> _T:
+    """The value of a key; the oldest ones are forgotten."""
+    if key not in known:
+        known[key] = made()
+        if len(known) > _KNOWN:
+            known.popitem(last=False)
+    return known[key]

@@ -1,0 +1,117 @@
+"""A stiffness that is not formed against the same as an array: products, cells, exchanges, negative directions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from runs import ROOT
+from scenes import model
+from unformed import path_run
+
+import hvi_fenicsx as hvi
+from hvi_fenicsx import Scene, prepare
+from hvi_fenicsx.system.condensation import Condensation
+from hvi_fenicsx.system.condensed_stiffness import CellColumns, CondensedStiffness, DenseStiffness
+from hvi_fenicsx.system.factorised_stiffness import FactorisedStiffness
+
+SPRING = {"law": "graph", "points": [[0, 0], [9e-6, 3e6], [9e-6, 1.5e6]]}
+
+
+def both(table: Scene) -> tuple[DenseStiffness, CondensedStiffness]:
+    """S as an array and without, on the same unknowns."""
+    system = prepare(table).system
+    unformed = Condensation(system, None, 0).problem.elastic
+    assert isinstance(unformed, FactorisedStiffness)
+    formed = Condensation(system).problem.elastic
+    assert isinstance(formed, DenseStiffness)
+    return formed, unformed
+
+
+def plane() -> Scene:
+    return Scene.model_validate(model(5, friction=SPRING))
+
+
+def space() -> Scene:
+    return hvi.read_scene(ROOT / "demos" / "anchor_3d.toml", ["domain.cells=[2,3,2]"])
+
+
+@pytest.mark.parametrize("scene", [plane, space])
+def test_products_are_those_of_the_array(scene: Callable[[], Scene]) -> None:
+    formed, unformed = both(scene())
+    n, size = len(formed.array), float(np.max(formed.diagonal))
+    x = np.random.default_rng(0).standard_normal(n)
+    for one, other in ((formed, unformed), (formed.raised(0.3), unformed.raised(0.3))):
+        assert other @ x == pytest.approx(one @ x, abs=1e-12 * size)
+        assert other.column(n // 2) == pytest.approx(one.column(n // 2), abs=1e-12 * size)
+        assert other.array == pytest.approx(one.array, abs=1e-12 * size)
+        assert np.all(other.diagonal >= one.diagonal * (1.0 - 1e-12))
+
+
+def cell(n: int, seed: int, driver: int | None) -> CellColumns:
+    """A third of the unknowns stands; some laws fall."""
+    rng = np.random.default_rng(seed)
+    rise = rng.choice([0.0, 0.0, 0.0, 0.0, 1.0, -1.0], n)
+    slope = np.where(rise == 0.0, rng.uniform(-0.3, 0.5, n), 0.0)
+    return CellColumns(slope=slope, rise=rise, driver=driver, factor=rng.standard_normal(n))
+
+
+@pytest.mark.parametrize("driver", [None, 0, 3, 4])
+def test_cells_are_inverted_and_their_columns_exchanged(driver: int | None) -> None:
+    formed, unformed = both(plane())
+    n = len(formed.array)
+    columns = cell(n, 1, driver)
+    moving = columns.rise == 0.0
+    matrix = np.where(moving, formed.array, 0.0) + np.diag(np.where(moving, columns.slope, columns.rise))
+    if driver is not None:
+        matrix[:, driver] = columns.factor
+    rng = np.random.default_rng(2)
+    for stiffness in (formed, unformed):
+        inverse, changed = stiffness.inverse(columns), matrix.copy()
+        for place in (2, 5, 2):
+            entering, right = rng.standard_normal((2, n))
+            before = inverse.copy()
+            inverse.exchange(inverse.solve(entering), place)
+            changed[:, place] = entering
+            assert changed @ inverse.solve(right) == pytest.approx(right, abs=1e-9)
+            assert not np.allclose(before.solve(right), inverse.solve(right))
+        inverse.swap(1, 4)
+        assert (changed @ inverse.solve(right)[[0, 4, 2, 3, 1, *range(5, n)]]) == pytest.approx(right, abs=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_negative_directions_are_those_of_the_eigenvalues(seed: int) -> None:
+    formed, unformed = both(plane())
+    columns = cell(len(formed.array), seed, None)
+    moving, slope = columns.moving, 10.0 * columns.slope - 2.0
+    free = np.flatnonzero(moving)
+    values = np.linalg.eigvalsh(formed.array[np.ix_(free, free)] + np.diag(slope[free]))
+    for stiffness in (formed, unformed):
+        assert stiffness.negative_directions(moving, slope, 1e-12) == np.count_nonzero(values < 0.0)
+        assert stiffness.negative_directions(moving, slope, 1e-12) > 0
+
+
+def test_a_body_that_only_its_floor_holds_is_singular_without_it() -> None:
+    """Rigid motions meet no stiffness; with springs, or with two unknowns held, the body is held."""
+    table = model(4, friction=SPRING)
+    del table["boundary"]["wall"]
+    formed, unformed = both(Scene.model_validate(table))
+    n = len(formed.array)
+    everything, none = np.ones(n, dtype=bool), np.zeros(n)
+    for stiffness in (formed, unformed):
+        assert stiffness.is_singular(everything, none)
+        assert not stiffness.is_singular(everything, none + 0.1)
+        with pytest.raises(np.linalg.LinAlgError):
+            unformed.inverse(CellColumns(slope=none, rise=none, driver=None, factor=none))
+
+
+def test_unknowns_without_a_law_are_left_out_where_the_others_hold_the_body() -> None:
+    """On a free block with friction alone, nothing would hold the rest: all of its floor's unknowns are kept."""
+    glue = {"law": "graph", "points": [[0, 0], [2e-6, 3e6], [1.6e-5, 0]]}
+    table = model(4, friction=glue)
+    table["path"] = {"to": 1.0}
+    del table["boundary"]["floor"]["contact"]
+    held = path_run(table, formed=False)
+    table["boundary"]["wall"]["displacement"] = [0.0, 0.0]
+    assert path_run(table, formed=False).size < held.size
