@@ -18,7 +18,8 @@ from hvi_fenicsx.solvers.thresholds import PathThresholds
 def path_run(table: dict[str, Any], *, formed: bool, comm: MPI.Comm = MPI.COMM_WORLD) -> PathRun:
     """A path that is to be followed with or without S as an array."""
     limits = PathThresholds(largest_dense=10**6 if formed else 0)
-    thresholds = replace(DEFAULT, solvers=replace(DEFAULT.solvers, path=limits))
+    linear = replace(DEFAULT.solvers.linear, solve_overhead=np.inf if formed else 0.0)
+    thresholds = replace(DEFAULT, solvers=replace(DEFAULT.solvers, path=limits, linear=linear))
     scene = Scene.model_validate(table)
     assert scene.path is not None
     return PathRun(prepare(scene, comm, thresholds=thresholds), scene.path)
