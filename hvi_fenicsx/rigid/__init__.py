@@ -1,7 +1,7 @@
 """Rigid motions: the kernel of a scene, the name of each motion, and whether the load can be borne."""
 
 from ..laws.convex_parts import Directional
-from .analyse import analyse, load_factors, state_of
+from .analyse import analyse, gives_way, load_factors
 from .kernel import FixedDirections, kernel, modes, null_space
 from .least_energy import Rest, Sides, least_energy
 from .motions import AnyBody, JoinedBodies, Mode, MotionFields, RigidBody, describe, fields_at, motion_at, rigid_fields
@@ -32,6 +32,7 @@ __all__ = [
     "combine_factors",
     "describe",
     "fields_at",
+    "gives_way",
     "kernel",
     "least_energy",
     "load_factors",
@@ -39,6 +40,5 @@ __all__ = [
     "motion_at",
     "null_space",
     "rigid_fields",
-    "state_of",
     "undecided",
 ]

@@ -18,7 +18,7 @@ from ..errors import HviError, InputError, SolverError
 from .kernel import modes
 from .limit_analysis import Analysis
 from .reduction import ReducedProblem, RigidProblem, reduce
-from .solvability import ExistenceState, LoadFactors, Solvability, undecided, unmovable
+from .solvability import LoadFactors, Solvability, undecided, unmovable
 from .thresholds import DEFAULT, Thresholds
 
 Result = TypeVar("Result")
@@ -35,22 +35,25 @@ def analyse(comm: MPI.Comm, problem: RigidProblem, thresholds: Thresholds = DEFA
     return _judged(comm, problem, thresholds, unmovable(), lambda found: _verdict(problem, found))
 
 
-def state_of(comm: MPI.Comm, problem: RigidProblem, thresholds: Thresholds = DEFAULT) -> ExistenceState:
-    """The state alone, without load factors. Collective; the same on all ranks.
+def gives_way(comm: MPI.Comm, problem: RigidProblem, thresholds: Thresholds = DEFAULT) -> bool:
+    """Whether the load does more work along a rigid motion than the growth resists. Collective; the same on all ranks.
+
+    The growth does not hold the body then, whatever the peak does. One minimum tells, where the whole verdict takes one
+    for each face of the unit ball; where the programmes broke down, nothing is known, and it is not said to give way.
 
     Args:
         comm: the ranks of the mesh.
         problem: the body and what it meets.
         thresholds: what counts as zero, and when to give up.
     """
-    return _judged(comm, problem, thresholds, unmovable().state, lambda found: _state(problem, found))
+    return _judged(comm, problem, thresholds, False, lambda found: _gives_way(problem, found))
 
 
-def _state(problem: RigidProblem, reduced: ReducedProblem) -> ExistenceState:
+def _gives_way(problem: RigidProblem, reduced: ReducedProblem) -> bool:
     try:
-        return Analysis(problem, reduced).state
+        return Analysis(problem, reduced).gives_way
     except SolverError:
-        return "undecided"
+        return False
 
 
 def _verdict(problem: RigidProblem, reduced: ReducedProblem) -> Solvability:

@@ -118,19 +118,20 @@ class GlobalProgramme:
         """
         return self.convex.evaluate(f, y)
 
-    def minimise(self, f: Functional, region: Region, give_up: float = np.inf) -> Minimum | None:
+    def minimise(self, f: Functional, region: Region, give_up: float = np.inf, aim: float = -np.inf) -> Minimum | None:
         """Minimum of f over region and cone; None if that is empty or nothing in it is small enough.
 
         Args:
             f: the functional, with its cone.
             region: where to search.
             give_up: values above this are of no interest.
+            aim: a value below this will do; the least is found even so where factors are negative.
 
         Raises:
             SolverError: the gap between value and bound does not close.
         """
         if not np.any(f.factors < 0.0):
-            return self.convex.minimise(f, region, give_up)
+            return self.convex.minimise(f, region, give_up, aim=aim)
         part = ConcavePart.of(f, self.convex)
         if not len(part.basis):  # no motion slips where the growth is negative
             return self.convex.minimise(replace(f, factors=np.maximum(f.factors, 0.0)), region, give_up)

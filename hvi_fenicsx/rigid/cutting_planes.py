@@ -109,7 +109,9 @@ class Programme:
         slip = sum(b * g.value(y) for b, g in zip(f.factors, self.integrals, strict=True) if b)
         return float(f.linear @ y + slip)
 
-    def minimise(self, f: Functional, region: Region, give_up: float = np.inf, enough: float = 0.0) -> Minimum | None:
+    def minimise(
+        self, f: Functional, region: Region, give_up: float = np.inf, enough: float = 0.0, aim: float = -np.inf
+    ) -> Minimum | None:
         """Minimum of a convex f over region and cone; None if that is empty or nothing in it is small enough.
 
         Args:
@@ -117,6 +119,7 @@ class Programme:
             region: where to search.
             give_up: values above this are of no interest.
             enough: a gap between value and bound that will do.
+            aim: a value below this will do, whatever the gap.
 
         Raises:
             SolverError: the gap between value and bound does not close.
@@ -131,7 +134,7 @@ class Programme:
                 value = self.evaluate(f, found.y)
                 best = Minimum(value, found.y, found.lower) if value < best.value else best
             gap = best.value - found.lower
-            if (np.isfinite(gap) and gap <= enough) or progress.done(gap):
+            if best.value < aim or (np.isfinite(gap) and gap <= enough) or progress.done(gap):
                 return replace(best, lower=found.lower)
             self._cut_towards(found.y, best.y)
         raise SolverError(

@@ -70,9 +70,11 @@ class Analysis:
         return loose if np.abs(work).max(initial=0.0) <= self.tie else loose @ null_space(work[None], self.thresholds)
 
     @property
-    def state(self) -> ExistenceState:
-        """Whether the body is held."""
-        return self._state(self._margin(self.growth))
+    def gives_way(self) -> bool:
+        """Whether the load does more work along some motion than the growth resists."""
+        rest = self.growth.minus(self.work)
+        found = self.programme.minimise(rest, ball(self.reduced.frame), give_up=-self.tie, aim=-self.tie)
+        return found is not None and found.value < -self.tie
 
     def solvability(self) -> Solvability:
         """The whole verdict."""

@@ -12,7 +12,7 @@ from ..laws import Superpotential
 from ..laws.convex_parts import Directional
 from ..problem.law_term import LawTerm
 from ..problem.problem import Problem
-from ..rigid import AnyBody, Resistance, RigidProblem, fields_at, state_of
+from ..rigid import AnyBody, Resistance, RigidProblem, fields_at, gives_way
 from ..typing import Array
 from . import existence
 from .thresholds import DEFAULT, Thresholds
@@ -41,7 +41,7 @@ def is_unbounded(
     growths = [_growth(law, thresholds) for law in laws]
     terms = list(zip(problem.terms, growths, xi, strict=True))
     majorants = (_majorant(problem, forces, body, terms) for body in problem.bodies)
-    return any(state_of(comm, one) in ("metastable", "escapes") for one in majorants)
+    return any(gives_way(comm, one) for one in majorants)
 
 
 def _majorant(

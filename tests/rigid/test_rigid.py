@@ -29,12 +29,12 @@ from hvi_fenicsx.rigid import (
     analyse,
     combine,
     describe,
+    gives_way,
     kernel,
     load_factors,
     modes,
     motion_at,
     rigid_fields,
-    state_of,
 )
 from hvi_fenicsx.rigid.functional import SlipIntegral
 from hvi_fenicsx.rigid.solvability import undecided
@@ -165,7 +165,8 @@ def test_the_block_slides_at_growth_and_at_peak_times_its_length() -> None:
 )
 def test_the_states_flip_exactly_at_the_load_factors(push: float, state: str) -> None:
     verdict = analyse(ALONE, block(push))
-    assert verdict.state == state == state_of(ALONE, block(push))
+    assert verdict.state == state
+    assert gives_way(ALONE, block(push)) == (push > 0.5)
     assert (verdict.direction is None) == (state == "held")
 
 
@@ -312,7 +313,8 @@ def test_a_one_sided_law_holds_one_way_only() -> None:
         problem = RigidProblem(body=body, loads=loads, contact=(contact,), resistances=(friction,))
         verdict = analyse(ALONE, problem)
         assert verdict.lambda_held == pytest.approx(held, abs=1e-9)
-        assert verdict.state == state == state_of(ALONE, problem)
+        assert verdict.state == state
+        assert gives_way(ALONE, problem) == (state in ("metastable", "escapes"))  # no push meets the peak exactly
 
 
 def test_the_literal_law_pushes_the_body_to_the_left() -> None:

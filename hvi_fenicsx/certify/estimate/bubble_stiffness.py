@@ -43,13 +43,13 @@ class BubbleStiffness:
         self._inverse: Array = np.reciprocal(diagonal(problem, bubbles))
 
     def times(self, e: Array) -> Array:
-        """A e of owned values (n, d). Collective."""
+        """A e of owned values (n, d), overwritten by the next product. Collective."""
         self._in.x.array[: e.size] = e.ravel()
         self._in.x.scatter_forward()
         self._out.x.array[:] = 0.0
         fem.assemble_vector(self._out.x.array, self._action)
         self._out.x.scatter_reverse(la.InsertMode.add)
-        return np.array(self._out.x.array[: e.size]).reshape(e.shape)
+        return np.asarray(self._out.x.array[: e.size]).reshape(e.shape)
 
     def diagonal_solve(self, r: Array) -> Array:
         """The diagonal's inverse times r (n, d)."""
@@ -75,7 +75,8 @@ class BubbleStiffness:
         goal = tolerance**2 * self._dot(z, self.diagonal_solve(z))
         moved = self.comm.allreduce(bool(e.any()), op=MPI.LOR)
         r = load - self.times(e) if moved else load.copy()
-        p, rho = np.zeros_like(r), 0.0
+        p, rho = self._in.x.array[: r.size].reshape(r.shape), 0.0  # in place: a vector of bubbles is large
+        p[:] = 0.0
         for _ in range(max_steps):
             np.copyto(z, r)
             project(z)
@@ -111,15 +112,13 @@ def diagonal(problem: Problem, bubbles: fem.FunctionSpace) -> Array:
     hats = np.vstack([-np.ones(d), np.eye(d)])
     slopes = [*hats, *(hats[a] + hats[b] for a, b in itertools.combinations(range(d + 1), 2))]
     upward = [tuple((slope * np.sign(slope[np.flatnonzero(slope)[0]])).tolist()) for slope in slopes]
-    known = {slope: affine.energies(np.array(slope)) for slope in dict.fromkeys(upward)}
-    numbers, energies = {slope: i for i, slope in enumerate(known)}, np.array([e.ravel() for e in known.values()])
-    cells, values = bubbles.dofmap.list[: energies.shape[1] // d], fem.Function(bubbles)
+    energies = {slope: affine.energies(np.array(slope)) for slope in dict.fromkeys(upward)}
+    cells, values = bubbles.dofmap.list[: len(energies[upward[0]])], fem.Function(bubbles)
     blocks, cell = values.x.array.reshape(-1, d), bubbles.mesh.topology.cell_name()
     for k, index in enumerate(of_cell(nodes.degree(problem.space), cell)):
-        weights = np.zeros(len(energies))
+        own = np.zeros((len(cells), d))
         for number, share in energy_shares(index, cell):
-            weights[numbers[upward[number]]] += share
-        own = (weights @ energies).reshape(-1, d)
+            own += share * energies[upward[number]]
         for i in range(d):
             blocks[:, i] += np.bincount(cells[:, k], own[:, i], minlength=len(blocks))
     values.x.scatter_reverse(la.InsertMode.add)

@@ -82,12 +82,11 @@ class _Coupled:
         Args:
             first: whether nothing is known yet.
         """
-        between, _ = self._traces.tested(None if first else self.error)
-        load = self._residual - between
+        load, _ = self._traces.tested(None if first else self.error)
+        np.subtract(self._residual, load, out=load)
         if not first:
             load -= self._of_nodes.values()
-        found = defect.least_energy(self._stiffness, self._constraints, load, self._thresholds)
-        self.error.bubbles.x.array[:] = found.x.array
+        defect.find_least_energy(self.error.bubbles, self._stiffness, self._constraints, load, self._thresholds)
 
     def move_nodes(self) -> None:
         """Move the nodes as the bubbles and the laws ask. Collective."""

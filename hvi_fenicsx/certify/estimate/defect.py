@@ -164,22 +164,22 @@ def constraints(problem: Problem, u: fem.Function, space: fem.FunctionSpace) -> 
     return Constraints(free=free, prescribed=value, bounds=bounds)
 
 
-def least_energy(
-    stiffness: BubbleStiffness, under: Constraints, load: Array, thresholds: Thresholds = DEFAULT
-) -> fem.Function:
-    """The admissible bubbles of least energy under a load, ghosts updated. Collective.
+def find_least_energy(
+    e: fem.Function, stiffness: BubbleStiffness, under: Constraints, load: Array, thresholds: Thresholds = DEFAULT
+) -> None:
+    """Find the admissible bubbles of least energy under a load. Collective.
 
     Args:
+        e: takes the result, ghosts updated.
         stiffness: a(e, e).
         under: what they must meet.
         load: ρ, (n, d).
         thresholds: how accurately.
     """
-    e, found = fem.Function(stiffness.space), under.prescribed.copy()
-    solve(stiffness, load, under.free, found, under.bounds, thresholds)
-    e.x.array[: found.size] = found.ravel()
+    owned = e.x.array[: load.size].reshape(load.shape)
+    owned[:] = under.prescribed
+    solve(stiffness, load, under.free, owned, under.bounds, thresholds)
     e.x.scatter_forward()
-    return e
 
 
 def solve(

@@ -135,7 +135,8 @@ def _between_nodes(traces: LawTraces, inverse: dual_norm.DualNorm) -> Array:
     load *= -1.0
     load += problem.bulk.residual_in(traces.bubbles, u, problem.linear.values())
     stiffness = BubbleStiffness(problem, traces.bubbles)
-    bubbles = defect.least_energy(stiffness, defect.constraints(problem, u, traces.bubbles), load, traces.thresholds)
+    bubbles, under = fem.Function(traces.bubbles), defect.constraints(problem, u, traces.bubbles)
+    defect.find_least_energy(bubbles, stiffness, under, load, traces.thresholds)
     cells = problem.bulk.energy_by_cell(bubbles)
     if problem.terms:
         cells += problem.bulk.energy_by_cell(inverse.solve(unmet)[0])

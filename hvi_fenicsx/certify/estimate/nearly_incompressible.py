@@ -117,7 +117,8 @@ def squares(traces: LawTraces, inverse: DualNorm) -> Array:
     load = problem.bulk.residual_in(traces.bubbles, u, problem.linear.values()) - between
     if problem.terms:
         load -= stiffness.on_bubbles(unmet)
-    bubbles = defect.least_energy(stiffness, defect.constraints(problem, u, traces.bubbles), load, traces.thresholds)
+    bubbles, under = fem.Function(traces.bubbles), defect.constraints(problem, u, traces.bubbles)
+    defect.find_least_energy(bubbles, stiffness, under, load, traces.thresholds)
     stiffness.follow(bubbles.x.array.reshape(-1, unmet.shape[1])[: len(between)], unmet)
     shear = problem.bulk.energy_by_cell(bubbles + stiffness.at_nodes)
     return shear + problem.bulk.pressure_energy(stiffness.pressures) + problem.bulk.dilatation_error(u)
