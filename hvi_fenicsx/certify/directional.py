@@ -129,10 +129,10 @@ class _Collector:
             term: the law, in local components.
         """
         (dofs, sign), w = next(shared_forces.components(term)), term.weights
-        near = self.near[term.surface.blocks]
+        near = term.reach(self.near[term.surface.blocks])
         x = _on_kink(term.law, term.argument(self.u), near)
         left, right = w * term.law.left(x), w * term.law.right(x)
-        before, after = (w * _second(term.law, x + step) for step in (-2 * near, 2 * near))
+        before, after = (w / term.stretch * _second(term.law, x + step) for step in (-2 * near, 2 * near))
         ahead = sign > 0
         np.add.at(self.up, dofs, np.where(ahead, right, -left))
         np.add.at(self.down, dofs, np.where(ahead, -left, right))
@@ -148,7 +148,8 @@ class _Collector:
         Args:
             term: the law, in local components.
         """
-        w, slip, near = term.weights, term.slip(self.u), self.near[term.surface.blocks]
+        w, slip, distance = term.weights, term.slip(self.u), self.near[term.surface.blocks]
+        near = term.reach(distance)
         x = _on_kink(term.law, term.argument(self.u), near)
         moving = x > near
         size = np.where(moving, x, 1.0)
@@ -157,7 +158,7 @@ class _Collector:
         force = np.einsum("m,mk,mkd->md", w * (left + right) / 2, unit, term.directions)
         across = np.where(moving, np.minimum(left, right) / size, np.inf)
         sides = [_second(term.law, x + step) for step in (np.where(moving, -2, 2) * near, 2 * near)]
-        curvature = w * np.minimum(np.minimum(*sides), across)
+        curvature = w / term.stretch * np.minimum(np.minimum(*sides), across)
         touched = np.any(term.directions != 0.0, axis=1)
         dofs = term.surface.dofs
         self.up[dofs] += force
@@ -169,7 +170,7 @@ class _Collector:
         on = np.isin(x, term.law.kinks)
         ahead = np.einsum("mk,mkd->md", unit, term.directions)[:, None]
         self._couple(term, on & moving, w * (right - left) / 2, ahead, Length.plain(1))
-        counting = term.directions * term.counts(self.u, near)[:, :, None]
+        counting = term.directions * term.counts(self.u, distance)[:, :, None]
         self._couple(term, on & ~moving, w * right, counting, term.length or Length.plain(1))
 
     def _couple(self, term: LawTerm, on: Mask, factors: Array, rows: Array, length: Length) -> None:

@@ -80,7 +80,7 @@ class ForceAttribution:
             term: the law at its vertices.
             u: the displacement, nondimensional, a local array.
         """
-        low, high = term.law.interval(term.argument(u), self.near[term.surface.blocks])
+        low, high = term.law.interval(term.argument(u), term.reach(self.near[term.surface.blocks]))
         for dofs, sign in shared_forces.components(term):
             ends = np.stack([sign * low, sign * high]) * term.weights
             np.add.at(self.low, dofs, ends.min(axis=0))

@@ -26,7 +26,7 @@ class LawState:
         allowed: the nearest traction along its directions that the law allows, (m, k).
         scale: what its traction is judged by, (m,).
         hidden: where a support hides what the law gives, (m,).
-        near: distance from a kink that counts as being on it, (m,).
+        near: distance of arguments from a kink that counts as being on it, (m,).
     """
 
     term: LawTerm
@@ -47,7 +47,7 @@ class LawState:
     @property
     def unsettled(self) -> float:
         """The largest relative change of the energies of the term if they were frozen anew."""
-        found = self.term.energies_of(self.components, self.near)
+        found = self.term.energies_of(self.components, self._near_rest)
         return float(np.max(np.abs(found / self.term.energies - 1.0), initial=0.0))
 
     @property
@@ -62,7 +62,12 @@ class LawState:
         Along a path on which it stays the same this is the share of mode II in the work of the law.
         """
         assert self.term.length is not None
-        return self.term.length.slip_share(self.components, self.near)
+        return self.term.length.slip_share(self.components, self._near_rest)
+
+    @property
+    def _near_rest(self) -> Array:
+        """Distance of displacements that is none, (m,)."""
+        return self.near * self.term.stretch
 
     def on_convex_kink(self) -> Mask:
         """Where it is on a kink of the law's convex part, (m,)."""
@@ -80,7 +85,7 @@ def of_term(attribution: ForceAttribution, number: int, term: LawTerm, u: Array,
         scale: what its traction is judged by, (m,).
     """
     local = attribution.terms[number]
-    argument, near = term.argument(u), attribution.near[term.surface.blocks]
+    argument, near = term.argument(u), term.reach(attribution.near[term.surface.blocks])
     low, high = term.law.interval(argument, near)
     parts, hidden = [], np.zeros(len(argument), dtype=bool)
     for dofs, sign in shared_forces.components(local):
@@ -116,7 +121,7 @@ def _of_length(
     assert length is not None
     blocks, d = term.surface.blocks, term.free.shape[1]
     near, components = attribution.near[blocks], term.slip(u)
-    low, high = term.law.interval(term.argument(u), near)
+    low, high = term.law.interval(term.argument(u), term.reach(near))
     gradient = length.gradient(components)
     elsewhere = (attribution.held | attribution.contact).reshape(-1, d)[blocks]
     hidden = np.any((local.directions != 0.0) & elsewhere[:, None, :], axis=2)

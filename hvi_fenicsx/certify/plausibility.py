@@ -256,15 +256,16 @@ def _slip_and_kink(problem: Problem, law: LawState, thresholds: PlausibilityThre
         reached = np.where(law.argument > 0, reached, 0.0)
     most = largest(comm, float(np.max(reached, initial=0.0)))
     beyond = total(comm, float(weights[reached > far * kink].sum())) / total(comm, float(weights.sum()))
-    u0, what = problem.scales.displacement, "slip" if term.direction is Direction.SLIP else term.direction.value
+    metres = problem.scales.displacement * largest(comm, float(np.max(term.stretch, initial=0.0)))
+    what = "slip" if term.direction is Direction.SLIP else term.direction.value
     if thresholds.rounding < most < kink / far:
         yield (
-            f"{_place(problem, term)}: the largest {what} is {most * u0:.3g} m, the law's first kink {kink * u0:.3g} "
+            f"{_place(problem, term)}: the largest {what} is {most * metres:.3g} m, the law's first kink {kink * metres:.3g} "
             "m: the law is on its first piece everywhere; are the law's displacements in m?"
         )
     elif beyond > thresholds.nearly_all:
         yield (
-            f"{_place(problem, term)}: the {what} is up to {most * u0:.3g} m, the law's first kink {kink * u0:.3g} "
+            f"{_place(problem, term)}: the {what} is up to {most * metres:.3g} m, the law's first kink {kink * metres:.3g} "
             "m: the law is far beyond it nearly everywhere; are the law's displacements in m?"
         )
 

@@ -182,7 +182,7 @@ def _of_law(term: LawTerm, row: Integers, free: Mask, u: Array, near: Array) -> 
     rows = row[term.surface.blocks]
     own = np.flatnonzero(rows >= 0)
     rows = rows[own]
-    argument, within = term.argument(u)[own], near[term.surface.blocks][own]
+    argument, within = term.argument(u)[own], term.reach(near[term.surface.blocks])[own]
     weights = term.weights[own, None]
     low, high = (weights * end[:, None] for end in term.law.interval(argument, within))
     moving = (argument > within)[:, None] | np.full((len(own), 1), not term.radial)

@@ -19,7 +19,7 @@ from .thresholds import UniquenessThresholds
 
 
 def needed_falls(state: LawState, thresholds: UniquenessThresholds) -> Array | None:
-    """The least c at each vertex, infinite where there is none, (m,); None where the traction is no polyline.
+    """The least c of displacements at each vertex, infinite where there is none, (m,); None: the traction is no polyline.
 
     Args:
         state: of a law at a certified displacement.
@@ -36,6 +36,7 @@ def needed_falls(state: LawState, thresholds: UniquenessThresholds) -> Array | N
     for arc in (a for a in graph.arcs() if not state.term.radial or a.low >= 0.0):
         falls = np.maximum(falls, _needed(arc, x, energy, traction, rounding))
     falls[falls <= thresholds.rounding * float(np.max(np.abs(graph.slopes)))] = 0.0
+    falls /= state.term.stretch
     if state.term.radial:
         return np.where(state.hidden | (traction < 0.0), np.inf, falls)
     return np.where(state.hidden, 0.0, falls)

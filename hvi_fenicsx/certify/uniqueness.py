@@ -95,7 +95,7 @@ def _doubt(
             f"a law falls, and it was not tried whether the body is stiffer: more than {thresholds.most_on_boundary} "
             f"unknowns on Γc, or {thresholds.most_unknowns:,} in all"
         )
-    each = [np.full(len(term.placed), fall) for term, fall in zip(system.terms, falls, strict=True)]
+    each = [fall / term.stretch for term, fall in zip(system.terms, falls, strict=True)]
     if (moved := _moved(system, modes, motions, each, thresholds)) is not None:
         return f"a law falls, and only laws and contact hold the motion {moved}"
     return None if _stiffer(system, modes, each, thresholds) else "a law falls more steeply than the body is stiff"
@@ -179,7 +179,7 @@ def _stiffer(system: System, modes: Sequence[Mode], falls: Sequence[Array], thre
 
 
 def _rate(term: LawTerm, slope: Array) -> Array:
-    """The tangent of a law with given slopes by the argument wherever it is, (m,); (m, d, d)."""
+    """The tangent of a law with given slopes by displacements wherever it is, (m,); (m, d, d)."""
     factors = np.ones(1) if term.length is None else np.array(term.length.factors)
     full = np.einsum("m,k,mka,mkb->mab", slope, factors**2, term.directions, term.directions)
     return np.asarray(term.free[:, :, None] * full * term.free[:, None, :])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 from typing import Any, Protocol
@@ -156,7 +157,10 @@ class BoundaryLaw:
     Attributes:
         direction: the displacement.
         law: the superpotential, SI.
-        multiplier: what it is multiplied by, positive.
+        multiplier: what its tractions are multiplied by, positive.
+        length_multiplier: what its lengths are multiplied by, positive: at c times the displacement it has the traction
+            that it had.
+        contradictions: what keeps formulas in the place of its numbers from being one law at points (n, 3), in words.
         slip: β, what a slip is multiplied by where it is taken together with an opening.
         mixity: how the energy of separation depends on the mode; None: it does not.
     """
@@ -164,8 +168,10 @@ class BoundaryLaw:
     direction: Direction
     law: Superpotential
     multiplier: SpatialValue = ONE
+    length_multiplier: SpatialValue = ONE
     slip: float = 1.0
     mixity: Mixity | None = None
+    contradictions: Callable[[Array], list[str]] | None = None
 
 
 @dataclass(frozen=True, slots=True)

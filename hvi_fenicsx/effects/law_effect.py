@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
 from pydantic import (
     AfterValidator,
     BeforeValidator,
+    ModelWrapValidatorHandler,
     PlainSerializer,
+    PrivateAttr,
     SerializerFunctionWrapHandler,
     ValidationError,
     model_serializer,
     model_validator,
 )
+from pydantic_core import InitErrorDetails
 from typing_extensions import override
 
 from .. import laws
@@ -21,14 +24,16 @@ from ..errors import InputError
 from ..formula import Formula
 from ..schema import refusal, shown
 from ..spatial_value import SpatialValue
+from . import law_formulas
 from .base import Effect, Evaluate, FormContext, Place, Sizes
 from .contribution import ONE, BoundaryLaw, Contribution, Direction
 from .formula_field import FormulaField
+from .law_formulas import PlacedLaw
 
 
-def _law(value: Any) -> laws.Superpotential:
+def _law(value: Any) -> PlacedLaw:
     if isinstance(value, laws.Superpotential):
-        return value
+        return PlacedLaw(law=value)
     if not isinstance(value, dict):
         raise refusal('must be a table, like { law = "name", ... }')
     parameters = dict(value)
@@ -36,41 +41,29 @@ def _law(value: Any) -> laws.Superpotential:
     if not isinstance(name, str):
         raise refusal(f'the law\'s name is missing: law = "name"; allowed: {", ".join(laws.available())}')
     try:
-        return laws.create(name, parameters)
+        return law_formulas.create(name, parameters)
     except InputError as error:
         if isinstance(error.__cause__, ValidationError):
-            _refuse_formulas(error.__cause__)
-            raise error.__cause__ from None  # it knows the place of each wrong parameter
+            raise _explained(error.__cause__) from None  # it knows the place of each wrong parameter
         raise refusal(str(error)) from None
 
 
-def _refuse_formulas(error: ValidationError) -> None:
-    """Say how a law changes from place to place, where a formula stands for one of its numbers."""
+def _explained(error: ValidationError) -> ValidationError:
+    """What is wrong with a law's parameters; if one is a text, why it is no formula."""
     for found in error.errors():
-        given = found["input"]
-        if found["type"] == "float_type" and isinstance(given, str) and _is_formula(given):
-            key = ".".join(map(str, found["loc"]))
-            raise refusal(
-                f"{key} = {shown(given)}: the parameters of a law are numbers. Where its tractions change from place "
-                'to place, state them once and what they are multiplied by: multiplier = "1 + x"'
-            )
-
-
-def _is_formula(text: str) -> bool:
-    """Whether a text is a formula, and no number in quotes."""
-    try:
-        formula = Formula(text)
-    except InputError:
-        return False
-    try:
-        return float(text) != formula.at(np.zeros((1, 3)))[0]
-    except ValueError:
-        return True
+        if found["type"] == "float_type" and isinstance(text := found["input"], str):
+            try:
+                Formula(text)
+            except InputError as wrong:
+                said = refusal(f"must be a number (is {shown(text)}) or a formula in x, y, z: {wrong}")
+                details = InitErrorDetails(type=said, loc=found["loc"], input=text)
+                return ValidationError.from_exception_data(error.title, [details])
+    return error
 
 
 LawField = Annotated[
     laws.Superpotential,
-    BeforeValidator(_law),
+    BeforeValidator(lambda value: _law(value).law),
     PlainSerializer(lambda law: laws.describe(law)),
 ]
 """A superpotential as a field of a scene model: ``{ law = "name", ...parameters }``."""
@@ -78,7 +71,7 @@ LawField = Annotated[
 
 def _positive(value: SpatialValue) -> SpatialValue:
     if value.is_number and not float(value.source) > 0.0:
-        raise refusal(f"multiplier = {value.source} must be positive; leave the law out where there is none")
+        raise refusal(f"is {value.source} and must be positive; leave the law out where there is none")
     return value
 
 
@@ -107,23 +100,41 @@ class LawEffect(Effect):
     """the name of the law; write its parameters as further keys of the same table"""
     multiplier: Multiplier = ONE
     """what all tractions of the law are multiplied by, a positive number or a formula in x, y, z"""
+    length_multiplier: Multiplier = ONE
+    """what all displacements of the law are multiplied by, a positive number or a formula in x, y, z"""
+    _placed: PlacedLaw | None = PrivateAttr(default=None)
 
-    @model_validator(mode="before")
+    @model_validator(mode="wrap")
     @classmethod
-    def _from_table(cls, data: Any) -> Any:
+    def _from_table(cls, data: Any, handler: ModelWrapValidatorHandler[Self]) -> Self:
         law = data.get("law") if isinstance(data, dict) else None
         if isinstance(data, cls) or isinstance(law, laws.Superpotential):
-            return data
+            return handler(data)
         if not isinstance(data, dict):
-            return {"law": _law(data)}
+            return handler({"law": _law(data).law})
         own = {key: data[key] for key in cls.model_fields if key != "law" and key in data}
-        return {"law": _law({key: value for key, value in data.items() if key not in own}), **own}
+        placed = _law({key: value for key, value in data.items() if key not in own})
+        return handler({"law": placed.law, **own})._multiplied_by(placed)
+
+    def _multiplied_by(self, placed: PlacedLaw) -> Self:
+        """The effect with what formulas in the place of numbers make of its law."""
+        if not placed.parameters:
+            return self
+        changed = self.model_copy(
+            update={
+                "multiplier": law_formulas.times(self.multiplier, placed.multiplier),
+                "length_multiplier": law_formulas.times(self.length_multiplier, placed.length_multiplier),
+            }
+        )
+        changed._placed = placed
+        return changed
 
     @model_serializer(mode="wrap")
     def _as_table(self, handler: SerializerFunctionWrapHandler) -> Any:
         table = handler(self)
-        if self.multiplier == ONE:
-            del table["multiplier"]
+        for key in ("multiplier", "length_multiplier"):
+            if getattr(self, key) == ONE:
+                del table[key]
         return {**table.pop("law"), **table}
 
     @override
@@ -132,7 +143,14 @@ class LawEffect(Effect):
         return Contribution(laws=(self._brought(),))
 
     def _brought(self, slip: float = 1.0) -> BoundaryLaw:
-        return BoundaryLaw(self.direction, self.law, self.multiplier, slip)
+        return BoundaryLaw(
+            self.direction,
+            self.law,
+            self.multiplier,
+            self.length_multiplier,
+            slip,
+            contradictions=self._placed.contradictions if self._placed else None,
+        )
 
     @override
     def implausible(self, largest: Evaluate, sizes: Sizes) -> tuple[str, ...]:

@@ -25,8 +25,8 @@ class Role:
         prescribed: the displacement components, from 0, that it prescribes.
         bounded: whether it bounds the normal displacement.
         obstacle: the unit vector towards a flat obstacle, where it has one.
-        laws: the displacement that each of its laws acts on, the law as a scene writes it, and its multiplier, a number
-            or a formula.
+        laws: the displacement that each of its laws acts on, the law as a scene writes it, and the multipliers of its
+            tractions and of its lengths, numbers or formulas.
     """
 
     place: str
@@ -64,7 +64,12 @@ def role_of(effect: Effect, contribution: Contribution) -> Role:
 
 
 def _law(brought: BoundaryLaw) -> dict[str, Any]:
-    return {"direction": brought.direction.value, "law": _table(brought.law), "multiplier": brought.multiplier.source}
+    return {
+        "direction": brought.direction.value,
+        "law": _table(brought.law),
+        "multiplier": brought.multiplier.source,
+        "length_multiplier": brought.length_multiplier.source,
+    }
 
 
 def _table(law: Superpotential) -> dict[str, Any]:

@@ -205,7 +205,7 @@ class Superpotential(ABC):
         return self.kinks[(self.kinks >= np.min(x - atol)) & (self.kinks <= np.max(x + atol))]
 
 
-_KEYS_BESIDE = {"multiplier"}
+_KEYS_BESIDE = {"multiplier", "length_multiplier"}
 """What stands in a scene's table beside a law's parameters."""
 
 

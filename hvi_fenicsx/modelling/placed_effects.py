@@ -194,14 +194,17 @@ class _Law(OnSide):
         side: the side's name.
         law: one of ``hvi_fenicsx.laws``, or of your own class; SI.
         multiplier: what all its tractions are multiplied by, positive.
+        length_multiplier: what all its displacements are multiplied by, positive.
     """
 
     side: str
     law: Superpotential
     multiplier: Value = field(default=1.0, kw_only=True)
+    length_multiplier: Value = field(default=1.0, kw_only=True)
 
     def _keys(self, mesh: dmesh.Mesh) -> dict[str, Any]:
-        return {"law": self.law, "multiplier": values.spatial_value(self.multiplier, mesh)}
+        given = {"multiplier": self.multiplier, "length_multiplier": self.length_multiplier}
+        return {"law": self.law, **{key: values.spatial_value(value, mesh) for key, value in given.items()}}
 
 
 class Friction(_Law):

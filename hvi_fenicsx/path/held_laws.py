@@ -80,7 +80,7 @@ def find(problem: Problem, parts: Mapping[int, int], prescribed: Array) -> tuple
         entries = (
             np.array([parts.get(int(dof), -1) for dof in main], dtype=np.int64),
             direction[here] * term.weights[here, None],
-            np.einsum("md,mdc->mc", direction[here], prescribed[dofs[here]]),
+            np.einsum("md,mdc->mc", direction[here], prescribed[dofs[here]]) / term.stretch[here, None],
         )
         numbers, forces, arguments = (np.concatenate(agree(problem.domain.mesh.comm, e)) for e in entries)
         known = numbers >= 0

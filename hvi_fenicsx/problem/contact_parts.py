@@ -162,6 +162,8 @@ def _bounds(
     if bounds.force is not None:
         ahead = -value(bounds.force.ahead) if bounds.force.straight else upper
         force = _pressed(load_name(where.part, effect), bounds.force, ahead - upper, scales)
+        if not any(agree(context.domain.mesh.comm, bool(np.any(force.rate < 0.0)))):
+            raise InputError(f"boundary.{force.name}: the force moves the obstacle away from the body; turn it round")
     return Bounds(where, -value(bounds.upper), upper, move, force)
 
 

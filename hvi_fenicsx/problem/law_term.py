@@ -19,6 +19,9 @@ from ..laws import Length, Mixity, Superpotential
 from ..typing import Array, Mask
 from .contact_surface import Surface
 
+_ROUNDING = 4.0 * float(np.finfo(np.float64).eps)
+"""Of a displacement over a stretch, relative."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class LawTerm:
@@ -29,7 +32,8 @@ class LawTerm:
         direction: which displacement it acts on.
         law: the superpotential j that is solved.
         exact: the unsmoothed one (the same where nothing is smoothed).
-        placed: what the scene multiplies j by at each vertex, positive, (m,).
+        placed: what the scene multiplies the tractions of j by at each vertex, positive, (m,).
+        stretch: what the scene multiplies the lengths of j by there, positive: the law is stretch j(· / stretch), (m,).
         directions: unit vectors that the displacement is multiplied with, (m, k, d).
         length: what the law acts on is this length of the k components; None: the signed component, k = 1.
         free: 1 where a component is not prescribed, (m, d).
@@ -44,6 +48,7 @@ class LawTerm:
     law: Superpotential
     exact: Superpotential
     placed: Array
+    stretch: Array
     directions: Array
     length: Length | None
     free: Array
@@ -74,12 +79,17 @@ class LawTerm:
 
     @property
     def weights(self) -> Array:
-        """Lumped areas times multiplier, over L^(d-1): j' times these are forces, and j energies, (m,)."""
+        """Lumped areas times multiplier, over L^(d-1): j' times these are forces, (m,)."""
         return self.surface.weights * self.multiplier
 
     @property
+    def energy_weights(self) -> Array:
+        """What j times these are energies, (m,)."""
+        return self.weights * self.stretch
+
+    @property
     def multiplier(self) -> Array:
-        """What j is multiplied by: by the scene, and by the energy of separation at its mode mixity, (m,)."""
+        """What the tractions of j are multiplied by: by the scene, and by the energy of separation at its mode mixity, (m,)."""
         return self.placed * self.energies
 
     @property
@@ -97,7 +107,7 @@ class LawTerm:
         return np.einsum("mkd,md->mk", self.directions, self.surface.values(u))
 
     def argument(self, u: Array) -> Array:
-        """What the law's j acts on: the signed component, or the length of the vector; shape (m,)."""
+        """What the law's j acts on: the signed component, or the length of the vector, over the stretch; shape (m,)."""
         return self.argument_of(self.slip(u))
 
     def argument_of(self, components: Array) -> Array:
@@ -106,10 +116,21 @@ class LawTerm:
         Args:
             components: along the directions, (m, k).
         """
-        return components[:, 0] if self.length is None else self.length.of(components)
+        size = components[:, 0] if self.length is None else self.length.of(components)
+        return size if np.all(self.stretch == 1.0) else self._off_rounding(size / self.stretch)
+
+    def _off_rounding(self, argument: Array) -> Array:
+        """Arguments (m,), those that miss a convex kink by rounding put on it: a bound may hold the displacement there."""
+        for kink in self.law.convex.kinks:
+            argument = np.where(np.abs(argument - kink) <= _ROUNDING * np.abs(kink), kink, argument)
+        return argument
+
+    def reach(self, near: Array) -> Array:
+        """Distances of displacements, (m,), as distances of what j acts on, (m,)."""
+        return near / self.stretch
 
     def gradient(self, components: Array) -> Array:
-        """The derivative of the argument by the components (m, k), of the same shape; zero where a length is zero."""
+        """The derivative of the argument times stretch by the components (m, k); zero where a length is zero."""
         return np.ones_like(components) if self.length is None else self.length.gradient(components)
 
     def counts(self, u: Array, near: float | Array) -> Mask:
@@ -161,8 +182,9 @@ class LawTerm:
             derivative: of the law at u, (m,).
             second: the law's second derivative at u, (m,).
         """
-        local = second[:, None, None]
+        steep = second / self.stretch
+        local = steep[:, None, None]
         if self.length is not None:
-            local = self.length.hessian(self.slip(u), derivative, second)
+            local = self.length.hessian(self.slip(u), derivative, steep)
         full = np.einsum("mka,mkl,mlb->mab", self.directions, local, self.directions)
         return np.einsum("ma,mab,mb->mab", self.free, full, self.free)

@@ -135,13 +135,15 @@ def _term(
             f'boundary.{where.part}: law = "{law.law.name}" jumps upwards at a length > 0 of a vector, which is a '
             "ring that bounds cannot follow; smooth it: [solver] smoothing and epsilon"
         )
+    _check_formulas(context, where, key, law)
     density = _density(context)
     return LawTerm(
         surface=where,
         direction=law.direction,
         law=solved,
         exact=exact,
-        placed=_multiplier(context, where, key, law.multiplier),
+        placed=_factor(context, where, f"{key}: multiplier", law.multiplier),
+        stretch=_factor(context, where, f"{key}: length_multiplier", law.length_multiplier),
         directions=law.direction.along(where.normals, where.tangents),
         length=length,
         free=(~np.isin(where.dofs, fixed)).astype(np.float64),
@@ -152,8 +154,20 @@ def _term(
     )
 
 
-def _multiplier(context: DomainForms, where: Surface, key: str, given: SpatialValue) -> Array:
-    """What a law is multiplied by at the vertices of its part, (m,). Collective.
+def _check_formulas(context: DomainForms, where: Surface, key: str, law: BoundaryLaw) -> None:
+    """Refuse formulas in the place of a law's numbers that are not one law at the vertices of its part. Collective.
+
+    Raises:
+        InputError: on all ranks alike.
+    """
+    if law.contradictions is None:
+        return
+    for text in (text for rank in agree(context.domain.mesh.comm, law.contradictions(where.points)) for text in rank):
+        raise InputError(f"boundary.{where.part}.{key}: {text}")
+
+
+def _factor(context: DomainForms, where: Surface, key: str, given: SpatialValue) -> Array:
+    """What tractions or lengths of a law are multiplied by at the vertices of its part, (m,). Collective.
 
     Raises:
         InputError: on all ranks alike: it is not a positive number somewhere.
@@ -163,7 +177,7 @@ def _multiplier(context: DomainForms, where: Surface, key: str, given: SpatialVa
     said = [f"{found[i]:g} at {tuple(map(float, where.points[i]))}" for i in bad[:1]]
     for text in (text for rank in agree(context.domain.mesh.comm, said) for text in rank):
         reason = "it must be positive at every vertex. Where there is no law, leave that piece out: `where`"
-        raise InputError(f"boundary.{where.part}.{key}: multiplier = {given.source!r} is {text}; {reason}")
+        raise InputError(f"boundary.{where.part}.{key} = {given.source!r} is {text}; {reason}")
     return found
 
 

@@ -222,16 +222,19 @@ class Result:
         except HviError:
             return None
 
-    def multiplier(self, part: ContactPart, direction: str = "slip") -> Array | None:
-        """What the law of a part is multiplied by at its vertices, (m,); None if there is not one law, or no formula.
+    def multipliers(self, part: ContactPart, direction: str = "slip") -> tuple[Array, Array] | None:
+        """What tractions and lengths of a part's law are multiplied by at its vertices, (m,); None: not known.
 
         Args:
             part: the part.
             direction: the displacement that the law acts on.
         """
-        found = [law["multiplier"] for law in self._brought(part.name, direction)]
+        found = self._brought(part.name, direction)
+        if len(found) != 1:
+            return None
+        points = part.points.astype(np.float64)
         try:
-            return Formula(found[0]).at(part.points.astype(np.float64)) if len(found) == 1 else None
+            return Formula(found[0]["multiplier"]).at(points), Formula(found[0]["length_multiplier"]).at(points)
         except HviError:
             return None
 

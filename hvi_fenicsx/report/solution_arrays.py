@@ -12,7 +12,7 @@ This module alone knows the keys of the file. With n vertices and c cells in d d
 - ``load:NAME:KEY``, a load there that no formula of the scene tells, at m vertices: ``vertices`` (m,), ``traction``
   (m, d) and ``pressure`` (m,) against the boundary in N/m²
 - ``part:NAME:KEY``, a part of Γc with m vertices: ``vertices`` (m,), ``facets`` (k, d), ``weights`` (m,), ``normals``
-  (m, d), ``drops``, and the columns of ``contact.csv`` by their names, (m,) each
+  (m, d), ``drops`` (m, j), and the columns of ``contact.csv`` by their names, (m,) each
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ class PartArrays:
         facets: segments or triangles by the vertices of the body, (k, d), each row ascending.
         weights: lumped lengths or areas of the vertices, m or m², (m,).
         normals: outward unit normals, (m, d).
-        drops: the slips at which the friction law drops, m.
+        drops: the slips at which the friction law drops at each vertex, m, (m, j).
     """
 
     columns: Mapping[str, Array]

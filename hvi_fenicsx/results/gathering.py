@@ -136,6 +136,9 @@ def _part(problem: Problem, state: ContactState) -> PartArrays | None:
     vertices = _joined(comm, _globally(problem, surface.blocks))
     weights = _joined(comm, surface.weights * scales.length ** (scales.dimension - 1))
     normals = _joined(comm, surface.normals)
+    slips = [law.term for law in state.laws if law.term.direction is Direction.SLIP]
+    each = [term.stretch[:, None] * term.exact.concave.kinks for term in slips]
+    drops = _joined(comm, np.concatenate([np.empty((len(surface.weights), 0)), *each], axis=1))
     facets = _facets(problem, surface.facets)
     if scales.dimension == 2:
         pairs = _joined(comm, arc_length.edges(problem, surface))
@@ -147,14 +150,13 @@ def _part(problem: Problem, state: ContactState) -> PartArrays | None:
     else:
         order = arc_length.lexicographic(np.column_stack([columns[axis] for axis in "xyz"]))
         columns = {name: values[order] for name, values in columns.items()}
-    drops = [law.term.exact.concave.kinks for law in state.laws if law.term.direction is Direction.SLIP]
     return PartArrays(
         columns=columns,
         vertices=vertices[order],
         facets=facets[np.isin(facets, vertices).all(axis=1)],
         weights=weights[order],
         normals=normals[order],
-        drops=np.concatenate([np.empty(0), *drops]) * scales.displacement,
+        drops=drops[order] * scales.displacement,
     )
 
 

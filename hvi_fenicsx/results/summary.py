@@ -107,7 +107,7 @@ def _mode_mixity(solution: Solution) -> dict[str, float] | None:
     found = {}
     for state in examination.states if examination else ():
         if (law := state.of_both_modes) is not None:
-            squares = state.surface.weights * law.argument**2
+            squares = state.surface.weights * (law.term.stretch * law.argument) ** 2
             slip, whole = comm.allreduce(np.array([np.nansum(squares * law.slip_share), squares.sum()]))
             found[state.surface.part] = float(slip / whole) if whole > 0.0 else math.nan
     return found or None

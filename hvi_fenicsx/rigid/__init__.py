@@ -4,7 +4,8 @@ from ..laws.convex_parts import Directional
 from .analyse import analyse, gives_way, load_factors
 from .kernel import FixedDirections, kernel, modes, null_space
 from .least_energy import Rest, Sides, least_energy
-from .motions import AnyBody, JoinedBodies, Mode, MotionFields, RigidBody, describe, fields_at, motion_at, rigid_fields
+from .motions import AnyBody, JoinedBodies, Mode, MotionFields, Movable, RigidBody, describe, fields_at, motion_at, rigid_fields
+from .pressed import pressed, without_obstacles
 from .reduction import ContactCone, Resistance, RigidProblem
 from .solvability import ExistenceState, LoadFactors, PaperConditions, Solvability, combine, combine_factors, undecided
 from .thresholds import Thresholds
@@ -19,6 +20,7 @@ __all__ = [
     "LoadFactors",
     "Mode",
     "MotionFields",
+    "Movable",
     "PaperConditions",
     "Resistance",
     "Rest",
@@ -39,6 +41,8 @@ __all__ = [
     "modes",
     "motion_at",
     "null_space",
+    "pressed",
     "rigid_fields",
     "undecided",
+    "without_obstacles",
 ]

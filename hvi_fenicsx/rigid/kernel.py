@@ -9,7 +9,7 @@ import numpy as np
 from mpi4py import MPI
 
 from ..typing import Array
-from .motions import AnyBody, Mode, Places, fields_at, is_place, mode_of
+from .motions import Mode, Movable, Places, fields_at, is_place, mode_of
 from .thresholds import DEFAULT, Thresholds
 
 
@@ -30,7 +30,7 @@ class FixedDirections:
             raise ValueError("FixedDirections needs points (k, 3) and directions (k, d) with the same k")
 
 
-def kernel(comm: MPI.Comm, body: AnyBody, fixed: Sequence[FixedDirections], thresholds: Thresholds = DEFAULT) -> Array:
+def kernel(comm: MPI.Comm, body: Movable, fixed: Sequence[FixedDirections], thresholds: Thresholds = DEFAULT) -> Array:
     """A basis of Y as columns of rigid coefficients, (3|6, k). Collective; the same on all ranks.
 
     First the translations, orthonormal; then rotations about orthonormal axes, one radian each, whose
@@ -53,7 +53,7 @@ def _natural_null_space(rows: Array, shifts: int, thresholds: Thresholds) -> Arr
     return natural_basis(null_space(rows, thresholds), shifts, thresholds)
 
 
-def modes(basis: Array, body: AnyBody) -> tuple[Mode, ...]:
+def modes(basis: Array, body: Movable) -> tuple[Mode, ...]:
     """The motions of a kernel's basis. Local.
 
     Args:
@@ -128,6 +128,6 @@ def _snap(values: Array) -> Array:
     return np.where(np.abs(values) < 1e-13, 0.0, values)
 
 
-def _condition_rows(part: FixedDirections, body: AnyBody) -> Array:
+def _condition_rows(part: FixedDirections, body: Movable) -> Array:
     """(k, 3|6): the work of each condition on the basis motions."""
     return np.asarray(np.einsum("kd,knd->kn", part.directions, fields_at(part.points, body)))

@@ -8,6 +8,7 @@ body by body, then the rotations of all.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Protocol
 
 import numpy as np
 
@@ -123,6 +124,34 @@ AnyBody = RigidBody | JoinedBodies
 """What moves."""
 
 
+class Movable(Protocol):
+    """What has rigid motions: a body, bodies that meet, and what else moves with them."""
+
+    @property
+    def dimension(self) -> int:
+        """2 or 3."""
+
+    @property
+    def index(self) -> int:
+        """Its number."""
+
+    @property
+    def motions(self) -> int:
+        """Number of rigid motions."""
+
+    @property
+    def shifts(self) -> int:
+        """Number of translations among them; they come first."""
+
+    def describe(self, coefficients: Array, *, signed: bool) -> str:
+        """A motion in words.
+
+        Args:
+            coefficients: on the basis, (motions,).
+            signed: whether the name has the sense too.
+        """
+
+
 @dataclass(frozen=True)
 class MotionFields:
     """What the basis motions are at some vertices: the displacement, on an interface the relative one.
@@ -166,7 +195,7 @@ class Mode:
     body: int = 0
 
 
-def mode_of(coefficients: Array, body: AnyBody, *, signed: bool) -> Mode:
+def mode_of(coefficients: Array, body: Movable, *, signed: bool) -> Mode:
     """The motion with the given coefficients, with its name.
 
     Args:
@@ -177,7 +206,7 @@ def mode_of(coefficients: Array, body: AnyBody, *, signed: bool) -> Mode:
     return Mode(body.describe(coefficients, signed=signed), tuple(float(c) for c in coefficients), body.index)
 
 
-def fields_at(places: Places, body: AnyBody) -> Array:
+def fields_at(places: Places, body: Movable) -> Array:
     """The basis motions, (m, motions, d). Local to the rank.
 
     Args:
@@ -186,7 +215,7 @@ def fields_at(places: Places, body: AnyBody) -> Array:
     """
     if isinstance(places, MotionFields):
         return places.values
-    if isinstance(body, JoinedBodies):
+    if not isinstance(body, RigidBody):
         raise ValueError("points do not say which of several bodies they belong to; give MotionFields")
     return rigid_fields(places, body)
 

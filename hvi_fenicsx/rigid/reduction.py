@@ -18,7 +18,7 @@ from ..laws.convex_parts import Directional
 from ..typing import Array
 from .functional import Functional, SlipIntegral, merged
 from .kernel import FixedDirections, kernel
-from .motions import AnyBody, Places, fields_at, is_place
+from .motions import Movable, Places, fields_at, is_place
 from .thresholds import DEFAULT, Thresholds
 
 
@@ -103,7 +103,7 @@ class RigidProblem:
         force: sum of the absolute nodal forces: beside it a work is rounding or not, however well loads balance.
     """
 
-    body: AnyBody
+    body: Movable
     loads: Mapping[str, Array]
     fixed: tuple[FixedDirections, ...] = ()
     contact: tuple[ContactCone, ...] = ()
@@ -254,12 +254,12 @@ def unit_rows(rows: Array, tiny: float) -> Array:
     return np.asarray(rows[length > tiny] / length[length > tiny, None])
 
 
-def _trace(part: Resistance, body: AnyBody, basis: Array) -> Array:
+def _trace(part: Resistance, body: Movable, basis: Array) -> Array:
     """∫ y·y over this rank's vertices of a part, as a quadratic form on the kernel's basis, (k, k)."""
     fields = np.einsum("mnd,nk->mdk", fields_at(part.points, body), basis)
     return np.asarray(np.einsum("m,mdk,mdl->kl", part.weights, fields, fields))
 
 
-def _work(points: Places, directions: Array, body: AnyBody, basis: Array) -> Array:
+def _work(points: Places, directions: Array, body: Movable, basis: Array) -> Array:
     """direction·y of each basis motion of the kernel: directions (m, r, d) give (m, r, k)."""
     return np.asarray(np.einsum("mrd,mnd->mrn", directions, fields_at(points, body)) @ basis)

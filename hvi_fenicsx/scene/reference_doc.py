@@ -14,6 +14,7 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 from ..effects import Effect, Place
+from ..formula import Formula
 from ..laws.base import registered
 from ..mesh.shapes import DomainShape, PlacedShape
 from ..schema import OneOf, descriptions
@@ -140,6 +141,8 @@ def _provided(registry: Mapping[str, type[T]]) -> dict[str, type[T]]:
 def _toml(value: Any) -> str:
     if isinstance(value, tuple) and len(value) == 1:
         return _toml(value[0])
+    if isinstance(value, Formula):
+        return _toml(value.source)
     if value is None or value in ("", ()):
         return "none"
     return f'`"{value}"`' if isinstance(value, str) else f"`{str(value).lower()}`"

@@ -119,7 +119,8 @@ class BranchIteration(Method):
 
     def _off_kinks(self, x: PETSc.Vec) -> PETSc.Vec | None:
         """A point of lower energy, where x is on a kink of G, which hides a descent: both sides are tried."""
-        near = [self.thresholds.kink_distance * self.system.references.at(t.surface.blocks) for t in self.system.terms]
+        distance, references = self.thresholds.kink_distance, self.system.references
+        near = [t.reach(distance * references.at(t.surface.blocks)) for t in self.system.terms]
         on = [
             law.concave.left(a - d) < law.concave.right(a + d) - self.thresholds.kink_jump * law.traction_scale
             for law, a, d in zip(self._laws, self._convex.arguments(x), near, strict=True)

@@ -38,7 +38,8 @@ def slip_bounds(system: System, cells: Sequence[Cells]) -> tuple[PETSc.Vec, PETS
 def _keep_in_cells(term: LawTerm, cells: Cells, lower: PETSc.Vec, upper: PETSc.Vec) -> None:
     """Keep the signed slip of each vertex in its cell."""
     dofs, sign, free = _slip_dofs(term)
-    low, high = np.where(sign > 0, cells.lower, -cells.upper), np.where(sign > 0, cells.upper, -cells.lower)
+    least, most = cells.lower * term.stretch, cells.upper * term.stretch
+    low, high = np.where(sign > 0, least, -most), np.where(sign > 0, most, -least)
     lower.array[dofs[free]] = np.maximum(lower.array[dofs], low)[free]
     upper.array[dofs[free]] = np.minimum(upper.array[dofs], high)[free]
 

@@ -161,12 +161,7 @@ class ObstacleForceSolve:
         """The way after which the obstacle touches the body at rest; behind it where it would overlap. Collective."""
         ways = [b.upper[b.force.rate < 0] / -b.force.rate[b.force.rate < 0] for b in self._system.bounds if b.force]
         least = min((float(np.min(way, initial=np.inf)) for way in ways), default=np.inf)
-        found = self._system.comm.allreduce(least, op=MPI.MIN)
-        if not np.isfinite(found):
-            raise InputError(
-                f"boundary.{self._force.name}: the force moves the obstacle away from the body; turn it round"
-            )
-        return float(found)
+        return float(self._system.comm.allreduce(least, op=MPI.MIN))
 
     def _anew(self, way: float, start: fem.Function | None) -> LevelSolution:
         """From the coarse meshes, or from a displacement. Collective."""
@@ -227,7 +222,7 @@ class ObstacleForceSolve:
         if result.converged and not balance.passed:
             reason = (
                 f"contact of {balance.name} bears {balance.borne / balance.force:.6g} of the force at all positions "
-                "that were tried; the body gives way, or what it bears jumps there"
+                "that were tried; what it bears jumps there, or the laws give way"
             )
             result = replace(result, converged=False, reason=reason)
         return replace(found, result=result)

@@ -92,7 +92,7 @@ class _LawEnergy:
         argument = term.argument_of(slip)
         xi, weights = law.concave.left(np.zeros_like(argument)), term.weights
         force = (weights * (law.convex.right(argument) - xi))[:, None] * term.gradient(slip)
-        energy = weights @ (law.convex.value(argument) - xi * argument)
+        energy = term.energy_weights @ (law.convex.value(argument) - xi * argument)
         return float(energy), np.einsum("mr,mrk->k", force, self._moves[p])
 
 
@@ -135,10 +135,10 @@ def at_kinks(system: System, laws: Sequence[Superpotential], x: PETSc.Vec, near:
         if not len(kinks):
             continue
         nearest = kinks[np.argmin(np.abs(argument[:, None] - kinks), axis=1)]
-        on = np.abs(argument - nearest) <= near * np.maximum(1.0, np.abs(nearest))
+        on = np.abs(argument - nearest) <= near * np.maximum(1.0 / term.stretch, np.abs(nearest))
         kept = term.counts(x.array_r, near)
         touched = np.any((term.directions != 0.0) & kept[:, :, None], axis=1) & (term.free > 0) & on[:, None]
-        along = np.einsum("md,m->md", np.sum(term.directions, axis=1), nearest)
+        along = np.einsum("md,m->md", np.sum(term.directions, axis=1), nearest * term.stretch)
         x.array[term.surface.dofs[touched]] = along[touched]
         found.append(term.surface.dofs[touched])
     return np.unique(np.concatenate(found))

@@ -103,6 +103,6 @@ def _width(part: PartFields) -> float:
 def _jumps(part: PartFields) -> Array:
     """The middles of the facets on which the slip passes a drop of the law; (k, d)."""
     slip = part.slip[:, 0] if part.slip.shape[1] == 1 else np.linalg.norm(part.slip, axis=1)
-    low, high = (f(slip[part.facets], axis=1)[:, None] for f in (np.min, np.max))
-    passed = np.any((low <= part.drops) & (part.drops <= high), axis=1)
+    beyond = (slip[:, None] - part.drops)[part.facets]
+    passed = np.any((beyond.min(axis=1) <= 0.0) & (beyond.max(axis=1) >= 0.0), axis=1)
     return np.asarray(part.points[part.facets[passed]].mean(axis=1))

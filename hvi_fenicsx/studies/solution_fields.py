@@ -29,7 +29,7 @@ class PartFields:
         friction: -σ_t, N/m², (m, d-1); zero where no law acts along the part, since the residual there is rounding.
         pressure: σ_n, negative in compression, N/m², (m,); zero where neither contact nor a law acts across the part.
         contact: 1 where the part is closed, (m,).
-        drops: the slips at which the friction law drops, m, (j,).
+        drops: the slips at which the friction law drops at each node, m, (m, j).
         bounded: whether the part has contact.
     """
 
@@ -111,7 +111,7 @@ def _part(part: PartArrays, points: Array, ends: Integers) -> PartFields:
         friction=_tangential(columns, "friction_t") if "friction_t1" in columns else np.zeros_like(slip),
         pressure=columns["sigma_n"] * (bounded or "branch_n" in columns),
         contact=columns["contact"] if bounded else np.zeros(len(order)),
-        drops=part.drops,
+        drops=part.drops[order],
         bounded=bounded,
     )
 

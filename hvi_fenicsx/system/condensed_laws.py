@@ -69,7 +69,7 @@ class _Term:
         self._free = along & (self._unknowns >= 0)
         constant = np.einsum("mkd,mdc->mkc", term.directions, values)
         self._components = np.count_nonzero(self._free, axis=1)
-        self._arguments = constant[:, 0].T
+        self._arguments = constant[:, 0].T / term.stretch
         moved = np.any(constant != 0.0, axis=(1, 2)) & ((self._components > 0) | term.radial)
         if any(agree(system.comm, bool(np.any(moved)))):
             raise InputError(
@@ -92,14 +92,20 @@ class _Term:
         return np.asarray(np.any((term.directions[:, 0] != 0.0) & self._free, axis=1))
 
     def _bonds(self, here: Mask, components: int, opens: bool) -> Sequence[Bonds]:
-        """The vertices of one kind. Collective."""
+        """The vertices of one kind, by what the lengths of their law are multiplied by. Collective."""
+        stretch = self._term.stretch
+        known = np.unique(np.concatenate(agree(self._comm, stretch[here])))
+        return [b for one in known for b in self._alike(here & (stretch == one), components, opens, float(one))]
+
+    def _alike(self, here: Mask, components: int, opens: bool, stretch: float) -> Sequence[Bonds]:
+        """The vertices of one kind and stretch. Collective."""
         term, surface = self._term, self._term.surface
         unknowns, signs = self._felt(here, components, opens)
         parts = (unknowns, signs, (surface.weights * term.placed)[here], surface.points[here])
         unknowns, signs, weights, points = (np.concatenate(agree(self._comm, p)) for p in parts)
         if not len(weights):
             return []
-        law = term.law
+        law = term.law if stretch == 1.0 else term.law.scaled(1.0 / stretch, 1.0)
         if term.length is not None and components == 1 and not opens:  # a slip alone: its law has the factor
             factor = term.length.factors[-1]
             law = law if factor == 1.0 else law.scaled(factor, 1.0 / factor)
@@ -138,7 +144,7 @@ class _Term:
         """The vertices where no component is free, and the energy is not always zero, of all ranks. Collective."""
         at_rest = float(self._term.law.value(np.zeros(1))[0])
         here = (self._components == 0) & (np.any(self._arguments != 0.0, axis=0) | (at_rest != 0.0))
-        weights = np.concatenate(agree(self._comm, self._term.weights[here]))
+        weights = np.concatenate(agree(self._comm, self._term.energy_weights[here]))
         arguments = np.concatenate(agree(self._comm, self._arguments[:, here]), axis=1)
         if not len(weights):
             return []

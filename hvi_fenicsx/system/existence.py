@@ -20,6 +20,7 @@ from ..rigid import (
     FixedDirections,
     LoadFactors,
     Mode,
+    Movable,
     MotionFields,
     Resistance,
     RigidProblem,
@@ -43,6 +44,9 @@ def solvability(problem: Problem, forces: Mapping[str, PETSc.Vec]) -> Solvabilit
     """
     comm = problem.domain.mesh.comm
     found = combine([analyse(comm, body) for body in rigid_problems(problem, forces)])
+    if (obstacles := _with_obstacles(problem, forces)) is not None:
+        known = [_of_body(body, analyse(comm, body)) for body in obstacles]
+        found = replace(combine(known), kernel=found.kernel, free=found.free, paper=found.paper)
     return replace(found, direction=parting.named(problem, found.direction))
 
 
@@ -57,9 +61,9 @@ def load_factors(problem: Problem, forces: Mapping[str, PETSc.Vec], load: str | 
     Raises:
         InputError: on all ranks alike: there is no such load.
     """
-    name = None if load is None else load_name(list(loads_of_rigid_motions(problem, forces)), load)
-    comm = problem.domain.mesh.comm
-    found = rigid.combine_factors([rigid.load_factors(comm, body, name) for body in rigid_problems(problem, forces)])
+    comm, bodies = problem.domain.mesh.comm, _with_obstacles(problem, forces) or rigid_problems(problem, forces)
+    name = None if load is None else load_name(list(dict.fromkeys(n for body in bodies for n in body.loads)), load)
+    found = rigid.combine_factors([_limits(body, rigid.load_factors(comm, body, name)) for body in bodies])
     mode, peak = (parting.named(problem, limiting) for limiting in (found.mode, found.peak_mode))
     return replace(found, mode=mode, peak_mode=peak)
 
@@ -90,6 +94,56 @@ def rigid_problems(problem: Problem, forces: Mapping[str, PETSc.Vec]) -> tuple[R
     """
     loads = loads_of_rigid_motions(problem, forces)
     return tuple(rigid_problem(problem, loads, body) for body in problem.bodies)
+
+
+def _with_obstacles(problem: Problem, forces: Mapping[str, PETSc.Vec]) -> tuple[RigidProblem, ...] | None:
+    """The data with the motions of obstacles that forces press; None without one, or if one touches two bodies. Collective."""
+    whole = rigid_problems(problem, forces)
+    if all(b.force is None for b in problem.bounds):
+        return None
+    touched = [
+        {b.force.name: b.force for b in problem.bounds if b.force is not None and _meets(problem, one.body, b)}
+        for one in whole
+    ]
+    names = [name for one in touched for name in one]
+    if len(set(names)) < len(names):
+        return None
+    found = [
+        rigid.pressed(one, {name: f.force for name, f in here.items()}, _ways(problem, one.body, list(here)))
+        for one, here in zip(whole, touched, strict=True)
+    ]
+    return tuple(replace(one, loads={n: np.zeros(one.body.motions) for n in names} | dict(one.loads)) for one in found)
+
+
+def _meets(problem: Problem, body: Movable, bounds: Bounds) -> bool:
+    """Whether bounds act on a body. Collective."""
+    mine = bool(inside(problem, body, bounds.surface.blocks).any())
+    return bool(problem.domain.mesh.comm.allreduce(mine, op=MPI.LOR))
+
+
+def _ways(problem: Problem, body: Movable, names: Sequence[str]) -> list[Array]:
+    """What obstacles do at the vertices of each contact cone of a body, (m, obstacles, d)."""
+    found = []
+    for bounds in (b for b in problem.bounds if not _bilateral(b)):
+        mine = inside(problem, body, bounds.surface.blocks)
+        normals = bounds.surface.normals[mine]
+        ways = np.zeros((len(normals), len(names), normals.shape[1]))
+        if (force := bounds.force) is not None:
+            ways[:, names.index(force.name)] = -force.rate[mine, None] * normals
+        found.append(ways)
+    return found
+
+
+def _of_body(problem: RigidProblem, found: Solvability) -> Solvability:
+    """A verdict whose motions are those of the body."""
+    direction, critical = (rigid.without_obstacles(problem, mode) for mode in (found.direction, found.critical))
+    return replace(found, direction=direction, critical=critical)
+
+
+def _limits(problem: RigidProblem, found: LoadFactors) -> LoadFactors:
+    """Load factors whose motions are those of the body."""
+    mode, peak = (rigid.without_obstacles(problem, limiting) for limiting in (found.mode, found.peak_mode))
+    return replace(found, mode=mode, peak_mode=peak)
 
 
 def motions(problem: Problem, *, contact_closed: bool, without: Sequence[Mode] = ()) -> list[Mode]:
@@ -146,7 +200,7 @@ def _bilateral(bounds: Bounds) -> bool:
     return bool(np.all(np.isfinite(bounds.lower) & np.isfinite(bounds.upper)))
 
 
-def inside(problem: Problem, body: AnyBody, blocks: Entities) -> Mask:
+def inside(problem: Problem, body: Movable, blocks: Entities) -> Mask:
     """Which vertices belong to a body, (n,).
 
     Args:

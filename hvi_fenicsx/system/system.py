@@ -287,7 +287,7 @@ class System:
         u = x.array_r
         local = 0.0
         for term, model in zip(self.terms, models, strict=True):
-            local += float(np.sum(term.weights * model.value(term.argument(u))))
+            local += float(np.sum(term.energy_weights * model.value(term.argument(u))))
         return 0.5 * float(x.dot(self._work)) - float(self.load.dot(x)) + float(self.comm.allreduce(local))
 
     @cached_property

@@ -101,13 +101,42 @@ def test_the_solution_is_that_with_the_obstacle_held_where_the_force_moved_it(de
     assert np.sum(top.pressure * top.weight) == pytest.approx(5e5, rel=1e-6)
 
 
-def test_a_body_that_gives_way_is_not_certified() -> None:
-    """A load holds the block against the plate, which bears no more than this load."""
-    table = block(**{side: {"on": side, "displacement": way} for side, way in _HELD.items()})
-    table["boundary"]["base"] = {"on": "bottom", "traction": [0.0, 0.0, 1e3 / AREA]}
+GLIDES = {side: {"on": side, "displacement": way} for side, way in _HELD.items()}
+
+
+@pytest.mark.parametrize(("load", "way"), [(1e3, "-z"), (1e5, "+z")])
+def test_a_body_that_only_a_load_holds_against_the_plate_escapes(load: float, way: str) -> None:
+    """The smaller one of both forces cannot hold the larger one: proven before anything is solved."""
+    table = block(**GLIDES, base={"on": "bottom", "traction": [0.0, 0.0, load / AREA]})
     found = hvi.solve(hvi.Scene.model_validate(table))
-    assert found.exit_code == ExitCode.NOT_CONVERGED
-    assert "gives way" in found.reason
+    assert found.exit_code == ExitCode.NO_SOLUTION
+    assert found.solvability.direction is not None
+    assert found.solvability.direction.name == f"translation along {way}, together with the obstacle of lid.contact"
+
+
+def test_the_force_on_the_plate_has_the_limit_load_of_the_bed() -> None:
+    """The bed bears 48 kN at its peak and 24 kN beyond it, the plate presses with 30 kN."""
+    bed = {"law": "graph", "points": [[0, 0], [1e-6, 4e5], [1e-6, 2e5]], "one_sided": True}
+    table = block(**GLIDES, base={"on": "bottom", "support": bed})
+    prepared = hvi.prepare(hvi.Scene.model_validate(table))
+    assert prepared.solvability.state == "metastable"
+    for factors in (prepared.load_factors("lid"), prepared.load_factors()):
+        assert (factors.held, factors.peak) == pytest.approx((24 / 30, 48 / 30), rel=1e-9)
+    table["boundary"]["lid"]["contact"]["obstacle"]["force"] = [0.0, 0.0, -4.9e4]
+    assert hvi.solve(hvi.Scene.model_validate(table)).exit_code == ExitCode.NO_SOLUTION
+
+
+@pytest.mark.parametrize(("foot", "state"), [(0.1, "escapes"), (0.3, "borderline")])
+def test_a_plate_that_presses_beside_the_foot_tips_the_block(foot: float, state: str) -> None:
+    """The plate does not turn: it tips the block where all that it touches is beside the foot. The block may slide."""
+    table = block(
+        base={"on": "bottom", "where": f"x < {foot}", "contact": {"gap": 0.0}},
+        front={"on": ["front", "back"], "displacement": ["free", 0.0, "free"]},
+    )
+    table["domain"]["cells"] = [4, 1, 2]
+    table["boundary"]["lid"]["where"] = "x > 0.2"
+    prepared = hvi.prepare(hvi.Scene.model_validate(table))
+    assert prepared.solvability.state == state
 
 
 @pytest.mark.parametrize(

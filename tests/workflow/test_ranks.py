@@ -36,7 +36,9 @@ CUBE: Table = {
 SCENES: dict[str, Table] = {
     "paper": model(16, friction=PAPER, smoothing="paper", epsilon_absolute=0.1),
     "exact": model(16, friction=PAPER),
-    "lift-off": model(13, 6e6, 1e6, quadratic_linear(2.5e6) | {"multiplier": "1 + 0.4*x"}),
+    "lift-off": model(
+        13, 6e6, 1e6, quadratic_linear(2.5e6) | {"multiplier": "1 + 0.4*x", "length_multiplier": "1 + x/3"}
+    ),
     "levels": model(56, 6e6, 1e6, quadratic_linear(3e6)),  # solved by multigrid, its coarser level on one rank
     "gamg": model(24, 6e6, 1e6, quadratic_linear(3e6), linear_solver="gamg"),
     "tresca": model(10, 3e6, 1e6, {"law": "tresca", "yield_traction": 5e5}),

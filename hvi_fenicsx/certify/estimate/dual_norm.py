@@ -107,7 +107,7 @@ def _held(system: System, x: PETSc.Vec, near: float) -> Entities:
         dofs, sign = bounds.component()
         found.append(dofs[touches(bounds, sign * u[dofs], near)])
     for term in system.terms:
-        stuck = on_kink(term.law.convex, term.argument(u), near)[:, None] & term.counts(u, near)
+        stuck = on_kink(term.law.convex, term.argument(u), near / term.stretch)[:, None] & term.counts(u, near)
         found.extend(dofs[stuck[:, i]] for i, (dofs, _) in enumerate(components(term)))
     return np.setdiff1d(np.unique(np.concatenate(found)), system.problem.fixed).astype(np.int32)
 
@@ -119,7 +119,7 @@ def _rising(comm: MPI.Comm, term: LawTerm, u: Array, thresholds: Thresholds) -> 
     second = np.maximum(convex.second(argument) - term.law.concave.second(argument), 0.0)
     if comm.allreduce(float(np.max(second, initial=0.0)), op=MPI.MAX) == 0.0:
         second = np.full_like(second, thresholds.foundation)
-        return term.rate(u, second * argument, second)
+        return term.rate(u, second * argument, second * term.stretch)
     secant = np.maximum((convex.left(argument) + convex.right(argument)) / 2, 0.0) if term.radial else second
     return term.rate(u, secant, second)
 
@@ -182,7 +182,8 @@ def _law_forces(problem: Problem, states: Sequence[ContactState], near: float, *
         for law in state.laws:
             term = law.term
             asked = term.exact if exact else term.law
-            away = law.given - nearest(asked, term.length, law.components, law.given, near)
+            components = law.components / term.stretch[:, None]
+            away = law.given - nearest(asked, term.length, components, law.given, near / term.stretch)
             away[law.hidden] = 0.0
             vectors = np.einsum("mk,mkd->md", away * term.weights[:, None], term.directions)
             np.add.at(forces, state.surface.blocks, vectors)

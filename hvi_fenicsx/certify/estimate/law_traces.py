@@ -30,7 +30,9 @@ Trace = PartTrace | InterfaceTrace
 """The facets of a part, or of two bodies that meet, between their nodes."""
 
 
-def nearest(law: Superpotential, length: Length | None, slip: Array, traction: Array, near: float) -> Array:
+def nearest(
+    law: Superpotential, length: Length | None, slip: Array, traction: Array, near: float | Array
+) -> Array:
     """The admissible tractions of a law nearest to given ones, (m, k).
 
     Args:
@@ -38,7 +40,7 @@ def nearest(law: Superpotential, length: Length | None, slip: Array, traction: A
         length: the length that it acts on; None: the signed slip, k = 1.
         slip: the components of what it acts on, (m, k).
         traction: the given ones, (m, k).
-        near: distance from a kink that counts as being on it.
+        near: distance from a kink that counts as being on it, one for all or (m,).
     """
     ends = law.interval(slip[:, 0] if length is None else length.of(slip), near)
     if length is None:
@@ -95,11 +97,12 @@ class LawTrace:
 
 @dataclass(frozen=True, kw_only=True)
 class _Solved:
-    """What u_h gives one law between the nodes, (f, q, k) each; no error changes it.
+    """What u_h gives one law between the nodes, (f, q, k) each; no error changes it. Slips are over the law's stretch.
 
     Attributes:
         points: the quadrature points.
         multiplier: of the law, (f, q, 1).
+        stretch: of the law, (f, q, 1).
         nodal: the interpolated nodal tractions.
         sticks: whether all nodes around are on a convex kink, (f, q, 1).
         nodewise: the slip, linear from node to node.
@@ -108,6 +111,7 @@ class _Solved:
 
     points: Trace
     multiplier: Array
+    stretch: Array
     nodal: Array
     sticks: Mask
     nodewise: Array
@@ -181,7 +185,7 @@ class LawTraces:
         asked = term.exact if self.exact and error is not None else term.law
         slip = solved.slip_under(asked)
         if error is not None:
-            added = points.of_field(error.nodes) + points.of_bubbles(error.bubbles)
+            added = (points.of_field(error.nodes) + points.of_bubbles(error.bubbles)) / solved.stretch
             slip = stopped(asked, slip, slip + np.where(solved.sticks, 0.0, added))
         k, of_law = slip.shape[2], nodal / solved.multiplier
         traction = nearest(asked, term.length, slip.reshape(-1, k), of_law.reshape(-1, k), self.thresholds.near)
@@ -192,13 +196,15 @@ class LawTraces:
         if id(law) not in self._solved:
             points = self.part(state.surface, law.term.directions)
             on_kink = points.from_node_to_node(law.on_convex_kink()[:, None].astype(float))
+            stretch = points.from_node_to_node(law.term.stretch[:, None])
             solved = _Solved(
                 points=points,
                 multiplier=points.interpolated(law.term.multiplier[:, None]),
+                stretch=stretch,
                 nodal=points.interpolated(law.carried),
                 sticks=np.asarray(on_kink > 1 - self.thresholds.near),
-                nodewise=points.of_field_from_node_to_node(self.u),
-                slip=points.of_field(self.u),
+                nodewise=points.of_field_from_node_to_node(self.u) / stretch,
+                slip=points.of_field(self.u) / stretch,
             )
             self._solved[id(law)] = law, solved
         return self._solved[id(law)][1]

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -18,8 +17,6 @@ from ...units import Unit, quantity, unit_for
 from ..registry import picture
 from ..style import BLUE, GREEN, GREY, HEADING, INK, ORANGE, VERMILION, area, figure, heading
 
-if TYPE_CHECKING:
-    from ....laws import Superpotential
 
 PANEL, GAP, FOOT = 1.75, 0.62, 0.72
 """Inches: a panel, the room for its title, the axis below the last."""
@@ -72,9 +69,8 @@ def _panels(result: Result, part: ContactPart, length: Unit) -> Iterator[Callabl
     """From the top: slip and friction, what a normal law acts on, the pressure."""
 
     def displacement(values: Array, words: str, direction: str) -> Callable[[Axes], None]:
-        return partial(
-            _displacement, part=part, values=values, law=result.law(part.name, direction), words=words, length=length
-        )
+        drops = _drops(result, part, direction)
+        return partial(_displacement, part=part, values=values, drops=drops, words=words, length=length)
 
     yield displacement(part.slip, "slip $u_t$", "slip")
     if result.resists(part.name, "slip", "separation"):
@@ -86,15 +82,23 @@ def _panels(result: Result, part: ContactPart, length: Unit) -> Iterator[Callabl
     yield partial(_pressure, part=part, length=length)
 
 
-def _displacement(
-    axes: Axes, part: ContactPart, values: Array, law: Superpotential | None, words: str, length: Unit
-) -> None:
+def _drops(result: Result, part: ContactPart, direction: str) -> Array:
+    """Where the law of a part drops at each vertex, m, (m, j)."""
+    law, multipliers = result.law(part.name, direction), result.multipliers(part, direction)
+    if law is None or multipliers is None:
+        return np.empty((len(part["s"]), 0))
+    return multipliers[1][:, None] * law.concave.kinks
+
+
+def _displacement(axes: Axes, part: ContactPart, values: Array, drops: Array, words: str, length: Unit) -> None:
     """What a law acts on, and the values at which the law drops."""
     values = _without_noise(values, part)
     unit = unit_for(_largest(values), "m")
     _line(axes, part, values, length, unit, BLUE)
-    kinks = law.concave.kinks if law is not None else np.empty(0)
-    shown, beyond = _within(kinks, values)
+    if np.any(np.ptp(drops, axis=0) > 0.0):
+        _title(axes, f"{words} in {unit.name}", _changing_drops(axes, part, values, drops, length, unit))
+        return
+    shown, beyond = _within(drops[0], values)
     for kink in shown:
         axes.axhline(kink / unit.size, color=INK, ls=(0, (4, 3)), lw=1.4)
     note = ""
@@ -103,6 +107,18 @@ def _displacement(
     elif len(beyond):
         note = f"the law drops at {_listed(beyond)}, not reached"
     _title(axes, f"{words} in {unit.name}", note)
+
+
+def _changing_drops(
+    axes: Axes, part: ContactPart, values: Array, drops: Array, length: Unit, unit: Unit
+) -> str:
+    """Draw where the law drops, which changes from vertex to vertex; says what the lines mean."""
+    low, high = min(float(np.nanmin(values)), 0.0), max(float(np.nanmax(values)), 0.0)
+    shown = [d for d in drops.T if np.any((d <= IN_RANGE * high) & (d >= IN_RANGE * low))]
+    for drop in shown:
+        inside = np.where((drop <= IN_RANGE * high) & (drop >= IN_RANGE * low), drop, np.nan)
+        axes.plot(part["s"] / length.size, inside / unit.size, color=INK, ls=(0, (4, 3)), lw=1.4)
+    return "dashed: the law drops there" if shown else "the law drops beyond, not reached"
 
 
 def _within(kinks: Array, values: Array) -> tuple[Array, Array]:
@@ -124,8 +140,9 @@ def _friction(axes: Axes, *, part: ContactPart, result: Result, length: Unit) ->
     values = part.friction
     unit = unit_for(_largest(values), "Pa")
     law, note = result.law(part.name) if result.summary.get("smoothing") else None, ""
-    if law is not None and (multiplier := result.multiplier(part)) is not None:
-        low, high = (multiplier * end for end in law.interval(part.slip.astype(np.float64)))
+    if law is not None and (multipliers := result.multipliers(part)) is not None:
+        multiplier, stretch = multipliers
+        low, high = (multiplier * end for end in law.interval(part.slip.astype(np.float64) / stretch))
         note = "dashed: the law itself, unsmoothed"
         for bound in (low, high) if np.any(high > low) else (low,):
             axes.plot(part["s"] / length.size, bound / unit.size, color=INK, ls=(0, (4, 3)), lw=1.4, zorder=4)

@@ -191,16 +191,19 @@ def _frame(axes: Axes, flat: FlatPart, *, last: bool) -> None:
 
 def _notes(fig: Figure, result: Result, part: ContactPart, flat: FlatPart) -> None:
     """Where the law drops, as a line on the map of the slip, and what grey means; both said there."""
-    law, said = result.law(part.name), []
+    law, multipliers, said = result.law(part.name), result.multipliers(part), []
+    stretch = np.ones(len(part.slip)) if multipliers is None else multipliers[1]
+    slip, constant = part.slip / stretch, np.ptp(stretch) == 0.0
     axes = fig.axes[-2]  # the map on top, which was drawn last, before its bar
     kinks = law.concave.kinks if law is not None else np.empty(0)
     for kink in kinks[kinks > 0.0]:
-        if np.nanmin(part.slip) < kink < np.nanmax(part.slip):
+        at = f"at {quantity(float(kink * stretch[0]), 'm')}" if constant else "at lengths that change"
+        if np.nanmin(slip) < kink < np.nanmax(slip):
             triangles = Triangulation(flat.points[:, 0], flat.points[:, 1], flat.triangles)
-            axes.tricontour(triangles, part.slip, [kink], colors=INK, linestyles="--")
-            said.append(f"dashed: the law drops at {quantity(float(kink), 'm')}")
+            axes.tricontour(triangles, slip, [kink], colors=INK, linestyles="--")
+            said.append(f"dashed: the law drops {at}")
         else:
-            said.append(f"the law drops at {quantity(float(kink), 'm')}, not reached")
+            said.append(f"the law drops {at}, not reached")
     if part.idle.any():
         said.append(f"grey: lifted, up to {quantity(part.largest_gap, 'm')}")
     _say(fig, axes, said[-2:])
