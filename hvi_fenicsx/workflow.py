@@ -98,7 +98,7 @@ def finish_with_levels(
     prepared = replace(prepared, system=solved.system)
     result, examination, warnings = _examined(prepared, solved.result, solved.levels, control)
     errors = None
-    if estimating and examination.certificate.passed and prepared.problem.has_potential and balance is None:
+    if estimating and examination.certificate.passed and prepared.problem.has_potential:
         with prepared.timer("estimate"):
             errors = estimate(prepared.system, solved.levels, result.u, examination)
         warnings += plausibility.of_estimate(errors)
@@ -232,7 +232,7 @@ def _solved(
     try:
         if obstacle_force.pressed(prepared.problem) is not None:
             solve = obstacle_force.ObstacleForceSolve(model, system, solvability, options, control)
-            found, balance = solve.solve(start if isinstance(start, fem.Function) else None)
+            found, balance = solve.solve(start)
         elif isinstance(start, CoarseStart):
             found = nested_iteration.solve_from_coarser(system, start, solvability, options, control)
         elif start is not None:

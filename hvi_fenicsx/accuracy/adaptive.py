@@ -23,7 +23,6 @@ from ..runtime.mpi import agree, total
 from ..runtime.timing import Timer
 from ..scene import Scene
 from ..solution import Solution
-from ..solvers import obstacle_force
 from ..solvers.coarse_start import CoarseStart
 from ..solvers.context import Progress, RunControl, never
 from ..solvers.nested_iteration import refined_levels
@@ -126,7 +125,6 @@ class AdaptiveSolver:
         return self._begun(prepared)
 
     def _begun(self, prepared: Preparation) -> AdaptiveLevel:
-        obstacle_force.refuse(prepared.problem, "no error is estimated")
         solution, levels = finish_with_levels(prepared, self.progress, self.interrupted)
         return AdaptiveLevel(prepared=prepared, solution=solution, levels=levels, step=None)
 
@@ -183,7 +181,14 @@ class AdaptiveSolver:
         found, start = level.solution.solve_result, None
         if found is not None:
             found = found if ahead is None else replace(found, u=ahead)
-            start = CoarseStart(system=level.prepared.system, result=found, prolongation=step, levels=levels)
+            balance = level.solution.balance
+            start = CoarseStart(
+                system=level.prepared.system,
+                result=found,
+                prolongation=step,
+                levels=levels,
+                way=None if balance is None else balance.way * level.prepared.problem.scales.displacement,
+            )
         solution, used = finish_with_levels(prepared, self.progress, self.interrupted, start)
         return AdaptiveLevel(prepared=prepared, solution=solution, levels=used, step=step)
 

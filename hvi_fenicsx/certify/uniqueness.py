@@ -8,6 +8,11 @@ order in each direction (a pressed contact, a kink that is not used up), or a la
 
 Where laws drop, the state itself may tell: no displacement has a lower energy if the stiffness outweighs by how much
 the laws' energies are below their tangents there (:mod:`.supporting_parabolas`).
+
+Where a force F presses an obstacle, E - F way takes the place of the energy E of the body, and contact bounds u·n by the
+way: what is convex stays so, and E(v) >= E(u) + E'(u)(v - u) gives E(v) - F way_v >= E(u) - F way_u, as contact bears F.
+So the lowest state is that at all positions of the obstacle. The only one is, too, where the body has no rigid motions:
+contact that bears F tells the obstacle's position. With rigid motions it is told for the position that was found.
 """
 
 from __future__ import annotations
@@ -65,19 +70,23 @@ def uniqueness(
     """
     modes = existence.motions(system.problem, contact_closed=False)
     motions = [system.unknowns(field).array_r.copy() for field in free_motions.fields(system.problem, modes)]
-    doubt = _doubt(system, modes, motions, thresholds)
+    doubt, pressed = _doubt(system, modes, motions, thresholds), any(b.force is not None for b in system.bounds)
+    everywhere = "; at every position of the obstacle" if pressed else ""
     if doubt is not None:
         supported = _supported(system, modes, motions, examination, thresholds)
         if supported is not None:
-            return Uniqueness(state="lowest", why=f"{supported} ({doubt}, so there may be other equilibria)")
-        searched = all(term.mixity is None for term in system.terms)
+            why = f"{supported} ({doubt}, so there may be other equilibria){everywhere}"
+            return Uniqueness(state="lowest", why=why)
+        searched = all(term.mixity is None for term in system.terms) and not pressed
         return Uniqueness(state="unknown", why=f"{doubt}; {WAY_OUT}" if searched else doubt)
     falling = any(term.law.steepest_fall > 0.0 for term in system.terms)
     proof = "the body is stiffer than its laws fall, so the energy is convex" if falling else "the energy is convex"
     left = _left(system, modes, motions, u, examination, thresholds)
     if not left:
-        return Uniqueness(state="unique", why=f"{proof}, and no rigid motion leaves it as it is")
-    return Uniqueness(state="lowest", why=f"{proof}; others of the same energy may differ by: {left}")
+        here = "; with the obstacle where it is" if pressed and modes else everywhere
+        return Uniqueness(state="unique", why=f"{proof}, and no rigid motion leaves it as it is{here}")
+    together = ", or by motions together with the obstacle" if pressed else ""
+    return Uniqueness(state="lowest", why=f"{proof}; others of the same energy may differ by: {left}{together}")
 
 
 def _doubt(

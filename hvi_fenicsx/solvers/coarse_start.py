@@ -23,12 +23,14 @@ class CoarseStart:
         result: what was found there.
         prolongation: from the coarser system's unknowns to the finer one's.
         levels: the coarser levels of the finer system.
+        way: by which a force has moved an obstacle, m; None: no force presses one.
     """
 
     system: System
     result: SolveResult
     prolongation: PETSc.Mat
     levels: Levels
+    way: float | None = None
 
 
 def prolonged(start: CoarseStart, system: System) -> PETSc.Vec:

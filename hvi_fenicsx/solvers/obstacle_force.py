@@ -21,6 +21,7 @@ from ..runtime.log import logger
 from ..system.system import System
 from ..typing import Array
 from . import coarse_start, nested_iteration, registry
+from .coarse_start import CoarseStart
 from .context import RunControl, SolveContext
 from .nested_iteration import LevelSolution
 from .options import SolverOptions
@@ -133,14 +134,14 @@ class ObstacleForceSolve:
         self._solvability, self._options, self._control = solvability, options, control
         self._counts = Counts()
 
-    def solve(self, start: fem.Function | None = None) -> tuple[LevelSolution, ObstacleBalance]:
+    def solve(self, start: CoarseStart | fem.Function | None = None) -> tuple[LevelSolution, ObstacleBalance]:
         """The solution and where the obstacle is. Collective.
 
         Args:
-            start: a displacement on the same mesh to begin at, m.
+            start: a solution on a coarser mesh; or a displacement on the same mesh to begin at, m.
         """
         ways = _Ways(self._first_touch(), self._force.force, self._farthest)
-        found = self._anew(ways.first, start)
+        found = self._refined(start) if isinstance(start, CoarseStart) else self._anew(ways.first, start)
         balance = self._balance(found)
         for _ in range(_MOST):
             if balance.passed or not found.result.converged:
@@ -162,6 +163,14 @@ class ObstacleForceSolve:
         ways = [b.upper[b.force.rate < 0] / -b.force.rate[b.force.rate < 0] for b in self._system.bounds if b.force]
         least = min((float(np.min(way, initial=np.inf)) for way in ways), default=np.inf)
         return float(self._system.comm.allreduce(least, op=MPI.MIN))
+
+    def _refined(self, start: CoarseStart) -> LevelSolution:
+        """From a solution on a coarser mesh, the obstacle where it was there. Collective."""
+        assert start.way is not None
+        system = self._system.with_obstacle_at(start.way / self._system.problem.scales.displacement)
+        found = nested_iteration.solve_from_coarser(system, start, self._solvability, self._options, self._control)
+        self._counts.add(found.result.counts)
+        return found
 
     def _anew(self, way: float, start: fem.Function | None) -> LevelSolution:
         """From the coarse meshes, or from a displacement. Collective."""

@@ -6,11 +6,16 @@ from typing import Any
 
 import numpy as np
 import pytest
+from mpi4py import MPI
 from runs import ROOT
 from scenes import Table
 
 import hvi_fenicsx as hvi
+from hvi_fenicsx.accuracy import control
+from hvi_fenicsx.accuracy.adaptive import AdaptiveSolver
+from hvi_fenicsx.accuracy.goal import Goal
 from hvi_fenicsx.errors import ExitCode, SolverError
+from hvi_fenicsx.runtime.timing import Timer
 from hvi_fenicsx.solvers import obstacle_force
 
 E, AREA, HEIGHT, GAP = 1e9, 0.12, 0.5, 2e-4
@@ -42,7 +47,9 @@ def test_a_plate_under_a_force_goes_down_by_the_gap_and_the_compression_of_the_c
     np.testing.assert_allclose(found.obstacle.displacement, [0.0, 0.0, -GAP - 3e4 * HEIGHT / (E * AREA)], rtol=1e-9)
     np.testing.assert_allclose(found.resultant("lid"), PLATE["force"], rtol=1e-8, atol=1e-4)
     np.testing.assert_allclose(found.contact["lid"].pressure, 3e4 / AREA, rtol=1e-7)
-    assert found.estimate is None
+    assert found.uniqueness is not None
+    assert found.uniqueness.state == "unique"
+    assert "at every position of the obstacle" in found.uniqueness.why
 
 
 def test_a_rigid_block_between_a_plate_and_springs_goes_down_by_force_over_stiffness() -> None:
@@ -99,6 +106,47 @@ def test_the_solution_is_that_with_the_obstacle_held_where_the_force_moved_it(de
     assert again.energy == pytest.approx(found.energy, rel=1e-9)
     top = again.contact["top"]
     assert np.sum(top.pressure * top.weight) == pytest.approx(5e5, rel=1e-6)
+
+
+def roller(cells: int, moved: dict[str, list[float]]) -> Table:
+    """A roller on a block of twice as many cells along x."""
+    shape = {"shape": "sphere", "center": [0.5, 4.5002], "radius": 4.0, "direction": [0.0, 1.0]}
+    return {
+        "domain": {"shape": "rectangle", "size": [1.0, 0.5], "cells": [2 * cells, cells]},
+        "material": {"model": "plane_strain", "youngs_modulus": E, "poisson_ratio": 0.3},
+        "boundary": {
+            "base": {"on": "bottom", "displacement": [0.0, 0.0]},
+            "top": {"on": "top", "where": "x > 0.2 and x < 0.8", "contact": {"obstacle": shape | moved}},
+        },
+    }
+
+
+def test_the_error_under_a_force_is_that_of_the_body_under_the_obstacle_where_it_is() -> None:
+    """Energies over those of a fine mesh are squares of errors: to leading order the same with the obstacle held."""
+    force = {"force": [0.0, -5e5]}
+    coarse, fine = (solved(roller(n, force), estimate=n == 10) for n in (10, 40))
+    assert coarse.obstacle is not None
+    assert fine.obstacle is not None
+    below = coarse.energy - fine.energy
+    below -= 5e5 * (fine.obstacle.displacement[1] - coarse.obstacle.displacement[1])
+    held = {"displacement": coarse.obstacle.displacement.tolist()}
+    same, other = (solved(roller(n, held), estimate=n == 10) for n in (10, 40))
+    assert np.sqrt(below) == pytest.approx(np.sqrt(same.energy - other.energy), rel=0.08)
+    assert coarse.estimate is not None
+    assert same.estimate is not None
+    assert coarse.estimate.relative == pytest.approx(same.estimate.relative, rel=1e-6)
+
+
+@pytest.mark.parametrize("degree", [1, 2])
+def test_the_mesh_is_refined_under_a_force(degree: int) -> None:
+    scene = hvi.Scene.model_validate(roller(5, {"force": [0.0, -5e5]}) | {"solver": {"degree": degree}})
+    found = control.solve_to_goal(scene, MPI.COMM_WORLD, Goal(0.3), AdaptiveSolver(timer=Timer()), lambda _: None)
+    assert found.why is None
+    assert len(found.steps) > 1
+    assert found.solution.obstacle is not None
+    assert found.solution.obstacle.passed
+    assert found.solution.estimate is not None
+    assert found.solution.estimate.relative <= 0.3
 
 
 GLIDES = {side: {"on": side, "displacement": way} for side, way in _HELD.items()}
