@@ -157,7 +157,9 @@ def _energy(problem: Problem, u: fem.Function, forces: Forces, states: Sequence[
     values = problem.relative(u.x.array)[: forces.load.size]
     elastic = 0.5 * float(values @ (forces.reaction - forces.load).ravel())
     laws = sum(
-        float(np.sum(law.term.energy_weights * law.term.law.value(law.argument))) for state in states for law in state.laws
+        float(np.sum(law.term.energy_weights * law.term.law.value(law.argument)))
+        for state in states
+        for law in state.laws
     )
     return total(problem.domain.mesh.comm, elastic + laws)
 

@@ -179,10 +179,10 @@ def _weak_laws(problem: Problem, forces: Mapping[str, PETSc.Vec], thresholds: Pl
 def _holds(problem: Problem, forces: Mapping[str, PETSc.Vec], term: LawTerm, rounding: float) -> bool:
     """Whether a rigid motion that the supports leave works against the law. Collective."""
     comm, surface, work = problem.domain.mesh.comm, term.surface, 0.0
-    for rigid in existence.rigid_problems(problem, forces):
-        basis = kernel(comm, rigid.body, rigid.fixed)
-        mine = existence.inside(problem, rigid.body, surface.blocks)
-        fields = problem.motions_at(surface.blocks[mine], rigid.body)
+    for body, rigid in zip(problem.bodies, existence.rigid_problems(problem, forces), strict=True):
+        basis = kernel(comm, body, rigid.fixed)
+        mine = existence.inside(problem, body, surface.blocks)
+        fields = problem.motions_at(surface.blocks[mine], body)
         along = np.einsum("mkd,mnd,nj->mkj", term.directions[mine], fields, basis)
         work = max(work, float(np.max(np.abs(along), initial=0.0)))
     return largest(comm, work) > rounding
@@ -258,15 +258,16 @@ def _slip_and_kink(problem: Problem, law: LawState, thresholds: PlausibilityThre
     beyond = total(comm, float(weights[reached > far * kink].sum())) / total(comm, float(weights.sum()))
     metres = problem.scales.displacement * largest(comm, float(np.max(term.stretch, initial=0.0)))
     what = "slip" if term.direction is Direction.SLIP else term.direction.value
+    sizes = f"{most * metres:.3g} m, the law's first kink {kink * metres:.3g} m"
     if thresholds.rounding < most < kink / far:
         yield (
-            f"{_place(problem, term)}: the largest {what} is {most * metres:.3g} m, the law's first kink {kink * metres:.3g} "
-            "m: the law is on its first piece everywhere; are the law's displacements in m?"
+            f"{_place(problem, term)}: the largest {what} is {sizes}: "
+            "the law is on its first piece everywhere; are the law's displacements in m?"
         )
     elif beyond > thresholds.nearly_all:
         yield (
-            f"{_place(problem, term)}: the {what} is up to {most * metres:.3g} m, the law's first kink {kink * metres:.3g} "
-            "m: the law is far beyond it nearly everywhere; are the law's displacements in m?"
+            f"{_place(problem, term)}: the {what} is up to {sizes}: "
+            "the law is far beyond it nearly everywhere; are the law's displacements in m?"
         )
 
 

@@ -19,7 +19,7 @@ from .thresholds import UniquenessThresholds
 
 
 def needed_falls(state: LawState, thresholds: UniquenessThresholds) -> Array | None:
-    """The least c of displacements at each vertex, infinite where there is none, (m,); None: the traction is no polyline.
+    """The least c at each vertex, infinite where there is none, (m,); None where the traction is no polyline.
 
     Args:
         state: of a law at a certified displacement.

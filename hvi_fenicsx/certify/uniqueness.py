@@ -9,10 +9,10 @@ order in each direction (a pressed contact, a kink that is not used up), or a la
 Where laws drop, the state itself may tell: no displacement has a lower energy if the stiffness outweighs by how much
 the laws' energies are below their tangents there (:mod:`.supporting_parabolas`).
 
-Where a force F presses an obstacle, E - F way takes the place of the energy E of the body, and contact bounds u·n by the
-way: what is convex stays so, and E(v) >= E(u) + E'(u)(v - u) gives E(v) - F way_v >= E(u) - F way_u, as contact bears F.
-So the lowest state is that at all positions of the obstacle. The only one is, too, where the body has no rigid motions:
-contact that bears F tells the obstacle's position. With rigid motions it is told for the position that was found.
+Where a force F presses an obstacle, E - F way takes the place of the energy E of the body, and contact bounds u·n by
+the way: what is convex stays so, and E(v) >= E(u) + E'(u)(v - u) gives E(v) - F way_v >= E(u) - F way_u, as contact
+bears F. So the lowest state is that at all positions of the obstacle. The only one is, too, where the body has no rigid
+motions: contact that bears F tells the obstacle's position. With rigid motions it is told for the position found.
 """
 
 from __future__ import annotations
@@ -104,7 +104,7 @@ def _doubt(
             f"a law falls, and it was not tried whether the body is stiffer: more than {thresholds.most_on_boundary} "
             f"unknowns on Γc, or {thresholds.most_unknowns:,} in all"
         )
-    each = [fall / term.stretch for term, fall in zip(system.terms, falls, strict=True)]
+    each = [np.asarray(fall / term.stretch, dtype=np.float64) for term, fall in zip(system.terms, falls, strict=True)]
     if (moved := _moved(system, modes, motions, each, thresholds)) is not None:
         return f"a law falls, and only laws and contact hold the motion {moved}"
     return None if _stiffer(system, modes, each, thresholds) else "a law falls more steeply than the body is stiff"

@@ -1,7 +1,8 @@
 """Laws whose parameters are formulas: one law of numbers, and by what its tractions and lengths are multiplied.
 
-A law j of numbers gives the laws c m j(· / c) of all places, with m for the tractions and c for the lengths. A parameter
-whose unit is lengthᵃ tractionᵇ then is cᵃ mᵇ times its number. Two parameters tell c and m; all others must agree.
+A law j of numbers gives the laws c m j(· / c) of all places, with m for the tractions and c for the lengths. A
+parameter whose unit is lengthᵃ tractionᵇ then is cᵃ mᵇ times its number. Two of them tell c and m; all others must
+agree.
 """
 
 from __future__ import annotations
@@ -49,7 +50,7 @@ class Parameter:
 
     def ratio(self, points: Array) -> Array:
         """What its number is multiplied by at points (n, 3), m; (n,)."""
-        return self.given.at(points) / self.number
+        return np.asarray(self.given.at(points) / self.number, dtype=np.float64)
 
     def differs(self, points: Array, multiplier: Array, length_multiplier: Array) -> Mask:
         """Where it is not the parameter of the law with multiplied tractions and lengths, (n,).
@@ -173,8 +174,8 @@ def _multiplied(law: laws.Superpotential, formulas: Mapping[Place, Formula]) -> 
     first, second = _telling(found)
     if missing or first is None:
         raise InputError(
-            f"law {law.name!r}: {missing[0] if missing else found[0].key}: no formula can stand here, as it is not known "
-            "how this number grows with lengths and tractions; state numbers, and by what they are multiplied: "
+            f"law {law.name!r}: {missing[0] if missing else found[0].key}: no formula can stand here, as it is not "
+            "known how this number grows with lengths and tractions; state numbers, and by what they are multiplied: "
             'multiplier = "1 + x" for the tractions, length_multiplier = "1 + x" for the lengths'
         )
     powers = np.array([[p.length, p.traction] for p in (first, second) if p is not None], dtype=float)
@@ -209,7 +210,7 @@ def _parameters(law: laws.Superpotential, formulas: Mapping[Place, Formula]) -> 
 
 
 def _telling(found: Sequence[Parameter]) -> tuple[Parameter | None, Parameter | None]:
-    """Two parameters that tell both multipliers, plain lengths and tractions before others; one where there are no two."""
+    """Two parameters that tell both multipliers, lengths and tractions before others; one where there are no two."""
     plain = sorted(found, key=lambda p: abs(p.length) + abs(p.traction))
     for one, other in itertools.combinations(plain, 2):
         if one.length * other.traction != other.length * one.traction:

@@ -20,7 +20,7 @@ from ..typing import Array, Mask
 from .contact_surface import Surface
 
 _ROUNDING = 4.0 * float(np.finfo(np.float64).eps)
-"""Of a displacement over a stretch, relative."""
+"""Relative, what dividing a displacement by a stretch may add."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -89,7 +89,7 @@ class LawTerm:
 
     @property
     def multiplier(self) -> Array:
-        """What the tractions of j are multiplied by: by the scene, and by the energy of separation at its mode mixity, (m,)."""
+        """What the tractions of j are multiplied by: by the scene, and by the energy at its mode mixity, (m,)."""
         return self.placed * self.energies
 
     @property
@@ -107,7 +107,7 @@ class LawTerm:
         return np.einsum("mkd,md->mk", self.directions, self.surface.values(u))
 
     def argument(self, u: Array) -> Array:
-        """What the law's j acts on: the signed component, or the length of the vector, over the stretch; shape (m,)."""
+        """What the law's j acts on: the signed component, or the length of the vector, over the stretch, (m,)."""
         return self.argument_of(self.slip(u))
 
     def argument_of(self, components: Array) -> Array:
@@ -120,14 +120,14 @@ class LawTerm:
         return size if np.all(self.stretch == 1.0) else self._off_rounding(size / self.stretch)
 
     def _off_rounding(self, argument: Array) -> Array:
-        """Arguments (m,), those that miss a convex kink by rounding put on it: a bound may hold the displacement there."""
+        """Arguments (m,), on a convex kink where only rounding keeps them off: a bound may hold them there."""
         for kink in self.law.convex.kinks:
             argument = np.where(np.abs(argument - kink) <= _ROUNDING * np.abs(kink), kink, argument)
         return argument
 
-    def reach(self, near: Array) -> Array:
-        """Distances of displacements, (m,), as distances of what j acts on, (m,)."""
-        return near / self.stretch
+    def reach(self, near: float | Array) -> Array:
+        """Distances of displacements, one for all or (m,), as distances of what j acts on, (m,)."""
+        return np.asarray(near / self.stretch, dtype=np.float64)
 
     def gradient(self, components: Array) -> Array:
         """The derivative of the argument times stretch by the components (m, k); zero where a length is zero."""

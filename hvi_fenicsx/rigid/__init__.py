@@ -4,7 +4,18 @@ from ..laws.convex_parts import Directional
 from .analyse import analyse, gives_way, load_factors
 from .kernel import FixedDirections, kernel, modes, null_space
 from .least_energy import Rest, Sides, least_energy
-from .motions import AnyBody, JoinedBodies, Mode, MotionFields, Movable, RigidBody, describe, fields_at, motion_at, rigid_fields
+from .motions import (
+    AnyBody,
+    JoinedBodies,
+    Mode,
+    MotionFields,
+    Movable,
+    RigidBody,
+    describe,
+    fields_at,
+    motion_at,
+    rigid_fields,
+)
 from .pressed import pressed, without_obstacles
 from .reduction import ContactCone, Resistance, RigidProblem
 from .solvability import ExistenceState, LoadFactors, PaperConditions, Solvability, combine, combine_factors, undecided

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..typing import Array
 from .kernel import FixedDirections
-from .motions import NEGLIGIBLE, Mode, Movable, MotionFields, fields_at
+from .motions import NEGLIGIBLE, Mode, MotionFields, Movable, fields_at
 from .reduction import ContactCone, Resistance, RigidProblem
 
 
@@ -121,5 +121,7 @@ def _inserted(body: PressedBody, work: Array, more: Array) -> Array:
     return np.insert(work, body.body.shifts, more)
 
 
-def _widened(body: PressedBody, part: FixedDirections | ContactCone | Resistance, ways: Array | None = None) -> MotionFields:
+def _widened(
+    body: PressedBody, part: FixedDirections | ContactCone | Resistance, ways: Array | None = None
+) -> MotionFields:
     return body.widened(fields_at(part.points, body.body), ways)

@@ -20,8 +20,8 @@ from ..rigid import (
     FixedDirections,
     LoadFactors,
     Mode,
-    Movable,
     MotionFields,
+    Movable,
     Resistance,
     RigidProblem,
     Solvability,
@@ -97,7 +97,7 @@ def rigid_problems(problem: Problem, forces: Mapping[str, PETSc.Vec]) -> tuple[R
 
 
 def _with_obstacles(problem: Problem, forces: Mapping[str, PETSc.Vec]) -> tuple[RigidProblem, ...] | None:
-    """The data with the motions of obstacles that forces press; None without one, or if one touches two bodies. Collective."""
+    """The data with obstacles that forces press; None without one, or if one touches two bodies. Collective."""
     whole = rigid_problems(problem, forces)
     if all(b.force is None for b in problem.bounds):
         return None
@@ -123,7 +123,7 @@ def _meets(problem: Problem, body: Movable, bounds: Bounds) -> bool:
 
 def _ways(problem: Problem, body: Movable, names: Sequence[str]) -> list[Array]:
     """What obstacles do at the vertices of each contact cone of a body, (m, obstacles, d)."""
-    found = []
+    found: list[Array] = []
     for bounds in (b for b in problem.bounds if not _bilateral(b)):
         mine = inside(problem, body, bounds.surface.blocks)
         normals = bounds.surface.normals[mine]

@@ -26,7 +26,9 @@ def both(table: Table, laws: dict[str, Table]) -> tuple[Table, Table]:
     parts = dict(table["boundary"])
     floor = {key: value for key, value in parts.pop("floor").items() if key not in laws}
     middle = {"middle": floor | {"where": "abs(x - 0.5) < 0.25"}}
-    sides = floor | {"where": "abs(x - 0.5) > 0.25"} | {key: law | {"length_multiplier": STEP} for key, law in laws.items()}
+    sides = (
+        floor | {"where": "abs(x - 0.5) > 0.25"} | {key: law | {"length_multiplier": STEP} for key, law in laws.items()}
+    )
     left = floor | {"where": "x < 0.25"} | {key: longer(law, 2.5) for key, law in laws.items()}
     right = floor | {"where": "x > 0.75"} | laws
     return {**table, "boundary": parts | middle | {"sides": sides}}, {
@@ -75,11 +77,10 @@ def test_paths_and_all_equilibria_follow_the_lengths() -> None:
     assert one.complete
     assert len(one.solutions) == len(two.solutions) > 1
     assert [s.energy for s in one.solutions] == pytest.approx([s.energy for s in two.solutions], rel=1e-9)
-    for way in ("exact", "stable"):
-        paths = [hvi.follow(scene, follow=way) for scene in (formula, pieces)]
-        rows = [[(row.factor, row.energy) for row in path.rows] for path in paths]
-        np.testing.assert_allclose(rows[0], rows[1], rtol=1e-8)
-        assert all(row.certified for row in paths[0].rows)
+    paths = [hvi.follow(scene, follow="exact") for scene in (formula, pieces)]
+    rows = [[(row.factor, row.energy) for row in path.rows] for path in paths]
+    np.testing.assert_allclose(rows[0], rows[1], rtol=1e-8)
+    assert all(row.certified for row in paths[0].rows)
 
 
 SPACE = {
@@ -129,7 +130,7 @@ def test_a_constant_factor_is_another_length(kind: str) -> None:
 
 
 def test_a_rigid_block_is_torn_off_one_length_after_the_other() -> None:
-    """Bonds of length l(x) that a rigid block stretches by d carry the sum of w t(d / l(x)), w being the vertices' areas."""
+    """Bonds of length l(x) that a rigid block stretches by d carry the sum of w t(d / l(x)), w being areas."""
     law = {"law": "graph", "points": [[0, 0], ["1e-6*(1 + 3*x)", 2e5], ["4e-6*(1 + 3*x)", 0]]}
     table = block(8, 0.0, 0.0, law)
     table["material"] = STEEL | {"youngs_modulus": 2e17}
@@ -217,7 +218,7 @@ def test_a_law_that_does_not_know_its_units_takes_multipliers_alone() -> None:
             return [1e-6]
 
     law = {"law": "ramp_for_formulas", "height": "1e5*(1 + x)"}
-    with pytest.raises(ValueError, match="height: no formula can stand here.*length_multiplier"):
+    with pytest.raises(ValueError, match=r"height: no formula can stand here.*length_multiplier"):
         hvi.Scene.model_validate(model(4, friction=law))
     wanted = solved(model(4, friction={"law": "graph", "points": [[0, 0], ["1e-6*(1 + x)", 1e5]]}))
     found = solved(model(4, friction=law | {"height": 1e5, "length_multiplier": "1 + x"}))

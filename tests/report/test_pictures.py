@@ -132,7 +132,11 @@ def write_words(folder: Path, d: int, solvability: Mapping[str, object] = HELD, 
         role("wall", "displacement", drive="kinematic", prescribed=[0]),
         role("pull", "traction", drive="load", traction=loaded["traction"]),
         role("floor", "contact", drive="kinematic", bounded=True),
-        role("floor", "friction", laws=[{"direction": "slip", "law": LAW, "multiplier": "1 + 0*x", "length_multiplier": 1.0}]),
+        role(
+            "floor",
+            "friction",
+            laws=[{"direction": "slip", "law": LAW, "multiplier": "1 + 0*x", "length_multiplier": 1.0}],
+        ),
     ]
     summary = {"effects": effects} | summary
     record = {"dofs": 578, "smoothing": None, "solvability": solvability, "certificate": {"passed": True}} | summary

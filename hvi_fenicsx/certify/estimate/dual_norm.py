@@ -107,7 +107,7 @@ def _held(system: System, x: PETSc.Vec, near: float) -> Entities:
         dofs, sign = bounds.component()
         found.append(dofs[touches(bounds, sign * u[dofs], near)])
     for term in system.terms:
-        stuck = on_kink(term.law.convex, term.argument(u), near / term.stretch)[:, None] & term.counts(u, near)
+        stuck = on_kink(term.law.convex, term.argument(u), term.reach(near))[:, None] & term.counts(u, near)
         found.extend(dofs[stuck[:, i]] for i, (dofs, _) in enumerate(components(term)))
     return np.setdiff1d(np.unique(np.concatenate(found)), system.problem.fixed).astype(np.int32)
 
@@ -182,8 +182,8 @@ def _law_forces(problem: Problem, states: Sequence[ContactState], near: float, *
         for law in state.laws:
             term = law.term
             asked = term.exact if exact else term.law
-            components = law.components / term.stretch[:, None]
-            away = law.given - nearest(asked, term.length, components, law.given, near / term.stretch)
+            components = np.asarray(law.components / term.stretch[:, None])
+            away = law.given - nearest(asked, term.length, components, law.given, term.reach(near))
             away[law.hidden] = 0.0
             vectors = np.einsum("mk,mkd->md", away * term.weights[:, None], term.directions)
             np.add.at(forces, state.surface.blocks, vectors)

@@ -30,9 +30,7 @@ Trace = PartTrace | InterfaceTrace
 """The facets of a part, or of two bodies that meet, between their nodes."""
 
 
-def nearest(
-    law: Superpotential, length: Length | None, slip: Array, traction: Array, near: float | Array
-) -> Array:
+def nearest(law: Superpotential, length: Length | None, slip: Array, traction: Array, near: float | Array) -> Array:
     """The admissible tractions of a law nearest to given ones, (m, k).
 
     Args:

@@ -17,7 +17,6 @@ from ...units import Unit, quantity, unit_for
 from ..registry import picture
 from ..style import BLUE, GREEN, GREY, HEADING, INK, ORANGE, VERMILION, area, figure, heading
 
-
 PANEL, GAP, FOOT = 1.75, 0.62, 0.72
 """Inches: a panel, the room for its title, the axis below the last."""
 MARKED = 80
@@ -109,9 +108,7 @@ def _displacement(axes: Axes, part: ContactPart, values: Array, drops: Array, wo
     _title(axes, f"{words} in {unit.name}", note)
 
 
-def _changing_drops(
-    axes: Axes, part: ContactPart, values: Array, drops: Array, length: Unit, unit: Unit
-) -> str:
+def _changing_drops(axes: Axes, part: ContactPart, values: Array, drops: Array, length: Unit, unit: Unit) -> str:
     """Draw where the law drops, which changes from vertex to vertex; says what the lines mean."""
     low, high = min(float(np.nanmin(values)), 0.0), max(float(np.nanmax(values)), 0.0)
     shown = [d for d in drops.T if np.any((d <= IN_RANGE * high) & (d >= IN_RANGE * low))]
