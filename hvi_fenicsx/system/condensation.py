@@ -1,8 +1,9 @@
-"""A system condensed to the unknowns of Γc that carry a bound or a law, as a dense problem of arrays.
+"""A system condensed to the unknowns of Γc that carry a bound or a law, as a problem of arrays.
 
 All unknowns of Γc's vertices are kept first (:mod:`.interior`): with them a body is held. Those that carry nothing are
 then eliminated as well, as far as the others hold the body: where a rigid motion leaves all bounds and laws as they
-are, one unknown for each such motion stays.
+are, one unknown for each such motion stays. Where these are many, the stiffness is not formed
+(:mod:`.factorised_stiffness`), and what carries nothing is not kept, as far as the others hold the body.
 """
 
 from __future__ import annotations
@@ -51,7 +52,7 @@ class Condensation:
         self._interior = interior = Interior(system, kept)
         laws = condensed_laws.make(system, interior, self._loading.prescribed)
         found = carriers.find(system, interior, laws, loading.obstacle_shift(system, scaled or ()))
-        if largest_dense is not None and self._is_large(largest_dense):
+        if largest_dense is not None and self._is_large(largest_dense, len(found.carrying)):
             chosen = self._reduce(found.carrying)
             found, laws = found.of(chosen), laws.renumbered(chosen, interior.size)
             elastic = self._unformed()
@@ -59,10 +60,10 @@ class Condensation:
             elastic = self._formed(interior.stiffness(), found.carrying)
         self.problem = self._condensed(elastic, found, laws)
 
-    def _is_large(self, most: int) -> bool:
-        """Whether S has more unknowns, or its products take longer than solves with the factors."""
+    def _is_large(self, most: int, carrying: int) -> bool:
+        """Whether Γc has more unknowns, or products with S of those that carry take longer than solves with factors."""
         entries = 2.0 * self._interior.entries + self._system.thresholds.solve_overhead
-        return self._interior.size > most or self._interior.size**2 > entries
+        return self._interior.size > most or carrying**2 > entries
 
     def _reduce(self, carrying: Integers) -> Integers:
         """Keep those unknowns alone that carry something, where they hold the body; which are kept. Collective."""
