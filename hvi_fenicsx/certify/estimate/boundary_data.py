@@ -92,7 +92,8 @@ class FacetSamples:
             value: on the boundary.
             at: the points in barycentric coordinates, (q, d); by default the sample points.
         """
-        points = np.einsum("qv,fvi->fqi", self.barycentric if at is None else at, self.corners)
+        functions = spaces.simplex_functions(self.facets.degree, self.barycentric if at is None else at)
+        points = np.einsum("qn,fni->fqi", functions, self.nodes)  # on the curve where the facet is curved
         return value.at(points.reshape(-1, 3)).reshape(points.shape[:2])
 
     def beyond_nodes(self, value: SpatialValue, at: Array | None = None) -> Array:
