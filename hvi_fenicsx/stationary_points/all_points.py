@@ -18,10 +18,10 @@ from scipy.optimize import linprog
 from ..typing import Array, Integers
 from . import monotone_radius, stationarity
 from .arcs import on_interval
+from .boxes import Box, fresh_box
 from .convex_programme import Chains, minimise
 from .linear_test import LinearTest
-from .lowest import fresh_box
-from .relaxation import Box, Relaxation, envelopes
+from .relaxation import Relaxation, envelopes
 from .scalar_problem import ScalarProblem
 from .stationarity import Kind
 from .tightening import ForceIntervals

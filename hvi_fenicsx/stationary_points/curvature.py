@@ -15,12 +15,15 @@ import numpy as np
 from scipy.linalg import eigh
 
 from ..typing import Array, Integers, Mask
+from . import motions
 from .scalar_problem import ScalarProblem
 
 REGULAR = 1e-10
 """Eigenvalues of S below this share of the largest one are zero."""
 MOST_ROUNDS = 4
 """How often what some unknowns do not need is given to the others."""
+SPARED = 0.98
+"""Share of the curvature along rigid motions that S - D does not need, which is not lent."""
 
 
 def kernel(stiffness: Array) -> Array:
@@ -41,11 +44,19 @@ class Curvature:
         added: d, which is negative where the law's own slope is given to S, (n + m,).
         radii: half widths (n + m,) of what strong convexity allows for a gap of ½; inf where a rigid motion moves.
         range_radii: the same of displacements without rigid motions.
+        lent: σ along the shapes of rigid motions, (k,).
+        share_radii: half widths of the motions' shares, (k,).
+        follow: how the unknowns move with the shares, (n, k).
+        apart: half widths (n,) of displacements at given shares, like the radii.
     """
 
     added: Array
     radii: Array
     range_radii: Array
+    lent: Array
+    share_radii: Array
+    follow: Array
+    apart: Array
 
 
 class CurvatureShare:
@@ -63,7 +74,22 @@ class CurvatureShare:
     def _kernel(self) -> Array:
         return kernel(self._problem.stiffness)
 
-    def share(self, low: Array, high: Array, undecided: Integers, weights: Array, part: float) -> Curvature:
+    @cached_property
+    def shapes(self) -> Array:
+        """How rigid motions move the unknowns with laws, (n, k)."""
+        return motions.shapes(self._problem, self._kernel)
+
+    def at_rest(self, x: Array) -> Array:
+        """A point without its rigid motions of unknowns with laws, (n,).
+
+        Args:
+            x: the point, (n,).
+        """
+        return np.asarray(x - self._kernel @ np.linalg.pinv(self.shapes.T @ self._kernel) @ (self.shapes.T @ x))
+
+    def share(
+        self, low: Array, high: Array, undecided: Integers, weights: Array, part: float, *, lend: bool = False
+    ) -> Curvature:
         """D on a box.
 
         Args:
@@ -72,20 +98,58 @@ class CurvatureShare:
             undecided: arguments whose law is not convex on the box.
             weights: how much of D each of these is to have, (n + m,).
             part: the share of the largest D of that kind that is taken, below 1.
+            lend: whether curvature is lent along rigid motions.
         """
         problem = self._problem
         slope = problem.arcs.least_slope(low, high)
         drops = problem.arcs.drops(low, high) > 0.0
         own = self._own(low, slope, drops)
-        matrix = problem.stiffness + np.diag(problem.diagonal(own))
-        motions = self._free_motions(problem.diagonal(own))
+        lent: Array = np.full(self.shapes.shape[1], self._scale if lend else 0.0)
+        along = np.diag(problem.diagonal(own)) + (self.shapes * lent) @ self.shapes.T
+        free = self._free_motions(along)
         need = np.where(drops, np.inf, np.maximum(-slope, 0.0))
-        added = np.zeros(len(low))
-        left = undecided[~self._moved(motions)[undecided]]
+        added = self._given(problem.stiffness + along, free, undecided, weights, need, part)
+        matrix = problem.stiffness + along - np.diag(problem.diagonal(added))
+        inverse = self._inverse(matrix, free)
+        if lent.any():
+            lent, matrix = self._needed(lent, matrix, inverse)
+            inverse = self._inverse(matrix, free)
+        follow, apart = self._at_given_shares(matrix, along)
+        radii = self._radii(inverse)
+        shares = np.sqrt(np.einsum("ik,ij,jk->k", self.shapes, inverse, self.shapes))
+        return Curvature(
+            added=added - own,
+            radii=np.where(self._moved(free), np.inf, radii),
+            range_radii=radii,
+            lent=lent,
+            share_radii=np.where(np.any(np.abs(self.shapes.T @ free) > 1e-9, axis=1), np.inf, shares),
+            follow=follow,
+            apart=apart,
+        )
+
+    def _at_given_shares(self, matrix: Array, along: Array) -> tuple[Array, Array]:
+        """How unknowns move with the shares of rigid motions, and what strong convexity allows them besides."""
+        if not self.shapes.size:
+            return self.shapes, np.full(len(matrix), np.inf)
+        rigid = self._scale * self.shapes @ self.shapes.T
+        free = self._free_motions(along + rigid)
+        inverse = self._inverse(matrix + rigid, free)
+        moved = inverse @ self.shapes
+        follow = np.asarray(np.linalg.solve(self.shapes.T @ moved, moved.T).T)
+        squares = np.diag(inverse) - np.einsum("ik,ik->i", follow, moved)
+        apart = np.sqrt(np.maximum(squares, 0.0))
+        return follow, np.asarray(np.where(np.any(np.abs(free) > 1e-9, axis=1), np.inf, apart))
+
+    def _given(
+        self, matrix: Array, free: Array, undecided: Integers, weights: Array, need: Array, part: float
+    ) -> Array:
+        """D, (n + m,): in proportion to the weights, but no more than is needed."""
+        added = np.zeros(len(weights))
+        left = undecided[~self._moved(free)[undecided]]
         for _ in range(MOST_ROUNDS):
             if not left.size:
                 break
-            inverse = self._inverse(matrix - np.diag(problem.diagonal(added)), motions)
+            inverse = self._inverse(matrix - np.diag(self._problem.diagonal(added)), free)
             given = part / self._largest(inverse, left, weights) * np.maximum(weights[left], 1e-12)
             enough = given >= need[left]
             if not enough.any():
@@ -93,8 +157,13 @@ class CurvatureShare:
                 break
             added[left[enough]] = need[left[enough]]
             left = left[~enough]
-        radii = self._radii(self._inverse(matrix - np.diag(problem.diagonal(added)), motions))
-        return Curvature(added=added - own, radii=np.where(self._moved(motions), np.inf, radii), range_radii=radii)
+        return added
+
+    def _needed(self, lent: Array, matrix: Array, inverse: Array) -> tuple[Array, Array]:
+        """What S - D needs of the curvature lent, and S - D with it."""
+        columns = self.shapes * np.sqrt(lent)
+        spared = min(1.0, SPARED / max(float(np.linalg.eigvalsh(columns.T @ inverse @ columns)[-1]), SPARED))
+        return (1.0 - spared) * lent, matrix - spared * columns @ columns.T
 
     def _own(self, low: Array, slope: Array, drops: Mask) -> Array:
         """How much of its curvature each law gives to S, (n + m,); a law of a length must still rise then."""
@@ -136,10 +205,10 @@ class CurvatureShare:
         squares = np.concatenate([np.diag(inverse), np.linalg.eigvalsh(blocks)[:, -1]])
         return np.asarray(np.sqrt(np.maximum(squares, 0.0)))
 
-    def _free_motions(self, own: Array) -> Array:
-        """The kernel of S + diag(own), orthonormal columns."""
-        motions = self._kernel
-        if not motions.shape[1]:
-            return motions
-        values, vectors = np.linalg.eigh(motions.T @ (own[:, None] * motions))
-        return np.asarray(motions @ vectors[:, values <= REGULAR * self._scale])
+    def _free_motions(self, along: Array) -> Array:
+        """The rigid motions that a matrix does not resist, orthonormal columns."""
+        rigid = self._kernel
+        if not rigid.shape[1]:
+            return rigid
+        values, vectors = np.linalg.eigh(rigid.T @ along @ rigid)
+        return np.asarray(rigid @ vectors[:, values <= REGULAR * self._scale])

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..typing import Array
+from .motions import Lent
 from .scalar_problem import ScalarProblem
 
 
@@ -25,12 +26,14 @@ class DualBound:
         low: of the box, finite, (n + m,).
         high: of the box, finite, (n + m,).
         added: d, (n + m,).
+        lent: curvature along rigid motions.
     """
 
     problem: ScalarProblem
     low: Array
     high: Array
     added: Array
+    lent: Lent
 
     def at(self, x: Array, multipliers: Array) -> float:
         """The bound from a point, without the problem's constant.
@@ -39,19 +42,31 @@ class DualBound:
             x: the point, (n,).
             multipliers: of the problem's bounds, positive at lower ones, negative at upper ones, (n,).
         """
-        problem, n = self.problem, self.problem.size
-        pull = problem.stiffness @ x - problem.diagonal(self.added) * x
-        force = problem.force - pull + multipliers
-        along = problem.lengths.along(force)
+        problem, lengths = self.problem, self.problem.lengths
+        pull = problem.stiffness @ x - problem.diagonal(self.added) * x + self.lent.pull(x)
+        force = problem.force + self.lent.force - pull + multipliers
+        error = self._rounding * self._sizes(x, multipliers)
+        along, slack = lengths.along(force), np.abs(lengths.along(error))
         own = force.copy()
-        own[problem.lengths.members] = 0.0
-        q = np.concatenate([own, np.linalg.norm(problem.lengths.felt(along), axis=1)])
-        values, places = problem.arcs.least(self.low, self.high, self.added, q)
+        own[lengths.members] = error[lengths.members] = 0.0
+        q = np.concatenate([own, np.linalg.norm(lengths.felt(along), axis=1)])
+        values, parts = self._least(q, np.concatenate([error, np.linalg.norm(slack, axis=1)]))
         held = np.where(multipliers != 0.0, np.where(multipliers > 0.0, problem.lower, problem.upper), 0.0)
-        shut = self._shut(along)
-        bound = -0.5 * x @ pull + values.sum() + shut.sum() + multipliers @ held
-        parts = np.abs(values) + np.abs(q * places) + np.abs(0.5 * self.added * places * places)
-        return float(bound - self._safety(x, parts.sum() + np.abs(shut).sum() + np.abs(multipliers * held).sum(), n))
+        shut = self._shut(along - slack)
+        bound = -0.5 * x @ pull + values.sum() + shut.sum() + multipliers @ held + self.lent.constant
+        parts += float(np.abs(shut).sum() + np.abs(multipliers * held).sum())
+        parts += 0.5 * float(np.abs(x) @ self._sizes(x, multipliers))
+        return float(bound - self._rounding * parts)
+
+    def _least(self, q: Array, error: Array) -> tuple[Array, float]:
+        """The least terms for all forces near q, which are concave in the force, and the sum of their parts' sizes."""
+        problem = self.problem
+        (first, at), (second, other) = (
+            problem.arcs.least(self.low, self.high, self.added, q + sign * error) for sign in (-1.0, 1.0)
+        )
+        values, places = np.minimum(first, second), np.maximum(np.abs(at), np.abs(other))
+        sizes = np.abs(values) + np.abs(q * places) + np.abs(0.5 * self.added * places * places)
+        return values, float(sizes.sum())
 
     def _shut(self, along: Array) -> Array:
         """The least of ½ d t² - g t over negative openings t, (m,)."""
@@ -62,10 +77,13 @@ class DualBound:
         at = np.maximum(np.divide(g, d, out=np.array(end), where=d > 0.0), end)
         return np.asarray(np.where(g < 0.0, (0.5 * d * at - g) * at, 0.0))
 
-    def _safety(self, x: Array, parts: float, n: int) -> float:
-        """Machine epsilon times the number of unknowns times the sizes of all terms, at x and at the box's far end."""
+    @property
+    def _rounding(self) -> float:
+        """What a sum of as many terms as there are unknowns is off at most, relative to their sizes."""
+        return float(np.finfo(float).eps) * (self.problem.size + len(self.problem.lengths))
+
+    def _sizes(self, x: Array, multipliers: Array) -> Array:
+        """The sizes of all terms of the forces at a point, (n,)."""
         problem = self.problem
-        farthest = np.maximum(np.abs(self.low[:n]), np.abs(self.high[:n]))
-        pulls = np.abs(problem.stiffness) @ np.abs(x) + np.abs(problem.diagonal(self.added) * x)
-        sizes = (pulls + np.abs(problem.force)) @ farthest + 0.5 * pulls @ np.abs(x) + parts
-        return float(np.finfo(float).eps * (n + len(problem.lengths)) * sizes)
+        elastic = np.abs(problem.stiffness) @ np.abs(x) + np.abs(problem.diagonal(self.added) * x)
+        return np.asarray(elastic + self.lent.size(x) + np.abs(problem.force) + np.abs(multipliers))

@@ -24,7 +24,7 @@ MOST_STEPS = 60
 SHARES = tuple(0.5**k for k in range(16))
 """Shares of a step that are tried."""
 SHORT = 1e-8
-"""A step shorter than this share of the displacements changes the energy by its square: it is the last."""
+"""A step whose displacements and forces are below this share of all changes the energy by its square: the last."""
 SETTLED = 1e-15
 """A decrease below this share of the parts of the energy is rounding."""
 CLOSE = 1e-9
@@ -142,7 +142,7 @@ class LengthProgramme:
             found = self._better(x, value, near_zero=True) or self._better(x, value, near_zero=False)
             if found is None:
                 return x, step
-            last = float(np.abs(found[0] - x).max()) <= SHORT * float(np.abs(x).max())
+            last = self._short(found[0] - x, x)
             x, value = found
             if last:
                 return x, step
@@ -181,7 +181,7 @@ class LengthProgramme:
     def _better(self, x: Array, value: float, *, near_zero: bool) -> tuple[Array, float] | None:
         """A point of lower energy, and its energy."""
         goal = self._step(x, self._tangent(x, near_zero=near_zero))
-        if float(np.abs(goal - x).max()) <= SHORT * float(np.abs(x).max()):
+        if self._short(goal - x, x):
             return None
         least = SETTLED * (abs(value) + float(np.abs(self.b) @ np.abs(x)))
         for share in SHARES:
@@ -190,6 +190,10 @@ class LengthProgramme:
             if after < value - least:
                 return trial, after
         return None
+
+    def _short(self, step: Array, x: Array) -> bool:
+        pull = float(np.abs(self.a @ step).max())
+        return bool(np.abs(step).max() <= SHORT * np.abs(x).max() and pull <= SHORT * float(np.abs(self.b).max()))
 
     def _tangent(self, x: Array, *, near_zero: bool) -> Tangent:
         """Frames and curvatures at a point; vectors that forces would hold at zero may be held there already."""

@@ -12,8 +12,9 @@ import numpy as np
 
 from ..errors import SolverError
 from ..typing import Array
+from .boxes import Box
 from .curvature import Curvature, kernel
-from .relaxation import Box, Relaxation
+from .relaxation import Relaxation
 from .scalar_problem import ScalarProblem
 
 MOST_FORCES = 24
@@ -35,16 +36,25 @@ def level_set(problem: ScalarProblem, box: Box, curvature: Curvature, level: flo
         SolverError: no finite box was found.
     """
     energy = level + SLACK * problem.energy_size(box.x)
-    root = np.sqrt(2.0 * max(energy - box.bound, 0.0))
+    root = np.sqrt(2.0 * max(energy - box.value, 0.0))
     n = problem.size
     low, high = box.x - root * curvature.radii[:n], box.x + root * curvature.radii[:n]
     free = np.flatnonzero(~np.isfinite(curvature.radii[:n]))
     if free.size:
-        motions = kernel(problem.stiffness)
+        motions = _apart(problem, kernel(problem.stiffness))
         spread = np.abs(motions[free]) @ _reach(problem, box, motions, energy)
         around = root * curvature.range_radii[free] + spread
         low[free], high[free] = box.x[free] - around, box.x[free] + around
     return problem.with_lengths(np.maximum(low, box.low[:n]), np.minimum(high, box.high[:n]))
+
+
+def _apart(problem: ScalarProblem, motions: Array) -> Array:
+    """The same motions, those that bounds cannot hold apart from others, as these may have no limit."""
+    bounded = np.isfinite(problem.lower) | np.isfinite(problem.upper)
+    if not bounded.any():
+        return motions
+    turn = np.linalg.svd(motions[bounded])[2]
+    return np.asarray(motions @ turn.T)
 
 
 def _reach(problem: ScalarProblem, box: Box, motions: Array, energy: float) -> Array:

@@ -17,10 +17,13 @@ import numpy as np
 
 from ..errors import SolverError
 from ..typing import Array
+from . import motions
 from .arcs import on_interval
+from .boxes import Box, clipped, fresh_box
+from .curvature import Curvature
 from .descent import descend
 from .level_set import level_set
-from .relaxation import Box, Relaxation
+from .relaxation import Relaxation
 from .scalar_problem import ScalarProblem
 from .tightening import ForceIntervals
 
@@ -32,6 +35,10 @@ WORTHWHILE = 0.15
 """A round that closes less than this share of a box's gap is the last."""
 MOST_SKIPPED = 10
 """Boxes from which no descent is made, between two from which one is."""
+LOST = 0.25
+"""Share of a box's gap that the chords of rigid motions may take off."""
+WIDENED = 1e-9
+"""Relative widening of radii, for rounding."""
 ROUNDING = 1e-13
 """Energies that differ by less than this share of their parts are equal."""
 
@@ -106,7 +113,12 @@ class LowestSearch:
         self._try(first.x)
         low, high = level_set(problem, first, curvature, self.upper + 2.0 * problem.error)
         self._low, self._high = low, high
-        self._enter(fresh_box(low, high, first.x))
+        self._enter(self._moving(replace(fresh_box(low, high, first.x), bound=first.bound)))
+
+    def _moving(self, box: Box) -> Box:
+        """The box with the intervals of rigid motions' shares."""
+        low, high = self._relaxation.share_span(box.low, box.high)
+        return replace(box, motion_low=low, motion_high=high)
 
     def resume(self, boxes: Iterable[tuple[Array, Array, Array]], point: Array) -> None:
         """Go on from open boxes, each low, high and weights, and the lowest point.
@@ -117,11 +129,14 @@ class LowestSearch:
         """
         self.x, self.upper = point, self.problem.energy(point)
         listed = list(boxes)
-        self._low = np.min([b[0] for b in listed], axis=0, initial=np.inf)
-        self._high = np.max([b[1] for b in listed], axis=0, initial=-np.inf)
+        size = len(self.problem.chains)
+        self._low = np.min([b[0][:size] for b in listed], axis=0, initial=np.inf)
+        self._high = np.max([b[1][:size] for b in listed], axis=0, initial=-np.inf)
         self._try(point)
         for low, high, weights in listed:
-            self._enter(replace(fresh_box(low, high, point), weights=weights, share=1.0 / len(listed)))
+            box = replace(fresh_box(low[:size], high[:size], point), weights=weights, share=1.0 / len(listed))
+            with_shares = replace(box, motion_low=low[size:], motion_high=high[size:])
+            self._enter(with_shares if len(low) > size else self._moving(box))
 
     @property
     def region(self) -> tuple[Array, Array]:
@@ -129,8 +144,10 @@ class LowestSearch:
         return self._low, self._high
 
     def open_boxes(self) -> Iterator[tuple[Array, Array, Array]]:
-        """Low, high and weights of the boxes that wait."""
-        return ((box.low, box.high, box.weights) for _, _, box in self.waiting)
+        """Low, high and weights of the boxes that wait; low and high with those of rigid motions' shares."""
+        for _, _, box in self.waiting:
+            low, high = ((box.low, box.motion_low), (box.high, box.motion_high))
+            yield np.concatenate(low), np.concatenate(high), box.weights
 
     def progress(self) -> Progress:
         """How far the search is."""
@@ -175,14 +192,15 @@ class LowestSearch:
             if stop():
                 return False
             _, _, box = heapq.heappop(self.waiting)
-            for low, high in self._halves(box):
-                half = replace(fresh_box(low, high, box.x), bound=box.bound, weights=box.weights)
+            for half in self._halves(box):
                 self._enter(replace(half, share=0.5 * box.share))
             report(self.progress())
         return True
 
-    def _halves(self, box: Box) -> list[tuple[Array, Array]]:
+    def _halves(self, box: Box) -> list[Box]:
         """Two boxes: where the envelope and the law differ most, at the joint in the chord that is nearest to x."""
+        if box.motion_gaps.max(initial=0.0) > box.gaps.max():
+            return self._halves_of_motion(box)
         i = int(np.argmax(box.gaps))
         at = float(self.problem.arguments(box.x)[i])
         ends = (a.high for a in on_interval(self.problem.chains[i], float(box.low[i]), float(box.high[i]))[:-1])
@@ -191,7 +209,15 @@ class LowestSearch:
             at = min(inside, key=lambda e: abs(e - at))
         left, right = box.high.copy(), box.low.copy()
         left[i] = right[i] = at
-        return [(box.low, left), (right, box.high)]
+        return [replace(box, high=left), replace(box, low=right)]
+
+    def _halves_of_motion(self, box: Box) -> list[Box]:
+        """Two boxes: parts of the interval of a rigid motion's share."""
+        j = int(np.argmax(box.motion_gaps))
+        left, right = box.motion_high.copy(), box.motion_low.copy()
+        here, joint = float(self._relaxation.shares(box.x)[j]), float(self._relaxation.joints[j])
+        left[j] = right[j] = motions.divided(float(right[j]), float(left[j]), joint, here)
+        return [replace(box, motion_high=left), replace(box, motion_low=right)]
 
     def _enter(self, box: Box) -> None:
         """Tighten and bound a box; it waits if it is still open."""
@@ -199,7 +225,7 @@ class LowestSearch:
         found = self._bounded(box)
         if found is None:
             return
-        if not found.gaps.any():  # every envelope is tight: the point is the box's lowest, to rounding
+        if found.tight:  # every envelope is tight: the point is the box's lowest, to rounding
             self._try(found.x)
             if found.bound >= self.upper - self._allowed:
                 return
@@ -213,20 +239,42 @@ class LowestSearch:
                 smaller = self._forces.tightened(box.low, box.high)
                 if smaller is None:
                     return None
-                box = replace(box, low=smaller[0], high=smaller[1], x=_clipped(box.x, *smaller))
-                box, curvature = self._relaxation.solve(box, part)
+                box = replace(box, low=smaller[0], high=smaller[1], x=clipped(box.x, *smaller))
+                lost = LOST * (self.upper - box.bound) if math.isfinite(box.bound) else 0.0
+                box, curvature = self._relaxation.solve(box, part, lost)
                 if self._closed(box):
                     return None
                 if part == PARTS[-1] and round_ == 0:
                     self._try_at_times(box.x)
                     if self._closed(box):
                         return None
-                reach = curvature.radii * math.sqrt(2.0 * max(self.upper - box.bound, 0.0))
+                reach = curvature.radii * self._radius(box)
                 at = self.problem.arguments(box.x)
                 box = replace(box, low=np.maximum(box.low, at - reach), high=np.minimum(box.high, at + reach))
-            if not box.gaps.any() or box.bound - before < WORTHWHILE * (self.upper - box.bound):
+                box = self._motions_tightened(box, curvature)
+                if np.any(box.motion_low > box.motion_high) or np.any(box.low > box.high):
+                    return None
+            if box.tight or box.bound - before < WORTHWHILE * (self.upper - box.bound):
                 break
         return box
+
+    def _motions_tightened(self, box: Box, curvature: Curvature) -> Box:
+        """The intervals of rigid motions' shares made smaller by those of the unknowns, and by strong convexity."""
+        low, high = self._relaxation.share_span(box.low, box.high)
+        at = self._relaxation.shares(box.x)
+        reach, apart = (r * self._radius(box) for r in (curvature.share_radii, curvature.apart))
+        low = np.maximum(box.motion_low, np.maximum(low, at - reach))
+        high = np.minimum(box.motion_high, np.minimum(high, at + reach))
+        up, down = np.maximum(curvature.follow, 0.0), np.minimum(curvature.follow, 0.0)
+        n = len(box.x)
+        first, last = box.low.copy(), box.high.copy()
+        first[:n] = np.maximum(first[:n], box.x + up @ (low - at) + down @ (high - at) - apart)
+        last[:n] = np.minimum(last[:n], box.x + up @ (high - at) + down @ (low - at) + apart)
+        return replace(box, low=first, high=last, motion_low=low, motion_high=high)
+
+    def _radius(self, box: Box) -> float:
+        """How far lower points are from the relaxation's minimiser, in the norm of its matrix."""
+        return math.sqrt(2.0 * max(self.upper - box.value, 0.0)) * (1.0 + WIDENED)
 
     def _closed(self, box: Box) -> bool:
         return box.bound >= self.upper - self._allowed
@@ -253,30 +301,4 @@ class LowestSearch:
         return bool(np.any(below & np.isneginf(problem.lower) | above & np.isposinf(problem.upper)))
 
     def _inside(self, x: Array) -> Array:
-        return _clipped(x, self._low, self._high)
-
-
-def fresh_box(low: Array, high: Array, x: Array) -> Box:
-    """A box of which nothing is known.
-
-    Args:
-        low: (n + m,).
-        high: (n + m,).
-        x: where its relaxation is to begin, (n,).
-    """
-    none = np.zeros(len(low))
-    return Box(
-        low=low,
-        high=high,
-        bound=-math.inf,
-        x=_clipped(x, low, high),
-        weights=none,
-        gaps=none,
-        chord_low=low,
-        chord_high=high,
-    )
-
-
-def _clipped(x: Array, low: Array, high: Array) -> Array:
-    """The unknowns within their intervals, (n,)."""
-    return np.asarray(np.clip(x, low[: len(x)], high[: len(x)]))
+        return clipped(x, self._low, self._high)

@@ -12,7 +12,8 @@ from dataclasses import replace
 import numpy as np
 
 from ..typing import Array
-from .relaxation import Box, Relaxation
+from .boxes import Box
+from .relaxation import Relaxation
 from .scalar_problem import ScalarProblem
 
 PART = 0.9

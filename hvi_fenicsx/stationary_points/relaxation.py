@@ -2,50 +2,29 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 
 from ..laws.arc import Arc
-from ..typing import Array, Integers
+from ..typing import Array, Integers, Mask
+from . import motions
 from .arcs import envelope
+from .boxes import Box
 from .convex_programme import Chains, minimise
 from .curvature import Curvature, CurvatureShare
 from .dual_bound import DualBound
 from .length_programme import LengthProgramme
+from .motions import Lent
 from .scalar_problem import ScalarProblem
 
+MOST_PARTS = 64
+"""Parts of the interval of a rigid motion's share that are worth the curvature along it."""
 TIGHT = 1e-14
 """An envelope below its law by less than this share of the energy's parts is tight."""
 LEAST_WEIGHT = 0.1
 """Share of the weights of D that does not follow from where envelopes were not tight."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Box:
-    """Intervals of the unknowns and the lengths, and what is known of the energy there.
-
-    Attributes:
-        low: (n + m,).
-        high: (n + m,).
-        bound: no point of it has a lower energy.
-        x: the relaxation's minimiser, (n,).
-        weights: where envelopes were not tight, (n + m,).
-        gaps: law minus envelope at x, (n + m,).
-        chord_low: begin of the chord of the envelope at x, (n + m,).
-        chord_high: end of it, (n + m,).
-        share: of the whole search, by the number of parts at each division.
-    """
-
-    low: Array
-    high: Array
-    bound: float
-    x: Array
-    weights: Array
-    gaps: Array
-    chord_low: Array
-    chord_high: Array
-    share: float = 1.0
 
 
 def envelopes(problem: ScalarProblem, low: Array, high: Array, added: Array) -> list[list[Arc]]:
@@ -97,33 +76,101 @@ class Relaxation:
         wide = high > low
         return np.flatnonzero(wide & ((arcs.drops(low, high) > 0.0) | (arcs.least_slope(low, high) < 0.0)))
 
-    def solve(self, box: Box, part: float) -> tuple[Box, Curvature]:
+    def share_span(self, low: Array, high: Array) -> tuple[Array, Array]:
+        """The least and the largest shares of rigid motions in a box, (k,) each.
+
+        Args:
+            low: of the box, (n + m,).
+            high: of the box, (n + m,).
+        """
+        n = self.problem.size
+        return motions.span(self._share.shapes, low[:n], high[:n])
+
+    @cached_property
+    def joints(self) -> Array:
+        """The largest shares of rigid motions at which laws have joints, (k,)."""
+        return motions.farthest_joints(self.problem, self._share.shapes)
+
+    def shares(self, x: Array) -> Array:
+        """The shares of rigid motions at a point, (k,).
+
+        Args:
+            x: the point, (n,).
+        """
+        return np.asarray(self._share.shapes.T @ x)
+
+    def solve(self, box: Box, part: float, lost: float = 0.0) -> tuple[Box, Curvature]:
         """The box with its bound, minimiser and gaps, and the curvature that was used.
 
         Args:
             box: where to minimise; its x is where to begin.
             part: share of the largest curvature.
+            lost: energy that the chords of rigid motions may take off.
         """
         problem, undecided = self.problem, self.undecided(box.low, box.high)
         weights = np.zeros(len(box.low))
         weights[undecided] = self._weights(box, undecided)
-        curvature = self._share.share(box.low, box.high, undecided, weights, part)
+        curvature, wanted = self._curvature(box, undecided, weights, part, lost)
         chains = envelopes(problem, box.low, box.high, curvature.added)
-        x, bound, steps = self._minimised(box, curvature, chains)
+        lent = self.lent(box, curvature)
+        x, value, bound, steps = self._minimised(box, curvature, lent, chains)
         self.programmes += steps
-        return self._examined(box, x, bound, Chains.of(chains), curvature, undecided), curvature
+        gaps = np.zeros(len(box.motion_low))
+        gaps[np.flatnonzero(curvature.lent)] = _above(lent.gaps(x), TIGHT * problem.energy_size(x))
+        box = replace(
+            box,
+            motion_gaps=np.where(wanted, np.inf, gaps),
+            value=value + problem.constant,
+            bound=max(box.bound, bound + problem.constant),
+        )
+        return self._examined(box, x, Chains.of(chains), curvature, undecided), curvature
 
-    def _minimised(self, box: Box, curvature: Curvature, chains: list[list[Arc]]) -> tuple[Array, float, int]:
-        """The minimiser, a lower bound, and the linear systems or steps that it took."""
+    def _curvature(
+        self, box: Box, undecided: Integers, weights: Array, part: float, lost: float
+    ) -> tuple[Curvature, Mask]:
+        """The curvature, and the rigid motions whose shares are to be divided before any is lent along them, (k,)."""
+        given, wide = (box.low, box.high, undecided, weights, part), box.motion_high - box.motion_low
+        wanted: Mask = np.zeros(len(wide), dtype=np.bool_)
+        if lost > 0.0 and len(wide):
+            wanted = motions.long(box.motion_low, box.motion_high, self.joints)
+            if undecided.size and not wanted.any():
+                curvature = self._share.share(*given, lend=True)
+                cost = curvature.lent * wide**2 / 8.0
+                if cost.sum() <= lost:
+                    return curvature, wanted
+                wanted = (cost >= 0.5 * cost.max()) & (cost.sum() <= MOST_PARTS**2 * lost)
+        return self._share.share(*given), wanted
+
+    def lent(self, box: Box, curvature: Curvature) -> Lent:
+        """The curvature along rigid motions with the intervals of their shares.
+
+        Args:
+            box: the box.
+            curvature: on it.
+        """
+        used = np.flatnonzero(curvature.lent)
+        ends = (box.motion_low[used], box.motion_high[used]) if used.size else (np.empty(0), np.empty(0))
+        return Lent(shapes=self._share.shapes[:, used], stiffness=curvature.lent[used], low=ends[0], high=ends[1])
+
+    def _minimised(
+        self, box: Box, curvature: Curvature, lent: Lent, chains: list[list[Arc]]
+    ) -> tuple[Array, float, float, int]:
+        """The minimiser, two lower bounds, that of the point and a better one, and the steps that it took."""
         problem = self.problem
-        a = problem.stiffness - np.diag(problem.diagonal(curvature.added))
+        a = problem.stiffness - np.diag(problem.diagonal(curvature.added)) + lent.matrix
+        b = problem.force + lent.force
         if not len(problem.lengths):
-            found = minimise(a, problem.force, Chains.of(chains), box.x)
-            return found.x, found.bound, found.steps
-        programme = LengthProgramme.of(problem, a, problem.force, chains, curvature.added[problem.size :])
+            found = minimise(a, b, Chains.of(chains), box.x)
+            bound = found.bound + lent.constant
+            return found.x, bound, bound, found.steps
+        programme = LengthProgramme.of(problem, a, b, chains, curvature.added[problem.size :])
         x, steps = programme.minimiser(box.x)
-        dual = DualBound(problem=problem, low=box.low, high=box.high, added=curvature.added)
-        return x, dual.at(x, programme.multipliers(x)), steps
+        dual = DualBound(problem=problem, low=box.low, high=box.high, added=curvature.added, lent=lent)
+        multipliers = programme.multipliers(x)
+        value = bound = dual.at(x, multipliers)
+        if np.any(np.abs(self.shares(x)) > self.joints):  # the same forces, with less rounding
+            bound = max(bound, dual.at(self._share.at_rest(x), multipliers))
+        return x, value, bound, steps
 
     def _weights(self, box: Box, undecided: Integers) -> Array:
         arcs, low, high = self.problem.arcs, box.low, box.high
@@ -133,9 +180,7 @@ class Relaxation:
         most = float(seen.max(initial=0.0))
         return np.asarray(strength * (seen / most + LEAST_WEIGHT if most > 0.0 else 1.0))
 
-    def _examined(
-        self, box: Box, x: Array, bound: float, stack: Chains, curvature: Curvature, undecided: Integers
-    ) -> Box:
+    def _examined(self, box: Box, x: Array, stack: Chains, curvature: Curvature, undecided: Integers) -> Box:
         """Where the envelope is not tight at x: the gaps, the chords, and the weights for the next D."""
         problem, at = self.problem, self.problem.arguments(x)
         rows = np.arange(len(at))
@@ -149,10 +194,13 @@ class Relaxation:
         weights = 0.5 * (box.weights + spread) if box.weights.any() else spread
         return replace(
             box,
-            bound=max(box.bound, bound + problem.constant),
             x=x,
             weights=weights,
             gaps=np.where(loose, gaps, 0.0),
             chord_low=begin,
             chord_high=end,
         )
+
+
+def _above(values: Array, least: float) -> Array:
+    return np.where(values > least, values, 0.0)

@@ -11,9 +11,10 @@ from ..errors import InputError, SolverError
 from ..typing import Array
 from . import systematic
 from .all_points import Enumeration, StationaryPoint
+from .boxes import fresh_box
 from .found import Found, Keep, Saved, Start, Wanted, forget
 from .length_kinds import kind_of
-from .lowest import LowestSearch, Progress, fresh_box
+from .lowest import LowestSearch, Progress
 from .passes import passes
 from .progress_words import Clock, all_in_words, lowest_in_words
 from .scalar_problem import ScalarProblem

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,9 +13,11 @@ from scipy.optimize import minimize
 import hvi_fenicsx as hvi
 from hvi_fenicsx.laws.traction_graph import TractionGraph
 from hvi_fenicsx.stationary_points.arcs import FREE, chain
+from hvi_fenicsx.stationary_points.boxes import fresh_box
 from hvi_fenicsx.stationary_points.length_kinds import kind_of
 from hvi_fenicsx.stationary_points.lengths import Lengths
-from hvi_fenicsx.stationary_points.lowest import LowestSearch, fresh_box
+from hvi_fenicsx.stationary_points.lowest import LowestSearch
+from hvi_fenicsx.stationary_points.motions import divided
 from hvi_fenicsx.stationary_points.relaxation import Relaxation
 from hvi_fenicsx.stationary_points.scalar_problem import ScalarProblem
 from hvi_fenicsx.stationary_points.stationarity import Kind
@@ -171,6 +174,78 @@ def test_no_point_of_a_box_is_below_its_bound(seed: int, opening: bool) -> None:
     for part in (0.5, 0.999):
         bound = Relaxation(problem).solve(fresh_box(low, high, low[: problem.size]), part)[0].bound
         assert min(problem.energy(x) for x in inside) >= bound
+
+
+def freed(problem: ScalarProblem, held: float) -> ScalarProblem:
+    """The same problem where the last components of all vectors can move together, held by the laws alone."""
+    motion = np.zeros(problem.size)
+    members = problem.lengths.unknowns[:, 1]
+    motion[members] = 1.0 / problem.lengths.factors[:, 1]
+    motion /= np.linalg.norm(motion)
+    rest = np.eye(problem.size) - np.outer(motion, motion)
+    force = rest @ problem.force + held * motion
+    return replace(problem, stiffness=rest @ problem.stiffness @ rest, force=force)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_no_point_of_a_box_is_below_a_bound_with_curvature_lent_along_a_rigid_motion(seed: int) -> None:
+    problem, random = freed(random_problem(seed, 3, 2, opening=False), 0.3), np.random.default_rng(seed)
+    low = np.maximum(random.uniform(-2, 0, problem.size), problem.lower)
+    low, high = problem.with_lengths(low, low + random.uniform(1.0, 3, problem.size))
+    relaxation = Relaxation(problem)
+    least, most = relaxation.share_span(low, high)
+    first, last = least + 0.3 * (most - least), least + 0.6 * (most - least)
+    box = replace(fresh_box(low, high, low[: problem.size]), motion_low=first, motion_high=last)
+    solved, curvature = relaxation.solve(box, 0.999, lost=1e6)
+    assert curvature.lent.any()
+    samples = random.uniform(low[: problem.size], high[: problem.size], (4000, problem.size))
+    inside = [x for x in samples if np.all((relaxation.shares(x) >= first) & (relaxation.shares(x) <= last))]
+    assert inside
+    assert min(problem.energy(x) for x in inside) >= solved.bound
+    added = problem.diagonal(curvature.added)
+    lent = relaxation.lent(solved, curvature).matrix
+    step = np.array(inside) - solved.x
+    near = 0.5 * np.einsum("ij,jk,ik->i", step, problem.stiffness - np.diag(added) + lent, step)
+    assert np.all(np.array([problem.energy(x) for x in inside]) >= solved.value + near - 1e-9)
+
+
+@pytest.mark.parametrize("seed", [0, 1, *(pytest.param(s, marks=pytest.mark.long) for s in range(2, 7))])
+def test_the_lowest_energy_of_a_body_that_only_laws_hold_is_below_all_descents(seed: int) -> None:
+    problem = random_problem(seed, 3, 2, opening=False)
+    softening = TractionGraph.from_points([(0.0, 0.0), (0.1, 2.0), (1.5, 1.0)])
+    laws = (*problem.chains[: problem.size], *(chain(softening, 1.0, 1.0) for _ in range(3)))
+    problem = freed(replace(problem, chains=laws), 0.5)
+    found, random = proven(problem), np.random.default_rng(seed)
+    least = min(_descended(problem, 2.0 * random.normal(size=problem.size)) for _ in range(6))
+    assert found.progress().lower <= least
+    assert found.upper <= least + 1e-6 * abs(least)
+
+
+def test_a_search_with_divided_rigid_motions_goes_on_where_it_was_stopped() -> None:
+    problem = random_problem(1, 3, 2, opening=False)
+    softening = TractionGraph.from_points([(0.0, 0.0), (0.1, 2.0), (1.5, 1.0)])
+    laws = (*problem.chains[: problem.size], *(chain(softening, 1.0, 1.0) for _ in range(3)))
+    problem = freed(replace(problem, chains=laws), 0.5)
+    whole, part, rest = proven(problem), LowestSearch(problem=problem), LowestSearch(problem=problem)
+    part.start()
+    assert not part.run(lambda: part.boxes > 3, lambda _: None)
+    left = list(part.open_boxes())
+    assert all(len(low) == problem.size + 3 + 1 for low, _, _ in left)  # unknowns, lengths, one rigid motion
+    rest.resume(left, part.x)
+    assert rest.run(lambda: False, lambda _: None)
+    assert part.boxes < whole.boxes
+    assert rest.upper == pytest.approx(whole.upper, rel=1e-8)
+
+
+def test_intervals_of_shares_are_divided_far_behind_joints_in_growing_parts() -> None:
+    assert divided(-1e6, 1e6, 2.0, 0.5) == 2.0
+    parts = [2.0]
+    while parts[-1] * 8.0 < 1e6:
+        parts.append(divided(parts[-1], 1e6, 2.0, 0.5))
+    assert parts == [2.0 * 8.0**k for k in range(len(parts))]
+    assert divided(-1e6, 2.0, 2.0, 0.5) == -2.0
+    assert divided(-2.0, 2.0, 2.0, 0.5) == 0.5
+    assert divided(-2.0, 2.0, 2.0, 1.99) == pytest.approx(1.2)
 
 
 def space(cells: int) -> Table:

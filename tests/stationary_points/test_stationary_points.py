@@ -18,9 +18,10 @@ from hvi_fenicsx.errors import SolverError
 from hvi_fenicsx.laws.traction_graph import TractionGraph
 from hvi_fenicsx.stationary_points.all_points import Enumeration
 from hvi_fenicsx.stationary_points.arcs import FREE, chain, energy, envelope, total
+from hvi_fenicsx.stationary_points.boxes import fresh_box
 from hvi_fenicsx.stationary_points.condensed_form import scalar_problem
 from hvi_fenicsx.stationary_points.found import Wanted
-from hvi_fenicsx.stationary_points.lowest import LowestSearch, fresh_box
+from hvi_fenicsx.stationary_points.lowest import LowestSearch
 from hvi_fenicsx.stationary_points.progress_words import Clock, Unit, lowest_in_words
 from hvi_fenicsx.stationary_points.relaxation import Relaxation
 from hvi_fenicsx.stationary_points.scalar_problem import ScalarProblem
