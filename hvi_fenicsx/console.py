@@ -249,6 +249,8 @@ def path_outcome(path: LoadPath) -> Iterator[str]:
     unit = "N/m" if path.dimension == 2 else "N"
     for part in path.parts:
         row = path.strongest(part)
+        if not any(path.rows[row].forces[part]):  # a moment
+            continue
         force = ", ".join(f"{f:.6g}" for f in path.rows[row].forces[part])
         yield f"largest force on {part}: ({force}) {unit}, at factor {path.rows[row].factor:.6g} (row {row})"
     released = [f"{path.rows[n].factor:.6g}" for n in path.jumps]

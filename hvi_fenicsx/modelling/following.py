@@ -108,7 +108,7 @@ class ModelPath(LoadPath):
 
     def _as_read(self) -> PathResult:
         """As the report reads it from its folder."""
-        columns = {"stable": self.stable.astype(float)}
+        columns = {"factor": self.factors, "stable": self.stable.astype(float)}
         for part in self.parts:
             for kind, values in (("f", self.force(part)), ("u", self.displacement(part))):
                 columns |= {f"{part}.{kind}{'xyz'[i]}": values[:, i] for i in range(self.dimension)}

@@ -19,6 +19,8 @@ from .reader import title_of
 
 _WORDS = frozenset({"event", "part"})
 """Columns that are no numbers."""
+_NOTHING = 1e-9
+"""Work so small beside the largest force on the largest displacement is none."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -61,12 +63,18 @@ class PathResult:
 
     @cached_property
     def driven(self) -> str | None:
-        """The part whose force and displacement are drawn: of those that the factor drives the one most pulled."""
+        """The part that is drawn: of those that the factor drives the one whose force goes the longest way.
+
+        Where no force does, as under a moment, the one that moves most.
+        """
         scaled = {str(name).rpartition(".")[0] for name in self.path["scaled"]}
-        found = self.path["peak_forces"].items()
-        forces = {part: sum((value or 0.0) ** 2 for value in one["force"]) for part, one in found}
-        known = {part: size for part, size in forces.items() if part in scaled} or forces
-        return max(known, key=lambda part: known[part]) if known else None
+        parts = list(self.path["peak_forces"])
+        known = [part for part in parts if part in scaled] or parts
+        ways = {part: [float(np.max(np.abs(values))) for values in self.along(part)] for part in known}
+        largest = [max((way[k] for way in ways.values()), default=0.0) for k in (0, 1)]
+        done = max((u * force for u, force in ways.values()), default=0.0)
+        worked = done > _NOTHING * largest[0] * largest[1]
+        return max(known, key=lambda part: ways[part][0] * (ways[part][1] if worked else 1.0), default=None)
 
     def vectors(self, part: str, kind: str) -> Array:
         """The forces or displacements of a part, (rows, d).
@@ -80,12 +88,15 @@ class PathResult:
     def along(self, part: str) -> tuple[Array, Array]:
         """Mean displacement and force of a part in the direction of its largest force, (rows,) each.
 
+        Where no force acts on it, in that of its largest displacement.
+
         Args:
             part: its name.
         """
         forces, displacements = self.vectors(part, "f"), self.vectors(part, "u")
-        sizes = np.linalg.norm(forces, axis=1)
-        strongest = forces[int(np.argmax(sizes))] / (np.max(sizes) or 1.0)
+        leading = forces if np.any(forces) else displacements
+        sizes = np.linalg.norm(leading, axis=1)
+        strongest = leading[int(np.argmax(sizes))] / (np.max(sizes) or 1.0)
         return displacements @ strongest, forces @ strongest
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -47,3 +48,31 @@ def test_the_legend_is_inside_the_picture_and_below_its_heading(
     assert box.x1 <= fig.bbox.width
     assert not any(box.overlaps(text.get_window_extent()) for text in fig.texts)
     assert box.y0 >= fig.axes[0].get_window_extent().y1 - 1.0
+
+
+def beside(force: tuple[float, float], way: float) -> PathResult:
+    """The same path with another part that is driven: a constant force on it, and how far it goes."""
+    given = result(("start", *["kink"] * 5, "end"), (1,) * 7, "reached")
+    columns = dict(given.columns) | {"factor": np.arange(7.0), "press.ux": np.zeros(7), "press.uy": way * np.arange(7.0)}
+    columns |= {"press.fx": np.full(7, force[0]), "press.fy": np.full(7, force[1])}
+    path = given.path
+    peaks = path["peak_forces"] | {"press": {"force": list(force)}}
+    path = path | {"peak_forces": peaks, "scaled": ["pull.traction", "press.traction"]}
+    return replace(given, columns=columns, summary={"path": path})
+
+
+def test_the_part_is_drawn_whose_force_goes_the_longest_way() -> None:
+    assert beside((0.0, -1e6), -1e-7).driven == "pull"
+    assert beside((0.0, -1e6), -1e-3).driven == "press"
+
+
+def test_under_a_moment_the_factor_is_drawn_over_the_displacement() -> None:
+    """No force acts on the part that moves, and the part that is held does not move."""
+    given = beside((0.0, 0.0), 2e-3)
+    columns = dict(given.columns) | {"pull.ux": np.zeros(7)}
+    shown = replace(given, columns=columns)
+    assert shown.driven == "press"
+    axes = make(shown).axes[0]
+    assert axes.get_ylabel() == "load factor"
+    drawn = axes.get_lines()[0].get_xydata()
+    assert np.nanmax(np.asarray(drawn), axis=0) == pytest.approx([12.0, 6.0])  # mm; the factor

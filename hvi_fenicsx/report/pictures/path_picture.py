@@ -17,8 +17,8 @@ from .style import BLUE, GREEN, GREY, HEADING, INK, ORANGE, VERMILION, area, fig
 
 NAME = "path.png"
 _CAPTION = (
-    "The load path: force over mean displacement of the driven part. Solid: stable; dashed: unstable, which a test "
-    "cannot hold; dotted: jumps; dots: events on the way."
+    "The load path: force (under a moment the load factor) over mean displacement of the driven part. Solid: stable; "
+    "dashed: unstable, which a test cannot hold; dotted: jumps; dots: events on the way."
 )
 _ENTRIES = 0.35
 """Room for the second line of the legend, inches."""
@@ -50,16 +50,19 @@ def make(result: PathResult) -> Figure:
     """
     assert result.driven is not None
     u, force = result.along(result.driven)
-    units = unit_for(float(np.max(np.abs(u))), "m"), unit_for(float(np.max(np.abs(force))), _unit(result))
+    pulled = bool(np.any(force))
+    load = force if pulled else result.columns["factor"]
+    units = unit_for(float(np.max(np.abs(u))), "m"), _unit(result, load) if pulled else Unit(1.0, "")
     fig = figure(HEADING + 5.4 + _ENTRIES)
     titled(fig, result.title, _subject(result), *_verdict(result))
     axes = area(fig, 1.15, 0.85, 6.5, 4.45)
-    x, y = np.asarray(u / units[0].size), np.asarray(force / units[1].size)
+    x, y = np.asarray(u / units[0].size), np.asarray(load / units[1].size)
     _stretches(axes, result, x, y)
     _marks(axes, result, x, y, units)
     axes.axhline(0.0, color=GREY, lw=0.8, zorder=0)
-    axes.set_xlabel(f"mean displacement of “{result.driven}” along its force ({units[0].name})")
-    axes.set_ylabel(f"force on “{result.driven}” ({units[1].name})")
+    direction = " along its force" if pulled else ""
+    axes.set_xlabel(f"mean displacement of “{result.driven}”{direction} ({units[0].name})")
+    axes.set_ylabel(f"force on “{result.driven}” ({units[1].name})" if pulled else "load factor")
     axes.margins(0.06, 0.10)
     _explain(axes)
     return fig
@@ -73,8 +76,8 @@ def _explain(axes: Axes) -> None:
                 borderaxespad=0.0, handlelength=1.6, columnspacing=0.9)  # fmt: skip
 
 
-def _unit(result: PathResult) -> str:
-    return "N" if len(result.axes) == 3 else "N/m"
+def _unit(result: PathResult, force: Array) -> Unit:
+    return unit_for(float(np.max(np.abs(force))), "N" if len(result.axes) == 3 else "N/m")
 
 
 def _subject(result: PathResult) -> str:
@@ -125,7 +128,8 @@ def _named(
     result: PathResult, x: Array, y: Array, units: tuple[Unit, Unit]
 ) -> Iterator[tuple[int, str, str, str | None]]:
     peak = int(np.argmax(y))
-    yield peak, "^", ORANGE, f"peak {y[peak]:.4g} {units[1].name} at {x[peak]:.4g} {units[0].name}"
+    load = f"{y[peak]:.4g} {units[1].name}".rstrip()
+    yield peak, "^", ORANGE, f"peak {load} at {x[peak]:.4g} {units[0].name}"
     for count, number in enumerate(n for n, event in enumerate(result.events) if event == "turn"):
         yield number, "s", INK, None if count else "turn"
     if result.path["end"] != "reached":
