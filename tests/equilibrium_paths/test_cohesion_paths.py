@@ -17,7 +17,7 @@ from hvi_fenicsx.effects import Direction
 from hvi_fenicsx.equilibrium_paths.exact import ExactFollower
 from hvi_fenicsx.equilibrium_paths.state import End, Event, Follow, PathOptions, PathState
 from hvi_fenicsx.errors import InputError
-from hvi_fenicsx.laws import BenzeggaghKenane, Mixity, PowerLaw, Superpotential
+from hvi_fenicsx.laws import BenzeggaghKenane, Exponential, Mixity, PowerLaw, Superpotential
 from hvi_fenicsx.system.condensed_problem import Bonds, CondensedProblem
 
 Array = npt.NDArray[np.float64]
@@ -149,14 +149,27 @@ def test_states_are_stationary_points_of_the_energy() -> None:
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("closes", [False, True])
-def test_a_tenth_of_the_step_is_the_same_branch(closes: bool) -> None:
-    given = strip(graph(SOFTENING), [0.2, 1.0] if closes else [-0.4, 1.0], closes=closes)
-    _, states = path(given, programme=(3.0,), follow=Follow.EXACT)
-    _, finer = path(given, programme=(3.0,), follow=Follow.EXACT, fineness=0.1)
+@pytest.mark.parametrize(
+    ("law", "mixity", "closes"),
+    [
+        (graph(SOFTENING), None, False),
+        (graph(SOFTENING), None, True),
+        (graph([[0, 0], [0.05, 1], [5, 0]]), BenzeggaghKenane(3.0, 2.1), False),
+        (Exponential(1.0, 0.0, 0.5), None, False),
+    ],
+)
+def test_a_tenth_of_the_step_is_the_same_branch(law: Superpotential, mixity: Mixity | None, closes: bool) -> None:
+    given = strip(law, [0.2, 1.0] if closes else [-0.4, 1.0], closes=closes)
+    given = replace(given, bonds=(replace(given.bonds[0], mixity=mixity),))
+    options: dict[str, Any] = {"programme": (3.0,), "follow": Follow.EXACT, "remember": (0,)}
+    _, states = path(given, **options)
+    _, finer = path(given, **options, fineness=0.1)
     assert events(finer) == events(states)
     assert folds(finer) == pytest.approx(folds(states), rel=1e-8)
     assert states[-1].x == pytest.approx(finer[-1].x, abs=1e-8)
+    assert states[-1].dissipated == pytest.approx(finer[-1].dissipated, rel=1e-8)
+    for found in (states, finer):
+        assert np.all(np.diff([s.dissipated for s in found]) >= -1e-12 * found[-1].dissipated)
 
 
 @pytest.mark.long

@@ -53,8 +53,8 @@ def test_the_legend_is_inside_the_picture_and_below_its_heading(
 def beside(force: tuple[float, float], way: float) -> PathResult:
     """The same path with another part that is driven: a constant force on it, and how far it goes."""
     given = result(("start", *["kink"] * 5, "end"), (1,) * 7, "reached")
-    columns = dict(given.columns) | {"factor": np.arange(7.0), "press.ux": np.zeros(7), "press.uy": way * np.arange(7.0)}
-    columns |= {"press.fx": np.full(7, force[0]), "press.fy": np.full(7, force[1])}
+    columns = dict(given.columns) | {"factor": np.arange(7.0), "press.ux": np.zeros(7)}
+    columns |= {"press.uy": way * np.arange(7.0), "press.fx": np.full(7, force[0]), "press.fy": np.full(7, force[1])}
     path = given.path
     peaks = path["peak_forces"] | {"press": {"force": list(force)}}
     path = path | {"peak_forces": peaks, "scaled": ["pull.traction", "press.traction"]}
