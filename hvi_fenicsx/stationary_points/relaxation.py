@@ -19,6 +19,8 @@ from .length_programme import LengthProgramme
 from .motions import Lent
 from .scalar_problem import ScalarProblem
 
+MOST_MOTIONS = 1
+"""Rigid motions of unknowns with laws along which curvature is lent; the parts of several multiply."""
 MOST_PARTS = 64
 """Parts of the interval of a rigid motion's share that are worth the curvature along it."""
 TIGHT = 1e-14
@@ -131,7 +133,7 @@ class Relaxation:
         """The curvature, and the rigid motions whose shares are to be divided before any is lent along them, (k,)."""
         given, wide = (box.low, box.high, undecided, weights, part), box.motion_high - box.motion_low
         wanted: Mask = np.zeros(len(wide), dtype=np.bool_)
-        if lost > 0.0 and len(wide):
+        if lost > 0.0 and 0 < len(wide) <= MOST_MOTIONS:
             wanted = motions.long(box.motion_low, box.motion_high, self.joints)
             if undecided.size and not wanted.any():
                 curvature = self._share.share(*given, lend=True)
