@@ -71,7 +71,12 @@ class CellInverse(ABC):
 
     @abstractmethod
     def swap(self, one: int, other: int) -> None:
-        """Swap the places of two variables."""
+        """Swap the places of two variables.
+
+        Args:
+            one: the first place.
+            other: the second one.
+        """
 
     @abstractmethod
     def copy(self) -> Self:
