@@ -201,7 +201,7 @@ class _SnesRun:
         self.sizes = NOT_MEASURED
         self._stalled = self._slow = 0
         self._inner = owner.held.inner_iterations
-        self.stopped = False
+        self.stopped = self.far = False
 
     def create(self, line_search: str, max_iterations: int) -> PETSc.SNES:
         """The configured SNES."""
@@ -245,8 +245,15 @@ class _SnesRun:
 
     def outcome(self) -> Outcome:
         """How it ended."""
-        reason = "interrupted" if self.stopped else _REASON.get(int(self.reason), str(self.reason))
-        return Outcome(self.last <= self.tolerance, self.iterations, self.linear, self.last, reason, self.stopped)
+        return Outcome(
+            self.last <= self.tolerance, self.iterations, self.linear, self.last, self._reason(), self.stopped
+        )
+
+    def _reason(self) -> str:
+        """Why it ended, in our words or PETSc's."""
+        if self.far:
+            return f"a displacement of more than {self.thresholds.runaway:.0e} times p0 L / E0"
+        return "interrupted" if self.stopped else _REASON.get(int(self.reason), str(self.reason))
 
     def _function(self, snes: PETSc.SNES, x: PETSc.Vec, f: PETSc.Vec) -> None:
         self.owner.system.residual(x, f, self.models)
@@ -266,7 +273,8 @@ class _SnesRun:
         self.stopped = self.owner.interrupted()
         if self.stopped:
             return PETSc.SNES.ConvergedReason.DIVERGED_FUNCTION_COUNT
-        if not np.isfinite(self.last) or x.norm(PETSc.NormType.INFINITY) > self.thresholds.runaway:
+        self.far = x.norm(PETSc.NormType.INFINITY) > self.thresholds.runaway
+        if self.far or not np.isfinite(self.last):
             return PETSc.SNES.ConvergedReason.DIVERGED_FNORM_NAN
         if self.last <= self.tolerance:
             return PETSc.SNES.ConvergedReason.CONVERGED_FNORM_RELATIVE
