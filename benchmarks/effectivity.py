@@ -101,7 +101,7 @@ def _on_finest(u: fem.Function, step: Step, finer: Sequence[Step]) -> fem.Functi
     x, coarse = u.x.petsc_vec, u.function_space
     for fine_step in finer:
         assert fine_step.refined is not None
-        mesh, degree = fine_step.system.problem.domain.mesh, nodes.degree(coarse)
+        mesh, degree = fine_step.system.problem.space.mesh, nodes.degree(coarse)
         fine = displacement_space(mesh, degree)
         x = fine_step.refined.transfer.prolongation(fine, coarse) * x
         coarse = fine
