@@ -63,6 +63,7 @@ class _Coupled:
     def __init__(self, traces: LawTraces, inverse: DualNorm) -> None:
         problem, space = traces.problem, traces.bubbles
         self._traces, self._inverse, self._thresholds = traces, inverse, traces.thresholds
+        self._longest = 0.0
         self._stiffness = BubbleStiffness(problem, space)
         self._constraints = defect.constraints(problem, traces.u, space)
         self._residual = problem.bulk.residual_in(space, traces.u, problem.linear.values())
@@ -89,11 +90,15 @@ class _Coupled:
         defect.find_least_energy(self.error.bubbles, self._stiffness, self._constraints, load, self._thresholds)
 
     def move_nodes(self) -> None:
-        """Move the nodes as the bubbles and the laws ask. Collective."""
+        """Move the nodes as the bubbles ask; the laws answer that, so it takes a few rounds. Collective."""
         problem, nodes = self._traces.problem, self.error.nodes
-        _, laws = self._traces.tested(self.error)
-        step, _ = self._inverse.solve(laws - problem.combined(self._on_nodes.values()))
-        nodes.x.array[:] += step.x.array
+        for _ in range(self._thresholds.answer_rounds):
+            _, laws = self._traces.tested(self.error)
+            step, length = self._inverse.solve(laws - problem.combined(self._on_nodes.values()))
+            nodes.x.array[:] += step.x.array
+            self._longest = max(self._longest, length)
+            if length <= self._thresholds.answer_change * self._longest:
+                break
         self._inverse.keep_within_bounds(nodes)
 
 

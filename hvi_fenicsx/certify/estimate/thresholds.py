@@ -33,6 +33,8 @@ class Thresholds:
             degree of the solution: at degree 2 always, or up to 40 % of the error is not seen.
         coupled_rounds: times at most that bubbles and nodes are solved for in turns.
         coupled_change: relative change in energy norm of both up to which no further round is needed.
+        answer_rounds: times at most that the nodes' answer to the bubbles is corrected by the laws'.
+        answer_change: relative change in energy norm of that answer up to which no further round is needed.
         coarse: the mesh's error over the norm of the solution, above which the numbers are rough.
     """
 
@@ -52,6 +54,8 @@ class Thresholds:
     coupled: Mapping[int, float] = field(default_factory=lambda: {1: 0.3, 2: 0.0})
     coupled_rounds: int = 12
     coupled_change: float = 0.02
+    answer_rounds: int = 4
+    answer_change: float = 0.05
     coarse: float = 0.1
 
 
