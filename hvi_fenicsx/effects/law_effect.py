@@ -103,6 +103,7 @@ class LawEffect(Effect):
     length_multiplier: Multiplier = ONE
     """what all displacements of the law are multiplied by, a positive number or a formula in x, y, z"""
     _placed: PlacedLaw | None = PrivateAttr(default=None)
+    _given: dict[str, Any] = PrivateAttr(default_factory=dict)
 
     @model_validator(mode="wrap")
     @classmethod
@@ -114,28 +115,27 @@ class LawEffect(Effect):
             return handler({"law": _law(data).law})
         own = {key: data[key] for key in cls.model_fields if key != "law" and key in data}
         placed = _law({key: value for key, value in data.items() if key not in own})
-        return handler({"law": placed.law, **own})._multiplied_by(placed)
+        effect = handler({"law": placed.law, **own})
+        return effect._multiplied_by(placed, data) if placed.parameters else effect
 
-    def _multiplied_by(self, placed: PlacedLaw) -> Self:
-        """The effect with what formulas in the place of numbers make of its law."""
-        if not placed.parameters:
-            return self
+    def _multiplied_by(self, placed: PlacedLaw, given: dict[str, Any]) -> Self:
+        """The effect with what formulas in the place of numbers make of its law; it is stored as it was given."""
         changed = self.model_copy(
             update={
                 "multiplier": law_formulas.times(self.multiplier, placed.multiplier),
                 "length_multiplier": law_formulas.times(self.length_multiplier, placed.length_multiplier),
             }
         )
-        changed._placed = placed
+        changed._placed, changed._given = placed, given
         return changed
 
     @model_serializer(mode="wrap")
     def _as_table(self, handler: SerializerFunctionWrapHandler) -> Any:
         table = handler(self)
         for key in ("multiplier", "length_multiplier"):
-            if getattr(self, key) == ONE:
+            if self._given or getattr(self, key) == ONE:
                 del table[key]
-        return {**table.pop("law"), **table}
+        return {**table.pop("law"), **table, **self._given}
 
     @override
     def contribute(self, context: FormContext, where: str | None) -> Contribution:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pickle
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -9,6 +11,7 @@ import pytest
 from scenes import DELTA, STEEL, Table, block, model, quadratic_linear, two_blocks
 
 import hvi_fenicsx as hvi
+from hvi_fenicsx.scene.writer import dump_scene
 
 STEP = "2.5 if x < 0.5 else 1"
 TENSILE = {"law": "graph", "points": [[0, 0], [2e-6, 4e5], [9e-6, 1e5]]}
@@ -201,6 +204,17 @@ def test_models_from_python_give_lengths_as_functions() -> None:
 def test_what_is_refused(law: Table, said: str) -> None:
     with pytest.raises((hvi.InputError, ValueError), match=said):
         hvi.prepare(hvi.Scene.model_validate(model(4, friction=quadratic_linear(1e6) | law)))
+
+
+def test_a_copied_or_written_scene_has_the_formulas_and_is_refused_alike(tmp_path: Path) -> None:
+    """Ranks get a copy of the scene, and the result's folder a file."""
+    bent = {"law": "graph", "points": [[0, 0], ["1e-6*(1 + x)", 1e5], ["1e-6*(2 + x)", 1e5]]}
+    scene = hvi.Scene.model_validate(model(4, friction=bent))
+    written = tmp_path / "scene.toml"
+    written.write_text(dump_scene(scene), encoding="utf-8")
+    for again in (pickle.loads(pickle.dumps(scene)), hvi.read_scene(written)):
+        with pytest.raises(hvi.InputError, match="another shape"):
+            hvi.prepare(again)
 
 
 def test_a_law_that_does_not_know_its_units_takes_multipliers_alone() -> None:
