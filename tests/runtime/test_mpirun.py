@@ -7,6 +7,8 @@ import os
 import signal
 import subprocess
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +31,18 @@ def on_path(folder: Path, script: str) -> str:
     file.write_text(f"#!/bin/bash\n{script}\n", encoding="utf-8")
     file.chmod(0o755)
     return f"{file.parent}:{os.environ['PATH']}"
+
+
+@contextmanager
+def stopped(scene: Path, path: str) -> Iterator[subprocess.Popen[str]]:
+    """A run on two ranks that got SIGTERM when its mpirun was ready."""
+    out = scene.with_name("r")
+    words = [sys.executable, "-m", "hvi_fenicsx", "run", str(scene), "--np", "2", "--out", str(out)]
+    pipes: dict[str, Any] = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    with subprocess.Popen(words, cwd=ROOT, env=os.environ | {"PATH": path}, **pipes) as process:
+        assert process.stdout.readline() == "ready\n"
+        process.send_signal(signal.SIGTERM)
+        yield process
 
 
 @pytest.mark.parametrize("words", ["02", "1e3", "²", "2²", "+2", " 2", "0", "2.0", "4097", "9" * 5000, ""])
@@ -68,11 +82,7 @@ def test_after_a_signal_the_ranks_are_heard_at_once_and_mpiruns_notices_are_not(
         tmp_path, f"trap \"{said}; read -t 60 line < '{tmp_path}/go'; exit 1\" USR1; echo ready; sleep 60 & wait"
     )
     os.mkfifo(tmp_path / "go")
-    words = [sys.executable, "-m", "hvi_fenicsx", "run", str(scene), "--np", "2", "--out", str(tmp_path / "r")]
-    pipes: dict[str, Any] = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
-    with subprocess.Popen(words, cwd=ROOT, env=os.environ | {"PATH": path}, **pipes) as process:
-        assert process.stdout.readline() == "ready\n"
-        process.send_signal(signal.SIGTERM)
+    with stopped(scene, path) as process:
         assert process.stderr.readline() == "hvi: saving\n"
         assert process.stderr.readline() == "more\n"
         assert process.poll() is None
@@ -85,11 +95,7 @@ def test_ranks_that_were_interrupted_are_so_when_mpirun_is_ended_without_a_word(
     """The second signal comes between the last rank's end and mpirun's own."""
     code = "trap 'echo -n 130 > $HVI_EXIT_CODE_FILE; echo written' USR1; trap 'exit 1' TERM"
     path = on_path(tmp_path, f"{code}; echo ready; while true; do sleep 0.1; done")
-    words = [sys.executable, "-m", "hvi_fenicsx", "run", str(scene), "--np", "2", "--out", str(tmp_path / "r")]
-    pipes: dict[str, Any] = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
-    with subprocess.Popen(words, cwd=ROOT, env=os.environ | {"PATH": path}, **pipes) as process:
-        assert process.stdout.readline() == "ready\n"
-        process.send_signal(signal.SIGTERM)
+    with stopped(scene, path) as process:
         assert process.stdout.readline() == "written\n"
         process.send_signal(signal.SIGTERM)
         assert process.wait(60) == 130
