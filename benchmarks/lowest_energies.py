@@ -1,6 +1,7 @@
 """The lowest energy with a proof, on scenes that were written down before the first run; one line each, and a table.
 
-    ./hvi exec python3 benchmarks/lowest_energies.py [--limit SECONDS] [--limit-large SECONDS] [--largest VERTICES]
+    ./hvi exec python3 benchmarks/lowest_energies.py [--limit SECONDS] [--limit-large SECONDS]
+                                                       [--smallest VERTICES] [--largest VERTICES]
 
 Families in the plane: the model problem with strong laws (drops), four teeth, softening, lift-off, a free block; sizes
 4 to 192 cells along the floor; the demo `jureczka_ochal` and the composite of Mäkelä and others at its eight loads; two
@@ -25,7 +26,7 @@ from hvi_fenicsx import workflow
 from hvi_fenicsx.stationary_points.bodies import Equilibria
 
 Table = dict[str, Any]
-SPACE_SIZES = (2, 3, 4, 5, 6, 7, 9, 11)
+SPACE_SIZES = (2, 3, 4, 5, 6, 7, 9, 11, 13, 15)
 GLUE_SIZES = (4, 8, 16, 32, 63, 127)
 SIZES = (4, 8, 12, 16, 24, 32, 48, 64, 96, 128, 192)
 DEMO = Path(__file__).resolve().parent.parent / "demos" / "jureczka_ochal.toml"
@@ -192,13 +193,14 @@ def main() -> None:
     parser.add_argument(
         "--limit-large", type=float, default=600.0, help=f"seconds for those of more than {LARGE} vertices"
     )
+    parser.add_argument("--smallest", type=int, default=0, help="contact vertices")
     parser.add_argument("--largest", type=int, default=256, help="contact vertices")
     parser.add_argument("--only", default="", help="only scenes whose name begins like this")
     parser.add_argument("--out", type=Path)
     options = parser.parse_args()
     rows: list[Table] = []
     for name, vertices, scene in scenes(options.largest):
-        if not name.startswith(options.only):
+        if vertices < options.smallest or not name.startswith(options.only):
             continue
         rows.append(measured(name, vertices, scene, options.limit_large if vertices > LARGE else options.limit))
         print(*rows[-1].values(), sep="\t", flush=True)
