@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Any
 
 import dolfinx
 import numpy as np
 import numpy.typing as npt
+import ufl
 from dolfinx import common, fem, graph
 from dolfinx import cpp as _cpp
 from dolfinx import mesh as _mesh
@@ -15,6 +17,18 @@ from petsc4py import PETSc
 from .typing import Array, Entities
 
 VERSION: str = dolfinx.__version__
+
+
+class _Domain(ufl.Mesh):
+    """UFL's mesh, which makes its cell once: UFL asks for it many times in each form, and it has parts of its own."""
+
+    @cached_property
+    def _cell(self) -> Any:
+        return super().ufl_cell()
+
+    def ufl_cell(self) -> Any:
+        """The kind of cell."""
+        return self._cell
 
 
 def geometry_dofmap(mesh: _mesh.Mesh) -> Entities:
@@ -60,6 +74,8 @@ def refine(mesh: _mesh.Mesh, edges: Entities | None) -> tuple[_mesh.Mesh, Entiti
     mesh.topology.create_entities(1)
     fine, parents = _mesh.refine(mesh, edges, None, _mesh.RefinementOption.parent_cell)[:2]
     offset = mesh.comm.exscan(len(parents)) or 0  # parents come in input order
+    domain = _Domain(fine.ufl_domain().ufl_coordinate_element())
+    fine = _mesh.Mesh(fine._cpp_object, domain)
     return fine, np.asarray(parents[fine.topology.original_cell_index - offset], dtype=np.int32)
 
 
@@ -87,7 +103,7 @@ def simplex_mesh(comm: Any, cells: npt.NDArray[Any], points: Array, kind: str, *
     cells, points = np.asarray(cells, dtype=np.int64), np.ascontiguousarray(points)
     # with one rank and no partitioner, dolfinx does not even distribute
     partitioner = stay if comm.size > 1 and not spread else None
-    return _mesh.create_mesh(comm, cells=cells, x=points, e=element, partitioner=partitioner)
+    return _mesh.create_mesh(comm, cells=cells, x=points, e=_Domain(element), partitioner=partitioner)
 
 
 def mesh_of_entities(comm: Any, points: Array, cells: Entities, facets: Entities, sides: Entities) -> _mesh.Mesh | None:
@@ -104,7 +120,6 @@ def mesh_of_entities(comm: Any, points: Array, cells: Entities, facets: Entities
         The mesh; None where this dolfinx takes no topology that is made elsewhere.
     """
     import basix.ufl
-    import ufl
 
     if not hasattr(_cpp.mesh.Topology, "set_index_map"):
         return None
@@ -120,7 +135,7 @@ def mesh_of_entities(comm: Any, points: Array, cells: Entities, facets: Entities
     element = basix.ufl.element("Lagrange", kind.name, 1, shape=(d,))
     shape = fem.coordinate_element(element.basix_element)._cpp_object
     geometry = _cpp.mesh.Geometry_float64(maps[0], cells, shape, points, np.arange(n, dtype=np.int64))
-    return _mesh.Mesh(_cpp.mesh.Mesh_float64(comm, topology, geometry), ufl.Mesh(element))
+    return _mesh.Mesh(_cpp.mesh.Mesh_float64(comm, topology, geometry), _Domain(element))
 
 
 def quadratic_mesh(mesh: _mesh.Mesh, dofmap: Any, points: Array) -> _mesh.Mesh:
@@ -132,7 +147,6 @@ def quadratic_mesh(mesh: _mesh.Mesh, dofmap: Any, points: Array) -> _mesh.Mesh:
         points: the local nodes by this dofmap, m, (n, 3).
     """
     import basix.ufl
-    import ufl
 
     d, index_map = mesh.geometry.dim, dofmap.index_map
     element = basix.ufl.element("Lagrange", mesh.topology.cell_name(), 2, shape=(d,))
@@ -141,7 +155,7 @@ def quadratic_mesh(mesh: _mesh.Mesh, dofmap: Any, points: Array) -> _mesh.Mesh:
     nodes = np.ascontiguousarray(points[:, :d])
     geometry = _cpp.mesh.Geometry_float64(index_map, dofmap.list, shape, nodes, numbers)
     topology = getattr(mesh.topology, "_cpp_object", mesh.topology)
-    return _mesh.Mesh(_cpp.mesh.Mesh_float64(mesh.comm, topology, geometry), ufl.Mesh(element))
+    return _mesh.Mesh(_cpp.mesh.Mesh_float64(mesh.comm, topology, geometry), _Domain(element))
 
 
 def same_topology(one: _mesh.Mesh, other: _mesh.Mesh) -> bool:
