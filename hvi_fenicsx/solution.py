@@ -152,13 +152,21 @@ class Solution:
         if self.solve_result is None:
             return "no solution exists: the load moves the body away"
         if self.converged:
-            local = " (a local equilibrium: the state is metastable)" if self.solvability.state == "metastable" else ""
             free = ", ".join(mode.name for mode in self.solvability.free)
-            return f"certified{local}" + (f"; determined up to {free}" if free else "")
+            return f"certified{self._which}" + (f"; determined up to {free}" if free else "")
         if self.solvability.state == "metastable" and not self.solve_result.interrupted:
             return f"metastable, and no equilibrium found ({self.solve_result.reason})"
         unknown = "; whether a solution exists could not be decided" if self.solvability.state == "undecided" else ""
         return f"not certified ({self.solve_result.reason}){unknown}"
+
+    @property
+    def _which(self) -> str:
+        """Which equilibrium it is, in brackets, where that is not plain."""
+        local = "a local equilibrium: the state is metastable" if self.solvability.state == "metastable" else ""
+        off = self.solve_result.off_path if self.solve_result else None
+        path = f"loading leads to it by a jump, if at all: {off}" if off else ""
+        said = "; ".join(part for part in (local, path) if part)
+        return f" ({said})" if said else ""
 
     @cached_property
     def forces(self) -> PlacedForces | None:

@@ -25,7 +25,7 @@ from .closed_start import resting_start
 from .context import SolveContext
 from .continuation import Continuation
 from .law_models import Majorant
-from .load_path_start import softens
+from .load_path_start import PathStart, softens
 from .result import Counts, SolveResult
 from .rigid_start import at_rest
 
@@ -33,26 +33,33 @@ from .rigid_start import at_rest
 class _StepLimit:
     """Whether to stop: the user asks for it, or all starts together have taken too many Newton steps (None: any).
 
-    The first start may have a limit of its own.
+    A start may have a limit of its own; its steps count for that alone.
     """
 
     def __init__(self, interrupted: Callable[[], bool], most: int | None) -> None:
         self._interrupted, self._most = interrupted, most
-        self._steps, self.exceeded, self.cut = 0, False, False
-        self.first: int | None = None
+        self._steps, self.exceeded = 0, False
+        self._left: int | None = None
+
+    @property
+    def cut(self) -> bool:
+        """Whether the start has taken more steps than it may."""
+        return self._left is not None and self._left < 0
 
     def __call__(self) -> bool:
         """Asked once a Newton step. Collective."""
         if self._interrupted():
             return True
+        if self._left is not None:
+            self._left -= 1
+            return self.cut
         self._steps += 1
-        self.cut = self.first is not None and self._steps > self.first
         self.exceeded = self.exceeded or (self._most is not None and self._steps > self._most)
-        return self.exceeded or self.cut
+        return self.exceeded
 
-    def without_first(self) -> None:
-        """The first start is done."""
-        self.first, self.cut = None, False
+    def next_start(self, most: int | None = None) -> None:
+        """Another start begins, with a limit of its own or without one."""
+        self._left = most
 
 
 class Auto(BranchIteration):
@@ -83,10 +90,10 @@ class Auto(BranchIteration):
 
     def _search(self, start: PETSc.Vec | None, branches: PETSc.Vec | None) -> SolveResult:
         follows = start is None and branches is None and self._asks_for_path()
-        self._limit.first = self.options.thresholds.path.quick_steps if follows and self._soft() else None
+        self._limit.next_start(self.options.thresholds.path.quick_steps if follows and self._soft() else None)
         first = super().solve(start, branches)
         cut = self._limit.cut
-        self._limit.without_first()
+        self._limit.next_start()
         if first.converged or (first.interrupted and not cut) or not self.system.terms:
             return first
         along = self._along_path(first) if follows else None
@@ -124,29 +131,49 @@ class Auto(BranchIteration):
         if path is None or (path.x is None and self._held):
             return None
         if path.x is None:
-            reason = f"no equilibrium on the loading path: {path.reason}"
-            return replace(first, interrupted=False, reason=reason, borne=path.borne)
+            return self._off_path(first, path)
         for found in self._attempt(self._iteration().solve, path.x):
             found.counts.add(first.counts)
             if found.converged or found.interrupted:
                 return found
         return None
 
+    def _off_path(self, first: SolveResult, path: PathStart) -> SolveResult:
+        """An equilibrium from other starts, to which loading leads by a jump if at all; else that its path has none.
+
+        Each start gets few steps: what laws hold is found in some ten, what slides away takes hundreds. Collective.
+        """
+        counts = Counts()
+        counts.add(first.counts)
+        resting, _ = resting_start(self.solver, self._laws)
+        for found in self._on_other_pieces(resting, self.options.thresholds.path.other_steps):
+            counts.add(found.counts)
+            if found.converged or (found.interrupted and not self._limit.cut):
+                return replace(found, counts=counts, off_path=path.reason)
+        self._limit.next_start()
+        reason = f"no equilibrium on the loading path: {path.reason}"
+        return replace(first, counts=counts, interrupted=False, reason=reason, borne=path.borne)
+
     def _others(self) -> Iterator[SolveResult]:
         """Results from further starts, one after the other."""
-        exact, broken = [term.exact for term in self.system.terms], self.thresholds.broken_slip
+        exact = [term.exact for term in self.system.terms]
         if any(law is not true for law, true in zip(self._laws, exact, strict=True)):
             for found in self._attempt(self._iteration(exact).solve):
                 yield from self._from_exact(found)
         yield from self._from_rest()
         resting, _ = resting_start(self.solver, self._laws)
-        for factor in (1.0, broken, -broken):
-            pieces = resting.copy()
-            pieces.scale(factor)
-            yield from self._attempt(self._iteration().solve, None, pieces)
+        yield from self._on_other_pieces(resting)
         yield from self._attempt(Continuation(self.context).solve)
         for start in (self.system.undisplaced(), resting):
             yield from self._attempt(self._iteration().newton, start)
+
+    def _on_other_pieces(self, resting: PETSc.Vec, most: int | None = None) -> Iterator[SolveResult]:
+        """On the pieces of the slips at rest, and with every bond broken, each in so many Newton steps at most."""
+        for factor in (1.0, self.thresholds.broken_slip, -self.thresholds.broken_slip):
+            pieces = resting.copy()
+            pieces.scale(factor)
+            self._limit.next_start(most)
+            yield from self._attempt(self._iteration().solve, None, pieces)
 
     def _from_rest(self) -> Iterator[SolveResult]:
         """From bodies at rest on their supports, since closed contact is no start where bodies roll.

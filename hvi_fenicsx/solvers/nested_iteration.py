@@ -119,12 +119,14 @@ def solve_from_coarser(
     _log_level(system, kind)
     result = kind(context).solve() if first is None else kind(context).solve(first)
     if first is not None and not result.converged and not result.interrupted:
+        first = None
         result = kind(SolveContext.create(system, start.levels, solvability, options, control)).solve()
     counts = Counts()
     counts.add(found.counts)
     counts.add(result.counts)
     steady = result.steady and (found.steady or found.levels == 1)  # a single coarser level says too little
-    result = replace(result, counts=counts, levels=found.levels + 1, steady=steady)
+    off_path = result.off_path if first is None else found.off_path
+    result = replace(result, counts=counts, levels=found.levels + 1, steady=steady, off_path=off_path)
     return LevelSolution(system=system, levels=start.levels, result=result)
 
 

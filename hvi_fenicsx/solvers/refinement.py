@@ -55,4 +55,6 @@ def refined(
     counts = Counts()
     counts.add(found.counts)
     counts.add(again.counts)
-    return replace(again, counts=counts, levels=found.levels, borne=found.borne) if again.converged else None
+    if not again.converged:
+        return None
+    return replace(again, counts=counts, levels=found.levels, borne=found.borne, off_path=found.off_path)

@@ -63,6 +63,7 @@ class SolveResult:
         levels: levels of the mesh hierarchy on which it was solved, one after the other.
         steady: whether the pieces and the active set of the start were the final ones, on every level.
         borne: what of the load is borne, where a load path was followed and says so.
+        off_path: how the load path ended, where it ended before the whole load and this was found from another start.
     """
 
     u: fem.Function
@@ -75,3 +76,4 @@ class SolveResult:
     levels: int = 1
     steady: bool = False
     borne: Borne | None = None
+    off_path: str | None = None

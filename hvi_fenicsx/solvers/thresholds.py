@@ -135,6 +135,7 @@ class PathThresholds:
 
     Attributes:
         quick_steps: Newton steps of the first start before a path is followed, where laws soften.
+        other_steps: Newton steps of each further start where a path ends before the whole load.
         vertex_unknowns: unknowns of Γc's vertices up to which the system is condensed.
         curved_unknowns: condensed unknowns up to which a path that is not straight between events is followed.
         whole_curve_unknowns: those up to which the curve of all equilibria is followed for a start, without jumps.
@@ -144,6 +145,7 @@ class PathThresholds:
     """
 
     quick_steps: int = 8
+    other_steps: int = 20
     vertex_unknowns: int = 1_600
     curved_unknowns: int = 200
     whole_curve_unknowns: int = 400
