@@ -45,6 +45,7 @@ Physical Curve("bottom") = {{1}}; Physical Curve("left") = {{3}}; Physical Curve
 Physical Curve("outer") = {{2}}; Physical Surface("body") = {{1}};
 Mesh.ElementOrder = {order};
 """
+"""A quarter of a ring, radii 1 and 2."""
 SPRING = {"law": "graph", "points": [[0, 0], [1.0, 1e8]]}
 
 

@@ -158,6 +158,25 @@ def quadratic_mesh(mesh: _mesh.Mesh, dofmap: Any, points: Array) -> _mesh.Mesh:
     return _mesh.Mesh(_cpp.mesh.Mesh_float64(mesh.comm, topology, geometry), _Domain(element))
 
 
+def linear_mesh(mesh: _mesh.Mesh) -> _mesh.Mesh:
+    """A mesh of the same topology whose cells are straight.
+
+    Args:
+        mesh: of simplices of any order.
+    """
+    import basix.ufl
+
+    d, topology = mesh.geometry.dim, getattr(mesh.topology, "_cpp_object", mesh.topology)
+    index_map, cells = topology.index_map(0), mesh.topology.connectivity(d, 0).array.reshape(-1, d + 1)
+    numbers = np.arange(index_map.size_local + index_map.num_ghosts, dtype=np.int32)
+    nodes = np.empty((len(numbers), d))
+    nodes[cells] = mesh.geometry.x[geometry_dofmap(mesh)[: len(cells), : d + 1], :d]
+    element = basix.ufl.element("Lagrange", mesh.topology.cell_name(), 1, shape=(d,))
+    shape = fem.coordinate_element(element.basix_element)._cpp_object
+    geometry = _cpp.mesh.Geometry_float64(index_map, cells, shape, nodes, index_map.local_to_global(numbers))
+    return _mesh.Mesh(_cpp.mesh.Mesh_float64(mesh.comm, topology, geometry), _Domain(element))
+
+
 def same_topology(one: _mesh.Mesh, other: _mesh.Mesh) -> bool:
     """Whether two meshes share their cells and facets, and so the numbers of them.
 

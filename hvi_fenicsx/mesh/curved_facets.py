@@ -36,13 +36,15 @@ class CurvedFacets:
 
         So an edge between two sides stays on both.
         """
+        if not len(x):
+            return np.array(x, dtype=np.float64)
         facet, point = self._pairs(x)
         found, away = self._projected(facet, x[point])
         order = np.argsort(-away, kind="stable")  # of several facets of one point, the last one stays
         result = np.array(x, dtype=np.float64)
         result[point[order]] = found[order]
         straight, own = self._middles()
-        away, number = KDTree(straight).query(x) if len(x) else (np.empty(0), np.empty(0, np.int64))
+        away, number = KDTree(straight).query(x)
         same = away <= _ROUNDING * np.linalg.norm(np.ptp(self.points, axis=(0, 1)))
         result[same] = own[number[same]]
         return result
@@ -67,7 +69,7 @@ class CurvedFacets:
         """Facets, and points that may be nearest to them; all facets for points that are near none."""
         centres = self.points.mean(axis=1)
         radii = 1.5 * np.linalg.norm(self.points - centres[:, None], axis=2).max(axis=1)
-        near = KDTree(x).query_ball_point(centres, radii, return_sorted=True) if len(x) else []
+        near = KDTree(x).query_ball_point(centres, radii, return_sorted=True)
         facet = np.repeat(np.arange(len(near)), [len(one) for one in near])
         point = np.concatenate([np.empty(0), *near]).astype(np.int64)
         lost = np.setdiff1d(np.arange(len(x)), point)

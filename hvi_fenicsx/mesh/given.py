@@ -6,13 +6,15 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
+from dolfinx import fem
 from dolfinx import mesh as dmesh
 
 from .. import compat
 from ..errors import InputError
 from ..runtime.mpi import agree
 from ..typing import Entities
-from . import folds
+from . import folds, nodes, second_order
+from .curved_facets import CurvedFacets
 from .domain import Domain
 
 _SIMPLICES = ("triangle", "tetrahedron")
@@ -23,8 +25,10 @@ def domain_of(
 ) -> Domain:
     """The domain of a mesh with tags. Collective.
 
+    Cells of second order become straight, as those of a mesh file do; the facets of the sides remain as curves.
+
     Args:
-        mesh: of triangles or tetrahedra, in m.
+        mesh: of triangles or tetrahedra of order 1 or 2, in m.
         facets: tags of facets, or None.
         cells: tags of cells, or None.
         sides: tags of facets by the names of the sides.
@@ -33,7 +37,9 @@ def domain_of(
     Raises:
         InputError: on all ranks alike, with what is wrong and how to mend it.
     """
-    _check_mesh(mesh)
+    _check_cells(mesh)
+    straight = mesh if compat.geometry_degree(mesh) == 1 else compat.linear_mesh(mesh)
+    _check_folds(straight)
     d = mesh.topology.dim
     mesh.topology.create_connectivity(d - 1, d)
     if regions and cells is None:
@@ -44,7 +50,26 @@ def domain_of(
         raise InputError(f"body: {next(iter(sides))!r} is a side, but no tags of facets are given: facets=...")
     named_sides = _named(mesh, facets, d - 1, sides)
     _check_outer(mesh, named_sides)
-    return Domain.from_mesh(mesh, named_sides, _named(mesh, cells, d, regions))
+    curves = {} if straight is mesh else _curves(mesh, named_sides)
+    return Domain.from_mesh(straight, named_sides, _named(mesh, cells, d, regions), curves)
+
+
+def _curves(mesh: dmesh.Mesh, sides: Mapping[str, Entities]) -> dict[str, CurvedFacets]:
+    """The curves of sides of second order, by name, on all ranks. Collective.
+
+    Raises:
+        InputError: a curve turns back within a facet.
+    """
+    space, found = fem.functionspace(mesh, ("Lagrange", 2)), {}
+    points = nodes.points(space)[:, : mesh.geometry.dim]
+    for name, facets in sides.items():
+        curve = np.concatenate(agree(mesh.comm, points[nodes.facet_nodes(space, facets)]))
+        if len(turning := second_order.turning_back(curve)):
+            place = tuple(map(float, curve[turning[0]].mean(axis=0)))
+            raise InputError(f"body: the side {name!r} has at {place} a {second_order.TURNING_BACK}")
+        if second_order.is_curved(curve):
+            found[name] = CurvedFacets(curve)
+    return found
 
 
 def check_tags(**given: Any) -> None:
@@ -75,7 +100,7 @@ def tags_present(mesh: dmesh.Mesh, tags: Any) -> set[int]:
     return set().union(*agree(mesh.comm, own))
 
 
-def _check_mesh(mesh: dmesh.Mesh) -> None:
+def _check_cells(mesh: dmesh.Mesh) -> None:
     kind, d = mesh.topology.cell_name(), mesh.geometry.dim
     if kind not in _SIMPLICES:
         raise InputError(
@@ -87,12 +112,10 @@ def _check_mesh(mesh: dmesh.Mesh) -> None:
             f"body: the mesh has cells of dimension {mesh.topology.dim} in {d} coordinates; give as many coordinates "
             f"as dimensions, such as gdim={mesh.topology.dim} where the mesh is read"
         )
-    if (degree := compat.geometry_degree(mesh)) != 1:
+    if (degree := compat.geometry_degree(mesh)) > 2:
         raise InputError(
-            f"body: the cells are curved (degree {degree}); give straight ones, degree 1, or the mesh file of second "
-            "order that gmsh saves: hvi.Body.file(...)"
+            f"body: the cells are of order {degree}; give a mesh of order 1 or 2 (gmsh: Mesh.ElementOrder)"
         )
-    _check_folds(mesh)
 
 
 def _check_folds(mesh: dmesh.Mesh) -> None:

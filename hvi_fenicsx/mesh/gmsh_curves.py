@@ -9,17 +9,12 @@ import numpy as np
 
 from ..errors import InputError
 from ..typing import Array, Entities, Integers
-from . import gmsh_arrays
+from . import gmsh_arrays, second_order
 
 _QUADRATIC = {1: 8, 2: 9, 3: 11}
 """Gmsh's element type of the simplex of second order, by dimension."""
 _ORDER = {1: [0, 1, 2], 2: [0, 1, 2, 4, 5, 3]}
 """Where basix has the nodes of a facet, by its dimension."""
-_EDGES = {1: [(0, 1)], 2: [(1, 2), (0, 2), (0, 1)]}
-_STRAIGHT = 1e-9
-"""Distance of a midpoint from the middle of its edge over the edge's length that is rounding."""
-_FARTHEST = 0.25
-"""The same along the edge: from there on the curve turns back."""
 
 
 def straightened(gmsh: Any, path: Path, dimension: int) -> tuple[Array, Entities]:
@@ -46,7 +41,11 @@ def straightened(gmsh: Any, path: Path, dimension: int) -> tuple[Array, Entities
 
 
 def _facets(gmsh: Any, path: Path, dimension: int, group: int) -> tuple[Array, Entities]:
-    """The facets of a group and the group of each; none where they are straight."""
+    """The facets of a group and the group of each; none where they are straight.
+
+    Raises:
+        InputError: a midpoint is too far from the middle of its edge.
+    """
     tags, points, _ = gmsh.model.mesh.getNodes()
     place = dict(zip(tags.tolist(), points.reshape(-1, 3), strict=True))
     rows: list[Integers] = [np.empty((0, len(_ORDER[dimension])), dtype=np.int64)]
@@ -56,26 +55,9 @@ def _facets(gmsh: Any, path: Path, dimension: int, group: int) -> tuple[Array, E
                 rows.append(np.asarray(nodes, dtype=np.int64).reshape(-1, len(_ORDER[dimension])))
     nodes = np.concatenate(rows)[:, _ORDER[dimension]]
     found = np.array([[place[node] for node in facet] for facet in nodes.tolist()]).reshape(*nodes.shape, 3)
-    if not _is_curved(path, found, nodes, dimension):
+    if len(bad := second_order.turning_back(found)):
+        names = ", ".join(map(str, nodes[bad[0]]))
+        raise InputError(f"mesh file {path}: the boundary element of nodes {names} has a {second_order.TURNING_BACK}")
+    if not second_order.is_curved(found):
         found = found[:0]
     return found, np.full(len(found), group, dtype=np.int32)
-
-
-def _is_curved(path: Path, found: Array, nodes: Integers, dimension: int) -> bool:
-    """Whether any midpoint is off the middle of its edge.
-
-    Raises:
-        InputError: one is too far from it.
-    """
-    curved = False
-    for middle, (a, b) in enumerate(_EDGES[dimension], dimension + 1):
-        edge = found[:, b] - found[:, a]
-        off = found[:, middle] - (found[:, a] + found[:, b]) / 2
-        length = np.linalg.norm(edge, axis=1)
-        curved |= bool(np.any(np.linalg.norm(off, axis=1) > _STRAIGHT * length))
-        along = np.abs(np.sum(off * edge, axis=1)) >= _FARTHEST * length**2
-        if np.any(along):
-            bad = ", ".join(map(str, nodes[np.argmax(along)]))
-            text = "lies beyond the middle half of its edge, where a curve of second order turns back; remesh"
-            raise InputError(f"mesh file {path}: a midpoint of the boundary element of nodes {bad} {text}")
-    return curved

@@ -100,7 +100,10 @@ class UserEnergy(Effect):
 
 
 def _assembled(form: Form, space: fem.FunctionSpace) -> PETSc.Mat:
-    made = form(ufl.TrialFunction(space), ufl.TestFunction(space))
+    try:
+        made = form(ufl.TrialFunction(space), ufl.TestFunction(space))
+    except ValueError as error:  # so UFL refuses data of several meshes
+        raise InputError(f"energy: UFL refuses the form: {error} Its data must be on body.mesh") from error
     if not isinstance(made, ufl.Form) or len(made.arguments()) != 2:
         raise InputError("energy: the function must return a bilinear UFL form a(u, v), such as inner(σ(u), ε(v))*dx")
     matrix = assemble_matrix(forms.compiled(made))

@@ -50,14 +50,14 @@ class PythonFunction(SpatialValue):
 
 
 class Expression(SpatialValue):
-    """A scalar UFL expression, or fem.Function, on the body's own mesh.
+    """A scalar UFL expression, or fem.Function, on the body's own mesh or one of the same cells, straight or curved.
 
-    On the mesh itself it stands in forms as it is, on curved cells of degree 2 as it is at their nodes. At vertices,
+    On the mesh itself it stands in forms as it is, on one of the same cells as it is at their nodes. At vertices,
     and on coarser meshes, which only give start values, it is sampled at the nearest vertex.
 
     Args:
         expression: in SI.
-        mesh: the body's mesh.
+        mesh: its own.
     """
 
     __slots__ = ("_expression", "_mesh", "source")
@@ -86,20 +86,20 @@ class Expression(SpatialValue):
         if mesh is self._mesh:
             return self._expression
         if compat.same_topology(mesh, self._mesh):
-            return self._on_curved_cells(mesh)
+            return self._on_same_cells(mesh)
         found = fem.Function(fem.functionspace(mesh, ("Lagrange", 1)))
         found.interpolate(lambda x: self.at(x.T))
         return found
 
-    def _on_curved_cells(self, mesh: dmesh.Mesh) -> fem.Function:
-        """The expression at the nodes of the curved mesh that belongs to the body's: their numbers are the same."""
-        straight, curved = (fem.functionspace(one, ("Lagrange", 2)) for one in (self._mesh, mesh))
+    def _on_same_cells(self, mesh: dmesh.Mesh) -> fem.Function:
+        """The expression at the nodes of a mesh of the same cells, straight or curved: their numbers are the same."""
+        own, other = (fem.functionspace(one, ("Lagrange", 2)) for one in (self._mesh, mesh))
         d = mesh.geometry.dim
         position = fem.Function(fem.functionspace(self._mesh, ("Lagrange", 2, (d,))))
-        position.x.array[:] = nodes.points(curved)[:, :d].ravel()
+        position.x.array[:] = nodes.points(other)[:, :d].ravel()
         moved = ufl.replace(self._expression, {ufl.SpatialCoordinate(self._mesh): position})
-        sampled, found = fem.Function(straight), fem.Function(curved)
-        sampled.interpolate(compat.expression(moved, straight))
+        sampled, found = fem.Function(own), fem.Function(other)
+        sampled.interpolate(compat.expression(moved, own))
         found.x.array[:] = sampled.x.array
         return found
 
@@ -157,10 +157,19 @@ def _component(function: Callable[[Array], Any], number: int) -> Callable[[Array
 def _expression(given: Any, mesh: dmesh.Mesh) -> SpatialValue:
     if given.ufl_shape != ():
         raise InputError(f"a scalar is wanted; the UFL expression has the shape {given.ufl_shape}")
-    domains = [domain.ufl_cargo() for domain in ufl.domain.extract_domains(given)]
-    if any(domain is not mesh._cpp_object for domain in domains):
+    domains = ufl.domain.extract_domains(given)
+    if not domains:
+        return Formula(float(given(())))  # a number needs no mesh
+    own = [_mesh_of(domain, mesh) for domain in domains]
+    if any(one is not own[0] for one in own) or not compat.same_topology(own[0], mesh):
         raise InputError("a UFL expression or fem.Function is of another mesh than the body; make it on body.mesh")
-    return Expression(given, mesh) if domains else Formula(float(given(())))  # a number needs no mesh
+    return Expression(given, own[0])
+
+
+def _mesh_of(domain: ufl.Mesh, mesh: dmesh.Mesh) -> dmesh.Mesh:
+    """The mesh of UFL's domain: the body's, or the one that the user made the body of."""
+    cargo = domain.ufl_cargo()
+    return mesh if cargo is mesh._cpp_object else dmesh.Mesh(cargo, domain)
 
 
 def _shortened(text: str) -> str:

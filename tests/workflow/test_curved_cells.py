@@ -6,6 +6,7 @@ is held to Lamé's thick walls and to uniform stresses, which curved cells repre
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -25,20 +26,11 @@ from hvi_fenicsx.problem import spaces
 from hvi_fenicsx.studies import interpolation
 from hvi_fenicsx.studies.solution_fields import SolutionFields
 
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "benchmarks"))
+from degree_two import RING
+
 E, NU, P = 1e7, 0.3, 1e5
 BULK, SHEAR = E / (3 * (1 - 2 * NU)), E / (2 * (1 + NU))
-RING = """
-h = {size};
-Point(1) = {{0, 0, 0, h}};
-Point(2) = {{1, 0, 0, h}}; Point(3) = {{2, 0, 0, h}}; Point(4) = {{0, 2, 0, h}}; Point(5) = {{0, 1, 0, h}};
-Line(1) = {{2, 3}}; Circle(2) = {{3, 1, 4}}; Line(3) = {{4, 5}}; Circle(4) = {{5, 1, 2}};
-Curve Loop(1) = {{1, 2, 3, 4}}; Plane Surface(1) = {{1}};
-Physical Curve("bottom") = {{1}}; Physical Curve("outer") = {{2}};
-Physical Curve("left") = {{3}}; Physical Curve("inner") = {{4}};
-Physical Surface("body") = {{1}};
-Mesh.ElementOrder = {order};
-"""
-"""A quarter of a ring, radii 1 and 2."""
 SHELL = """
 gmsh.option.setNumber("Mesh.MeshSizeMax", {size})
 gmsh.option.setNumber("Mesh.MeshSizeMin", {size})
