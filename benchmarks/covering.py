@@ -1,4 +1,4 @@
-"""A list of cases that covers a table of axes: every value, every pair of values, chosen triples, and corners.
+"""A list of cases that covers a table of axes: every value, every pair, chosen groups of axes, and corners.
 
 Greedy (AETG; Cohen et al. 1997): each case starts from an uncovered tuple, and each of its other axes takes the value
 that covers most of what is left. Deterministic: the table's seed decides what the coverage leaves open.
@@ -22,10 +22,14 @@ Tuple = frozenset[tuple[str, Any]]
 
 @dataclass(frozen=True)
 class Case:
-    """One combination. ``number`` counts from 1; ``key`` is made of the values, so it outlives a change of the list."""
+    """One combination. ``number`` counts from 1; ``key`` is made of the values, so it outlives a change of the list.
+
+    ``fixed`` has the values of the axes that the table does not vary; they are no part of the key.
+    """
 
     number: int
     values: Values
+    fixed: Values = field(default_factory=dict)
 
     @property
     def key(self) -> str:
@@ -33,7 +37,7 @@ class Case:
         return hashlib.sha256(text.encode()).hexdigest()[:10]
 
     def __getitem__(self, axis: str) -> Any:
-        return self.values[axis]
+        return self.values[axis] if axis in self.values else self.fixed[axis]
 
 
 @dataclass
@@ -73,7 +77,7 @@ class Table:
 
     def tuples(self) -> set[Tuple]:
         """What is to be covered."""
-        groups = [*itertools.combinations(self.axes, 2), *map(tuple, self.data["triples"])]
+        groups = [*itertools.combinations(self.axes, 2), *map(tuple, self.data["groups"])]
         rows = (dict(zip(g, r, strict=True)) for g in groups for r in itertools.product(*(self.axes[a] for a in g)))
         return {frozenset(row.items()) for row in rows if self.allowed(row)}
 
@@ -91,7 +95,7 @@ def cases(table: Table) -> list[Case]:
             left -= _covered(values, context)
         found += _coverage(context, left)
     unique = {json.dumps(v, sort_keys=True): v for v in found}
-    return [Case(i, v) for i, v in enumerate(unique.values(), start=1)]
+    return [Case(i, v, table.data["fixed"]) for i, v in enumerate(unique.values(), start=1)]
 
 
 def _singles(table: Table) -> Iterator[Values]:
@@ -140,15 +144,15 @@ def _choice(table: Table, given: Values, axis: str, left: set[Tuple]) -> Any:
 
 def _gain(given: Values, new: tuple[str, Any], table: Table, left: set[Tuple]) -> int:
     others = [(item,) for item in given.items()]
-    triples = [tuple((a, given[a]) for a in t if a != new[0]) for t in _ready(table, given, new[0])]
-    return sum(frozenset((new, *rest)) in left for rest in [*others, *triples])
+    groups = [tuple((a, given[a]) for a in t if a != new[0]) for t in _ready(table, given, new[0])]
+    return sum(frozenset((new, *rest)) in left for rest in [*others, *groups])
 
 
 def _ready(table: Table, given: Values, axis: str) -> list[list[str]]:
-    """The triples with this axis whose other axes are given."""
-    return [t for t in table.data["triples"] if axis in t and all(a in given for a in t if a != axis)]
+    """The groups with this axis whose other axes are given."""
+    return [t for t in table.data["groups"] if axis in t and all(a in given for a in t if a != axis)]
 
 
 def _covered(values: Values, table: Table) -> set[Tuple]:
-    groups = [*itertools.combinations(table.axes, 2), *map(tuple, table.data["triples"])]
+    groups = [*itertools.combinations(table.axes, 2), *map(tuple, table.data["groups"])]
     return {frozenset((a, values[a]) for a in group) for group in groups}

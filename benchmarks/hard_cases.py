@@ -2,8 +2,8 @@
 
     python3 benchmarks/hard_cases.py run [--method auto ...] [--only KEY ...] [--cells N] [--limit SECONDS]
         [--sample NUMBER SEED] [--out FILE]
-    python3 benchmarks/hard_cases.py report [--out results/hard_cases.jsonl]
-    python3 benchmarks/hard_cases.py list
+    python3 benchmarks/hard_cases.py report [--table hard_wide] [--out FILE]
+    python3 benchmarks/hard_cases.py list [--table hard_wide]
 
 ``run`` starts one worker for the cases on one rank and one, through mpirun, for those on two; each works its cases off
 in one process and adds a line to the results after each. Finished ones are not done again. A worker that crashes, or
@@ -28,7 +28,7 @@ from covering import Case, Table, cases
 
 HERE = Path(__file__).resolve().parent
 AXES = HERE / "hard_cases.toml"
-RESULTS = HERE.parent / "results" / "hard_cases.jsonl"
+TABLES = ("hard_cases", "hard_wide")
 SILENCE = 10.0
 """A worker that writes nothing for so many time limits, in wall time, hangs."""
 
@@ -37,17 +37,19 @@ Record = dict[str, Any]
 
 def main() -> int:
     """The command line."""
-    table = Table.read(AXES)
-    options = _options(table)
+    options = _options()
+    table = Table.read(HERE / f"{options.table}.toml")
+    options.limit = options.limit or table.data["limit"]
+    options.out = options.out or HERE.parent / "results" / f"{options.table}.jsonl"
     listed = [c for c in cases(table) if not options.only or c.key in options.only]
     if options.command == "run":
-        listed = _sampled([c for c in listed if c["cells"] <= options.cells], options.sample)
+        listed = _sampled([c for c in listed if c["cells"] <= (options.cells or c["cells"])], options.sample)
     if options.command == "list":
         print("\n".join(f"{c.number:3} {c.key} {c.values}" for c in listed))
     elif options.command == "report":
         import hard_report
 
-        hard_report.write(table, listed, read(options.out), HERE.parent / "docs")
+        hard_report.write(options.table, table, listed, read(options.out), HERE.parent / "docs")
     elif options.worker:
         _work(table, [c for c in listed if c["ranks"] == options.worker], options)
     else:
@@ -64,17 +66,18 @@ def _sampled(listed: list[Case], sample: list[int] | None) -> list[Case]:
     return random.Random(seed).sample(listed, len(listed))[:number]
 
 
-def _options(table: Table) -> argparse.Namespace:
+def _options() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("command", choices=["run", "report", "list"])
+    parser.add_argument("--table", choices=TABLES, default=TABLES[0], help="the axes (hard_cases)")
     parser.add_argument("--method", nargs="+", help="methods, by default all there are")
     parser.add_argument("--only", nargs="+", metavar="KEY", help="cases, by default all there are")
-    parser.add_argument("--cells", type=int, default=max(table.axes["cells"]), help="run no larger cases")
+    parser.add_argument("--cells", type=int, help="run no larger cases")
     sample = "so many of them, drawn with a seed"
     parser.add_argument("--sample", type=int, nargs=2, metavar=("NUMBER", "SEED"), help=sample)
     limit = "processor time for one case and one method, by default the table's"
-    parser.add_argument("--limit", type=float, metavar="SECONDS", default=table.data["limit"], help=limit)
-    parser.add_argument("--out", type=Path, default=RESULTS, help="file of results (results/hard_cases.jsonl)")
+    parser.add_argument("--limit", type=float, metavar="SECONDS", help=limit)
+    parser.add_argument("--out", type=Path, help="file of results (results/TABLE.jsonl)")
     parser.add_argument("--worker", type=int, metavar="RANKS", help=argparse.SUPPRESS)
     return parser.parse_args()
 

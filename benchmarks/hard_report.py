@@ -1,4 +1,4 @@
-"""The document of the hard-case matrix: docs/hard-cases.md and its picture, from the results alone."""
+"""The document of a hard-case matrix and its picture, docs/hard-cases.md of the first, from the results alone."""
 
 from __future__ import annotations
 
@@ -17,18 +17,18 @@ QUICK = 10.0
 COMMAND = "./hvi exec python3 benchmarks/hard_cases.py"
 
 
-def write(table: Table, listed: Sequence[Case], records: Iterable[Record], folder: Path) -> None:
-    """Both files."""
-    results = Results(table, listed, records)
+def write(name: str, table: Table, listed: Sequence[Case], records: Iterable[Record], folder: Path) -> None:
+    """Both files, called as the table is."""
+    results, page = Results(table, listed, records), name.replace("_", "-")
     parts = [
-        _head(table, listed),
+        _head(name, table, listed),
         _counts(results),
         _iterations(results),
         _without(results),
         *(_open(results, m) for m in results.methods),
     ]
-    (folder / "hard-cases.md").write_text("\n\n".join(parts) + "\n", encoding="utf-8")
-    draw(table, results, folder / "hard-cases.png")
+    (folder / f"{page}.md").write_text("\n\n".join(parts) + "\n", encoding="utf-8")
+    draw(table, results, folder / f"{page}.png")
 
 
 def _without(results: Results) -> str:
@@ -51,30 +51,31 @@ def _size(case: Case) -> list[str]:
     return [case["law"], str(case["cells"])]
 
 
-def _head(table: Table, listed: Sequence[Case]) -> str:
+def _head(name: str, table: Table, listed: Sequence[Case]) -> str:
+    page = name.replace("_", "-")
     return f"""# Hard cases: which method solves what?
 
 This page reports {len(listed)} difficult problems, solved with several methods. Only the certificate decides whether
 a problem is solved. The problems combine everything that makes such a problem difficult: support, law, strength,
-distance from the limit load, mesh, units, start and more. `benchmarks/hard_cases.toml` has these axes and their values.
+distance from the limit load, mesh, units, start and more. `benchmarks/{name}.toml` has these axes and their values.
 They were committed before anything was run (the `later` values before anything was run with them). The list of cases
 follows from the axes (`{COMMAND} list`): it has
 
 - every value of an axis, in an otherwise plain case;
 - every pair of values of two axes;
-- every triple of values of these axes: {"; ".join(", ".join(t) for t in table.data["triples"])};
+- every combination of values of these axes: {"; ".join(", ".join(t) for t in table.data["groups"])};
 - a few combinations of many extreme values.
 
 The commands are
 
-    {COMMAND} run       # hours for all methods; `--method auto` is minutes; resumes where it stopped
-    {COMMAND} report    # writes this document and its picture
+    {COMMAND} run --table {name}       # hours for all methods; `--method auto` is minutes; resumes where it stopped
+    {COMMAND} report --table {name}    # writes this document and its picture
 
 A case counts as solved in three situations: its displacement is certified within
 {table.data["tolerance"]:g}; or it is proved that no solution exists (state *escapes*); or its state is metastable or
 borderline, and no method found an equilibrium. The time of one case and method is processor time.
 
-![Share of the cases solved by each method, for each value of each axis](hard-cases.png)"""
+![Share of the cases solved by each method, for each value of each axis]({page}.png)"""
 
 
 def _counts(results: Results) -> str:

@@ -15,8 +15,11 @@ from dolfinx import fem
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from hvi_fenicsx import preparation, workflow
+from hvi_fenicsx import workflow
 from hvi_fenicsx.errors import HviError
+from hvi_fenicsx.path.following import Control, PathRun
+from hvi_fenicsx.preparation import Preparation
+from hvi_fenicsx.scene import PathTable
 from hvi_fenicsx.solvers import SolveContext, SolveResult, registry
 from hvi_fenicsx.solvers.context import RunControl
 
@@ -55,14 +58,32 @@ def _attempt(case: Case, data: Mapping[str, Any], method: str, late: Callable[[]
     prepared = hard_scenes.prepare(case, data, method, COMM)
     known = prepared.solvability
     about = {"state": known.state, "margin": known.margin, "dofs": prepared.system.dofs}
+    answer = _followed if case["question"] == "path" else _equilibrium
+    return about | answer(case, data, prepared, late)
+
+
+def _followed(case: Case, data: Mapping[str, Any], prepared: Preparation, late: Callable[[], bool]) -> Record:
+    """The path to the whole load: each row certified, and its end as existence says, where that is decided."""
+    state = prepared.solvability.state
+    path = PathRun(prepared, PathTable()).follow(Control(interrupted=late))
+    wanted = {"held": ("reached",), "escapes": ("escapes",)}.get(state, ("reached", "escapes"))
+    about = {"rows": len(path.rows), "end": path.end, "uncertified": path.uncertified}
+    if path.end not in wanted:
+        return {**about, "outcome": "failed", "reason": "time limit" if path.end == "interrupted" else path.reason}
+    outcome = "failed" if path.uncertified else "certified"
+    return {**about, "outcome": outcome, "reason": f"{path.uncertified} rows are not certified" * (outcome == "failed")}
+
+
+def _equilibrium(case: Case, data: Mapping[str, Any], prepared: Preparation, late: Callable[[], bool]) -> Record:
+    """The equilibrium at the whole load."""
+    known = prepared.solvability
     if known.state == "escapes":
-        return {**about, "outcome": "escapes", "reason": "no solution exists"}
+        return {"outcome": "escapes", "reason": "no solution exists"}
     control = RunControl(timer=prepared.timer, interrupted=late)
     found = _solved(case, data, prepared, control)
     found, proof = workflow.judged(prepared, found, control=control)
     outcome = "certified" if proof.certificate.passed else _unsolved(known.state, found)
     return {
-        **about,
         "outcome": outcome,
         "reason": "time limit" if found.interrupted else found.reason,
         "newton": found.counts.newton,
@@ -80,7 +101,7 @@ def _unsolved(state: str, found: SolveResult) -> str:
     return "no_equilibrium" if state in UNDECIDED and not broken else "failed"
 
 
-def _solved(case: Case, data: Mapping[str, Any], prepared: preparation.Preparation, control: RunControl) -> SolveResult:
+def _solved(case: Case, data: Mapping[str, Any], prepared: Preparation, control: RunControl) -> SolveResult:
     """The method's result; the case's start is for the methods that begin on pieces of the laws."""
     context = SolveContext.create(prepared.system, (), prepared.solvability, prepared.options, control)
     method = registry.choose(prepared.options, prepared.system)(context)

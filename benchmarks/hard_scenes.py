@@ -27,10 +27,13 @@ RESIDUAL = {
     "graph": 0.3,
     "one_sided": 0.4,
     "literal": 0.5,
+    "softening": 0.2,
 }
 """What is left of each law's traction after its drops, over its peak."""
 TILT, WALL_TILT = 1.4, 2.0
 """The tilted press is Q (1 - tilt x/W): a free block stands as long as tilt < 1.5, one at a wall while it is < 2."""
+_IN_SPACE = 0.6
+"""A body in space has the cells along a plate's side to this power, so that about as many in all."""
 _MOVED = 0.2
 _RATIO = 1000.0
 
@@ -55,12 +58,21 @@ class Frame:
         return cls(case, width, height, press, modulus, case["delta"] * press * length / modulus)
 
     @property
+    def in_space(self) -> bool:
+        return self.case["body"] in ("block", "stack_3d")
+
+    @property
+    def is_stack(self) -> bool:
+        """Whether the body stands on another one."""
+        return self.case["body"] in ("stack", "stack_3d")
+
+    @property
     def peak(self) -> float:
         return self.case["strength"] * self.press
 
     @property
     def residual(self) -> float:
-        return self.peak * RESIDUAL[self.case["law"]]
+        return self.peak * RESIDUAL.get(self.case["law"], 0.0)
 
     @property
     def distance(self) -> float:
@@ -71,23 +83,47 @@ class Frame:
 def scene(case: Case, data: Mapping[str, Any], method: str) -> Scene:
     """The scene of a case."""
     f = Frame.of(case, data)
-    boundary: Plain = {
-        "pull": {"on": "right", "traction": [_pull(f), 0.0]},
-        "press": {"on": "top", "traction": [0.0, _press(f)]},
-        "floor": {"on": "bottom", "contact": {"gap": 0.0}, "friction": _law(f), **_adhesion(f)},
-    }
-    if case["support"] == "wall":
-        boundary["wall"] = {"on": "left", "displacement": [0.0, "free"]}
     model, nu = case["material"].split()
+    material = {"model": "three_dimensional" if f.in_space else model, "youngs_modulus": f.modulus}
     return Scene.model_validate(
         {
             "title": f"hard case {case.key}",
-            "domain": {"shape": "rectangle", "size": [f.width, f.height], "cells": [case["cells"]] * 2},
-            "material": {"model": model, "youngs_modulus": f.modulus, "poisson_ratio": float(nu)},
-            "boundary": boundary,
-            "solver": _solver(case, method, data["tolerance"]) | {"degree": data.get("degree", 1)},
+            "domain": _domain(f),
+            "material": material | {"poisson_ratio": float(nu)},
+            **_parts(f),
+            "solver": _solver(case, method, data["tolerance"]) | {"degree": case["degree"]},
         }
     )
+
+
+def _domain(f: Frame) -> Plain:
+    """One body, or two of which the lower one's mesh is coarser, so that no nodes of theirs meet but the corners'."""
+    cells, depth = f.case["cells"], [f.width] * f.in_space
+    size = [f.width, *depth, f.height]
+    number = round(cells**_IN_SPACE) if f.in_space else cells
+    shape = {"shape": "box" if f.in_space else "rectangle", "size": size}
+    body = shape | {"cells": [number] * len(size)}
+    if not f.is_stack:
+        return body
+    lower = shape | {"cells": [max(1, number - 1)] * len(size), "origin": [0.0] * (len(size) - 1) + [-f.height]}
+    return {"lower": lower, "upper": body}
+
+
+def _parts(f: Frame) -> Plain:
+    """The tables of the boundary and, of two bodies, of what is between them."""
+    case, own = f.case, "upper." if f.is_stack else ""
+    flat = [0.0] * (1 + f.in_space)  # the components beside the one that is given
+    boundary: Plain = {
+        "pull": {"on": f"{own}right", "traction": [_pull(f), *flat]},
+        "press": {"on": f"{own}top", "traction": [*flat, _press(f)]},
+    }
+    if case["support"] == "wall":
+        boundary["wall"] = {"on": f"{own}left", "displacement": [0.0, *["free"] * len(flat)]}
+    floor = {"contact": {"gap": 0.0}, **_law(f), **_adhesion(f)}
+    if not f.is_stack:
+        return {"boundary": boundary | {"floor": {"on": "bottom", **floor}}}
+    boundary["base"] = {"on": "lower.bottom", "displacement": [0.0, *flat]}
+    return {"boundary": boundary, "interface": {"floor": {"between": ["upper.bottom", "lower.top"], **floor}}}
 
 
 def _solver(case: Case, method: str, tolerance: float) -> Plain:
@@ -114,10 +150,17 @@ def _pull(f: Frame) -> Any:
         return 2.0 * moment / f.height**2 * (1.0 - f.distance)
     limit = f.residual if case["support"] == "residual" else f.peak
     mean = limit * f.width / f.height * (1.0 - f.distance)
-    return f"{mean!r}*(4 - 6*y/{f.height!r})"  # no moment about the floor
+    up = "z" if f.in_space else "y"
+    return f"{mean!r}*(4 - 6*{up}/{f.height!r})"  # no moment about the floor
 
 
 def _law(f: Frame) -> Plain:
+    """The effect of the floor's law: friction, or of opening and slip together."""
+    law = f.case["law"]
+    return {"cohesion": _cohesion(f)[law]} if law in _cohesion(f) else {"friction": _friction(f)[law]}
+
+
+def _friction(f: Frame) -> Plain:
     peak, residual, slip = f.peak, f.residual, f.slip
     drop = {"peak_traction": peak, "residual_traction": residual, "delta": slip}
     ramp = [[0.0, 0.0], [slip, peak], [slip, residual]]
@@ -131,7 +174,15 @@ def _law(f: Frame) -> Plain:
         "tresca": {"law": "tresca", "yield_traction": peak, "reference_slip": slip},
         "graph": {"law": "graph", "points": up_and_down},
         "one_sided": {"law": "graph", "points": ramp, "one_sided": True},
-    }[f.case["law"]]
+        "softening": {"law": "graph", "points": [[0.0, 0.0], [slip, peak], [4 * slip, residual]]},
+    }
+
+
+def _cohesion(f: Frame) -> Plain:
+    """The strength in shear is the peak: beta times that in tension, with a mixity beta times the energies' ratio."""
+    law = {"law": "graph", "points": [[0.0, 0.0], [f.slip, f.peak], [4 * f.slip, 0.0]]}
+    shear = {"beta": 0.5, "mixity": "benzeggagh_kenane", "energy_ratio": 2.0, "exponent": 2.0}
+    return {"cohesion": law, "mixed": law | shear}
 
 
 def _adhesion(f: Frame) -> Plain:
@@ -146,6 +197,8 @@ def _adhesion(f: Frame) -> Plain:
 def prepare(case: Case, data: Mapping[str, Any], method: str, comm: MPI.Comm) -> preparation.Preparation:
     """As :func:`hvi_fenicsx.preparation.prepare`, on a mesh whose vertices are moved first. Collective."""
     made = scene(case, data, method)
+    if case["distortion"] == "none":
+        return preparation.prepare(made, comm)
     body = made.domain.build(comm, made.dimension)
     distort(body, case)
     return preparation.prepare(made, comm, domain=body)
@@ -156,12 +209,8 @@ def distort(body: domain.Domain, case: Case) -> None:
     size, n = body.upper - body.lower, case["cells"]
     x = body.mesh.geometry.x
     place = (x[:, :2] - body.lower) / size  # 0 to 1
-    moved = {"none": _same, "random": _shaken, "graded": _graded(0), "layer": _graded(1)}[case["distortion"]](place, n)
+    moved = {"random": _shaken, "graded": _graded(0), "layer": _graded(1)}[case["distortion"]](place, n)
     x[:, :2] = body.lower + moved * size
-
-
-def _same(place: Array, n: int) -> Array:
-    return place
 
 
 def _shaken(place: Array, n: int) -> Array:

@@ -39,7 +39,8 @@ def parameters(chosen: list[Case]) -> list[Any]:
 
 
 def solve_and_judge(case: Case, degree: int = 1) -> None:
-    record = hard_run.attempt(case, {**TABLE.data, "degree": degree}, "auto", TABLE.data["limit"])
+    case = replace(case, fixed={**case.fixed, "degree": degree})
+    record = hard_run.attempt(case, TABLE.data, "auto", TABLE.data["limit"])
     assert record["outcome"] in SOLVED, f"{case.values}: {record['reason']} {record.get('certificate')}"
 
 
