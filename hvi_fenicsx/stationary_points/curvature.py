@@ -79,6 +79,11 @@ class CurvatureShare:
         """How rigid motions move the unknowns with laws, (n, k)."""
         return motions.shapes(self._problem, self._kernel)
 
+    @cached_property
+    def springs(self) -> Array:
+        """A matrix as stiff as S that resists these motions alone, (n, n)."""
+        return np.asarray(self._scale * self.shapes @ self.shapes.T)
+
     def at_rest(self, x: Array) -> Array:
         """A point without its rigid motions of unknowns with laws, (n,).
 
@@ -131,9 +136,8 @@ class CurvatureShare:
         """How unknowns move with the shares of rigid motions, and what strong convexity allows them besides."""
         if not self.shapes.size:
             return self.shapes, np.full(len(matrix), np.inf)
-        rigid = self._scale * self.shapes @ self.shapes.T
-        free = self._free_motions(along + rigid)
-        inverse = self._inverse(matrix + rigid, free)
+        free = self._free_motions(along + self.springs)
+        inverse = self._inverse(matrix + self.springs, free)
         moved = inverse @ self.shapes
         follow = np.asarray(np.linalg.solve(self.shapes.T @ moved, moved.T).T)
         squares = np.diag(inverse) - np.einsum("ik,ik->i", follow, moved)

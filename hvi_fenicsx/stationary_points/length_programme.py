@@ -154,15 +154,36 @@ class LengthProgramme:
         Args:
             x: the minimiser, (n,).
         """
-        lengths, force = self.lengths, self.b - self.a @ x
+        lengths = self.lengths
         here, vectors = self._tangent(x, near_zero=False), lengths.vectors(x)
         pull = np.where(here.out, 0.0, vectors) * np.where(here.moving, here.across, 0.0)[:, None]
         pull[:, 0] += np.where(lengths.opens, self.shut * np.minimum(vectors[:, 0], 0.0), 0.0)
-        wanted = force.copy()
-        wanted[lengths.members] = (pull * lengths.factors)[lengths.there]
+        laws = np.zeros(len(x))
+        laws[lengths.members] = (pull * lengths.factors)[lengths.there]
+        return self.bound_forces(x, laws)
+
+    def bound_forces(self, x: Array, laws: Array) -> Array:
+        """Forces of the bounds that are met, such that the laws' forces are left for the vectors' unknowns, (n,).
+
+        Args:
+            x: a point, (n,).
+            laws: forces of the laws on the vectors' unknowns, (n,).
+        """
+        force = self.b - self.a @ x
+        wanted = np.where(self._own, force, laws)
         return np.where(x <= self.lower, np.maximum(wanted - force, 0.0), 0.0) + np.where(
             x >= self.upper, np.minimum(wanted - force, 0.0), 0.0
         )
+
+    def borne(self, size: Array) -> tuple[Array, Array]:
+        """What the laws bear just before some lengths, and what they hold at zero, (m,) each.
+
+        Args:
+            size: the lengths, (m,).
+        """
+        n = len(self.b)
+        low, _ = self._stack.interval(np.concatenate([self._stack.low[:n], np.minimum(size, self._radius)]))
+        return np.maximum(low[n:], 0.0), np.maximum(self._stack.after[n:, 0], 0.0)
 
     def _admissible(self, x: Array) -> Array:
         low, high = self._stack.low[: len(x)], self._stack.high[: len(x)]

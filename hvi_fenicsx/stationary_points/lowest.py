@@ -17,11 +17,10 @@ import numpy as np
 
 from ..errors import SolverError
 from ..typing import Array
-from . import motions
-from .arcs import on_interval
 from .boxes import Box, clipped, fresh_box
 from .curvature import Curvature
 from .descent import descend
+from .division import halves
 from .level_set import level_set
 from .relaxation import Relaxation
 from .scalar_problem import ScalarProblem
@@ -192,32 +191,10 @@ class LowestSearch:
             if stop():
                 return False
             _, _, box = heapq.heappop(self.waiting)
-            for half in self._halves(box):
+            for half in halves(self._relaxation, box):
                 self._enter(replace(half, share=0.5 * box.share))
             report(self.progress())
         return True
-
-    def _halves(self, box: Box) -> list[Box]:
-        """Two boxes: where the envelope and the law differ most, at the joint in the chord that is nearest to x."""
-        if box.motion_gaps.max(initial=0.0) > box.gaps.max():
-            return self._halves_of_motion(box)
-        i = int(np.argmax(box.gaps))
-        at = float(self.problem.arguments(box.x)[i])
-        ends = (a.high for a in on_interval(self.problem.chains[i], float(box.low[i]), float(box.high[i]))[:-1])
-        inside = [e for e in ends if box.chord_low[i] < e < box.chord_high[i]]
-        if inside:
-            at = min(inside, key=lambda e: abs(e - at))
-        left, right = box.high.copy(), box.low.copy()
-        left[i] = right[i] = at
-        return [replace(box, high=left), replace(box, low=right)]
-
-    def _halves_of_motion(self, box: Box) -> list[Box]:
-        """Two boxes: parts of the interval of a rigid motion's share."""
-        j = int(np.argmax(box.motion_gaps))
-        left, right = box.motion_high.copy(), box.motion_low.copy()
-        here, joint = float(self._relaxation.shares(box.x)[j]), float(self._relaxation.joints[j])
-        left[j] = right[j] = motions.divided(float(right[j]), float(left[j]), joint, here)
-        return [replace(box, motion_high=left), replace(box, motion_low=right)]
 
     def _enter(self, box: Box) -> None:
         """Tighten and bound a box; it waits if it is still open."""

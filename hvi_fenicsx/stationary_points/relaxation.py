@@ -15,6 +15,7 @@ from .boxes import Box
 from .convex_programme import Chains, minimise
 from .curvature import Curvature, CurvatureShare
 from .dual_bound import DualBound
+from .held_forces import with_held_forces
 from .length_programme import LengthProgramme
 from .motions import Lent
 from .scalar_problem import ScalarProblem
@@ -170,8 +171,10 @@ class Relaxation:
         dual = DualBound(problem=problem, low=box.low, high=box.high, added=curvature.added, lent=lent)
         multipliers = programme.multipliers(x)
         value = bound = dual.at(x, multipliers)
-        if np.any(np.abs(self.shares(x)) > self.joints):  # the same forces, with less rounding
-            bound = max(bound, dual.at(self._share.at_rest(x), multipliers))
+        if np.any(np.abs(self.shares(x)) > self.joints):
+            y, pushes = with_held_forces(programme, x, self._share.springs)
+            rested = ((self._share.at_rest(p), forces) for p, forces in ((x, multipliers), (y, pushes)))
+            bound = max(bound, *(dual.at(*each) for each in rested))  # at rest the forces have less rounding
         return x, value, bound, steps
 
     def _weights(self, box: Box, undecided: Integers) -> Array:

@@ -221,6 +221,36 @@ def test_the_lowest_energy_of_a_body_that_only_laws_hold_is_below_all_descents(s
     assert found.upper <= least + 1e-6 * abs(least)
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_far_away_where_laws_bear_just_the_load_the_bound_is_the_least_energy_at_infinity(seed: int) -> None:
+    """There the laws' forces are known, so that the least energy follows from linear systems."""
+    problem = random_problem(seed, 3, 2, opening=False)
+    law = TractionGraph.from_points([(0.0, 0.0), (0.1, 2.0), (1.5, 1.0)])
+    problem = replace(problem, chains=(*problem.chains[: problem.size], *(chain(law, 1.0, 1.0) for _ in range(3))))
+    motion = freed(problem, 1.0).force - freed(problem, 0.0).force
+    borne = np.zeros(problem.size)
+    members = problem.lengths.unknowns[:, 1]
+    borne[members] = problem.lengths.factors[:, 1]
+    problem = freed(problem, float(borne @ motion))
+    low, high = (1e5 * motion - 20.0, 1e6 * motion + 20.0)
+    low, high = problem.with_lengths(np.maximum(low, problem.lower), high)
+    relaxation = Relaxation(problem)
+    box = fresh_box(low, high, np.maximum(5e5 * motion + 1.0, problem.lower))
+    first, last = relaxation.share_span(low, high)
+    bound = relaxation.solve(replace(box, motion_low=first, motion_high=last), 0.999)[0].bound
+    least = min(_least_with_forces(problem, borne, held) for held in ([], [problem.size - 1]))
+    least += 3 * (0.1 + 2.1 - 1.5)  # behind its last point each law has the energy r + 0.7
+    assert least - 1e-5 <= bound <= least + 1e-3  # at a distance of 1e6 the other components add their square over it
+
+
+def _least_with_forces(problem: ScalarProblem, borne: Array, held: list[int]) -> float:
+    """The least energy with laws that bear these forces, some unknowns being zero; inf where this is not admissible."""
+    free = np.setdiff1d(np.arange(problem.size), held)
+    force, matrix = (problem.force - borne)[free], problem.stiffness[np.ix_(free, free)]
+    x = np.linalg.pinv(matrix, rcond=1e-10) @ force
+    return float(-0.5 * force @ x) if held or x[-1] >= 0.0 else np.inf
+
+
 def test_a_search_with_divided_rigid_motions_goes_on_where_it_was_stopped() -> None:
     problem = random_problem(1, 3, 2, opening=False)
     softening = TractionGraph.from_points([(0.0, 0.0), (0.1, 2.0), (1.5, 1.0)])
