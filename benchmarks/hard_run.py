@@ -16,6 +16,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from hvi_fenicsx import workflow
+from hvi_fenicsx.certify.certificate import Examination
 from hvi_fenicsx.errors import HviError
 from hvi_fenicsx.path.following import Control, PathRun
 from hvi_fenicsx.preparation import Preparation
@@ -79,9 +80,7 @@ def _equilibrium(case: Case, data: Mapping[str, Any], prepared: Preparation, lat
     known = prepared.solvability
     if known.state == "escapes":
         return {"outcome": "escapes", "reason": "no solution exists"}
-    control = RunControl(timer=prepared.timer, interrupted=late)
-    found = _solved(case, data, prepared, control)
-    found, proof = workflow.judged(prepared, found, control=control)
+    found, proof = _judged(case, data, prepared, late)
     outcome = "certified" if proof.certificate.passed else _unsolved(known.state, found)
     return {
         "outcome": outcome,
@@ -93,6 +92,18 @@ def _equilibrium(case: Case, data: Mapping[str, Any], prepared: Preparation, lat
         "energy": proof.energy,
         "certificate": proof.certificate.as_dict(),
     }
+
+
+def _judged(
+    case: Case, data: Mapping[str, Any], prepared: Preparation, late: Callable[[], bool]
+) -> tuple[SolveResult, Examination]:
+    """A result and its certificate: as of ``hvi run``, but where a method or its start is looked at by itself."""
+    if prepared.options.method == "auto" and case["start"] == "default":
+        solution = workflow.finish(prepared, interrupted=late, estimating=False)
+        assert solution.solve_result is not None and solution.examination is not None
+        return solution.solve_result, solution.examination
+    control = RunControl(timer=prepared.timer, interrupted=late)
+    return workflow.judged(prepared, _solved(case, data, prepared, control), control=control)
 
 
 def _unsolved(state: str, found: SolveResult) -> str:
