@@ -100,7 +100,8 @@ def _judged(
     """A result and its certificate: as of ``hvi run``, but where a method or its start is looked at by itself."""
     if prepared.options.method == "auto" and case["start"] == "default":
         solution = workflow.finish(prepared, interrupted=late, estimating=False)
-        assert solution.solve_result is not None and solution.examination is not None
+        assert solution.solve_result is not None
+        assert solution.examination is not None
         return solution.solve_result, solution.examination
     control = RunControl(timer=prepared.timer, interrupted=late)
     return workflow.judged(prepared, _solved(case, data, prepared, control), control=control)
