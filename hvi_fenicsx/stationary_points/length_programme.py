@@ -142,8 +142,7 @@ class LengthProgramme:
             found = self._better(x, value, near_zero=True) or self._better(x, value, near_zero=False)
             if found is None:
                 return x, step
-            last = self._short(found[0] - x, x)
-            x, value = found
+            x, value, last = found
             if last:
                 return x, step
         return x, MOST_STEPS
@@ -199,18 +198,23 @@ class LengthProgramme:
         own[self.lengths.members] = False
         return own
 
-    def _better(self, x: Array, value: float, *, near_zero: bool) -> tuple[Array, float] | None:
-        """A point of lower energy, and its energy."""
+    def _better(self, x: Array, value: float, *, near_zero: bool) -> tuple[Array, float, bool] | None:
+        """A point of lower energy, its energy, and whether it is the last.
+
+        A step that is short, or changes the energy by rounding only, is taken whole as the last one: the bound is off
+        by the forces it leaves times the lengths that are allowed, which are not small.
+        """
         goal = self._step(x, self._tangent(x, near_zero=near_zero))
+        whole = self._admissible(goal)
         if self._short(goal - x, x):
-            return None
+            return whole, value, True
         least = SETTLED * (abs(value) + float(np.abs(self.b) @ np.abs(x)))
         for share in SHARES:
             trial = self._admissible(x + share * (goal - x))
             after = self.value(trial)
             if after < value - least:
-                return trial, after
-        return None
+                return trial, after, self._short(trial - x, x)
+        return (whole, value, True) if self.value(whole) <= value + least else None
 
     def _short(self, step: Array, x: Array) -> bool:
         pull = float(np.abs(self.a @ step).max())
