@@ -93,8 +93,11 @@ def _along_the_curve(problem: CondensedProblem, most_events: int) -> FullLoad | 
 
 
 def _begins(states: Sequence[PathState]) -> bool:
-    """Whether some load is borne on a path; where none is, the whole load may be borne all the same, off the path."""
-    return any(state.factor > 0.0 for state in states)
+    """Whether some load is borne on a path, and none beyond the whole, at which a sound path ends.
+
+    Where no load is borne on it, the whole one may be all the same, off the path.
+    """
+    return 0.0 < max((state.factor for state in states), default=0.0) <= 1.0
 
 
 def _largest(states: Sequence[PathState]) -> Loaded:

@@ -5,8 +5,8 @@ a body that rolls or tips on its way to rest, it is the position at rest of the 
 metastable state the iteration may slide off while an equilibrium exists on other pieces of the laws: starts on the
 pieces of the resting slips, with every bond broken, and a continuation in the smoothing look for it there. Where laws
 push, the only equilibrium may be no minimum of the energy, from which every descent leads away; Newton's method on the
-laws themselves looks for such ones last. Where an equilibrium may not exist, the search ends after a number of Newton
-steps.
+laws themselves, and through narrowing smoothings, looks for such ones last. Where an equilibrium may not exist, the
+search ends after a number of Newton steps.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from petsc4py import PETSc
 
 from ..errors import SolverError
 from ..laws import Superpotential
-from . import load_path_start
+from . import load_path_start, newton_continuation
 from .branch import BranchIteration
 from .closed_start import resting_start
 from .context import SolveContext
@@ -141,7 +141,7 @@ class Auto(BranchIteration):
     def _off_path(self, first: SolveResult, path: PathStart) -> SolveResult:
         """An equilibrium from other starts, to which loading leads by a jump if at all; else that its path has none.
 
-        Each start gets few steps: what laws hold is found in some ten, what slides away takes hundreds. Collective.
+        Each start gets few steps: what laws hold is found in a few, what slides away takes hundreds. Collective.
         """
         counts = Counts()
         counts.add(first.counts)
@@ -166,6 +166,7 @@ class Auto(BranchIteration):
         yield from self._attempt(Continuation(self.context).solve)
         for start in (self.system.undisplaced(), resting):
             yield from self._attempt(self._iteration().newton, start)
+        yield from self._attempt(newton_continuation.solve, self.context)
 
     def _on_other_pieces(self, resting: PETSc.Vec, most: int | None = None) -> Iterator[SolveResult]:
         """On the pieces of the slips at rest, and with every bond broken, each in so many Newton steps at most."""

@@ -79,15 +79,16 @@ class BranchIteration(Method):
                 better.copy(x)
         return self._result(x, outcome)
 
-    def newton(self, start: PETSc.Vec) -> SolveResult:
+    def newton(self, start: PETSc.Vec, drops: Sequence[Array] | None = None) -> SolveResult:
         """A stationary point near a start by Newton's method on the laws themselves, perhaps no minimum. Collective.
 
         Args:
             start: where to begin.
+            drops: kinks of G on which vertices are held, NaN where they are not, by term; None: none is held.
         """
         x = start.copy()
         with self.solver.reporting(self._progress):
-            outcome, stationary = self._convex.newton(x, self._convex.cells(x))
+            outcome, stationary = self._convex.newton(x, self._convex.cells(x), drops)
         return self._result(x, replace(outcome, converged=stationary))
 
     def _resting(self) -> PETSc.Vec:

@@ -160,7 +160,9 @@ class ConvexStep:
         trial.copy(x)
         return found, stationary
 
-    def newton(self, x: PETSc.Vec, cells: Sequence[Cells]) -> tuple[Outcome, bool]:
+    def newton(
+        self, x: PETSc.Vec, cells: Sequence[Cells], drops: Sequence[Array] | None = None
+    ) -> tuple[Outcome, bool]:
         """Newton steps on the laws themselves, whole ones, each vertex kept in its cell. Collective.
 
         Near a solution a line search on the energy would see no more than its rounding.
@@ -168,18 +170,34 @@ class ConvexStep:
         Args:
             x: start and result.
             cells: where each vertex is kept, by term.
+            drops: kinks of G on which vertices are held, NaN where they are not, by term, (m,) each.
 
         Returns:
             How it ended, and whether x is stationary.
         """
         lower, upper = kink_bounds.slip_bounds(self._system, cells)
+        if drops is not None:
+            lower, upper = kink_bounds.held_on(self._system.terms, (lower, upper), drops)
         exact = [ExactLaw(law, c) for law, c in zip(self._laws, cells, strict=True)]
         most = self._thresholds.newton_steps
         found = self._solver.solve(
             x, exact, self._options.tolerance, lower=lower, upper=upper, line_search="basic", max_iterations=most
         )
         self._counts.add_outcome(found)
-        return found, found.converged and not self.anywhere(self._overloaded(x, exact))
+        if drops is None or not found.converged:
+            return found, found.converged and not self.anywhere(self._overloaded(x, exact))
+        return found, self.measure(x, cells, self._carried(x, exact, drops)) <= self._options.tolerance
+
+    def _carried(self, x: PETSc.Vec, exact: Sequence[ExactLaw], drops: Sequence[Array]) -> list[Array]:
+        """The ξ that balance what holds vertices on drops, by term, (m,) each."""
+        self._system.residual(x, self._residual, exact)
+        found = []
+        for term, model, at, a in zip(self._system.terms, exact, drops, self.arguments(x), strict=True):
+            middle = (model.law.concave.left(a) + model.law.concave.right(a)) / 2
+            force = np.einsum("md,md->m", term.directions[:, 0, :], term.surface.values(self._residual.array_r))
+            held = np.isfinite(at) & (not term.radial)
+            found.append(middle + np.divide(force, term.weights, out=np.zeros_like(force), where=held))
+        return found
 
     def _overloaded(self, x: PETSc.Vec, models: Sequence[Majorant | ExactLaw]) -> list[npt.NDArray[np.int64]]:
         self._system.residual(x, self._residual, models)

@@ -35,6 +35,26 @@ def slip_bounds(system: System, cells: Sequence[Cells]) -> tuple[PETSc.Vec, PETS
     return lower, upper
 
 
+def held_on(
+    terms: Sequence[LawTerm], bounds: tuple[PETSc.Vec, PETSc.Vec], drops: Sequence[Array]
+) -> tuple[PETSc.Vec, PETSc.Vec]:
+    """The bounds, with those that hold some signed slips where they are to be.
+
+    Args:
+        terms: the laws.
+        bounds: lower and upper ones.
+        drops: where each slip is held, NaN where it is not, by term, (m,) each.
+    """
+    lower, upper = (bound.copy() for bound in bounds)
+    for term, at in zip(terms, drops, strict=True):
+        if term.radial:
+            continue
+        dofs, sign, free = _slip_dofs(term)
+        on = free & np.isfinite(at)
+        lower.array[dofs[on]] = upper.array[dofs[on]] = (sign * at * term.stretch)[on]
+    return lower, upper
+
+
 def _keep_in_cells(term: LawTerm, cells: Cells, lower: PETSc.Vec, upper: PETSc.Vec) -> None:
     """Keep the signed slip of each vertex in its cell."""
     dofs, sign, free = _slip_dofs(term)

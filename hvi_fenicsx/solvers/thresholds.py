@@ -108,6 +108,10 @@ class BranchThresholds:
         rest_tolerance: relative tolerance of the linear solve that puts bodies on their supports.
         search_steps: Newton steps of all starts together, unless the body is held; hard cases took at most 589.
         widths: relative widths of the smoothing that a continuation goes through, if wider than the wanted one.
+        widest: the first width at which Newton's method looks for equilibria that are no minimum: laws that push are
+            nearly straight there.
+        narrowing: factor from each such width to the next.
+        narrowest: the last of them.
     """
 
     attempts: Sequence[tuple[bool, str, int]] = BRANCH_ATTEMPTS
@@ -127,6 +131,9 @@ class BranchThresholds:
     rest_tolerance: float = 1e-4
     search_steps: int = 1_000
     widths: Sequence[float] = (1.0, 1e-1, 1e-2, 1e-3)
+    widest: float = 100.0
+    narrowing: float = 0.7
+    narrowest: float = 1e-3
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -145,7 +152,7 @@ class PathThresholds:
     """
 
     quick_steps: int = 8
-    other_steps: int = 20
+    other_steps: int = 10
     vertex_unknowns: int = 1_600
     curved_unknowns: int = 200
     whole_curve_unknowns: int = 400

@@ -54,11 +54,15 @@ def names(folder: Path) -> list[str]:
 def test_what_the_program_did_not_write_stays(way: str, copy: Path) -> None:
     (copy / "r" / "body.msh").write_text("mine")
     (copy / "r" / "notes").mkdir()
-    before = names(copy / "r")
+    for beside in (".r.old", ".r.partial", "r.old", "r.partial"):  # names that were once the program's own
+        (copy / beside).mkdir()
+        (copy / beside / "thesis.txt").write_text("mine")
+    before, around = names(copy / "r"), names(copy)
     assert run(copy / "square.toml", copy / "r", way, "--set", "domain.cells=[3, 3]").returncode == 0
     assert summary(copy / "r")["dofs"] == 32
-    assert names(copy / "r") == before
+    assert (names(copy / "r"), names(copy)) == (before, around)
     assert (copy / "r" / "body.msh").read_text() == "mine"
+    assert all((copy / beside / "thesis.txt").exists() for beside in around if beside.endswith((".old", ".partial")))
 
 
 def test_a_summary_alone_makes_no_result(scene: Path, tmp_path: Path) -> None:

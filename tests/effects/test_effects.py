@@ -359,6 +359,10 @@ REFUSED: dict[str, tuple[Table, str]] = {
     ),
     "too many moduli": (wood(youngs_moduli=MODULI), "youngs_moduli has 3 entries; plane_stress wants 2"),
     "impossible contraction": (wood(poisson_ratios=[3.5]), "not positive definite"),
+    "moduli whose compliances are beyond all numbers": (
+        wood(youngs_moduli=[1e-320, 1e-320], poisson_ratios=[0.3], shear_moduli=[1e-320]),
+        "the elasticity is zero, or its numbers are too large or too far apart",
+    ),
     "a lopsided tensor": (
         changed(material=MATERIALS["tensor"] | {"matrix": [[2.0, 1.0, 0.0], [0.5, 2.0, 0.0], [0.0, 0.0, 1.0]]}),
         "not symmetric: C[1][2] = 1, not 0.5",

@@ -15,8 +15,8 @@ from hvi_fenicsx.equilibrium_paths.state import PathOptions
 from hvi_fenicsx.solvers import load_path_start
 from hvi_fenicsx.system.condensation import Condensation
 
-MOST_STEPS = 80
-"""Newton steps where a load path ends: those before it, and three further starts of at most 20."""
+MOST_STEPS = 50
+"""Newton steps where a load path ends: those before it, and three further starts of at most 10."""
 STRENGTH = 220.591e3
 """Of the bar, N/m: Yuan and Teng's closed form."""
 
@@ -158,6 +158,26 @@ def test_an_equilibrium_to_which_loading_leads_by_a_jump_only_is_found_and_told(
     assert found.converged
     assert "loading leads to it by a jump, if at all: at the factor 0.703226" in found.reason
     assert found.examination.energy == pytest.approx(resting.examination.energy, rel=1e-10)
+
+
+def test_a_path_beyond_the_whole_load_is_lost_and_says_nothing() -> None:
+    """A scene of the attack (20261123 #118): rounding took the path to 6.6 times the load."""
+    law = [[0, 0], [4.5842e-5, 1013.7], [5.8694e-4, -45.84], [5.8694e-4, 187.99]]
+    found = solved(
+        {
+            "domain": {"shape": "half_disk", "mesh_size": 0.496, "radius": 0.5},
+            "material": {"model": "plane_stress", "youngs_modulus": 2.52e7, "poisson_ratio": 0.29},
+            "boundary": {
+                "floor": {
+                    "on": "arc",
+                    "contact": {"obstacle": {"point": [0.0, 0.0], "normal": [-3e-5, 1.0]}},
+                    "friction": {"law": "graph", "points": law, "one_sided": True},
+                },
+                "press": {"on": "top", "traction": [0.0, -976.853]},
+            },
+        }
+    )
+    assert found.converged or found.solve_result.borne is None
 
 
 @pytest.mark.parametrize("gap", [0.0, 1e-6])

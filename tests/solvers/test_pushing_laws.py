@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from scenes import Table, model, solved
+import pytest
+from enumeration import Floor, polyline
+from scenes import Table, block, energy, model, solved
 
 
 def test_an_equilibrium_that_is_no_minimum_is_found() -> None:
@@ -19,3 +21,14 @@ def test_an_equilibrium_that_is_no_minimum_is_found() -> None:
     assert found.solvability.state == "metastable"
     assert found.examination is not None
     assert found.examination.certificate.second_order == "not a minimiser"
+
+
+@pytest.mark.parametrize(("cells", "push"), [(2, 0.0), (2, 1e5), (2, 3e5), (3, 3e5)])
+def test_an_equilibrium_on_the_drop_of_a_law_that_pushes_is_found(cells: int, push: float) -> None:
+    """Slips to both sides of one vertex balance the push; under a push enumeration finds this one equilibrium."""
+    law = [(0.0, -4e5), (1e-6, -4e5)]
+    points = Floor(cells, push, 1e6, polyline(law), wall=False).stationary()
+    found = solved(block(cells, push, 1e6, {"law": "graph", "points": [list(point) for point in law]}))
+    assert found.exit_code == 0
+    assert len(points) == 1 or not push
+    assert any(energy(found) == pytest.approx(point.energy, rel=1e-9) for point in points)

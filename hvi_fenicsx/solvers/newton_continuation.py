@@ -1,0 +1,69 @@
+"""Newton's method through narrowing smoothings: equilibria that are no minimum, also on a drop.
+
+A descent leads away from these. Smoothed widely, a law that pushes at once is nearly straight: its equation has a
+solution, and Newton's method finds it from where springs would hold the body. As the width narrows, vertices that stay
+within it are on the drop. At each width they are held there, as by a support, until the drop carries what they take up.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+from petsc4py import PETSc
+
+from ..laws import Superpotential
+from ..laws.catalogue import LinearSpring
+from ..laws.smoothing import QUADRATIC
+from ..typing import Array
+from .branch import BranchIteration
+from .context import SolveContext
+from .result import Counts, SolveResult
+
+_SPRING = LinearSpring(stiffness=1.0)
+"""In units of E0/L."""
+
+
+def solve(context: SolveContext) -> SolveResult:
+    """A stationary point of the wanted laws. Collective.
+
+    Args:
+        context: the system and how to solve it.
+    """
+    found = BranchIteration(context, [_SPRING] * len(context.system.terms)).solve()
+    counts = Counts()
+    counts.add(found.counts)
+    for width in _widths(context) if found.converged else ():
+        laws = [QUADRATIC.relative(term.exact, width) for term in context.system.terms]
+        found = BranchIteration(context, laws, width).newton(context.system.unknowns(found.u))
+        counts.add(found.counts)
+        if not found.converged:
+            break
+        exact = BranchIteration(context).newton(x := context.system.unknowns(found.u), _drops(context, laws, x))
+        counts.add(exact.counts)
+        if exact.converged:
+            return replace(exact, counts=counts)
+    return replace(found, converged=False, counts=counts)
+
+
+def _widths(context: SolveContext) -> Iterator[float]:
+    """Relative widths of the smoothing, down to the wanted one."""
+    thresholds = context.options.thresholds.branch
+    width = thresholds.widest
+    while width > max(thresholds.narrowest, context.epsilon or 0.0):
+        yield width
+        width *= thresholds.narrowing
+
+
+def _drops(context: SolveContext, smoothed: Sequence[Superpotential], x: PETSc.Vec) -> list[Array]:
+    """The kink of G on which a vertex is, since its smoothed traction lies between those of both sides, else NaN."""
+    terms = zip(context.system.terms, smoothed, strict=True)
+    return [_drop(term.law, smooth, term.argument(x.array_r)) for term, smooth in terms]
+
+
+def _drop(law: Superpotential, smooth: Superpotential, argument: Array) -> Array:
+    found, between, kinks = np.full(len(argument), np.nan), smooth.concave.left(argument), law.concave.kinks
+    for kink, low, high in zip(kinks, law.concave.left(kinks), law.concave.right(kinks), strict=True):
+        found[(between > low) & (between < high)] = kink
+    return found
