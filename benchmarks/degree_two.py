@@ -1,6 +1,6 @@
 """Degree 2: the rule on Γc in space, the pressure, what it saves, penetration between nodes, iterations towards ν = ½.
 
-    ./hvi exec python3 benchmarks/degree_two.py rules|pressure|block|strip|hertz|curved|dips|rubber
+    ./hvi exec python3 benchmarks/degree_two.py rules|pressure|block|strip|hertz|dips|rubber
 
 Energies decide: the square root of the relative error of the energy is the relative error in the energy norm, but for
 what the rule on Γc adds to the energy.
@@ -9,10 +9,8 @@ what the rule on Γc adds to the energy.
 from __future__ import annotations
 
 import sys
-import tempfile
 import time
 from collections.abc import Callable, Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -35,17 +33,6 @@ OWN = spaces.EDGE_SHARE[3]
 _make_surface = contact_surface.make_surface
 STEEL = {"model": "plane_stress", "youngs_modulus": 2.15e11, "poisson_ratio": 0.29}
 RUBBER = {"model": "three_dimensional", "youngs_modulus": 1e7, "poisson_ratio": 0.3}
-RING = """
-h = {size};
-Point(1) = {{0, 0, 0, h}};
-Point(2) = {{1, 0, 0, h}}; Point(3) = {{2, 0, 0, h}}; Point(4) = {{0, 2, 0, h}}; Point(5) = {{0, 1, 0, h}};
-Line(1) = {{2, 3}}; Circle(2) = {{3, 1, 4}}; Line(3) = {{4, 5}}; Circle(4) = {{5, 1, 2}};
-Curve Loop(1) = {{1, 2, 3, 4}}; Plane Surface(1) = {{1}};
-Physical Curve("bottom") = {{1}}; Physical Curve("left") = {{3}}; Physical Curve("inner") = {{4}};
-Physical Curve("outer") = {{2}}; Physical Surface("body") = {{1}};
-Mesh.ElementOrder = {order};
-"""
-"""A quarter of a ring, radii 1 and 2."""
 SPRING = {"law": "graph", "points": [[0, 0], [1.0, 1e8]]}
 
 
@@ -207,33 +194,6 @@ def hertz() -> None:
         )
 
 
-def curved() -> None:
-    """Lamé's ring, radii 1 and 2 m, a quarter of it: errors with curved cells (a file of second order) and straight."""
-    modulus, ratio, load = 1e7, 0.3, 1e5
-    at_one = (1 + ratio) / modulus * load / 3 * (1 - 2 * ratio + 4)
-    for order in (2, 1):
-        for cells in (2, 4, 8, 16):
-            with tempfile.TemporaryDirectory() as folder:
-                file = Path(folder) / "ring.geo"
-                file.write_text(RING.format(size=1 / cells, order=order))
-                material = hvi.Isotropic(youngs_modulus=modulus, poisson_ratio=ratio, model="plane_strain")
-                symmetry = [hvi.Displacement("bottom", [None, 0.0]), hvi.Displacement("left", [0.0, None])]
-                model = hvi.Model(hvi.Body.file(file), [material, *symmetry, hvi.Pressure("inner", load)])
-                found = hvi.solve(model, degree=2)
-            x = found.problem.positions[:, :2]
-            r = np.linalg.norm(x, axis=1, keepdims=True)
-            exact = (1 + ratio) / modulus * load / 3 * ((1 - 2 * ratio) * r + 4 / r) * x / r
-            away = np.abs(found.u.x.array.reshape(-1, 2) - exact).max() / at_one
-            energy = -0.25 * np.pi * load * at_one
-            error, estimated = np.sqrt(abs(found.energy / energy - 1)), found.estimate
-            assert estimated is not None
-            print(
-                f"file of order {order}, {found.dofs} unknowns: energy norm {error:.2e} (estimated "
-                f"{estimated.relative:.2e}), largest nodal error {away:.1e}",
-                flush=True,
-            )
-
-
 def dips() -> None:
     """The largest penetration between nodes over the largest displacement, by mesh."""
     scenes: dict[str, tuple[Callable[[int], dict[str, Any]], Sequence[int]]] = {
@@ -308,4 +268,4 @@ def iterations(scene: hvi.Scene, kind: Any) -> tuple[int, float]:
 
 
 if __name__ == "__main__":
-    {f.__name__: f for f in (rules, pressure, block, strip, hertz, curved, dips, rubber)}[sys.argv[1]]()
+    {f.__name__: f for f in (rules, pressure, block, strip, hertz, dips, rubber)}[sys.argv[1]]()

@@ -13,16 +13,16 @@ class Timer:
     """Adds up time (s) by phase; the time of an inner phase does not count for the one around it.
 
     Args:
-        clock: seconds since any moment; by default wall time.
+        clock: seconds since any moment; by default wall time, ``time.perf_counter`` as it is when the timer is made.
 
     Attributes:
         seconds: by phase, s.
     """
 
-    def __init__(self, clock: Callable[[], float] = time.perf_counter) -> None:
-        self._clock = clock
+    def __init__(self, clock: Callable[[], float] | None = None) -> None:
+        self._clock = clock or time.perf_counter
         self.seconds = dict.fromkeys(PHASES, 0.0)
-        self._start = clock()
+        self._start = self._clock()
         self._inner: list[float] = []
 
     @contextmanager

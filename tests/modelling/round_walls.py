@@ -37,7 +37,7 @@ def wall(comm: MPI.Comm, cells: int, order: int) -> mesh.Mesh:
     if comm.rank:
         points, found = points[:0], found[:0]
     element = basix.ufl.element("Lagrange", "triangle", order, shape=(2,))
-    return mesh.create_mesh(comm, found, points, element)
+    return mesh.create_mesh(comm, cells=found, x=points, e=element)
 
 
 def _middles(a: int, b: int, c: int) -> tuple[int, int, int]:

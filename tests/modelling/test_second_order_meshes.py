@@ -74,10 +74,9 @@ def test_an_energy_with_data_on_the_curved_mesh_is_refused() -> None:
 
 
 def test_cells_of_third_order_and_curves_that_turn_back_are_refused() -> None:
-    corners = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
     element = basix.ufl.element("Lagrange", "triangle", 3, basix.LagrangeVariant.gll_warped, shape=(2,))
-    x = np.asarray(element.basix_element.points)
-    cubic = mesh.create_mesh(MPI.COMM_SELF, np.arange(10)[None], x @ (corners[1:] - corners[0]), element)
+    points = np.asarray(element.basix_element.points)
+    cubic = mesh.create_mesh(MPI.COMM_SELF, cells=np.arange(10)[None], x=points, e=element)
     with pytest.raises(hvi.InputError, match="order 3"):
         hvi.Body(cubic)
     made = wall(MPI.COMM_SELF, 2, 2)
