@@ -23,6 +23,7 @@ from ..runtime.timing import Timer
 from ..scene import Scene, read_scene
 from ..stationary_points.bodies import Equilibria
 from ..stationary_points.found import Found, Saved
+from ..stationary_points.progress_words import Clock, certified_in_words
 from ..system import petsc_options
 from . import equilibria_files as files
 from . import search_file, telling
@@ -101,7 +102,8 @@ def _run(request: Request) -> int:
         )
         on_root(COMM, lambda: kept.write_left(found.left))
         code = _exit_code(prepared, found, interrupted=interrupt.requested())
-        rows = [_written(request, bodies, found, i) for i in range(len(found.points))]
+        telling.say([f"result: {found.reason}; {found.nodes} boxes"])
+        rows = list(_all_written(request, bodies, found))
         files.write(folder, prepared, found, rows, code, request.options.given)
         if rows:
             on_root(COMM, lambda: _picture_and_page(folder.work, draw=not request.options.no_pictures))
@@ -149,6 +151,14 @@ def _exit_code(prepared: Preparation, found: Found, *, interrupted: bool) -> Exi
     return ExitCode.INTERRUPTED if interrupted else ExitCode.NOT_CONVERGED
 
 
+def _all_written(request: Request, bodies: Equilibria, found: Found) -> Iterator[files.Row]:
+    """Write all equilibria, and tell how many are written; their rows. Collective."""
+    report, clock, count = _reporter(), Clock(), len(found.points)
+    for i in range(count):
+        yield _written(request, bodies, found, i)
+        report(certified_in_words(i + 1, count, clock))
+
+
 def _written(request: Request, bodies: Equilibria, found: Found, i: int) -> files.Row:
     """Write one equilibrium into a result folder of its own; its row. Collective."""
     solution, folder = bodies.solution(found.points[i]), request.folder
@@ -162,7 +172,6 @@ def _written(request: Request, bodies: Equilibria, found: Found, i: int) -> file
 
 
 def _lines(prepared: Preparation, found: Found, rows: list[files.Row]) -> Iterator[str]:
-    yield f"result: {found.reason}; {found.nodes} boxes"
     unit = "J/m" if prepared.problem.scales.dimension == 2 else "J"
     for row in rows[:MOST_TOLD]:
         uncertified = "" if row.certified else "  NOT CERTIFIED"

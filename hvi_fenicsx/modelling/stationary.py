@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields
 from typing import Any
 
@@ -16,6 +16,7 @@ from ..solution import Solution
 from ..stationary_points import bodies
 from ..stationary_points.found import Found
 from ..stationary_points.passes import Pass
+from ..stationary_points.progress_words import Clock, certified_in_words
 from .model import Model
 from .solution import ModelSolution
 from .solving import check
@@ -84,7 +85,15 @@ def equilibria(
     searched = bodies.Equilibria(prepared)
     stop = _stop(prepared.system.comm, limit)
     found = searched.find(lowest=lowest, gap=gap, stop=stop, report=_LOG.debug)
-    return _result(found, tuple(searched.solution(p) for p in found.points), prepared.problem.scales.energy)
+    return _result(found, tuple(_certified(searched, found)), prepared.problem.scales.energy)
+
+
+def _certified(searched: bodies.Equilibria, found: Found) -> Iterator[Solution]:
+    """The whole bodies at all points, each certified. Collective."""
+    clock, count = Clock(), len(found.points)
+    for i, point in enumerate(found.points):
+        yield searched.solution(point)
+        _LOG.debug(certified_in_words(i + 1, count, clock))
 
 
 def _stop(ranks: MPI.Comm, limit: float | None) -> Callable[[], bool]:

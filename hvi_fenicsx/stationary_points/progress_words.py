@@ -1,4 +1,4 @@
-"""How far a search is, in words: bounds, gap, open boxes, and about how long it will take.
+"""How far a search is, in words: bounds, gap, open boxes, and about how long it, or the rest of the work, will take.
 
 Each division gives its parts equal shares of the whole search; what is done is what open boxes are not (Knuth 1975,
 Mathematics of Computation 29). The time to go follows from the share that is done; it is a rough estimate, since
@@ -63,6 +63,17 @@ def lowest_in_words(now: Progress, energies: Unit, clock: Clock) -> str:
     low, high = (f"{bound * energies.size:.8g}" for bound in (now.lower, now.upper))
     ends = f"between {low} and {high} {energies.name}".rstrip()
     return f"lowest: {ends}, gap {now.gap:.1e}, {now.boxes} boxes, {now.waiting} open{clock.to_go(now.share)}"
+
+
+def certified_in_words(done: int, count: int, clock: Clock) -> str:
+    """How many of the equilibria found are certified, and written where they are written.
+
+    Args:
+        done: so many.
+        count: of so many.
+        clock: since the first one.
+    """
+    return f"certified: {done} of {count} equilibria{clock.to_go(1.0 - done / count)}"
 
 
 def all_in_words(search: Enumeration, clock: Clock) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import logging
 from collections.abc import Callable
 from pathlib import Path
 
@@ -36,9 +37,13 @@ def energies() -> list[float]:
     return [p.energy for p in Floor(3, 6e6, 1e6, law).stationary()]
 
 
-def test_python_finds_all_certified_and_proves_the_lowest() -> None:
+def test_python_finds_all_certified_and_proves_the_lowest(caplog: pytest.LogCaptureFixture) -> None:
     scene = hvi.Scene.model_validate(model(3, 6e6, friction=STRONG))
-    found = hvi.equilibria(scene)
+    with caplog.at_level(logging.DEBUG, logger="hvi_fenicsx"):
+        found = hvi.equilibria(scene)
+    told = [r.getMessage() for r in caplog.records if r.getMessage().startswith("certified: ")]
+    assert [words.split(",")[0] for words in told] == [f"certified: {k} of 3 equilibria" for k in (1, 2, 3)]
+    assert told[-1].endswith("about 0 s to go")
     assert found.complete
     assert found.kinds == ("minimiser", "minimiser", "saddle")
     assert [s.energy for s in found.solutions] == pytest.approx(energies(), rel=1e-9)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -78,7 +79,9 @@ def render(template: str, values: dict[str, Any], path: Path) -> Path:
     return path
 
 
+@functools.cache
 def _environment() -> jinja2.Environment:
+    """The templates, each compiled once."""
     import jinja2  # a tenth of a second, for the report alone
 
     loader = jinja2.FileSystemLoader(Path(__file__).parent)
