@@ -1,11 +1,11 @@
-"""What softening costs: `auto` with the load path as a start and without it, beside the same scene on springs.
+"""What softening costs: `auto` beside the same scene on springs, with the load path as a start or also without it.
 
-    ./hvi exec python3 benchmarks/softening.py [--limit 120] [--json FILE] [NAME ...]
+    ./hvi exec python3 benchmarks/softening.py [--limit 120] [--without] [--json FILE] [NAME ...]
 
 Processor time of the solve, from the assembled system to the certificate, in one process; a small run before loads the
 libraries. On springs each law is replaced by a linear spring of its first slope. Above a strength there is no answer on
 springs to compare with: the answer just below it stands in that column. A solve that takes longer than the limit is
-interrupted.
+interrupted. Newton steps are those of all levels, and of the finest one.
 """
 
 from __future__ import annotations
@@ -13,14 +13,18 @@ from __future__ import annotations
 import argparse
 import copy
 import json
+import logging
 import time
 import tomllib
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from typing_extensions import override
+
 from hvi_fenicsx import Scene
 from hvi_fenicsx.preparation import DEFAULT, prepare
+from hvi_fenicsx.runtime.newton_step import NewtonStep
 from hvi_fenicsx.solvers.thresholds import PathThresholds
 from hvi_fenicsx.solvers.thresholds import Thresholds as SolverThresholds
 from hvi_fenicsx.workflow import finish
@@ -28,6 +32,7 @@ from hvi_fenicsx.workflow import finish
 Table = dict[str, Any]
 DEMOS = Path(__file__).parent.parent / "demos"
 SOFT_ANCHOR = [[0, 0], [5e-6, 1e6], [100e-6, 0]]
+SOFT_FLOOR = [[0, 0], [2e-6, 1e6], [1.6e-5, 3e5]]
 WITHOUT = replace(DEFAULT, solvers=SolverThresholds(path=PathThresholds(quick_steps=1_000_000, vertex_unknowns=-1)))
 
 
@@ -52,10 +57,19 @@ def bar(cells: list[int], strength: float, **solver: object) -> Table:
     return table
 
 
-def lap(load: float) -> Table:
+def lap(load: float, lower: list[int], upper: list[int]) -> Table:
     """The single-lap joint under a multiple of its load."""
     table = demo("single_lap")
+    table["domain"]["lower"]["cells"], table["domain"]["upper"]["cells"] = lower, upper
     table["boundary"]["pull"]["traction"] = [load * 3.0e7, 0.0]
+    return table
+
+
+def block(cells: list[int], load: float) -> Table:
+    """The pushed block on a floor whose friction falls, under a multiple of its push."""
+    table = demo("pushed_block", cells)
+    table["boundary"]["floor"]["friction"] = {"law": "graph", "points": SOFT_FLOOR}
+    table["boundary"]["push"]["traction"] = [load * 6.0e5, 0.0]
     return table
 
 
@@ -95,17 +109,28 @@ def plate(cells: list[int], lift: float) -> Table:
 
 
 SMOOTHED = {"smoothing": "quadratic", "epsilon": 0.01}
+SMALL_LAP = ([100, 4], [128, 4])
 CASES: dict[str, tuple[Table, Table]] = {
     # the scene; what stands in the column of springs
-    "peeling, 30,050": (peeling([600, 24]), peeling([600, 24])),
-    "peeling, 465,794": (peeling([2400, 96]), peeling([2400, 96])),
-    "glued bar, 0.98 of its strength": (bar([380, 2], 0.98), bar([380, 2], 0.98)),
-    "single lap, load x 3": (lap(3.0), lap(3.0)),
-    "plate in space": (plate([24, 10, 3], 1e-4), plate([24, 10, 3], 1e-4)),
-    "anchor in space, load x 1.3": (anchor([16, 16, 8], 1.3), anchor([16, 16, 8], 1.3)),
+    name: (table, table)
+    for name, table in {
+        "peeling, 30,000": peeling([600, 24]),
+        "peeling, 470,000": peeling([2400, 96]),
+        "glued bar, 0.98 of its strength, 30,000": bar([1520, 8], 0.98),
+        "glued bar, 0.98 of its strength, 470,000": bar([6080, 32], 0.98),
+        "single lap, load x 4, 30,000": lap(4.0, [400, 16], [512, 16]),
+        "single lap, load x 4, 470,000": lap(4.0, [1600, 64], [2048, 64]),
+        "pushed block, load x 1.35, 30,000": block([128, 128], 1.35),
+        "pushed block, load x 1.35, 470,000": block([480, 480], 1.35),
+        "plate in space, 30,000": plate([48, 20, 8], 1e-4),
+        "plate in space, 470,000": plate([120, 48, 24], 1e-4),
+        "anchor in space, load x 1.3, 30,000": anchor([24, 24, 12], 1.3),
+        "anchor in space, load x 1.3, 470,000": anchor([64, 64, 32], 1.3),
+    }.items()
+} | {
     "anchor with friction in space, load x 1.3": (sticking_anchor([8, 8, 4], 1.3), anchor([8, 8, 4], 1.3)),
     "no: glued bar, 1.05 of its strength": (bar([380, 2], 1.05), bar([380, 2], 0.98)),
-    "no: single lap, load x 8": (lap(8.0), lap(3.0)),
+    "no: single lap, load x 8": (lap(8.0, *SMALL_LAP), lap(3.0, *SMALL_LAP)),
     "no: smoothed glued bar, 1.05 of its strength": (bar([190, 2], 1.05, **SMOOTHED), bar([190, 2], 0.98)),
     "no: anchor with friction in space, load x 1.42": (sticking_anchor([8, 8, 4], 1.42), anchor([8, 8, 4], 1.3)),
 }
@@ -123,41 +148,60 @@ def on_springs(table: Table) -> Table:
     return found
 
 
+class FinestSteps(logging.Handler):
+    """Counts the Newton steps of the level that is solved; the finest one is the last."""
+
+    def __init__(self) -> None:
+        super().__init__(logging.INFO)
+        self.count = 0
+
+    @override
+    def emit(self, record: logging.LogRecord) -> None:
+        if str(record.msg).startswith("level of"):
+            self.count = 0
+
+    def step(self, step: NewtonStep) -> None:
+        """One more, but for the start of a solve."""
+        self.count += step.iteration > 0
+
+
 def timed(table: Table, thresholds: Any, limit: float) -> Table:
     """Seconds, Newton steps and the answer."""
-    prepared = prepare(Scene.model_validate(table), thresholds=thresholds)
+    prepared, finest = prepare(Scene.model_validate(table), thresholds=thresholds), FinestSteps()
+    log = logging.getLogger("hvi_fenicsx")
+    log.addHandler(finest)
     start = time.process_time()
-    solution = finish(prepared, lambda step: None, lambda: time.process_time() - start > limit, estimating=False)
+    solution = finish(prepared, finest.step, lambda: time.process_time() - start > limit, estimating=False)
     seconds = time.process_time() - start
+    log.removeHandler(finest)
     found = solution.solve_result
     return {
         "seconds": seconds,
         "dofs": solution.dofs,
-        "newton": found.counts.newton,
+        "newton": f"{found.counts.newton}, {finest.count}",
         "levels": found.levels,
         "answer": "certified" if solution.converged else f"over {limit:g} s" if found.interrupted else found.reason,
         "energy": solution.examination.energy,
     }
 
 
-def measure(name: str, limit: float) -> Table:
-    """One case, in the three ways."""
+def measure(name: str, limit: float, *, without: bool) -> Table:
+    """One case, in the two or three ways."""
     scene, beside = CASES[name]
     springs = beside if name.startswith("no:") else on_springs(beside)
-    tables = {"springs": (springs, DEFAULT), "path": (scene, DEFAULT), "without": (scene, WITHOUT)}
+    tables = {"springs": (springs, DEFAULT), "path": (scene, DEFAULT)}
+    if without:
+        tables["without"] = (scene, WITHOUT)
     return {"name": name} | {key: timed(table, chosen, limit) for key, (table, chosen) in tables.items()}
 
 
 def row(found: Table) -> str:
     """A row of the table."""
-    base, path, before = (found[key] for key in ("springs", "path", "without"))
-    ratios = [f"{one['seconds'] / base['seconds']:.1f}" for one in (path, before)]
-    same = abs(path["energy"] - before["energy"]) <= 1e-6 * abs(before["energy"])
-    answers = (
-        path["answer"] if path["answer"] == before["answer"] and same else f"{path['answer']} / {before['answer']}"
-    )
-    cells = [found["name"], path["dofs"], f"{base['seconds']:.2f}", base["newton"], ratios[0], path["newton"]]
-    return "| " + " | ".join(map(str, [*cells, ratios[1], before["newton"], answers])) + " |"
+    base, path = found["springs"], found["path"]
+    cells = [found["name"], path["dofs"], path["levels"], f"{base['seconds']:.2f}", base["newton"]]
+    for one in (found[key] for key in ("path", "without") if key in found):
+        cells += [f"{one['seconds'] / base['seconds']:.1f}", one["newton"], one["answer"]]
+    return "| " + " | ".join(map(str, cells)) + " |"
 
 
 def main() -> None:
@@ -165,16 +209,21 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("names", nargs="*", help="parts of names")
     parser.add_argument("--limit", type=float, default=120.0, help="seconds of processor time for one solve")
+    parser.add_argument("--without", action="store_true", help="also without the load path as a start")
     parser.add_argument("--json", type=Path)
     words = parser.parse_args()
     wanted = [name for name in CASES if not words.names or any(word in name for word in words.names)]
+    logging.getLogger("hvi_fenicsx").setLevel(logging.INFO)
     timed(peeling([30, 2]), DEFAULT, words.limit)
     timed(plate([8, 4, 2], 1e-5), DEFAULT, words.limit)
-    print("| | unknowns | springs, s | Newton | path / springs | Newton | without / springs | Newton | answer |")
-    print("|" + "---|" * 9)
+    ways = ["over springs", *(["without the path"] if words.without else [])]
+    head = ["", "unknowns", "levels", "springs, s", "Newton"]
+    head += [title for way in ways for title in (way, "Newton", "answer")]
+    print("| " + " | ".join(head) + " |")
+    print("|" + "---|" * len(head))
     results = []
     for name in wanted:
-        results.append(measure(name, words.limit))
+        results.append(measure(name, words.limit, without=words.without))
         print(row(results[-1]), flush=True)
     if words.json:
         words.json.write_text(json.dumps(results, indent=1))

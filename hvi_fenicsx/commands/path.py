@@ -140,7 +140,7 @@ def _followed(request: PathRequest, interrupt: Interrupt) -> dict[str, Any]:
         telling.say([f"{len(request.known)} rows are there already; on from factor {request.known[-1]['factor']:.6g}"])
     with ExitStack() as stack:
         writer = _JournalWriter(request, stack)
-        control = Control(keep=writer.keep, progress=_tell, interrupted=interrupt.requested)
+        control = Control(keep=writer.keep, progress=_tell, interrupted=interrupt.requested, jumping=_tell_jump)
         path = run.follow(control, request.known)
     telling.say(console.path_outcome(path))
     return path_output.write(request.folder, run, path, request.given, telling.LOG.info, draw=request.draw)
@@ -164,6 +164,11 @@ class _JournalWriter:
                 file.unlink(missing_ok=True)
             self._journal = self._stack.enter_context(Journal(file, self._request.identity))
         self._journal.append(record)
+
+
+def _tell_jump(factor: float, steps: int) -> None:
+    """The moving line in the middle of a long jump."""
+    telling.LOG.debug("jump at the factor %.6g, step %d", factor, steps, extra={"moving": True})
 
 
 def _tell(number: int, row: PathRow) -> None:

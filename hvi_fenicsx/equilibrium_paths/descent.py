@@ -8,7 +8,7 @@ that cell, this is the equilibrium.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
@@ -46,15 +46,23 @@ class Descent:
     Args:
         bonds: the problem with the present graphs of its laws.
         load: f, (n,).
+        step: called before each step; it may end the iteration by an exception.
         proximal: stiffness of the proximal term, relative to the elastic one.
         most: steps at most.
         far: a displacement that is infinite, in units of all lengths of the problem.
     """
 
     def __init__(
-        self, bonds: BondTable, load: Array, *, proximal: float = 1e-6, most: int = 2_000, far: float = 1e3
+        self,
+        bonds: BondTable,
+        load: Array,
+        step: Callable[[], None] = lambda: None,
+        *,
+        proximal: float = 1e-6,
+        most: int = 2_000,
+        far: float = 1e3,
     ) -> None:
-        self._bonds, self._load, self._most = bonds, load, most
+        self._bonds, self._load, self._step, self._most = bonds, load, step, most
         problem = bonds.problem
         self._stiffness, self._n = problem.elastic, problem.size
         self._proximal = proximal * float(np.max(self._stiffness.diagonal, initial=1e-300))
@@ -181,6 +189,7 @@ class Descent:
         cells = place(stiffness, self._convex, x, force)
         tracer = Tracer(stiffness, held, load - held, cells, 0.0)
         while True:
+            self._step()
             step = tracer.advance(1.0)
             if step.variable is None or step.variable < 0:
                 self._cells = tracer.cells

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -25,6 +25,7 @@ from .snap import snap
 from .state import End, Event, Follow, PathOptions, PathState, Place, Position, place_of
 from .step import FACTOR
 from .tracer import Tracer
+from .watch import Stopped, Watch
 
 
 class ExactFollower(Follower):
@@ -34,7 +35,7 @@ class ExactFollower(Follower):
         problem: the problem.
         options: what path is wanted.
         resume: the state after which to go on; by default the path begins at factor 0.
-        interrupted: whether to stop, asked at each event.
+        watch: whether to stop, asked at each event and within jumps, and who is told of these.
         beginning: the first state, where it is known.
 
     Attributes:
@@ -51,10 +52,10 @@ class ExactFollower(Follower):
         problem: CondensedProblem,
         options: PathOptions,
         resume: PathState | None = None,
-        interrupted: Callable[[], bool] = lambda: False,
+        watch: Watch | None = None,
         beginning: Beginning | None = None,
     ) -> None:
-        super().__init__(problem, options, resume, interrupted)
+        super().__init__(problem, options, resume, watch)
         self._beginning, self._bonds = beginning, BondTable(problem, options.remember)
         self._moved, self._direction, self._blocked = 0, 1, False
         self._untried: tuple[Array, list[Way]] = np.empty(0), []
@@ -86,9 +87,12 @@ class ExactFollower(Follower):
     def _loaded(self, start: Beginning, constant: CondensedProblem) -> Beginning:
         """From rest to the constant loads, as stable as it goes."""
         options = PathOptions(remember=self._options.remember)
-        follower = ExactFollower(constant, options, beginning=replace(start, constant=None))
+        beginning = replace(start, constant=None)
+        follower = ExactFollower(constant, options, watch=self._watcher, beginning=beginning)
         for _ in follower.states():
             pass
+        if follower.end is End.INTERRUPTED:
+            raise Stopped
         if follower.end is not End.REACHED:
             reason = f"under the constant loads alone: {follower.reason}"
             return Beginning(cells=None, memory=follower.memory, reason=reason)
@@ -225,7 +229,9 @@ class ExactFollower(Follower):
     def _jump(self, aim: float) -> Iterator[PathState]:
         """On to the next stable equilibrium at the same factor, or off."""
         cells, factor, memory = self.tracer.cells, self.tracer.factor, self._bonds.memory
-        found = snap(self._bonds, self._problem.load(factor), self.tracer, self._moved, self._direction)
+        self._watcher.jumps(factor)
+        load, step = self._problem.load(factor), self._watcher.step
+        found = snap(self._bonds, load, self.tracer, self._moved, self._direction, step)
         if found is not None and found.cells is not None:
             yield self._landed(found.cells, aim, found.inverse)
             return
@@ -244,7 +250,7 @@ class ExactFollower(Follower):
         """Down by the branch iteration."""
         cells, rates = self.tracer.cells, self.tracer.rates
         self._remember_all()
-        descent = Descent(self._bonds, self._problem.load(self.tracer.factor))
+        descent = Descent(self._bonds, self._problem.load(self.tracer.factor), self._watcher.step)
         return descent.land(descent.pushed(cells, rates), cells.x)
 
     def _landed(self, cells: Cells, aim: float, inverse: CellInverse | None = None) -> PathState:

@@ -15,6 +15,7 @@ from .eliminated import without_fixed
 from .kinds import kind_of
 from .programme import Follower
 from .state import End, Follow, PathOptions, PathState
+from .watch import Watch
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,15 +46,16 @@ class FullLoad:
     borne: Loaded | None = None
 
 
-def at_full_load(problem: CondensedProblem, most_events: int) -> FullLoad | None:
+def at_full_load(problem: CondensedProblem, most_events: int, watch: Watch | None = None) -> FullLoad | None:
     """The equilibrium to which a path leads. None where this says nothing: the path is lost, or does not begin.
 
     Args:
         problem: the problem; its factor scales all loads.
         most_events: events at most, of each path.
+        watch: whether to stop.
     """
     fewer, kept = without_fixed(problem)
-    found = (_event_by_event if is_piecewise_linear(fewer) else _along_the_curve)(fewer, most_events)
+    found = (_event_by_event if is_piecewise_linear(fewer) else _along_the_curve)(fewer, most_events, watch)
     if found is None:
         return None
 
@@ -66,24 +68,24 @@ def at_full_load(problem: CondensedProblem, most_events: int) -> FullLoad | None
     return replace(found, x=None if found.x is None else whole(found.x), borne=borne)
 
 
-def _event_by_event(problem: CondensedProblem, most_events: int) -> FullLoad | None:
+def _event_by_event(problem: CondensedProblem, most_events: int, watch: Watch | None) -> FullLoad | None:
     """Where piecewise linear laws lead: as stable as it goes, or else along the whole curve of equilibria.
 
     Where a body comes off on the way, the curve is followed on, through the limit point, since its factor may rise to 1
     again.
     """
-    follower, states = _followed(problem, Follow.STABLE, most_events)
+    follower, states = _followed(problem, Follow.STABLE, most_events, watch)
     if follower.end is End.ESCAPES and _begins(states):
         ended = FullLoad(x=None, reason=follower.reason, borne=_largest(states))
-        follower, states = _followed(problem, Follow.EXACT, most_events)
-        if follower.end is not End.REACHED:
+        follower, states = _followed(problem, Follow.EXACT, most_events, watch)
+        if follower.end not in (End.REACHED, End.INTERRUPTED):
             return ended
     return _reached(follower, states)
 
 
-def _along_the_curve(problem: CondensedProblem, most_events: int) -> FullLoad | None:
+def _along_the_curve(problem: CondensedProblem, most_events: int, watch: Watch | None) -> FullLoad | None:
     """Where other laws lead: along the curve of equilibria, since a jump takes longer than the whole curve."""
-    follower, states = _followed(problem, Follow.EXACT, most_events)
+    follower, states = _followed(problem, Follow.EXACT, most_events, watch)
     if follower.end is End.ESCAPES and _begins(states):
         largest, stable = _largest(states), list(itertools.takewhile(lambda state: state.stable, states))
         first = len(stable) == len(states) or states[len(stable)].factor == largest.factor
@@ -112,7 +114,10 @@ def _reached(follower: Follower, states: Sequence[PathState]) -> FullLoad | None
     return FullLoad(x=states[-1].x, reason="the whole load is reached")
 
 
-def _followed(problem: CondensedProblem, follow: Follow, most_events: int) -> tuple[Follower, list[PathState]]:
+def _followed(
+    problem: CondensedProblem, follow: Follow, most_events: int, watch: Watch | None
+) -> tuple[Follower, list[PathState]]:
     """The follower at the end of its path, and the states."""
-    follower = kind_of(problem).follower(problem, PathOptions(follow=follow, most_events=most_events))
+    options = PathOptions(follow=follow, most_events=most_events)
+    follower = kind_of(problem).follower(problem, options, watch=watch)
     return follower, list(follower.states())

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from ..system.condensed_problem import CondensedProblem
 from .state import End, Event, PathOptions, PathState
+from .watch import Stopped, Watch
 
 
 class Follower(ABC):
@@ -18,7 +19,7 @@ class Follower(ABC):
         problem: the problem.
         options: what path is wanted.
         resume: the state after which to go on; by default the path begins at factor 0.
-        interrupted: whether to stop, asked at each state.
+        watch: whether to stop, asked at each state and within jumps, and who is told of these.
 
     Attributes:
         end: how the path ended; None before.
@@ -30,10 +31,10 @@ class Follower(ABC):
         problem: CondensedProblem,
         options: PathOptions,
         resume: PathState | None = None,
-        interrupted: Callable[[], bool] = lambda: False,
+        watch: Watch | None = None,
     ) -> None:
         self._problem, self._options = problem, options
-        self._resume, self._interrupted = resume, interrupted
+        self._resume, self._watcher = resume, watch or Watch()
         self._leg, self._events, self._unstable, self._peak = 0, 0, 0, 0.0
         self._floats = problem.elastic.is_singular(np.ones(problem.size, dtype=bool), np.zeros(problem.size))
         self.end: End | None = None
@@ -41,6 +42,12 @@ class Follower(ABC):
 
     def states(self) -> Iterator[PathState]:
         """The states from start to end; the first one of a path that is resumed is the next one."""
+        try:
+            yield from self._all_states()
+        except Stopped:
+            self._finish(End.INTERRUPTED, "interrupted")
+
+    def _all_states(self) -> Iterator[PathState]:
         if self._resume is None:
             yield from self._begun()
         else:
@@ -91,7 +98,7 @@ class Follower(ABC):
         self._peak = max(self._peak, abs(self.factor))
         if self._floats and self._is_off():
             self._finish(End.ESCAPES, "the load is back at zero, and nothing holds the body any more")
-        elif self._interrupted():
+        elif self._watcher.interrupted():
             self._finish(End.INTERRUPTED, "interrupted")
         elif self._events > self._options.most_events:
             self._finish(End.LOST, f"no end after {self._options.most_events} events")

@@ -8,7 +8,7 @@ remember on the way.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -40,7 +40,9 @@ class Snap:
     inverse: CellInverse | None = None
 
 
-def snap(bonds: BondTable, load: Array, path: Tracer, moved: int, direction: int) -> Snap | None:
+def snap(
+    bonds: BondTable, load: Array, path: Tracer, moved: int, direction: int, step: Callable[[], None]
+) -> Snap | None:
     """Follow the curve with the first restraint that leads to an end; None where none does.
 
     Args:
@@ -49,6 +51,7 @@ def snap(bonds: BondTable, load: Array, path: Tracer, moved: int, direction: int
         path: the curve, at a state that is not stable.
         moved: the unknown whose passage made it so.
         direction: of that unknown along its graph, 1 or -1.
+        step: called before each step; it may end the search by an exception.
     """
     memory, cells = bonds.memory, path.cells
     try:
@@ -59,7 +62,7 @@ def snap(bonds: BondTable, load: Array, path: Tracer, moved: int, direction: int
         held = _held_back(bonds, load, cells, restraint, inverse)
         if held is None or held.rates[moved] * direction <= 0.0:
             continue
-        found = _to_its_end(held, bonds, load, restraint)
+        found = _to_its_end(held, bonds, load, restraint, step)
         if found is not None:
             return found
         bonds.restore(memory)
@@ -97,9 +100,10 @@ def _held_back(bonds: BondTable, load: Array, cells: Cells, restraint: Array, in
         return None
 
 
-def _to_its_end(tracer: Tracer, bonds: BondTable, load: Array, c: Array) -> Snap | None:
+def _to_its_end(tracer: Tracer, bonds: BondTable, load: Array, c: Array, going: Callable[[], None]) -> Snap | None:
     fall, turnover, standing = 0.0, 1e-3 * float(np.abs(tracer.cells.x) @ np.abs(load)), 0
     for _ in range(1_000 + 100 * len(tracer.cells)):
+        going()
         t, x = tracer.factor, tracer.cells.x
         step = tracer.advance(0.0)
         standing = standing + 1 if np.allclose(tracer.cells.x, x, rtol=1e-12, atol=0.0) else 0

@@ -34,7 +34,7 @@ class Thresholds:
         least_jacobian: part of its straight size to which a curved cell may shrink anywhere.
     """
 
-    coarsest_block: int = 8
+    coarsest_block: int = 4
     bisected_edges: Mapping[int, float] = field(default_factory=lambda: {2: 0.0, 3: 0.76})
     hierarchy_from: int = 20_000
     coarsest: int = 2_500

@@ -13,6 +13,7 @@ from ..equilibrium_paths.bonds import is_piecewise_linear
 from ..equilibrium_paths.kinds import kind_of
 from ..equilibrium_paths.programme import Follower
 from ..equilibrium_paths.state import End, Event, Follow, PathOptions, PathState
+from ..equilibrium_paths.watch import Watch
 from ..errors import InputError
 from ..load_path import LoadPath, PathRow
 from ..preparation import Preparation
@@ -36,12 +37,14 @@ class Control:
     Attributes:
         keep: is given the record of each new state, on all ranks.
         progress: is told each new row.
-        interrupted: whether to stop (collective).
+        interrupted: whether to stop (collective); asked at each state, and at each step of a jump.
+        jumping: is told the factor of a long jump and its steps so far.
     """
 
     keep: Callable[[Record], None] = lambda record: None
     progress: Callable[[int, PathRow], None] = lambda number, row: None
     interrupted: Callable[[], bool] = lambda: False
+    jumping: Callable[[float, int], None] = lambda factor, steps: None
 
 
 class PathRun:
@@ -130,7 +133,8 @@ class PathRun:
     def _follower(self, control: Control) -> Follower:
         options = PathOptions(programme=self.wanted.to, follow=Follow(self.wanted.follow), remember=self._remember)
         resume = self.states[-1] if self.states else None
-        return self._kind.follower(self._condensation.problem, options, resume, control.interrupted)
+        watch = Watch(control.interrupted, control.jumping)
+        return self._kind.follower(self._condensation.problem, options, resume, watch)
 
     def _take(self, state: PathState, verdict: Verdict) -> None:
         self.states.append(state)

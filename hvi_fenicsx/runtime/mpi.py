@@ -54,6 +54,30 @@ def on_root(comm: MPI.Comm, action: Callable[[], T]) -> T:
     return result
 
 
+def on_root_asking(comm: MPI.Comm, action: Callable[[Callable[[], bool]], T], question: Callable[[], bool]) -> T:
+    """Run a long action on rank 0 only, which may ask a question that all ranks must ask together. Collective.
+
+    Args:
+        comm: the ranks; all get the result.
+        action: what to do with a function that asks; it raises no error that the program goes on from.
+        question: is asked on all ranks when the action asks; rank 0's answer counts.
+    """
+
+    def ask() -> bool:
+        comm.bcast(True, root=0)
+        return question()
+
+    if comm.rank != 0:
+        while comm.bcast(None, root=0):
+            question()
+        return comm.bcast(None, root=0)
+    try:
+        result = action(ask)
+    finally:
+        comm.bcast(False, root=0)
+    return comm.bcast(result, root=0)
+
+
 @contextmanager
 def ended_together(comm: MPI.Comm) -> Iterator[None]:
     """End all ranks when one of them has an error that the others do not have: they would wait for it for ever.

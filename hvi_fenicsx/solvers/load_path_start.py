@@ -7,6 +7,7 @@ load, or it ends before.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
 
@@ -16,8 +17,10 @@ from petsc4py import PETSc
 from ..equilibrium_paths.bonds import is_piecewise_linear
 from ..equilibrium_paths.full_load import FullLoad, at_full_load
 from ..equilibrium_paths.graphs import graph_of
+from ..equilibrium_paths.watch import Watch
 from ..errors import InputError, SolverError
 from ..laws import Superpotential
+from ..runtime.mpi import on_root_asking
 from ..system.condensation import Condensation
 from ..system.condensed_problem import CondensedProblem
 from ..system.system import System
@@ -50,7 +53,7 @@ def softens(law: Superpotential) -> bool:
     return graph is not None and bool(np.any(graph.slopes < 0.0))
 
 
-def follow(system: System, thresholds: PathThresholds) -> PathStart | None:
+def follow(system: System, thresholds: PathThresholds, interrupted: Callable[[], bool]) -> PathStart | None:
     """The start, where its path can be followed in short time; None where it cannot, or is lost. Collective.
 
     A path of other than piecewise linear equations is followed where laws soften and Γc has few unknowns.
@@ -58,6 +61,7 @@ def follow(system: System, thresholds: PathThresholds) -> PathStart | None:
     Args:
         system: the system; its tangent and what it holds are taken away.
         thresholds: how large the condensed system may be.
+        interrupted: whether to stop (collective); then None.
     """
     known = all(graph_of(term.exact) is not None for term in system.terms)
     if not known or system.comm.allreduce(len(system.jacobian.rows.dofs)) > thresholds.vertex_unknowns:
@@ -67,7 +71,7 @@ def follow(system: System, thresholds: PathThresholds) -> PathStart | None:
         condensation = Condensation(system)
     except (InputError, SolverError):
         return None
-    found = _on_first_rank(system, condensation.problem, thresholds)
+    found = _on_first_rank(system, condensation.problem, thresholds, interrupted)
     start = None if found is None else _expanded(system, condensation, found)
     condensation.free()
     return start
@@ -83,13 +87,19 @@ def _expanded(system: System, condensation: Condensation, found: FullLoad) -> Pa
     return PathStart(x=x, reason=found.reason, borne=borne)
 
 
-def _on_first_rank(system: System, problem: CondensedProblem, thresholds: PathThresholds) -> FullLoad | None:
+def _on_first_rank(
+    system: System, problem: CondensedProblem, thresholds: PathThresholds, interrupted: Callable[[], bool]
+) -> FullLoad | None:
     """Where the path leads, the same on all ranks to the last digit. Collective."""
-    found = None
-    if system.comm.rank == 0 and _is_short(system, problem, thresholds):
+    if not _is_short(system, problem, thresholds):
+        return None
+
+    def followed(ask: Callable[[], bool]) -> FullLoad | None:
         with suppress(np.linalg.LinAlgError, InputError):  # some edges in space have no path
-            found = at_full_load(problem, thresholds.most_events)
-    return system.comm.bcast(found)
+            return at_full_load(problem, thresholds.most_events, Watch(ask))
+        return None
+
+    return on_root_asking(system.comm, followed, interrupted)
 
 
 def _is_short(system: System, problem: CondensedProblem, thresholds: PathThresholds) -> bool:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -12,11 +12,12 @@ from ...system.condensed_problem import CondensedProblem
 from ...typing import Array
 from ..programme import Follower
 from ..state import End, Event, Follow, PathOptions, PathState, Place, Position, place_of
+from ..watch import Stopped, Watch
 from .curve import Curve, Move, Outcome
 from .energies import Balance, displacement_rate
 from .equations import Refused
 from .felt import factors, felt
-from .jump import jump
+from .jump import Jump
 from .passage import Crossing, Passage, order
 from .rest import Rest, at_rest, is_held
 from .sites import Sites
@@ -30,7 +31,7 @@ class ArcLengthFollower(Follower):
         problem: the problem.
         options: what path is wanted.
         resume: the state after which to go on; by default the path begins at factor 0.
-        interrupted: whether to stop, asked at each state.
+        watch: whether to stop, asked at each state and within jumps, and who is told of these.
         fineness: of the steps; 0.1 for a tenth of their length.
 
     Attributes:
@@ -46,12 +47,12 @@ class ArcLengthFollower(Follower):
         problem: CondensedProblem,
         options: PathOptions,
         resume: PathState | None = None,
-        interrupted: Callable[[], bool] = lambda: False,
+        watch: Watch | None = None,
         fineness: float = 1.0,
     ) -> None:
         self._factors = factors(problem)
         problem = felt(problem, self._factors)
-        super().__init__(problem, options, resume, interrupted)
+        super().__init__(problem, options, resume, watch)
         self._fineness = fineness
         self._laws = vertex_laws(problem, options.remember)
         self._sites = Sites(problem, self._laws)
@@ -84,9 +85,11 @@ class ArcLengthFollower(Follower):
         """From rest to the constant loads, as stable as it goes; where the sites are then."""
         if rest.z is None or rest.constant is None:
             return rest.z
-        follower = ArcLengthFollower(rest.constant, PathOptions(remember=self._options.remember))
+        follower = ArcLengthFollower(rest.constant, PathOptions(remember=self._options.remember), watch=self._watcher)
         for _ in follower.states():
             pass
+        if follower.end is End.INTERRUPTED:
+            raise Stopped
         if follower.end is not End.REACHED:
             self.reason = f"under the constant loads alone: {follower.reason}"
             return None
@@ -109,7 +112,7 @@ class ArcLengthFollower(Follower):
             sites.rebuild(k)
             sites.enter(k, int(position.numbers[k]))
         self._follow_from(position.small.copy(), state.factor)
-        self._unstable, self._leg = state.unstable, position.leg
+        self._unstable, self._leg, self._last = state.unstable, position.leg, state
         self._balance = Balance(self._problem, sites, state.work, state.dissipated)
         self._balance.begin(self._curve.here.values, self._curve.factor)
         if state.event not in (Event.START, Event.TURN):
@@ -208,8 +211,16 @@ class ArcLengthFollower(Follower):
     def _jump(self, aim: float) -> Iterator[PathState]:
         """On to the next stable equilibrium at the same factor, or off."""
         factor, problem = self._curve.factor, self._problem
-        heading = -self._curve.trend or 1
-        landing = jump(problem, self._sites, self._curve.here, problem.load(factor), self._lag, heading)
+        self._watcher.jumps(factor)
+        jump = Jump(
+            problem=problem,
+            sites=self._sites,
+            here=self._curve.here,
+            load=problem.load(factor),
+            lag=self._lag,
+            step=self._watcher.step,
+        )
+        landing = jump.landing(-self._curve.trend or 1)
         if landing is None:
             self._finish(End.LOST, f"no stable equilibrium found at the factor {factor:.6g}")
             yield self._state(Event.END)

@@ -7,7 +7,8 @@ such curve leads to an end soon, the body moves as an overdamped one (:mod:`.rel
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -26,7 +27,9 @@ _BEYOND = 1e-2
 _PUSH = 1e-6
 """How much larger the loads are that take a body off a state at which it would rest."""
 _MOST = 40
-"""Steps of such a curve at most, and twenty more for each site: it may zigzag where bonds break one after the other."""
+"""Steps of such a curve at most, at first."""
+_LATER = 20
+"""So many more for each site where nothing else leads to an end: it may zigzag where bonds break one by one."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,62 +43,121 @@ class Landing:
     z: Array | None
 
 
-def jump(problem: CondensedProblem, sites: Sites, here: Place, load: Array, lag: Array, heading: int) -> Landing | None:
-    """The landing, with the sites there; None where none was found, with the sites where they were.
+@dataclass(frozen=True, kw_only=True)
+class Jump:
+    """A jump from a state.
 
-    Args:
+    Attributes:
         problem: the problem.
-        sites: where they are.
+        sites: where they are; after the jump, where they are then.
         here: the state, and where its curve goes on.
         load: f, (n,).
         lag: an order of the sites, (m,).
-        heading: 1 where larger factors are not borne, -1 where smaller ones are not.
+        step: called before each step; it may end the jump by an exception.
     """
-    kept = sites.kept()
-    for restraint in _restraints(problem, sites, here):
-        for row in _starts(here):
-            found = _followed(problem, sites, here, load, restraint, row, lag)
+
+    problem: CondensedProblem
+    sites: Sites
+    here: Place
+    load: Array
+    lag: Array
+    step: Callable[[], None]
+
+    def landing(self, heading: int) -> Landing | None:
+        """Where it leads; None where this was not found, with the sites where they were.
+
+        Args:
+            heading: 1 where larger factors are not borne, -1 where smaller ones are not.
+        """
+        ways: list[Callable[[], Landing | None]] = [
+            lambda: self._held_back(_MOST),
+            self._released,
+            lambda: self._held_back(_MOST + _LATER * len(self.sites)),
+            lambda: self._pushed_off(heading),
+        ]
+        kept = self.sites.kept()
+        for way in ways:
+            found = way()
             if found is not None:
                 return found
-            sites.restore(kept)
-    start = here.y[:-1] if sites.on_drops() else _beyond(problem, sites, here)
-    directions = sites.rates(here.y[:-1], here.tangent[:-1])
-    found = _relaxed(problem, sites, start, load, lag, directions)
-    if found is None:
-        sites.restore(kept)
-        push = _PUSH * heading * np.max(np.abs(load)) / np.max(np.abs(problem.force_rate), initial=1e-300)
-        found = _pushed_off(problem, sites, here, load, push * problem.force_rate, lag)
-    if found is None:
-        sites.restore(kept)
-    return found
-
-
-def _relaxed(
-    problem: CondensedProblem, sites: Sites, z: Array, load: Array, lag: Array, directions: Array
-) -> Landing | None:
-    relaxation = Relaxation(problem, sites, z, load, lag)
-    if not relaxation.run(directions):
+            self.sites.restore(kept)
         return None
-    return Landing(z=None if relaxation.escapes else relaxation.z)
 
+    def _held_back(self, most: int) -> Landing | None:
+        """The landing of the first restraint whose curve leads to an end in so many steps."""
+        kept = self.sites.kept()
+        for restraint in _restraints(self.problem, self.sites, self.here):
+            tried: list[Array] = []
+            for row in _starts(self.here):
+                with suppress(Refused, np.linalg.LinAlgError):
+                    found = self._followed(restraint, row, most, tried)
+                    if found is not None:
+                        return found
+                self.sites.restore(kept)
+        return None
 
-def _pushed_off(
-    problem: CondensedProblem, sites: Sites, here: Place, load: Array, push: Array, lag: Array
-) -> Landing | None:
-    """The landing under loads that are larger at first: where many bonds reach an end together, the body rests."""
-    directions = sites.rates(here.y[:-1], here.tangent[:-1])
-    found = _relaxed(problem, sites, here.y[:-1].copy(), load + push, lag, directions)
-    if found is None or found.z is None:
-        return found
-    return _relaxed(problem, sites, found.z, load, lag, directions)
+    def _followed(self, restraint: Array, row: Array, most: int, tried: list[Array]) -> Landing | None:
+        """Along the curve of one restraint in a direction that was not tried; None where it leads to no end."""
+        sites = self.sites
+        curve = Curve(self.load, restraint * float(np.mean(sites.forces)), sites, self.here.y[:-1].copy(), 0.0)
+        tangent = curve.tangent(curve.here.values, row)
+        if any(np.allclose(tangent, other, rtol=0.0, atol=ROUNDING) for other in tried):
+            return None
+        tried.append(tangent)
+        curve.head(tangent)
+        if curve.factor_rate > 1e-7:
+            return None
+        Crossing(curve, self.lag).run()
+        return self._to_its_end(curve, most)
 
+    def _to_its_end(self, curve: Curve, most: int) -> Landing | None:
+        start = curve.here.y
+        for _ in range(most):
+            self.step()
+            move = curve.advance(0.0)
+            if move.outcome is Outcome.FACTOR:
+                stable = curve.sites.unstable_directions(curve.here.values) == 0
+                moved = float(np.max(np.abs(curve.here.y - start), initial=0.0))
+                return Landing(z=curve.here.y[:-1]) if stable and moved > 1e-9 else None
+            if move.outcome is Outcome.AWAY:
+                slow = abs(curve.factor_rate) <= 1e-6
+                return Landing(z=None) if curve.here.y[-1] < 0.0 and slow else None
+            if move.outcome is Outcome.STUCK or curve.here.y[-1] > 1e-9:
+                return None
+            if move.outcome in (Outcome.END, Outcome.TURNED):
+                Crossing(curve, self.lag).run(move.site, turned=move.outcome is Outcome.TURNED)
+        return None
 
-def _beyond(problem: CondensedProblem, sites: Sites, here: Place) -> Array:
-    """A little farther along the path, where the loads are smaller than those that act."""
-    curve = Curve(problem.force, problem.force_rate, sites, here.y[:-1].copy(), 0.0)
-    curve.place(here.y.copy(), here.tangent)
-    curve.length = _BEYOND
-    return curve.advance(np.inf).after.y[:-1]
+    def _released(self) -> Landing | None:
+        """The landing of an overdamped motion."""
+        start = self.here.y[:-1] if self.sites.on_drops() else self._beyond()
+        return self._relaxed(start, self.load, self._directions())
+
+    def _directions(self) -> Array:
+        """In which the sites go along the path, (m,)."""
+        return self.sites.rates(self.here.y[:-1], self.here.tangent[:-1])
+
+    def _beyond(self) -> Array:
+        """A little farther along the path, where the loads are smaller than those that act."""
+        curve = Curve(self.problem.force, self.problem.force_rate, self.sites, self.here.y[:-1].copy(), 0.0)
+        curve.place(self.here.y.copy(), self.here.tangent)
+        curve.length = _BEYOND
+        return curve.advance(np.inf).after.y[:-1]
+
+    def _relaxed(self, z: Array, load: Array, directions: Array) -> Landing | None:
+        relaxation = Relaxation(self.problem, self.sites, z, load, self.lag, self.step)
+        if not relaxation.run(directions):
+            return None
+        return Landing(z=None if relaxation.escapes else relaxation.z)
+
+    def _pushed_off(self, heading: int) -> Landing | None:
+        """The landing under loads that are larger at first: where many bonds reach an end together, the body rests."""
+        rate, directions = self.problem.force_rate, self._directions()
+        push = _PUSH * heading * np.max(np.abs(self.load)) / np.max(np.abs(rate), initial=1e-300)
+        found = self._relaxed(self.here.y[:-1].copy(), self.load + push * rate, directions)
+        if found is None or found.z is None:
+            return found
+        return self._relaxed(found.z, self.load, directions)
 
 
 def _starts(here: Place) -> Iterator[Array]:
@@ -181,36 +243,3 @@ def _evened(sites: Sites, motion: Array) -> Array:
             found[unknowns] = sum(law.weight for law in several) * motion[unknowns] / size
     largest = float(np.max(np.abs(found), initial=0.0))
     return np.asarray(found / largest) if largest else motion
-
-
-def _followed(
-    problem: CondensedProblem, sites: Sites, here: Place, load: Array, restraint: Array, row: Array, lag: Array
-) -> Landing | None:
-    """Along the curve of one restraint; None where it leads to no end."""
-    curve = Curve(load, restraint * float(np.mean(sites.forces)), sites, here.y[:-1].copy(), 0.0)
-    try:
-        curve.head(curve.tangent(curve.here.values, row))
-        if curve.factor_rate > 1e-7:
-            return None
-        Crossing(curve, lag).run()
-        return _to_its_end(curve, lag)
-    except (Refused, np.linalg.LinAlgError):
-        return None
-
-
-def _to_its_end(curve: Curve, lag: Array) -> Landing | None:
-    start = curve.here.y
-    for _ in range(_MOST + 20 * len(curve.sites)):
-        move = curve.advance(0.0)
-        if move.outcome is Outcome.FACTOR:
-            stable = curve.sites.unstable_directions(curve.here.values) == 0
-            moved = float(np.max(np.abs(curve.here.y - start), initial=0.0))
-            return Landing(z=curve.here.y[:-1]) if stable and moved > 1e-9 else None
-        if move.outcome is Outcome.AWAY:
-            slow = abs(curve.factor_rate) <= 1e-6
-            return Landing(z=None) if curve.here.y[-1] < 0.0 and slow else None
-        if move.outcome is Outcome.STUCK or curve.here.y[-1] > 1e-9:
-            return None
-        if move.outcome in (Outcome.END, Outcome.TURNED):
-            Crossing(curve, lag).run(move.site, turned=move.outcome is Outcome.TURNED)
-    return None

@@ -7,6 +7,8 @@ energy falls all the way until equilibrium is reached or a body is out of all re
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from ...system.condensed_problem import CondensedProblem
@@ -31,14 +33,17 @@ class Relaxation:
         z: their coordinates, (n,).
         load: f, (n,).
         lag: an order of the sites, (m,).
+        step: called before each step; it may end the motion by an exception.
 
     Attributes:
         z: the coordinates now, (n,).
         escapes: whether a body is out of reach.
     """
 
-    def __init__(self, problem: CondensedProblem, sites: Sites, z: Array, load: Array, lag: Array) -> None:
-        self._problem, self._sites, self._load, self._lag = problem, sites, load, lag
+    def __init__(
+        self, problem: CondensedProblem, sites: Sites, z: Array, load: Array, lag: Array, step: Callable[[], None]
+    ) -> None:
+        self._problem, self._sites, self._load, self._lag, self._step = problem, sites, load, lag, step
         self._damping = np.diag(sites.forces / sites.length)
         self.z, self.escapes, self._theta = z.copy(), False, 1.0
         self._size = 1.0 + float(np.max(np.abs(sites.s(z)), initial=0.0))
@@ -109,6 +114,7 @@ class Relaxation:
         for _ in range(50 + 4 * len(sites)):
             if curve.here.tangent[-1] < 0.0 or sites.on_drops():
                 break
+            self._step()
             move = curve.advance(1.0)
             self.z = curve.here.y[:-1].copy()
             if move.outcome is Outcome.FACTOR:

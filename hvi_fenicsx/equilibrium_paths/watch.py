@@ -1,0 +1,50 @@
+"""What a follower asks and tells on its way, in the middle of a long jump too."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+
+class Stopped(Exception):
+    """A jump was asked to stop: the path ends with the state before it."""
+
+
+class Watch:
+    """Whether to stop, and who is told of a jump's steps.
+
+    Args:
+        interrupted: whether to stop, asked at each state and at each step of a jump.
+        jumping: is told the factor of a long jump and its steps so far.
+        seconds: from one time that it is told to the next.
+    """
+
+    def __init__(
+        self,
+        interrupted: Callable[[], bool] = lambda: False,
+        jumping: Callable[[float, int], None] = lambda factor, steps: None,
+        seconds: float = 1.0,
+    ) -> None:
+        self.interrupted, self._jumping, self._seconds = interrupted, jumping, seconds
+        self._factor, self._steps, self._told = 0.0, 0, 0.0
+
+    def jumps(self, factor: float) -> None:
+        """Begin a jump.
+
+        Args:
+            factor: λ.
+        """
+        self._factor, self._steps, self._told = factor, 0, time.monotonic()
+
+    def step(self) -> None:
+        """One step of the jump is next.
+
+        Raises:
+            Stopped: it is not to be taken.
+        """
+        if self.interrupted():
+            raise Stopped
+        self._steps += 1
+        if time.monotonic() - self._told >= self._seconds:
+            self._told = time.monotonic()
+            self._jumping(self._factor, self._steps)
