@@ -36,7 +36,7 @@ def read(comm: MPI.Comm, path: Path, dimension: int, scale: float = 1.0, thresho
         path: the file.
         dimension: of the cells, 2 or 3.
         scale: m per unit of the file's coordinates.
-        thresholds: how long gmsh may take.
+        thresholds: how long gmsh may take, and how much memory.
 
     Raises:
         InputError: on all ranks alike: not readable, no mesh nor harmless script, no named groups, wrong dimension, no
@@ -44,7 +44,7 @@ def read(comm: MPI.Comm, path: Path, dimension: int, scale: float = 1.0, thresho
         Interrupted: on all ranks alike: a signal came.
     """
     found: list[MeshArrays] = []
-    names, nodes = on_root(comm, lambda: _read(path, dimension, scale, found, thresholds.gmsh_file_seconds))
+    names, nodes = on_root(comm, lambda: _read(path, dimension, scale, found, thresholds))
     check_affordable(comm, dimension * nodes, dimension, "domain.file", "mesh the body coarser")
     arrays = found.pop() if found else None
     curves = on_root(comm, lambda: {} if arrays is None else _curves(arrays, names[dimension - 1], scale, dimension))
@@ -61,7 +61,7 @@ def _curves(found: MeshArrays, names: Mapping[str, int], scale: float, dimension
 
 
 def _read(
-    path: Path, dimension: int, scale: float, found: list[MeshArrays], seconds: float
+    path: Path, dimension: int, scale: float, found: list[MeshArrays], thresholds: Thresholds
 ) -> tuple[dict[int, dict[str, int]], int]:
     """Read the file in a process of its own. Rank 0 only.
 
@@ -70,7 +70,7 @@ def _read(
         dimension: of the cells.
         scale: m per unit of the file's coordinates.
         found: the mesh is added here.
-        seconds: how long gmsh may take.
+        thresholds: how long gmsh may take, and how much memory.
 
     Returns:
         The physical groups by dimension and name, and the number of nodes.
@@ -79,14 +79,15 @@ def _read(
         path=str(path.absolute()),
         is_script=_is_script(path),
         dimension=dimension,
-        memory=memory.limit(),
+        memory=thresholds.gmsh_share * memory.free(),
         thresholds=gmsh_checks.DEFAULT,
     )
     try:
-        done = helper_process.run("hvi_fenicsx.mesh.gmsh_reader", [request.dumps()], seconds)
+        done = helper_process.run("hvi_fenicsx.mesh.gmsh_reader", [request.dumps()], thresholds.gmsh_file_seconds)
     except subprocess.TimeoutExpired:
         text = (
-            f"gmsh has not done with it after {seconds:g} s; look for an endless loop, or give the .msh that gmsh saves"
+            f"gmsh has not done with it after {thresholds.gmsh_file_seconds:g} s; look for an endless loop, or give "
+            "the .msh that gmsh saves"
         )
         raise InputError(f"mesh file {path}: {text}") from None
     if done.returncode or not done.stdout:

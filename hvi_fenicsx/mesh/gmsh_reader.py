@@ -92,6 +92,8 @@ def _read(request: Request) -> dict[str, Any]:
     except Exception as error:
         # gmsh raises bare Exceptions, whatever is wrong with a file
         reason = str(error).replace(str(opened), str(path))
+        if "Out of memory" in reason:
+            reason = f"it wants more than the {request.memory / 1024:.2g} GB that it may use; make it smaller"
         raise InputError(f"mesh file {path}: gmsh cannot read it: {reason}") from None
     curves = gmsh_curves.straightened(gmsh, path, dimension)
     gmsh_checks.check(gmsh, path, dimension, request.thresholds)

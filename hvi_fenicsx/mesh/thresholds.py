@@ -27,6 +27,7 @@ class Thresholds:
         sampled_cells: cells, about, by which sizes, regions and ranks of a body in space are known.
         remeshed_size: part by which a remeshed body's volume, or the area of a side, may differ.
         gmsh_file_seconds: seconds that gmsh has to read a mesh file, and to mesh a script.
+        gmsh_share: part of the memory that nothing uses which gmsh may take for a file.
         gmsh_seconds: seconds that gmsh has in any case to remesh a body in space.
         gmsh_seconds_per_triangle: seconds more for each triangle of its surface; it takes some 1e-4.
         barycentric_rounding: a barycentric weight that is rounding: the point lies on the facet opposite to that
@@ -45,6 +46,7 @@ class Thresholds:
     sampled_cells: int = 20_000
     remeshed_size: float = 0.25
     gmsh_file_seconds: float = 600.0
+    gmsh_share: float = 0.8
     gmsh_seconds: float = 5.0
     gmsh_seconds_per_triangle: float = 1e-3
     barycentric_rounding: float = 1e-9

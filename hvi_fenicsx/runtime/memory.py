@@ -59,6 +59,17 @@ def limit() -> float:
     return min(_of_machine(), _of_process())
 
 
+def free(table: Path = Path("/proc/meminfo")) -> float:
+    """What of :func:`limit` no process of this machine uses now, MB, as far as the machine tells.
+
+    Args:
+        table: where it tells.
+    """
+    lines = table.read_text(encoding="ascii").splitlines() if table.is_file() else []
+    found = [int(line.split()[1]) / 2**10 for line in lines if line.startswith("MemAvailable:")]
+    return min([limit(), *found])
+
+
 def room(comm: MPI.Comm) -> float:
     """The memory of all machines that the ranks run on, as far as they may use it, MB. Collective."""
     here = comm.Split_type(MPI.COMM_TYPE_SHARED)

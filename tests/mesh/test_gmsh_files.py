@@ -19,7 +19,7 @@ from hvi_fenicsx.mesh import gmsh_checks, gmsh_file, gmsh_script
 from hvi_fenicsx.mesh.domain import Domain
 from hvi_fenicsx.mesh.gmsh_reader import Request
 from hvi_fenicsx.mesh.thresholds import Thresholds
-from hvi_fenicsx.runtime import helper_process
+from hvi_fenicsx.runtime import helper_process, memory
 from hvi_fenicsx.runtime.signals import Interrupt
 
 TRIANGLE = """Point(1) = {0, 0, 0}; Point(2) = {1, 0, 0}; Point(3) = {0, 1, 0};
@@ -132,6 +132,14 @@ def test_a_script_that_ends_gmsh_or_never_ends_is_refused(command: str, tmp_path
     with pytest.raises(InputError, match=words) as refused:
         read(written(tmp_path / "m.geo", command + "\n" + TRIANGLE), seconds)
     assert str(tmp_path / "m.geo") in str(refused.value)
+
+
+def test_a_script_that_fills_the_memory_is_refused(tmp_path: Path) -> None:
+    """The machine's other programs lose nothing: gmsh gets a share of what is free, here 1.5 GB."""
+    thresholds = Thresholds(gmsh_share=1500 / memory.free())
+    script = written(tmp_path / "m.geo", "a[] = {0:1000000000};\n" + TRIANGLE)
+    with pytest.raises(InputError, match=r"wants more than the 1\.5 GB that it may use"):
+        gmsh_file.read(MPI.COMM_WORLD, script, 2, thresholds=thresholds)
 
 
 def signalled_while_meshing(temporary: Path) -> None:

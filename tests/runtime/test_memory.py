@@ -47,6 +47,12 @@ def test_what_ulimit_allows_holds() -> None:
         resource.setrlimit(resource.RLIMIT_DATA, before)
 
 
+def test_what_others_use_is_not_free(tmp_path: Path) -> None:
+    (tmp_path / "meminfo").write_text("MemTotal:  24000000 kB\nMemAvailable:    2048 kB\n", encoding="ascii")
+    assert memory.free(tmp_path / "meminfo") == 2.0
+    assert memory.free(tmp_path / "absent") == memory.limit()
+
+
 SHAPES: dict[str, tuple[dict[str, Any], int, float]] = {
     "cells": ({"shape": "rectangle", "size": [1.0, 1.0], "cells": [30, 30]}, 2, 2 * 31**2),
     "box": ({"shape": "box", "size": [1.0, 1.0, 1.0], "cells": [6, 6, 6]}, 3, 3 * 7**3),
