@@ -1,6 +1,6 @@
 """Degree 2: the rule on Γc in space, the pressure, what it saves, penetration between nodes, iterations towards ν = ½.
 
-    ./hvi exec python3 benchmarks/degree_two.py rules|pressure|block|strip|hertz|dips|rubber
+    ./hvi exec python3 benchmarks/degree_two.py rules|pressure|block|strip|hertz|dips|rubber|starts
 
 Energies decide: the square root of the relative error of the energy is the relative error in the energy norm, but for
 what the rule on Γc adds to the energy.
@@ -18,6 +18,7 @@ from mpi4py import MPI
 
 import hvi_fenicsx as hvi
 from hvi_fenicsx.mesh.thresholds import Thresholds
+from hvi_fenicsx.preparation import Thresholds as RunThresholds
 from hvi_fenicsx.problem import contact_surface, spaces
 from hvi_fenicsx.runtime.timing import Timer
 from hvi_fenicsx.scene_model import model_of, options_of
@@ -25,8 +26,10 @@ from hvi_fenicsx.solvers import nested_iteration
 from hvi_fenicsx.solvers.active_set import ActiveSetSolver
 from hvi_fenicsx.solvers.closed_start import resting_start
 from hvi_fenicsx.solvers.context import RunControl
+from hvi_fenicsx.solvers.thresholds import Thresholds as SolverThresholds
 from hvi_fenicsx.system.assemble import assemble
 from hvi_fenicsx.system.held_solver import LinearSettings
+from hvi_fenicsx.system.thresholds import Thresholds as LinearThresholds
 
 SHARES = (0.02, 0.05, 0.1, 0.125, 0.2, 0.25)
 OWN = spaces.EDGE_SHARE[3]
@@ -214,17 +217,39 @@ def rubber() -> None:
 
     Multigrid for displacements (mg), for displacements and pressures (mixed), and algebraic multigrid (gamg).
     """
-    for dimension, degree, cells in ((2, 1, 64), (2, 2, 32), (2, 2, 64), (2, 2, 128), (3, 2, 8), (3, 2, 12)):
+    every = ((2, 1, 64), (2, 1, 128), (2, 1, 256), (3, 1, 16), (3, 1, 24))
+    for dimension, degree, cells in (*every, (2, 2, 32), (2, 2, 64), (2, 2, 128), (3, 2, 8), (3, 2, 12)):
         small = cells in (32, 64)
-        for nu in (0.3, 0.45, 0.49, 0.499, 0.4999, 0.499999) if small else (0.3, 0.499, 0.4999, 0.499999):
+        ratios = (0.3, 0.45, 0.49) if degree == 1 else (0.3, 0.499, 0.4999, 0.499999)
+        for nu in (0.3, 0.45, 0.49, 0.499, 0.4999, 0.499999) if small else ratios:
             scene = hvi.Scene.model_validate(pressed(dimension, degree, cells, nu))
-            kinds = [kind for kind in ("gamg", "mg", "mixed", "lu") if suits(kind, nu, small=small)]
+            kinds = [kind for kind in ("gamg", "mg", "mixed", "lu") if suits(kind, nu, degree, small=small)]
             found = ", ".join("{} {} ({:.2g} s)".format(kind, *iterations(scene, kind)) for kind in kinds)
             print(f"{dimension}D, degree {degree}, {cells} cells a side, ν = {nu}: {found}", flush=True)
 
 
-def suits(kind: str, nu: float, *, small: bool) -> bool:
+def starts() -> None:
+    """A contact problem at ν = 0.4999 from a start of degree 1: solved directly, or that of a softer body."""
+    for dimension, cells in ((2, 64), (2, 128), (3, 16), (3, 20)):
+        scene = hvi.Scene.model_validate(pressed(dimension, 2, cells, 0.4999))
+        for name, largest in (("direct", 10**9), ("softer", 0)):
+            linear = LinearThresholds(largest_rubber=dict.fromkeys((2, 3), largest))
+            thresholds, begun = RunThresholds(solvers=SolverThresholds(linear=linear)), time.process_time()
+            found = hvi.solve(scene, thresholds=thresholds, estimate=False)
+            seconds, result = time.process_time() - begun, found.solve_result
+            assert result is not None
+            assert found.examination is not None
+            print(
+                f"{dimension}D, {found.dofs} unknowns, {name} start: {result.counts.linear} linear iterations, "
+                f"{seconds:.1f} s, energy {found.examination.energy:.10g}",
+                flush=True,
+            )
+
+
+def suits(kind: str, nu: float, degree: int, *, small: bool) -> bool:
     """Whether a solver is measured: what takes minutes is left out."""
+    if degree == 1 and not small:
+        return kind == "mg"
     if kind == "mixed":
         return nu > 0.45
     return kind == "mg" if nu <= 0.45 and not small else nu < 0.49995 and (small or kind == "lu")
@@ -268,4 +293,4 @@ def iterations(scene: hvi.Scene, kind: Any) -> tuple[int, float]:
 
 
 if __name__ == "__main__":
-    {f.__name__: f for f in (rules, pressure, block, strip, hertz, dips, rubber)}[sys.argv[1]]()
+    {f.__name__: f for f in (rules, pressure, block, strip, hertz, dips, rubber, starts)}[sys.argv[1]]()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from typing import Any, Protocol
 
@@ -189,6 +189,19 @@ class Averaged:
     shear: float
     divergence: Any
     volume: Any
+
+    @property
+    def ratio(self) -> float:
+        """λ/μ."""
+        return 2.0 * self.modulus / self.shear
+
+    def softened(self, ratio: float) -> Averaged:
+        """The same with λ/μ of no more than a ratio.
+
+        Args:
+            ratio: at most.
+        """
+        return replace(self, modulus=min(self.modulus, 0.5 * ratio * self.shear))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -67,6 +67,7 @@ class Tracer:
     ) -> None:
         self._stiffness, self._constant, self._rate = stiffness, constant, rate
         self.cells, self.factor, self.heading, self._size = cells, factor, heading, 0.0
+        self._stiffest, self._dead, self._live = map(_largest, (stiffness.diagonal, constant, rate))
         self._generator = np.random.default_rng(0)
         self._perturb()
         if small is not None:
@@ -116,8 +117,8 @@ class Tracer:
     def refine(self) -> None:
         """Take out what rounding has left in the equations, and find the direction."""
         residual = self._residual()
-        forces = [self.elastic, self.cells.force, self._constant, self.factor * self._rate]
-        self._size = max(self._size, *(float(np.max(np.abs(f), initial=0.0)) for f in forces))
+        loads = self._dead, abs(self.factor) * self._live
+        self._size = max(self._size, _largest(self.elastic), _largest(self.cells.force), *loads)
         self._find_direction()
         self._correct(self._basis.roughly(residual))
 
@@ -125,7 +126,7 @@ class Tracer:
         """Take a change off, the driving variable held; if that is a slow one, to the nearest point of the curve."""
         if self.driver != FACTOR:
             along = np.where(self.cells.moving, self.rates, 0.0)
-            scale = float(np.max(np.abs(along), initial=0.0)) or 1.0
+            scale = _largest(along) or 1.0
             along, rate, own = along / scale, self.factor_rate / scale, float(change[self.driver])
             change[self.driver] = 0.0
             slow = abs(self.rates[self.driver]) < _SLOW * scale
@@ -201,7 +202,7 @@ class Tracer:
         """
         moving = self.cells.moving
         kinds = [float(np.max(speed[kind], initial=0.0)) for kind in (moving, ~moving)]
-        elastic = 0.1 * float(np.max(self._stiffness.diagonal, initial=0.0)) * kinds[0]
+        elastic = 0.1 * self._stiffest * kinds[0]
         return np.asarray(np.where(moving, kinds[0], max(kinds[1], elastic)))
 
     def sizes(self) -> Array:
@@ -249,10 +250,9 @@ class Tracer:
     def _factor_stands(self) -> bool:
         """Whether the factor stands still, but for rounding, while unknowns move."""
         cells, rates = self.cells, self.rates
-        moved = float(np.max(np.abs(np.where(cells.moving, rates, 0.0)), initial=0.0))
-        forces = float(np.max(np.abs(np.where(cells.moving, cells.slope, cells.rise) * rates), initial=0.0))
-        size = float(np.max(self._stiffness.diagonal, initial=0.0)) * moved + forces
-        return abs(self.factor_rate) * float(np.max(np.abs(self._rate), initial=0.0)) <= 1e-10 * size
+        forces = _largest(np.where(cells.moving, cells.slope, cells.rise) * rates)
+        size = self._stiffest * _largest(np.where(cells.moving, rates, 0.0)) + forces
+        return abs(self.factor_rate) * self._live <= 1e-10 * size
 
     def at_end(self, aim: float) -> bool:
         """Whether another unknown is at the end of its segment already.
@@ -277,3 +277,8 @@ class Tracer:
         """Go back."""
         self.heading = -self.heading
         self._find_direction()
+
+
+def _largest(values: Array) -> float:
+    """The largest absolute value, 0 of none."""
+    return float(np.abs(values).max(initial=0.0))

@@ -89,7 +89,7 @@ class Bulk:
     @property
     def volumetric_ratio(self) -> float:
         """The largest λ/μ of regions where div u is averaged; 0 where there are none."""
-        return max((2 * part.modulus / part.shear for part in self.averaged), default=0.0)
+        return max((part.ratio for part in self.averaged), default=0.0)
 
     def matrix(self) -> PETSc.Mat:
         """The stiffness matrix, a new one without conditions; block size d. Collective."""
@@ -261,6 +261,7 @@ def make_bulk(
     made: Sequence[tuple[str | None, Effect, Contribution]],
     strains: Mapping[str, Any],
     shared: Shared | None = None,
+    volumetric_ratio: float = np.inf,
 ) -> Bulk:
     """The elastic operator that effects contribute. Collective.
 
@@ -272,7 +273,9 @@ def make_bulk(
         made: the effects, each with its place and what it contributes.
         strains: their linear forms of ε(v), by the name of the load.
         shared: where problems on one mesh share what an equal origin makes equal; None: each makes its own.
+        volumetric_ratio: λ/μ where div u is averaged, at most.
     """
+    averaged = tuple(part.softened(volumetric_ratio) for _, _, c in made for part in c.averaged)
     elastic = tuple((where, effect) for where, effect, c in made if c.bilinear or c.averaged)
     brought = [(form, effect.place is Place.MATERIAL) for _, effect, c in made for form in c.bilinear]
     strained = [own or feels_no_rigid_motion(form, space) for form, own in brought]
@@ -283,9 +286,9 @@ def make_bulk(
         form=sum(form for form, _ in brought),
         material=sum(form for (form, _), of_strain in zip(brought, strained, strict=True) if of_strain),
         foundation=sum(foundations) if foundations else None,
-        averaged=tuple(part for _, _, c in made for part in c.averaged),
+        averaged=averaged,
         strains=strains,
         across=tuple(form for _, _, c in made for form in c.across),
-        origin=(nodes.degree(space), scales.length, scales.modulus, *elastic),
+        origin=(nodes.degree(space), scales.length, scales.modulus, *(part.ratio for part in averaged), *elastic),
         shared=shared,
     )

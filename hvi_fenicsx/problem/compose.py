@@ -41,6 +41,7 @@ class Model:
         modify: what is solved in the place of each law.
         interfaces: the two sides of each, by name.
         degree: of the elements, 1 or 2.
+        volumetric_ratio: λ/μ where div u is averaged, at most: a softer body gives a start for a stiffer one.
     """
 
     parts: Mapping[str, BoundaryPart]
@@ -48,6 +49,7 @@ class Model:
     modify: Modification = unchanged
     interfaces: Mapping[str, Sides] = field(default_factory=dict)
     degree: int = 1
+    volumetric_ratio: float = np.inf
 
 
 def compose(domain: Domain, model: Model, thresholds: Thresholds = DEFAULT) -> Problem:
@@ -141,7 +143,9 @@ def _problem(
         scales=scales,
         space=context.space,
         points=coefficients_of(context.space, context.points),
-        bulk=bulk.make_bulk(context.space, scales, contributions, strains, context.domain.shared),
+        bulk=bulk.make_bulk(
+            context.space, scales, contributions, strains, context.domain.shared, model.volumetric_ratio
+        ),
         linear={**linear, **strains},
         conditions=conditions,
         fixed=fixed,

@@ -236,10 +236,16 @@ def options() -> dict[str, Any]:
 
 def _name(form: Any) -> str:
     """A name for all that the compiled form depends on."""
+    return hashlib.sha256(repr([form.signature(), *_surroundings()]).encode()).hexdigest()[:40]
+
+
+@cache
+def _surroundings() -> list[Any]:
+    """What all compiled forms depend on."""
     free = {key: value for key, value in options().items() if key not in ("cache_dir", "timeout")}
     system = [sysconfig.get_config_var(name) for name in ("SOABI", "CFLAGS")]
-    parts = [form.signature(), ffcx.__version__, compat.VERSION, system, sorted(free.items())]
-    return hashlib.sha256(repr([*parts, sorted(ffcx.options.get_options().items())]).encode()).hexdigest()[:40]
+    compiler = sorted(ffcx.options.get_options().items())
+    return [ffcx.__version__, compat.VERSION, system, sorted(free.items()), compiler]
 
 
 def _new_folder(entry: _Entry) -> Path:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+import numpy as np
 from dolfinx import fem
 from petsc4py import PETSc
 
@@ -203,7 +204,7 @@ def _coarser_system(model: Model, system: System, control: RunControl) -> tuple[
     assert coarser is not None
     domain, transfer = coarser
     try:
-        return assemble(domain, replace(model, degree=1), control.timer, system.thresholds), transfer
+        return assemble(domain, _coarser_model(model, system), control.timer, system.thresholds), transfer
     except InputError:
         if all(part.where is None for part in model.parts.values()):
             raise
@@ -212,7 +213,21 @@ def _coarser_system(model: Model, system: System, control: RunControl) -> tuple[
 
 def _of_degree_one(model: Model, system: System, control: RunControl) -> System:
     """The system of degree 1 on the same mesh. Collective."""
-    return assemble(system.problem.domain, replace(model, degree=1), control.timer, system.thresholds)
+    return assemble(system.problem.domain, _coarser_model(model, system), control.timer, system.thresholds)
+
+
+def _coarser_model(model: Model, system: System) -> Model:
+    """The model of the next coarser level, of degree 1.
+
+    Below degree 2 a nearly incompressible body that is too large for a direct solver is softened, and stays so on the
+    levels below: of degree 1 no multigrid solves it, and this one only gives a start.
+    """
+    limits, mesh, ratio = system.thresholds, system.problem.domain.mesh, system.problem.bulk.volumetric_ratio
+    if model.degree == 1:
+        return model
+    large = mesh.geometry.dim * nodes.count(mesh, 1) > limits.largest_rubber[mesh.geometry.dim]
+    softened = 0.0 < ratio <= limits.volumetric_ratio or large
+    return replace(model, degree=1, volumetric_ratio=limits.softened_ratio if softened else np.inf)
 
 
 def refined_levels(

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -157,7 +158,14 @@ class CondensedProblem:
         Args:
             factor: λ.
         """
-        return _polynomial(self.constant, factor) + sum(b.energy(factor) for b in self.prescribed_bonds)
+        standing, moved = self._prescribed
+        return _polynomial(self.constant, factor) + standing + sum(b.energy(factor) for b in moved)
+
+    @cached_property
+    def _prescribed(self) -> tuple[float, tuple[PrescribedBonds, ...]]:
+        """The energy of bonds at displacements that the factor does not move, and the other bonds."""
+        moved = tuple(bonds for bonds in self.prescribed_bonds if np.any(bonds.arguments[1]))
+        return sum(b.energy(0.0) for b in self.prescribed_bonds if not np.any(b.arguments[1])), moved
 
     def potential(self, x: Array, factor: float) -> float:
         """<g, u>: the loads times the displacements of the body in equilibrium with x.

@@ -84,7 +84,7 @@ class LinearSettings:
             return cls(wanted, thresholds)
         stiff, degree = system.problem.bulk.volumetric_ratio, nodes.degree(system.problem.space)
         if levels and system.free_motions is None:
-            if stiff <= thresholds.volumetric_ratio[degree]:
+            if stiff <= thresholds.volumetric_ratio:
                 return cls("mg", thresholds)
             if degree > 1:
                 return cls("mixed", thresholds)

@@ -185,6 +185,5 @@ def _compliance(part: Dilatation) -> PETSc.Mat:
 def _schur_complement(part: Dilatation) -> PETSc.Vec:
     """The inverse of V (1/λ + 1/μ), by vertex; 1 outside of the region."""
     rate, found = part.stiffness.array_r, part.stiffness.duplicate()
-    ratio = 2.0 * part.averaged.modulus / part.averaged.shear
-    found.array[:] = np.where(rate > 0, rate / (1.0 + ratio), 1.0)
+    found.array[:] = np.where(rate > 0, rate / (1.0 + part.averaged.ratio), 1.0)
     return found

@@ -13,7 +13,9 @@ class Thresholds:
     Attributes:
         largest_direct: unknowns up to which a direct solve is the faster one, by dimension (docs/benchmarks.md).
         volumetric_ratio: λ/μ where dilatation is averaged, up to which displacements alone are the unknowns of
-            geometric multigrid, by degree; 50 is that of ν = 0.4902 (docs/degree-2.md).
+            geometric multigrid; 50 is that of ν = 0.4902 (docs/degree-2.md).
+        largest_rubber: unknowns of degree 1 up to which a start is solved directly above that ratio, by dimension.
+        softened_ratio: λ/μ of the levels that give a start where there are more.
         mixed_accuracy: relative residual that a solve for displacements and pressures leaves.
         mixed_margin: factor of that residual, over λ/μ, to which the equations of displacements and pressures are
             solved.
@@ -48,7 +50,9 @@ class Thresholds:
     """
 
     largest_direct: Mapping[int, int] = field(default_factory=lambda: {2: 60_000, 3: 15_000})
-    volumetric_ratio: Mapping[int, float] = field(default_factory=lambda: {1: 0.0, 2: 50.0})
+    volumetric_ratio: float = 50.0
+    largest_rubber: Mapping[int, int] = field(default_factory=lambda: {2: 500_000, 3: 15_000})
+    softened_ratio: float = 40.0
     mixed_accuracy: float = 1e-2
     mixed_margin: float = 0.05
     mixed_iterations: int = 1_000
