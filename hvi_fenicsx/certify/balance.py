@@ -6,16 +6,18 @@ Rounding of the stresses excuses no net force: only what rounding makes of the s
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 from dolfinx import fem
 
+from ..problem.contact_surface import Surface
 from ..problem.problem import Problem
 from ..problem.references import References
 from ..system import net_forces as rigid_balance
 from ..system.net_forces import ActingForces, Holder, PartForces
 from ..system.supported_body import SupportedBody
-from ..typing import Array
+from ..typing import Array, Mask
 from .contact_state import ContactState, Forces
 from .thresholds import DEFAULT, Thresholds
 
@@ -74,8 +76,31 @@ def net_forces(
         u: nondimensional, ghosts updated.
         thresholds: what rounding is.
     """
-    problem, acting = references.problem, _acting(references, forces, states, u, thresholds)
-    closed = [(state.surface, state.contact) for state in states]
+    acting = _acting(references, forces, [holder for state in states for holder in _holders(state)], u, thresholds)
+    return _along_motions(acting, references, [(state.surface, state.contact) for state in states], thresholds)
+
+
+def net_forces_carried(
+    references: References, forces: Forces, carried: Array, u: fem.Function, thresholds: Thresholds = DEFAULT
+) -> Array:
+    """As :func:`net_forces`, where what contact and laws carry is known: they could carry nothing else. Collective.
+
+    Args:
+        references: of the problem that was solved.
+        forces: at u.
+        carried: by contact and laws, nodal forces at this rank's vertices, (vertices, d).
+        u: nondimensional, ghosts updated.
+        thresholds: what rounding is.
+    """
+    acting = _acting(references, forces, [], u, thresholds)
+    acting = replace(acting, left=acting.left + carried, carried=[*acting.carried, PartForces.nonzero(carried)])
+    return _along_motions(acting, references, [], thresholds)
+
+
+def _along_motions(
+    acting: ActingForces, references: References, closed: Sequence[tuple[Surface, Mask]], thresholds: Thresholds
+) -> Array:
+    problem = references.problem
     motions = (SupportedBody.of(problem, body).motions(closed) for body in problem.bodies)
     nets = [rigid_balance.along(references, one, acting) for one in motions]
     return np.array([net.beyond_rounding(thresholds.nothing_acts) for net in nets])
@@ -84,12 +109,11 @@ def net_forces(
 def _acting(
     references: References,
     forces: Forces,
-    states: Sequence[ContactState],
+    holders: Sequence[Holder],
     u: fem.Function,
     thresholds: Thresholds,
 ) -> ActingForces:
     problem = references.problem
-    holders = [holder for state in states for holder in _holders(state)]
     foundation = -problem.combined(problem.bulk.foundation_force(u))
     left = forces.pushing + foundation
     for given in (holder.forces for holder in holders):

@@ -12,14 +12,21 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from dolfinx import fem
+from petsc4py import PETSc
 
-from ..certify import certificate, contact_state
+from ..certify import balance, certificate, contact_state
+from ..certify.contact_state import Forces
+from ..certify.thresholds import DEFAULT as THRESHOLDS
 from ..equilibrium_paths.state import Event, PathState
+from ..problem import references
 from ..problem.factored_problem import FactoredProblem
+from ..problem.problem import Problem
 from ..problem.vectors import turn
 from ..solvers import frozen_mixity
 from ..system.condensation import Condensation
 from ..system.system import System
+from ..typing import Array
 
 ALWAYS = frozenset({Event.START, Event.JUMP, Event.TURN, Event.END})
 """The events whose states are examined with the whole body."""
@@ -89,17 +96,36 @@ class Certifier:
     def _in_balance(self, state: PathState) -> bool:
         """Whether forces from the forms are those that were judged on Γc, and none are left elsewhere. Collective.
 
-        What bonds remember is in their graphs on Γc, not in the laws that the certificate of a single run knows.
+        What bonds remember is in their graphs on Γc, not in the laws that the certificate of a single run knows. As
+        there, what rounding makes of the stresses is excused, and no net force.
         """
-        system, factor = self._system, state.factor
-        u = system.displacement(self._condensation.expand(state.x, factor))
-        forces = contact_state.forces(self._factored.at(factor), u)
+        system, condensation, problem = self._system, self._condensation, self._factored.at(state.factor)
+        u = system.displacement(condensation.expand(state.x, state.factor))
+        forces, carried = contact_state.forces(problem, u), condensation.carried(state.x, state.factor)
         reaction = system.load.duplicate()
         reaction.array[:] = forces.reaction.ravel()
         turn(reaction, system.rotation)
-        size = max(np.sqrt(system.comm.allreduce(float(np.sum(f**2)))) for f in (forces.load, forces.reaction))
-        size = max(size, self._whole_load if self._is_unloaded(state) else 0.0)
-        return bool(self._condensation.unbalanced(reaction, state.x, factor) <= self._tolerance * (size or 1.0))
+        left = condensation.unbalanced(reaction, carried)
+        size = max(self._norm(f) for f in (forces.load, forces.reaction))
+        size = max(size, self._whole_load if self._is_unloaded(state) else 0.0) or 1.0
+        return left <= self._tolerance * size or self._is_rounding(left / size, problem, u, forces, carried, size)
+
+    def _is_rounding(
+        self, left: float, problem: Problem, u: fem.Function, forces: Forces, carried: PETSc.Vec, size: float
+    ) -> bool:
+        """Whether what is left is no more than the last digits of u make, and the net forces balance. Collective."""
+        if left > THRESHOLDS.largest_rounding:
+            return False
+        sample = balance.unbalanced(problem, balance.rounding_sample(problem, u.x.array), ())
+        if left * size > THRESHOLDS.rounding_safety * self._norm(sample):
+            return False
+        rotation, known = self._system.rotation, references.of(problem, forces.load)
+        given = (carried if rotation is None else rotation * carried).array_r.reshape(forces.load.shape)
+        net = balance.net_forces_carried(known, forces, given, u)
+        return bool(np.all(net <= self._tolerance))
+
+    def _norm(self, values: Array) -> float:
+        return float(np.sqrt(self._system.comm.allreduce(float(np.sum(values**2)))))
 
     def _examined(self, state: PathState) -> bool:
         """Whether the certificate of the whole body passes. Collective."""

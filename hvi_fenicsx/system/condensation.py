@@ -25,6 +25,7 @@ from .condensed_problem import CondensedProblem
 from .condensed_stiffness import CondensedStiffness, DenseStiffness
 from .factorised_stiffness import FactorisedStiffness
 from .interior import Interior
+from .rigid_defect import RigidMotions
 from .system import System
 
 
@@ -109,6 +110,8 @@ class Condensation:
         stay = self._stay
         self._shift = found.shift[stay]
         force, applied, constant, applied_constant = self._loads()
+        if isinstance(elastic, DenseStiffness):
+            elastic, force = self._balanced(elastic, force)
         laws = laws.renumbered(stay, self._interior.size)
         return _shifted(
             self._shift,
@@ -127,6 +130,12 @@ class Condensation:
                 parts=tuple(found.parts[i] for i in stay),
             ),
         )
+
+    def _balanced(self, elastic: DenseStiffness, force: Array) -> tuple[DenseStiffness, Array]:
+        """Stiffness and loads as rounding has not changed them along rigid motions. Collective."""
+        motions = RigidMotions.of(self._system, self._interior, self._stay)
+        work = self._system.comm.allreduce(motions.fields.T @ self._loading.lifted)
+        return DenseStiffness(motions.without_forces(elastic.array)), motions.with_work(force, work)
 
     def _loads(self) -> tuple[Array, Array, Array, Array]:
         """Condensed forces and applied loads (n, 2), and the constants of the energy and of <g, u>. Collective."""
@@ -211,21 +220,30 @@ class Condensation:
         found[fixed] = self._system.holding.at_prescribed(u, self._system.rotation) - applied[fixed]
         return found
 
-    def unbalanced(self, reaction: PETSc.Vec, x: Array, factor: float) -> float:
-        """What is left of forces on the body once contact and laws carry S x - f at their unknowns. Collective.
+    def carried(self, x: Array, factor: float) -> PETSc.Vec:
+        """What contact and laws carry, S x - f at their unknowns, in the components of the unknowns. Collective.
+
+        Args:
+            x: the condensed unknowns, (n,).
+            factor: λ.
+        """
+        interior, whole = self._interior, np.zeros(self._interior.size)
+        whole[self._stay] = self.problem.elastic @ x - self.problem.load(factor)
+        found = self._system.load.duplicate()
+        found.array[interior.kept] = whole[interior.first : interior.first + len(interior.kept)]
+        return found
+
+    def unbalanced(self, reaction: PETSc.Vec, carried: PETSc.Vec) -> float:
+        """What is left of forces on the body once contact and laws carry theirs. Collective.
 
         Args:
             reaction: internal forces minus loads of the whole body, in the components of the unknowns.
-            x: the condensed unknowns, (n,).
-            factor: λ.
+            carried: by contact and laws, likewise.
 
         Returns:
             The Euclidean norm off the supports.
         """
-        interior, carried = self._interior, np.zeros(self._interior.size)
-        carried[self._stay] = self.problem.elastic @ x - self.problem.load(factor)
-        left = reaction.array.copy()
-        left[interior.kept] -= carried[interior.first : interior.first + len(interior.kept)]
+        left = reaction.array - carried.array
         left[np.union1d(self._system.problem.fixed_here, self._system.pins)] = 0.0
         return float(np.sqrt(self._system.comm.allreduce(float(left @ left))))
 
