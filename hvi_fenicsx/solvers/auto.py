@@ -146,13 +146,21 @@ class Auto(BranchIteration):
         counts = Counts()
         counts.add(first.counts)
         resting, _ = resting_start(self.solver, self._laws)
-        for found in self._on_other_pieces(resting, self.options.thresholds.path.other_steps):
+        for found in self._not_by_loading(resting):
             counts.add(found.counts)
             if found.converged or (found.interrupted and not self._limit.cut):
                 return replace(found, counts=counts, off_path=path.reason)
         self._limit.next_start()
         reason = f"no equilibrium on the loading path: {path.reason}"
         return replace(first, counts=counts, interrupted=False, reason=reason, borne=path.borne)
+
+    def _not_by_loading(self, resting: PETSc.Vec) -> Iterator[SolveResult]:
+        """Results from starts that may lead elsewhere than loading does: few steps of each, more where a law pushes."""
+        yield from self._on_other_pieces(resting, self.options.thresholds.path.other_steps)
+        self._limit.next_start()
+        growths = [term.exact.growth for term in self.system.terms]
+        if any(min(growth.minus, growth.plus) < 0.0 for growth in growths):
+            yield from self._attempt(newton_continuation.solve, self.context)
 
     def _others(self) -> Iterator[SolveResult]:
         """Results from further starts, one after the other."""

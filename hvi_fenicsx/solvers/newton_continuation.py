@@ -1,8 +1,9 @@
 """Newton's method through narrowing smoothings: equilibria that are no minimum, also on a drop.
 
 A descent leads away from these. Smoothed widely, a law that pushes at once is nearly straight: its equation has a
-solution, and Newton's method finds it from where springs would hold the body. As the width narrows, vertices that stay
-within it are on the drop. At each width they are held there, as by a support, until the drop carries what they take up.
+solution, and Newton's method finds it from where springs would hold the body, if not at one width then at a narrower
+one. As the width narrows, vertices that stay within it are on the drop. At each width they are held there, as by a
+support, until the drop carries what they take up.
 """
 
 from __future__ import annotations
@@ -31,20 +32,23 @@ def solve(context: SolveContext) -> SolveResult:
     Args:
         context: the system and how to solve it.
     """
-    found = BranchIteration(context, [_SPRING] * len(context.system.terms)).solve()
+    found = held = BranchIteration(context, [_SPRING] * len(context.system.terms)).solve()
     counts = Counts()
-    counts.add(found.counts)
-    for width in _widths(context) if found.converged else ():
-        laws = [QUADRATIC.relative(term.exact, width) for term in context.system.terms]
-        found = BranchIteration(context, laws, width).newton(context.system.unknowns(found.u))
+    counts.add(held.counts)
+    for width in _widths(context) if held.converged else ():
+        start, laws = (
+            found if found.converged else held,
+            [QUADRATIC.relative(t.exact, width) for t in context.system.terms],
+        )
+        found = BranchIteration(context, laws, width).newton(context.system.unknowns(start.u))
         counts.add(found.counts)
         if not found.converged:
-            break
+            continue
         exact = BranchIteration(context).newton(x := context.system.unknowns(found.u), _drops(context, laws, x))
         counts.add(exact.counts)
         if exact.converged:
             return replace(exact, counts=counts)
-    return replace(found, converged=False, counts=counts)
+    return replace(held, converged=False, counts=counts)
 
 
 def _widths(context: SolveContext) -> Iterator[float]:

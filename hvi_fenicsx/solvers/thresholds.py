@@ -152,7 +152,7 @@ class PathThresholds:
     """
 
     quick_steps: int = 8
-    other_steps: int = 10
+    other_steps: int = 15
     vertex_unknowns: int = 1_600
     curved_unknowns: int = 200
     whole_curve_unknowns: int = 400

@@ -15,8 +15,8 @@ from hvi_fenicsx.equilibrium_paths.state import PathOptions
 from hvi_fenicsx.solvers import load_path_start
 from hvi_fenicsx.system.condensation import Condensation
 
-MOST_STEPS = 50
-"""Newton steps where a load path ends: those before it, and three further starts of at most 10."""
+MOST_STEPS = 65
+"""Newton steps where a load path ends: those before it, and three further starts of at most 15."""
 STRENGTH = 220.591e3
 """Of the bar, N/m: Yuan and Teng's closed form."""
 

@@ -32,3 +32,23 @@ def test_an_equilibrium_on_the_drop_of_a_law_that_pushes_is_found(cells: int, pu
     assert found.exit_code == 0
     assert len(points) == 1 or not push
     assert any(energy(found) == pytest.approx(point.energy, rel=1e-9) for point in points)
+
+
+@pytest.mark.parametrize(
+    ("push", "press", "law"),
+    [
+        (111980.10020183094, 601566.2811261887, [(0.0, -373267.0006727698), (1.74099219e-6, -114753.69814063578)]),
+        (
+            220945.98102403237,
+            1871740.213802309,
+            [(0.0, 0.0), (5.28796738e-7, 736486.60), (5.28796738e-7, -727410.54), (1.05759348e-6, -603529.45)],
+        ),
+    ],
+    ids=["at a narrower width", "where a load path ends"],
+)
+def test_others_are_found_as_well(push: float, press: float, law: list[tuple[float, float]]) -> None:
+    """Of a random draw of laws that push."""
+    points = Floor(2, push, press, polyline(law), wall=False).stationary()
+    found = solved(block(2, push, press, {"law": "graph", "points": [list(point) for point in law]}))
+    assert found.exit_code == 0
+    assert any(energy(found) == pytest.approx(point.energy, rel=1e-7) for point in points)
