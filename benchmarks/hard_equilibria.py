@@ -36,8 +36,7 @@ def decided(case: Case, table: Table, limit: float) -> str | None:
         found = Equilibria(prepared).find(lowest=False, gap=1e-8, stop=_clock(limit), report=lambda _: None)
     except HviError as error:
         return f"not searched: {error}"
-    words = "all" if found.complete else "open"
-    return f"{words}\t{len(found.points)} equilibria\t{found.nodes} cells\t{time.process_time() - begin:.1f} s"
+    return f"{found.reason}\t{found.nodes} cells\t{time.process_time() - begin:.1f} s"
 
 
 def _clock(limit: float) -> Callable[[], bool]:
