@@ -34,6 +34,10 @@ SHORTER = 0.9
 """Tightening goes on while some interval shrinks to this share."""
 REGULAR = 1e-6
 """Least pivot, relative to the largest, of a matrix that counts as positive definite."""
+WIDE = 30.0
+"""Intervals that are wider, in displacements at which laws have joints, are made smaller by linear programmes."""
+HALF = 0.5
+"""Where these leave less than this share of an interval, the cell is looked at again before it is divided."""
 CONDITION = 1e12
 """Condition number beyond which a linear system is singular."""
 
@@ -83,10 +87,7 @@ class Enumeration:
         cell = self._tightened(fresh_box(low, high, np.zeros(problem.size)))
         if cell is None:
             return
-        low, high = cell.low.copy(), cell.high.copy()
-        for i in np.flatnonzero(high - low > 0.1 * far):
-            low[i], high[i] = self._linear.bounds(low, high, i)
-        self.waiting.append(replace(cell, low=low, high=high))
+        self.waiting.append(cell)
 
     def run(self, stop: Callable[[], bool], report: Callable[[Enumeration], None]) -> bool:
         """Divide cells until none is left; whether that is so.
@@ -101,10 +102,23 @@ class Enumeration:
             self.cells += 1
             cell = self._tightened(self.waiting.pop())
             if cell is not None and not self._decided(cell) and not self._linear.excludes(cell.low, cell.high):
-                parts = list(self._parts(cell))
-                self.waiting += (replace(part, share=cell.share / len(parts)) for part in parts)
+                self._divide(cell)
             report(self)
         return True
+
+    def _divide(self, cell: Box) -> None:
+        """Put parts of a cell on the stack; the cell itself, made smaller, if it reaches far behind all joints."""
+        wide = np.flatnonzero(cell.high - cell.low > WIDE * self.problem.reach)
+        if wide.size:
+            smaller = _within(cell, *self._linear.narrowed(cell.low, cell.high, wide))
+            if np.any(smaller.low > smaller.high):
+                return
+            if np.any(smaller.high - smaller.low < HALF * (cell.high - cell.low)):
+                self.waiting.append(smaller)
+                return
+            cell = smaller
+        parts = list(self._parts(cell))
+        self.waiting += (replace(part, share=cell.share / len(parts)) for part in parts)
 
     def _tightened(self, cell: Box) -> Box | None:
         """The cell made smaller; None if no stationary point is in it."""
@@ -224,6 +238,10 @@ class Enumeration:
 def _with(cell: Box, i: int, begin: float, end: float) -> Box:
     low, high = cell.low.copy(), cell.high.copy()
     low[i], high[i] = begin, end
+    return _within(cell, low, high)
+
+
+def _within(cell: Box, low: Array, high: Array) -> Box:
     return replace(cell, low=low, high=high, x=np.clip(cell.x, low, high))
 
 

@@ -49,8 +49,13 @@ class ScalarProblem:
     @property
     def far(self) -> float:
         """A displacement far beyond all joints of the chains: the end of what is searched."""
+        return min(FAR * self.reach, self.farthest)
+
+    @cached_property
+    def reach(self) -> float:
+        """The largest displacement at which a chain has a joint, and one unit at least."""
         ends = (abs(e) for c in self.chains for a in c for e in (a.low, a.high))
-        return min(FAR * max([1.0, *(e for e in ends if e < INF)]), self.farthest)
+        return max([1.0, *(e for e in ends if e < INF)])
 
     @property
     def size(self) -> int:

@@ -13,17 +13,21 @@ from typing import Any
 import numpy as np
 import pytest
 from enumeration import Floor, polyline
+from mpi4py import MPI
 from scenes import DELTA, model, quadratic_linear, solved
 
 from hvi_fenicsx.solvers import refinement
 from hvi_fenicsx.solvers.refinement import refined
 from hvi_fenicsx.solvers.result import SolveResult
+from hvi_fenicsx.stationary_points.all_points import Enumeration
+from hvi_fenicsx.stationary_points.bodies import Equilibria
 
 BENCHMARKS = Path(__file__).resolve().parents[2] / "benchmarks"
 sys.path.insert(0, str(BENCHMARKS))
 
 import hard_enumeration  # noqa: E402 (a script's neighbour, not a package)
 import hard_run  # noqa: E402
+import hard_scenes  # noqa: E402
 from covering import Case, Table, cases  # noqa: E402
 
 TABLE = Table.read(BENCHMARKS / "hard_cases.toml")
@@ -47,6 +51,17 @@ def solve_and_judge(case: Case, degree: int = 1) -> None:
 @pytest.mark.parametrize("case", parameters(FAST))
 def test_auto_solves_a_small_case(case: Case) -> None:
     solve_and_judge(case)
+
+
+def test_a_bonded_block_just_below_its_peak_has_no_equilibrium_proven_in_few_cells() -> None:
+    """The enumeration of all states says so too (docs/hard-cases.md). Cells that reach far were divided in vain before."""
+    case = next(case for case in LISTED if case.key == "6507789c7d")
+    problem = Equilibria(hard_scenes.prepare(case, TABLE.data, "auto", MPI.COMM_SELF)).problem
+    assert problem is not None
+    search = Enumeration(problem=problem)
+    search.start()
+    assert search.run(lambda: search.cells > 200, lambda _: None)
+    assert not search.points
 
 
 STEEP = [case for case in LISTED if case.key in ("9206d05c90", "135630e77f")]
