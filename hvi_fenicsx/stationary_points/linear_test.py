@@ -120,8 +120,10 @@ class LinearTest:
             cost = np.concatenate([sign * own / unit, rays])
             found = linprog(cost, A_eq=columns, b_eq=right, bounds=(0, None), method="highs")
             self.programmes += 1
-            known = found.status == 0
-            ends.append(self._least(-unit * found.eqlin.marginals[:n] / size, corners, sign * own) if known else -np.inf)
+            if found.status != 0:
+                ends.append(-np.inf)
+                continue
+            ends.append(self._least(-unit * found.eqlin.marginals[:n] / size, corners, sign * own))
         return ends[0], -ends[1]
 
     def _corners(self, low: Array, high: Array) -> _Corners:

@@ -54,8 +54,8 @@ def test_auto_solves_a_small_case(case: Case) -> None:
 
 
 def test_a_bonded_block_just_below_its_peak_has_no_equilibrium_proven_in_few_cells() -> None:
-    """The enumeration of all states says so too (docs/hard-cases.md). Cells that reach far were divided in vain before."""
-    case = next(case for case in LISTED if case.key == "6507789c7d")
+    """The enumeration of all states says so, too (docs/hard-cases.md). Cells that reach far were divided in vain."""
+    case = next(c for c in LISTED if c.key == "6507789c7d")
     problem = Equilibria(hard_scenes.prepare(case, TABLE.data, "auto", MPI.COMM_SELF)).problem
     assert problem is not None
     search = Enumeration(problem=problem)
