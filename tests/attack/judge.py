@@ -19,7 +19,13 @@ AGREES, CONTRADICTS, MISSED, UNDECIDED = "agrees", "contradicts", "missed", "und
 Table = dict[str, Any]
 SHARP, LOST = 1e-7, 1e-3
 """Where rounding moves tractions by less than the first a point can be judged; from the second on it says nothing."""
-REFUSALS = ("orthogonal or equal", "that differ", "would have to be", "violates the contact bound")
+REFUSALS = (
+    "orthogonal or equal",
+    "that differ",
+    "would have to be",
+    "violates the contact bound",
+    "solves the law without smoothing",
+)
 """What is said of scenes that are drawn at random and mean nothing; every other scene is to be answered."""
 SMALLEST_FACTOR = 1e-3
 """A load factor below this is not compared: beside the rest of the load its work is within our tie."""

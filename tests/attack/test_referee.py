@@ -24,6 +24,8 @@ from referee.minimality import examine, sampled_descent
 from referee.programmes import Body, verdict
 from referee.solution import Check
 
+from hvi_fenicsx import InputError, Scene, prepare
+
 STEEL = {"model": "plane_stress", "youngs_modulus": 2.15e11, "poisson_ratio": 0.29}
 WEAK = {"law": "quadratic_linear", "gamma1": 1e6, "gamma2": 5e5, "delta": 9e-6}
 
@@ -93,6 +95,14 @@ def test_a_false_claim_is_found(claim: dict[str, Any]) -> None:
 def test_a_refusal_wants_a_reason_in_the_scene() -> None:
     for words, wanted in (("prescribe displacements that differ", UNDECIDED), ("no path is known", CONTRADICTS)):
         assert judge(scene(), None, Answer(2, words)).word == wanted
+
+
+def test_a_method_that_smooths_nothing_is_refused_where_smoothing_is_drawn_with_it() -> None:
+    """20787 #27: a day's attack failed by it."""
+    table = scene(3e5, WEAK) | {"solver": {"method": "branch", "smoothing": "chks", "epsilon_absolute": 1e-3}}
+    with pytest.raises(InputError) as refused:
+        prepare(Scene.model_validate(table))
+    assert judge(table, None, Answer(2, str(refused.value))).word == UNDECIDED
 
 
 def test_a_solution_that_is_not_found_is_missed() -> None:
