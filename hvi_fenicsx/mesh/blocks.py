@@ -28,7 +28,13 @@ _AXIS_OF_SIDE = {"left": (0, 0), "right": (0, 1), "bottom": (-1, 0), "top": (-1,
 """Axis (-1: the last, the vertical one) and end of each named side."""
 
 
-def block(comm: MPI.Comm, size: Sequence[float], cells: Sequence[int], thresholds: Thresholds = DEFAULT) -> Domain:
+def block(
+    comm: MPI.Comm,
+    size: Sequence[float],
+    cells: Sequence[int],
+    thresholds: Thresholds = DEFAULT,
+    reflected: Sequence[int] = (),
+) -> Domain:
     """The rectangle or box [0, size], in cells cut into triangles or tetrahedra. Collective.
 
     Each coarser level of its mesh hierarchy has half the cells each way, as long as they can be halved.
@@ -38,11 +44,12 @@ def block(comm: MPI.Comm, size: Sequence[float], cells: Sequence[int], threshold
         size: lengths of the edges, m, (d,).
         cells: cells each way, (d,).
         thresholds: how coarse the coarsest level is.
+        reflected: axes along which the parts of the ranks are reflected.
     """
-    grid, upper = mesh(comm, size, cells), np.asarray(size, dtype=float)
+    grid, upper = mesh(comm, size, cells, reflected), np.asarray(size, dtype=float)
 
     def coarsening() -> tuple[Domain, Transfer]:
-        return block(comm, size, [n // 2 for n in cells], thresholds), GridTransfer(size, cells)
+        return block(comm, size, [n // 2 for n in cells], thresholds, reflected), GridTransfer(size, cells)
 
     return Domain(
         mesh=grid,
@@ -52,18 +59,20 @@ def block(comm: MPI.Comm, size: Sequence[float], cells: Sequence[int], threshold
         upper=upper,
         one_piece=True,
         coarsening=coarsening if all(n % 2 == 0 and n // 2 >= thresholds.coarsest_block for n in cells) else None,
+        reflected=lambda axes: block(comm, size, cells, thresholds, axes),
     )
 
 
-def mesh(comm: MPI.Comm, size: Sequence[float], cells: Sequence[int]) -> dmesh.Mesh:
+def mesh(comm: MPI.Comm, size: Sequence[float], cells: Sequence[int], reflected: Sequence[int] = ()) -> dmesh.Mesh:
     """The mesh of the rectangle or box [0, size], without ghost cells. Collective.
 
     Args:
         comm: the ranks that share it.
         size: lengths of the edges, m, (d,).
         cells: cells each way, (d,), each cut into triangles or tetrahedra.
+        reflected: axes along which the parts of the ranks are reflected.
     """
-    lower, upper = part_of_rank(cells, comm.size, comm.rank)
+    lower, upper = part_of_rank(cells, comm.size, comm.rank, reflected)
     kind, points = {2: "triangle", 3: "tetrahedron"}[len(cells)], _points(comm, size, cells)
     simplices = _simplices(lower, upper, cells)
     if comm.size == 1:
@@ -74,13 +83,16 @@ def mesh(comm: MPI.Comm, size: Sequence[float], cells: Sequence[int]) -> dmesh.M
     return compat.simplex_mesh(comm, simplices, points, kind)
 
 
-def part_of_rank(cells: Sequence[int], ranks: int, rank: int) -> tuple[Integers, Integers]:
+def part_of_rank(
+    cells: Sequence[int], ranks: int, rank: int, reflected: Sequence[int] = ()
+) -> tuple[Integers, Integers]:
     """The part of the grid that a rank keeps.
 
     Args:
         cells: cells each way, (d,).
         ranks: number of ranks.
         rank: the rank.
+        reflected: axes along which the parts of all ranks are reflected.
 
     Returns:
         The first cell, and the one after the last, (d,) both; they are equal where there are too few cells.
@@ -96,6 +108,8 @@ def part_of_rank(cells: Sequence[int], ranks: int, rank: int) -> tuple[Integers,
             upper[axis], last = cut, middle
         else:
             lower[axis], first = cut, middle
+    for turned in reflected:
+        lower[turned], upper[turned] = 1.0 - upper[turned], 1.0 - lower[turned]
     begin, end = (np.floor(place * cells + 0.5).astype(np.int64) for place in (lower, upper))
     return begin, end
 

@@ -69,11 +69,14 @@ def energies(mesh: dmesh.Mesh) -> list[float]:
     return [float(fem.assemble_scalar(fem.form(form))) for form in forms]
 
 
-@pytest.mark.parametrize(("cells", "ranks"), itertools.product(GRIDS, [1, 2, 3, 4, 7, 40]))
-def test_each_cell_is_on_one_rank(cells: Sequence[int], ranks: int) -> None:
+@pytest.mark.parametrize(
+    ("cells", "ranks", "reflected"), itertools.product(GRIDS, [1, 2, 3, 4, 7, 40], [(), (0,), (0, 1)])
+)
+def test_each_cell_is_on_one_rank(cells: Sequence[int], ranks: int, reflected: Sequence[int]) -> None:
     count = np.zeros(cells, dtype=int)
     for rank in range(ranks):
-        count[tuple(itertools.starmap(slice, zip(*blocks.part_of_rank(cells, ranks, rank), strict=True)))] += 1
+        part = blocks.part_of_rank(cells, ranks, rank, reflected)
+        count[tuple(itertools.starmap(slice, zip(*part, strict=True)))] += 1
     assert np.all(count == 1)
 
 

@@ -166,10 +166,11 @@ class SeveralBodies(DomainShape):
     def _joined(self, comm: MPI.Comm, build: Callable[[DomainShape], Domain]) -> Domain:
         from .. import body_overlaps
         from ..joined import joined
+        from ..near_parts import near_parts
 
         placed = [body.placed(name, build(body.form)) for name, body in self.bodies.items()]
         body_overlaps.check(comm, placed)
-        return joined(comm, placed)
+        return joined(comm, near_parts(comm, placed))
 
     def _with_forms(self, forms: Mapping[str, DomainShape]) -> Self:
         return self.changed(bodies={name: body.changed(form=forms[name]) for name, body in self.bodies.items()})
