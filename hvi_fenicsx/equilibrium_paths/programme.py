@@ -11,6 +11,9 @@ from ..system.condensed_problem import CondensedProblem
 from .state import End, Event, PathOptions, PathState
 from .watch import Stopped, Watch
 
+_AT_LIMIT = 1e-6
+"""A factor so near to the largest that can be borne, relative to those of the programme, is at the limit."""
+
 
 class Follower(ABC):
     """Follows the path of a problem through a programme.
@@ -54,12 +57,28 @@ class Follower(ABC):
             self._restore(self._resume)
         programme = self._options.programme
         while self.end is None and self._leg < len(programme):
-            yield from self._towards(programme[self._leg])
+            yield from self._gone_to(programme[self._leg])
             self._leg += 1
             if self.end is None:
                 yield self._after_leg(programme)
         if self.end is None:  # resumed from its last state
             self._finish(End.REACHED, "the programme is done")
+
+    def _gone_to(self, aim: float) -> Iterator[PathState]:
+        """A leg; none where no factor on it is borne."""
+        if aim > self._options.borne and self.factor >= self._options.borne - self._small:
+            self._finish(End.ESCAPES, self._not_borne())
+            yield self._state(Event.END)
+        else:
+            yield from self._towards(aim)
+
+    @property
+    def _small(self) -> float:
+        """A difference of factors that does not count."""
+        return _AT_LIMIT * max(map(abs, self._options.programme))
+
+    def _not_borne(self) -> str:
+        return f"no factor above {self._options.borne:.6g} is borne by any equilibrium: a body comes off"
 
     def _after_leg(self, programme: Sequence[float]) -> PathState:
         if self._leg < len(programme):
@@ -104,4 +123,6 @@ class Follower(ABC):
             self._finish(End.LOST, f"no end after {self._options.most_events} events")
 
     def _finish(self, end: End, reason: str) -> None:
+        if end is End.LOST and abs(self.factor - self._options.borne) <= self._small:
+            end, reason = End.ESCAPES, self._not_borne()
         self.end, self.reason = end, reason

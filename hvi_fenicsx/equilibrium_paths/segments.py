@@ -124,11 +124,14 @@ class Component:
         graph: traction over the unknown.
         weight: lumped area.
         passed: displacements (least, greatest) up to which a bond with memory has been; None without memory.
+        curved: whether the graph has chords of a law: a piece that has been passed ends where the bond has been, even
+            if the chords go on in its direction.
     """
 
     graph: TractionGraph
     weight: float
     passed: tuple[float, float] | None = None
+    curved: bool = False
 
     def force(self, x: Array, side: str) -> Array:
         """The limit of the force from one side, (m,).
@@ -208,6 +211,8 @@ def _changes(component: Component, at: float) -> bool:
     number = int(np.searchsorted(graph.breaks, at))
     if number == len(graph.breaks) or graph.breaks[number] != at:
         return False
+    if component.curved and component.passed is not None and at != 0.0 and at in component.passed:
+        return True
     return bool(graph.left[number] != graph.right[number] or graph.slopes[number] != graph.slopes[number + 1])
 
 

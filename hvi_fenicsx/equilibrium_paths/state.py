@@ -143,9 +143,11 @@ class PathOptions:
         follow: how to go on where the path is not stable.
         remember: numbers of the problem's bonds that remember.
         most_events: events at most.
+        borne: the largest factor with which there may be an equilibrium, where that is known.
     """
 
     programme: Sequence[float] = (1.0,)
     follow: Follow = Follow.STABLE
     remember: Collection[int] = ()
     most_events: int = 1_000_000
+    borne: float = float("inf")

@@ -131,10 +131,24 @@ class PathRun:
         )
 
     def _follower(self, control: Control) -> Follower:
-        options = PathOptions(programme=self.wanted.to, follow=Follow(self.wanted.follow), remember=self._remember)
+        wanted = self.wanted
+        options = PathOptions(
+            programme=wanted.to, follow=Follow(wanted.follow), remember=self._remember, borne=self._borne()
+        )
         resume = self.states[-1] if self.states else None
         watch = Watch(control.interrupted, control.jumping)
         return self._kind.follower(self._condensation.problem, options, resume, watch)
+
+    def _borne(self) -> float:
+        """The largest factor with which an equilibrium may exist, where rigid motions tell; else inf. Collective.
+
+        They tell it of one load or of all; where supports and obstacles are moved to does not matter to them.
+        """
+        loads = set(self.prepared.system.forces)
+        scaled = sorted(loads.intersection(self.scaled))
+        if scaled and len(scaled) == len(loads):
+            return self.prepared.load_factors().peak
+        return self.prepared.load_factors(scaled[0]).peak if len(scaled) == 1 else float(np.inf)
 
     def _take(self, state: PathState, verdict: Verdict) -> None:
         self.states.append(state)

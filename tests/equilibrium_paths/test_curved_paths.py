@@ -13,14 +13,16 @@ from condensed import bonds, chain, graph, problem
 from test_exact_paths import SOFTENING, bar, largest_imbalance, peeled, random_problem, spring
 
 from hvi_fenicsx.effects import Direction
+from hvi_fenicsx.equilibrium_paths import segments
 from hvi_fenicsx.equilibrium_paths.arc_length.distances import CurvedDistances
 from hvi_fenicsx.equilibrium_paths.arc_length.follower import ArcLengthFollower
 from hvi_fenicsx.equilibrium_paths.exact import ExactFollower
+from hvi_fenicsx.equilibrium_paths.graphs import Passed, remembering
 from hvi_fenicsx.equilibrium_paths.kinds import ArcLengthKind, ExactKind, kind_of
 from hvi_fenicsx.equilibrium_paths.programme import Follower
 from hvi_fenicsx.equilibrium_paths.state import End, Event, Follow, PathOptions, PathState
 from hvi_fenicsx.errors import InputError
-from hvi_fenicsx.laws import Exponential, Superpotential
+from hvi_fenicsx.laws import Exponential, Superpotential, TractionGraph
 from hvi_fenicsx.laws.smoothing import create
 from hvi_fenicsx.system.condensed_problem import Bonds, CondensedProblem
 
@@ -271,3 +273,12 @@ def test_an_edge_where_a_law_on_a_length_meets_another_is_refused() -> None:
     given = plate(graph(DROP), 3, 0.0, bonds(graph(DROP), 1))
     with pytest.raises(InputError, match=r"\|u_t\|"):
         ArcLengthFollower(given, PathOptions())
+
+
+def test_a_piece_ends_where_a_bond_with_memory_has_been_though_its_chord_goes_on() -> None:
+    """The smoothed law rises in proportion at first; unloading from there set out on the fresh piece for ever."""
+    law = TractionGraph(np.array([-2.0, 0.0, 2.0]), *[np.array([-1.0, 0.0, 1.0])] * 2, np.array([0.0, 0.5, 0.5, 0.0]))
+    known = remembering(law, Passed(displacements=(-1.0, 1.0), tractions=(-0.5, 0.5)))
+    part = segments.Component(graph=known, weight=1.0, passed=(-1.0, 1.0), curved=True)
+    ends = [s.x + s.high for s in segments.chain([part], 0.0, np.inf) if s.kind is segments.Kind.PIECE]
+    assert ends == [1.0, 2.0, np.inf]

@@ -177,3 +177,47 @@ def test_where_the_naive_iteration_cycles_for_ever_the_energy_falls_to_a_solutio
     energies = found.solve_result.energies if found.solve_result else ()
     assert len(energies) > 1
     assert np.all(np.diff(energies) <= 1e-10 * np.abs(energies[:-1]))
+
+
+PLAIN = {
+    "body": "plate",
+    "question": "path",
+    "degree": 1,
+    "support": "tip",
+    "law": "softening",
+    "strength": 0.1,
+    "delta": 0.2,
+    "lift": "tilted",
+    "margin": 1e-3,
+    "side": "over",
+    "smoothing": "quadratic",
+    "epsilon": 1e-3,
+    "cells": 4,
+    "stretch": 1.0,
+    "units": "m",
+    "modulus": 2.15e11,
+    "material": "plane_stress 0.29",
+    "linear": "lu",
+    "ranks": 1,
+}
+LOST = {
+    # a smoothed law that unloads from its first piece, along which its chord already goes
+    "block in space": {"body": "block", "support": "peak", "strength": 3.0, "side": "under", "stretch": 10.0},
+    # no load at all is borne: the path went astray at factors of 1e-13
+    "stack that tips": {"body": "stack", "law": "exponential", "smoothing": "chks"},
+    "block that tips": {"body": "block", "law": "tresca", "smoothing": "chks"},
+    # a length of 5e-17 set out backwards
+    "block that comes off": {"body": "block", "support": "wall", "law": "graph", "strength": 3.0, "lift": "none",
+                             "smoothing": "chks", "stretch": 100.0, "material": "plane_strain 0.4999"},
+}  # fmt: skip
+SLOW = {"block in space": pytest.mark.long}
+
+
+@pytest.mark.parametrize("name", [pytest.param(name, marks=SLOW.get(name, ())) for name in LOST])
+def test_a_path_that_was_lost_ends_where_the_body_comes_off(name: str) -> None:
+    """Cases of benchmarks/hard_wide.toml, on fewer cells."""
+    wide = Table.read(BENCHMARKS / "hard_wide.toml")
+    case = Case(number=1, values=PLAIN | LOST[name], fixed=wide.data["fixed"])
+    record = hard_run.attempt(case, wide.data, "auto", wide.data["limit"])
+    assert record["outcome"] == "certified", record
+    assert record["end"] == "escapes"

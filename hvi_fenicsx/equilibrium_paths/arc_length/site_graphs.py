@@ -41,6 +41,10 @@ class Kept:
     passed: list[Passed | None]
 
 
+_NO_LENGTH = 1e-12
+"""A length that is 0, but for rounding, in units of s."""
+
+
 class SiteGraphs(SiteLaws):
     """All sites, each on one segment of its graph.
 
@@ -91,7 +95,10 @@ class SiteGraphs(SiteLaws):
             return beside_opening(float(problem.lower[self.radials.opening_unknowns[opening]]))
         parts = [
             Component(
-                graph=law.graph(), weight=law.weight, passed=None if law.passed is None else law.passed.displacements
+                graph=law.graph(),
+                weight=law.weight,
+                passed=None if law.passed is None else law.passed.displacements,
+                curved=law.curved,
             )
             for law in laws
         ]
@@ -209,7 +216,7 @@ class SiteGraphs(SiteLaws):
         return self.radials.directions(z)
 
     def rates(self, z: Array, direction: Array) -> Array:
-        """How s changes along a direction of the coordinates, (m,); a length of 0 grows in each of them.
+        """How s changes along a direction of the coordinates, (m,); a length of 0, but for rounding, grows in each.
 
         Args:
             z: the coordinates, (n,).
@@ -217,7 +224,7 @@ class SiteGraphs(SiteLaws):
         """
         radials = self.radials
         along = radials.along(radials.directions(z), direction)
-        along = np.where(radials.lengths(z) > 0.0, along, radials.lengths(direction))
+        along = np.where(radials.lengths(z) > _NO_LENGTH, along, radials.lengths(direction))
         return np.concatenate([direction[self.one], along, direction[radials.opening_unknowns]])
 
     def on_drops(self) -> list[int]:
