@@ -33,6 +33,8 @@ MOST = 4_000
 """Linear programmes of one case that are worth it: half a minute."""
 LARGEST = 8
 """Cells along the floor."""
+_OTHERS = ("exponential", "cohesion", "mixed")
+"""Laws that are not piecewise linear on one unknown."""
 _LP_ERROR = 1e-7
 """What a linear programme may be wrong by, of the largest load or displacement unit: for less it gives up nothing."""
 _INFEASIBLE = 2
@@ -81,8 +83,10 @@ class State:
 
 
 def fits(case: Case) -> bool:
-    """Whether the laws' tractions are piecewise linear and the floor is short."""
-    return case["smoothing"] in ("exact", "quadratic") and case["law"] != "exponential" and case["cells"] <= LARGEST
+    """Whether the laws' tractions are piecewise linear, one on each unknown, and the floor is short."""
+    straight = case["smoothing"] in ("exact", "quadratic") and case["law"] not in _OTHERS
+    plain = (case["body"], case["degree"], case["question"]) == ("plate", 1, "solve")
+    return straight and plain and case["cells"] <= LARGEST
 
 
 def equilibria(case: Case, data: Mapping[str, Any]) -> int | None:

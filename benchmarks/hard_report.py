@@ -14,6 +14,9 @@ from hard_results import SOLVED, Record, Results
 
 QUICK = 10.0
 """Seconds of processor time within which all methods are compared."""
+_BRANCH = "`branch` was run on the unsmoothed laws only, because it is made for them.\n"
+_PATHS = """ A path is solved if all its rows are certified and its end
+is not against what is proved: it reaches a load at which the body is held, and ends before one that moves it away."""
 COMMAND = "./hvi exec python3 benchmarks/hard_cases.py"
 
 
@@ -39,12 +42,15 @@ def _without(results: Results) -> str:
     rows = [[f"`{k}`", *_size(results.cases[k]), str(n)] for k, n in decided.items()]
     words = f"""## Cases without an equilibrium
 
-In {len(ended - results.found)} metastable or borderline cases no method found an equilibrium. Is there none?
+In {len(ended - results.found)} metastable or borderline cases no method found an equilibrium."""
+    if not rows:
+        return words
+    words += f""" Is there none?
 `benchmarks/hard_enumeration.py` tries all states of the floor's vertices by branch and bound. It can do so where the
 tractions are piecewise linear (unsmoothed laws and the quadratic smoothing) and the floor is short: here in
 {len(results.enumerated)} cases. In {len(decided)} of them it ended within its limit of linear programmes.
 {confirmed} of these have no equilibrium."""
-    return f"{words}\n\n{_markdown(['case', 'law', 'cells', 'equilibria there are'], rows)}" if rows else words
+    return f"{words}\n\n{_markdown(['case', 'law', 'cells', 'equilibria there are'], rows)}"
 
 
 def _size(case: Case) -> list[str]:
@@ -53,13 +59,10 @@ def _size(case: Case) -> list[str]:
 
 def _head(name: str, table: Table, listed: Sequence[Case]) -> str:
     page = name.replace("_", "-")
-    return f"""# Hard cases: which method solves what?
+    return f"""# {table.data["title"]}
 
-This page reports {len(listed)} difficult problems, solved with several methods. Only the certificate decides whether
-a problem is solved. The problems combine everything that makes such a problem difficult: support, law, strength,
-distance from the limit load, mesh, units, start and more. `benchmarks/{name}.toml` has these axes and their values.
-They were committed before anything was run (the `later` values before anything was run with them). The list of cases
-follows from the axes (`{COMMAND} list`): it has
+{_about(name, table, listed)} The list of cases follows from the axes
+(`{COMMAND} list --table {name}`): it has
 
 - every value of an axis, in an otherwise plain case;
 - every pair of values of two axes;
@@ -73,9 +76,17 @@ The commands are
 
 A case counts as solved in three situations: its displacement is certified within
 {table.data["tolerance"]:g}; or it is proved that no solution exists (state *escapes*); or its state is metastable or
-borderline, and no method found an equilibrium. The time of one case and method is processor time.
+borderline, and no method found an equilibrium.{_PATHS if "question" in table.axes else ""} The time of one case and
+method is processor time.
 
 ![Share of the cases solved by each method, for each value of each axis]({page}.png)"""
+
+
+def _about(name: str, table: Table, listed: Sequence[Case]) -> str:
+    later = " (the `later` values before anything was run with them)" if "later" in table.data else ""
+    return f"""This page reports {len(listed)} difficult problems. Only the certificate decides whether a problem is
+solved. {table.data["about"]} `benchmarks/{name}.toml` has the axes and their values. They were committed before
+anything was run{later}."""
 
 
 def _counts(results: Results) -> str:
@@ -100,15 +111,14 @@ There are {len(results.cases)} cases. The columns mean:
 - *no solution exists*: the existence analysis proves it before any method is asked; not counted under
   *asked* and *solved*;
 - *refused*: `tao` and `ssls` take no law with a kink (the paper's smoothing keeps one at zero slip); `condensed` runs
-  in one process only;
+  in one process only; an exact law that jumps upwards at a length is taken in the plane only;
 - *asked*: the cases run, without these two;
 - *held: certified*: of the cases in which the body is held, so that an equilibrium exists, those that are certified;
 - *no equilibrium found*: the state is metastable or borderline, and no method or enumeration found an equilibrium;
 - *missed*: the method found no equilibrium, but another method or the enumeration did;
 - *failed*: all other cases.
 
-`branch` was run on the unsmoothed laws only, because it is made for them.
-Solved within {QUICK:g} s: {", ".join(quick)}."""
+{_BRANCH if "branch" in results.methods else ""}Solved within {QUICK:g} s: {", ".join(quick)}."""
 
 
 def _count(results: Results, method: str) -> list[str]:
