@@ -11,6 +11,7 @@ it is not what the energies say.
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from enum import Enum
 
@@ -227,11 +228,14 @@ class Curve(Equations):
 
     def settle(self) -> None:
         """Take out what rounding has left in the equations: sites pass their ends a little before or after them."""
-        try:
-            y = self.correct(self.here.y, self.plane(0.0))
-        except Refused:
-            return
-        self.place(y, self.here.tangent)
+        with suppress(Refused):
+            self.place(self.correct(self.here.y, self.plane(0.0)), self.here.tangent)
+
+    def settle_at_factor(self) -> None:
+        """The same with the factor as it is."""
+        with suppress(Refused):
+            y = self.correct(self.here.y, self.at_factor(self.factor))
+            self.place(np.append(y[:-1], self.here.y[-1]), self.here.tangent)
 
     def _in_place(self, site: int) -> Move:
         """No step: a site that is slower than others passed its end by what rounding allows, and goes on from there."""

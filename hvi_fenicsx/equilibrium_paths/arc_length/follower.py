@@ -148,7 +148,8 @@ class ArcLengthFollower(Follower):
             return
         row = np.eye(1, self._problem.size + 1, self._problem.size)[0]
         self._head(row, 1 if aim > self._curve.factor else -1)
-        self._crossed()
+        if self._crossed():
+            self._curve.settle_at_factor()
         self._trend()
 
     def _crossed(self, arrived: int | None = None, *, turned: bool = False) -> list[Passage]:
