@@ -17,6 +17,9 @@ from .interior import Interior
 from .supported_body import SupportedBody
 from .system import System
 
+_UNSEEN = 1e-10
+"""A motion that moves no condensed unknown, relative to the one that moves them most."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class RigidMotions:
@@ -40,9 +43,9 @@ class RigidMotions:
             stay: those of them that the condensed problem has.
         """
         fields = _fields(system)
-        at = interior.gathered(fields)[stay]
-        q, r = np.linalg.qr(at)
-        return cls(basis=q, fields=np.linalg.solve(r.T, fields.T).T)
+        basis, lengths, combined = np.linalg.svd(interior.gathered(fields)[stay], full_matrices=False)
+        seen = lengths > _UNSEEN * np.max(lengths, initial=0.0)
+        return cls(basis=basis[:, seen], fields=fields @ (combined[seen].T / lengths[seen]))
 
     def without_forces(self, stiffness: Array) -> Array:
         """A stiffness whose forces along the motions are zero, (n, n).

@@ -115,3 +115,11 @@ def test_a_rigid_motion_has_no_condensed_force_and_the_work_of_the_loads() -> No
     assert np.max(np.abs(stiffness @ upwards)) < 1e-14 * np.max(np.abs(stiffness))
     loads = problem.load(1.0) @ upwards * system.problem.scales.force
     assert loads == pytest.approx(-4e5, rel=1e-12)
+
+
+def test_the_path_of_a_body_on_nothing_ends_at_once() -> None:
+    """No unknown carries anything, and a rigid motion is left."""
+    table = slender().model_dump()
+    boundary = {name: part for name, part in table["boundary"].items() if name != "floor"}
+    path = hvi.follow(hvi.Scene.model_validate(table | {"boundary": boundary}))
+    assert (path.end, len(path.rows), path.uncertified) == ("escapes", 2, 0)
