@@ -262,7 +262,12 @@ class Curve(Equations):
         rate = self._rate_of(outcome, site)
         if rate(self.here) * rate(move.after) >= 0.0:
             return self._moved(outcome, site, move.after.y)
-        root = brentq(lambda way: rate(self._at(way)), 0.0, whole, xtol=1e-13 * whole, rtol=1e-13, maxiter=100)
+        ends = {0.0: self.here, whole: move.after}  # corrected anew, their rates may have other signs by rounding
+
+        def rate_at(way: float) -> float:
+            return rate(ends[way] if way in ends else self._at(way))
+
+        root = brentq(rate_at, 0.0, whole, xtol=1e-13 * whole, rtol=1e-13, maxiter=100)
         return self._moved(outcome, site, self._at(float(root)).y)
 
     def _turned(self, after: Place) -> tuple[Outcome, int | None] | None:
