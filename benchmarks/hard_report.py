@@ -106,7 +106,7 @@ def _counts(results: Results) -> str:
 
 {_markdown(words, (_count(results, m) for m in results.methods))}
 
-There are {len(results.cases)} cases. The columns mean:
+There are {len(results.cases)} cases; what is missing under *cases run* has not been run yet. The columns mean:
 
 - *no solution exists*: the existence analysis proves it before any method is asked; not counted under
   *asked* and *solved*;

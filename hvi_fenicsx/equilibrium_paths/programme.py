@@ -125,4 +125,7 @@ class Follower(ABC):
     def _finish(self, end: End, reason: str) -> None:
         if end is End.LOST and abs(self.factor - self._options.borne) <= self._small:
             end, reason = End.ESCAPES, self._not_borne()
+        low, high = self._options.held
+        if end is End.ESCAPES and low + self._small < self.factor < high - self._small:
+            end, reason = End.LOST, f"{reason}, on the way that was tried; the body is held there, so the path is lost"
         self.end, self.reason = end, reason

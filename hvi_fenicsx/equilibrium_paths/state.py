@@ -144,6 +144,7 @@ class PathOptions:
         remember: numbers of the problem's bonds that remember.
         most_events: events at most.
         borne: the largest factor with which there may be an equilibrium, where that is known.
+        held: between these factors there is one, whatever the bonds remember; as far as that is known.
     """
 
     programme: Sequence[float] = (1.0,)
@@ -151,3 +152,4 @@ class PathOptions:
     remember: Collection[int] = ()
     most_events: int = 1_000_000
     borne: float = float("inf")
+    held: tuple[float, float] = (0.0, 0.0)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from dolfinx import fem
@@ -133,22 +134,23 @@ class PathRun:
     def _follower(self, control: Control) -> Follower:
         wanted = self.wanted
         options = PathOptions(
-            programme=wanted.to, follow=Follow(wanted.follow), remember=self._remember, borne=self._borne()
+            programme=wanted.to, follow=Follow(wanted.follow), remember=self._remember, **self._limits()
         )
         resume = self.states[-1] if self.states else None
         watch = Watch(control.interrupted, control.jumping)
         return self._kind.follower(self._condensation.problem, options, resume, watch)
 
-    def _borne(self) -> float:
-        """The largest factor with which an equilibrium may exist, where rigid motions tell; else inf. Collective.
+    def _limits(self) -> dict[str, Any]:
+        """With which factors there is an equilibrium, and with which none, where rigid motions tell. Collective.
 
         They tell it of one load or of all; where supports and obstacles are moved to does not matter to them.
         """
         loads = set(self.prepared.system.forces)
         scaled = sorted(loads.intersection(self.scaled))
-        if scaled and len(scaled) == len(loads):
-            return self.prepared.load_factors().peak
-        return self.prepared.load_factors(scaled[0]).peak if len(scaled) == 1 else float(np.inf)
+        if not scaled or 1 < len(scaled) < len(loads):
+            return {}
+        known = self.prepared.load_factors(None if len(scaled) == len(loads) else scaled[0])
+        return {"borne": known.peak, "held": (known.held_from, known.held)}
 
     def _take(self, state: PathState, verdict: Verdict) -> None:
         self.states.append(state)
