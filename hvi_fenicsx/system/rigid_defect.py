@@ -35,7 +35,7 @@ class RigidMotions:
 
     @classmethod
     def of(cls, system: System, interior: Interior, stay: Integers) -> Self:
-        """Those of a system; none where a foundation or a pin resists them. Collective.
+        """Those of a system; none where something resists them, or the unknowns do not see each. Collective.
 
         Args:
             system: the system.
@@ -43,9 +43,11 @@ class RigidMotions:
             stay: those of them that the condensed problem has.
         """
         fields = _fields(system)
-        basis, lengths, combined = np.linalg.svd(interior.gathered(fields)[stay], full_matrices=False)
-        seen = lengths > _UNSEEN * np.max(lengths, initial=0.0)
-        return cls(basis=basis[:, seen], fields=fields @ (combined[seen].T / lengths[seen]))
+        basis, triangle = np.linalg.qr(interior.gathered(fields)[stay])
+        lengths = np.abs(np.diagonal(triangle))
+        if len(lengths) < fields.shape[1] or np.any(lengths <= _UNSEEN * np.max(lengths, initial=0.0)):
+            return cls(basis=basis[:, :0], fields=fields[:, :0])
+        return cls(basis=basis, fields=np.linalg.solve(triangle.T, fields.T).T)
 
     def without_forces(self, stiffness: Array) -> Array:
         """A stiffness whose forces along the motions are zero, (n, n).
