@@ -23,6 +23,7 @@ from ..problem import references
 from ..problem.factored_problem import FactoredProblem
 from ..problem.problem import Problem
 from ..problem.vectors import turn
+from ..runtime.mpi import total
 from ..solvers import frozen_mixity
 from ..system.condensation import Condensation
 from ..system.system import System
@@ -125,7 +126,7 @@ class Certifier:
         return bool(np.all(net <= self._tolerance))
 
     def _norm(self, values: Array) -> float:
-        return float(np.sqrt(self._system.comm.allreduce(float(np.sum(values**2)))))
+        return float(np.sqrt(total(self._system.comm, float(np.sum(values**2)))))
 
     def _examined(self, state: PathState) -> bool:
         """Whether the certificate of the whole body passes. Collective."""

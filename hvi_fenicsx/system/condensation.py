@@ -18,6 +18,7 @@ from scipy.linalg import cho_factor, cho_solve
 from scipy.linalg.lapack import dpstrf
 
 from ..errors import SolverError
+from ..runtime.mpi import total
 from ..typing import Array, Integers
 from . import carriers, condensed_laws, loading
 from .carriers import Carriers
@@ -245,7 +246,7 @@ class Condensation:
         """
         left = reaction.array - carried.array
         left[np.union1d(self._system.problem.fixed_here, self._system.pins)] = 0.0
-        return float(np.sqrt(self._system.comm.allreduce(float(left @ left))))
+        return float(np.sqrt(total(self._system.comm, float(left @ left))))
 
     def free(self) -> None:
         """Free the PETSc objects."""
