@@ -77,7 +77,7 @@ class ExactFollower(Follower):
         self._bonds.restore(start.memory)
         self._balance = EnergyBalance(self._problem, self._bonds)
         if start.cells is None:
-            self._finish(End.ESCAPES, start.reason)
+            self._come_off(0.0, start.reason)
             return
         self._unstable = start.cells.unstable_directions()
         self._follow_from(start.cells, 0.0)
@@ -181,7 +181,7 @@ class ExactFollower(Follower):
             return self._state(state.event, state.place, bifurcation=True)
         if found is not None:
             where = f"at the factor {state.factor:.6g} the path comes back to where it was"
-            self._finish(End.LOST, f"{where}: {found.value}")
+            self._lose(self.factor, f"{where}: {found.value}")
         return state
 
     def _takes_another_way(self, aim: float) -> bool:
@@ -213,9 +213,9 @@ class ExactFollower(Follower):
     def _endless(self) -> None:
         """Nothing stops the curve: at a factor that stands a body escapes."""
         if self.tracer.stands:
-            self._finish(End.ESCAPES, f"at the factor {self.tracer.factor:.6g} a body comes off")
+            self._come_off(self.factor, f"at the factor {self.factor:.6g} a body comes off")
         else:
-            self._finish(End.LOST, "the path leads away from the wanted factor for ever")
+            self._lose(self.factor, "the path leads away from the wanted factor for ever")
 
     # -- jumps
 
@@ -238,10 +238,10 @@ class ExactFollower(Follower):
         landing = self._descended() if found is None else Landing(x=cells.x, escapes=True, found=False, steps=0)
         if landing.escapes:
             self._bonds.restore(memory)
-            self._finish(End.ESCAPES, f"at the factor {factor:.6g} no equilibrium is left: a body comes off")
+            self._come_off(factor, f"at the factor {factor:.6g} no equilibrium is left: a body comes off")
             yield self._state(Event.END)
         elif not landing.found:
-            self._finish(End.LOST, f"no stable equilibrium found at the factor {factor:.6g}")
+            self._lose(factor, f"no stable equilibrium found at the factor {factor:.6g}")
             yield self._state(Event.END)
         else:
             yield self._landed(self._placed(landing.x, factor), aim)

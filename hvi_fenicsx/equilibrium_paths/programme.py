@@ -116,16 +116,26 @@ class Follower(ABC):
         self._events += 1
         self._peak = max(self._peak, abs(self.factor))
         if self._floats and self._is_off():
-            self._finish(End.ESCAPES, "the load is back at zero, and nothing holds the body any more")
+            self._come_off(self.factor, "the load is back at zero, and nothing holds the body any more")
         elif self._watcher.interrupted():
             self._finish(End.INTERRUPTED, "interrupted")
         elif self._events > self._options.most_events:
-            self._finish(End.LOST, f"no end after {self._options.most_events} events")
+            self._lose(self.factor, f"no end after {self._options.most_events} events")
 
     def _finish(self, end: End, reason: str) -> None:
-        if end is End.LOST and abs(self.factor - self._options.borne) <= self._small:
-            end, reason = End.ESCAPES, self._not_borne()
-        low, high = self._options.held
-        if end is End.ESCAPES and low + self._small < self.factor < high - self._small:
-            end, reason = End.LOST, f"{reason}, on the way that was tried; the body is held there, so the path is lost"
         self.end, self.reason = end, reason
+
+    def _come_off(self, factor: float, reason: str) -> None:
+        """End where the way that was tried leads off; that proves nothing where the body is held."""
+        low, high = self._options.held
+        if low + self._small < factor < high - self._small:
+            self._finish(End.LOST, f"{reason}, on the way that was tried; the body is held there, so the path is lost")
+        else:
+            self._finish(End.ESCAPES, reason)
+
+    def _lose(self, factor: float, reason: str) -> None:
+        """End without an answer; where no larger factor is borne, that is one."""
+        if abs(factor - self._options.borne) <= self._small:
+            self._finish(End.ESCAPES, self._not_borne())
+        else:
+            self._finish(End.LOST, reason)

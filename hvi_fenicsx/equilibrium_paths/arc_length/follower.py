@@ -73,7 +73,7 @@ class ArcLengthFollower(Follower):
         rest = at_rest(self._problem, self._sites)
         z = self._loaded(rest)
         if z is None:
-            self._finish(End.ESCAPES, self.reason or "nothing holds the body at rest")
+            self._come_off(0.0, self.reason or "nothing holds the body at rest")
             return
         self._follow_from(z, 0.0)
         self._balance = Balance(self._problem, self._sites)
@@ -159,7 +159,7 @@ class ArcLengthFollower(Follower):
             return crossing.run(arrived, turned=turned)
         except (Refused, np.linalg.LinAlgError):
             where = f"at the factor {self._curve.factor:.6g} several bonds are at ends of their pieces"
-            self._finish(End.LOST, f"{where}, and each way on leads from one of them to the other")
+            self._lose(self.factor, f"{where}, and each way on leads from one of them to the other")
             return crossing.passages
 
     def _head(self, row: Array, sign: float) -> None:
@@ -198,11 +198,11 @@ class ArcLengthFollower(Follower):
     def _ended(self, outcome: Outcome) -> None:
         curve, shown = self._curve, f"{self._curve.factor:.6g}"
         if outcome is Outcome.STUCK:
-            self._finish(End.LOST, f"at the factor {shown} no step is short enough to stay on the path")
+            self._lose(self.factor, f"at the factor {shown} no step is short enough to stay on the path")
         elif abs(curve.factor_rate) <= 1e-6:
-            self._finish(End.ESCAPES, f"at the factor {shown} a body comes off")
+            self._come_off(self.factor, f"at the factor {shown} a body comes off")
         else:
-            self._finish(End.LOST, "the path leads away from the wanted factor for ever")
+            self._lose(self.factor, "the path leads away from the wanted factor for ever")
 
     @override
     def _is_off(self) -> bool:
@@ -223,10 +223,10 @@ class ArcLengthFollower(Follower):
         )
         landing = jump.landing(-self._curve.trend or 1)
         if landing is None:
-            self._finish(End.LOST, f"no stable equilibrium found at the factor {factor:.6g}")
+            self._lose(factor, f"no stable equilibrium found at the factor {factor:.6g}")
             yield self._state(Event.END)
         elif landing.z is None:
-            self._finish(End.ESCAPES, f"at the factor {factor:.6g} no equilibrium is left: a body comes off")
+            self._come_off(factor, f"at the factor {factor:.6g} no equilibrium is left: a body comes off")
             assert self._last is not None
             yield replace(self._last, event=Event.END, place=None, released=0.0)
         else:
