@@ -1,7 +1,8 @@
 """A Newton step with elastic forces by cell, where the rounding of the matrix keeps a solution from its certificate.
 
 A product with the matrix rounds each row on its own. In a slender body that is bent far the errors of the rows have a
-net force, which contact and laws then carry, or do not. Forces of cells are in balance whatever the displacement.
+net force, which is left on Γc where neither contact nor a law carries it. Forces of cells are in balance whatever the
+displacement.
 """
 
 from __future__ import annotations
@@ -10,8 +11,8 @@ from dolfinx import fem
 
 from ..system.levels import Levels
 from ..system.system import System
-from . import balance
 from .certificate import Certificate, Examination
+from .estimate import dual_norm
 from .estimate.dual_norm import DualNorm
 from .thresholds import DEFAULT, Thresholds
 
@@ -40,7 +41,7 @@ def corrected(
         thresholds: how accurately the step is solved for.
     """
     inverse = DualNorm(system, levels, u)
-    force = balance.unbalanced(system.problem, examination.forces.reaction, examination.states)
+    force = dual_norm.algebraic(system.problem, examination, thresholds.near)
     step, _ = inverse.solve(force, thresholds.correction)
     inverse.destroy()
     found = fem.Function(u.function_space, name=u.name)

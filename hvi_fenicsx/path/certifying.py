@@ -4,6 +4,9 @@ On Γc: each unknown must be on the graph of its laws and bounds, with the force
 from the factorised body. The certificate of the whole body (:mod:`.certify`) reassembles all forces from the forms;
 where bonds remember, what was judged on Γc must be what these forces leave there. So it must at states where the loads
 are nothing beside those of the whole programme: there is nothing else by which to measure what is left of forces.
+
+Where rounding alone may speak against a state, its displacement is corrected as that of a single run
+(:mod:`.certify.correction`); the corrected one is then the state's.
 """
 
 from __future__ import annotations
@@ -15,7 +18,8 @@ import numpy as np
 from dolfinx import fem
 from petsc4py import PETSc
 
-from ..certify import balance, certificate, contact_state
+from ..certify import balance, certificate, contact_state, correction
+from ..certify.certificate import Examination
 from ..certify.contact_state import Forces
 from ..certify.thresholds import DEFAULT as THRESHOLDS
 from ..equilibrium_paths.state import Event, PathState
@@ -42,10 +46,12 @@ class Verdict:
     Attributes:
         certified: whether all that was looked at is within the tolerance.
         whole: whether the whole body was looked at.
+        corrected: whether it is the corrected displacement that is certified.
     """
 
     certified: bool
     whole: bool
+    corrected: bool = False
 
 
 class Certifier:
@@ -81,9 +87,22 @@ class Certifier:
             number: of its row.
         """
         on_surface = self._distance(state) <= self._tolerance
-        whole = state.event in ALWAYS or is_examined(number)
-        examined = self._examined if _plain(state) and not self._is_unloaded(state) else self._in_balance
-        return Verdict(certified=on_surface and (not whole or examined(state)), whole=whole)
+        if not (state.event in ALWAYS or is_examined(number)):
+            return Verdict(certified=on_surface, whole=False)
+        if not _plain(state) or self._is_unloaded(state):
+            return Verdict(certified=on_surface and self._in_balance(state), whole=True)
+        passed, corrected = self._examined(state)
+        return Verdict(certified=on_surface and passed, whole=True, corrected=corrected)
+
+    def displacement(self, state: PathState, verdict: Verdict) -> fem.Function:
+        """The displacement of the whole body that was certified, nondimensional, ghosts updated. Collective.
+
+        Args:
+            state: the state.
+            verdict: what was found of it.
+        """
+        u = self._expanded(state)
+        return self._corrected(state, u, self._examination(state, u)) if verdict.corrected else u
 
     def _load(self, factor: float) -> float:
         """The Euclidean norm of loads, of what prescribed displacements pull and obstacles push. Collective."""
@@ -101,7 +120,7 @@ class Certifier:
         there, what rounding makes of the stresses is excused, and no net force.
         """
         system, condensation, problem = self._system, self._condensation, self._factored.at(state.factor)
-        u = system.displacement(condensation.expand(state.x, state.factor))
+        u = self._expanded(state)
         forces, carried = contact_state.forces(problem, u), condensation.carried(state.x, state.factor)
         reaction = system.load.duplicate()
         reaction.array[:] = forces.reaction.ravel()
@@ -128,13 +147,26 @@ class Certifier:
     def _norm(self, values: Array) -> float:
         return float(np.sqrt(total(self._system.comm, float(np.sum(values**2)))))
 
-    def _examined(self, state: PathState) -> bool:
-        """Whether the certificate of the whole body passes. Collective."""
-        u = self._system.displacement(self._condensation.expand(state.x, state.factor))
+    def _examined(self, state: PathState) -> tuple[bool, bool]:
+        """Whether the certificate of the whole body passes, and whether only once it is corrected. Collective."""
+        u = self._expanded(state)
+        found = self._examination(state, u)
+        if found.certificate.passed or not correction.may_help(found.certificate):
+            return found.certificate.passed, False
+        passed = self._examination(state, self._corrected(state, u, found)).certificate.passed
+        return passed, passed
+
+    def _expanded(self, state: PathState) -> fem.Function:
+        return self._system.displacement(self._condensation.expand(state.x, state.factor))
+
+    def _examination(self, state: PathState, u: fem.Function) -> Examination:
         problem = self._factored.at(state.factor)
         frozen_mixity.freeze(problem, u)
-        found = certificate.examine(problem, u, self._tolerance)
-        return found.certificate.passed
+        return certificate.examine(problem, u, self._tolerance)
+
+    def _corrected(self, state: PathState, u: fem.Function, found: Examination) -> fem.Function:
+        system = self._system.with_obstacles_of(self._factored.at(state.factor))
+        return correction.corrected(system, (), u, found)
 
 
 def is_examined(number: int) -> bool:

@@ -191,8 +191,7 @@ class PathRun:
         Args:
             number: of the row.
         """
-        state = self.states[number]
-        return self._expanded(state.x, state.factor)
+        return self._certifier.displacement(self.states[number], self._verdicts[number])
 
     def state(self, number: int) -> tuple[Problem, fem.Function]:
         """The problem at the factor of a row, and the displacement there. Collective.

@@ -130,9 +130,19 @@ class System:
         Args:
             way: along the force, in units of u0.
         """
+        return self.with_obstacles_of(self.problem.with_obstacle_at(way))
+
+    def with_obstacles_of(self, problem: Problem) -> System:
+        """The system with the obstacles where another problem of the same body has them; all matrices are shared.
+
+        Collective.
+
+        Args:
+            problem: the other problem.
+        """
         found = copy.copy(self)
-        found.problem = self.problem.with_obstacle_at(way)
-        found.bounds = tuple(bounds.moved(way) for bounds in self.bounds)
+        found.problem = problem
+        found.bounds = problem.bounds if self.frames is None else tuple(map(self.frames.bounds, problem.bounds))
         found.references = references.of(found.problem, self._sum_of(self.forces))
         found.lower, found.upper = found._box()
         return found

@@ -16,6 +16,9 @@ from enumeration import Floor, polyline
 from mpi4py import MPI
 from scenes import DELTA, model, quadratic_linear, solved
 
+from hvi_fenicsx.certify import certificate
+from hvi_fenicsx.path.following import Control, PathRun
+from hvi_fenicsx.scene import PathTable
 from hvi_fenicsx.solvers import refinement
 from hvi_fenicsx.solvers.refinement import refined
 from hvi_fenicsx.solvers.result import SolveResult
@@ -221,6 +224,29 @@ def test_a_path_that_was_lost_ends_where_the_body_comes_off(name: str) -> None:
     record = hard_run.attempt(case, wide.data, "auto", wide.data["limit"])
     assert record["outcome"] == "certified", record
     assert record["end"] == "escapes"
+
+
+TALL = {
+    "on a block": {"body": "stack", "support": "peak", "law": "quadratic_linear", "strength": 10.0, "margin": 0.01,
+                   "side": "under", "modulus": 1e3},
+    "at degree 2": {"body": "stack", "support": "tip", "strength": 0.1, "margin": 1e-7, "side": "under",
+                    "degree": 2, "units": "um", "modulus": 1e12},
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", TALL)
+def test_the_rows_of_a_tall_body_are_certified_as_they_are_written(name: str) -> None:
+    """Rounding of the stiffness had left forces at open gaps; each displacement passes the certificate by itself."""
+    wide = Table.read(BENCHMARKS / "hard_wide.toml")
+    sharp = {"smoothing": "exact", "epsilon": "none", "cells": 8, "stretch": 0.1}
+    case = Case(number=1, values=PLAIN | sharp | TALL[name], fixed=wide.data["fixed"])
+    prepared = hard_scenes.prepare(case, wide.data, "auto", MPI.COMM_SELF)
+    run = PathRun(prepared, PathTable())
+    path = run.follow(Control())
+    assert len(path.rows) > 5
+    assert path.uncertified == 0
+    plain = [n for n, state in enumerate(run.states) if not np.any(state.memory)]
+    assert all(certificate.examine(*run.state(n), prepared.options.tolerance).certificate.passed for n in plain)
 
 
 @pytest.mark.long
