@@ -8,6 +8,7 @@ three: before it, behind it, and on it, where the traction may have any value be
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 
@@ -22,6 +23,7 @@ from .boxes import Box, fresh_box
 from .convex_programme import Chains, minimise
 from .linear_test import LinearTest
 from .relaxation import Relaxation, envelopes
+from .rigid_balance import RigidBalance
 from .scalar_problem import ScalarProblem
 from .stationarity import Kind
 from .tightening import ForceIntervals
@@ -77,6 +79,7 @@ class Enumeration:
 
     def __post_init__(self) -> None:
         self._forces = ForceIntervals(self.problem, joints_at_ends=False)
+        self._balance = RigidBalance(self.problem)
         self._places: Array = np.empty((0, self.problem.size))
         self._linear, self._relaxation = LinearTest(self.problem), Relaxation(self.problem)
 
@@ -109,7 +112,8 @@ class Enumeration:
     def _divide(self, cell: Box) -> None:
         """Put parts of a cell on the stack; the cell itself, made smaller, if it reaches far behind all joints."""
         wide = np.flatnonzero(cell.high - cell.low > WIDE * self.problem.reach)
-        if wide.size:
+        far = np.intersect1d(wide, self._balance.pivots)
+        if wide.size and not len(self._balance.pivots):
             smaller = _within(cell, *self._linear.narrowed(cell.low, cell.high, wide))
             if np.any(smaller.low > smaller.high):
                 return
@@ -117,13 +121,14 @@ class Enumeration:
                 self.waiting.append(smaller)
                 return
             cell = smaller
-        parts = list(self._parts(cell))
+        parts = list(self._far_parts(cell, int(far[0])) if far.size else self._parts(cell))
         self.waiting += (replace(part, share=cell.share / len(parts)) for part in parts)
 
     def _tightened(self, cell: Box) -> Box | None:
         """The cell made smaller; None if no stationary point is in it."""
         for _ in range(MOST_ROUNDS):
             sides = self._forces.tightened(cell.low, cell.high)
+            sides = None if sides is None else self._balance.tightened(*sides)
             if sides is None:
                 return None
             smaller = monotone_radius.tightened(self._relaxation, replace(cell, low=sides[0], high=sides[1]))
@@ -203,6 +208,15 @@ class Enumeration:
         """Where a bound of the problem can push, and the unknown is free to leave it."""
         ends = (cell.low <= self.problem.lower) | (cell.high >= self.problem.upper)
         return np.asarray(ends & (cell.low < cell.high))
+
+    def _far_parts(self, cell: Box, i: int) -> Iterator[Box]:
+        """The parts of a cell that reaches far: near the joints, and far from them on either side."""
+        begin, end = float(cell.low[i]), float(cell.high[i])
+        near = max(self.problem.reach, begin, -end)
+        at = math.sqrt(near * max(end, -begin))
+        marks = [begin, *(mark for mark in (-at, at) if begin < mark < end), end]
+        for first, last in itertools.pairwise(marks):
+            yield _with(cell, i, first, last)
 
     def _parts(self, cell: Box) -> Iterator[Box]:
         """The parts of a cell: at a drop where there is one, else at a joint, a bound, or in the middle."""

@@ -25,6 +25,7 @@ from hvi_fenicsx.stationary_points.linear_test import LinearTest
 from hvi_fenicsx.stationary_points.lowest import LowestSearch
 from hvi_fenicsx.stationary_points.progress_words import Clock, Unit, lowest_in_words
 from hvi_fenicsx.stationary_points.relaxation import Relaxation
+from hvi_fenicsx.stationary_points.rigid_balance import RigidBalance
 from hvi_fenicsx.stationary_points.scalar_problem import ScalarProblem
 from hvi_fenicsx.stationary_points.stationarity import Kind
 from hvi_fenicsx.system.condensation import Condensation
@@ -117,6 +118,33 @@ def test_cells_made_smaller_by_linear_programmes_keep_all_points(case: Case) -> 
         first, last = LinearTest(problem).narrowed(near_low, near_high, each)
         assert np.all((point.x >= first) & (point.x <= last))
         assert float((last - first).max()) < 1e3
+
+
+@everywhere
+def test_cells_made_smaller_by_the_balance_of_bodies_keep_all_points(case: Case) -> None:
+    problem, _ = problem_of(case)
+    balance, random = RigidBalance(problem), np.random.default_rng(0)
+    for point in found(problem).points:
+        for reach in (1e-3, 1.0, 1e3, 1e6):
+            low = np.maximum(problem.lower, point.x - reach * random.uniform(0.01, 1.0, problem.size))
+            high = np.minimum(problem.upper, point.x + reach * random.uniform(0.01, 1.0, problem.size))
+            ends = balance.tightened(low, high)
+            assert ends is not None
+            assert np.all((point.x >= ends[0]) & (point.x <= ends[1]))
+
+
+def test_the_balance_of_bodies_knows_that_all_bonds_must_bear_nearly_their_peak() -> None:
+    """Pulled by the peak less 1 % of it, no bond can be broken: all slips lie just before the drop."""
+    far_drop = 1e3 * DELTA  # the body's own strain is small beside it
+    law = {"law": "graph", "points": [[0.0, 0.0], [far_drop, 1e6], [far_drop, 5e5]]}
+    problem = scalar_problem(Condensation(prepare(Scene.model_validate(block(8, 0.99e6, 1e6, law))).system).problem)
+    low, high = np.maximum(problem.lower, -problem.far), np.minimum(problem.upper, problem.far)
+    ends = RigidBalance(problem).tightened(low, high)
+    bonded = np.array([len(chain) > 1 for chain in problem.chains])
+    assert ends is not None
+    assert np.all(ends[0][bonded] > 0.8 * problem.reach)
+    assert np.all(ends[1][bonded] <= problem.reach * (1.0 + 1e-9))
+    assert len(found(problem).points) >= 1
 
 
 def on_teeth(count: int, drop: float = 3.0) -> TractionGraph:

@@ -1,0 +1,92 @@
+"""What intervals of forces leave of intervals of displacements, on the graphs of laws and bounds."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..typing import Array, Mask
+from .scalar_problem import ArcTable, ScalarProblem
+
+WIDENED = 1e-12
+"""Relative widening of what is found, for rounding."""
+
+
+class GraphClip:
+    """The graphs of a problem's laws and bounds, to which springs may be added.
+
+    Args:
+        problem: the problem.
+        springs: stiffness d of the springs, (n,).
+        joints_at_ends: whether a joint at the end of an interval counts with all its tractions; if not, only where the
+            interval is that joint alone.
+    """
+
+    def __init__(self, problem: ScalarProblem, springs: Array, *, joints_at_ends: bool) -> None:
+        self._problem, self._springs, self._joints_at_ends = problem, springs, joints_at_ends
+        self._arcs = ArcTable.of(problem.chains[: problem.size])
+
+    def clipped(self, low: Array, high: Array, least: Array, most: Array) -> tuple[Array, Array] | None:
+        """Smaller intervals that hold all x for which d x + ∂φ(x), and what bounds bear, meets the forces.
+
+        Args:
+            low: of x, (n,), finite.
+            high: of x, (n,), finite.
+            least: force, (n,).
+            most: force, (n,).
+
+        Returns:
+            low and high; None if one interval is empty.
+        """
+        column_least, column_most, arcs = least[:, None], most[:, None], self._arcs
+        begin, end = np.maximum(arcs.low, low[:, None]), np.minimum(arcs.high, high[:, None])
+        first, last = self._on_arcs(begin, end, column_least, column_most, arcs.meets(low, high))
+        joint_low, joint_high = self._at_joints(low, high, column_least, column_most)
+        first = np.minimum(first.min(axis=1), joint_low)
+        last = np.maximum(last.max(axis=1), joint_high)
+        first, last = self._at_bounds(low, high, least, most, first, last)
+        if np.any(first > last):
+            return None
+        wide = WIDENED * (np.abs(first) + np.abs(last) + (high - low))
+        return np.maximum(low, first - wide), np.minimum(high, last + wide)
+
+    def _on_arcs(self, begin: Array, end: Array, least: Array, most: Array, meets: Mask) -> tuple[Array, Array]:
+        """The ends of what is left of each arc; (inf, -inf) of those that are lost."""
+        arcs, d = self._arcs, self._springs[:, None]
+        with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+            slope = arcs.slopes + d
+            at_begin = arcs.tractions + arcs.slopes * (begin - arcs.anchors) + d * begin
+            at_end = at_begin + slope * (end - begin)
+            to_least, to_most = begin + (least - at_begin) / slope, begin + (most - at_begin) / slope
+            rises, falls = slope > 0.0, slope < 0.0
+            first = np.where(rises, to_least, np.where(falls, to_most, begin))
+            last = np.where(rises, to_most, np.where(falls, to_least, end))
+            lost = (np.minimum(at_begin, at_end) > most) | (np.maximum(at_begin, at_end) < least) | ~meets
+        first, last = np.clip(first, begin, end), np.clip(last, begin, end)
+        return np.where(lost, np.inf, first), np.where(lost, -np.inf, last)
+
+    def _at_joints(self, low: Array, high: Array, least: Array, most: Array) -> tuple[Array, Array]:
+        """The first and the last joint in the box whose interval of tractions meets the forces."""
+        arcs, d = self._arcs, self._springs[:, None]
+        at = arcs.high[:, :-1]
+        inside = (at >= low[:, None]) & (at <= high[:, None])
+        if not self._joints_at_ends:
+            inside &= ((at > low[:, None]) & (at < high[:, None])) | (low == high)[:, None]
+        with np.errstate(invalid="ignore"):
+            a, b = arcs.before[:, :-1] + d * at, arcs.after[:, 1:] + d * at
+            meets = inside & (np.minimum(a, b) <= most) & (np.maximum(a, b) >= least)
+        first = np.where(meets, at, np.inf).min(axis=1, initial=np.inf)
+        return first, np.where(meets, at, -np.inf).max(axis=1, initial=-np.inf)
+
+    def _at_bounds(
+        self, low: Array, high: Array, least: Array, most: Array, first: Array, last: Array
+    ) -> tuple[Array, Array]:
+        """The ends of the range stay where a bound can push there."""
+        problem, rows, arcs = self._problem, np.arange(len(low)), self._arcs
+        for at, bound, upper in ((low, problem.lower, False), (high, problem.upper, True)):
+            k = arcs.at(at)
+            pull = arcs.tractions[rows, k] + arcs.slopes[rows, k] * (at - arcs.anchors[rows, k]) + self._springs * at
+            sizes = sum(np.where(np.isfinite(part), np.abs(part), 0.0) for part in (pull, least, most))
+            pushes = (most >= pull - WIDENED * sizes) if upper else (least <= pull + WIDENED * sizes)
+            stays = (at == bound) & pushes
+            first, last = np.where(stays, np.minimum(first, at), first), np.where(stays, np.maximum(last, at), last)
+        return first, last

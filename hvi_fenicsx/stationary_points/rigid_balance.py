@@ -1,0 +1,161 @@
+"""Smaller cells by the balance of whole bodies: net forces and moments, and the elastic part of the displacement.
+
+With τ = f - Sx the forces that laws and bounds bear, a rigid motion r (Sr = 0) demands r·τ = r·f. And
+x = Tx_p + G(f - τ), where x_p are a few unknowns, pivots, that fix the rigid motion T x_p. So intervals of the forces,
+which also cells that reach far have, bound the differences of displacements. S and G are what they were computed to be:
+what Sr and I - T_p - GS are off zero is counted, with the rounding of these products.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.linalg import qr
+
+from ..typing import Array
+from .graph_clip import WIDENED, GraphClip
+from .scalar_problem import ArcTable, ScalarProblem
+
+RIGID = 1e-11
+"""Eigenvalues of S below this share of the largest are those of rigid motions."""
+MOST_ROUNDS = 20
+"""Passes over all unknowns."""
+PROGRESS = 0.1
+"""A pass that makes no interval shorter by this share is the last."""
+EPSILON = float(np.finfo(float).eps)
+
+
+class RigidBalance:
+    """What net balance and elasticity leave of a cell.
+
+    Args:
+        problem: the problem.
+
+    Attributes:
+        pivots: unknowns that fix the rigid motions, one for each.
+    """
+
+    def __init__(self, problem: ScalarProblem) -> None:
+        self._problem, n = problem, problem.size
+        self._arcs = ArcTable.of(problem.chains[:n])
+        self._graphs = GraphClip(problem, np.zeros(n), joints_at_ends=False)
+        values, vectors = np.linalg.eigh(problem.stiffness)
+        rigid = values <= RIGID * values[-1]
+        shapes, elastic = vectors[:, rigid], vectors[:, ~rigid]
+        self.pivots = qr(shapes.T, pivoting=True, mode="r")[1][: shapes.shape[1]]
+        self._motions = shapes @ np.linalg.inv(shapes[self.pivots])
+        self._motions[np.abs(self._motions) < 1e-13] = 0.0
+        flexibility = (elastic / values[~rigid]) @ elastic.T
+        self._flexibility = flexibility - self._motions @ flexibility[self.pivots]
+        self._measure_errors()
+
+    def _measure_errors(self) -> None:
+        """How far the products with S are off what they are for exact numbers, rounding included."""
+        stiffness, n = self._problem.stiffness, self._problem.size
+        rest = np.eye(n) - self._flexibility @ stiffness
+        rest[:, self.pivots] -= self._motions
+        sizes = np.eye(n) + np.abs(self._flexibility) @ np.abs(stiffness)
+        sizes[:, self.pivots] += np.abs(self._motions)
+        self._rest = np.abs(rest) + n * EPSILON * sizes
+        net = stiffness @ self._motions
+        self._net = np.abs(net) + n * EPSILON * (np.abs(stiffness) @ np.abs(self._motions))
+
+    def tightened(self, low: Array, high: Array) -> tuple[Array, Array] | None:
+        """A smaller cell with the same stationary points; None if there is none in it.
+
+        Args:
+            low: of the cell, (n,), finite.
+            high: of the cell, (n,), finite.
+        """
+        for _ in range(MOST_ROUNDS):
+            if (forces := self._balanced(*self._forces(low, high), low, high)) is None:
+                return None
+            slack = WIDENED * sum(np.where(np.isfinite(part), np.abs(part), 0.0) for part in forces)
+            if (ends := self._graphs.clipped(low, high, forces[0] - slack, forces[1] + slack)) is None:
+                return None
+            if (ends := self._elastic(*ends, *forces)) is None:
+                return None
+            shorter = (ends[1] - ends[0]) < (1.0 - PROGRESS) * (high - low)
+            low, high = ends
+            if not shorter.any():
+                break
+        return low, high
+
+    def _forces(self, low: Array, high: Array) -> tuple[Array, Array]:
+        """What laws and bounds can bear in a cell, (n,) each; infinite where a bound can push."""
+        problem, arcs = self._problem, self._arcs
+        begin, end = np.maximum(arcs.low, low[:, None]), np.minimum(arcs.high, high[:, None])
+        meets = arcs.meets(low, high) | ((low == high)[:, None] & (begin <= end))
+        with np.errstate(invalid="ignore"):
+            ends = np.stack([arcs.tractions + arcs.slopes * (at - arcs.anchors) for at in (begin, end)])
+        least = np.where(meets, ends.min(axis=0), np.inf).min(axis=1)
+        most = np.where(meets, ends.max(axis=0), -np.inf).max(axis=1)
+        wide = WIDENED * (np.abs(least) + np.abs(most))
+        return (
+            np.where(low <= problem.lower, -np.inf, least - wide),
+            np.where(high >= problem.upper, np.inf, most + wide),
+        )
+
+    def _balanced(self, least: Array, most: Array, low: Array, high: Array) -> tuple[Array, Array] | None:
+        """Smaller intervals of the forces: the net force along each rigid motion is that of the load."""
+        force, size = self._problem.force, np.maximum(np.abs(low), np.abs(high))
+        for motion, net in zip(self._motions.T, self._net.T, strict=True):
+            i = np.flatnonzero(motion)
+            r = motion[i]
+            ends = np.sort(np.stack([r * least[i], r * most[i]]), axis=0)
+            finite = np.where(np.isfinite(ends), np.abs(ends), 0.0).max(axis=0)
+            error = float(net @ size) + len(force) * EPSILON * float(np.abs(motion) @ np.abs(force) + finite.sum())
+            total = float(motion @ force)
+            new = np.stack([total - error - _sum_of_others(ends[1]), total + error - _sum_of_others(ends[0])])
+            new = np.sort(new / r, axis=0)
+            least[i], most[i] = np.maximum(least[i], new[0]), np.minimum(most[i], new[1])
+        return None if np.any(least > most) else (least, most)
+
+    def _elastic(self, low: Array, high: Array, least: Array, most: Array) -> tuple[Array, Array] | None:
+        """Smaller intervals of the displacements: x = T x_p + e with e = G(f - τ)."""
+        if not np.all(np.isfinite(least) & np.isfinite(most)):
+            return low, high
+        first, last = self._elastic_parts(low, high, least, most)
+        begin, end = low[self.pivots], high[self.pivots]
+        for j, motion in enumerate(self._motions.T):
+            i = np.flatnonzero(motion)
+            others = np.delete(np.arange(len(begin)), j)
+            rest_low, rest_high = _product(self._motions[np.ix_(i, others)], begin[others], end[others])
+            ways = np.sort(np.stack([low[i] - last[i] - rest_high, high[i] - first[i] - rest_low]) / motion[i], axis=0)
+            slack = WIDENED * np.abs(np.stack([low[i], high[i], first[i], last[i]]) / motion[i]).max()
+            begin[j], end[j] = max(begin[j], ways[0].max() - slack), min(end[j], ways[1].min() + slack)
+        if np.any(begin > end):
+            return None
+        moved_low, moved_high = _product(self._motions, begin, end)
+        slack = WIDENED * (np.abs(moved_low) + np.abs(moved_high) + np.abs(first) + np.abs(last))
+        low, high = np.maximum(low, moved_low + first - slack), np.minimum(high, moved_high + last + slack)
+        return None if np.any(low > high) else (low, high)
+
+    def _elastic_parts(self, low: Array, high: Array, least: Array, most: Array) -> tuple[Array, Array]:
+        """The intervals of e, made short: G is changed along rigid motions, where the net force is known."""
+        problem, motions, n = self._problem, self._motions, self._problem.size
+        weights = (most - least) ** 2 + 1e-300
+        normal = motions.T @ (weights[:, None] * motions)
+        shift = -np.linalg.lstsq(normal, (self._flexibility * weights @ motions).T, rcond=None)[0].T
+        flexibility = self._flexibility + shift @ motions.T
+        first, last = _product(flexibility, problem.force - most, problem.force - least)
+        size = np.maximum(np.abs(low), np.abs(high))
+        forces = np.abs(problem.force) + np.maximum(np.abs(least), np.abs(most))
+        error = self._rest @ size + np.abs(shift) @ (self._net.T @ size) + n * EPSILON * (np.abs(flexibility) @ forces)
+        return first - error, last + error
+
+
+def _product(matrix: Array, low: Array, high: Array) -> tuple[Array, Array]:
+    """The ends of matrix @ [low, high]."""
+    plus, minus = np.maximum(matrix, 0.0), np.minimum(matrix, 0.0)
+    return plus @ low + minus @ high, plus @ high + minus @ low
+
+
+def _sum_of_others(parts: Array) -> Array:
+    """For each part the sum of all others, some of which may be infinite."""
+    infinite = ~np.isfinite(parts)
+    if not infinite.any():
+        return np.asarray(parts.sum() - parts)
+    sign = parts[infinite][0]
+    finite = np.where(infinite, 0.0, parts)
+    alone = infinite.sum() - infinite
+    return np.where(alone > 0, sign, finite.sum() - finite)
