@@ -173,6 +173,7 @@ class Auto(BranchIteration):
         yield from self._on_other_pieces(resting)
         yield from self._attempt(Continuation(self.context).solve)
         for start in (self.system.undisplaced(), resting):
+            yield from self._attempt(newton_continuation.stay_on_kinks, self.context, start)
             yield from self._attempt(self._iteration().newton, start)
         yield from self._attempt(newton_continuation.solve, self.context)
 

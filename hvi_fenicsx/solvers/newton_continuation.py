@@ -51,6 +51,24 @@ def solve(context: SolveContext) -> SolveResult:
     return replace(held, converged=False, counts=counts)
 
 
+def stay_on_kinks(context: SolveContext, x: PETSc.Vec) -> SolveResult:
+    """A stationary point near x at which the vertices that x has on kinks of G stay there. Collective.
+
+    No smoothing leads to it where a kink has a traction of one sign only, as a literal law has at zero.
+
+    Args:
+        context: the system and how to solve it.
+        x: where to begin.
+    """
+    kinks = [_kinks_at(term.law, term.argument(x.array_r)) for term in context.system.terms]
+    return BranchIteration(context).newton(x, kinks)
+
+
+def _kinks_at(law: Superpotential, argument: Array) -> Array:
+    """The kink of G that each argument is exactly on, else NaN."""
+    return np.where(np.isin(argument, law.concave.kinks), argument, np.nan)
+
+
 def _widths(context: SolveContext) -> Iterator[float]:
     """Relative widths of the smoothing, down to the wanted one."""
     thresholds = context.options.thresholds.branch

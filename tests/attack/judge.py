@@ -115,6 +115,8 @@ def judge(scene: Table, drawn: Mesh | None, answer: Answer, seed: int = 0) -> Ve
         word = AGREES if answer.code == 0 else CONTRADICTS
         return Verdict(word, "nothing drives, so u = 0 is a solution")
     truth = programmes.verdict(problem)
+    if answer.state == "undecided" and truth.state != "unclear":
+        return Verdict(MISSED, f"whether a solution exists was left undecided, in truth {truth.state}")
     wrong, missed = _existence(problem, truth, answer), list[str]()
     if answer.code == 0:
         more, note = _solution(problem, answer, seed)
@@ -137,7 +139,7 @@ def _existence(problem: Problem, truth: programmes.Verdict, answer: Answer) -> l
     tied = answer.state == "borderline" and np.nanmin(np.abs([truth.growth, truth.peak])) < truth.equal
     if answer.state not in allowed.get(truth.state, (truth.state,)) and not tied:
         found.append(f"state {answer.state}{tie}, in truth {truth.state} ({truth.growth:.2e}, {truth.peak:.2e})")
-    sure = truth.state in ("held", "metastable") and abs(truth.growth) > programmes.TIE
+    sure = truth.state in ("held", "metastable") and abs(truth.growth) > max(programmes.TIE, truth.equal)
     if answer.margin is not None and sure and (answer.margin > 0) != (truth.growth > 0):
         found.append(f"margin {answer.margin:.2e}, in truth {truth.growth:.2e}")
     if answer.paper and truth.state in ("metastable", "escapes"):

@@ -155,6 +155,42 @@ def test_a_vertex_that_touches_its_bound_does_not_descend_through_rounding() -> 
     assert sampled_descent(check, Floor(problem), np.random.default_rng(0)) > -1e-4
 
 
+def test_a_jump_that_nearly_gives_way_still_holds_a_vertex() -> None:
+    """The law falls so fast that the energy falls again at a hundredth of the steps that are drawn."""
+    pull, u0 = 1e6, 1e6 / 2.15e11
+    falling = {"law": "exponential", "peak_traction": 1.001 * pull, "residual_traction": 0.0, "delta": 1e-6 * u0}
+    table = scene(0.0) | {"material": STEEL | {"poisson_ratio": 0.0}}
+    table["boundary"] = {
+        "roof": {"on": "top", "displacement": ["free", 0.0]},
+        "right": {"on": "right", "displacement": [0.0, "free"]},
+        "floor": table["boundary"]["floor"] | {"friction": falling},
+        "wall": {"on": "left", "displacement": [0.0, "free"]},
+    }
+    problem = assemble(table, block([1.0, 1.0], [2, 2]))
+    middle = next(p for p in problem.laws if problem.mesh.points[p.vertex, 0] == 0.5)
+    problem.load[2 * middle.vertex] += pull * middle.weight
+    check = Check(problem, np.zeros_like(problem.mesh.points))
+    assert not check.wrongs()
+    assert sampled_descent(check, Floor(problem), np.random.default_rng(0)) > -1e-4
+
+
+def test_a_slip_below_what_its_displacement_resolves_may_have_any_traction() -> None:
+    """Fallen by 1 m onto its floor, a box slips by less than rounding leaves of a displacement of 1 m."""
+    fine = {"law": "quadratic_linear", "gamma1": 2.0, "gamma2": 1.0, "delta": 1e-13}
+    floor = {"on": "bottom", "contact": {"gap": 1.0}, "friction": fine}
+    table = {
+        "domain": {"shape": "box", "size": [1.0, 1.0, 1.0], "cells": [1, 1, 1]},
+        "material": STEEL | {"model": "three_dimensional"},
+        "boundary": {"floor": floor, "press": {"on": "top", "traction": [0.0, 0.0, -1.0]}},
+        "solver": {},
+    }
+    problem = assemble(table, block([1.0, 1.0, 1.0], [1, 1, 1]))
+    check = Check(problem, np.zeros_like(problem.mesh.points) - [1e-15, 0.0, 1.0])
+    law = problem.laws[0]
+    _, *friction = check.columns(law.vertex)
+    assert [column.high for column in friction] == pytest.approx([2.0 * law.weight] * 2)
+
+
 def test_a_jump_far_weaker_than_the_loads_may_still_hold_a_vertex() -> None:
     weak = {"law": "graph", "points": [[0.0, 5.0], [1e-13, 0.0]], "one_sided": False}
     table = scene(0.0, weak) | {"material": STEEL | {"poisson_ratio": 0.0}}

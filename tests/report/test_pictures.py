@@ -207,6 +207,10 @@ def test_a_plane_result_has_its_body_and_its_contact(
     assert_drawn(draw.draw(folder), "body.png", "contact.png")
 
 
+def test_a_side_of_one_edge_has_a_pressure_that_is_drawn(tmp_path: Path) -> None:
+    assert body_plane.draw(reader.read(result(tmp_path / "r", square(1), pressed))).axes
+
+
 @pytest.mark.parametrize("value", [pressed, peeled], ids=lambda f: f.__name__)
 def test_so_has_a_result_in_space_and_no_x_server_remains(
     tmp_path: Path, value: Callable[[Array], Array], left_running: Callable[[], list[str]]

@@ -215,7 +215,7 @@ def _profile(base: Array, outward: Array, pressure: Array, largest: float, size:
         if part.max() <= NOTHING * largest:
             continue
         tips = base + PRESSURE * size / largest * part[:, None] * outward
-        tips[np.convolve(part > NOTHING * largest, [1, 1, 1], "same") == 0] = np.nan  # no line where there is no stress
+        tips[np.convolve(part > NOTHING * largest, [1, 1, 1])[1:-1] == 0] = np.nan  # no line where there is no stress
         yield _filled(base, tips, colour, f"{words}, up to {quantity(float(part.max()), 'Pa')}")
         tips = np.where(np.isnan(tips), base, tips)
         first, last = np.flatnonzero(part > 0.02 * part.max())[[0, -1]]

@@ -72,10 +72,16 @@ def _least(matrix: Array, where: list[int]) -> float:
 
 def _side(check: Check, c: Coordinate, sign: float) -> tuple[float, float]:
     """The derivative of the energy to one side, in units of what rounding may be, and the law's curvature there."""
+    slope, tolerance, curvature = _derivatives(check, c, sign)
+    return slope / tolerance, curvature
+
+
+def _derivatives(check: Check, c: Coordinate, sign: float) -> tuple[float, float, float]:
+    """The derivative of the energy to one side, what rounding may be, and the law's curvature there."""
     near, x = check.near(c.vertex), float(c.direction @ check.u[c.vertex])
     touching = check.touching(c.vertex)
     if (sign > 0 and x >= c.upper - touching) or (sign < 0 and x <= c.lower + touching):
-        return np.inf, 0.0
+        return np.inf, 1.0, 0.0
     slope = -sign * float(c.direction @ check.missing[c.vertex])
     curvature, tolerance = 0.0, weight_of(check, c) * check.wrong
     for law, turn, weight in c.laws:
@@ -87,7 +93,7 @@ def _side(check: Check, c: Coordinate, sign: float) -> tuple[float, float]:
         curvature += weight * _slope(law, at, to)
         steepest = max(abs(_slope(law, at, side)) for side in (-1.0, 1.0))
         tolerance += weight * steepest * abs(at - place)  # a kink nearby is not the place itself
-    return slope / tolerance, curvature
+    return slope, tolerance, curvature
 
 
 def weight_of(check: Check, c: Coordinate) -> float:
@@ -138,7 +144,10 @@ def _room(check: Check, c: Coordinate, x: float) -> tuple[float, float]:
 
 
 def _within_pieces(check: Check, floor: Floor, step: Array) -> Array:
-    """The step, shortened so that no vertex reaches another piece of its law: beyond it the energy may fall again."""
+    """The step, shortened so that no vertex reaches another piece of its law: beyond it the energy may fall again.
+
+    So it may where a vertex that a jump of its law holds has gone so far that the law's fall outdoes the jump.
+    """
     share = 1.0
     for c, change in zip(floor.coordinates, step, strict=True):
         x = float(c.direction @ check.u[c.vertex])
@@ -147,4 +156,7 @@ def _within_pieces(check: Check, floor: Floor, step: Array) -> Array:
             far = far[far > check.near(c.vertex)]
             if len(far) and abs(change) > 0.5 * far.min():
                 share = min(share, 0.5 * float(far.min()) / abs(change))
+        slope, tolerance, curvature = _derivatives(check, c, float(np.sign(change)) or 1.0)
+        if slope > tolerance and abs(change) * -curvature > 0.5 * slope:
+            share = min(share, 0.5 * slope / (abs(change) * -curvature))
     return np.asarray(share * step)

@@ -109,7 +109,7 @@ class Check:
             slip = p.slip(self.u)
             x = self.problem.argument(p, self.u)
             if p.radial and x <= near:
-                radius = p.weight * float(np.abs(p.law.side(np.array([1e-12 * near]), "right"))[0])
+                radius = p.weight * float(np.max(np.abs(p.law.interval(np.array([x]), near))))  # no slip that is known
                 found += [Column(t, -radius, radius) for t in p.directions]
                 continue
             low, high = (float(v[0]) * p.weight for v in p.law.interval(np.array([x]), near))
