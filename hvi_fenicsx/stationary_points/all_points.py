@@ -70,16 +70,19 @@ class Enumeration:
         points: found so far.
         cells: looked at so far.
         waiting: a stack of cells not yet decided.
+        undecided: cells in which the polylines of curved laws may have a point; whether the laws have, is not known.
     """
 
     problem: ScalarProblem
     points: list[StationaryPoint] = field(default_factory=list)
     cells: int = 0
     waiting: list[Box] = field(default_factory=list)
+    undecided: int = 0
 
     def __post_init__(self) -> None:
         self._forces = ForceIntervals(self.problem, joints_at_ends=False)
         self._balance = RigidBalance(self.problem)
+        self._curved = bool(np.any(self.problem.force_error))
         self._places: Array = np.empty((0, self.problem.size))
         self._linear, self._relaxation = LinearTest(self.problem), Relaxation(self.problem)
 
@@ -144,6 +147,8 @@ class Enumeration:
         """Whether the cell's points, one at most or a continuum, have been found."""
         fixed = cell.low == cell.high
         free = np.flatnonzero(~fixed)
+        if self._curved:
+            return self._is_undecided(cell, free)
         arcs, problem = self.problem.arcs, self.problem
         if not free.size:
             self.enter(cell.low)
@@ -159,6 +164,16 @@ class Enumeration:
             return False
         self._enter_linear(cell, free, matrix)
         return True
+
+    def _is_undecided(self, cell: Box, free: Integers) -> bool:
+        """Whether a cell of curved laws can hardly be excluded: the polylines may have one point there."""
+        arcs = self.problem.arcs
+        slopes = arcs.least_slope(cell.low, cell.high)[free]
+        one = not free.size or bool(np.all(arcs.meets(cell.low, cell.high)[free].sum(axis=1) <= 1))
+        if one or _positive(self.problem.stiffness[np.ix_(free, free)] + np.diag(slopes)):
+            self.undecided += 1
+            return True
+        return False
 
     def _minimum(self, cell: Box, added: Array) -> Array:
         """The minimiser of a cell on which the energy is convex, the falls of its laws being less than S."""

@@ -87,6 +87,8 @@ class Equilibria:
         with self._prepared.timer("solve"):
             if self.problem.error and lowest:
                 wanted = self._refined(self.problem, wanted, stop, report)
+            elif self.problem.error and not wanted.bounded and not len(self.problem.lengths):
+                wanted = replace(wanted, near=scalar_problem(self._condensation.problem, tractions=True))
             return find(self.problem, wanted, stop, report, saved, keep)
 
     def _refined(

@@ -12,33 +12,43 @@ import numpy as np
 from ..errors import InputError
 from ..system.condensed_problem import Bonds, CondensedProblem
 from .arcs import FREE, Chain, chain, total
-from .law_graphs import LawGraph, exact_graph, law_graph
+from .law_graphs import LawGraph, exact_graph, law_graph, near_graph
 from .lengths import Lengths
 from .scalar_problem import FAR, ScalarProblem
 
 COARSE = 1e-4
 """Error of the energy of curved laws, relative to their scale, with which the first search is made."""
+NEAR = 1e-3
+"""Error of the tractions of curved laws, relative to their scale, where it is proven that there is no equilibrium."""
+ROUNDED = 1e-12
+"""Widening of this error by rounding."""
 
 
-def scalar_problem(problem: CondensedProblem, factor: float = 1.0, *, tolerance: float | None = None) -> ScalarProblem:
+def scalar_problem(
+    problem: CondensedProblem, factor: float = 1.0, *, tolerance: float | None = None, tractions: bool = False
+) -> ScalarProblem:
     """The problem at a load factor.
 
     Args:
         problem: the condensed problem.
         factor: λ.
         tolerance: energy by which curved laws may differ from their polylines, altogether; None: a coarse one.
+        tractions: whether the polylines are to be near the tractions, too; then `force_error` is how near.
 
     Raises:
         InputError: a law has no potential, or acts on the length of a vector whose components have other laws.
     """
     found: dict[_Argument, list[Chain]] = {}
     far, constant, error = _far(problem.bonds), problem.constant_at(factor), 0.0
-    for bonds, law in zip(problem.bonds, _graphs(problem.bonds, far, tolerance), strict=True):
+    force_error = np.zeros(problem.size)
+    graphs = _near_graphs(problem.bonds, far) if tractions else _graphs(problem.bonds, far, tolerance)
+    for bonds, law in zip(problem.bonds, graphs, strict=True):
         _refuse_mixity(bonds)
         area = float(bonds.weights.sum())
         constant, error = constant + area * law.offset, error + area * law.error
         for argument, sign, weight in _arguments(bonds):
             found.setdefault(argument, []).append(chain(law.graph, weight, sign))
+            force_error[list(argument.unknowns)] += abs(sign) * weight * law.traction_error * (1.0 + ROUNDED)
     vectors = [argument for argument in found if argument.radial]
     _refuse_overlap(problem, found)
     unknowns = [found.get(_Argument(unknowns=(i,)), []) for i in range(problem.size)]
@@ -52,6 +62,7 @@ def scalar_problem(problem: CondensedProblem, factor: float = 1.0, *, tolerance:
         lengths=_lengths(vectors),
         constant=constant,
         error=error,
+        force_error=force_error if tractions else 0.0,
         farthest=far if error else math.inf,
     )
 
@@ -97,6 +108,12 @@ def _graphs(laws: Sequence[Bonds], far: float, tolerance: float | None) -> Itera
     for b in laws:
         aim = COARSE * b.law.energy_scale if tolerance is None else tolerance / (area or 1.0)
         yield law_graph(b.law, far, aim)
+
+
+def _near_graphs(laws: Sequence[Bonds], far: float) -> Iterator[LawGraph]:
+    """The laws as polylines near their tractions."""
+    for b in laws:
+        yield near_graph(b.law, far, NEAR * b.law.traction_scale)
 
 
 def _far(laws: Sequence[Bonds]) -> float:

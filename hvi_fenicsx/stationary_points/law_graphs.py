@@ -8,6 +8,7 @@ follows from the derivatives of the law's convex parts at the samples: these nev
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,6 +23,8 @@ SAMPLES = 512
 """Intervals of an interval between two nodes on which the difference is bounded."""
 MOST_NODES = 2000
 """Nodes are not made denser beyond this number."""
+Difference = Callable[[Superpotential, Array, Array], Array]
+"""Bounds of what a law and its polyline differ by on intervals: law, begins, ends."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,11 +35,13 @@ class LawGraph:
         graph: the polyline; its energy is zero at zero.
         offset: the law's energy at zero.
         error: the law's energy differs from that of the polyline by this at most.
+        traction_error: the law's traction differs from the polyline by this at most.
     """
 
     graph: TractionGraph
     offset: float
     error: float
+    traction_error: float = 0.0
 
 
 def exact_graph(law: Superpotential) -> TractionGraph | None:
@@ -59,20 +64,36 @@ def law_graph(law: Superpotential, far: float, tolerance: float) -> LawGraph:
     offset = float(law.value(np.zeros(1))[0])
     if (graph := exact_graph(law)) is not None:
         return LawGraph(graph=graph, offset=offset, error=0.0)
-    nodes, error = _nodes(law, far, tolerance)
+    nodes, error = _nodes(law, far, tolerance, _errors)
     return LawGraph(graph=_joined(law, nodes), offset=offset, error=error)
 
 
-def _nodes(law: Superpotential, far: float, tolerance: float) -> tuple[Array, float]:
-    """Nodes between which the energies differ by at most a tolerance, and how far they do."""
+def near_graph(law: Superpotential, far: float, tolerance: float) -> LawGraph:
+    """The polyline of a law whose traction is near the law's everywhere.
+
+    Args:
+        law: the law.
+        far: displacements beyond it do not matter.
+        tolerance: difference of tractions that is aimed at, where the law is curved.
+    """
+    if (graph := exact_graph(law)) is not None:
+        return LawGraph(graph=graph, offset=float(law.value(np.zeros(1))[0]), error=0.0)
+    nodes, traction_error = _nodes(law, far, tolerance, _traction_errors)
+    error = float(_errors(law, nodes[:-1], nodes[1:]).max())
+    offset = float(law.value(np.zeros(1))[0])
+    return LawGraph(graph=_joined(law, nodes), offset=offset, error=error, traction_error=traction_error)
+
+
+def _nodes(law: Superpotential, far: float, tolerance: float, differences: Difference) -> tuple[Array, float]:
+    """Nodes between which energies or tractions differ by at most a tolerance, and how far they do."""
     first = _first_nodes(law, far)
     begin, end = first[:-1], first[1:]
     kept, worst = [first[-1:]], 0.0
     while begin.size:
-        errors = _errors(law, begin, end)
+        errors = differences(law, begin, end)
         full = sum(map(len, kept)) + 2 * begin.size > MOST_NODES
         fine = (errors <= tolerance) | full
-        worst = max(worst, float(errors[fine].max(initial=0.0)))
+        worst = float(np.max(errors[fine], initial=worst))  # not a number stays so
         kept.append(begin[fine])
         begin, end = begin[~fine], end[~fine]
         middle = 0.5 * (begin + end)
@@ -94,16 +115,39 @@ def _middle_tractions(law: Superpotential, begin: Array, end: Array) -> Array:
     return np.asarray(2.0 * (law.value(end) - law.value(begin)) / (end - begin) - ends)
 
 
-def _errors(law: Superpotential, begin: Array, end: Array) -> Array:
-    """Bounds of the difference of the energies on intervals, (n,)."""
+def _samples(begin: Array, end: Array) -> tuple[Array, Array]:
+    """Shares of intervals, and the places there, (n, k)."""
     share: Array = np.linspace(0.0, 1.0, SAMPLES + 1, dtype=np.float64)
     x = begin[:, None] + (end - begin)[:, None] * share
     x[:, -1] = end
+    return share, x
+
+
+def _rises(law: Superpotential, x: Array) -> Array:
+    """By how much the tractions of the law's convex parts rise from sample to sample, together, (n, k - 1)."""
+    ends = x[:, 1:].ravel(), x[:, :-1].ravel()
+    rises = sum(part.left(ends[0]) - part.right(ends[1]) for part in (law.convex, law.concave))
+    return np.asarray(rises).reshape(len(x), -1)
+
+
+def _traction_errors(law: Superpotential, begin: Array, end: Array) -> Array:
+    """Bounds of the difference of the tractions on intervals, (n,)."""
+    share, x = _samples(begin, end)
+    traction = _polyline(law, begin, end, share)[1]
+    after, before = (side(x.ravel()).reshape(x.shape) for side in (law.right, law.left))
+    at_samples = np.maximum(np.abs(after - traction)[:, :-1], np.abs(before - traction)[:, 1:])
+    most = at_samples + _rises(law, x) + np.abs(np.diff(traction, axis=1))
+    rounding = 4.0 * np.finfo(float).eps * np.abs(after).max(axis=1)
+    return np.asarray(most.max(axis=1) + rounding)
+
+
+def _errors(law: Superpotential, begin: Array, end: Array) -> Array:
+    """Bounds of the difference of the energies on intervals, (n,)."""
+    share, x = _samples(begin, end)
     energy, traction = _polyline(law, begin, end, share)
     value = law.value(x.ravel()).reshape(x.shape)
     difference = np.abs(energy + value[:, :1] - value)
-    rises = sum(p.left(x[:, 1:].ravel()) - p.right(x[:, :-1].ravel()) for p in (law.convex, law.concave))
-    span = np.abs(np.diff(traction, axis=1)) + np.asarray(rises).reshape(len(begin), SAMPLES)
+    span = np.abs(np.diff(traction, axis=1)) + _rises(law, x)
     most = np.maximum(difference[:, 1:], difference[:, :-1]) + 0.25 * span * np.diff(x, axis=1)
     rounding = np.finfo(float).eps * np.abs(value).max(axis=1)
     return np.asarray(most.max(axis=1) + rounding)

@@ -17,6 +17,11 @@ from ..typing import Array, Integers
 from .arcs import on_interval
 from .scalar_problem import ScalarProblem
 
+HULL_ROUNDING = 1e-15
+"""Corners nearer to the hull than this share of the products compared are kept."""
+MANY = 8
+"""Of more corners those inside the hull are left out."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class _Corners:
@@ -87,7 +92,7 @@ class LinearTest:
         np.minimum.at(least, corners.owner, values)
         sizes = (np.abs(problem.stiffness) @ np.abs(y))[corners.owner] * np.abs(corners.x) + np.abs(cost)
         rounding = np.finfo(float).eps * problem.size * (sizes.sum() + np.abs(y) @ np.abs(problem.force))
-        return float(least.sum() - y @ problem.force - rounding)
+        return float(least.sum() - y @ problem.force - rounding - np.sum(np.abs(y) * problem.force_error))
 
     def narrowed(self, low: Array, high: Array, which: Integers) -> tuple[Array, Array]:
         """A smaller cell with the same stationary points; low > high somewhere if it has none.
@@ -144,7 +149,8 @@ class LinearTest:
         if low == high:
             return {(low, a.rate(low)) for a in self._problem.chains[i] if a.low <= low <= a.high}
         arcs = on_interval(self._problem.chains[i], low, high)
-        return {(x, a.rate(x)) for a in arcs for x in (a.low, a.high)}
+        corners = {(x, a.rate(x)) for a in arcs for x in (a.low, a.high)}
+        return corners if len(corners) <= MANY else _without_inner(corners)
 
     def _columns(self, corners: _Corners) -> tuple[Array, Array]:
         """Equations of the shares of corners and rays: forces in balance, shares of each unknown sum to 1."""
@@ -155,3 +161,25 @@ class LinearTest:
         columns[corners.pushed, m + np.arange(len(corners.push))] = corners.push
         columns[n + corners.owner, np.arange(m)] = 1.0
         return columns, np.concatenate([problem.force, np.ones(n)])
+
+
+def _without_inner(corners: set[tuple[float, float]]) -> set[tuple[float, float]]:
+    """The corners of the hull (Andrew 1979, Information Processing Letters 9); one that rounding leaves is no harm."""
+    ordered = sorted(corners)
+    return {*_lower_hull(ordered), *((x, -t) for x, t in _lower_hull([(x, -t) for x, t in ordered]))}
+
+
+def _lower_hull(ordered: list[tuple[float, float]]) -> list[tuple[float, float]]:
+    hull: list[tuple[float, float]] = []
+    for x, t in ordered:
+        while len(hull) > 1 and _is_above(hull[-1], hull[-2], (x, t)):
+            hull.pop()
+        hull.append((x, t))
+    return hull
+
+
+def _is_above(middle: tuple[float, float], first: tuple[float, float], last: tuple[float, float]) -> bool:
+    """Whether a point lies above the chord between two others by more than rounding."""
+    x, t = middle[0] - first[0], middle[1] - first[1]
+    dx, dt = last[0] - first[0], last[1] - first[1]
+    return t * dx - dt * x > HULL_ROUNDING * (abs(t * dx) + abs(dt * x))

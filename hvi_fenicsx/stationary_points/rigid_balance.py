@@ -69,7 +69,8 @@ class RigidBalance:
         for _ in range(MOST_ROUNDS):
             if (forces := self._balanced(*self._forces(low, high), low, high)) is None:
                 return None
-            slack = WIDENED * sum(np.where(np.isfinite(part), np.abs(part), 0.0) for part in forces)
+            rounding = WIDENED * sum(np.where(np.isfinite(part), np.abs(part), 0.0) for part in forces)
+            slack = rounding + self._problem.force_error
             if (ends := self._graphs.clipped(low, high, forces[0] - slack, forces[1] + slack)) is None:
                 return None
             if (ends := self._elastic(*ends, *forces)) is None:
@@ -89,7 +90,7 @@ class RigidBalance:
             ends = np.stack([arcs.tractions + arcs.slopes * (at - arcs.anchors) for at in (begin, end)])
         least = np.where(meets, ends.min(axis=0), np.inf).min(axis=1)
         most = np.where(meets, ends.max(axis=0), -np.inf).max(axis=1)
-        wide = WIDENED * (np.abs(least) + np.abs(most))
+        wide = WIDENED * (np.abs(least) + np.abs(most)) + problem.force_error
         return (
             np.where(low <= problem.lower, -np.inf, least - wide),
             np.where(high >= problem.upper, np.inf, most + wide),

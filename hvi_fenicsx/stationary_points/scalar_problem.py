@@ -33,6 +33,7 @@ class ScalarProblem:
         lengths: of vectors of unknowns which have no law of their own.
         constant: a part of the energy that x does not change.
         error: the energy of the laws differs from that of the chains by this at most; 0 where these are exact.
+        force_error: the forces of the laws differ from those of the chains by this at most, (n,).
         farthest: displacements up to which this is known.
     """
 
@@ -44,6 +45,7 @@ class ScalarProblem:
     lengths: Lengths = field(default_factory=Lengths.none)
     constant: float = 0.0
     error: float = 0.0
+    force_error: Array | float = 0.0
     farthest: float = INF
 
     @property

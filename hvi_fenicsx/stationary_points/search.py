@@ -24,6 +24,7 @@ MOST_BOXES = 50
 """Boxes that are bounded for the gap where what was asked for is not proven."""
 OWN_GAP = 0.85
 """Share of the gap that a search may leave where the laws are curved; the rest is for what their polylines differ."""
+NO_POINT = "no equilibrium, proven"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -217,6 +218,8 @@ def _without_proof(task: _Task) -> Found:
     task.report("a search without a proof that nothing is missed")
     below = _bounded(task, [])
     points = tuple(systematic.near_stationary(problem, [] if below is None else [below.x], task.stop))
+    if not points and (cells := _cells_of_none(task)):
+        return Found(points=(), complete=True, lower_bound=None, proven=True, nodes=cells, reason=NO_POINT)
     return Found(
         points=points,
         complete=False,
@@ -226,6 +229,17 @@ def _without_proof(task: _Task) -> Found:
         reason=f"{len(points)} found, and there may be more: of laws that "
         f"{'act on a length' if len(problem.lengths) else 'are curved'} it cannot be proven that these are all",
     )
+
+
+def _cells_of_none(task: _Task) -> int:
+    """The number of cells by which it is proven that laws of one component, curved ones too, have no point; else 0."""
+    near = task.wanted.near
+    if near is None or not np.all(np.isfinite(near.force_error)):
+        return 0
+    search, clock = Enumeration(problem=near), Clock()
+    search.start()
+    none = search.run(lambda: search.undecided > 0 or task.stop(), lambda now: task.report(all_in_words(now, clock)))
+    return max(search.cells, 1) if none and not search.undecided else 0
 
 
 def _bounded(task: _Task, points: list[Array]) -> LowestSearch | None:
@@ -241,7 +255,7 @@ def _bounded(task: _Task, points: list[Array]) -> LowestSearch | None:
 
 def _in_words(points: tuple[StationaryPoint, ...]) -> str:
     if not points:
-        return "no equilibrium, proven"
+        return NO_POINT
     continua = sum(not p.isolated for p in points)
     return f"all equilibria, proven: {len(points)}" + (
         f", of these {continua} stand for a continuum" if continua else ""

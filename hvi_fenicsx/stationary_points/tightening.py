@@ -86,5 +86,5 @@ class ForceIntervals:
         force = self._problem.force
         least = force - self._positive @ high - self._negative @ low - others
         most = force - self._positive @ low - self._negative @ high + others
-        slack = WIDENED * (np.abs(least) + np.abs(most) + np.abs(force))
+        slack = WIDENED * (np.abs(least) + np.abs(most) + np.abs(force)) + self._problem.force_error
         return self._graphs.clipped(low, high, least - slack, most + slack)

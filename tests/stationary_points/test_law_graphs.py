@@ -12,8 +12,9 @@ from scipy.optimize import minimize
 import hvi_fenicsx as hvi
 from hvi_fenicsx import laws
 from hvi_fenicsx.laws.smoothing import registered
+from hvi_fenicsx.stationary_points.all_points import Enumeration
 from hvi_fenicsx.stationary_points.condensed_form import scalar_problem
-from hvi_fenicsx.stationary_points.law_graphs import law_graph
+from hvi_fenicsx.stationary_points.law_graphs import law_graph, near_graph
 from hvi_fenicsx.stationary_points.lowest import LowestSearch
 
 MODEL = laws.QuadraticLinear(2.0, 1.0, 1.0)
@@ -46,6 +47,42 @@ def test_a_curved_law_is_as_near_to_its_polyline_as_is_said(law: laws.Superpoten
     difference = np.abs(found.graph.primitive(x) + found.offset - law.value(x))
     assert np.max(difference) <= found.error <= tolerance
     assert np.max(difference) > 0.05 * found.error  # the bound is not idle
+
+
+@pytest.mark.parametrize("law", CURVED, ids=lambda law: law.name)
+def test_the_tractions_of_a_curved_law_are_as_near_as_is_said(law: laws.Superpotential) -> None:
+    tolerance = 1e-3 * law.traction_scale
+    found = near_graph(law, 1e6, tolerance)
+    random = np.random.default_rng(1)
+    x = np.concatenate([random.uniform(-4, 4, 100_000), random.uniform(-1e6, 1e6, 1000)])
+    difference = np.abs(found.graph.traction(x, "right") - law.right(x))
+    assert np.max(difference) <= found.traction_error <= tolerance
+    assert np.max(difference) > 0.05 * found.traction_error  # the bound is not idle
+
+
+@pytest.mark.parametrize("law", CURVED, ids=lambda law: law.name)
+def test_two_bonds_on_a_spring_have_no_equilibrium_only_where_a_scan_finds_none(law: laws.Superpotential) -> None:
+    """The balance of the first gives the second's displacement, so the net force is a function of one unknown."""
+    spring, x = 0.4, np.linspace(-60.0, 60.0, 200_001)
+    most = float(law.right(x).max())
+    proven = 0
+    for share in (0.97, 0.75):
+        for apart in (0.0, 0.5):
+            pull = most * np.array([share + apart, share - apart])
+            second = x - (pull[0] - law.right(x)) / spring
+            net = pull.sum() - law.right(x) - law.right(second)
+            exists = bool(net.min() <= 0.0)
+            bonds = condensed.bonds(law, [0, 1])
+            near = condensed.problem(spring * np.array([[1.0, -1.0], [-1.0, 1.0]]), pull, bonds)
+            search = Enumeration(problem=scalar_problem(near, tractions=True))
+            search.start()
+            ended = search.run(lambda search=search: search.undecided > 0, lambda _: None)
+            none = ended and not search.undecided
+            assert not (none and exists)
+            proven += none
+            if net.min() > 0.05 * most:
+                assert none
+    assert proven
 
 
 @pytest.mark.long
