@@ -125,10 +125,14 @@ class Follower(ABC):
     def _finish(self, end: End, reason: str) -> None:
         self.end, self.reason = end, reason
 
+    def _is_held(self, factor: float) -> bool:
+        """Whether there is an equilibrium at a factor whatever the bonds remember, as far as that is known."""
+        low, high = self._options.held
+        return low + self._small < factor < high - self._small
+
     def _come_off(self, factor: float, reason: str) -> None:
         """End where the way that was tried leads off; that proves nothing where the body is held."""
-        low, high = self._options.held
-        if low + self._small < factor < high - self._small:
+        if self._is_held(factor):
             self._finish(End.LOST, f"{reason}, on the way that was tried; the body is held there, so the path is lost")
         else:
             self._finish(End.ESCAPES, reason)

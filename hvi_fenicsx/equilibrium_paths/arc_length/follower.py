@@ -219,6 +219,7 @@ class ArcLengthFollower(Follower):
             here=self._curve.here,
             load=problem.load(factor),
             lag=self._lag,
+            held=self._is_held(factor),
             step=self._watcher.step,
         )
         landing = jump.landing(-self._curve.trend or 1)

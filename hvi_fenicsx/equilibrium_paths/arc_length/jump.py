@@ -53,6 +53,7 @@ class Jump:
         here: the state, and where its curve goes on.
         load: f, (n,).
         lag: an order of the sites, (m,).
+        held: whether there is an equilibrium at these loads whatever the bonds remember, so that no way leads off.
         step: called before each step; it may end the jump by an exception.
     """
 
@@ -61,6 +62,7 @@ class Jump:
     here: Place
     load: Array
     lag: Array
+    held: bool
     step: Callable[[], None]
 
     def landing(self, heading: int) -> Landing | None:
@@ -120,8 +122,8 @@ class Jump:
                 moved = float(np.max(np.abs(curve.here.y - start), initial=0.0))
                 return Landing(z=curve.here.y[:-1]) if stable and moved > 1e-9 else None
             if move.outcome is Outcome.AWAY:
-                slow = abs(curve.factor_rate) <= 1e-6
-                return Landing(z=None) if curve.here.y[-1] < 0.0 and slow else None
+                off = abs(curve.factor_rate) <= 1e-6 and curve.here.y[-1] < 0.0 and not self.held
+                return Landing(z=None) if off else None
             if move.outcome is Outcome.STUCK or curve.here.y[-1] > 1e-9:
                 return None
             if move.outcome in (Outcome.END, Outcome.TURNED):
@@ -145,7 +147,7 @@ class Jump:
         return curve.advance(np.inf).after.y[:-1]
 
     def _relaxed(self, z: Array, load: Array, directions: Array) -> Landing | None:
-        relaxation = Relaxation(self.problem, self.sites, z, load, self.lag, self.step)
+        relaxation = Relaxation(self.problem, self.sites, z, load, self.lag, held=self.held, step=self.step)
         if not relaxation.run(directions):
             return None
         return Landing(z=None if relaxation.escapes else relaxation.z)

@@ -33,6 +33,7 @@ class Relaxation:
         z: their coordinates, (n,).
         load: f, (n,).
         lag: an order of the sites, (m,).
+        held: whether no way leads off at these loads, however far the body goes.
         step: called before each step; it may end the motion by an exception.
 
     Attributes:
@@ -41,12 +42,20 @@ class Relaxation:
     """
 
     def __init__(
-        self, problem: CondensedProblem, sites: Sites, z: Array, load: Array, lag: Array, step: Callable[[], None]
+        self,
+        problem: CondensedProblem,
+        sites: Sites,
+        z: Array,
+        load: Array,
+        lag: Array,
+        *,
+        held: bool,
+        step: Callable[[], None],
     ) -> None:
         self._problem, self._sites, self._load, self._lag, self._step = problem, sites, load, lag, step
         self._damping = np.diag(sites.forces / sites.length)
         self.z, self.escapes, self._theta = z.copy(), False, 1.0
-        self._size = 1.0 + float(np.max(np.abs(sites.s(z)), initial=0.0))
+        self._infinite = np.inf if held else _FAR * (1.0 + float(np.max(np.abs(sites.s(z)), initial=0.0)))
 
     def run(self, directions: Array) -> bool:
         """Move to equilibrium; whether one was found, or the body escapes.
@@ -67,7 +76,7 @@ class Relaxation:
         for _ in range(200 + 20 * len(self._sites)):
             if self._at_rest():
                 return self._settled()
-            if float(np.max(np.abs(self._sites.s(self.z)), initial=0.0)) > _FAR * self._size:
+            if float(np.max(np.abs(self._sites.s(self.z)), initial=0.0)) > self._infinite:
                 self.escapes = True
                 return True
             self._theta *= _FASTER if self._stepped_or_back() else _SLOWER

@@ -70,7 +70,7 @@ class VertexLaw:
         limit = self.law.right if same else self.law.left
         found = self.sign * limit(self.sign * x)
         inside = self._inside(x, side)
-        return np.where(inside, self.graph().traction(x, side), found)
+        return np.where(inside, self.graph().traction(x, side), found) if np.any(inside) else found
 
     def _inside(self, x: Array, side: str) -> Array:
         """Whether the limit is taken where the bond has been."""

@@ -160,8 +160,8 @@ class PlusSmoothedLaw(SmoothedLaw, register=False):
         kinks = max(self.law.convex.kinks.size, self.law.concave.kinks.size)
         return self.plus.kappa * self.epsilon_absolute * kinks
 
-    @property
     @override
+    @cached_property
     def breaks(self) -> Array:
         ends = self.law.breaks
         for part in (self.law.convex, self.law.concave):
