@@ -20,7 +20,7 @@ from .scalar_problem import ScalarProblem
 HULL_ROUNDING = 1e-15
 """Corners nearer to the hull than this share of the products compared are kept."""
 MANY = 8
-"""Of more corners those inside the hull are left out."""
+"""Where there are more corners than this, those inside the hull are left out."""
 
 
 @dataclass(frozen=True, kw_only=True)
