@@ -152,13 +152,15 @@ def _existence(problem: Problem, truth: programmes.Verdict, answer: Answer) -> l
         outside = programmes.verdict(problem, held * (1 + 1e-4))
         if outside.state == "held":
             found.append(f"held up to {held:.4g} times the load, but held beyond")
-    if (
-        np.isfinite(peak)
-        and peak > SMALLEST_FACTOR
-        and programmes.verdict(problem, peak * (1 + 1e-3)).state in ("held", "metastable")
-    ):
+    if np.isfinite(peak) and peak > SMALLEST_FACTOR and not _may_escape(problem, peak * (1 + 1e-3)):
         found.append(f"peak at {peak:.4g} times the load, but no escape beyond")
     return found
+
+
+def _may_escape(problem: Problem, factor: float) -> bool:
+    """Whether some body escapes, or may by a tie, be the others held or metastable."""
+    states = [programmes.Body(problem, label, factor).verdict().state for label in range(problem.bodies)]
+    return not {"escapes", "unclear"}.isdisjoint(states)
 
 
 def _solution(problem: Problem, answer: Answer, seed: int) -> tuple[list[str], str]:

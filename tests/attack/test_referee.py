@@ -12,6 +12,7 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
 
+from attack import attack
 from generator.kinds import draw
 from judge import CONTRADICTS, MISSED, UNDECIDED, blurred, judge
 from program import Answer
@@ -153,6 +154,12 @@ def test_a_vertex_that_touches_its_bound_does_not_descend_through_rounding() -> 
     check = Check(problem, u)
     assert not check.wrongs()
     assert sampled_descent(check, Floor(problem), np.random.default_rng(0)) > -1e-4
+
+
+def test_a_peak_where_one_body_ties_is_no_contradiction_whatever_the_others_are(tmp_path: Path) -> None:
+    _, answer, verdict = attack(20261203, 994, tmp_path, 30.0)
+    assert answer.state == "escapes"
+    assert verdict.word == "agrees"
 
 
 def test_a_jump_that_nearly_gives_way_still_holds_a_vertex() -> None:
