@@ -134,7 +134,7 @@ class LawEffect(Effect):
         table = handler(self)
         for key in ("multiplier", "length_multiplier"):
             if self._given or getattr(self, key) == ONE:
-                del table[key]
+                table.pop(key, None)  # pydantic may have been told to leave it out
         return {**table.pop("law"), **table, **self._given}
 
     @override

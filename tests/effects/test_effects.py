@@ -240,6 +240,11 @@ def test_two_materials_end_to_end_are_exact_where_their_widths_agree() -> None:
 BAR = {"poisson_ratio": 0.0, "thermal_expansion": ALPHA}
 
 
+def test_a_law_is_written_without_what_was_left_out() -> None:
+    floor = read_scene(ROOT / "demos" / "strong_law.toml").model_dump(exclude_unset=True)["boundary"]["floor"]
+    assert floor["friction"] == {"law": "quadratic_linear", "gamma1": 1e6, "gamma2": 5e5, "delta": 9e-6}
+
+
 def test_heat_in_one_region_strains_that_region_only() -> None:
     table = read_scene(ROOT / "demos" / "thermal_bar.toml").model_dump()
     table["body"] = {"warm": {"region": "steel", "temperature": 30.0}}
