@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from ..typing import Array, Mask
@@ -9,6 +11,32 @@ from .scalar_problem import ArcTable, ScalarProblem
 
 WIDENED = 1e-12
 """Relative widening of what is found, for rounding."""
+
+
+Clip = Callable[[Array, Array], tuple[Array, Array] | None]
+"""A pass over intervals: smaller ones, or None if one is empty."""
+
+
+def clipped_again(
+    once: Clip, low: Array, high: Array, *, most_rounds: int, progress: float
+) -> tuple[Array, Array] | None:
+    """What passes leave of intervals, as long as they make some of them shorter; None if one is empty.
+
+    Args:
+        once: a pass.
+        low: of the intervals, (n,), finite.
+        high: of the intervals, (n,), finite.
+        most_rounds: passes at most.
+        progress: a pass that makes no interval shorter by this share is the last.
+    """
+    for _ in range(most_rounds):
+        if (ends := once(low, high)) is None:
+            return None
+        shorter = (ends[1] - ends[0]) < (1.0 - progress) * (high - low)
+        low, high = ends
+        if not shorter.any():
+            break
+    return low, high
 
 
 class GraphClip:

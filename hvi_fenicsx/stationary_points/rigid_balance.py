@@ -12,7 +12,7 @@ import numpy as np
 from scipy.linalg import qr
 
 from ..typing import Array
-from .graph_clip import WIDENED, GraphClip
+from .graph_clip import WIDENED, GraphClip, clipped_again
 from .scalar_problem import ArcTable, ScalarProblem
 
 RIGID = 1e-11
@@ -66,20 +66,15 @@ class RigidBalance:
             low: of the cell, (n,), finite.
             high: of the cell, (n,), finite.
         """
-        for _ in range(MOST_ROUNDS):
-            if (forces := self._balanced(*self._forces(low, high), low, high)) is None:
-                return None
-            rounding = WIDENED * sum(np.where(np.isfinite(part), np.abs(part), 0.0) for part in forces)
-            slack = rounding + self._problem.force_error
-            if (ends := self._graphs.clipped(low, high, forces[0] - slack, forces[1] + slack)) is None:
-                return None
-            if (ends := self._elastic(*ends, *forces)) is None:
-                return None
-            shorter = (ends[1] - ends[0]) < (1.0 - PROGRESS) * (high - low)
-            low, high = ends
-            if not shorter.any():
-                break
-        return low, high
+        return clipped_again(self._once, low, high, most_rounds=MOST_ROUNDS, progress=PROGRESS)
+
+    def _once(self, low: Array, high: Array) -> tuple[Array, Array] | None:
+        if (forces := self._balanced(*self._forces(low, high), low, high)) is None:
+            return None
+        rounding = WIDENED * sum(np.where(np.isfinite(part), np.abs(part), 0.0) for part in forces)
+        slack = rounding + self._problem.force_error
+        ends = self._graphs.clipped(low, high, forces[0] - slack, forces[1] + slack)
+        return None if ends is None else self._elastic(*ends, *forces)
 
     def _forces(self, low: Array, high: Array) -> tuple[Array, Array]:
         """What laws and bounds can bear in a cell, (n,) each; infinite where a bound can push."""

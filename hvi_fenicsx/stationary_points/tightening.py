@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..typing import Array
-from .graph_clip import WIDENED, GraphClip
+from .graph_clip import WIDENED, GraphClip, clipped_again
 from .scalar_problem import ArcTable, ScalarProblem
 
 MOST_ROUNDS = 8
@@ -37,17 +37,12 @@ class ForceIntervals:
             low: of the box, (n + m,), finite.
             high: of the box, (n + m,), finite.
         """
+        return clipped_again(self._once, low, high, most_rounds=MOST_ROUNDS, progress=PROGRESS)
+
+    def _once(self, low: Array, high: Array) -> tuple[Array, Array] | None:
         n = self._problem.size
-        for _ in range(MOST_ROUNDS):
-            found = self._pass(low[:n], high[:n], self._most_tractions(low[n:], high[n:]))
-            ends = None if found is None else self._with_lengths(found, low[n:], high[n:])
-            if ends is None:
-                return None
-            shorter = (ends[1] - ends[0]) < (1.0 - PROGRESS) * (high - low)
-            low, high = ends
-            if not shorter.any():
-                break
-        return low, high
+        found = self._pass(low[:n], high[:n], self._most_tractions(low[n:], high[n:]))
+        return None if found is None else self._with_lengths(found, low[n:], high[n:])
 
     def _most_tractions(self, low: Array, high: Array) -> Array:
         """The largest forces of laws of lengths on the unknowns, (n,)."""

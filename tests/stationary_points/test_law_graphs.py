@@ -16,6 +16,7 @@ from hvi_fenicsx.stationary_points.all_points import Enumeration
 from hvi_fenicsx.stationary_points.condensed_form import scalar_problem
 from hvi_fenicsx.stationary_points.law_graphs import law_graph, near_graph
 from hvi_fenicsx.stationary_points.lowest import LowestSearch
+from hvi_fenicsx.typing import Array
 
 MODEL = laws.QuadraticLinear(2.0, 1.0, 1.0)
 TEETH = laws.Sawtooth(3.0, 1.0, 0.5, 3)
@@ -38,12 +39,17 @@ def test_the_quadratic_smoothing_of_a_polyline_is_a_polyline(law: laws.Superpote
     np.testing.assert_allclose(found.graph.traction(x, "right"), smoothed.right(x), rtol=0, atol=1e-11)
 
 
+def near_and_far() -> Array:
+    """Displacements near the pieces of a law, and some far away."""
+    random = np.random.default_rng(1)
+    return np.concatenate([random.uniform(-4, 4, 100_000), random.uniform(-1e6, 1e6, 1000)])
+
+
 @pytest.mark.parametrize("law", CURVED, ids=lambda law: law.name)
 def test_a_curved_law_is_as_near_to_its_polyline_as_is_said(law: laws.Superpotential) -> None:
     tolerance = 1e-7 * law.energy_scale
     found = law_graph(law, 1e6, tolerance)
-    random = np.random.default_rng(1)
-    x = np.concatenate([random.uniform(-4, 4, 100_000), random.uniform(-1e6, 1e6, 1000)])
+    x = near_and_far()
     difference = np.abs(found.graph.primitive(x) + found.offset - law.value(x))
     assert np.max(difference) <= found.error <= tolerance
     assert np.max(difference) > 0.05 * found.error  # the bound is not idle
@@ -53,8 +59,7 @@ def test_a_curved_law_is_as_near_to_its_polyline_as_is_said(law: laws.Superpoten
 def test_the_tractions_of_a_curved_law_are_as_near_as_is_said(law: laws.Superpotential) -> None:
     tolerance = 1e-3 * law.traction_scale
     found = near_graph(law, 1e6, tolerance)
-    random = np.random.default_rng(1)
-    x = np.concatenate([random.uniform(-4, 4, 100_000), random.uniform(-1e6, 1e6, 1000)])
+    x = near_and_far()
     difference = np.abs(found.graph.traction(x, "right") - law.right(x))
     assert np.max(difference) <= found.traction_error <= tolerance
     assert np.max(difference) > 0.05 * found.traction_error  # the bound is not idle
