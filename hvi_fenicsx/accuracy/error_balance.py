@@ -49,7 +49,13 @@ class ErrorBalance:
         left = self._beside(smoothing) / mesh if mesh > 0 else 1.0
         # On Γc errors fall as the square of the energy norm's. Halving the edges of marked cells leaves 4^-p of it.
         needed = (1 - (left**2 if self.quantity.in_energy_norm else left)) / (1 - 0.25**self.elements.degree)
-        return min(self.largest_bulk, max(self.thresholds.smallest_bulk, needed))
+        return max(self.thresholds.smallest_bulk, needed) if needed <= self._largest_last_bulk else self.largest_bulk
+
+    @property
+    def _largest_last_bulk(self) -> float:
+        """Part of the squared error that a step may refine if that is enough for the aim."""
+        goes_far = self.elements == Elements(dimension=2, degree=2) and self.quantity.in_energy_norm
+        return self.thresholds.last_bulk_of_degree_2 if goes_far else self.largest_bulk
 
     def _beside(self, part: float) -> float:
         """The largest error beside a part with which both together are no larger than the aim."""

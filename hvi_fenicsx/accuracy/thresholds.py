@@ -50,6 +50,8 @@ class ControlThresholds:
         bulk_3d: the same in 3D.
         bulk_on_contact: the same for errors on Γc: they fall as the square of the energy norm's, so a smaller share
             goes as far.
+        last_bulk_of_degree_2: the share up to which one step at degree 2 goes in 2D if that reaches the energy norm
+            asked for: a mesh less is worth more than some cells.
         smallest_bulk: the least share that a step refines.
         aim: part of the accuracy asked for at which the last step aims.
         smoothing: part of the accuracy asked for that smoothing may take.
@@ -74,6 +76,7 @@ class ControlThresholds:
     bulk_2d: float = 0.75
     bulk_3d: float = 0.5
     bulk_on_contact: float = 0.5
+    last_bulk_of_degree_2: float = 0.9
     smallest_bulk: float = 0.2
     aim: float = 0.9
     smoothing: float = 0.3

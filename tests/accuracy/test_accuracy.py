@@ -22,8 +22,9 @@ from hvi_fenicsx import Scene, read_scene
 from hvi_fenicsx.accuracy import adaptive, control, cost_forecast, degree_choice, quantities
 from hvi_fenicsx.accuracy.adaptive import AdaptiveLevel, AdaptiveSolver
 from hvi_fenicsx.accuracy.cost_forecast import AdaptiveStep, Elements
+from hvi_fenicsx.accuracy.error_balance import ErrorBalance
 from hvi_fenicsx.accuracy.goal import AccuracyResult, Goal
-from hvi_fenicsx.accuracy.quantities import FrictionTraction
+from hvi_fenicsx.accuracy.quantities import EnergyNorm, FrictionTraction
 from hvi_fenicsx.accuracy.quantity_base import Observable, contact_norm, extrapolated, prolong
 from hvi_fenicsx.accuracy.thresholds import CONTROL
 from hvi_fenicsx.certify import contact_state
@@ -281,6 +282,28 @@ def test_a_last_step_refines_as_much_of_the_error_as_it_is_to(share: float) -> N
     finest = AdaptiveSolver(timer=Timer()).refine(level, adaptive.refined_with_neighbours(level, share), scene)
     left = [r.solution.estimate.discretisation for r in (finest, level)]  # type: ignore[union-attr]
     assert 1.0 - (left[0] / left[1]) ** 2 == pytest.approx(0.75 * share, abs=0.02)
+
+
+@pytest.mark.parametrize(
+    ("dimension", "degree", "left", "wanted"),
+    [(2, 1, 0.6, 0.75), (2, 2, 0.6, 0.6827), (2, 2, 0.4, 0.896), (2, 2, 0.3, 0.75), (3, 2, 0.4, 0.5)],
+)
+def test_a_last_step_at_degree_two_goes_farther(dimension: int, degree: int, left: float, wanted: float) -> None:
+    """Refined cells keep 4^-p of their squares; of the error that is left it aims at nine tenths."""
+    step = AdaptiveStep(
+        dofs=1000,
+        error=1.0,
+        discretisation=0.9 * 0.01 / (1.25 * left),
+        smoothing=0.0,
+        algebraic=0.0,
+        epsilon=None,
+        tolerance=1e-6,
+        seconds=1.0,
+        memory=100.0,
+    )
+    elements = Elements(dimension=dimension, degree=degree)
+    balance = ErrorBalance(accuracy=0.01, quantity=EnergyNorm(), elements=elements, thresholds=CONTROL)
+    assert balance.bulk(step) == pytest.approx(wanted, abs=1e-4)
 
 
 @pytest.mark.parametrize("order", [0.7, 1.0, 1.9])
