@@ -7,8 +7,11 @@ new ones: ``./hvi test --hypothesis-profile=search``; what it finds belongs into
 from __future__ import annotations
 
 import os
+import tempfile
+from collections.abc import Iterator
 from pathlib import Path
 
+import pytest
 from hypothesis import settings
 
 for name, value in {
@@ -31,3 +34,11 @@ os.environ["PYTHONPATH"] = os.pathsep.join([str(Path(__file__).parent / "support
 settings.register_profile("repeatable", derandomize=True, deadline=None)
 settings.register_profile("search", derandomize=False, deadline=None)
 settings.load_profile("repeatable")
+
+
+@pytest.fixture(autouse=True)
+def session(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """Each test's mpirun keeps its files apart: it would not start on those of a killed one of the same number."""
+    with tempfile.TemporaryDirectory(prefix="hvi-mpi-", ignore_cleanup_errors=True) as folder:
+        monkeypatch.setenv("PRTE_MCA_prte_local_tmpdir_base", folder)
+        yield

@@ -102,10 +102,10 @@ class _Errors:
 
 
 def _started(command: Sequence[str], file: Path) -> subprocess.Popen[str]:
-    """Mpirun, in a session of its own; its ranks know the file."""
+    """Mpirun, in a session of its own, which keeps its files beside this one; its ranks know the file."""
     return subprocess.Popen(
         command,
-        env={**os.environ, _CODE_FILE: str(file)},
+        env={**os.environ, **processes.session(str(file.parent)), _CODE_FILE: str(file)},
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         encoding="utf-8",

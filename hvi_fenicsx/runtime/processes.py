@@ -33,9 +33,13 @@ _USER_SETTINGS = (
     "OMPI_MCA_mpi_yield_when_idle",
     "OMPI_MCA_rmaps_base_oversubscribe",
     "PRTE_MCA_mapby",
+    "PRTE_MCA_prte_local_tmpdir_base",
+    "PRTE_MCA_prte_tmpdir_base",
     "PRTE_MCA_rmaps_default_mapping_policy",
 )
 """Variables by which users (and `./hvi`) set up every mpirun; the others with these beginnings belong to one run."""
+_SESSION = "PRTE_MCA_prte_local_tmpdir_base"
+"""The folder in which Open MPI's mpirun makes its own; other implementations pass it over."""
 _CAUGHT: list[int] = []
 """The signals that were caught since the command began."""
 _RAISED: list[int] = []
@@ -47,6 +51,18 @@ def environment() -> dict[str, str]:
     kept = {name: value for name, value in os.environ.items() if name in _USER_SETTINGS or not name.startswith(_MPI)}
     paths = [str(Path(__file__).parents[2]), *kept.get("PYTHONPATH", "").split(os.pathsep)]
     return {**kept, "PYTHONPATH": os.pathsep.join(filter(None, paths))}  # an empty one would be the current folder
+
+
+def session(folder: str) -> dict[str, str]:
+    """Variables that have Open MPI's mpirun keep its own files in a folder; none where the user has chosen a place.
+
+    Elsewhere it names them by its process number, and does not start where a killed one of the same number left some.
+
+    Args:
+        folder: an empty one, for one mpirun.
+    """
+    chosen = any(name.endswith("tmpdir_base") for name in os.environ)
+    return {} if chosen else {_SESSION: folder}
 
 
 def ensure_home() -> None:

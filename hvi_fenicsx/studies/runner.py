@@ -6,6 +6,7 @@ import contextlib
 import signal
 import statistics
 import subprocess
+import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -130,24 +131,22 @@ class Runner:
         self.store.announce(one.setting)
         path.with_suffix(".json").unlink(missing_ok=True)
         write_text(path.with_suffix(".toml"), dump_scene(one.setting.scene))
-        child = subprocess.Popen(
-            [*_python(self.store.ranks), "-m", "hvi_fenicsx.studies.point", *self._arguments(one, path)],
-            env=processes.environment(),
-            cwd=path.parent,
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.PIPE,
-            text=True,
-            start_new_session=True,
-            preexec_fn=processes.die_with_parent,
-        )
+        words = [*_python(self.store.ranks), "-m", "hvi_fenicsx.studies.point", *self._arguments(one, path)]
         try:
-            with _ended(child, path, self.thresholds.kill_after):
-                _, errors = child.communicate(timeout=self._limit(one))
+            code, errors = self._ended(words, path, self._limit(one))
             if not path.with_suffix(".json").exists():
-                self._failed(path, child.returncode, errors)
+                self._failed(path, code, errors)
         except subprocess.TimeoutExpired:
             self._given_up(path, self._limit(one))
         self._done.append((self.progress.seconds - began, one.setting.unknowns))
+
+    def _ended(self, words: list[str], path: Path, limit: float) -> tuple[int, str]:
+        """What a child ends with and what it says of errors; whatever happens, nothing else remains of it."""
+        with tempfile.TemporaryDirectory(prefix="hvi-point-", ignore_cleanup_errors=True) as session:
+            child = _started(words, path.parent, session)
+            with _none_left(child, path, self.thresholds.kill_after):
+                _, errors = child.communicate(timeout=limit)
+        return child.returncode, errors
 
     def _arguments(self, one: PointRun, path: Path) -> list[str]:
         repeat = 1 if one.stiffness else self.repeat
@@ -204,8 +203,22 @@ def _python(ranks: int) -> list[str]:
     return [*processes.PYTHON] if ranks == 1 else processes.launcher(ranks)
 
 
+def _started(words: list[str], folder: Path, session: str) -> subprocess.Popen[str]:
+    """A child in a folder, which leads a group; mpirun keeps its own files in another."""
+    return subprocess.Popen(
+        words,
+        env={**processes.environment(), **processes.session(session)},
+        cwd=folder,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+        preexec_fn=processes.die_with_parent,
+    )
+
+
 @contextlib.contextmanager
-def _ended(child: subprocess.Popen[str], path: Path, patience: float) -> Iterator[None]:
+def _none_left(child: subprocess.Popen[str], path: Path, patience: float) -> Iterator[None]:
     """Whatever happens, of the child nothing remains: no process (it leads a group), no half-written file."""
     try:
         yield

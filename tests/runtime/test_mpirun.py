@@ -63,6 +63,20 @@ def test_an_mpirun_that_ends_without_a_word_is_told(
     assert "TMPDIR" in done.stderr
 
 
+def test_each_mpirun_keeps_its_own_files_in_a_folder_of_its_own_or_where_the_user_wants_them(
+    scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A killed one's are in the way of a later one of the same process number, which would not start."""
+    local, common = "PRTE_MCA_prte_local_tmpdir_base", "PRTE_MCA_prte_tmpdir_base"
+    monkeypatch.setenv("PATH", on_path(tmp_path, f"echo ${local}; ls -d ${local}; exit 1"))
+    monkeypatch.delenv(local)
+    first, second = (hvi("run", scene, "--np", "2").stdout.split() for _ in range(2))
+    assert first[0] == first[1] != second[0]
+    assert not Path(first[0]).exists()
+    monkeypatch.setenv(common, "elsewhere")
+    assert hvi("run", scene, "--np", "2").stdout.split() == ["."]
+
+
 def test_a_full_folder_for_temporary_files_is_told_before(
     scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
