@@ -105,7 +105,7 @@ def _started(command: Sequence[str], file: Path) -> subprocess.Popen[str]:
     """Mpirun, in a session of its own, which keeps its files beside this one; its ranks know the file."""
     return subprocess.Popen(
         command,
-        env={**os.environ, **processes.session(str(file.parent)), _CODE_FILE: str(file)},
+        env={**os.environ, **processes.session(file.parent), _CODE_FILE: str(file)},
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         encoding="utf-8",
@@ -130,17 +130,13 @@ def _writer(lines: Iterable[str] | None, write: Callable[[str], None]) -> thread
 @contextlib.contextmanager
 def _code_file() -> Iterator[Path]:
     """An empty file for the exit code of the ranks."""
-    try:
-        folder = tempfile.TemporaryDirectory(prefix="hvi-np-", ignore_cleanup_errors=True)
-    except OSError as error:
-        raise InputError(f"--np: no temporary file can be made ({error}); set TMPDIR to a folder with room") from None
-    with folder:
-        file = Path(folder.name, "code")
+    with processes.temporary_folder("--np") as folder:
+        file = folder / "code"
         try:
             file.write_bytes(bytes(_ROOM))
             file.write_bytes(b"")
         except OSError as error:
-            raise InputError(f"--np: {folder.name}: {error.strerror}; set TMPDIR to a folder with room") from None
+            raise InputError(f"--np: {folder}: {error.strerror}; set TMPDIR to a folder with room") from None
         yield file
 
 

@@ -53,7 +53,26 @@ def environment() -> dict[str, str]:
     return {**kept, "PYTHONPATH": os.pathsep.join(filter(None, paths))}  # an empty one would be the current folder
 
 
-def session(folder: str) -> dict[str, str]:
+@contextlib.contextmanager
+def temporary_folder(option: str) -> Iterator[Path]:
+    """An empty folder for one mpirun, which goes in every case.
+
+    Args:
+        option: of the command line, which needs it.
+
+    Raises:
+        InputError: there is no room for it.
+    """
+    try:
+        folder = tempfile.TemporaryDirectory(prefix="hvi-np-", ignore_cleanup_errors=True)
+    except OSError as error:
+        words = f"{option}: no temporary file can be made ({error}); set TMPDIR to a folder with room"
+        raise InputError(words) from None
+    with folder:
+        yield Path(folder.name)
+
+
+def session(folder: Path) -> dict[str, str]:
     """Variables that have Open MPI's mpirun keep its own files in a folder; none where the user has chosen a place.
 
     Elsewhere it names them by its process number, and does not start where a killed one of the same number left some.
@@ -62,7 +81,7 @@ def session(folder: str) -> dict[str, str]:
         folder: an empty one, for one mpirun.
     """
     chosen = any(name.endswith("tmpdir_base") for name in os.environ)
-    return {} if chosen else {_SESSION: folder}
+    return {} if chosen else {_SESSION: str(folder)}
 
 
 def ensure_home() -> None:

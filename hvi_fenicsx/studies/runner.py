@@ -6,7 +6,6 @@ import contextlib
 import signal
 import statistics
 import subprocess
-import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -142,7 +141,7 @@ class Runner:
 
     def _ended(self, words: list[str], path: Path, limit: float) -> tuple[int, str]:
         """What a child ends with and what it says of errors; whatever happens, nothing else remains of it."""
-        with tempfile.TemporaryDirectory(prefix="hvi-point-", ignore_cleanup_errors=True) as session:
+        with _session(self.store.ranks) as session:
             child = _started(words, path.parent, session)
             with _none_left(child, path, self.thresholds.kill_after):
                 _, errors = child.communicate(timeout=limit)
@@ -203,11 +202,21 @@ def _python(ranks: int) -> list[str]:
     return [*processes.PYTHON] if ranks == 1 else processes.launcher(ranks)
 
 
-def _started(words: list[str], folder: Path, session: str) -> subprocess.Popen[str]:
-    """A child in a folder, which leads a group; mpirun keeps its own files in another."""
+@contextlib.contextmanager
+def _session(ranks: int) -> Iterator[dict[str, str]]:
+    """Variables of a child; mpirun gets a folder of its own."""
+    if ranks == 1:
+        yield {}
+        return
+    with processes.temporary_folder("--np") as folder:
+        yield processes.session(folder)
+
+
+def _started(words: list[str], folder: Path, session: dict[str, str]) -> subprocess.Popen[str]:
+    """A child in a folder, which leads a group."""
     return subprocess.Popen(
         words,
-        env={**processes.environment(), **processes.session(session)},
+        env={**processes.environment(), **session},
         cwd=folder,
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,

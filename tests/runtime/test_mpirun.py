@@ -7,6 +7,7 @@ import os
 import signal
 import subprocess
 import sys
+import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -88,6 +89,17 @@ def test_a_full_folder_for_temporary_files_is_told_before(
     done = hvi("run", scene, "--np", "2", "--out", tmp_path / "r")
     assert (done.returncode, done.stdout) == (2, "")
     assert "No space left on device; set TMPDIR to a folder with room" in done.stderr
+
+
+def test_without_a_folder_for_temporary_files_nothing_is_started(
+    scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("PATH", on_path(tmp_path, "echo started"))
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "missing"))
+    done = hvi("run", scene, "--np", "2", "--out", tmp_path / "r")
+    assert (done.returncode, done.stdout) == (2, "")
+    assert "--np: no temporary file can be made" in done.stderr
+    assert not (tmp_path / "r").exists()
 
 
 def test_after_a_signal_the_ranks_are_heard_at_once_and_mpiruns_notices_are_not(scene: Path, tmp_path: Path) -> None:
