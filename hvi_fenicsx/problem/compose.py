@@ -68,14 +68,16 @@ def compose(domain: Domain, model: Model, thresholds: Thresholds = DEFAULT) -> P
     facets = part_facets.find(domain, model.parts, effects)
     sizes, evaluate = scaling.sizes(domain.length, effects), functools.partial(_evaluation, domain, facets)
     scales = scaling.choose(sizes, domain.dimension, effects, evaluate, thresholds)
-    context = DomainForms(domain, facets, scales, effects, model.degree, _straight(model))
+    context = DomainForms(domain, facets, scales, effects, model.degree, _straight(domain, model))
     contributions = [PlacedContribution(where, effect, effect.contribute(context, where)) for where, effect in effects]
     implausible = [f"{scaling.place(e)}: {text}" for e in effects for text in e[1].implausible(evaluate(e), sizes)]
     return _problem(context, scales, contributions, model, tuple(implausible), thresholds)
 
 
-def _straight(model: Model) -> set[str]:
-    """The sides that stay as they are meshed: where two bodies meet, the facets' intersections are those of planes."""
+def _straight(domain: Domain, model: Model) -> set[str]:
+    """The sides that stay as they are meshed: where two bodies meet in space, facets intersect as triangles."""
+    if domain.dimension == 2:
+        return set()
     return {side for sides in model.interfaces.values() for side in (sides.first, sides.second)}
 
 

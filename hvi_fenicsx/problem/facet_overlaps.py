@@ -24,7 +24,7 @@ class Facets:
     Attributes:
         nodes: global numbers of their nodes, corners first, (f, n).
         points: these nodes, those of curved sides on their curves, m, (f, n, d).
-        normals: outward unit normals, (f, d).
+        normals: outward unit normals of the corners' segments or triangles, (f, d).
         share: of an edge's function that goes to each of its ends (:func:`.spaces.edge_share`).
     """
 
@@ -120,15 +120,25 @@ class Overlaps:
         Args:
             degree: of the functions.
         """
-        d = self.on_first.shape[1]
-        made: tuple[Any, Any] = basix.make_quadrature(basix.CellType[_KINDS[d]], 2 * degree)
+        made: tuple[Any, Any] = basix.make_quadrature(basix.CellType[_KINDS[self.on_first.shape[1]]], 2 * degree)
         rule = np.column_stack([1.0 - made[0].sum(axis=1), made[0]])
+        return self.sampled(rule, made[1] / made[1].sum(), np.arange(len(self.first)))
+
+    def sampled(self, rule: Array, shares: Array, chosen: Integers) -> OverlapPoints:
+        """The points of a rule, those of one intersection after those of the other.
+
+        Args:
+            rule: barycentric coordinates in an intersection, (q, d).
+            shares: their weights, whose sum is 1, (q,).
+            chosen: numbers of intersections.
+        """
+        d = rule.shape[1]
         return OverlapPoints(
-            first=np.repeat(self.first, len(rule)),
-            second=np.repeat(self.second, len(rule)),
-            weights=np.outer(self.areas, made[1] / made[1].sum()).ravel(),
-            on_first=(rule @ self.on_first).reshape(-1, d),
-            on_second=(rule @ self.on_second).reshape(-1, d),
+            first=np.repeat(self.first[chosen], len(rule)),
+            second=np.repeat(self.second[chosen], len(rule)),
+            weights=np.asarray(np.outer(self.areas[chosen], shares).ravel(), dtype=np.float64),
+            on_first=(rule @ self.on_first[chosen]).reshape(-1, d),
+            on_second=(rule @ self.on_second[chosen]).reshape(-1, d),
         )
 
 

@@ -7,12 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import InputError
-from ..mesh import nodes
+from ..mesh import nodes, second_order
 from ..mesh.refinement import cell_facets
 from ..runtime.mpi import agree
 from ..typing import Array, Entities, Mask
-from . import facet_overlaps, spaces
+from . import curved_overlaps, facet_overlaps, spaces
 from .domain_forms import DomainForms
+from .facet_integrals import is_curved
 from .facet_overlaps import Facets, Overlaps
 from .thresholds import Thresholds
 
@@ -41,15 +42,19 @@ class Pair:
         sides: what the scene says of it.
         first: the facets of the first side.
         second: those of the second.
+        curved: whether facets are curves through their nodes, else segments or triangles.
     """
 
     name: str
     sides: Sides
     first: Facets
     second: Facets
+    curved: bool = False
 
     def overlaps(self, thresholds: Thresholds) -> Overlaps:
         """The intersections of the facets of both sides."""
+        if self.curved:
+            return curved_overlaps.in_plane(self.first, self.second, thresholds)
         if self.first.points.shape[2] == 2:
             return facet_overlaps.in_plane(self.first, self.second, thresholds)
         from . import facet_polygons  # shapely, which plane bodies do not need
@@ -85,7 +90,8 @@ def pair(context: DomainForms, name: str, sides: Sides) -> Pair:
         if not len(facets.nodes):
             raise InputError(f"interface.{name}.between: no facet lies on {side!r}")
         found.append(facets)
-    return Pair(name=name, sides=sides, first=found[0], second=found[1])
+    curved = is_curved(context.space) and any(second_order.is_curved(facets.points) for facets in found)
+    return Pair(name=name, sides=sides, first=found[0], second=found[1], curved=curved)
 
 
 def _gathered(context: DomainForms, local: Entities) -> Facets:
@@ -101,7 +107,7 @@ def _gathered(context: DomainForms, local: Entities) -> Facets:
     inner = space.dofmap.list[cells][:, : d + 1][of_cell[cells] == local[:, None]]
     parts = [
         space.dofmap.index_map.local_to_global(np.ascontiguousarray(blocks.ravel())).reshape(blocks.shape),
-        context.points_on_curves[blocks][:, :, :d],
+        (context.points if is_curved(space) else context.points_on_curves)[blocks][:, :, :d],
         _outward(context.points[blocks[:, :d]][:, :, :d], context.points[inner][:, :d]),
     ]
     every = agree(context.domain.mesh.comm, parts)

@@ -15,7 +15,7 @@ from scipy.sparse import csr_array
 
 from ..runtime.mpi import agree
 from ..typing import Array, Entities, Integers
-from . import dual_basis, interface_checks, interface_sides
+from . import curved_overlaps, dual_basis, interface_checks, interface_sides
 from .contact_surface import Surface, tangents
 from .domain_forms import DomainForms
 from .dual_basis import RelativeRows
@@ -39,6 +39,7 @@ class Interface:
         overlaps: their intersections.
         sides: what the scene says of it.
         members: local vertices of both sides.
+        curved: whether facets are curves through their nodes.
     """
 
     name: str
@@ -51,6 +52,7 @@ class Interface:
     second: Facets
     overlaps: Overlaps
     sides: Sides
+    curved: bool
 
 
 def find(
@@ -88,7 +90,7 @@ def _interface(
     interface_checks.check_carried(pair, overlaps, kept, covered & busy)
     size = context.space.dofmap.index_map.size_global
     rows = dual_basis.relative_rows(pair.first, pair.second, overlaps, kept, size)
-    surface = _surface(context, pair, rows)
+    surface = _surface(context, pair, overlaps, rows)
     gap = _gaps(context, surface, pair, rows)
     interface_checks.check_apart(context.domain.mesh.comm, pair, surface, gap, thresholds)
     tied = _dofs(context, surface) if pair.sides.tied else np.empty(0, np.int32)
@@ -103,6 +105,7 @@ def _interface(
         second=pair.second,
         overlaps=overlaps,
         sides=pair.sides,
+        curved=pair.curved,
     )
 
 
@@ -112,12 +115,10 @@ def _own(context: DomainForms, rows: RelativeRows) -> Entities:
     return np.flatnonzero(rows.weights[start:end] > 0.0).astype(np.int32)
 
 
-def _surface(context: DomainForms, pair: Pair, rows: RelativeRows) -> Surface:
+def _surface(context: DomainForms, pair: Pair, overlaps: Overlaps, rows: RelativeRows) -> Surface:
     d, start = context.dimension, context.space.dofmap.index_map.local_range[0]
     blocks = _own(context, rows)
-    sums = np.zeros((len(rows.weights), d))
-    for node in range(pair.first.nodes.shape[1]):
-        np.add.at(sums, pair.first.nodes[:, node], pair.first.areas[:, None] * pair.first.normals)
+    sums, weights = _summed_normals(pair, overlaps, rows)
     mean = sums[start + blocks]
     normals = mean / np.linalg.norm(mean, axis=1, keepdims=True)
     normals = np.where(np.abs(normals) < DEFAULT.rounding * 10, 0.0, normals)
@@ -130,9 +131,29 @@ def _surface(context: DomainForms, pair: Pair, rows: RelativeRows) -> Surface:
         normals=normals,
         measured=normals,
         tangents=tangents(normals),
-        weights=rows.weights[start + blocks] / context.length ** (d - 1),
+        weights=weights[start + blocks] / context.length ** (d - 1),
         tied=pair.sides.tied,
     )
+
+
+def _summed_normals(pair: Pair, overlaps: Overlaps, rows: RelativeRows) -> tuple[Array, Array]:
+    """Vectors along the normals of all nodes (N, d), and the nodes' weights (N,).
+
+    On curved facets these are ∫φ_i n, and ∫ψ_i times the size of that over ∫φ_i: so a uniform pressure has the forces
+    of its nodal values, whatever the curve (as of :func:`.contact_surface.make_surface`).
+    """
+    sums = np.zeros((len(rows.weights), pair.first.points.shape[2]))
+    if not pair.curved:
+        for node in range(pair.first.nodes.shape[1]):
+            np.add.at(sums, pair.first.nodes[:, node], pair.first.areas[:, None] * pair.first.normals)
+        return sums, rows.weights
+    points, sizes = overlaps.points(pair.first.degree), np.zeros(len(sums))
+    functions = points.weights[:, None] * pair.first.functions(points.on_first)
+    normals = curved_overlaps.normals(pair.first, points)
+    np.add.at(sums, pair.first.nodes[points.first], functions[:, :, None] * normals[:, None])
+    np.add.at(sizes, pair.first.nodes[points.first], functions)
+    ratio = np.divide(np.linalg.norm(sums, axis=1), sizes, out=np.ones_like(sizes), where=sizes > 0.0)
+    return sums, rows.weights * ratio
 
 
 def _gaps(context: DomainForms, surface: Surface, pair: Pair, rows: RelativeRows) -> Array:

@@ -27,7 +27,6 @@ from hvi_fenicsx.studies import interpolation
 from hvi_fenicsx.studies.solution_fields import SolutionFields
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "benchmarks"))
-import rings
 from rings import RING
 
 E, NU, P = 1e7, 0.3, 1e5
@@ -142,18 +141,6 @@ def test_a_uniform_pressure_on_a_curved_side_is_exact(dimension: int, tmp_path: 
         inside = np.all(part.x > 1e-6, axis=1)
         assert inside.any()
         np.testing.assert_allclose(part.pressure[inside], 3 * BULK * 1e-2, rtol=1e-10)
-
-
-@pytest.mark.parametrize("other", [1.0, 0.7])
-def test_two_bodies_that_meet_at_a_curve_converge_as_one_does(other: float) -> None:
-    """Their sides there stay polygons; the error of that is of higher order, and within the estimate."""
-    coarse, fine = (
-        rings.errors(rings.solved(rings.RINGS.format(size=size, other=other * size, order=2), hvi.Contact("fit")))
-        for size in (1 / 4, 1 / 8)
-    )
-    assert coarse.norm / fine.norm > (coarse.unknowns / fine.unknowns) ** -0.8
-    assert fine.norm < 4e-3
-    assert 1.0 < fine.estimated / fine.norm < 2.0
 
 
 def test_a_force_on_a_curved_side_is_the_whole_force(tmp_path: Path) -> None:

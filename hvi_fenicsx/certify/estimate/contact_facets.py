@@ -13,7 +13,7 @@ from ...problem import spaces
 from ...problem.contact_surface import Surface
 from ...problem.problem import Problem
 from ...typing import Array, Entities
-from . import bubbles
+from . import bubbles, tangent_alignment
 
 
 @dataclass(frozen=True)
@@ -90,7 +90,9 @@ class PartTrace:
         d = problem.scales.dimension
         self._facets = contact_facets(problem, space, surface.facets)
         each = [self._at_local_nodes(directions[:, i]) for i in range(directions.shape[1])]
-        self._vectors = np.stack([n[self._facets.nodes] for n in each], axis=2)  # (f, n, k, d)
+        own = np.stack([n[self._facets.nodes] for n in each], axis=2)  # (f, n, k, d)
+        self._rotations = tangent_alignment.rotations(own)
+        self._vectors = tangent_alignment.turned(self._rotations, own)
         self._barycentric, weights = bubbles.quadrature("interval" if d == 2 else "triangle", degree)
         self._functions = self._functions_at(self._barycentric)
         self.weights: Array = self._facets.areas[:, None] * weights
@@ -111,9 +113,17 @@ class PartTrace:
         """Values at the part's owned nodes (m, k) by facet, (f, n, k). Collective."""
         return np.asarray(self._at_local_nodes(values)[self._facets.nodes])
 
+    def components_at_nodes(self, values: Array) -> Array:
+        """Components along the directions at the part's owned nodes (m, k) by facet, (f, n, k). Collective."""
+        return tangent_alignment.turned(self._rotations, self.at_nodes(values))
+
     def interpolated(self, values: Array) -> Array:
         """The function with coefficients at the part's owned nodes (m, k); (f, q, k). Collective."""
         return self._combined(self._functions, self.at_nodes(values))
+
+    def interpolated_components(self, values: Array) -> Array:
+        """As :meth:`interpolated`, of components along the directions. Collective."""
+        return self._combined(self._functions, self.components_at_nodes(values))
 
     def from_node_to_node(self, values: Array) -> Array:
         """Values at the part's owned nodes (m, k), linear from node to node; (f, q, k). Collective."""

@@ -41,7 +41,8 @@ def heights(points: Trace, law: LawState, of: Superpotential) -> Array:
         law: its state.
         of: the law, as it is or as it is solved.
     """
-    ends = points.at_nodes(law.argument[:, None])[:, :, 0]
+    of_nodes = points.at_nodes if law.term.radial else points.components_at_nodes
+    ends = of_nodes(law.argument[:, None])[:, :, 0]
     low, high = ends.min(axis=1, initial=np.inf), ends.max(axis=1, initial=-np.inf)
     height = np.zeros(len(ends))
     for kink, jump in zip(of.concave.kinks, of.concave.jumps, strict=True):

@@ -15,13 +15,14 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from ...mesh import nodes
-from ...problem import dual_basis
+from ...problem import curved_overlaps, dual_basis
 from ...problem.contact_surface import Surface
 from ...problem.facet_overlaps import Facets
 from ...problem.interfaces import Interface
 from ...problem.problem import Problem
 from ...runtime.mpi import agree
-from ...typing import Array, Entities, Integers
+from ...typing import Array, Entities, Integers, Mask
+from . import tangent_alignment
 from .bubbles import of_facet, quadrature, shape
 from .contact_facets import contact_facets, local_blocks
 
@@ -88,6 +89,7 @@ class InterfacePoints:
         functions: the basis functions of the first side's nodes at the points, (f, q, n).
         hats: the functions that are linear from node to node, (f, q, n).
         at_ends: the basis functions at the corners of the intersections, (f, d, n).
+        frames: normal and tangent of the first side at the points where facets are curved, else None, (f, q, d, d).
         sides: the bubbles of both sides.
         spread: what the first side's nodes carry, on its facets.
     """
@@ -97,10 +99,13 @@ class InterfacePoints:
         overlaps, names = interface.overlaps, interface.sides
         own = np.arange(comm.rank, len(overlaps.areas), comm.size)
         rule, weights = quadrature("interval" if d == 2 else "triangle", degree)
-        self.weights: Array = overlaps.areas[own, None] / problem.scales.length ** (d - 1) * weights
+        points = overlaps.sampled(rule, weights, own)
+        self.weights: Array = np.asarray(points.weights.reshape(len(own), -1) / float(problem.scales.length) ** (d - 1))
         self.facets = overlaps.first[own], overlaps.second[own]
-        places = rule @ overlaps.on_first[own], rule @ overlaps.on_second[own]
+        places = [on.reshape(*self.weights.shape, d) for on in (points.on_first, points.on_second)]
         first = interface.first
+        turned = curved_overlaps.frames(curved_overlaps.normals(first, points)) if interface.curved else None
+        self.frames = None if turned is None else turned.reshape(*self.weights.shape, d, d)
         self.degree, flat = first.degree, places[0].reshape(-1, d)
         self.shapes = [_shapes(self.degree, at) for at in places]
         self.functions, self.at_ends = first.functions(places[0]), first.functions(overlaps.on_first[own])
@@ -131,17 +136,33 @@ class InterfaceTrace:
     ) -> None:
         self._problem, self._bubbles, self._points = problem, bubbles, points
         self._surface, self._directions, self.weights = surface, directions, points.weights
-        _, count, d = directions.shape
-        vectors = self.interpolated(directions.reshape(-1, count * d))
-        self._vectors = vectors.reshape(*self.weights.shape, *directions.shape[1:])
+        own = points.spread.of_carriers(directions)
+        self._rotations = tangent_alignment.rotations(own, points.spread.reference)
+        self._vectors = self._turned(directions)
+
+    def _turned(self, directions: Array) -> Array:
+        """The directions at the points, (f, q, k, d); on curved facets they turn as the facets do. Collective."""
+        frames = self._points.frames
+        if frames is not None:
+            directions = directions @ curved_overlaps.frames(self._surface.normals).transpose(0, 2, 1)
+        found = self._components(self._points.functions, directions)
+        return found if frames is None else np.asarray(found @ frames)
 
     def interpolated(self, values: Array) -> Array:
         """The function with coefficients at the owned nodes (m, k) at the points, (f, q, k). Collective."""
         return self._combined(self._points.functions, values)
 
+    def interpolated_components(self, values: Array) -> Array:
+        """As :meth:`interpolated`, of components along the directions. Collective."""
+        return self._components(self._points.functions, values)
+
     def at_nodes(self, values: Array) -> Array:
-        """The same at the corners of the intersections, (f, d, k). Collective."""
+        """The function with coefficients at the owned nodes at the corners of intersections, (f, d, k). Collective."""
         return self._combined(self._points.at_ends, values)
+
+    def components_at_nodes(self, values: Array) -> Array:
+        """As :meth:`at_nodes`, of components along the directions. Collective."""
+        return self._components(self._points.at_ends, values)
 
     def from_node_to_node(self, values: Array) -> Array:
         """Values at the owned nodes (m, k), linear from node to node; (f, q, k). Collective."""
@@ -149,11 +170,11 @@ class InterfaceTrace:
 
     def of_field(self, u: fem.Function) -> Array:
         """The relative values of a displacement of the problem's space, (f, q, k). Collective."""
-        return self.interpolated(self._along(u))
+        return self.interpolated_components(self._along(u))
 
     def of_field_from_node_to_node(self, u: fem.Function) -> Array:
         """Its coefficients, linear from node to node, (f, q, k). Collective."""
-        return self.from_node_to_node(self._along(u))
+        return self._components(self._points.hats, self._along(u))
 
     def _along(self, u: fem.Function) -> Array:
         """The relative coefficients of a displacement along the directions at the owned nodes, (m, k). Collective."""
@@ -161,7 +182,15 @@ class InterfaceTrace:
         return np.asarray(np.einsum("mkd,md->mk", self._directions, there))
 
     def _combined(self, functions: Array, values: Array) -> Array:
-        return np.asarray(functions @ self._points.spread.on_facets(values)[self._points.facets[0]])
+        spread = self._points.spread
+        return np.asarray(functions @ spread.on_facets(spread.of_carriers(values))[self._points.facets[0]])
+
+    def _components(self, functions: Array, values: Array) -> Array:
+        """Sums of functions (f, q, n) times components, or directions, at the owned nodes (m, k, ...). Collective."""
+        spread = self._points.spread
+        along = tangent_alignment.turned(self._rotations, spread.of_carriers(values))
+        on_facets = spread.on_facets(along.reshape(*along.shape[:2], -1))[self._points.facets[0]]
+        return np.asarray(functions @ on_facets).reshape(*functions.shape[:2], *along.shape[2:])
 
     def of_bubbles(self, e: fem.Function) -> Array:
         """The relative values of bubbles, (f, q, k). Collective."""
@@ -190,9 +219,9 @@ class InterfaceTrace:
             for i, values in enumerate(shapes):
                 np.add.at(sums, side.of_facet[facet, i], sign * np.einsum("fq,fqd->fd", values, vectors))
             found[side.blocks] += self._problem.domain.mesh.comm.allreduce(sums)[side.owned]
-        on_facets = np.zeros((*self._points.spread.carriers.shape[:2], scaled.shape[2]))
+        on_facets = np.zeros(self._rotations.shape[:3])
         np.add.at(on_facets, self._points.facets[0], np.einsum("fqk,fqn->fnk", scaled, self._points.functions))
-        carried = self._points.spread.summed(on_facets)
+        carried = self._points.spread.summed(tangent_alignment.turned_back(self._rotations, on_facets))
         at_nodes[self._surface.blocks] = np.einsum("mk,mkd->md", carried, self._directions)
         return found, at_nodes
 
@@ -206,7 +235,8 @@ class _Spread:
     """Values at the nodes that carry something as values at the nodes of the first side's facets.
 
     Attributes:
-        carriers: which nodes (numbered through) the value at each node is the mean of, rows of weights, (f, n, n).
+        carriers: what the value at each node is the mean of, rows of weights, (f, n, n).
+        reference: a node of each facet's carriers, (f,).
     """
 
     def __init__(self, problem: Problem, interface: Interface) -> None:
@@ -216,26 +246,39 @@ class _Spread:
         own = start + interface.surface.blocks.astype(np.int64)
         known = np.flatnonzero(weights > 0.0)
         self._count, self._own = len(known), np.searchsorted(known, own)
-        kept = weights[first.nodes] > 0.0
+        self._kept = weights[first.nodes] > 0.0
         at = np.searchsorted(known, first.nodes).clip(max=len(known) - 1)
-        count = kept.shape[1]
-        self.carriers = np.zeros((len(kept), count, count))
-        self._at = np.where(kept, at, 0)
-        for number in range(count):
-            alone = kept[:, number]
-            shares = kept / np.maximum(kept.sum(axis=1, keepdims=True), 1)
-            self.carriers[:, number] = np.where(alone[:, None], np.eye(count)[number], shares)
-        for facet, node in dual_basis.adopted(first, interface.overlaps, kept).items():
+        self._at = np.where(self._kept, at, 0)
+        self._shares = (weights[own] / interface.rows.first.diagonal()[own])[:, None]
+        self.carriers = _means(self._kept)
+        for facet, node in dual_basis.adopted(first, interface.overlaps, self._kept).items():
             self._at[facet, 0], self.carriers[facet, :, 0] = np.searchsorted(known, node), 1.0
+        self.reference: Integers = np.argmax(self.carriers.any(axis=1), axis=1)
+
+    def of_carriers(self, values: Array) -> Array:
+        """Values at the owned nodes (m, ...) by facet and carrier, (facets, n, ...). Collective."""
+        every = np.zeros((self._count, *values.shape[1:]))
+        every[self._own] = values
+        return np.asarray(self._comm.allreduce(every)[self._at])
 
     def on_facets(self, values: Array) -> Array:
-        """Values at the owned nodes (m, k) at the nodes of all facets, (facets, n, k). Collective."""
-        every = np.zeros((self._count, values.shape[1]))
-        every[self._own] = values
-        return np.asarray(self.carriers @ self._comm.allreduce(every)[self._at])
+        """Values of carriers (facets, n, k) at the nodes of all facets, (facets, n, k)."""
+        return np.asarray(self.carriers @ values)
 
     def summed(self, values: Array) -> Array:
-        """Values at the nodes of facets (facets, n, k) summed at the owned nodes, (m, k). Collective."""
+        """Forces on the functions of facets' nodes (facets, n, k) as forces on the relative displacements, (m, k).
+
+        Beside a node that carries nothing a relative displacement of 1 moves the first side by another amount than 1:
+        the rows of the problem (:mod:`.dual_basis`) say by how much. So a uniform traction has the problem's own
+        nodal forces. Collective.
+        """
         every = np.zeros((self._count, values.shape[2]))
-        np.add.at(every, self._at, self.carriers.transpose(0, 2, 1) @ values)
-        return np.asarray(self._comm.allreduce(every)[self._own])
+        np.add.at(every, self._at[self._kept], values[self._kept])
+        return np.asarray(self._comm.allreduce(every)[self._own] * self._shares)
+
+
+def _means(kept: Mask) -> Array:
+    """Weights (f, n, n) by which nodes that carry something (f, n) stay as they are, others are the mean of these."""
+    count = kept.shape[1]
+    shares = kept / np.maximum(kept.sum(axis=1, keepdims=True), 1)
+    return np.asarray(np.where(kept[:, :, None], np.eye(count), shares[:, None, :]))

@@ -15,6 +15,7 @@ from dolfinx import fem, la
 
 from ...laws import Length, Superpotential
 from ...mesh import nodes
+from ...problem import curved_overlaps
 from ...problem.contact_surface import Surface
 from ...problem.problem import Problem
 from ...typing import Array, Mask
@@ -199,7 +200,7 @@ class LawTraces:
                 points=points,
                 multiplier=points.interpolated(law.term.multiplier[:, None]),
                 stretch=stretch,
-                nodal=points.interpolated(law.carried),
+                nodal=points.interpolated_components(law.carried),
                 sticks=np.asarray(on_kink > 1 - self.thresholds.near),
                 nodewise=points.of_field_from_node_to_node(self.u) / stretch,
                 slip=points.of_field(self.u) / stretch,
@@ -240,8 +241,10 @@ class LawTraces:
         for law in state.laws:
             force -= np.einsum("mk,mkd->md", law.carried, law.term.directions)
         axes = np.tile(np.eye(force.shape[1]), (len(force), 1, 1))
+        if (interface := self.problem.interface_of(state.surface)) is not None and interface.curved:
+            axes = curved_overlaps.frames(state.surface.normals)
         points = self.part(state.surface, axes)
-        return points.tested(points.interpolated(force))[0]
+        return points.tested(points.interpolated_components(np.einsum("mkd,md->mk", axes, force)))[0]
 
 
 def _gathered(space: fem.FunctionSpace, values: Array) -> Array:
