@@ -16,6 +16,7 @@ from ..system.condensation import Condensation
 from ..workflow import certified, finish
 from .all_points import StationaryPoint
 from .condensed_form import scalar_problem
+from .curved_laws import CurvedLaws
 from .found import Found, Keep, Saved, Wanted, forget
 from .progress_words import Unit
 from .scalar_problem import ScalarProblem
@@ -87,8 +88,10 @@ class Equilibria:
         with self._prepared.timer("solve"):
             if self.problem.error and lowest:
                 wanted = self._refined(self.problem, wanted, stop, report)
-            elif self.problem.error and not wanted.bounded and not len(self.problem.lengths):
-                wanted = replace(wanted, near=scalar_problem(self._condensation.problem, tractions=True))
+            elif self.problem.error and not len(self.problem.lengths):
+                condensed = self._condensation.problem
+                near = scalar_problem(condensed, tractions=True)
+                wanted = replace(wanted, curved=CurvedLaws(near=near, problem=condensed))
             return find(self.problem, wanted, stop, report, saved, keep)
 
     def _refined(
@@ -115,8 +118,9 @@ class Equilibria:
         if not np.allclose(comm.bcast(point.x), point.x, rtol=1e-9, atol=1e-12):
             raise SolverError("the ranks found different equilibria; run on one")
         u = self._prepared.system.displacement(self._condensation.expand(point.x))
-        if self.problem is not None and (self.problem.error or len(self.problem.lengths)):  # the point is not exact
-            u.x.array[:] *= self._prepared.problem.scales.displacement
-            return finish(self._prepared, start=u, estimating=False)
         found = SolveResult(u=u, method="stationary points of the condensed problem", converged=True, reason=point.kind)
-        return certified(self._prepared, found)
+        known = certified(self._prepared, found)
+        if known.converged or self.problem is None or not (self.problem.error or len(self.problem.lengths)):
+            return known
+        u.x.array[:] *= self._prepared.problem.scales.displacement  # the point is not exact
+        return finish(self._prepared, start=u, estimating=False)

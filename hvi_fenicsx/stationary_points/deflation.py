@@ -96,7 +96,8 @@ def _polyline(chain: Chain, low: float, high: float, weight: float) -> list[tupl
     moves = [(b[0] - a[0], b[1] - a[1]) for a, b in itertools.pairwise(corners)]
     lengths = [weight * abs(dx) + abs(dt) for dx, dt in moves]
     places = np.concatenate([[0.0], np.cumsum(lengths)])
-    starts = [(-np.inf, 0.0, *corners[0])] + [(s, s, *c) for s, c in zip(places, corners, strict=True)]
+    places -= places[np.argmin([abs(x) for x, _ in corners])]  # what is near zero must not be rounded by what is far
+    starts = [(-np.inf, places[0], *corners[0])] + [(s, s, *c) for s, c in zip(places, corners, strict=True)]
     ways = [(dx / size, dt / size) for dx, dt in [first, *moves, last] if (size := weight * abs(dx) + abs(dt))]
     return [(*start, *way) for start, way in zip(starts, ways, strict=True)]
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 
 from ..typing import Array
 from .all_points import StationaryPoint
+from .curved_laws import CurvedLaws
 from .passes import Pass
 from .progress_words import Unit
-from .scalar_problem import ScalarProblem
 
 Saved = Mapping[str, Array]
 """What is left of an unfinished search: arrays, by name."""
@@ -44,8 +44,8 @@ class Wanted:
         bounded: whether the energy is known to be bounded from below.
         start: where the lowest is, as far as that is known.
         energies: the unit of energies in reports.
-        near: the problem with polylines near the tractions of curved laws, by which it may be proven that there is no
-            equilibrium; None where this is not wanted.
+        curved: the curved laws, by which points are made exact, and it may be proven that there is none; None where no
+            law is curved, one acts on a length, or the lowest is wanted.
     """
 
     lowest: bool = False
@@ -53,7 +53,7 @@ class Wanted:
     bounded: bool = True
     start: Start | None = None
     energies: Unit = field(default_factory=Unit)
-    near: ScalarProblem | None = None
+    curved: CurvedLaws | None = None
 
 
 def forget(state: Callable[[], Saved]) -> None:

@@ -23,6 +23,8 @@ SAMPLES = 512
 """Intervals of an interval between two nodes on which the difference is bounded."""
 MOST_NODES = 2000
 """Nodes are not made denser beyond this number."""
+ROUNDED = 1e-12
+"""Places nearer than this share of their distance from zero are one."""
 Difference = Callable[[Superpotential, Array, Array], Array]
 """Bounds of what a law and its polyline differ by on intervals: law, begins, ends."""
 
@@ -105,8 +107,16 @@ def _first_nodes(law: Superpotential, far: float) -> Array:
     """Breaks of a law, and distances from zero that double."""
     first = law.length_scale
     doubled = first * 2.0 ** np.arange(max(np.ceil(np.log2(far / first)), 1.0))
-    known = np.concatenate([law.breaks, law.kinks, doubled, -doubled, [0.0, far, -far]])
-    return np.unique(known[np.abs(known) <= far])
+    known = np.concatenate([law.kinks, law.breaks, doubled, -doubled, [0.0, far, -far]])
+    return _apart(known[np.abs(known) <= far])
+
+
+def _apart(places: Array) -> Array:
+    """Places in order; of those that only rounding tells apart, the one that is named first."""
+    order = np.argsort(places, kind="stable")
+    ordered = places[order]
+    begins = np.flatnonzero(np.diff(ordered, prepend=-np.inf) > ROUNDED * np.abs(ordered))
+    return np.asarray(places[np.minimum.reduceat(order, begins)])
 
 
 def _middle_tractions(law: Superpotential, begin: Array, end: Array) -> Array:

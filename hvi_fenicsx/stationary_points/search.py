@@ -217,7 +217,11 @@ def _without_proof(task: _Task) -> Found:
     problem = task.problem
     task.report("a search without a proof that nothing is missed")
     below = _bounded(task, [])
-    points = tuple(systematic.near_stationary(problem, [] if below is None else [below.x], task.stop))
+    known = [] if below is None else [below.x]
+    if (curved := task.wanted.curved) is None:
+        points = tuple(systematic.near_stationary(problem, known, task.stop))
+    else:
+        points = tuple(systematic.near_stationary(curved.near, known, task.stop, curved.point))
     if not points and (cells := _cells_of_none(task)):
         return Found(points=(), complete=True, lower_bound=None, proven=True, nodes=cells, reason=NO_POINT)
     return Found(
@@ -233,10 +237,10 @@ def _without_proof(task: _Task) -> Found:
 
 def _cells_of_none(task: _Task) -> int:
     """The number of cells by which it is proven that laws of one component, curved ones too, have no point; else 0."""
-    near = task.wanted.near
-    if near is None or not np.all(np.isfinite(near.force_error)):
+    curved = task.wanted.curved
+    if task.wanted.bounded or curved is None or not np.all(np.isfinite(curved.near.force_error)):
         return 0
-    search, clock = Enumeration(problem=near), Clock()
+    search, clock = Enumeration(problem=curved.near), Clock()
     search.start()
     none = search.run(lambda: search.undecided > 0 or task.stop(), lambda now: task.report(all_in_words(now, clock)))
     return max(search.cells, 1) if none and not search.undecided else 0

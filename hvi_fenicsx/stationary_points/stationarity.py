@@ -89,7 +89,17 @@ def kind(problem: ScalarProblem, x: Array) -> Kind:
         problem: the problem.
         x: a stationary point, (n,).
     """
-    here = subdifferential(problem, x)
+    return kind_at(problem, x, subdifferential(problem, x))
+
+
+def kind_at(problem: ScalarProblem, x: Array, here: Subdifferential) -> Kind:
+    """As :func:`kind`, with laws of any form.
+
+    Args:
+        problem: the stiffness and the force.
+        x: a stationary point, (n,).
+        here: what the laws and bounds allow there.
+    """
     if here.falls.any():
         return Kind.SADDLE
     surely, perhaps = _free(problem, x, here)

@@ -20,7 +20,6 @@ from .deflation import DeflatedNewton
 from .descent import descend
 from .length_kinds import kind_of
 from .scalar_problem import ScalarProblem
-from .stationarity import imbalance
 
 PROGRAMMES = ((0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875, 1.0), (2.0, 1.5, 1.0), (4.0, 2.0, 1.0), (-1.0, 0.0, 1.0))
 """Load factors, one after the other; each programme begins at rest."""
@@ -37,9 +36,9 @@ MOST_POINTS = 100
 FAILURES = 3
 """Attempts without a new point after which a start is given up."""
 SAME = 1e-4
-"""Where points are not exact, those nearer than this share of the displacements are one."""
-OUT_OF_BALANCE = 1e-2
-"""Share of the largest force that is missing where a descent was not at its end: no solver makes such a point exact."""
+"""Where points are not exact, or were made so, those nearer than this share of the displacements are one."""
+Exact = Callable[[Array], StationaryPoint | None]
+"""The stationary point near a given one, (n,); None where there is none."""
 
 
 def candidates(problem: ScalarProblem, known: Sequence[StationaryPoint], stop: Callable[[], bool]) -> Iterator[Array]:
@@ -50,8 +49,7 @@ def candidates(problem: ScalarProblem, known: Sequence[StationaryPoint], stop: C
         known: the points found, to which the caller adds those that are.
         stop: asked before each attempt.
     """
-    exact = not len(problem.lengths) and not problem.error
-    newton = DeflatedNewton(problem) if exact else None
+    newton = None if len(problem.lengths) else DeflatedNewton(problem)
     for start in _starts(problem):
         if stop():
             return
@@ -78,27 +76,31 @@ def _deflated(
             failures += len(known) == before
 
 
-def near_stationary(problem: ScalarProblem, known: Sequence[Array], stop: Callable[[], bool]) -> list[StationaryPoint]:
-    """Points, by energy, where laws act on lengths or are curved; a solver is to make them exact.
+def near_stationary(
+    problem: ScalarProblem, known: Sequence[Array], stop: Callable[[], bool], exact: Exact | None = None
+) -> list[StationaryPoint]:
+    """Points, by energy, where laws act on lengths or are curved.
 
     Args:
         problem: the problem.
         known: points of low energy, each (n,).
         stop: asked before each attempt.
+        exact: makes points of polylines those of curved laws; None: a solver is to make points exact.
     """
     points = list[StationaryPoint]()
     for x in itertools.chain(known, candidates(problem, points, stop)):
-        near = SAME * (1.0 + float(np.max(np.abs(x), initial=0.0)))
-        if any(np.max(np.abs(p.x - x)) < near for p in points) or _far(problem, x) or _out_of_balance(problem, x):
-            continue
-        energy = problem.energy(x) + problem.error
-        points.append(StationaryPoint(x=x, energy=energy, kind=kind_of(problem, x), isolated=True))
+        point = None if _far(problem, x) else _as_it_is(problem, x) if exact is None else exact(x)
+        if point is not None and not any(_same(p.x, point.x) for p in points):
+            points.append(point)
     return sorted(points, key=lambda p: p.energy)
 
 
-def _out_of_balance(problem: ScalarProblem, x: Array) -> bool:
-    """Whether forces are missing; of laws of lengths that is not known here."""
-    return not len(problem.lengths) and imbalance(problem, x) > OUT_OF_BALANCE
+def _as_it_is(problem: ScalarProblem, x: Array) -> StationaryPoint:
+    return StationaryPoint(x=x, energy=problem.energy(x) + problem.error, kind=kind_of(problem, x), isolated=True)
+
+
+def _same(one: Array, other: Array) -> bool:
+    return bool(np.max(np.abs(one - other)) < SAME * (1.0 + np.max(np.abs(other), initial=0.0)))
 
 
 def _starts(problem: ScalarProblem) -> Iterator[Array]:

@@ -14,7 +14,7 @@ from hvi_fenicsx.stationary_points.all_points import Enumeration
 from hvi_fenicsx.stationary_points.deflation import DeflatedNewton, Graphs
 from hvi_fenicsx.stationary_points.found import Wanted
 from hvi_fenicsx.stationary_points.search import find
-from hvi_fenicsx.stationary_points.systematic import candidates, near_stationary
+from hvi_fenicsx.stationary_points.systematic import candidates
 
 
 def never() -> bool:
@@ -62,17 +62,6 @@ def test_newton_keeps_away_from_what_is_known() -> None:
         reached = [x for x in roots if x is not None]
         assert all(stationarity.imbalance(problem, x) < 1e-9 for x in reached)
         assert any(np.max(np.abs(x - point.x)) < 1e-9 for x in reached)
-
-
-def test_points_near_curved_laws_are_listed_only_where_forces_are_in_balance() -> None:
-    """A descent that is not at its end leaves a point that no solver makes an equilibrium."""
-    exact, _ = problem_of(FAST[0])
-    curved = dataclasses.replace(exact, error=1e-9)
-    points = [p.x for p in found(exact).points]
-    off = [x + 0.3 * np.max(np.abs(x)) for x in points]
-    assert all(stationarity.imbalance(curved, x) > 0.1 for x in off)
-    listed = near_stationary(curved, [*off, *points], lambda: True)
-    np.testing.assert_allclose([p.x for p in listed], sorted(points, key=curved.energy), atol=0.0)
 
 
 def test_a_search_that_is_stopped_has_what_was_found_without_proof_and_a_gap() -> None:

@@ -1,0 +1,98 @@
+"""Stationary points of curved laws: Newton's method on the laws themselves, from points of polylines near them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..system.condensed_problem import Bonds, CondensedProblem
+from ..typing import Array, Mask
+from . import stationarity
+from .all_points import StationaryPoint
+from .scalar_problem import ScalarProblem
+from .stationarity import Subdifferential
+
+MOST_STEPS = 30
+"""Newton steps of one point."""
+FASTER = 0.1
+"""Newton's method goes on in a balance that is good enough while each step leaves less than this share of the rest."""
+LONGEST = 0.1
+"""Way from the polylines' point, relative to its displacements, beyond which a point is another one."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class CurvedLaws:
+    """Laws of one component each, some of them curved.
+
+    Attributes:
+        near: the problem with polylines near the laws' tractions.
+        problem: the problem with the laws, at the load factor 1.
+    """
+
+    near: ScalarProblem
+    problem: CondensedProblem
+
+    def point(self, x: Array) -> StationaryPoint | None:
+        """The stationary point near one of the polylines; None where there is none.
+
+        An unknown stays where a jump of its laws or a bound bears the force.
+
+        Args:
+            x: displacements, (n,).
+        """
+        near, start, before = self.near, x, np.inf
+        size = float(np.max(np.abs(near.force), initial=0.0)) or 1.0
+        for _ in range(MOST_STEPS):
+            force, allowed = near.force - near.stiffness @ x, self._subdifferential(x)
+            rest = force - np.clip(force, allowed.low, allowed.high)
+            missing = float(np.max(np.abs(rest), initial=0.0))
+            if missing <= stationarity.ACCURACY * size and missing >= FASTER * before:
+                return self._found(x, allowed)
+            before = missing
+            jumps = allowed.high - allowed.low > stationarity.ACCURACY * size
+            step = self._step(rest, allowed, ~jumps | (rest != 0.0))
+            if step is None:
+                return None
+            x = np.clip(x + step, near.lower, near.upper)
+            if not np.max(np.abs(x - start)) <= LONGEST * (1.0 + np.max(np.abs(start))):
+                return None
+        return None
+
+    def _found(self, x: Array, allowed: Subdifferential) -> StationaryPoint:
+        kind = stationarity.kind_at(self.near, x, allowed)
+        return StationaryPoint(x=x, energy=self.problem.energy(x), kind=kind, isolated=True)
+
+    def _step(self, rest: Array, allowed: Subdifferential, free: Mask) -> Array | None:
+        """Newton's step of the free unknowns."""
+        step = np.zeros(len(rest))
+        matrix = self.near.stiffness[np.ix_(free, free)] + np.diag(allowed.least[free])
+        try:
+            step[free] = np.linalg.solve(matrix, rest[free])
+        except np.linalg.LinAlgError:
+            return None
+        return step
+
+    def _subdifferential(self, x: Array) -> Subdifferential:
+        """What the laws and bounds allow at a point."""
+        close = stationarity.ACCURACY * (1.0 + float(np.max(np.abs(x), initial=0.0)))
+        low, high, slope = np.zeros((3, self.near.size))
+        falls = np.zeros(self.near.size, dtype=np.bool_)
+        for bonds in self.problem.bonds:
+            at, argument = bonds.unknowns[:, 0], bonds.argument(x)
+            for total, force in zip((low, high), _forces(bonds, argument, close), strict=True):
+                np.add.at(total, at, force)
+            second = bonds.law.convex.second(argument) - bonds.law.concave.second(argument)
+            np.add.at(slope, at, bonds.weights * bonds.signs[:, 0] ** 2 * second)
+            for kink in bonds.law.concave.kinks:
+                falls[at[(np.abs(argument - kink) <= close) & (bonds.weights > 0.0)]] = True
+        low = np.where(x <= self.near.lower + close, -np.inf, low)
+        high = np.where(x >= self.near.upper - close, np.inf, high)
+        return Subdifferential(low=low, high=high, falls=falls, least=slope, most=slope)
+
+
+def _forces(bonds: Bonds, argument: Array, close: float) -> tuple[Array, Array]:
+    """The least and the largest force of each bond."""
+    factors = bonds.weights * bonds.signs[:, 0]
+    ends = [factors * traction for traction in bonds.law.interval(argument, close)]
+    return np.minimum(*ends), np.maximum(*ends)
