@@ -19,6 +19,7 @@ from ..problem.problem import Problem
 from ..problem.references import References
 from ..runtime.timing import Timer
 from ..solvers.law_models import Cells, ExactLaw
+from ..system.petsc_options import CHOLESKY, default_options, prefix
 from ..system.system import System
 from ..typing import Array, Integers
 from .directional import Growth, growth
@@ -60,11 +61,11 @@ def _by_inertia(problem: Problem, u: fem.Function, found: Growth) -> str:
     strong, weak = np.flatnonzero(found.strong), np.flatnonzero(found.weak)
     if negative_eigenvalues(system, strong) == 0:
         return LOCAL_MINIMISER
-    return NO_MINIMISER if negative_eigenvalues(system, np.union1d(strong, weak)) > 0 else UNDECIDED
+    return NO_MINIMISER if (negative_eigenvalues(system, np.union1d(strong, weak)) or 0) > 0 else UNDECIDED
 
 
-def negative_eigenvalues(system: System, held: Integers) -> int:
-    """How many eigenvalues of a system's matrix are negative, by a factorisation. Collective.
+def negative_eigenvalues(system: System, held: Integers) -> int | None:
+    """How many eigenvalues of a system's matrix are negative, by a factorisation; None where it failed. Collective.
 
     Args:
         system: the system, with the tangents that are set.
@@ -76,11 +77,13 @@ def negative_eigenvalues(system: System, held: Integers) -> int:
     matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
     matrix.setOption(PETSc.Mat.Option.SPD, False)
     pc = PETSc.PC().create(system.comm)
+    pc.setOptionsPrefix(f"{prefix()}inertia_")
     pc.setOperators(matrix)
-    pc.setType("cholesky")
-    pc.setFactorSolverType("mumps")
-    pc.setUp()
-    count = int(pc.getFactorMatrix().getMumpsInfog(_NEGATIVE_PIVOTS))
+    with default_options(CHOLESKY, "inertia_"):
+        pc.setFromOptions()
+        pc.setUp()
+    failed = bool(pc.getFailedReason())
+    count = None if failed else int(pc.getFactorMatrix().getMumpsInfog(_NEGATIVE_PIVOTS))
     pc.destroy()
     matrix.destroy()
     return count

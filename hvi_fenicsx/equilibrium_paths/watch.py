@@ -7,14 +7,14 @@ from collections.abc import Callable
 
 
 class Stopped(Exception):
-    """A jump was asked to stop: the path ends with the state before it."""
+    """The path was asked to stop between two states: it ends with the one before."""
 
 
 class Watch:
     """Whether to stop, and who is told of a jump's steps.
 
     Args:
-        interrupted: whether to stop, asked at each state and at each step of a jump.
+        interrupted: whether to stop, asked at each state, at each step of a jump, and as each site passes.
         jumping: is told the factor of a long jump and its steps so far.
         seconds: from one time that it is told to the next.
     """
@@ -36,14 +36,22 @@ class Watch:
         """
         self._factor, self._steps, self._told = factor, 0, time.monotonic()
 
+    def check(self) -> None:
+        """Go on, or not.
+
+        Raises:
+            Stopped: the path is to stop.
+        """
+        if self.interrupted():
+            raise Stopped
+
     def step(self) -> None:
         """One step of the jump is next.
 
         Raises:
             Stopped: it is not to be taken.
         """
-        if self.interrupted():
-            raise Stopped
+        self.check()
         self._steps += 1
         if time.monotonic() - self._told >= self._seconds:
             self._told = time.monotonic()

@@ -17,7 +17,7 @@ from ..system.petsc_options import configure
 from ..system.system import System
 from .smooth_method import SmoothMethod, SolverRun
 
-_DIRECT = {"ksp_type": "preonly", "pc_type": "lu", "pc_factor_mat_solver_type": "mumps"}
+_DIRECT = {"ksp_type": "preonly", "pc_type": "lu", "pc_factor_mat_solver_type": "mumps", "mat_mumps_icntl_14": 100}
 _KRYLOV = {
     "ksp_type": "gmres",
     "ksp_rtol": 1e-6,

@@ -107,10 +107,16 @@ class Enumeration:
                 return False
             self.cells += 1
             cell = self._tightened(self.waiting.pop())
-            if cell is not None and not self._decided(cell) and not self._linear.excludes(cell.low, cell.high):
+            if cell is not None and not self._is_done(cell):
                 self._divide(cell)
             report(self)
         return True
+
+    def _is_done(self, cell: Box) -> bool:
+        """Whether nothing is left to be found in a cell, or nothing more can be known about it."""
+        if self._curved:
+            return self._linear.excludes(cell.low, cell.high) or self._is_undecided(cell)
+        return self._decided(cell) or self._linear.excludes(cell.low, cell.high)
 
     def _divide(self, cell: Box) -> None:
         """Put parts of a cell on the stack; the cell itself, made smaller, if it reaches far behind all joints."""
@@ -147,8 +153,6 @@ class Enumeration:
         """Whether the cell's points, one at most or a continuum, have been found."""
         fixed = cell.low == cell.high
         free = np.flatnonzero(~fixed)
-        if self._curved:
-            return self._is_undecided(cell, free)
         arcs, problem = self.problem.arcs, self.problem
         if not free.size:
             self.enter(cell.low)
@@ -165,9 +169,11 @@ class Enumeration:
         self._enter_linear(cell, free, matrix)
         return True
 
-    def _is_undecided(self, cell: Box, free: Integers) -> bool:
+    def _is_undecided(self, cell: Box) -> bool:
         """Whether a cell of curved laws can hardly be excluded: the polylines may have one point there."""
-        arcs = self.problem.arcs
+        arcs, free = self.problem.arcs, np.flatnonzero(cell.low < cell.high)
+        if np.any(self._at_bound(cell)[free]):
+            return False
         slopes = arcs.least_slope(cell.low, cell.high)[free]
         one = not free.size or bool(np.all(arcs.meets(cell.low, cell.high)[free].sum(axis=1) <= 1))
         if one or _positive(self.problem.stiffness[np.ix_(free, free)] + np.diag(slopes)):

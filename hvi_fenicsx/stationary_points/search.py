@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -215,6 +216,8 @@ def _all(task: _Task) -> Found:
 def _without_proof(task: _Task) -> Found:
     """What is found where it cannot be proven that these are all: laws of lengths, or curved ones."""
     problem = task.problem
+    if cells := _cells_of_none(task, MOST_BOXES):
+        return _none(cells)
     task.report("a search without a proof that nothing is missed")
     below = _bounded(task, [])
     known = [] if below is None else [below.x]
@@ -223,7 +226,7 @@ def _without_proof(task: _Task) -> Found:
     else:
         points = tuple(systematic.near_stationary(curved.near, known, task.stop, curved.point))
     if not points and (cells := _cells_of_none(task)):
-        return Found(points=(), complete=True, lower_bound=None, proven=True, nodes=cells, reason=NO_POINT)
+        return _none(cells)
     return Found(
         points=points,
         complete=False,
@@ -235,14 +238,27 @@ def _without_proof(task: _Task) -> Found:
     )
 
 
-def _cells_of_none(task: _Task) -> int:
-    """The number of cells by which it is proven that laws of one component, curved ones too, have no point; else 0."""
+def _none(cells: int) -> Found:
+    return Found(points=(), complete=True, lower_bound=None, proven=True, nodes=cells, reason=NO_POINT)
+
+
+def _cells_of_none(task: _Task, most: float = math.inf) -> int:
+    """The number of cells by which it is proven that laws of one component, curved ones too, have no point; else 0.
+
+    Args:
+        task: the search.
+        most: cells after which the proof is given up.
+    """
     curved = task.wanted.curved
     if task.wanted.bounded or curved is None or not np.all(np.isfinite(curved.near.force_error)):
         return 0
     search, clock = Enumeration(problem=curved.near), Clock()
     search.start()
-    none = search.run(lambda: search.undecided > 0 or task.stop(), lambda now: task.report(all_in_words(now, clock)))
+
+    def over() -> bool:
+        return search.undecided > 0 or search.cells >= most or task.stop()
+
+    none = search.run(over, lambda now: task.report(all_in_words(now, clock)))
     return max(search.cells, 1) if none and not search.undecided else 0
 
 

@@ -19,6 +19,8 @@ from ..typing import Array, Integers
 from .petsc_options import CHOLESKY, default_options, prefix
 from .system import System
 
+_NO_MEMORY = PETSc.PC.FailedReason.FACTOR_OUTMEMORY
+
 
 class Interior:
     """A_ii, factorised. Creation is collective.
@@ -51,8 +53,9 @@ class Interior:
         self._everywhere = np.concatenate(agree(self._comm, kept + start)).astype(np.int64)
         self.coupling = self._coupled()
         self.pc = self._factorised(options, own_prefix)
-        if self.pc.getFailedReason():
-            raise SolverError("the stiffness without the displacements of Γc is singular: a body is not held")
+        if reason := self.pc.getFailedReason():
+            why = "no memory was left" if reason == _NO_MEMORY else "it is singular, a body is not held"
+            raise SolverError(f"the stiffness without the displacements of Γc was not factorised: {why}")
 
     @property
     def size(self) -> int:

@@ -18,8 +18,12 @@ from petsc4py import PETSc
 
 from ..errors import InputError
 
-CHOLESKY: Mapping[str, object] = {"pc_type": "cholesky", "pc_factor_mat_solver_type": "mumps"}
-"""Options of a direct solver."""
+CHOLESKY: Mapping[str, object] = {
+    "pc_type": "cholesky",
+    "pc_factor_mat_solver_type": "mumps",
+    "mat_mumps_icntl_14": 100,
+}
+"""Options of a direct solver. Its foreseen memory (a fifth more by default) is too little for some bodies on ranks."""
 _PREFIX: ContextVar[str] = ContextVar("prefix of PETSc options", default="hvi_")
 _OPTION = re.compile(r"--?[A-Za-z]")
 _NAME = re.compile(r"[A-Za-z]\w*")

@@ -48,6 +48,16 @@ def test_a_jump_that_is_stopped_leaves_the_state_before_it(kind: Any, most: int,
     assert rest[-1].x == pytest.approx(whole[-1].x, abs=1e-9)
 
 
+def test_a_path_is_stopped_before_the_first_site_passes() -> None:
+    """Many sites of a large body pass one after the other where it sets out, each with a tangent of its own."""
+    asked = []
+    follower = ArcLengthFollower(line(graph(DROP), 4), PathOptions(), watch=Watch(lambda: not asked.append(1)))
+    assert [s.event for s in follower.states()] == [Event.START]
+    assert follower.end is End.INTERRUPTED
+    assert len(asked) == 1
+    assert follower.factor == 0.0
+
+
 @pytest.mark.parametrize("kind", [ExactFollower, ArcLengthFollower])
 def test_a_jump_tells_its_factor_and_its_steps(kind: Any) -> None:
     """At the factor 2, by hand; each step is told where no time must pass between two of them."""

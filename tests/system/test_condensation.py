@@ -15,8 +15,10 @@ from scenes import DELTA, NU, E, Table, block, model, quadratic_linear
 
 from hvi_fenicsx import Scene, prepare
 from hvi_fenicsx.equilibrium_paths.bonds import is_piecewise_linear
-from hvi_fenicsx.errors import InputError
+from hvi_fenicsx.errors import InputError, SolverError
 from hvi_fenicsx.system.condensation import Condensation
+from hvi_fenicsx.system.interior import Interior
+from hvi_fenicsx.system.petsc_options import CHOLESKY
 from hvi_fenicsx.system.system import System
 
 Array = npt.NDArray[np.float64]
@@ -227,3 +229,10 @@ def test_all_ranks_hold_the_problem_of_one(ranks: int) -> None:
     assert together["equal"]
     for key in ("energies", "force", "whole"):
         assert together[key] == pytest.approx(alone[key], rel=1e-9)
+
+
+def test_a_factorisation_without_memory_is_not_called_a_body_that_is_not_held() -> None:
+    system = prepare(Scene.model_validate(model(8, friction=STRONG))).system
+    little = {**CHOLESKY, "mat_mumps_icntl_14": -95}
+    with pytest.raises(SolverError, match="no memory was left"):
+        Interior(system, np.empty(0, dtype=np.int32), little)

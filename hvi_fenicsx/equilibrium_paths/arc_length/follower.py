@@ -154,7 +154,7 @@ class ArcLengthFollower(Follower):
 
     def _crossed(self, arrived: int | None = None, *, turned: bool = False) -> list[Passage]:
         """The passages at the present point; where there is no end of them, the path is lost."""
-        crossing = Crossing(self._curve, self._lag)
+        crossing = Crossing(self._curve, self._lag, self._watcher.check)
         try:
             return crossing.run(arrived, turned=turned)
         except (Refused, np.linalg.LinAlgError):

@@ -109,7 +109,7 @@ class Jump:
         curve.head(tangent)
         if curve.factor_rate > 1e-7:
             return None
-        Crossing(curve, self.lag).run()
+        Crossing(curve, self.lag, self.step).run()
         return self._to_its_end(curve, most)
 
     def _to_its_end(self, curve: Curve, most: int) -> Landing | None:
@@ -127,7 +127,7 @@ class Jump:
             if move.outcome is Outcome.STUCK or curve.here.y[-1] > 1e-9:
                 return None
             if move.outcome in (Outcome.END, Outcome.TURNED):
-                Crossing(curve, self.lag).run(move.site, turned=move.outcome is Outcome.TURNED)
+                Crossing(curve, self.lag, self.step).run(move.site, turned=move.outcome is Outcome.TURNED)
         return None
 
     def _released(self) -> Landing | None:

@@ -9,6 +9,7 @@ sites comes from where they are, so that it is the same on any number of ranks.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -73,10 +74,11 @@ class Crossing:
     Args:
         curve: the curve; its direction and cell are changed.
         lag: the ways, of the order ε, of the sites to their ends, (m,).
+        check: is called before each passage; it may raise an error to end them.
     """
 
-    def __init__(self, curve: Curve, lag: Array) -> None:
-        self._curve, self._sites = curve, curve.sites
+    def __init__(self, curve: Curve, lag: Array, check: Callable[[], None]) -> None:
+        self._curve, self._sites, self._check = curve, curve.sites, check
         self._lag, self._left = lag, lag.copy()
         self.passages: list[Passage] = []
 
@@ -98,6 +100,7 @@ class Crossing:
                 rates[arrived] = -1e-9 * self._sites.outward[arrived]
             self._pass(arrived, rates)
         for _ in range(50 + 20 * len(self._sites)):
+            self._check()
             rates = self._rates()
             ways = self._ways(rates)
             k = int(np.argmin(ways)) if len(ways) else 0

@@ -119,7 +119,7 @@ class Relaxation:
         curve = Curve(held, left, sites, self.z, 0.0)
         row = np.eye(1, len(self.z) + 1, len(self.z))[0]
         curve.head(curve.tangent(curve.here.values, row))
-        Crossing(curve, self._lag).run()
+        Crossing(curve, self._lag, self._step).run()
         for _ in range(50 + 4 * len(sites)):
             if curve.here.tangent[-1] < 0.0 or sites.on_drops():
                 break
@@ -131,7 +131,7 @@ class Relaxation:
             if move.outcome in (Outcome.AWAY, Outcome.STUCK):
                 return False
             if move.outcome in (Outcome.END, Outcome.TURNED):
-                Crossing(curve, self._lag).run(move.site, turned=move.outcome is Outcome.TURNED)
+                Crossing(curve, self._lag, self._step).run(move.site, turned=move.outcome is Outcome.TURNED)
         self.z = curve.here.y[:-1].copy()
         dropped = bool(sites.on_drops())
         self._leave_drops(sites.rates(curve.here.y[:-1], curve.here.tangent[:-1]))
