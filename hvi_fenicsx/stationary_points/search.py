@@ -170,30 +170,35 @@ def _left_of_all(search: Enumeration) -> Saved:
     return {"lowest": np.array(False), "x": found, **_stacked(listed)}
 
 
-def _enumeration(task: _Task) -> Enumeration:
-    """The search for all points: a new one, with what is found without a proof, or one to go on with."""
-    problem, saved = task.problem, task.saved
+def _resumed(problem: ScalarProblem, saved: Saved) -> Enumeration:
+    """A search for all points to go on with."""
     search = Enumeration(problem=problem)
-    if saved is None:
-        for x in systematic.candidates(problem, search.points, task.stop):
-            search.enter(x)
-        search.start()
-    else:
-        for x in saved["x"]:
-            search.enter(x)
-        low, high = saved["low"], saved["high"]
-        cells = [fresh_box(low[i], high[i], 0.5 * (low[i] + high[i])) for i in range(len(low))]
-        search.waiting = [replace(cell, share=1.0 / len(cells)) for cell in cells]
+    for x in saved["x"]:
+        search.enter(x)
+    low, high = saved["low"], saved["high"]
+    cells = [fresh_box(low[i], high[i], 0.5 * (low[i] + high[i])) for i in range(len(low))]
+    search.waiting = [replace(cell, share=1.0 / len(cells)) for cell in cells]
     return search
 
 
+def _started(task: _Task, search: Enumeration, tell: Callable[[Enumeration], None]) -> None:
+    """A few cells, which often are all; else what is found without a proof."""
+    search.start()
+    if not search.run(lambda: search.cells >= MOST_BOXES or task.stop(), tell):
+        for x in systematic.candidates(task.problem, search.points, task.stop):
+            search.enter(x)
+
+
 def _all(task: _Task) -> Found:
-    search, clock = _enumeration(task), Clock()
+    search = Enumeration(problem=task.problem) if task.saved is None else _resumed(task.problem, task.saved)
+    clock = Clock()
 
     def tell(now: Enumeration) -> None:
         task.report(all_in_words(now, clock))
         task.keep(lambda: _left_of_all(search))
 
+    if task.saved is None:
+        _started(task, search, tell)
     complete = search.run(task.stop, tell)
     below = None if complete else _bounded(task, [p.x for p in search.points])
     if below is not None:
