@@ -207,6 +207,14 @@ def test_smoothed_laws_tend_to_the_law() -> None:
     assert off[2] < 1e-3
 
 
+def test_a_path_passes_the_steep_side_of_a_smoothed_peak() -> None:
+    """A bond hardly moves there, but its force does: it must not be taken for one that stands, and the path go back."""
+    law = Exponential(2.0, 1.0, 1.0)
+    steep = create("quadratic", law, epsilon=1e-6)
+    smoothed, plain = (path(line(one, 8), programme=(1e3,))[1] for one in (steep, law))
+    assert peak(smoothed) == pytest.approx(peak(plain), rel=1e-6)
+
+
 def first_fold(follower: Follower) -> float:
     return next(s.factor for s in follower.states() if s.event is Event.FOLD)
 

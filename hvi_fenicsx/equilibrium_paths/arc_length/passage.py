@@ -21,7 +21,7 @@ from .curve import Curve
 from .equations import ROUNDING, STANDING, Refused
 
 _SLOW = 1e-6
-"""A rate at which a site stands, but for rounding, beside the largest."""
+"""A rate of a site's force at which it stands, but for rounding, beside the largest."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -152,17 +152,25 @@ class Crossing:
     def _pass(self, k: int, rates: Array) -> None:
         """Into the next segment, and on in the same direction along the graph."""
         sites, curve, before = self._sites, self._curve, self._sites.segment(k)
-        forward = bool(rates[k] > 0.0)
+        forward, slow = bool(rates[k] > 0.0), self._is_slow(k)
         if forward * 2.0 - 1.0 == -sites.outward[k] and not self._unmoved(k):
             self._turn_back(k, forward=forward)
         else:
             sites.enter(k, int(sites.numbers[k]) + (1 if forward else -1))
         curve.place(curve.here.y, curve.here.tangent)
-        slow = abs(rates[k]) <= _SLOW * float(np.max(np.abs(curve.here.tangent)))
         row = curve.here.tangent if slow else curve.row(k)
         sign = 1.0 if slow or forward else -1.0
         curve.head(curve.tangent(curve.here.values, row, sign))
         self.passages.append(Passage(site=k, before=before, after=sites.segment(k)))
+
+    def _is_slow(self, k: int) -> bool:
+        """Whether a site stands but for rounding: beside all others neither it nor its force moves.
+
+        On a steep segment the force changes fast where the displacement hardly does.
+        """
+        values, stiffest = self._curve.here.values, float(np.max(np.diag(self._sites.stiffness)))
+        forces = (stiffest * np.abs(values.moves) + np.abs(values.rises)) * np.abs(self._all_rates())
+        return bool(forces[k] <= _SLOW * np.max(forces))
 
     def _unmoved(self, k: int) -> bool:
         """Whether the site has not left 0 but for rounding: there is nothing to remember."""
