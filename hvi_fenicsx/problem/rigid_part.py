@@ -45,17 +45,27 @@ class RigidPart:
     def __init__(self, comm: MPI.Comm, bodies: Sequence[BodyMotions]) -> None:
         self._comm = comm
         self._bodies = [_orthonormal(comm, body) for body in bodies]
+        self._owned = [_slice(body.places[: body.owned]) for body in bodies]
 
     def without(self, values: Array, travel: float = DEFAULT.travel) -> Array:
-        """Values without the travel of bodies that travel far, (n,). Collective.
+        """Values without the travel of bodies that travel far, (n,); where none does, the same array. Collective.
 
         Args:
             values: local ones, (n,).
             travel: of a body, relative to its deformation, beyond which it is taken off.
         """
-        parts = [b.values[:, : b.owned] @ values[b.places[: b.owned]] for b in self._bodies]
-        ends = np.cumsum([len(part) for part in parts])[:-1]
-        shares = np.split(self._comm.allreduce(np.concatenate(parts)), ends)
+        own = [values[places] for places in self._owned]
+        parts = [b.values[:, : b.owned] @ v for b, v in zip(self._bodies, own, strict=True)]
+        squares = np.array([v @ v for v in own])
+        ends = np.cumsum([len(part) for part in parts])
+        *shares, squares = np.split(self._comm.allreduce(np.concatenate([*parts, squares])), ends)
+        moved = np.array([share @ share for share in shares])
+        if not np.any(moved > 0.5 * travel**2 * (squares - moved)):  # by Pythagoras none is far, rounding included
+            return values
+        return self._rests(values, shares, travel)
+
+    def _rests(self, values: Array, shares: Sequence[Array], travel: float) -> Array:
+        """Values without the travel of bodies that travel far, (n,); shares are the parts of motions. Collective."""
         rests = [values[b.places] - share @ b.values for b, share in zip(self._bodies, shares, strict=True)]
         owned = [rest[: b.owned] for b, rest in zip(self._bodies, rests, strict=True)]
         strained = self._comm.allreduce(np.array([rest @ rest for rest in owned]))
@@ -64,6 +74,12 @@ class RigidPart:
             if share @ share > travel**2 * left:
                 found[body.places] = rest
         return found
+
+
+def _slice(places: Integers) -> slice | Integers:
+    """Places as a slice where they are consecutive, so that nothing is copied."""
+    consecutive = len(places) > 0 and bool(np.all(np.diff(places) == 1))
+    return slice(int(places[0]), int(places[-1]) + 1) if consecutive else places
 
 
 def _orthonormal(comm: MPI.Comm, body: BodyMotions) -> BodyMotions:

@@ -142,7 +142,7 @@ class BranchIteration(Method):
             return cells, replace(no_step(), reason=UNBOUNDED), True
         for tolerance in self._tolerances():
             cells, outcome = self._convex.minimise(x, cells, xi, tolerance, steady=self._straight)
-            left = self._convex.measure(x, cells, xi) if outcome.converged else math.inf
+            left = self._convex.measure_step(x, cells, xi, outcome) if outcome.converged else math.inf
             if left > max(tolerance, outcome.rounding):
                 break
         self.counts.branch += 1

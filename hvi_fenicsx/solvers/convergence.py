@@ -87,10 +87,9 @@ class ConvergenceTest:
             upper: upper bounds.
         """
         at, r = self._system.jacobian.rows.dofs, residual.array_r.copy()
-        on_lower, on_upper = np.zeros((2, len(r)), dtype=bool)
-        on_lower[at] = x.array_r[at] <= lower.array_r[at] + self._near
-        on_upper[at] = x.array_r[at] >= upper.array_r[at] - self._near
-        r = projected(r, on_lower, on_upper)
+        on_lower = x.array_r[at] <= lower.array_r[at] + self._near
+        on_upper = x.array_r[at] >= upper.array_r[at] - self._near
+        r[at] = projected(r[at], on_lower, on_upper)
         return Sizes(*self._forces(r, x), *self._net.sizes(x, residual.array_r, r, (on_lower, on_upper)))
 
     def sizes_without_bounds(self, x: PETSc.Vec, residual: PETSc.Vec) -> Sizes:
@@ -100,7 +99,7 @@ class ConvergenceTest:
             x: the displacement.
             residual: of the equation at x.
         """
-        r, nowhere = residual.array_r, np.zeros(residual.local_size, dtype=bool)
+        r, nowhere = residual.array_r, np.zeros(len(self._blocks), dtype=bool)
         return Sizes(*self._forces(r, x), *self._net.sizes(x, r, r, (nowhere, nowhere)))
 
     def _forces(self, residual: Array, x: PETSc.Vec) -> tuple[Array, Array]:
@@ -156,12 +155,12 @@ class ConvergenceTest:
 
 
 def projected(residual: Array, on_lower: Mask, on_upper: Mask) -> Array:
-    """The residual without the reactions that the bounds can bear: zero exactly where the inequality holds, (n,).
+    """The residual without the reactions that the bounds can bear: zero exactly where the inequality holds, (k,).
 
     Args:
-        residual: of the equations, (n,).
-        on_lower: which unknowns are on their lower bound, (n,).
-        on_upper: which are on their upper bound, (n,).
+        residual: of the equations, at unknowns that may have bounds, (k,).
+        on_lower: which of these are on their lower bound, (k,).
+        on_upper: which are on their upper bound, (k,).
     """
     r = np.where(on_lower, np.minimum(residual, 0.0), residual)
     return np.where(on_upper, np.maximum(r, 0.0), r)

@@ -128,14 +128,29 @@ class ConvexStep:
             cells: where each vertex is kept, by term.
             xi: ξ by term, (m,) each.
         """
-        arguments = zip(self._laws, xi, self.arguments(x), strict=True)
-        nearest = [np.clip(s, law.concave.left(a), law.concave.right(a)) for law, s, a in arguments]
-        models = self.majorants(cells, nearest)
+        models = self.majorants(cells, self._nearest(x, xi))
         if self.anywhere(self._overloaded(x, models)):
             return math.inf
         self._system.residual(x, self._residual, models)
         lower, upper = kink_bounds.slip_bounds(self._system, cells)
         return self._solver.measure(x, self._residual, lower, upper)
+
+    def measure_step(self, x: PETSc.Vec, cells: Sequence[Cells], xi: Sequence[Array], outcome: Outcome) -> float:
+        """As :meth:`measure`, after a step with these ξ: where all are still in ∂G, its own residual. Collective.
+
+        Args:
+            x: the displacement.
+            cells: where each vertex is kept, by term.
+            xi: ξ by term, (m,) each.
+            outcome: of the step that led to x.
+        """
+        changed = [near != s for near, s in zip(self._nearest(x, xi), xi, strict=True)]
+        return self.measure(x, cells, xi) if self.anywhere(changed) else outcome.measure
+
+    def _nearest(self, x: PETSc.Vec, xi: Sequence[Array]) -> list[Array]:
+        """The elements of ∂G at x that are nearest to ξ, by term."""
+        arguments = zip(self._laws, xi, self.arguments(x), strict=True)
+        return [np.clip(s, law.concave.left(a), law.concave.right(a)) for law, s, a in arguments]
 
     def accelerate(self, x: PETSc.Vec, cells: Sequence[Cells], outcome: Outcome) -> tuple[Outcome, bool]:
         """Newton steps with the true curvature, where G is curved. Collective.
@@ -200,6 +215,8 @@ class ConvexStep:
         return found
 
     def _overloaded(self, x: PETSc.Vec, models: Sequence[Majorant | ExactLaw]) -> list[npt.NDArray[np.int64]]:
+        if not kink_bounds.exist([m.cells for m in models]):
+            return [np.zeros(len(m.cells.index), dtype=np.int64) for m in models]
         self._system.residual(x, self._residual, models)
         slack = self._thresholds.kink_slack * self._options.tolerance
         return kink_bounds.overloaded(self._system, x, self._residual, models, slack)

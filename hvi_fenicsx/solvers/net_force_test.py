@@ -25,7 +25,7 @@ class NetForceTest:
     def __init__(self, system: System, thresholds: ActiveSetThresholds) -> None:
         self._system, self._thresholds = system, thresholds
         self._d = system.problem.scales.dimension
-        self._contact = np.unique(system.jacobian.rows.dofs // self._d).astype(np.int32)
+        self._contact = (system.jacobian.rows.dofs[:: self._d] // self._d).astype(np.int32)
         self._loads = PartForces.nonzero(self._local(system.pushing))
         self._capable = [self._local_part(force) for force in net_forces.capable(system.problem)]
         bodies = (SupportedBody.of(system.problem, body) for body in system.problem.bodies)
@@ -40,18 +40,17 @@ class NetForceTest:
             x: the displacement.
             residual: of the equations at x, (n,) on this rank.
             projected: the residual without the reactions of bounds, (n,).
-            on: which unknowns are on their lower and on their upper bound, (n,) each.
+            on: which unknowns of Γc are on their lower and on their upper bound, (k,) each.
         """
         system = self._system
         self._find_motions(x)
         at = system.jacobian.rows.dofs
-        laws = np.zeros_like(residual)
-        laws[at] = residual[at] - system.jacobian.elastic_at_contact(x) + system.load.array_r[at]
+        laws = residual[at] - system.jacobian.elastic_at_contact(x) + system.load.array_r[at]
         acting = ActingForces(
             left=-self._blocks(projected),
             loads=self._loads,
-            carried=[PartForces(self._contact, -self._blocks(laws)[self._contact])],
-            holders=self._holders(residual - projected, *on),
+            carried=[PartForces(self._contact, -self._blocks(laws))],
+            holders=self._holders(residual[at] - projected[at], *on),
             capable=self._capable,
             noise=np.ones(system.references.count),
             summation=0.0,
@@ -63,7 +62,7 @@ class NetForceTest:
     def _holders(self, reactions: Array, on_lower: Mask, on_upper: Mask) -> list[Holder]:
         """The bounds that are reached: each pushes along the axis of its unknown."""
         least, most = np.where(on_upper, -np.inf, 0.0), np.where(on_lower, np.inf, 0.0)
-        columns = [self._blocks(values)[self._contact] for values in (reactions, least, most)]
+        columns = [self._blocks(values) for values in (reactions, least, most)]
         axes = (np.broadcast_to(axis, columns[0].shape) for axis in np.eye(self._d))
         return [Holder(self._contact, axis, *(c[:, k] for c in columns)) for k, axis in enumerate(axes)]
 

@@ -116,12 +116,14 @@ class Jacobian:
         return self.rows.elastic(self.strained(x))
 
     def strained(self, x: PETSc.Vec) -> PETSc.Vec:
-        """X without what A does not see of it; it is overwritten by the next call. Collective.
+        """X without what A does not see of it: x itself, or a vector that the next call overwrites. Collective.
 
         Args:
             x: the vector.
         """
-        if self._rigid is None:
+        values = x.array_r
+        rest = values if self._rigid is None else self._rigid.without(values)
+        if rest is values:
             return x
-        self._strained.array[:] = self._rigid.without(x.array_r)
+        self._strained.array[:] = rest
         return self._strained
