@@ -14,7 +14,7 @@ from dolfinx import cpp as _cpp
 from dolfinx import mesh as _mesh
 from petsc4py import PETSc
 
-from .typing import Array, Entities
+from .typing import Array, Entities, Integers
 
 VERSION: str = dolfinx.__version__
 
@@ -106,35 +106,49 @@ def simplex_mesh(comm: Any, cells: npt.NDArray[Any], points: Array, kind: str, *
     return _mesh.create_mesh(comm, cells=cells, x=points, e=_Domain(element), partitioner=partitioner)
 
 
-def mesh_of_entities(comm: Any, points: Array, cells: Entities, facets: Entities, sides: Entities) -> _mesh.Mesh | None:
-    """The mesh of one rank whose facets are known: dolfinx would reorder the cells, and look for the facets.
+TAKES_TOPOLOGY = hasattr(_cpp.mesh.Topology, "set_index_map")
+"""Whether this dolfinx takes a topology that is made elsewhere."""
+
+
+def mesh_of_cells(
+    comm: Any,
+    points: Array,
+    cells: Entities,
+    *,
+    index_map: tuple[int, Integers, Entities],
+    inputs: Integers,
+    facets: tuple[Entities, Entities] | None = None,
+) -> _mesh.Mesh:
+    """The mesh of cells that stay where they are, in their order: dolfinx would send and reorder them. Collective.
 
     Args:
-        comm: of one rank.
-        points: (n, d).
-        cells: simplices by their vertices, (c, d+1), ascending.
-        facets: by their vertices, (f, d), ascending.
-        sides: the facets of each cell, (c, d+1), facet i being opposite to vertex i.
-
-    Returns:
-        The mesh; None where this dolfinx takes no topology that is made elsewhere.
+        comm: the ranks.
+        points: this rank's vertices, (n, d).
+        cells: its simplices by these, (c, d+1).
+        index_map: how many vertices it owns, which come first; the global numbers of the others, and their owners.
+        inputs: a number of each vertex that all ranks know, (n,).
+        facets: by their vertices, (f, d), and those of each cell, (c, d+1), facet i being opposite to vertex i; of one
+            rank only. None: dolfinx looks for them.
     """
     import basix.ufl
 
-    if not hasattr(_cpp.mesh.Topology, "set_index_map"):
-        return None
     (n, d), kind = points.shape, {2: _mesh.CellType.triangle, 3: _mesh.CellType.tetrahedron}[points.shape[1]]
     topology = _cpp.mesh.Topology(comm, kind)
-    maps = {dim: common.IndexMap(comm, size) for dim, size in ((0, n), (d - 1, len(facets)), (d, len(cells)))}
-    for dim, index_map in maps.items():
-        topology.set_index_map(dim, index_map)
-    vertices = np.arange(n, dtype=np.int32)[:, None]
-    for links, start, end in ((vertices, 0, 0), (facets, d - 1, 0), (cells, d, 0), (sides, d, d - 1)):
-        found = graph.adjacencylist(links)
+    vertices = common.IndexMap(comm, *index_map)
+    own = np.arange(n, dtype=np.int32)[:, None]
+    maps = {0: vertices, d: common.IndexMap(comm, len(cells))}
+    links = [(own, 0, 0), (cells, d, 0)]
+    if facets is not None:
+        maps[d - 1] = common.IndexMap(comm, len(facets[0]))
+        links += [(facets[0], d - 1, 0), (facets[1], d, d - 1)]
+    for dimension, entities in maps.items():
+        topology.set_index_map(dimension, entities)
+    for array, start, end in links:
+        found = graph.adjacencylist(array)
         topology.set_connectivity(getattr(found, "_cpp_object", found), start, end)
     element = basix.ufl.element("Lagrange", kind.name, 1, shape=(d,))
     shape = fem.coordinate_element(element.basix_element)._cpp_object
-    geometry = _cpp.mesh.Geometry_float64(maps[0], cells, shape, points, np.arange(n, dtype=np.int64))
+    geometry = _cpp.mesh.Geometry_float64(vertices, cells, shape, points, inputs)
     return _mesh.Mesh(_cpp.mesh.Mesh_float64(comm, topology, geometry), _Domain(element))
 
 

@@ -19,7 +19,7 @@ from mpi4py import MPI
 
 from .. import compat
 from ..typing import Array, Entities, Integers
-from . import grid_facets
+from . import grid_facets, grid_parts
 from .domain import Domain
 from .thresholds import DEFAULT, Thresholds
 from .transfer import GridTransfer, Transfer
@@ -72,15 +72,24 @@ def mesh(comm: MPI.Comm, size: Sequence[float], cells: Sequence[int], reflected:
         cells: cells each way, (d,), each cut into triangles or tetrahedra.
         reflected: axes along which the parts of the ranks are reflected.
     """
-    lower, upper = part_of_rank(cells, comm.size, comm.rank, reflected)
-    kind, points = {2: "triangle", 3: "tetrahedron"}[len(cells)], _points(comm, size, cells)
-    simplices = _simplices(lower, upper, cells)
-    if comm.size == 1:
-        facets, sides = grid_facets.facets(simplices, _steps(cells), len(points))
-        whole = compat.mesh_of_entities(comm, points, simplices.astype(np.int32), facets, sides)
-        if whole is not None:
-            return whole
-    return compat.simplex_mesh(comm, simplices, points, kind)
+    if not compat.TAKES_TOPOLOGY:
+        lower, upper = part_of_rank(cells, comm.size, comm.rank, reflected)
+        kind, simplices = {2: "triangle", 3: "tetrahedron"}[len(cells)], _simplices(lower, upper, cells)
+        return compat.simplex_mesh(comm, simplices, _points(comm, size, cells), kind)
+    parts = [part_of_rank(cells, comm.size, rank, reflected) for rank in range(comm.size)]
+    lower, upper = parts[comm.rank]
+    own, counts = grid_parts.vertices(comm, parts), upper - lower
+    numbers = _simplices(np.zeros_like(counts), counts, counts)
+    lines = [np.linspace(0.0, s, n + 1)[at] for s, n, at in zip(size, cells, own.places.T, strict=True)]
+    whole = comm.size == 1  # dolfinx alone can say which facets ranks share
+    return compat.mesh_of_cells(
+        comm,
+        np.column_stack(lines),
+        own.local[numbers],
+        index_map=(own.owned, own.ghosts, own.owners),
+        inputs=_flat(own.places, cells),
+        facets=grid_facets.facets(numbers, _steps(counts), len(own.local)) if whole else None,
+    )
 
 
 def part_of_rank(
@@ -114,7 +123,7 @@ def part_of_rank(
     return begin, end
 
 
-def _simplices(lower: Integers, upper: Integers, cells: Sequence[int]) -> Integers:
+def _simplices(lower: Integers, upper: Integers, cells: Sequence[int] | Integers) -> Integers:
     """The simplices of a part of the grid, (n, d+1), as numbers of the grid's vertices, x running fastest."""
     steps, corners = _steps(cells), np.zeros(1, np.int64)
     for begin, end, step in zip(lower, upper, steps, strict=True):
@@ -123,9 +132,14 @@ def _simplices(lower: Integers, upper: Integers, cells: Sequence[int]) -> Intege
     return np.asarray((corners[:, None, None] + paths).reshape(-1, len(cells) + 1))
 
 
-def _steps(cells: Sequence[int]) -> list[int]:
+def _steps(cells: Sequence[int] | Integers) -> list[int]:
     """From a vertex of the grid to the next one along each axis."""
-    return [math.prod(n + 1 for n in cells[:axis]) for axis in range(len(cells))]
+    return [math.prod(int(n) + 1 for n in cells[:axis]) for axis in range(len(cells))]
+
+
+def _flat(places: Integers, cells: Sequence[int]) -> Integers:
+    """The numbers of the grid's vertices, x running fastest, (n,)."""
+    return np.asarray(places @ np.array(_steps(cells), dtype=np.int64))
 
 
 def _points(comm: MPI.Comm, size: Sequence[float], cells: Sequence[int]) -> Array:
