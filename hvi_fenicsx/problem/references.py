@@ -93,9 +93,9 @@ class References:
             u: at this rank's vertices, in units of u0, (vertices, d).
             internal: the elastic forces there, likewise; only those at supports, contact and laws are looked at.
         """
-        held = self.moved.astype(np.float64)
+        held: Array = np.zeros(self.count)
         if np.any(self.moved):
-            held *= self.norms(np.where(self.holding, internal.ravel(), 0.0))
+            held = np.where(self.moved, self.norms(np.where(self.holding, internal.ravel(), 0.0)), 0.0)
         least = self.thresholds.least_force * self.displacements(u) * self.surface
         return np.maximum(np.maximum(self.load, held), least)
 

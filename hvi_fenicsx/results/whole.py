@@ -13,7 +13,7 @@ from ..errors import HviError
 from ..problem.cell_stress import mean_stress
 from ..report.html import render
 from ..report.pictures.draw import drawing
-from ..runtime.mpi import on_root
+from ..runtime.mpi import asleep_until_all, on_root
 from ..runtime.timing import Timer
 from ..solution import Solution
 from .folder import ResultFolder
@@ -47,7 +47,8 @@ def write_whole(
     """Write all files of a result but ``run.log``. Collective.
 
     Pictures and report are made from the other files; one that fails costs a line, not the run. A process of its own
-    draws, while the fields are written.
+    draws, while one rank writes the fields. Several ranks write them before, and then leave it the processors: beside
+    it each message between them would wait for one.
 
     Args:
         folder: being written.
@@ -65,8 +66,12 @@ def write_whole(
         sigma = None if solved is None else mean_stress(solution.problem.bulk, solved.u)
         record = {**write_basis(work, solution, folder.target, sigma), **given}
         on_root(comm, lambda: write_record(work, record))
-        with _drawn(work, tell, wanted=wanted.pictures and comm.rank == 0):
+        if comm.size > 1:
             write_fields(work, solution, sigma)
+        with _drawn(work, tell, wanted=wanted.pictures and comm.rank == 0):
+            if comm.size == 1:
+                write_fields(work, solution, sigma)
+        asleep_until_all(comm)
     with timer("output"):
         record["time"] = timer.report()
         on_root(comm, lambda: write_record(work, record))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 import time
 import traceback
@@ -104,7 +105,20 @@ def ended_together(comm: MPI.Comm) -> Iterator[None]:
 
 def _raised_by_all(comm: MPI.Comm) -> bool:
     """Whether all ranks come here, within a time."""
-    request, end = comm.Ibarrier(), time.monotonic() + _TOGETHER
+    return asleep_until_all(comm, _TOGETHER)
+
+
+def asleep_until_all(comm: MPI.Comm, seconds: float = math.inf) -> bool:
+    """Wait until all ranks come here, without the processor, which other processes may need. Collective.
+
+    Args:
+        comm: the ranks.
+        seconds: how long to wait at most.
+
+    Returns:
+        Whether all have come.
+    """
+    request, end = comm.Ibarrier(), time.monotonic() + seconds
     while not (done := request.Test()) and time.monotonic() < end:
         time.sleep(0.01)
     return bool(done)
