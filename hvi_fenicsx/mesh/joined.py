@@ -15,12 +15,12 @@ from dolfinx import mesh as dmesh
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from .. import compat
 from ..geometry import Curve
 from ..runtime.mpi import agree
 from ..typing import Array, Entities, Integers
-from . import nodes
+from . import joined_meshes, nodes
 from .domain import Domain
+from .joined_meshes import PlacedMesh
 from .transfer import Rows, Transfer
 
 
@@ -60,26 +60,23 @@ def joined(comm: MPI.Comm, bodies: Sequence[PlacedBody]) -> Domain:
         bodies: at least one, all of one dimension.
     """
     numbers = [_numbers(comm, bodies, i) for i in range(len(bodies))]
-    cells = [
-        found[compat.geometry_dofmap(b.domain.mesh)][: _cells(b)] for b, found in zip(bodies, numbers, strict=True)
-    ]
-    d = bodies[0].domain.dimension
-    points = [b.at(b.domain.mesh.geometry.x[: _nodes(b), :d]) for b in bodies]
-    kind = bodies[0].domain.mesh.topology.cell_name()
-    mesh = compat.simplex_mesh(comm, np.vstack(cells), np.vstack(points), kind)
+    mesh, cells = joined_meshes.joined(comm, [_placed(body) for body in bodies], numbers)
     sides: dict[str, Entities] = {}
-    for body, known in zip(bodies, numbers, strict=True):
-        sides |= {f"{body.name}.{side}": _facets(mesh, body, known, f) for side, f in body.domain.sides.items()}
+    regions: dict[str, Entities] = {}
+    for body, places in zip(bodies, cells, strict=True):
+        sides |= {f"{body.name}.{side}": _facets(mesh, body, places, f) for side, f in body.domain.sides.items()}
+        regions |= _regions(body, places)
     curves = {name: curve for body in bodies for name, curve in body.curves().items()}
-    domain = Domain.from_mesh(mesh, sides, _regions(mesh, bodies), curves)
+    domain = Domain.from_mesh(mesh, sides, regions, curves)
     if all(body.domain.coarsening is None for body in bodies):
         return domain
     return replace(domain, coarsening=lambda: _coarser(mesh, bodies, numbers))
 
 
-def _cells(body: PlacedBody) -> int:
-    """Cells that this rank owns."""
-    return int(body.domain.mesh.topology.index_map(body.domain.dimension).size_local)
+def _placed(body: PlacedBody) -> PlacedMesh:
+    """The body's mesh and its vertices in their place."""
+    mesh = body.domain.mesh
+    return PlacedMesh(mesh, body.at(mesh.geometry.x[:, : body.domain.dimension]))
 
 
 def _nodes(body: PlacedBody) -> int:
@@ -101,28 +98,23 @@ def _numbers(comm: MPI.Comm, bodies: Sequence[PlacedBody], number: int) -> Integ
     return np.asarray(before[rank] + every - starts[rank], dtype=np.int64)
 
 
-def _facets(mesh: dmesh.Mesh, body: PlacedBody, numbers: Integers, facets: Entities) -> Entities:
-    """The local facets of the common mesh that a body's facets are. Collective."""
-    d = body.domain.dimension
-    nodes = np.empty((0, d), dtype=np.int64)
-    if len(facets):  # dolfinx divides by their number
-        nodes = numbers[dmesh.entities_to_geometry(body.domain.mesh, d - 1, facets)]
-    found, _ = compat.local_entities(mesh, d - 1, nodes, np.zeros(len(nodes), dtype=np.int32))
-    return np.asarray(found, dtype=np.int32)
+def _facets(mesh: dmesh.Mesh, body: PlacedBody, cells: Entities, facets: Entities) -> Entities:
+    """The local facets of the common mesh that a body's facets are; a cell has its facets in the same order."""
+    d, topology = body.domain.dimension, body.domain.mesh.topology
+    for one in (topology, mesh.topology):
+        one.create_connectivity(d - 1, d)
+        one.create_connectivity(d, d - 1)
+    behind, own = topology.connectivity(d - 1, d), topology.connectivity(d, d - 1).array.reshape(-1, d + 1)
+    beside = behind.array[behind.offsets[facets]]
+    ways = np.argmax(own[beside] == facets[:, None], axis=1)
+    return np.asarray(mesh.topology.connectivity(d, d - 1).array.reshape(-1, d + 1)[cells[beside], ways])
 
 
-def _regions(mesh: dmesh.Mesh, bodies: Sequence[PlacedBody]) -> dict[str, Entities]:
-    """The local cells of the bodies and of their regions."""
-    counts = [_cells(body) for body in bodies]
-    offset = mesh.comm.exscan(sum(counts)) or 0
-    came_from = np.asarray(mesh.topology.original_cell_index)[: sum(counts)] - offset
-    found, first = {}, 0
-    for body, count in zip(bodies, counts, strict=True):
-        known: Mapping[str, Entities] = {f"{body.name}.{name}": c for name, c in body.domain.regions.items()}
-        for name, cells in {body.name: np.arange(count), **known}.items():
-            found[name] = np.flatnonzero(np.isin(came_from, cells[cells < count] + first)).astype(np.int32)
-        first += count
-    return found
+def _regions(body: PlacedBody, cells: Entities) -> dict[str, Entities]:
+    """The local cells of a body and of its regions in the common mesh."""
+    known: Mapping[str, Entities] = {f"{body.name}.{name}": c for name, c in body.domain.regions.items()}
+    every = {body.name: np.arange(len(cells), dtype=np.int32), **known}
+    return {name: np.sort(cells[found[found < len(cells)]]).astype(np.int32) for name, found in every.items()}
 
 
 def _coarser(
