@@ -19,7 +19,6 @@ TURN = np.array([[0.6, -0.8, 0.0], [0.8, 0.6, 0.0], [0.0, 0.0, 1.0]])
 def test_sides_and_bodies_are_where_their_bodies_are(size, cells, takes_topology, monkeypatch):
     monkeypatch.setattr(compat, "TAKES_TOPOLOGY", takes_topology)
     d = len(size)
-    both = ("lower", cells, 0.0, np.eye(d)), ("upper", [2 * n for n in cells], 3.0, TURN[:d, :d])
     bodies = [
         PlacedBody(name=name, domain=blocks.block(MPI.COMM_WORLD, size, n), origin=np.full(d, at), rotation=turn)
         for name, n, at, turn in (
