@@ -18,11 +18,11 @@ from .style import BLUE, GREEN, GREY, HEADING, INK, ORANGE, VERMILION, area, fig
 NAME = "path.png"
 _CAPTION = (
     "The load path: force (under a moment the load factor) over mean displacement of the driven part. Solid: stable; "
-    "dashed: unstable, which a test cannot hold; dotted: jumps; dots: events on the way."
+    "dashed: unstable, which a test cannot hold; dotted: jumps; dots: events on the way, some where they are many."
 )
 _ENTRIES = 0.35
 """Room for the second line of the legend, inches."""
-_DOTS = 400
+_DOTS = 40
 """So many events have a dot at most."""
 
 
