@@ -11,7 +11,7 @@ from dolfinx import mesh as dmesh
 from mpi4py import MPI
 
 from .. import compat
-from ..typing import Entities, Integers
+from ..typing import Entities
 from . import gmsh_arrays
 from .gmsh_arrays import MeshArrays
 
@@ -34,11 +34,11 @@ def session(comm: MPI.Comm) -> Iterator[Any]:
 def distribute(
     comm: MPI.Comm, found: MeshArrays | None, dimension: int, names: Mapping[int, Mapping[str, int]]
 ) -> tuple[dmesh.Mesh, dict[str, Entities], dict[str, Entities]]:
-    """A mesh that one rank has, shared among the ranks. Collective.
+    """A mesh that rank 0 has, shared among the ranks. Collective.
 
     Args:
         comm: the ranks.
-        found: the mesh; None on the ranks that do not have it.
+        found: the mesh; None on the other ranks.
         dimension: of the cells.
         names: physical groups of facets and of cells with their tags, by dimension; on all ranks.
 
@@ -48,13 +48,12 @@ def distribute(
     found = found or MeshArrays.empty(dimension)
     kind = "triangle" if dimension == 2 else "tetrahedron"
     mesh = compat.simplex_mesh(comm, found.cells, found.points[:, :dimension], kind, spread=True)
-    regions = _by_name(mesh, dimension, found.cells, found.cell_tags, names)
-    sides = _by_name(mesh, dimension - 1, found.facets, found.facet_tags, names)
-    return mesh, sides, regions
+    cells = np.arange(mesh.topology.index_map(dimension).size_local, dtype=np.int32)
+    tags = comm.bcast(found.cell_tags)[mesh.topology.original_cell_index[cells]]
+    local, marks = compat.local_entities(mesh, dimension - 1, found.facets, found.facet_tags)
+    return mesh, _by_name(local, marks, names[dimension - 1]), _by_name(cells, tags, names[dimension])
 
 
-def _by_name(
-    mesh: dmesh.Mesh, dimension: int, nodes: Integers, tags: Entities, names: Mapping[int, Mapping[str, int]]
-) -> dict[str, Entities]:
-    local, found = compat.local_entities(mesh, dimension, nodes, tags)
-    return {name: np.unique(local[found == tag]) for name, tag in names[dimension].items()}
+def _by_name(entities: Entities, tags: Entities, names: Mapping[str, int]) -> dict[str, Entities]:
+    """Local entities by the names of their tags."""
+    return {name: np.unique(entities[tags == tag]) for name, tag in names.items()}
