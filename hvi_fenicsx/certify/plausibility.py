@@ -153,8 +153,7 @@ def _straightened(problem: Problem) -> Iterator[str]:
     """A mesh of degree 2 whose cells are straight although curves are known."""
     domain = problem.domain
     straight = nodes.degree(problem.space) == 2 and problem.space.mesh is domain.mesh
-    in_space = bool(problem.interfaces) and domain.dimension == 3  # where bodies that meet are polyhedra, as documented
-    if straight and domain.curves and not in_space:
+    if straight and domain.curves:
         sides = ", ".join(repr(name) for name in sorted(domain.curves))
         reason, remedy = f"the mesh is too coarse for its curve ({sides}): cells would turn over", "use smaller cells"
         if not domain.bends:

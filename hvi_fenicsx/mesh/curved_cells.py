@@ -25,24 +25,17 @@ _MORE_SWEEPS = 2
 """Projections, from one side to the next, that bring a node of two sides onto both; each gains some digits."""
 
 
-def mesh_of(
-    domain: Domain, degree: int, straight: Collection[str] = (), thresholds: Thresholds = DEFAULT
-) -> dmesh.Mesh:
+def mesh_of(domain: Domain, degree: int, thresholds: Thresholds = DEFAULT) -> dmesh.Mesh:
     """The mesh that displacements of a degree live on. Collective.
 
     Args:
         domain: the body.
         degree: of the elements; at degree 1 cells are straight.
-        straight: sides that stay as they are meshed.
         thresholds: how much a cell may be bent; where one would be bent more, the whole mesh is straight.
     """
-    curved, flattened = set(domain.curves) - set(straight), set(domain.curves) & set(straight)
-    in_the_way = domain.dimension == 3 and flattened  # in space sides share edges
-    if degree == 1 or not (curved and domain.bends) or in_the_way:
+    if degree == 1 or not (domain.curves and domain.bends):
         return domain.mesh
-    return domain.once(
-        "curved cells", frozenset(curved), lambda: _curved(domain, sorted(curved), thresholds.least_jacobian)
-    )
+    return domain.once("curved cells", None, lambda: _curved(domain, sorted(domain.curves), thresholds.least_jacobian))
 
 
 def _curved(domain: Domain, names: Collection[str], least: float) -> dmesh.Mesh:

@@ -68,17 +68,10 @@ def compose(domain: Domain, model: Model, thresholds: Thresholds = DEFAULT) -> P
     facets = part_facets.find(domain, model.parts, effects)
     sizes, evaluate = scaling.sizes(domain.length, effects), functools.partial(_evaluation, domain, facets)
     scales = scaling.choose(sizes, domain.dimension, effects, evaluate, thresholds)
-    context = DomainForms(domain, facets, scales, effects, model.degree, _straight(domain, model))
+    context = DomainForms(domain, facets, scales, effects, model.degree)
     contributions = [PlacedContribution(where, effect, effect.contribute(context, where)) for where, effect in effects]
     implausible = [f"{scaling.place(e)}: {text}" for e in effects for text in e[1].implausible(evaluate(e), sizes)]
     return _problem(context, scales, contributions, model, tuple(implausible), thresholds)
-
-
-def _straight(domain: Domain, model: Model) -> set[str]:
-    """The sides that stay as they are meshed: where two bodies meet in space, facets intersect as triangles."""
-    if domain.dimension == 2:
-        return set()
-    return {side for sides in model.interfaces.values() for side in (sides.first, sides.second)}
 
 
 def _evaluation(domain: Domain, facets: Mapping[str, Entities], placed: Placed) -> Evaluate:

@@ -58,7 +58,7 @@ def _surface(context: DomainForms, where: str) -> Surface:
     facets, degree = context.part_facets[where], nodes.degree(context.space)
     return context.domain.once(
         f"surface {where} of degree {degree}",
-        (facets.tobytes(), context.straight),
+        facets.tobytes(),
         lambda: contact_surface.make_surface(
             where,
             context.space,

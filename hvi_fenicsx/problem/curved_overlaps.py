@@ -15,7 +15,7 @@ import numpy as np
 from typing_extensions import override
 
 from ..typing import Array, Integers
-from . import facet_overlaps
+from . import curved_shapes, facet_overlaps
 from .facet_overlaps import Facets, OverlapPoints, Overlaps
 from .thresholds import DEFAULT, Thresholds
 
@@ -50,7 +50,7 @@ class CurvedOverlaps(Overlaps):
         s, ends = straight.on_first[:, 1], self.on_first[each, :, 1]
         t = _where(self.other[each], _place(self.own[each], s))
         part = np.tile(shares, len(chosen)) * (ends[:, 1] - ends[:, 0])
-        speed = np.linalg.norm(slopes(self.nodes[each], s), axis=1)
+        speed = np.linalg.norm(curved_shapes.slopes(self.nodes[each], straight.on_first)[:, 0], axis=1)
         return replace(straight, weights=part * speed, on_second=np.column_stack([1.0 - t, t]))
 
 
@@ -78,39 +78,6 @@ def in_plane(first: Facets, second: Facets, thresholds: Thresholds = DEFAULT) ->
         own=own,
         other=other,
     )
-
-
-def normals(first: Facets, points: OverlapPoints) -> Array:
-    """The outward unit normals of the first side at points, (p, 2).
-
-    Args:
-        first: the side.
-        points: on its intersections with the other one.
-    """
-    slope = slopes(first.points[points.first], points.on_first[:, 1])
-    across = np.column_stack([slope[:, 1], -slope[:, 0]]) / np.linalg.norm(slope, axis=1, keepdims=True)
-    sign = np.sign(np.sum(across * first.normals[points.first], axis=1, keepdims=True))
-    return np.asarray(sign * across)
-
-
-def frames(normals: Array) -> Array:
-    """Normals and the tangents a quarter turn on from these, (..., 2, 2).
-
-    Args:
-        normals: unit vectors, (..., 2).
-    """
-    return np.stack([normals, np.stack([-normals[..., 1], normals[..., 0]], axis=-1)], axis=-2)
-
-
-def slopes(nodes: Array, s: Array) -> Array:
-    """The derivatives of parabolas by the reference coordinate, m, (p, 2).
-
-    Args:
-        nodes: both ends and the middle of each, m, (p, 3, 2).
-        s: the coordinates, from 0 to 1, (p,).
-    """
-    start, end, middle = np.moveaxis(nodes, 1, 0)
-    return np.asarray(end - start + 4.0 * (1.0 - 2.0 * s)[:, None] * (middle - (start + end) / 2))
 
 
 def _along(first: Facets, facets: Integers, points: Array) -> Array:

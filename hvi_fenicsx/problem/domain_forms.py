@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import dolfinx
@@ -33,12 +33,11 @@ class DomainForms:
         scales: Scales,
         effects: Sequence[Placed],
         degree: int = 1,
-        straight: Collection[str] = (),
     ) -> None:
         self.domain, self.dimension = domain, domain.dimension
         self.length, self.stress, self.modulus = scales.length, scales.stress, scales.modulus
-        self.space = _space(domain, degree, straight)
-        self.mesh, self.straight = self.space.mesh, frozenset(straight)
+        self.space = _space(domain, degree)
+        self.mesh = self.space.mesh
         self.trial, self.test = ufl.TrialFunction(self.space), ufl.TestFunction(self.space)
         self.normal = ufl.FacetNormal(self.mesh)
         self.materials = [placed for placed in effects if placed[1].place is Place.MATERIAL]
@@ -118,12 +117,12 @@ class DomainForms:
         return measure(ids[part])
 
 
-def _space(domain: Domain, degree: int, straight: Collection[str]) -> fem.FunctionSpace:
+def _space(domain: Domain, degree: int) -> fem.FunctionSpace:
     """The displacements, one space for all problems of a degree on a shared mesh. Collective."""
     return domain.once(
         f"space of degree {degree}",
-        frozenset(straight),
-        lambda: displacement_space(curved_cells.mesh_of(domain, degree, straight), degree),
+        None,
+        lambda: displacement_space(curved_cells.mesh_of(domain, degree), degree),
     )
 
 

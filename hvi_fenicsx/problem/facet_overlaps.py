@@ -51,6 +51,14 @@ class Facets:
         return found if self.degree == 2 else []
 
     @property
+    def hull(self) -> Array:
+        """Points whose convex hull holds each facet, curved or not, m, (f, n, d): Bézier's points."""
+        found = self.points.copy()
+        for node, ends in enumerate(self.edges, found.shape[2]):
+            found[:, node] = 2 * found[:, node] - found[:, ends].sum(axis=1) / 2
+        return found
+
+    @property
     def positions(self) -> Array:
         """The coefficients of the positions of the nodes, m, (f, n, d)."""
         found = self.points.copy()

@@ -7,6 +7,8 @@ the triangle (0, 0), (1, 0), (0, 1).
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 import numpy.typing as npt
 import shapely
@@ -18,7 +20,7 @@ from .facet_overlaps import Facets, Overlaps
 from .thresholds import DEFAULT, Thresholds
 
 _Shapes = npt.NDArray[np.object_]
-_CORNERS = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
+CORNERS = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
 _ANGLES = np.array([np.pi / 2, np.pi / 4, np.pi / 4])
 
 
@@ -30,22 +32,67 @@ def in_space(first: Facets, second: Facets, thresholds: Thresholds = DEFAULT) ->
         second: the other one.
         thresholds: which facets face each other, and what is rounding.
     """
-    number, other = _candidates(first, second, thresholds)
-    triangles, distance = _projected(first, second, number, other)
-    over = np.all((triangles.min(axis=1) < 1.0) & (triangles.max(axis=1) > 0.0), axis=1)
-    number, other, triangles, distance = number[over], other[over], triangles[over], distance[over]
-    clipped = shapely.intersection(_polygons(_CORNERS[None])[0], _polygons(triangles))
-    pieces, of_pair = shapely.get_parts(clipped, return_index=True)
+    number, other = candidates(first, second, thresholds)
+    frames = frames_of(first)[number]
+    local = in_frames(second.corners[other], first.corners[number, 0], frames)
+    clipped = clip(local[:, :, :2], number, np.abs(local[:, :, 2].mean(axis=1)), len(first.nodes), thresholds)
+    pair = clipped.outline
+    return Overlaps(
+        first=number[pair],
+        second=other[pair],
+        areas=np.abs(twice_areas(clipped.corners)) * first.areas[number[pair]],
+        on_first=barycentric(np.broadcast_to(CORNERS, clipped.corners.shape), clipped.corners),
+        on_second=barycentric(local[pair, :, :2], clipped.corners),
+        covered=clipped.covered,
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Clipped:
+    """What convex outlines have in common with the first side's facets, cut into triangles (k of them).
+
+    Attributes:
+        corners: in the coordinates of the first side's facet, (k, 3, 2).
+        outline: the outline of each, (k,).
+        covered: whether they fill the angle at each corner of the first side's facets, (f, 3).
+    """
+
+    corners: Array
+    outline: Integers
+    covered: Mask
+
+
+def clip(outlines: Array, number: Integers, distance: Array, count: int, thresholds: Thresholds) -> Clipped:
+    """Outlines clipped by the first side's facets, without what lies behind nearer ones.
+
+    Args:
+        outlines: triangles in the coordinates of the first side's facets, (p, 3, 2).
+        number: the facet of each, (p,).
+        distance: from it, (p,).
+        count: of the first side's facets, f.
+        thresholds: what is rounding.
+    """
+    over = np.flatnonzero(np.all((outlines.min(axis=1) < 1.0) & (outlines.max(axis=1) > 0.0), axis=1))
+    clipped = shapely.intersection(_polygons(CORNERS[None])[0], _polygons(outlines[over]))
+    pieces, of_outline = shapely.get_parts(clipped, return_index=True)
     solid = (shapely.get_type_id(pieces) == shapely.GeometryType.POLYGON) & (shapely.area(pieces) > thresholds.sliver)
-    pieces, of_pair = pieces[solid], of_pair[solid]
-    near = _nearest(pieces, number[of_pair], distance[of_pair])
-    pieces, of_pair = pieces[near], of_pair[near]
-    covered = _covered(pieces, number[of_pair], len(first.nodes), thresholds)
-    return _triangles(first, pieces, (number[of_pair], other[of_pair]), triangles[of_pair], covered)
+    pieces, of_outline = pieces[solid], over[of_outline[solid]]
+    near = _nearest(pieces, number[of_outline], distance[of_outline])
+    pieces, of_outline = pieces[near], of_outline[near]
+    corners, of_piece = _fans(pieces)
+    large = np.abs(twice_areas(corners)) > thresholds.sliver
+    covered = _covered(pieces, number[of_outline], count, thresholds)
+    return Clipped(corners=corners[large], outline=of_outline[of_piece[large]], covered=covered)
 
 
-def _candidates(first: Facets, second: Facets, thresholds: Thresholds) -> tuple[Integers, Integers]:
-    """Pairs of facets that may lie over each other: the first side's facets, the second's, (p,) each."""
+def candidates(first: Facets, second: Facets, thresholds: Thresholds) -> tuple[Integers, Integers]:
+    """Pairs of facets that may lie over each other: the first side's facets, the second's, (p,) each.
+
+    Args:
+        first: the side onto which is projected.
+        second: the other one.
+        thresholds: which facets face each other.
+    """
     (centres, radii), (others, other_radii) = _balls(first), _balls(second)
     normals, group = np.unique(np.round(first.normals, 12), axis=0, return_inverse=True)
     order = np.argsort(group.ravel(), kind="stable")
@@ -65,16 +112,25 @@ def _candidates(first: Facets, second: Facets, thresholds: Thresholds) -> tuple[
 
 def _balls(facets: Facets) -> tuple[Array, Array]:
     """Centres (f, 3) and radii (f,) of balls around facets."""
-    centres = facets.corners.mean(axis=1)
-    return centres, np.linalg.norm(facets.corners - centres[:, None], axis=2).max(axis=1)
+    centres, hull = facets.corners.mean(axis=1), facets.hull
+    return centres, np.linalg.norm(hull - centres[:, None], axis=2).max(axis=1)
 
 
-def _projected(first: Facets, second: Facets, number: Integers, other: Integers) -> tuple[Array, Array]:
-    """The second side's facets in the coordinates of the first's (p, 3, 2), and how far they are from it (p,)."""
-    start = first.corners[:, :1]
-    frames = np.linalg.inv(np.concatenate([first.corners[:, 1:] - start, first.normals[:, None]], axis=1))
-    local = np.einsum("pvi,pij->pvj", second.corners[other] - start[number], frames[number])
-    return local[:, :, :2], np.abs(local[:, :, 2].mean(axis=1))
+def frames_of(first: Facets) -> Array:
+    """Of the first side's facets: distances from the first corner times these are its own coordinates, (f, 3, 3)."""
+    sides = first.corners[:, 1:] - first.corners[:, :1]
+    return np.asarray(np.linalg.inv(np.concatenate([sides, first.normals[:, None]], axis=1)))
+
+
+def in_frames(points: Array, starts: Array, frames: Array) -> Array:
+    """Points in the coordinates of facets, the third along the normal, (p, n, 3).
+
+    Args:
+        points: m, (p, n, 3).
+        starts: the first corners of the facets, m, (p, 3).
+        frames: of the facets (:func:`frames_of`), (p, 3, 3).
+    """
+    return np.asarray(np.einsum("pvi,pij->pvj", points - starts[:, None], frames))
 
 
 def _polygons(corners: Array) -> _Shapes:
@@ -110,7 +166,7 @@ def _covered(pieces: _Shapes, number: Integers, count: int, thresholds: Threshol
     before = np.where(place[at] > 0, at - 1, at + sizes[polygon[at]] - 2)
     angles = _angles(corners[before] - corners[at], corners[at + 1] - corners[at])
     filled = np.zeros((count, 3))
-    for corner, place_of in enumerate(_CORNERS):
+    for corner, place_of in enumerate(CORNERS):
         near = np.linalg.norm(corners[at] - place_of, axis=1) <= thresholds.uncovered
         np.add.at(filled[:, corner], number[polygon[at[near]]], angles[near])
     return np.asarray(filled >= (1.0 - thresholds.uncovered) * _ANGLES)
@@ -122,26 +178,20 @@ def _angles(one: Array, other: Array) -> Array:
     return np.asarray(np.abs(np.arctan2(cross, np.sum(one * other, axis=1))))
 
 
-def _triangles(
-    first: Facets, pieces: _Shapes, pairs: tuple[Integers, Integers], triangles: Array, covered: Mask
-) -> Overlaps:
-    """Convex polygons as intersections, each a fan of triangles about its first corner."""
+def _fans(pieces: _Shapes) -> tuple[Array, Integers]:
+    """Convex polygons as fans of triangles about their first corners (k, 3, 2), and the polygon of each (k,)."""
     corners, polygon, place = _rings(pieces)
     sizes = np.bincount(polygon, minlength=len(pieces))
     at = np.flatnonzero((place > 0) & (place < sizes[polygon] - 2))
-    fan, of_piece = np.stack([corners[at - place[at]], corners[at], corners[at + 1]], axis=1), polygon[at]
-    areas = np.abs(np.linalg.det(fan[:, 1:] - fan[:, :1])) * first.areas[pairs[0][of_piece]]
-    return Overlaps(
-        first=pairs[0][of_piece],
-        second=pairs[1][of_piece],
-        areas=areas,
-        on_first=_barycentric(np.broadcast_to(_CORNERS, fan.shape), fan),
-        on_second=_barycentric(triangles[of_piece], fan),
-        covered=covered,
-    )
+    return np.stack([corners[at - place[at]], corners[at], corners[at + 1]], axis=1), polygon[at]
 
 
-def _barycentric(triangles: Array, points: Array) -> Array:
+def twice_areas(triangles: Array) -> Array:
+    """Determinants of triangles (n, 3, 2), in parts of a facet's area 1/2, (n,)."""
+    return np.asarray(np.linalg.det(triangles[:, 1:] - triangles[:, :1]))
+
+
+def barycentric(triangles: Array, points: Array) -> Array:
     """Barycentric coordinates of points (n, q, 2) in triangles (n, 3, 2), (n, q, 3)."""
     sides = triangles[:, 1:] - triangles[:, :1]
     found = (points - triangles[:, :1]) @ np.linalg.inv(sides)

@@ -42,7 +42,7 @@ class Pair:
         sides: what the scene says of it.
         first: the facets of the first side.
         second: those of the second.
-        curved: whether facets are curves through their nodes, else segments or triangles.
+        curved: whether facets are curved through their nodes, else segments or triangles.
     """
 
     name: str
@@ -53,13 +53,13 @@ class Pair:
 
     def overlaps(self, thresholds: Thresholds) -> Overlaps:
         """The intersections of the facets of both sides."""
-        if self.curved:
-            return curved_overlaps.in_plane(self.first, self.second, thresholds)
         if self.first.points.shape[2] == 2:
-            return facet_overlaps.in_plane(self.first, self.second, thresholds)
-        from . import facet_polygons  # shapely, which plane bodies do not need
+            flat = curved_overlaps if self.curved else facet_overlaps
+            return flat.in_plane(self.first, self.second, thresholds)
+        from . import curved_polygons, facet_polygons  # shapely, which plane bodies do not need
 
-        return facet_polygons.in_space(self.first, self.second, thresholds)
+        in_space = curved_polygons.in_space if self.curved else facet_polygons.in_space
+        return in_space(self.first, self.second, thresholds)
 
     def covered(self, overlaps: Overlaps) -> Mask:
         """Whether each node of the first side lies over the second, a midpoint with both ends of its edge, (f, n)."""

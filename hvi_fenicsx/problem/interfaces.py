@@ -15,7 +15,7 @@ from scipy.sparse import csr_array
 
 from ..runtime.mpi import agree
 from ..typing import Array, Entities, Integers
-from . import curved_overlaps, dual_basis, interface_checks, interface_sides
+from . import curved_shapes, dual_basis, interface_checks, interface_sides
 from .contact_surface import Surface, tangents
 from .domain_forms import DomainForms
 from .dual_basis import RelativeRows
@@ -39,7 +39,7 @@ class Interface:
         overlaps: their intersections.
         sides: what the scene says of it.
         members: local vertices of both sides.
-        curved: whether facets are curves through their nodes.
+        curved: whether facets are curved through their nodes.
     """
 
     name: str
@@ -149,7 +149,7 @@ def _summed_normals(pair: Pair, overlaps: Overlaps, rows: RelativeRows) -> tuple
         return sums, rows.weights
     points, sizes = overlaps.points(pair.first.degree), np.zeros(len(sums))
     functions = points.weights[:, None] * pair.first.functions(points.on_first)
-    normals = curved_overlaps.normals(pair.first, points)
+    normals = curved_shapes.normals(pair.first, points)
     np.add.at(sums, pair.first.nodes[points.first], functions[:, :, None] * normals[:, None])
     np.add.at(sizes, pair.first.nodes[points.first], functions)
     ratio = np.divide(np.linalg.norm(sums, axis=1), sizes, out=np.ones_like(sizes), where=sizes > 0.0)

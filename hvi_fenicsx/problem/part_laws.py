@@ -197,7 +197,7 @@ def _scaled(law: Superpotential, scales: Scales, place: str) -> Superpotential:
 def _density(context: DomainForms) -> fem.Function:
     """Room for the tractions of any law, which are written before each use. Collective."""
     name = f"tractions of degree {nodes.degree(context.space)}"
-    return context.domain.once(name, context.straight, lambda: fem.Function(context.space, name="clarke_derivative"))
+    return context.domain.once(name, None, lambda: fem.Function(context.space, name="clarke_derivative"))
 
 
 def _residual(context: DomainForms, where: Surface, density: fem.Function) -> fem.Form:

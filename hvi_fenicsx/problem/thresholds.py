@@ -26,6 +26,9 @@ class Thresholds:
         facing: cosine of the largest angle between the normal of a facet and that against the one that it meets.
         sliver: part of a facet that is too little to lie over another one.
         uncovered: part of a facet at its end that may lie beyond the other side.
+        rim: part of a facet by which the rims of curved sides may be apart and are still one.
+        rim_parts: chords that stand for a curved edge at the end of a side.
+        curved_degree: of the quadrature where curved facets lie over each other in space.
         overlap: part of a facet's length by which bodies may overlap: curved sides that touch do so by less.
         least_force: forces that are a smaller part of stiffness times displacement are not judged finer.
         travel: a body that travels so many times its deformation has stresses without this travel: to take it off
@@ -45,6 +48,9 @@ class Thresholds:
     facing: float = 0.5
     sliver: float = 1e-12
     uncovered: float = 1e-6
+    rim: float = 0.01
+    rim_parts: int = 8
+    curved_degree: int = 6
     overlap: float = 0.1
     least_force: float = 1e-5
     travel: float = 100.0

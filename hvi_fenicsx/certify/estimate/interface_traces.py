@@ -15,7 +15,7 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from ...mesh import nodes
-from ...problem import curved_overlaps, dual_basis
+from ...problem import curved_shapes, dual_basis
 from ...problem.contact_surface import Surface
 from ...problem.facet_overlaps import Facets
 from ...problem.interfaces import Interface
@@ -89,7 +89,7 @@ class InterfacePoints:
         functions: the basis functions of the first side's nodes at the points, (f, q, n).
         hats: the functions that are linear from node to node, (f, q, n).
         at_ends: the basis functions at the corners of the intersections, (f, d, n).
-        frames: normal and tangent of the first side at the points where facets are curved, else None, (f, q, d, d).
+        normals: of the first side at the points where facets are curved, else None, (f, q, d).
         sides: the bubbles of both sides.
         spread: what the first side's nodes carry, on its facets.
     """
@@ -104,8 +104,8 @@ class InterfacePoints:
         self.facets = overlaps.first[own], overlaps.second[own]
         places = [on.reshape(*self.weights.shape, d) for on in (points.on_first, points.on_second)]
         first = interface.first
-        turned = curved_overlaps.frames(curved_overlaps.normals(first, points)) if interface.curved else None
-        self.frames = None if turned is None else turned.reshape(*self.weights.shape, d, d)
+        normals = curved_shapes.normals(first, points) if interface.curved else None
+        self.normals = None if normals is None else normals.reshape(*self.weights.shape, d)
         self.degree, flat = first.degree, places[0].reshape(-1, d)
         self.shapes = [_shapes(self.degree, at) for at in places]
         self.functions, self.at_ends = first.functions(places[0]), first.functions(overlaps.on_first[own])
@@ -138,15 +138,23 @@ class InterfaceTrace:
         self._surface, self._directions, self.weights = surface, directions, points.weights
         own = points.spread.of_carriers(directions)
         self._rotations = tangent_alignment.rotations(own, points.spread.reference)
-        self._vectors = self._turned(directions)
+        self._vectors = self._turned(tangent_alignment.turned(self._rotations, own))
 
-    def _turned(self, directions: Array) -> Array:
-        """The directions at the points, (f, q, k, d); on curved facets they turn as the facets do. Collective."""
-        frames = self._points.frames
-        if frames is not None:
-            directions = directions @ curved_overlaps.frames(self._surface.normals).transpose(0, 2, 1)
-        found = self._components(self._points.functions, directions)
-        return found if frames is None else np.asarray(found @ frames)
+    def _turned(self, own: Array) -> Array:
+        """Directions of carriers (facets, n, k, d) at the points, (f, q, k, d). Collective.
+
+        On curved facets they turn as the facets do: they are interpolated as those of one carrier, turned with the
+        normals.
+        """
+        facets, normals = self._points.facets[0], self._points.normals
+        if normals is None:
+            return self._on_facets(self._points.functions, own)
+        spread = self._points.spread
+        at_carriers = spread.of_carriers(self._surface.normals)
+        one = at_carriers[np.arange(len(own)), spread.reference]
+        alike = own @ tangent_alignment.between(np.broadcast_to(one[:, None], at_carriers.shape), at_carriers)
+        back = tangent_alignment.between(normals, np.broadcast_to(one[facets, None], normals.shape))
+        return np.asarray(self._on_facets(self._points.functions, alike) @ back)
 
     def interpolated(self, values: Array) -> Array:
         """The function with coefficients at the owned nodes (m, k) at the points, (f, q, k). Collective."""
@@ -186,11 +194,14 @@ class InterfaceTrace:
         return np.asarray(functions @ spread.on_facets(spread.of_carriers(values))[self._points.facets[0]])
 
     def _components(self, functions: Array, values: Array) -> Array:
-        """Sums of functions (f, q, n) times components, or directions, at the owned nodes (m, k, ...). Collective."""
+        """Sums of functions (f, q, n) times components at the owned nodes (m, k). Collective."""
         spread = self._points.spread
-        along = tangent_alignment.turned(self._rotations, spread.of_carriers(values))
-        on_facets = spread.on_facets(along.reshape(*along.shape[:2], -1))[self._points.facets[0]]
-        return np.asarray(functions @ on_facets).reshape(*functions.shape[:2], *along.shape[2:])
+        return self._on_facets(functions, tangent_alignment.turned(self._rotations, spread.of_carriers(values)))
+
+    def _on_facets(self, functions: Array, values: Array) -> Array:
+        """Sums of functions (f, q, n) times values of carriers (facets, n, k, ...)."""
+        found = self._points.spread.on_facets(values.reshape(*values.shape[:2], -1))[self._points.facets[0]]
+        return np.asarray(functions @ found).reshape(*functions.shape[:2], *values.shape[2:])
 
     def of_bubbles(self, e: fem.Function) -> Array:
         """The relative values of bubbles, (f, q, k). Collective."""

@@ -15,14 +15,13 @@ from dolfinx import fem, la
 
 from ...laws import Length, Superpotential
 from ...mesh import nodes
-from ...problem import curved_overlaps
 from ...problem.contact_surface import Surface
 from ...problem.problem import Problem
 from ...typing import Array, Mask
 from ..contact_state import ContactState
 from ..law_state import LawState
 from ..placed_forces import traction
-from . import bubbles
+from . import bubbles, tangent_alignment
 from .contact_facets import PartTrace, local_blocks
 from .interface_traces import InterfacePoints, InterfaceTrace
 from .thresholds import DEFAULT, Thresholds
@@ -242,7 +241,7 @@ class LawTraces:
             force -= np.einsum("mk,mkd->md", law.carried, law.term.directions)
         axes = np.tile(np.eye(force.shape[1]), (len(force), 1, 1))
         if (interface := self.problem.interface_of(state.surface)) is not None and interface.curved:
-            axes = curved_overlaps.frames(state.surface.normals)
+            axes = tangent_alignment.frames(state.surface)
         points = self.part(state.surface, axes)
         return points.tested(points.interpolated_components(np.einsum("mkd,md->mk", axes, force)))[0]
 

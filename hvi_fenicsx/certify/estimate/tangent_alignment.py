@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...problem.contact_surface import Surface
 from ...typing import Array, Integers
 
 
@@ -49,3 +50,20 @@ def turned_back(rotations: Array, values: Array) -> Array:
         values: the components along the directions of one node of each facet, (f, n, k).
     """
     return np.asarray(np.einsum("fnkl,fnl->fnk", rotations, values))
+
+
+def frames(surface: Surface) -> Array:
+    """Normal and tangents of the nodes of a part, (m, d, d)."""
+    return np.concatenate([surface.normals[:, None], surface.tangents], axis=1)
+
+
+def between(one: Array, other: Array) -> Array:
+    """The rotations that take unit vectors to others the shortest way, (..., d, d); these must not be opposite.
+
+    Args:
+        one: unit vectors, (..., d).
+        other: unit vectors, (..., d).
+    """
+    both, cosine = one + other, np.sum(one * other, axis=-1)[..., None, None]
+    bent = both[..., :, None] * both[..., None, :] / (1.0 + cosine)
+    return np.asarray(np.eye(one.shape[-1]) - bent + 2.0 * other[..., :, None] * one[..., None, :])
