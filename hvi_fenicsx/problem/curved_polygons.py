@@ -17,7 +17,7 @@ import numpy as np
 from typing_extensions import override
 
 from ..typing import Array, Integers, Mask
-from . import curved_shapes, facet_polygons
+from . import curved_shapes, facet_polygons, triangle_clipping
 from .facet_overlaps import Facets, OverlapPoints, Overlaps
 from .thresholds import DEFAULT, Thresholds
 
@@ -56,7 +56,7 @@ class CurvedPolygons(Overlaps):
         flat = super().sampled(rule, shares, chosen)
         each = np.repeat(chosen, len(rule))
         at = curved_shapes.places(self.own[each], flat.on_first)
-        part = np.outer(facet_polygons.twice_areas(self.on_first[chosen][:, :, 1:]), shares / 2).ravel()
+        part = np.outer(triangle_clipping.twice_areas(self.on_first[chosen][:, :, 1:]), shares / 2).ravel()
         size = np.linalg.norm(curved_shapes.across(curved_shapes.slopes(self.nodes[each], flat.on_first)), axis=1)
         return replace(flat, weights=np.abs(part) * size, on_second=_where(self.others[each], at, flat.on_second))
 
@@ -74,12 +74,12 @@ def in_space(first: Facets, second: Facets, thresholds: Thresholds = DEFAULT) ->
     outlines = _outlines(first, second, pairs, pair, of_second, thresholds.rim)
     one_rim = replace(thresholds, uncovered=max(thresholds.uncovered, thresholds.rim))
     clipped = facet_polygons.clip(outlines, pairs.number[pair], pairs.distance[pair], len(first.nodes), one_rim)
-    own, part = pair[clipped.outline], facet_polygons.barycentric(outlines[clipped.outline], clipped.corners)
+    own, part = pair[clipped.outline], triangle_clipping.barycentric(outlines[clipped.outline], clipped.corners)
     number, x, y = pairs.number[own], *np.moveaxis(clipped.corners, 2, 0)
     return CurvedPolygons(
         first=number,
         second=pairs.other[own],
-        areas=np.abs(facet_polygons.twice_areas(clipped.corners)) * first.areas[number],
+        areas=np.abs(triangle_clipping.twice_areas(clipped.corners)) * first.areas[number],
         on_first=np.stack([1.0 - x - y, x, y], axis=2),
         on_second=part @ of_second[clipped.outline],
         covered=clipped.covered,

@@ -1,4 +1,4 @@
-"""Where the triangles of two sides in space lie over each other: polygons, clipped by GEOS (shapely).
+"""Where the triangles of two sides in space lie over each other: polygons (:mod:`.triangle_clipping`).
 
 As in the plane (:mod:`.facet_overlaps`), a point of the second side belongs to the point of the first that it is
 projected onto along the first facet's normal. Each facet of the first side has coordinates of its own, in which it is
@@ -10,17 +10,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
-import shapely
 from scipy.spatial import KDTree
 
 from ..typing import Array, Integers, Mask
+from . import triangle_clipping
 from .contact_surface import tangents
 from .facet_overlaps import Facets, Overlaps
 from .thresholds import DEFAULT, Thresholds
+from .triangle_clipping import CORNERS, Polygons, barycentric, twice_areas
 
-_Shapes = npt.NDArray[np.object_]
-CORNERS = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
 _ANGLES = np.array([np.pi / 2, np.pi / 4, np.pi / 4])
 
 
@@ -73,16 +71,14 @@ def clip(outlines: Array, number: Integers, distance: Array, count: int, thresho
         thresholds: what is rounding.
     """
     over = np.flatnonzero(np.all((outlines.min(axis=1) < 1.0) & (outlines.max(axis=1) > 0.0), axis=1))
-    clipped = shapely.intersection(_polygons(CORNERS[None])[0], _polygons(outlines[over]))
-    pieces, of_outline = shapely.get_parts(clipped, return_index=True)
-    solid = (shapely.get_type_id(pieces) == shapely.GeometryType.POLYGON) & (shapely.area(pieces) > thresholds.sliver)
-    pieces, of_outline = pieces[solid], over[of_outline[solid]]
-    near = _nearest(pieces, number[of_outline], distance[of_outline])
-    pieces, of_outline = pieces[near], of_outline[near]
-    corners, of_piece = _fans(pieces)
-    large = np.abs(twice_areas(corners)) > thresholds.sliver
-    covered = _covered(pieces, number[of_outline], count, thresholds)
-    return Clipped(corners=corners[large], outline=of_outline[of_piece[large]], covered=covered)
+    pieces = triangle_clipping.clip(outlines[over])
+    solid = pieces.areas > thresholds.sliver
+    pieces, outline = pieces.chosen(solid), over[solid]
+    near = _nearest(pieces, number[outline], distance[outline], thresholds)
+    pieces, outline = pieces.chosen(near), outline[near]
+    corners, of_piece = pieces.fans(thresholds.sliver)
+    covered = _covered(pieces, number[outline], count, thresholds)
+    return Clipped(corners=corners, outline=outline[of_piece], covered=covered)
 
 
 def candidates(first: Facets, second: Facets, thresholds: Thresholds) -> tuple[Integers, Integers]:
@@ -133,66 +129,24 @@ def in_frames(points: Array, starts: Array, frames: Array) -> Array:
     return np.asarray(np.einsum("pvi,pij->pvj", points - starts[:, None], frames))
 
 
-def _polygons(corners: Array) -> _Shapes:
-    """Triangles (p, 3, 2)."""
-    return np.asarray(shapely.polygons(corners), dtype=np.object_)
-
-
-def _nearest(pieces: _Shapes, number: Integers, distance: Array) -> Mask:
+def _nearest(pieces: Polygons, number: Integers, distance: Array, thresholds: Thresholds) -> Mask:
     """Which pieces do not lie behind nearer ones, (k,)."""
-    kept, areas = np.ones(len(pieces), dtype=bool), shapely.area(pieces)
+    kept, areas = np.ones(len(number), dtype=bool), pieces.areas
     sums = np.bincount(number, weights=areas, minlength=1)
     for crowded in np.flatnonzero(sums > 0.5 * (1.0 + 1e-9)):
         here = np.flatnonzero(number == crowded)
-        nearer: list[int] = []
+        nearer = np.empty((0, 3, 2))
         for one in here[np.argsort(distance[here], kind="stable")]:
-            kept[one] = shapely.area(shapely.intersection(pieces[nearer], pieces[one])).sum() < 0.5 * areas[one]
-            nearer += [one] if kept[one] else []
+            fan = pieces.chosen(np.array([one])).fans(thresholds.sliver)[0]
+            kept[one] = triangle_clipping.common_area(fan, nearer) < 0.5 * areas[one]
+            nearer = np.concatenate([nearer, fan]) if kept[one] else nearer
     return kept
 
 
-def _rings(pieces: _Shapes) -> tuple[Array, Integers, Integers]:
-    """The corners of polygons (n, 2), the first one again at the end; the polygon of each, and its place therein."""
-    corners, polygon = shapely.get_coordinates(pieces, return_index=True)
-    starts = np.searchsorted(polygon, np.arange(len(pieces)))
-    return corners, polygon, np.arange(len(polygon)) - starts[polygon]
-
-
-def _covered(pieces: _Shapes, number: Integers, count: int, thresholds: Thresholds) -> Mask:
+def _covered(pieces: Polygons, number: Integers, count: int, thresholds: Thresholds) -> Mask:
     """Whether the pieces fill the angle at each corner of the first side's facets, (count, 3)."""
-    corners, polygon, place = _rings(pieces)
-    sizes = np.bincount(polygon, minlength=len(pieces))
-    at = np.flatnonzero(place < sizes[polygon] - 1)
-    before = np.where(place[at] > 0, at - 1, at + sizes[polygon[at]] - 2)
-    angles = _angles(corners[before] - corners[at], corners[at + 1] - corners[at])
     filled = np.zeros((count, 3))
-    for corner, place_of in enumerate(CORNERS):
-        near = np.linalg.norm(corners[at] - place_of, axis=1) <= thresholds.uncovered
-        np.add.at(filled[:, corner], number[polygon[at[near]]], angles[near])
+    for corner, place in enumerate(CORNERS):
+        polygon, angles = pieces.angles_at(place, thresholds.uncovered)
+        np.add.at(filled[:, corner], number[polygon], angles)
     return np.asarray(filled >= (1.0 - thresholds.uncovered) * _ANGLES)
-
-
-def _angles(one: Array, other: Array) -> Array:
-    """The angles between vectors (n, 2)."""
-    cross = one[:, 0] * other[:, 1] - one[:, 1] * other[:, 0]
-    return np.asarray(np.abs(np.arctan2(cross, np.sum(one * other, axis=1))))
-
-
-def _fans(pieces: _Shapes) -> tuple[Array, Integers]:
-    """Convex polygons as fans of triangles about their first corners (k, 3, 2), and the polygon of each (k,)."""
-    corners, polygon, place = _rings(pieces)
-    sizes = np.bincount(polygon, minlength=len(pieces))
-    at = np.flatnonzero((place > 0) & (place < sizes[polygon] - 2))
-    return np.stack([corners[at - place[at]], corners[at], corners[at + 1]], axis=1), polygon[at]
-
-
-def twice_areas(triangles: Array) -> Array:
-    """Determinants of triangles (n, 3, 2), in parts of a facet's area 1/2, (n,)."""
-    return np.asarray(np.linalg.det(triangles[:, 1:] - triangles[:, :1]))
-
-
-def barycentric(triangles: Array, points: Array) -> Array:
-    """Barycentric coordinates of points (n, q, 2) in triangles (n, 3, 2), (n, q, 3)."""
-    sides = triangles[:, 1:] - triangles[:, :1]
-    found = (points - triangles[:, :1]) @ np.linalg.inv(sides)
-    return np.concatenate([1.0 - found.sum(axis=2, keepdims=True), found], axis=2)

@@ -11,7 +11,7 @@ from ..mesh import nodes, second_order
 from ..mesh.refinement import cell_facets
 from ..runtime.mpi import agree
 from ..typing import Array, Entities, Mask
-from . import curved_overlaps, facet_overlaps, spaces
+from . import curved_overlaps, curved_polygons, facet_overlaps, facet_polygons, spaces
 from .domain_forms import DomainForms
 from .facet_integrals import is_curved
 from .facet_overlaps import Facets, Overlaps
@@ -56,8 +56,6 @@ class Pair:
         if self.first.points.shape[2] == 2:
             flat = curved_overlaps if self.curved else facet_overlaps
             return flat.in_plane(self.first, self.second, thresholds)
-        from . import curved_polygons, facet_polygons  # shapely, which plane bodies do not need
-
         in_space = curved_polygons.in_space if self.curved else facet_polygons.in_space
         return in_space(self.first, self.second, thresholds)
 

@@ -46,7 +46,7 @@ class Thresholds:
     largest_scale: float = 1e100
     law_scale: float = 1e-3
     facing: float = 0.5
-    sliver: float = 1e-12
+    sliver: float = 1e-14
     uncovered: float = 1e-6
     rim: float = 0.01
     rim_parts: int = 8
