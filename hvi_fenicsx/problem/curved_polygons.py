@@ -144,12 +144,12 @@ def _fan(pattern: Mask, count: int) -> Array:
         a, b = np.eye(3)[(edge + 1) % 3], np.eye(3)[(edge + 2) % 3]
         many = count if pattern[edge] else 1
         around += [a * (many - step) / many + b * step / many for step in range(many)]
-    return np.stack([np.stack([np.full(3, 1 / 3), p, q]) for p, q in zip(around, [*around[1:], around[0]], strict=True)])
+    return np.stack(
+        [np.stack([np.full(3, 1 / 3), p, q]) for p, q in zip(around, [*around[1:], around[0]], strict=True)]
+    )
 
 
-def _outlines(
-    first: Facets, second: Facets, pairs: _Pairs, pair: Integers, of_second: Array, rim: float
-) -> Array:
+def _outlines(first: Facets, second: Facets, pairs: _Pairs, pair: Integers, of_second: Array, rim: float) -> Array:
     """Triangles of the second side's facets (o, 3, 3) in the reference coordinates of the first's, (o, 3, 2)."""
     each = np.repeat(pair, 3)
     at = curved_shapes.places(pairs.local[each], of_second.reshape(-1, 3))

@@ -44,7 +44,7 @@ def across(slopes: Array) -> Array:
     """
     if slopes.shape[2] == 2:
         return np.column_stack([slopes[:, 0, 1], -slopes[:, 0, 0]])
-    return np.cross(slopes[:, 0], slopes[:, 1])
+    return np.asarray(np.cross(slopes[:, 0], slopes[:, 1]), dtype=np.float64)
 
 
 def normals(first: Facets, points: OverlapPoints) -> Array:

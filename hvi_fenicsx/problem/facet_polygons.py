@@ -113,7 +113,11 @@ def _balls(facets: Facets) -> tuple[Array, Array]:
 
 
 def frames_of(first: Facets) -> Array:
-    """Of the first side's facets: distances from the first corner times these are its own coordinates, (f, 3, 3)."""
+    """Distances from a facet's first corner times these are its own coordinates, (f, 3, 3).
+
+    Args:
+        first: the side whose facets they are.
+    """
     sides = first.corners[:, 1:] - first.corners[:, :1]
     return np.asarray(np.linalg.inv(np.concatenate([sides, first.normals[:, None]], axis=1)))
 
@@ -135,7 +139,7 @@ def _nearest(pieces: Polygons, number: Integers, distance: Array, thresholds: Th
     sums = np.bincount(number, weights=areas, minlength=1)
     for crowded in np.flatnonzero(sums > 0.5 * (1.0 + 1e-9)):
         here = np.flatnonzero(number == crowded)
-        nearer = np.empty((0, 3, 2))
+        nearer: Array = np.empty((0, 3, 2))
         for one in here[np.argsort(distance[here], kind="stable")]:
             fan = pieces.chosen(np.array([one])).fans(thresholds.sliver)[0]
             kept[one] = triangle_clipping.common_area(fan, nearer) < 0.5 * areas[one]

@@ -37,7 +37,11 @@ class Polygons:
         return np.asarray(np.abs(np.sum(x * np.roll(y, -1, axis=1) - y * np.roll(x, -1, axis=1), axis=1)) / 2)
 
     def chosen(self, which: Mask | Integers) -> Polygons:
-        """Some of them."""
+        """Some of them.
+
+        Args:
+            which: a mask (k,), or numbers.
+        """
         return Polygons(corners=self.corners[which], sizes=self.sizes[which])
 
     def fans(self, least: float) -> tuple[Array, Integers]:
@@ -76,7 +80,7 @@ def clip(triangles: Array) -> Polygons:
         triangles: (p, 3, 2).
     """
     ring = np.concatenate([1.0 - triangles.sum(axis=2, keepdims=True), triangles], axis=2)
-    sizes = np.full(len(ring), 3)
+    sizes: Integers = np.full(len(ring), 3, dtype=np.int64)
     for side in range(3):
         ring, sizes = _cut(ring, sizes, side)
     inside = np.arange(ring.shape[1]) < sizes[:, None]
@@ -112,7 +116,12 @@ def _compact(ring: Array, kept: Mask) -> tuple[Array, Integers]:
 
 
 def common_area(triangles: Array, others: Array) -> float:
-    """The area that triangles (n, 3, 2) have in common with others (m, 3, 2); neither overlap among themselves."""
+    """The area that triangles have in common with others; neither overlap among themselves.
+
+    Args:
+        triangles: (n, 3, 2).
+        others: (m, 3, 2).
+    """
     sides = others[:, 1:] - others[:, :1]
     local = (triangles[None] - others[:, None, :1]) @ np.linalg.inv(sides)[:, None]
     common = clip(local.reshape(-1, 3, 2)).areas.reshape(len(others), len(triangles))
@@ -120,12 +129,21 @@ def common_area(triangles: Array, others: Array) -> float:
 
 
 def twice_areas(triangles: Array) -> Array:
-    """Determinants of triangles (n, 3, 2), in parts of an area of 1/2, (n,)."""
+    """Determinants of triangles, in parts of an area of 1/2, (n,).
+
+    Args:
+        triangles: (n, 3, 2).
+    """
     return np.asarray(np.linalg.det(triangles[:, 1:] - triangles[:, :1]))
 
 
 def barycentric(triangles: Array, points: Array) -> Array:
-    """Barycentric coordinates of points (n, q, 2) in triangles (n, 3, 2), (n, q, 3)."""
+    """Barycentric coordinates of points in triangles, (n, q, 3).
+
+    Args:
+        triangles: (n, 3, 2).
+        points: (n, q, 2).
+    """
     sides = triangles[:, 1:] - triangles[:, :1]
     found = (points - triangles[:, :1]) @ np.linalg.inv(sides)
     return np.concatenate([1.0 - found.sum(axis=2, keepdims=True), found], axis=2)

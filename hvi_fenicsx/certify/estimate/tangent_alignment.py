@@ -53,7 +53,11 @@ def turned_back(rotations: Array, values: Array) -> Array:
 
 
 def frames(surface: Surface) -> Array:
-    """Normal and tangents of the nodes of a part, (m, d, d)."""
+    """Normal and tangents of the nodes of a part, (m, d, d).
+
+    Args:
+        surface: the part.
+    """
     return np.concatenate([surface.normals[:, None], surface.tangents], axis=1)
 
 

@@ -1,0 +1,147 @@
+"""Lamé's hollow ball of two bodies at degree 2: errors with curved cells on both sides, and with straight ones.
+
+    ./hvi exec python3 benchmarks/shells.py
+
+An eighth of a ball, radii 1 and 2 m, under pressure inside; the two bodies meet at 1.5 m. The error in the energy norm
+is integrated over the bodies as they are meshed.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import ufl
+from dolfinx import fem
+
+import hvi_fenicsx as hvi
+from hvi_fenicsx.problem import spaces
+
+SHELLS = """
+SetFactory("OpenCASCADE");
+Sphere(1) = {{0, 0, 0, 1, 0, Pi/2, Pi/2}}; Sphere(2) = {{0, 0, 0, 1.5, 0, Pi/2, Pi/2}};
+Sphere(3) = {{0, 0, 0, 1.5, 0, Pi/2, Pi/2}}; Sphere(4) = {{0, 0, 0, 2, 0, Pi/2, Pi/2}};
+BooleanDifference(5) = {{ Volume{{2}}; Delete; }}{{ Volume{{1}}; Delete; }};
+BooleanDifference(6) = {{ Volume{{4}}; Delete; }}{{ Volume{{3}}; Delete; }};
+Physical Volume("first") = {{5}}; Physical Volume("second") = {{6}};
+Physical Surface("within") = {{17}}; Physical Surface("around") = {{26}}; Physical Surface("inner") = {{21}};
+Physical Surface("outer") = {{22}}; Physical Surface("left") = {{18, 23}}; Physical Surface("bottom") = {{19, 24}};
+Physical Surface("front") = {{20, 25}};
+MeshSize{{ PointsOf{{ Volume{{5}}; }} }} = {size}; MeshSize{{ PointsOf{{ Volume{{6}}; }} }} = {other};
+{matching}
+Mesh.ElementOrder = {order};
+"""
+"""An eighth of a hollow ball of two bodies, with cells of different sizes; of equal sizes the meshes match."""
+E, NU, P = 1e7, 0.3, 1e5
+BULK, SHEAR = E / (3 * (1 - 2 * NU)), E / (2 * (1 + NU))
+FLAT = ("left", "front", "bottom")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Errors:
+    """Relative errors: in the energy norm, as it is estimated, of the energy, and of the largest nodal displacement."""
+
+    unknowns: int
+    norm: float
+    estimated: float
+    energy: float
+    nodal: float
+
+    def __str__(self) -> str:
+        return (
+            f"{self.unknowns} unknowns: energy norm {self.norm:.2e}, estimated {self.estimated:.2e} (index "
+            f"{self.estimated / self.norm:.2f}), energy {self.energy:.1e}, largest nodal error {self.nodal:.1e}"
+        )
+
+
+def lame(r: Any) -> Any:
+    """The radial displacement under pressure inside (Lamé)."""
+    return P / 7 * (r / (3 * BULK) + 8 / (4 * SHEAR * r**2))
+
+
+def script(size: float, other: float, order: int = 2) -> str:
+    """The bodies for gmsh.
+
+    Args:
+        size: of the cells of the first body, m.
+        other: of those of the second; where it is the same, the meshes match.
+        order: of the mesh.
+    """
+    matching = "Periodic Surface {26} = {17} Translate {0, 0, 0};" if size == other else ""
+    return SHELLS.format(size=size, other=other, order=order, matching=matching)
+
+
+def bodies(size: float, other: float, order: int = 2, *, exchanged: bool = False) -> hvi.Body:
+    """The bodies with the interface ``fit``.
+
+    Args:
+        size: of the cells of the first body, m.
+        other: of those of the second.
+        order: of the mesh.
+        exchanged: whether the outer body's side is the first.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "shells.geo"
+        file.write_text(script(size, other, order))
+        names = ("around", "within") if exchanged else ("within", "around")
+        return hvi.Body.file(file, dimension=3).interface("fit", *names)
+
+
+def material(expansion: float = 0.0) -> hvi.Isotropic:
+    """The material of both bodies."""
+    return hvi.Isotropic(youngs_modulus=E, poisson_ratio=NU, model="three_dimensional", thermal_expansion=expansion)
+
+
+def symmetry() -> list[hvi.Displacement]:
+    """The planes of symmetry are held along their normals."""
+    return [hvi.Displacement(name, [0.0 if i == axis else None for i in range(3)]) for axis, name in enumerate(FLAT)]
+
+
+def under_pressure(body: hvi.Body) -> hvi.Solution:
+    """The solution of degree 2 with pressure inside."""
+    effects = [material(), *symmetry(), hvi.Pressure("inner", P), hvi.Contact("fit")]
+    return hvi.solve(hvi.Model(body, effects), degree=2)
+
+
+def errors(found: hvi.Solution) -> Errors:
+    """The errors of a solution under pressure."""
+    x = found.problem.positions[:, :3]
+    r = np.linalg.norm(x, axis=1, keepdims=True)
+    away = spaces.values(found.problem.space, found.u.x.array) - lame(r) * x / r
+    place = ufl.SpatialCoordinate(found.problem.space.mesh)
+    radius = ufl.sqrt(ufl.dot(place, place))
+    assert found.estimate is not None
+    return Errors(
+        unknowns=found.dofs,
+        norm=energy_error(found, lame(radius) / radius * place),
+        estimated=found.estimate.relative,
+        energy=float(found.energy / (-0.25 * np.pi * P * lame(1.0)) - 1),
+        nodal=float(np.abs(away).max() / lame(1.0)),
+    )
+
+
+def energy_error(found: hvi.Solution, exact: Any) -> float:
+    """The relative error in the energy norm, integrated; the displacement is given as a UFL expression."""
+    return float(np.sqrt(_energy(found.u - exact) / _energy(exact)))
+
+
+def _energy(v: Any) -> float:
+    strain = ufl.sym(ufl.grad(v))
+    density = 2 * SHEAR * ufl.inner(strain, strain) + (BULK - 2 * SHEAR / 3) * ufl.tr(strain) ** 2
+    return float(fem.assemble_scalar(fem.form(density * ufl.dx(metadata={"quadrature_degree": 8}))))
+
+
+def table() -> None:
+    """All errors on three meshes."""
+    for order in (2, 1):
+        for name, ratio, sizes in (("matching", 1.0, (0.6, 0.3, 0.15)), ("not matching", 0.7, (0.4, 0.28, 0.2))):
+            for size in sizes:
+                found = under_pressure(bodies(size, ratio * size, order))
+                print(f"{name}, file of order {order}, {errors(found)}", flush=True)
+
+
+if __name__ == "__main__":
+    table()

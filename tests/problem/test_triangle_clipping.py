@@ -1,0 +1,52 @@
+"""Triangles clipped by a triangle: parts of a cut plane, edges that nearly coincide, thin parts."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hvi_fenicsx.problem import facet_polygons, triangle_clipping
+from hvi_fenicsx.problem.facet_overlaps import Facets
+from hvi_fenicsx.problem.triangle_clipping import CORNERS
+
+UP = np.array([0.0, 0.0, 1.0])
+
+
+def test_a_triangle_beyond_a_shared_edge_has_nothing_in_common() -> None:
+    """Of these GEOS 3.13 returns the whole triangle."""
+    beyond = [[1.0, 2.7755575615628914e-17], [0.0, 1.0], [0.3289306825365248, 1.9598487023640792]]
+    same = [[0.0, 1.0], [1.0, 2.7755575615628914e-17], [0.0, 0.0]]
+    np.testing.assert_allclose(triangle_clipping.clip(np.array([beyond, same])).areas, [0.0, 0.5], atol=1e-15)
+
+
+def test_the_parts_of_a_cut_plane_fill_the_triangle() -> None:
+    """Turned grids of triangles: each point belongs to one of them."""
+    random = np.random.default_rng(3)
+    x, y = np.meshgrid(np.arange(-6, 6), np.arange(-6, 6))
+    low = np.stack([x, y], axis=2).reshape(-1, 1, 2) + np.array([(0, 0), (1, 0), (0, 1)])
+    high = np.stack([x, y], axis=2).reshape(-1, 1, 2) + np.array([(1, 1), (0, 1), (1, 0)])
+    for _ in range(20):
+        angle, size = random.uniform(0, 2 * np.pi), random.uniform(0.25, 2.0)
+        turn = size * np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+        triangles = np.concatenate([low, high]) @ turn + random.uniform(-0.1, 0.1, 2)
+        pieces = triangle_clipping.clip(triangles)
+        assert pieces.areas.sum() == pytest.approx(0.5, rel=1e-13)
+        fans, polygon = pieces.fans(1e-14)
+        assert np.abs(triangle_clipping.twice_areas(fans)).sum() == pytest.approx(1.0, rel=1e-12)
+        inside = triangle_clipping.barycentric(triangles[polygon], fans)
+        assert inside.min() > -1e-12
+        for corner in CORNERS:
+            full = {0.0: np.pi / 2}.get(float(corner.sum()), np.pi / 4)
+            assert pieces.chosen(pieces.areas > 1e-14).angles_at(corner, 1e-9)[1].sum() == pytest.approx(full)
+
+
+def test_a_corner_in_a_tiny_part_is_covered() -> None:
+    """A vertex of the other side nearly meets it: the part between is small, and is no gap."""
+    first = Facets(nodes=np.array([[0, 1, 2]]), points=np.pad(CORNERS, ((0, 0), (0, 1)))[None], normals=UP[None])
+    near = np.array([1.0 - 1.05e-6, 0.45e-6, 0.0])
+    around = near + 10.0 * np.array([[-0.11, -0.99, 0.0], [0.58, 0.81, 0.0], [-0.89, 0.45, 0.0]])
+    points = np.array([[near, around[i], around[(i + 1) % 3]] for i in range(3)])
+    second = Facets(nodes=np.arange(9).reshape(3, 3), points=points, normals=np.tile(-UP, (3, 1)))
+    found = facet_polygons.in_space(first, second)
+    assert found.covered.all()
+    assert found.areas.sum() == pytest.approx(0.5, rel=1e-12)
