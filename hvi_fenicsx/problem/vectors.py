@@ -59,7 +59,10 @@ class LinearForm:
 
     def values(self) -> Array:
         """The values at the blocks that this rank owns, (n, d), with the coefficients as they are. Collective."""
-        return np.asarray(sum(nodal_values(part) for part in self._parts))
+        found = nodal_values(self._parts[0])
+        for part in self._parts[1:]:
+            found += nodal_values(part)
+        return found
 
 
 def _alike(form: Any) -> list[list[Any]]:

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import functools
 import itertools
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
+from typing import Protocol
 
 import numpy as np
 import ufl
@@ -19,8 +20,24 @@ from mpi4py import MPI
 from ...mesh import nodes
 from ...problem.problem import Problem
 from ...runtime import forms
-from ...typing import Array
+from ...typing import Array, Entities, Mask
 from .bubbles import Index, of_cell, quadrature, slope
+
+_PIECE = 8192
+"""Blocks of which a few vectors fit into a processor's cache."""
+
+
+class Held(Protocol):
+    """What holds bubbles at some blocks, as the bounds of a part do."""
+
+    @property
+    def blocks(self) -> Entities:
+        """The bubbles' owned blocks, (k,)."""
+        ...
+
+    def project(self, r: Array) -> None:
+        """Take out of r (n, d) what is held, in place."""
+        ...
 
 
 class BubbleStiffness:
@@ -38,9 +55,10 @@ class BubbleStiffness:
     def __init__(self, problem: Problem, bubbles: fem.FunctionSpace) -> None:
         self.problem, self.space = problem, bubbles
         self.comm: MPI.Comm = bubbles.mesh.comm
+        self._inverse = diagonal(problem, bubbles)  # first: the vectors take the memory that it frees
+        np.reciprocal(self._inverse, out=self._inverse)
         self._in, self._out = fem.Function(bubbles), fem.Function(bubbles)
         self._action = forms.compiled(problem.bulk.between(self._in, ufl.TestFunction(bubbles)))
-        self._inverse: Array = np.reciprocal(diagonal(problem, bubbles))
 
     def times(self, e: Array) -> Array:
         """A e of owned values (n, d), overwritten by the next product. Collective."""
@@ -51,51 +69,119 @@ class BubbleStiffness:
         self._out.x.scatter_reverse(la.InsertMode.add)
         return np.asarray(self._out.x.array[: e.size]).reshape(e.shape)
 
-    def diagonal_solve(self, r: Array) -> Array:
-        """The diagonal's inverse times r (n, d)."""
-        return np.asarray(r * self._inverse)
+    def diagonal_solve(self, r: Array, at: Entities) -> Array:
+        """The diagonal's inverse times r at some blocks, (k, d).
 
-    def solve(
-        self, load: Array, e: Array, project: Callable[[Array], None], *, tolerance: float, max_steps: int
-    ) -> Array:
+        Args:
+            r: there, (k, d).
+            at: the owned blocks, (k,).
+        """
+        return np.asarray(r * self._inverse[at])
+
+    def descent(self, r: Array, free: Mask, bounds: Sequence[Held]) -> Array:
+        """P D⁻¹ P r, D being the diagonal and P taking out what is not free; overwritten by the next product.
+
+        Args:
+            r: (n, d).
+            free: where a bubble is not prescribed, (n, d).
+            bounds: what else is held.
+        """
+        z = self._out.x.array[: r.size].reshape(r.shape)
+        for at in _pieces(len(r)):
+            np.multiply(r[at], self._inverse[at], out=z[at])
+            z[at] *= free[at]
+        for held in bounds:
+            z[held.blocks] = r[held.blocks] * free[held.blocks]
+        for held in bounds:
+            held.project(z)
+        touched = np.unique(np.concatenate([np.empty(0, np.int32), *(held.blocks for held in bounds)]))
+        z[touched] *= self._inverse[touched] * free[touched]
+        for held in bounds:
+            held.project(z)
+        return z
+
+    def move(self, r: Array, e: Array, at: Entities, step: Array) -> float:
+        """Change e at some blocks and the residual with it, in place. Collective.
+
+        Args:
+            r: the residual load - A e, (n, d).
+            e: (n, d).
+            at: the owned blocks, (k,).
+            step: of e there, (k, d).
+
+        Returns:
+            By how much e·A e grows.
+        """
+        if not self.comm.allreduce(bool(step.any()), op=MPI.LOR):
+            return 0.0
+        p = self._in.x.array[: r.size].reshape(r.shape)
+        p[:] = 0.0
+        p[at] = step
+        return self._moved(r, e, 1.0, p, self.times(p))
+
+    def _moved(self, r: Array, e: Array, alpha: float, p: Array, q: Array) -> float:
+        """Add α p to e, and -α q to r, q being A p: by how much e·A e grows. Collective."""
+        growth = alpha * (2 * self._dot(e, q) + alpha * self._dot(p, q))
+        _add(e, alpha, p)
+        _add(r, -alpha, q)
+        return growth
+
+    def square(self, r: Array, descent: Callable[[Array], Array]) -> float:
+        """The square of a residual's norm. Collective.
+
+        Args:
+            r: (n, d).
+            descent: as :meth:`descent`.
+        """
+        return self._dot(r, descent(r))
+
+    def solve(self, r: Array, e: Array, descent: Callable[[Array], Array], *, goal: float, max_steps: int) -> float:
         """A e = load among e + the range of a symmetric projection, by conjugate gradients; in place. Collective.
 
         Args:
-            load: (n, d).
+            r: the residual load - A e, what is not free included, (n, d).
             e: start and result, (n, d).
-            project: takes out of a vector what is not free, in place.
-            tolerance: relative, of the residual in the norm of the diagonal's inverse.
+            descent: of a residual, as :meth:`descent`.
+            goal: square of the residual's norm at which to end.
             max_steps: of the conjugate gradients.
 
         Returns:
-            The residual load - A e, what is not free included, (n, d).
+            By how much e·A e grows.
         """
-        z = load.copy()
-        project(z)
-        goal = tolerance**2 * self._dot(z, self.diagonal_solve(z))
-        moved = self.comm.allreduce(bool(e.any()), op=MPI.LOR)
-        r = load - self.times(e) if moved else load.copy()
-        p, rho = self._in.x.array[: r.size].reshape(r.shape), 0.0  # in place: a vector of bubbles is large
-        p[:] = 0.0
-        for _ in range(max_steps):
-            np.copyto(z, r)
-            project(z)
-            z *= self._inverse
-            project(z)
+        p, rho, growth = self._in.x.array[: r.size].reshape(r.shape), 0.0, 0.0  # in place: they are large
+        for step in range(max_steps):
+            z = descent(r)
             rho, before = self._dot(r, z), rho
             if rho <= goal:
                 break
-            p *= rho / before if before else 0.0
-            p += z
+            _combine(p, z, rho / before if step else 0.0)
             q = self.times(p)
-            alpha = rho / self._dot(p, q)
-            e += np.multiply(p, alpha, out=z)
-            q *= alpha
-            r -= q
-        return r
+            growth += self._moved(r, e, rho / self._dot(p, q), p, q)
+        return growth
 
     def _dot(self, a: Array, b: Array) -> float:
         return float(self.comm.allreduce(float(np.vdot(a, b)), op=MPI.SUM))
+
+
+def _pieces(count: int) -> Iterator[slice]:
+    """Slices of so few blocks that what is done with one stays in the processor's cache."""
+    return (slice(start, start + _PIECE) for start in range(0, count, _PIECE))
+
+
+def _add(y: Array, factor: float, x: Array) -> None:
+    """Add factor x to y, without a temporary array of their size."""
+    for at in _pieces(len(y)):
+        y[at] += factor * x[at]
+
+
+def _combine(p: Array, z: Array, factor: float) -> None:
+    """Set p to z + factor p; p is not read where the factor is 0."""
+    if factor == 0.0:
+        np.copyto(p, z)
+        return
+    for at in _pieces(len(p)):
+        p[at] *= factor
+        p[at] += z[at]
 
 
 def diagonal(problem: Problem, bubbles: fem.FunctionSpace) -> Array:
@@ -113,16 +199,18 @@ def diagonal(problem: Problem, bubbles: fem.FunctionSpace) -> Array:
     slopes = [*hats, *(hats[a] + hats[b] for a, b in itertools.combinations(range(d + 1), 2))]
     upward = [tuple((slope * np.sign(slope[np.flatnonzero(slope)[0]])).tolist()) for slope in slopes]
     energies = {slope: affine.energies(np.array(slope)) for slope in dict.fromkeys(upward)}
-    cells, values = bubbles.dofmap.list[: len(energies[upward[0]])], fem.Function(bubbles)
+    del affine
+    cells, values = bubbles.dofmap.list[: len(energies[upward[0]][0])], fem.Function(bubbles)
     blocks, cell = values.x.array.reshape(-1, d), bubbles.mesh.topology.cell_name()
     for k, index in enumerate(of_cell(nodes.degree(problem.space), cell)):
-        own = np.zeros((len(cells), d))
+        shares: dict[tuple[float, ...], float] = {}
         for number, share in energy_shares(index, cell):
-            own += share * energies[upward[number]]
+            shares[upward[number]] = shares.get(upward[number], 0.0) + share * 16 / ((d + 1) * (d + 2))
         for i in range(d):
-            blocks[:, i] += np.bincount(cells[:, k], own[:, i], minlength=len(blocks))
+            own = sum(share * energies[slope][i] for slope, share in shares.items())
+            blocks[:, i] += np.bincount(cells[:, k], own, minlength=len(blocks))
     values.x.scatter_reverse(la.InsertMode.add)
-    return np.array(blocks[: bubbles.dofmap.index_map.size_local]) * 16 / ((d + 1) * (d + 2))
+    return blocks[: bubbles.dofmap.index_map.size_local]
 
 
 @functools.cache
@@ -153,10 +241,13 @@ class _Affine:
     def __init__(self, problem: Problem) -> None:
         mesh, d = problem.space.mesh, problem.scales.dimension
         space = fem.functionspace(mesh, ("Discontinuous Lagrange", 0, (d,)))
-        middle, self._slopes, self._sums = fem.Function(space), fem.Constant(mesh, np.zeros(d)), fem.Function(space)
-        cells = np.arange(len(space.dofmap.list), dtype=np.int32)
-        middle.x.array[:] = dmesh.compute_midpoints(mesh, d, cells)[:, :d].ravel()
-        height = ufl.dot(self._slopes, ufl.JacobianInverse(mesh) * (ufl.SpatialCoordinate(mesh) - middle))
+        self._slopes, self._sums = fem.Constant(mesh, np.zeros(d)), fem.Function(space)
+        place = ufl.SpatialCoordinate(mesh)
+        if problem.bulk.foundation is not None:  # no strain sees where the function vanishes
+            middle, cells = fem.Function(space), np.arange(len(space.dofmap.list), dtype=np.int32)
+            middle.x.array[:] = dmesh.compute_midpoints(mesh, d, cells)[:, :d].ravel()
+            place = place - middle
+        height = ufl.dot(self._slopes, ufl.JacobianInverse(mesh) * place)
         q, whole = ufl.TestFunction(space), ufl.Form([])
         for i, axis in enumerate(np.eye(d)):
             v = height * ufl.as_vector(axis.tolist())
@@ -164,9 +255,9 @@ class _Affine:
         self._form = forms.compiled(whole)
 
     def energies(self, slopes: Array) -> Array:
-        """The energies of the function with these slopes in reference coordinates (d,), along each axis, (cells, d)."""
+        """The energies of the function with these slopes in reference coordinates (d,), along each axis, (d, cells)."""
         self._slopes.value[:] = slopes
         self._sums.x.array[:] = 0.0
         fem.assemble_vector(self._sums.x.array, self._form)
         d, cells = len(slopes), self._sums.function_space.mesh.topology.index_map(len(slopes)).size_local
-        return np.array(self._sums.x.array[: cells * d]).reshape(-1, d)
+        return np.ascontiguousarray(self._sums.x.array[: cells * d].reshape(-1, d).T)

@@ -65,42 +65,53 @@ class _Coupled:
         problem, space = traces.problem, traces.bubbles
         self._traces, self._inverse, self._thresholds = traces, inverse, traces.thresholds
         self._longest = 0.0
-        self._stiffness = BubbleStiffness(problem, space)
-        self._constraints = defect.constraints(problem, traces.u, space)
-        self._residual = problem.bulk.residual_in(space, traces.u, problem.linear.values())
-        nodes, bubbles = fem.Function(problem.space), fem.Function(space)
-        self.error = ErrorField(nodes, bubbles)
-        self._of_nodes = problem.bulk.force_in(space, nodes)
-        self._on_nodes = problem.bulk.force_in(problem.space, nodes + bubbles)
-        self._energies = problem.bulk.energy_in_cells(nodes + bubbles)
+        self.error = ErrorField(fem.Function(problem.space), fem.Function(space))
+        load = problem.bulk.residual_in(space, traces.u, problem.linear.values())
+        self._laws, _ = traces.tested()
+        load -= self._laws
+        stiffness, under = BubbleStiffness(problem, space), defect.constraints(problem, traces.u, space)
+        self._least = defect.LeastEnergy(self.error.bubbles, stiffness, under, load, self._thresholds)
+        self._moved = fem.Function(problem.space)
+        self._of_moved = problem.bulk.force_in(space, self._moved)
+        self._of_bubbles = problem.bulk.force_in(problem.space, self.error.bubbles)
+        self._shared = 0.0
 
-    def squares(self) -> Array:
-        """η_K² of the owned cells. Collective."""
-        return np.maximum(self._energies.values()[:, 0], 0.0)
+    @property
+    def size(self) -> float:
+        """The energy norm of the error. Collective."""
+        square = self._least.energy + 2 * self._shared + self._inverse.energy(self.error.nodes)
+        return float(np.sqrt(max(square, 0.0)))
 
-    def find_bubbles(self, *, first: bool) -> None:
-        """Find the bubbles that belong to the nodes. Collective.
-
-        Args:
-            first: whether nothing is known yet.
-        """
-        load, _ = self._traces.tested(None if first else self.error)
-        np.subtract(self._residual, load, out=load)
-        if not first:
-            load -= self._of_nodes.values()
-        defect.find_least_energy(self.error.bubbles, self._stiffness, self._constraints, load, self._thresholds)
+    def find_bubbles(self) -> None:
+        """Find the bubbles that belong to the nodes. Collective."""
+        self._least.find()
 
     def move_nodes(self) -> None:
         """Move the nodes as the bubbles ask; the laws answer that, so it takes a few rounds. Collective."""
-        problem, nodes = self._traces.problem, self.error.nodes
+        traces, inverse, nodes = self._traces, self._inverse, self.error.nodes
+        np.negative(nodes.x.array, out=self._moved.x.array)
+        of_bubbles = self._of_bubbles.values()
         for _ in range(self._thresholds.answer_rounds):
-            _, laws = self._traces.tested(self.error)
-            step, length = self._inverse.solve(laws - problem.combined(self._on_nodes.values()))
+            _, unmet = traces.tested(self.error)
+            unmet -= traces.problem.combined(of_bubbles)
+            unmet -= inverse.force(nodes)
+            step, length = inverse.solve(unmet, self._thresholds.answer_tolerance)
             nodes.x.array[:] += step.x.array
             self._longest = max(self._longest, length)
             if length <= self._thresholds.answer_change * self._longest:
                 break
-        self._inverse.keep_within_bounds(nodes)
+        inverse.keep_within_bounds(nodes)
+        self._moved.x.array[:] += nodes.x.array
+        work = float(np.vdot(nodes.x.array[: of_bubbles.size], of_bubbles))
+        self._shared = total(traces.problem.domain.mesh.comm, work)
+
+    def tell_bubbles(self) -> None:
+        """Let the bubbles feel that nodes and laws have moved. Collective."""
+        before = self._laws
+        self._laws, _ = self._traces.tested(self.error)
+        changed = np.flatnonzero(np.any(self._laws != before, axis=1))
+        self._least.residual[changed] += before[changed] - self._laws[changed]
+        self._least.residual -= self._of_moved.values()
 
 
 def of_solution(traces: LawTraces, inverse: DualNorm) -> tuple[ErrorField, Array]:
@@ -113,12 +124,18 @@ def of_solution(traces: LawTraces, inverse: DualNorm) -> tuple[ErrorField, Array
     Returns:
         The estimated error, and η_K² of the owned cells.
     """
-    coupled, size, comm = _Coupled(traces, inverse), 0.0, traces.problem.domain.mesh.comm
-    for number in range(traces.thresholds.coupled_rounds):
-        coupled.find_bubbles(first=number == 0)
+    error = _found(traces, inverse)
+    return error, traces.problem.bulk.energy_by_cell(error.nodes + error.bubbles)
+
+
+def _found(traces: LawTraces, inverse: DualNorm) -> ErrorField:
+    """The estimated error. Collective."""
+    coupled, size = _Coupled(traces, inverse), 0.0
+    for _ in range(traces.thresholds.coupled_rounds):
+        coupled.find_bubbles()
         coupled.move_nodes()
-        cells = coupled.squares()
-        before, size = size, float(np.sqrt(total(comm, float(cells.sum()))))
+        before, size = size, coupled.size
         if abs(size - before) <= traces.thresholds.coupled_change * size:
             break
-    return coupled.error, cells
+        coupled.tell_bubbles()
+    return coupled.error

@@ -7,8 +7,6 @@ Gräser 2011).
 
 from __future__ import annotations
 
-import functools
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -52,10 +50,10 @@ class BubbleBounds:
         """Held where e leaves the bounds, let go where a force draws away from the bound that holds.
 
         Args:
-            e: the bubbles, (n, d).
-            force: the force on them, (n, d).
+            e: the bubbles at the points, (k, d).
+            force: the force on them, (k, d).
         """
-        along, push = self.component(e), self.component(force)
+        along, push = np.sum(e * self.normals, axis=1), np.sum(force * self.normals, axis=1)
         upper = np.where(self.side == 1, push >= 0, along > self.upper)
         lower = np.where(self.side == -1, push <= 0, along < self.lower)
         return replace(self, side=np.where(upper, 1, np.where(lower, -1, 0)).astype(np.int8))
@@ -72,33 +70,63 @@ class BubbleBounds:
         r[self.blocks] -= carried[:, None] * self.normals
 
 
-def prescribed(problem: Problem, u: fem.Function, space: fem.FunctionSpace) -> tuple[Mask, Array]:
-    """Whether a bubble is free (n, d), and what prescribed displacements ask of the others (n, d). Collective.
+@dataclass(frozen=True)
+class Prescribed:
+    """One prescribed component at the points of a part's bubbles (k of them).
+
+    Attributes:
+        blocks: the bubbles' owned blocks, (k,).
+        component: number of the component.
+        values: what the bubbles are to be, (k,).
+    """
+
+    blocks: Entities
+    component: int
+    values: Array
+
+
+def prescribed(problem: Problem, u: fem.Function, space: fem.FunctionSpace) -> tuple[Prescribed, ...]:
+    """What prescribed displacements ask of the bubbles. Collective.
 
     Args:
         problem: the prescribed displacements.
         u: the solution, nondimensional.
         space: the bubbles.
     """
-    d, owned = problem.scales.dimension, space.dofmap.index_map.size_local
-    free, value = np.ones((owned, d), dtype=np.bool_), np.zeros((owned, d))
-    points = space.tabulate_dof_coordinates()
+    found = []
     for part in problem.prescribed:
-        blocks = _on(space, part.facets)
-        free[blocks, part.component] = False
-        wanted = part.value.at(points[blocks]) / problem.scales.displacement
-        value[blocks, part.component] = wanted - _at(space, blocks, u)[:, part.component]
-    return free, value
+        points = _Points(space, _on(space, part.facets))
+        wanted = part.value.at(points.positions()) / problem.scales.displacement
+        found.append(Prescribed(points.blocks, part.component, wanted - points.values(u)[:, part.component]))
+    return tuple(found)
 
 
-def _at(space: fem.FunctionSpace, blocks: Entities, u: fem.Function) -> Array:
-    """The values (k, d) at some points of the bubbles of a function of another space, from the cells around them."""
-    chosen = np.zeros(space.dofmap.index_map.size_local + space.dofmap.index_map.num_ghosts, dtype=np.bool_)
-    chosen[blocks] = True
-    cells = np.flatnonzero(chosen[space.dofmap.list].any(axis=1)).astype(np.int32)
-    found = fem.Function(space)
-    found.interpolate(u, cells, cells)
-    return np.asarray(found.x.array.reshape(-1, space.dofmap.bs)[blocks])
+class _Points:
+    """The points of some bubbles.
+
+    Args:
+        space: of the bubbles.
+        blocks: their owned blocks, (k,).
+
+    Attributes:
+        blocks: as they are given.
+    """
+
+    def __init__(self, space: fem.FunctionSpace, blocks: Entities) -> None:
+        self._space, self.blocks = space, blocks
+        chosen = np.zeros(space.dofmap.index_map.size_local + space.dofmap.index_map.num_ghosts, dtype=np.bool_)
+        chosen[blocks] = True
+        self._cells = np.flatnonzero(chosen[space.dofmap.list].any(axis=1)).astype(np.int32)
+
+    def values(self, u: fem.Function) -> Array:
+        """The values (k, d) of a function of another space, from the cells around the points."""
+        found = fem.Function(self._space)
+        found.interpolate(u, self._cells, self._cells)
+        return np.array(found.x.array.reshape(-1, self._space.dofmap.bs)[self.blocks])
+
+    def positions(self) -> Array:
+        """Where they are, m, (k, 3)."""
+        return np.asarray(self._space.tabulate_dof_coordinates()[self.blocks])
 
 
 def bubble_bounds(problem: Problem, u: fem.Function, bounds: Bounds, space: fem.FunctionSpace) -> BubbleBounds:
@@ -111,22 +139,21 @@ def bubble_bounds(problem: Problem, u: fem.Function, bounds: Bounds, space: fem.
         space: the bubbles.
     """
     d = problem.scales.dimension
-    blocks = _on(space, bounds.surface.facets)
+    points, field = _Points(space, _on(space, bounds.surface.facets)), fem.Function(problem.space)
 
     def middle(values: Array) -> Array:
-        field = fem.Function(problem.space)
         spread = np.clip(values, -_FAR, _FAR)
-        field.x.array.reshape(-1, d)[bounds.surface.blocks] = spread
+        field.x.array.reshape(-1, d)[bounds.surface.blocks, : spread.shape[1]] = spread
         field.x.scatter_forward()
-        return _at(space, blocks, field)
+        return points.values(field)
 
     normals = middle(bounds.surface.normals)
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     normal = np.sum(bounds.surface.values(u.x.array) * bounds.surface.normals, axis=1)
-    lower, upper = (middle((b - normal)[:, None])[:, 0] for b in (bounds.lower, bounds.upper))
+    lower, upper = middle(np.column_stack([bounds.lower - normal, bounds.upper - normal]))[:, :2].T
     if nodes.degree(problem.space) == 1:  # what is beyond them is rounding; a quadratic function dips
         lower, upper = np.minimum(lower, 0.0), np.maximum(upper, 0.0)
-    return BubbleBounds(blocks, normals, lower, upper, np.zeros(len(blocks), np.int8))
+    return BubbleBounds(points.blocks, normals, lower, upper, np.zeros(len(points.blocks), np.int8))
 
 
 def _on(space: fem.FunctionSpace, facets: Entities) -> Entities:
@@ -141,12 +168,12 @@ class Constraints:
 
     Attributes:
         free: where they are not prescribed, (n, d).
-        prescribed: what is prescribed elsewhere, (n, d).
+        prescribed: what is prescribed elsewhere.
         bounds: of the parts with contact.
     """
 
     free: Mask
-    prescribed: Array
+    prescribed: tuple[Prescribed, ...]
     bounds: tuple[BubbleBounds, ...]
 
 
@@ -158,66 +185,94 @@ def constraints(problem: Problem, u: fem.Function, space: fem.FunctionSpace) -> 
         u: the solution, nondimensional.
         space: the bubbles.
     """
-    free, value = prescribed(problem, u, space)
+    free = np.ones((space.dofmap.index_map.size_local, problem.scales.dimension), dtype=np.bool_)
+    given = prescribed(problem, u, space)
+    for part in given:
+        free[part.blocks, part.component] = False
     parts = [b for b in problem.bounds if problem.interface_of(b.surface) is None]
     bounds = tuple(bubble_bounds(problem, u, part, space) for part in parts)
-    return Constraints(free=free, prescribed=value, bounds=bounds)
+    return Constraints(free=free, prescribed=given, bounds=bounds)
+
+
+class LeastEnergy:
+    """The admissible bubbles of least energy, an active set method, a few rounds. Creation is collective.
+
+    Args:
+        bubbles: take the result.
+        stiffness: a(e, e).
+        under: what they must meet.
+        load: ρ, (n, d); it becomes the residual.
+        thresholds: how accurately.
+
+    Attributes:
+        residual: ρ - a(e, ·), what is held included, (n, d); a change of the load is to be added to it.
+        energy: a(e, e).
+    """
+
+    def __init__(
+        self,
+        bubbles: fem.Function,
+        stiffness: BubbleStiffness,
+        under: Constraints,
+        load: Array,
+        thresholds: Thresholds = DEFAULT,
+    ) -> None:
+        self._bubbles, self._stiffness, self._under, self._thresholds = bubbles, stiffness, under, thresholds
+        self.residual, self.energy, self._parts, self._begun = load, 0.0, under.bounds, False
+        self._e = bubbles.x.array[: load.size].reshape(load.shape)
+        special = [np.empty(0, np.int32), *(p.blocks for p in under.prescribed), *(p.blocks for p in under.bounds)]
+        self._special = np.unique(np.concatenate(special))
+        for given in under.prescribed:
+            self._e[given.blocks, given.component] = given.values
+
+    def find(self) -> None:
+        """Find them; from the second time on from those that were found before. Collective."""
+        stiffness, limits, e = self._stiffness, self._thresholds, self._e
+        self._parts = tuple(p.updated(self._guess(p), self.residual[p.blocks]) for p in self._parts)
+        tolerance = limits.bubble_tolerance_again if self._begun else limits.bubble_tolerance
+        goal = tolerance**2 * stiffness.square(self.residual, self._descent)
+        for _ in range(limits.bubble_rounds):
+            self._put_on_bounds()
+            steps = limits.bubble_steps
+            self.energy += stiffness.solve(self.residual, e, self._descent, goal=goal, max_steps=steps)
+            changed = tuple(p.updated(e[p.blocks], self.residual[p.blocks]) for p in self._parts)
+            same = all(np.array_equal(a.side, b.side) for a, b in zip(self._parts, changed, strict=True))
+            self._parts = changed
+            if stiffness.comm.allreduce(same, op=MPI.LAND):
+                break
+        self._bubbles.x.scatter_forward()
+
+    def _guess(self, part: BubbleBounds) -> Array:
+        """The bubbles of a part as they are, at first what the diagonal alone makes of the load, (k, d)."""
+        at, free = part.blocks, self._under.free[part.blocks]
+        if self._begun:
+            return self._e[at]
+        return np.where(free, self._stiffness.diagonal_solve(self.residual[at], at), self._e[at])
+
+    def _put_on_bounds(self) -> None:
+        """Put the bubbles on the bounds that hold them; the residual follows, at first what is prescribed, too."""
+        before = self._e[self._special] if self._begun else 0.0
+        for part in self._parts:
+            part.put_on_bounds(self._e)
+        step = self._e[self._special] - before
+        self._e[self._special] -= step
+        self._begun = True
+        self.energy += self._stiffness.move(self.residual, self._e, self._special, step)
+
+    def _descent(self, r: Array) -> Array:
+        return self._stiffness.descent(r, self._under.free, self._parts)
 
 
 def find_least_energy(
-    e: fem.Function, stiffness: BubbleStiffness, under: Constraints, load: Array, thresholds: Thresholds = DEFAULT
+    bubbles: fem.Function, stiffness: BubbleStiffness, under: Constraints, load: Array, thresholds: Thresholds = DEFAULT
 ) -> None:
     """Find the admissible bubbles of least energy under a load. Collective.
 
     Args:
-        e: takes the result, ghosts updated.
+        bubbles: take the result, ghosts updated; zero before.
         stiffness: a(e, e).
         under: what they must meet.
-        load: ρ, (n, d).
+        load: ρ, (n, d), overwritten.
         thresholds: how accurately.
     """
-    owned = e.x.array[: load.size].reshape(load.shape)
-    owned[:] = under.prescribed
-    solve(stiffness, load, under.free, owned, under.bounds, thresholds)
-    e.x.scatter_forward()
-
-
-def solve(
-    stiffness: BubbleStiffness,
-    load: Array,
-    free: Mask,
-    e: Array,
-    parts: Sequence[BubbleBounds],
-    thresholds: Thresholds = DEFAULT,
-) -> None:
-    """The admissible bubbles of least energy, an active set method, a few rounds. Collective.
-
-    Args:
-        stiffness: a(e, e).
-        load: ρ, (n, d).
-        free: where a bubble is not prescribed, (n, d).
-        e: what is prescribed, (n, d); the result takes its place.
-        parts: the bounds.
-        thresholds: how accurately.
-    """
-    guess = np.where(free, stiffness.diagonal_solve(load), e)
-    parts = [part.updated(guess, load) for part in parts]
-    del guess
-    for _ in range(thresholds.bubble_rounds):
-        for part in parts:
-            part.put_on_bounds(e)
-        project = functools.partial(_project, free, tuple(parts))
-        tolerance, steps = thresholds.bubble_tolerance, thresholds.bubble_steps
-        force = stiffness.solve(load, e, project, tolerance=tolerance, max_steps=steps)
-        changed = [part.updated(e, force) for part in parts]
-        same = all(np.array_equal(a.side, b.side) for a, b in zip(parts, changed, strict=True))
-        parts = changed
-        if stiffness.comm.allreduce(same, op=MPI.LAND):
-            break
-
-
-def _project(free: Mask, parts: Sequence[BubbleBounds], r: Array) -> None:
-    """Take out of r (n, d) what is prescribed and what the bounds hold."""
-    r *= free
-    for part in parts:
-        part.project(r)
+    LeastEnergy(bubbles, stiffness, under, load, thresholds).find()

@@ -64,6 +64,33 @@ class DualNorm:
         energy = float(load.dot(x))
         return system.displacement(x), float(np.sqrt(max(energy, 0.0))) if np.isfinite(energy) else np.inf
 
+    def force(self, field: fem.Function) -> Array:
+        """The elastic force a(field, ·) at the owned blocks as :meth:`solve` takes it, (n, d). Collective.
+
+        Args:
+            field: of u_h's space, nondimensional; zero where u is prescribed.
+        """
+        system = self.system
+        out = self._elastic(system.unknowns(field))
+        cartesian = out if system.rotation is None else system.rotation * out
+        return np.array(cartesian.array_r).reshape(-1, system.problem.scales.dimension)
+
+    def energy(self, field: fem.Function) -> float:
+        """a(field, field), with what is averaged. Collective.
+
+        Args:
+            field: as of :meth:`force`.
+        """
+        x = self.system.unknowns(field)
+        return float(x.dot(self._elastic(x)))
+
+    def _elastic(self, x: PETSc.Vec) -> PETSc.Vec:
+        """A x, without what laws and holding add to A."""
+        out = self.system.load.duplicate()
+        self.system.jacobian.matrix.mult(x, out)
+        self.system.jacobian.rows.overwrite(x, out)
+        return out
+
     def keep_within_bounds(self, error: fem.Function) -> None:
         """Put u + an error on the bounds that it leaves, in place; from then on it is held there. Collective.
 

@@ -97,7 +97,7 @@ def estimate(
     cells += data_errors.squares(problem, traces.bubbles, examination.states, thresholds)
     smoothed = any(term.law != term.exact for term in problem.terms)
     smoothing = inverse.solve(dual_norm.smoothing(problem, examination.states, near))[1] if smoothed else 0.0
-    _, algebraic = inverse.solve(dual_norm.algebraic(problem, examination, near))
+    _, algebraic = inverse.solve(dual_norm.algebraic(problem, examination, near), thresholds.left_tolerance)
     inverse.destroy()
     comm = problem.domain.mesh.comm
     beyond = dual_norm.penetration_energy(problem, examination.states)
