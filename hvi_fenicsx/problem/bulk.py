@@ -21,7 +21,7 @@ from ..mesh import nodes
 from ..mesh.shared import Shared
 from ..runtime import forms
 from ..typing import Array
-from . import nodal_averaging
+from . import chosen_cells, nodal_averaging
 from .nodal_averaging import Dilatation
 from .scaling import Scales
 from .strain_energy import feels_no_rigid_motion
@@ -207,12 +207,17 @@ class Bulk:
         return LinearForm(self.energy_form(v, ufl.TestFunction(self._constants)))
 
     def energy_by_cell(self, v: Any) -> Array:
-        """The same, not negative, for v as it is, (cells,). Collective.
+        """The same, not negative, for v as it is, (cells,), piece by piece of a large mesh. Collective.
 
         Args:
             v: a displacement of any space, or a sum of such in UFL.
         """
-        return np.maximum(self.energy_in_cells(v).values()[:, 0], 0.0)
+        parts = list(chosen_cells.pieces(self.space.mesh))
+        if len(parts) == 1:
+            return np.maximum(self.energy_in_cells(v).values()[:, 0], 0.0)
+        form = self.energy_form(v, ufl.TestFunction(self._constants))
+        each = [LinearForm(chosen_cells.on_cells(form, part)).values()[part, 0] for part in parts]
+        return np.maximum(np.concatenate(each), 0.0)
 
     def pressures(self, u: fem.Function) -> list[fem.Function]:
         """The averaged volumetric stress of each region in ``averaged``, P1 fields. Collective."""

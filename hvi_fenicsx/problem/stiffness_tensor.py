@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-from typing import Any
 
 import numpy as np
 import ufl
@@ -11,6 +10,7 @@ from dolfinx import fem
 
 from ..typing import Array, Entities
 from .bulk import Bulk
+from .chosen_cells import on_cells
 from .vectors import LinearForm
 
 
@@ -45,27 +45,3 @@ def _strain(d: int, i: int, j: int) -> Array:
     strain[i, j] += 0.5
     strain[j, i] += 0.5
     return strain
-
-
-def on_cells(form: Any, cells: Entities) -> Any:
-    """A UFL form of integrals over cells, restricted to some of them.
-
-    Args:
-        form: its subdomain data are mesh tags, or none.
-        cells: local numbers.
-    """
-    data: list[tuple[int, Entities]] = []
-    restricted = []
-    for number, integral in enumerate(form.integrals(), start=1):
-        data.append((number, _shared(integral, cells)))
-        restricted.append(integral.reconstruct(subdomain_id=number, subdomain_data=data))
-    return ufl.Form(restricted)
-
-
-def _shared(integral: Any, cells: Entities) -> Entities:
-    """The cells among some over which an integral goes, ascending."""
-    tags, ids = integral.subdomain_data(), integral.subdomain_id()
-    if tags is None:
-        return np.unique(cells).astype(np.int32)
-    wanted = ids if isinstance(ids, tuple) else (ids,)
-    return np.intersect1d(cells, np.concatenate([tags.find(i) for i in wanted])).astype(np.int32)

@@ -33,6 +33,8 @@ class Thresholds:
         least_force: forces that are a smaller part of stiffness times displacement are not judged finer.
         travel: a body that travels so many times its deformation has stresses without this travel: to take it off
             rounds too, so of other bodies it is not taken off.
+        piece: cells at most over which a form goes at once where it goes over a mesh in pieces: dolfinx copies the
+            coefficients of all of them.
     """
 
     same_displacement: float = 1e-9
@@ -54,6 +56,7 @@ class Thresholds:
     overlap: float = 0.1
     least_force: float = 1e-5
     travel: float = 100.0
+    piece: int = 2**18
 
 
 DEFAULT = Thresholds()

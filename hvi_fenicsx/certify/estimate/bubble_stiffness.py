@@ -117,14 +117,15 @@ class BubbleStiffness:
         p = self._in.x.array[: r.size].reshape(r.shape)
         p[:] = 0.0
         p[at] = step
-        return self._moved(r, e, 1.0, p, self.times(p))
+        q = self.times(p)
+        return self._dot(p, q) + self._moved(r, e, 1.0, p, q)
 
     def _moved(self, r: Array, e: Array, alpha: float, p: Array, q: Array) -> float:
-        """Add α p to e, and -α q to r, q being A p: by how much e·A e grows. Collective."""
-        growth = alpha * (2 * self._dot(e, q) + alpha * self._dot(p, q))
+        """Add α p to e, and -α q to r, q being A p: 2 e·A (α p) before. Collective."""
+        mixed = 2 * alpha * self._dot(e, q)
         _add(e, alpha, p)
         _add(r, -alpha, q)
-        return growth
+        return mixed
 
     def square(self, r: Array, descent: Callable[[Array], Array]) -> float:
         """The square of a residual's norm. Collective.
@@ -156,7 +157,8 @@ class BubbleStiffness:
                 break
             _combine(p, z, rho / before if step else 0.0)
             q = self.times(p)
-            growth += self._moved(r, e, rho / self._dot(p, q), p, q)
+            alpha = rho / self._dot(p, q)
+            growth += alpha * rho + self._moved(r, e, alpha, p, q)
         return growth
 
     def _dot(self, a: Array, b: Array) -> float:

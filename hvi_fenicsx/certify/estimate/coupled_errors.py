@@ -50,7 +50,7 @@ def heights(points: Trace, law: LawState, of: Superpotential) -> Array:
     return height
 
 
-class _Coupled:
+class Coupled:
     """The forms and constraints of bubbles and nodes that are found together. Creation is collective.
 
     Args:
@@ -74,7 +74,13 @@ class _Coupled:
         self._moved = fem.Function(problem.space)
         self._of_moved = problem.bulk.force_in(space, self._moved)
         self._of_bubbles = problem.bulk.force_in(problem.space, self.error.bubbles)
-        self._shared = 0.0
+        self._shared, self._strongest = 0.0, 0.0
+        self._answer: Array = np.zeros((1, 1))
+
+    @property
+    def residual(self) -> Array:
+        """What the bubbles feel beside the error, what is held included, (n, d)."""
+        return self._least.residual
 
     @property
     def size(self) -> float:
@@ -91,9 +97,11 @@ class _Coupled:
         traces, inverse, nodes = self._traces, self._inverse, self.error.nodes
         np.negative(nodes.x.array, out=self._moved.x.array)
         of_bubbles = self._of_bubbles.values()
-        for _ in range(self._thresholds.answer_rounds):
-            _, unmet = traces.tested(self.error)
-            unmet -= traces.problem.combined(of_bubbles)
+        for number in range(self._thresholds.answer_rounds):
+            _, laws = traces.tested(self.error)
+            if self._settled(laws) and number > 0:
+                break
+            unmet = laws - traces.problem.combined(of_bubbles)
             unmet -= inverse.force(nodes)
             step, length = inverse.solve(unmet, self._thresholds.answer_tolerance)
             nodes.x.array[:] += step.x.array
@@ -104,6 +112,13 @@ class _Coupled:
         self._moved.x.array[:] += nodes.x.array
         work = float(np.vdot(nodes.x.array[: of_bubbles.size], of_bubbles))
         self._shared = total(traces.problem.domain.mesh.comm, work)
+
+    def _settled(self, laws: Array) -> bool:
+        """Whether the laws' force on the nodes (n, d) is nearly the one before. Collective."""
+        comm = self._traces.problem.domain.mesh.comm
+        changed = np.sqrt(total(comm, float(np.sum((laws - self._answer) ** 2))))
+        self._answer, self._strongest = laws, max(self._strongest, changed)
+        return bool(changed <= self._thresholds.answer_settled * self._strongest)
 
     def tell_bubbles(self) -> None:
         """Let the bubbles feel that nodes and laws have moved. Collective."""
@@ -130,7 +145,7 @@ def of_solution(traces: LawTraces, inverse: DualNorm) -> tuple[ErrorField, Array
 
 def _found(traces: LawTraces, inverse: DualNorm) -> ErrorField:
     """The estimated error. Collective."""
-    coupled, size = _Coupled(traces, inverse), 0.0
+    coupled, size = Coupled(traces, inverse), 0.0
     for _ in range(traces.thresholds.coupled_rounds):
         coupled.find_bubbles()
         coupled.move_nodes()

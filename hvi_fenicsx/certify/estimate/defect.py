@@ -96,7 +96,7 @@ def prescribed(problem: Problem, u: fem.Function, space: fem.FunctionSpace) -> t
     found = []
     for part in problem.prescribed:
         points = _Points(space, _on(space, part.facets))
-        wanted = part.value.at(points.positions()) / problem.scales.displacement
+        wanted = part.value.at(points.positions(needed=not part.value.is_number)) / problem.scales.displacement
         found.append(Prescribed(points.blocks, part.component, wanted - points.values(u)[:, part.component]))
     return tuple(found)
 
@@ -124,8 +124,10 @@ class _Points:
         found.interpolate(u, self._cells, self._cells)
         return np.array(found.x.array.reshape(-1, self._space.dofmap.bs)[self.blocks])
 
-    def positions(self) -> Array:
-        """Where they are, m, (k, 3)."""
+    def positions(self, *, needed: bool) -> Array:
+        """Where they are, m, (k, 3); zeros where it does not matter: dolfinx finds the points of all bubbles."""
+        if not needed:
+            return np.zeros((len(self.blocks), 3))
         return np.asarray(self._space.tabulate_dof_coordinates()[self.blocks])
 
 
@@ -229,7 +231,8 @@ class LeastEnergy:
         """Find them; from the second time on from those that were found before. Collective."""
         stiffness, limits, e = self._stiffness, self._thresholds, self._e
         self._parts = tuple(p.updated(self._guess(p), self.residual[p.blocks]) for p in self._parts)
-        tolerance = limits.bubble_tolerance_again if self._begun else limits.bubble_tolerance
+        again = limits.bubble_tolerance_again[nodes.degree(stiffness.problem.space)]
+        tolerance = again if self._begun else limits.bubble_tolerance
         goal = tolerance**2 * stiffness.square(self.residual, self._descent)
         for _ in range(limits.bubble_rounds):
             self._put_on_bounds()

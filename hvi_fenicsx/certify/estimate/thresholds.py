@@ -18,7 +18,8 @@ class Thresholds:
             met to a fourteenth of its length at degree 1, to a thirty-second at degree 2, whose edges are longer.
         interface_degree: the same on the intersections of the facets of two bodies, which are smaller.
         bubble_tolerance: of a solve for bubbles, in the energy norm: their energy is right to about its square.
-        bubble_tolerance_again: the same of what is left, where they are found again beside nodes that moved.
+        bubble_tolerance_again: the same of what is left, where they are found again beside nodes that moved, by the
+            degree of the solution.
         bubble_steps: conjugate gradient steps at most of such a solve.
         bubble_rounds: of the active set of the bounds between the nodes, at most.
         dual_tolerance: of a solve with the system's matrix, relative residual: the energy is right to about its square.
@@ -37,6 +38,7 @@ class Thresholds:
         coupled_change: relative change in energy norm of both up to which no further round is needed.
         answer_tolerance: of a solve for the nodes among those rounds: the next one takes up what it leaves.
         answer_rounds: times at most that the nodes' answer to the bubbles is corrected by the laws'.
+        answer_settled: change of the laws' force relative to the largest one, up to which the nodes need not follow it.
         answer_change: relative change in energy norm of that answer up to which no further round is needed.
         coarse: the mesh's error over the norm of the solution, above which the numbers are rough.
     """
@@ -45,7 +47,7 @@ class Thresholds:
     facet_degree: Mapping[int, int] = field(default_factory=lambda: {1: 12, 2: 30})
     interface_degree: Mapping[int, int] = field(default_factory=lambda: {1: 6, 2: 15})
     bubble_tolerance: float = 0.1
-    bubble_tolerance_again: float = 0.5
+    bubble_tolerance_again: Mapping[int, float] = field(default_factory=lambda: {1: 0.3, 2: 0.2})
     bubble_steps: int = 30
     bubble_rounds: int = 4
     dual_tolerance: float = 0.1
@@ -59,8 +61,9 @@ class Thresholds:
     coupled: Mapping[int, float] = field(default_factory=lambda: {1: 0.3, 2: 0.0})
     coupled_rounds: int = 12
     coupled_change: float = 0.02
-    answer_tolerance: float = 0.3
+    answer_tolerance: float = 0.2
     answer_rounds: int = 4
+    answer_settled: float = 0.02
     answer_change: float = 0.05
     coarse: float = 0.1
 

@@ -1,0 +1,57 @@
+"""Bubbles and nodes in turns: what is followed from step to step is what the forms say of the whole error."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scenes import Table, model, quadratic_linear
+
+from hvi_fenicsx import Scene
+from hvi_fenicsx.certify.certificate import examine
+from hvi_fenicsx.certify.estimate.coupled_errors import Coupled
+from hvi_fenicsx.certify.estimate.dual_norm import DualNorm
+from hvi_fenicsx.certify.estimate.law_traces import LawTraces
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "benchmarks"))
+
+from effectivity import scenes, steps
+
+
+def bent_wall() -> Table:
+    """Bubbles that are prescribed, others on bounds that are not zero, and a law that drops."""
+    table = model(6, pull=3e6, gap="1e-6*x*(1 - x)", friction=quadratic_linear(1e6))
+    table["boundary"]["wall"]["displacement"] = ["1e-6*y*(1 - y)", "free"]
+    return table
+
+
+CASES = {
+    "lift-off": scenes()["lift_off"],
+    "bent wall": Scene.model_validate(bent_wall()),
+    "two bodies": scenes()["single_lap"],
+    "half-disk": scenes()["hertz"],
+    "block in space": scenes()["block_3d"],
+}
+
+
+@pytest.mark.parametrize("degree", [1, pytest.param(2, marks=pytest.mark.long)])
+@pytest.mark.parametrize("name", CASES)
+def test_size_and_residual_are_followed(name: str, degree: int) -> None:
+    (step,) = steps(CASES[name].with_solver(degree=degree), 1)
+    system, u = step.system, step.u
+    problem, bulk = system.problem, system.problem.bulk
+    traces = LawTraces(problem, u, examine(problem, u, 1e-8).states, exact=False)
+    inverse = DualNorm(system, step.solved.levels, u)
+    coupled, bubbles = Coupled(traces, inverse), traces.bubbles
+    for _ in range(3):
+        coupled.find_bubbles()
+        coupled.move_nodes()
+        error = coupled.error.nodes + coupled.error.bubbles
+        assert coupled.size**2 == pytest.approx(bulk.energy_by_cell(error).sum(), rel=1e-8)
+        coupled.tell_bubbles()
+    felt = bulk.residual_in(bubbles, u, problem.linear.values()) - traces.tested(coupled.error)[0]
+    wanted = felt - bulk.force_in(bubbles, error).values()
+    assert coupled.residual == pytest.approx(wanted, abs=1e-9 * np.abs(felt).max())
+    inverse.destroy()
