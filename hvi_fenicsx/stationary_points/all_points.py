@@ -7,9 +7,7 @@ three: before it, behind it, and on it, where the traction may have any value be
 
 from __future__ import annotations
 
-import itertools
-import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -18,8 +16,9 @@ from scipy.optimize import linprog
 
 from ..typing import Array, Integers
 from . import monotone_radius, stationarity
-from .arcs import on_interval
+from .balance_test import BalanceTest, Look
 from .boxes import Box, fresh_box
+from .cell_parts import at_bounds, parts
 from .convex_programme import Chains, minimise
 from .linear_test import LinearTest
 from .relaxation import Relaxation, envelopes
@@ -36,10 +35,10 @@ SHORTER = 0.9
 """Tightening goes on while some interval shrinks to this share."""
 REGULAR = 1e-6
 """Least pivot, relative to the largest, of a matrix that counts as positive definite."""
-WIDE = 30.0
-"""Intervals that are wider, in displacements at which laws have joints, are made smaller by linear programmes."""
-HALF = 0.5
-"""Where these leave less than this share of an interval, the cell is looked at again before it is divided."""
+MOST_LOOKS = 4
+"""How often a cell is tested by the weighed balance before it is divided."""
+SHORTER_LOOK = 0.7
+"""It is tested again while some interval shrinks to this share."""
 CONDITION = 1e12
 """Condition number beyond which a linear system is singular."""
 
@@ -85,6 +84,7 @@ class Enumeration:
         self._curved = bool(np.any(self.problem.force_error))
         self._places: Array = np.empty((0, self.problem.size))
         self._linear, self._relaxation = LinearTest(self.problem), Relaxation(self.problem)
+        self._weighed = BalanceTest(self._relaxation)
 
     def start(self) -> None:
         """Begin with a cell that is far larger than the problem's displacements."""
@@ -106,9 +106,9 @@ class Enumeration:
             if stop():
                 return False
             self.cells += 1
-            cell = self._tightened(self.waiting.pop())
-            if cell is not None and not self._is_done(cell):
-                self._divide(cell)
+            look = self._looked(self.waiting.pop())
+            if look is not None and not self._is_done(look.cell):
+                self.waiting += parts(self.problem, self._balance.pivots, look.cell, look.guide)
             report(self)
         return True
 
@@ -118,20 +118,16 @@ class Enumeration:
             return self._linear.excludes(cell.low, cell.high) or self._is_undecided(cell)
         return self._decided(cell) or self._linear.excludes(cell.low, cell.high)
 
-    def _divide(self, cell: Box) -> None:
-        """Put parts of a cell on the stack; the cell itself, made smaller, if it reaches far behind all joints."""
-        wide = np.flatnonzero(cell.high - cell.low > WIDE * self.problem.reach)
-        far = np.intersect1d(wide, self._balance.pivots)
-        if wide.size and not len(self._balance.pivots):
-            smaller = _within(cell, *self._linear.narrowed(cell.low, cell.high, wide))
-            if np.any(smaller.low > smaller.high):
-                return
-            if np.any(smaller.high - smaller.low < HALF * (cell.high - cell.low)):
-                self.waiting.append(smaller)
-                return
-            cell = smaller
-        parts = list(self._far_parts(cell, int(far[0])) if far.size else self._parts(cell))
-        self.waiting += (replace(part, share=cell.share / len(parts)) for part in parts)
+    def _looked(self, cell: Box) -> Look | None:
+        """The cell made smaller, and where to divide it; None if no stationary point is in it."""
+        look = None
+        for _ in range(MOST_LOOKS):
+            if (tight := self._tightened(cell)) is None or (look := self._weighed.look(tight)) is None:
+                return None
+            cell = look.cell
+            if not np.any(cell.high - cell.low < SHORTER_LOOK * (tight.high - tight.low)):
+                break
+        return look
 
     def _tightened(self, cell: Box) -> Box | None:
         """The cell made smaller; None if no stationary point is in it."""
@@ -164,7 +160,7 @@ class Enumeration:
         if _positive(matrix):
             self.enter(self._minimum(cell, np.where(fixed, 0.0, -np.minimum(slopes, 0.0))))
             return True
-        if np.any(arcs.meets(cell.low, cell.high)[free].sum(axis=1) > 1) or np.any(self._at_bound(cell)[free]):
+        if np.any(arcs.meets(cell.low, cell.high)[free].sum(axis=1) > 1) or np.any(at_bounds(problem, cell)[free]):
             return False
         self._enter_linear(cell, free, matrix)
         return True
@@ -172,7 +168,7 @@ class Enumeration:
     def _is_undecided(self, cell: Box) -> bool:
         """Whether a cell of curved laws can hardly be excluded: the polylines may have one point there."""
         arcs, free = self.problem.arcs, np.flatnonzero(cell.low < cell.high)
-        if np.any(self._at_bound(cell)[free]):
+        if np.any(at_bounds(self.problem, cell)[free]):
             return False
         slopes = arcs.least_slope(cell.low, cell.high)[free]
         one = not free.size or bool(np.all(arcs.meets(cell.low, cell.high)[free].sum(axis=1) <= 1))
@@ -224,60 +220,6 @@ class Enumeration:
         self._places[count] = x
         kind = stationarity.kind(problem, x)
         self.points.append(StationaryPoint(x=x, energy=problem.energy(x), kind=kind, isolated=isolated))
-
-    def _at_bound(self, cell: Box) -> Array:
-        """Where a bound of the problem can push, and the unknown is free to leave it."""
-        ends = (cell.low <= self.problem.lower) | (cell.high >= self.problem.upper)
-        return np.asarray(ends & (cell.low < cell.high))
-
-    def _far_parts(self, cell: Box, i: int) -> Iterator[Box]:
-        """The parts of a cell that reaches far: near the joints, and far from them on either side."""
-        begin, end = float(cell.low[i]), float(cell.high[i])
-        near = max(self.problem.reach, begin, -end)
-        at = math.sqrt(near * max(end, -begin))
-        marks = [begin, *(mark for mark in (-at, at) if begin < mark < end), end]
-        for first, last in itertools.pairwise(marks):
-            yield _with(cell, i, first, last)
-
-    def _parts(self, cell: Box) -> Iterator[Box]:
-        """The parts of a cell: at a drop where there is one, else at a joint, a bound, or in the middle."""
-        arcs = self.problem.arcs
-        drops = arcs.drops(cell.low, cell.high)
-        if drops.any():
-            i = int(np.argmax(drops / np.maximum(np.diag(self.problem.stiffness), 1e-300)))
-            return self._at_joint(cell, i, drops_only=True)
-        joints = np.where(cell.low < cell.high, arcs.meets(cell.low, cell.high).sum(axis=1) - 1, -1)
-        if joints.max() > 0:
-            return self._at_joint(cell, int(np.argmax(joints)), drops_only=False)
-        return self._off_bound(cell, int(np.argmax(self._at_bound(cell))))
-
-    def _at_joint(self, cell: Box, i: int, *, drops_only: bool) -> Iterator[Box]:
-        arcs = on_interval(self.problem.chains[i], float(cell.low[i]), float(cell.high[i]))
-        joints = [(a.high, b.rate(b.low) - a.rate(a.high)) for a, b in itertools.pairwise(arcs)]
-        rounding = float(self.problem.arcs.rounding[i])
-        chosen = [(x, j) for x, j in joints if j < -rounding or not drops_only]
-        at, jump = chosen[len(chosen) // 2]
-        if abs(jump) > rounding:  # looked at last: a minimiser is on no drop
-            yield _with(cell, i, at, at)
-        yield _with(cell, i, cell.low[i], at)
-        yield _with(cell, i, at, cell.high[i])
-
-    def _off_bound(self, cell: Box, i: int) -> Iterator[Box]:
-        lower = cell.low[i] <= self.problem.lower[i]
-        at = cell.low[i] if lower else cell.high[i]
-        inner = np.nextafter(at, np.inf if lower else -np.inf)
-        yield _with(cell, i, inner, cell.high[i]) if lower else _with(cell, i, cell.low[i], inner)
-        yield _with(cell, i, at, at)
-
-
-def _with(cell: Box, i: int, begin: float, end: float) -> Box:
-    low, high = cell.low.copy(), cell.high.copy()
-    low[i], high[i] = begin, end
-    return _within(cell, low, high)
-
-
-def _within(cell: Box, low: Array, high: Array) -> Box:
-    return replace(cell, low=low, high=high, x=np.clip(cell.x, low, high))
 
 
 def _some_solution(matrix: Array, right: Array, sides: Array) -> Array | None:

@@ -2,8 +2,7 @@
 
 The graph (x, t) of each law on its interval lies in the hull of its corners; where a bound can push, with a ray. If
 multipliers y exist with y·(Sx + t) > y·f for all corners, no stationary point is in the cell. The programme only finds
-y; that the inequality holds is then evaluated, with an allowance for rounding, so no tolerance of it matters. In the
-same way xᵢ is nowhere less than the least of xᵢ + y·(Sx + t - f).
+y; that the inequality holds is then evaluated, with an allowance for rounding, so no tolerance of it matters.
 """
 
 from __future__ import annotations
@@ -74,62 +73,24 @@ class LinearTest:
             return False
         return self._least(-found.eqlin.marginals[:n] / size, corners) > 0.0
 
-    def _least(self, y: Array, corners: _Corners, cost: float | Array = 0.0) -> float:
-        """The least of cost + y·(Sx + t - f) over all corners and along all rays, less its rounding.
+    def _least(self, y: Array, corners: _Corners) -> float:
+        """The least of y·(Sx + t - f) over all corners and along all rays, less its rounding.
 
         Args:
             y: multipliers, (n,); those by which a ray would have no least are left out.
             corners: of the cell.
-            cost: of each corner, (m,).
         """
         problem = self._problem
         wrong = corners.pushed[y[corners.pushed] * corners.push < 0.0]
         y = y.copy()
         y[wrong] = 0.0
         pull = problem.stiffness @ y
-        values = pull[corners.owner] * corners.x + y[corners.owner] * corners.t + cost
+        values = pull[corners.owner] * corners.x + y[corners.owner] * corners.t
         least = np.full(problem.size, np.inf)
         np.minimum.at(least, corners.owner, values)
-        sizes = (np.abs(problem.stiffness) @ np.abs(y))[corners.owner] * np.abs(corners.x) + np.abs(cost)
+        sizes = (np.abs(problem.stiffness) @ np.abs(y))[corners.owner] * np.abs(corners.x)
         rounding = np.finfo(float).eps * problem.size * (sizes.sum() + np.abs(y) @ np.abs(problem.force))
         return float(least.sum() - y @ problem.force - rounding - np.sum(np.abs(y) * problem.force_error))
-
-    def narrowed(self, low: Array, high: Array, which: Integers) -> tuple[Array, Array]:
-        """A smaller cell with the same stationary points; low > high somewhere if it has none.
-
-        The multipliers of two programmes for each unknown bound it; what they prove is evaluated, as above.
-
-        Args:
-            low: of the cell, (n,), finite.
-            high: of the cell, (n,), finite.
-            which: the unknowns whose intervals are made smaller.
-        """
-        low, high = low.copy(), high.copy()
-        for i in which:
-            least, most = self._bounds(self._corners(low, high), int(i))
-            low[i], high[i] = max(low[i], least), min(high[i], most)
-            if low[i] > high[i]:
-                break
-        return low, high
-
-    def _bounds(self, corners: _Corners, i: int) -> tuple[float, float]:
-        """The least and the largest displacement of one unknown that corners and rays allow; infinite if not known."""
-        columns, right = self._columns(corners)
-        n, m = self._problem.size, len(corners.x)
-        size = np.maximum(np.abs(columns[:n]).max(axis=1), 1e-300)
-        columns[:n] /= size[:, None]
-        right[:n] /= size
-        own, rays = np.where(corners.owner == i, corners.x, 0.0), np.zeros(columns.shape[1] - m)
-        unit, ends = float(np.abs(own).max()) or 1.0, []
-        for sign in (1.0, -1.0):
-            cost = np.concatenate([sign * own / unit, rays])
-            found = linprog(cost, A_eq=columns, b_eq=right, bounds=(0, None), method="highs")
-            self.programmes += 1
-            if found.status != 0:
-                ends.append(-np.inf)
-                continue
-            ends.append(self._least(-unit * found.eqlin.marginals[:n] / size, corners, sign * own))
-        return ends[0], -ends[1]
 
     def _corners(self, low: Array, high: Array) -> _Corners:
         problem = self._problem

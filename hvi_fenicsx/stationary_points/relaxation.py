@@ -111,8 +111,7 @@ class Relaxation:
             lost: energy that the chords of rigid motions may take off.
         """
         problem, undecided = self.problem, self.undecided(box.low, box.high)
-        weights = np.zeros(len(box.low))
-        weights[undecided] = self._weights(box, undecided)
+        weights = self._weights(box, undecided)
         curvature, wanted = self._curvature(box, undecided, weights, part, lost)
         chains = envelopes(problem, box.low, box.high, curvature.added)
         lent = self.lent(box, curvature)
@@ -127,6 +126,16 @@ class Relaxation:
             bound=max(box.bound, bound + problem.constant),
         )
         return self._examined(box, x, Chains.of(chains), curvature, undecided), curvature
+
+    def curvature(self, box: Box, part: float) -> Array:
+        """The diagonal D of a box, (n + m,).
+
+        Args:
+            box: the box.
+            part: share of the largest curvature.
+        """
+        undecided = self.undecided(box.low, box.high)
+        return self._share.share(box.low, box.high, undecided, self._weights(box, undecided), part).added
 
     def _curvature(
         self, box: Box, undecided: Integers, weights: Array, part: float, lost: float
@@ -178,12 +187,15 @@ class Relaxation:
         return x, value, bound, steps
 
     def _weights(self, box: Box, undecided: Integers) -> Array:
+        """How much of D each argument is to have, (n + m,)."""
         arcs, low, high = self.problem.arcs, box.low, box.high
         drops = arcs.drops(low, high)
         strength = np.where(drops > 0.0, drops, -arcs.least_slope(low, high) * (high - low))[undecided]
         seen = box.weights[undecided]
         most = float(seen.max(initial=0.0))
-        return np.asarray(strength * (seen / most + LEAST_WEIGHT if most > 0.0 else 1.0))
+        weights = np.zeros(len(low))
+        weights[undecided] = strength * (seen / most + LEAST_WEIGHT if most > 0.0 else 1.0)
+        return weights
 
     def _examined(self, box: Box, x: Array, stack: Chains, curvature: Curvature, undecided: Integers) -> Box:
         """Where the envelope is not tight at x: the gaps, the chords, and the weights for the next D."""

@@ -59,6 +59,12 @@ class ScalarProblem:
         ends = (abs(e) for c in self.chains for a in c for e in (a.low, a.high))
         return max([1.0, *(e for e in ends if e < INF)])
 
+    @cached_property
+    def joint(self) -> float:
+        """The largest displacement at which a chain has a joint, one unit if there is none but at zero."""
+        ends = (abs(e) for c in self.chains for a in c for e in (a.low, a.high))
+        return max((e for e in ends if 0.0 < e < INF), default=1.0)
+
     @property
     def size(self) -> int:
         """Number of unknowns n."""

@@ -88,7 +88,7 @@ TEETH = {"law": "graph", "points": [[0, 0], *([d, t] for d in (4e-6, 9e-6, 1.4e-
 
 @pytest.mark.parametrize(
     ("words", "table"),
-    [((), model(3, 6e6, friction=STRONG)), (("--lowest",), model(32, 5e6, friction=TEETH))],
+    [((), model(8, 6e6, friction=STRONG)), (("--lowest",), model(32, 5e6, friction=TEETH))],
     ids=["all", "lowest"],
 )
 def test_a_search_that_is_killed_goes_on_from_its_last_state(

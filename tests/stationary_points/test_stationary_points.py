@@ -21,7 +21,6 @@ from hvi_fenicsx.stationary_points.arcs import FREE, chain, energy, envelope, to
 from hvi_fenicsx.stationary_points.boxes import fresh_box
 from hvi_fenicsx.stationary_points.condensed_form import scalar_problem
 from hvi_fenicsx.stationary_points.found import Wanted
-from hvi_fenicsx.stationary_points.linear_test import LinearTest
 from hvi_fenicsx.stationary_points.lowest import LowestSearch
 from hvi_fenicsx.stationary_points.progress_words import Clock, Unit, lowest_in_words
 from hvi_fenicsx.stationary_points.relaxation import Relaxation
@@ -104,20 +103,6 @@ def test_the_lowest_energy_is_that_of_brute_force(case: Case) -> None:
     else:
         with pytest.raises(SolverError, match="no lowest energy"):
             lowest(problem)
-
-
-@everywhere
-def test_cells_made_smaller_by_linear_programmes_keep_all_points(case: Case) -> None:
-    problem, _ = problem_of(case)
-    far, each = problem.far, np.arange(problem.size)
-    low, high = np.maximum(problem.lower, -far), np.minimum(problem.upper, far)
-    least, most = LinearTest(problem).narrowed(low, high, each)
-    for point in found(problem).points:
-        assert np.all((point.x >= least) & (point.x <= most))
-        near_low, near_high = np.maximum(low, point.x - 1e3), np.minimum(high, point.x + 1.0)
-        first, last = LinearTest(problem).narrowed(near_low, near_high, each)
-        assert np.all((point.x >= first) & (point.x <= last))
-        assert float((last - first).max()) < 1e3
 
 
 @everywhere
