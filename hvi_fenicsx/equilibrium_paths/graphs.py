@@ -8,12 +8,13 @@ import numpy as np
 
 from ..laws import PolylineLaw, Superpotential, TractionGraph
 from ..laws.base import ScaledLaw
+from ..laws.smoothing import PlusSmoothedLaw
 from ..typing import Array, Mask
 
 
 def graph_of(law: Superpotential) -> TractionGraph | None:
-    """The traction graph of a law; None where the traction is not piecewise linear."""
-    if isinstance(law, PolylineLaw):
+    """The traction graph of a law; None where the traction is not piecewise linear. A smoothed one may have one."""
+    if isinstance(law, PolylineLaw | PlusSmoothedLaw):
         return law.graph
     inner = graph_of(law.law) if isinstance(law, ScaledLaw) else None
     if inner is None or not isinstance(law, ScaledLaw):

@@ -14,8 +14,12 @@ from test_exact_paths import SOFTENING, bar, largest_imbalance, peeled, random_p
 
 from hvi_fenicsx.effects import Direction
 from hvi_fenicsx.equilibrium_paths import segments
+from hvi_fenicsx.equilibrium_paths.arc_length.bordered import Bordered
 from hvi_fenicsx.equilibrium_paths.arc_length.distances import CurvedDistances
+from hvi_fenicsx.equilibrium_paths.arc_length.equations import Equations, Refused
 from hvi_fenicsx.equilibrium_paths.arc_length.follower import ArcLengthFollower
+from hvi_fenicsx.equilibrium_paths.arc_length.passage import Crossing, Passage
+from hvi_fenicsx.equilibrium_paths.arc_length.relaxation import Relaxation
 from hvi_fenicsx.equilibrium_paths.exact import ExactFollower
 from hvi_fenicsx.equilibrium_paths.graphs import Passed, remembering
 from hvi_fenicsx.equilibrium_paths.kinds import ArcLengthKind, ExactKind, kind_of
@@ -82,6 +86,8 @@ def peak(states: Sequence[PathState]) -> float:
 def test_each_kind_of_problem_has_its_follower() -> None:
     assert isinstance(kind_of(spring()), ExactKind)
     assert isinstance(kind_of(plate(graph(DROP), 3, 0.0)), ArcLengthKind)
+    assert isinstance(kind_of(line(SMOOTHED, 3)), ExactKind)
+    assert isinstance(kind_of(line(create("chks", graph(DROP), epsilon=1e-2), 3)), ArcLengthKind)
     assert isinstance(kind_of(line(Exponential(1.0, 0.2, 0.5), 3)), ArcLengthKind)
 
 
@@ -196,6 +202,67 @@ def test_a_curved_law_softens_as_its_closed_form_says() -> None:
     assert largest_imbalance(given, states) < 1e-8
 
 
+def test_the_derivatives_of_the_forces_are_those_of_the_matrix() -> None:
+    """Along random directions, at the states of a path on which slips turn."""
+    generator = np.random.default_rng(5)
+    follower, _ = path(oblique(SMOOTHED), programme=(0.6,))
+    sites, values = follower._sites, follower._curve.here.values
+    for direction in generator.standard_normal((5, 6)):
+        moved = sites.stiffness @ sites.displacement_rate(values, direction) + sites.force_rate(values, direction)
+        assert moved == pytest.approx(sites.jacobian(values) @ direction, rel=1e-12)
+
+
+def test_a_curve_is_followed_with_few_factorisations(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Those of a point serve beside it, with another row too: fewer than two for each state; the peak is the same."""
+    made = []
+    factorise = Equations._factorise
+    monkeypatch.setattr(Equations, "_factorise", lambda self, *given: made.append(1) or factorise(self, *given))
+    given = line(Exponential(1.0, 0.2, 0.5), 8)
+    follower, states = path(given, programme=(9.0,), follow=Follow.EXACT)
+    few = len(made)
+    monkeypatch.setattr(Bordered, "takes", lambda self, row: False)
+    monkeypatch.setattr(Equations, "_refined", lambda self, *given: None)
+    wanted = path(given, programme=(9.0,), follow=Follow.EXACT)[1]
+    assert follower.end is End.ESCAPES
+    assert peak(states) == pytest.approx(peak(wanted), rel=1e-12)
+    assert few < 2 * len(states)
+    assert len(made) - few > 3 * few
+
+
+def test_a_body_that_comes_off_is_let_go_where_it_is_out_of_reach() -> None:
+    """Steps in time grow; in one that would lead far beyond, where no digits are left, the motion ends on its way."""
+    given = plate(graph(DROP), 5, 0.7)
+    follower, states = path(given, programme=(9.0,))
+    start, sites, load = follower._curve.here.y[:-1], follower._sites, given.load(2.0 * peak(states))
+    motion = Relaxation(given, sites, start, load, follower._lag, held=False, step=lambda: None)
+    motion._theta = 1e-8
+    assert motion.run(np.ones(len(sites)))
+    assert motion.escapes
+    assert float(np.max(np.abs(sites.s(motion.z)))) < 1e6
+
+
+class GoingRound(Crossing):
+    """Passages that lead from each of two cells to the other for ever."""
+
+    def _ways(self, rates: Array) -> Array:
+        return np.zeros_like(rates)
+
+    def _pass(self, k: int, rates: Array) -> None:
+        sites = self._sites
+        before = sites.segment(k)
+        sites.enter(k, 1 - int(sites.numbers[k]))
+        self.passages.append(Passage(site=k, before=before, after=sites.segment(k)))
+
+
+def test_passages_that_go_round_end_soon() -> None:
+    """Not after as many as all sites might need: each costs a factorisation."""
+    follower, _ = path(line(graph(DROP), 30), programme=(0.1,))
+    crossing = GoingRound(follower._curve, follower._lag, lambda: None)
+    with pytest.raises(Refused):
+        crossing.run()
+    assert len(crossing.passages) < 10
+
+
 def test_smoothed_laws_tend_to_the_law() -> None:
     """The quadratic smoothing of a drop of height c rounds its corner off within ε/c: the peak falls with ε."""
     options = PathOptions(programme=(9.0,), follow=Follow.EXACT)
@@ -213,6 +280,19 @@ def test_a_path_passes_the_steep_side_of_a_smoothed_peak() -> None:
     steep = create("quadratic", law, epsilon=1e-6)
     smoothed, plain = (path(line(one, 8), programme=(1e3,))[1] for one in (steep, law))
     assert peak(smoothed) == pytest.approx(peak(plain), rel=1e-6)
+
+
+@pytest.mark.parametrize("epsilon", [1e-1, 1e-6])
+def test_the_quadratic_smoothing_of_a_polyline_is_one_and_its_path_exact(epsilon: float) -> None:
+    """A bond on one spring k: λ = x + t(x)/k. The drop from 1 to 0.4 at 1 is a ramp of the width ε_absolute/0.6."""
+    k, half = 0.5, 0.5 * (0.5 * epsilon) / 0.6
+    given = problem(k, k, bonds(create("quadratic", graph(DROP), epsilon=epsilon), 0))
+    states = list(ExactFollower(given, PathOptions(programme=(9.0,), follow=Follow.EXACT)).states())
+    folds = [s for s in states if s.event is Event.FOLD]
+    assert [float(s.x[0]) for s in folds] == pytest.approx([1.0 - half, 1.0 + half], rel=1e-12)
+    rounding = 1e-12 + 1e-16 / epsilon  # of a displacement, times the slope of the ramp
+    assert [s.factor for s in folds] == pytest.approx([3.0 * (1.0 - half), 1.0 + half + 0.4 / k], rel=rounding)
+    assert largest_imbalance(given, states) < 1e-9
 
 
 def first_fold(follower: Follower) -> float:

@@ -336,7 +336,7 @@ def test_states_on_a_small_floor_are_among_all_that_there_are() -> None:
 
 
 def test_laws_that_are_not_piecewise_linear_are_refused() -> None:
-    table = model(2, friction=quadratic_linear(3e6, DELTA), smoothing="quadratic", epsilon=0.1)
+    table = model(2, friction=quadratic_linear(3e6, DELTA), smoothing="chks", epsilon=0.1)
     system = prepare(Scene.model_validate(table), MPI.COMM_SELF).system
     with pytest.raises(InputError, match="piecewise linear"):
         ExactFollower(Condensation(system).problem, PathOptions())

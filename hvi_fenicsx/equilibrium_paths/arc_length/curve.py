@@ -229,13 +229,16 @@ class Curve(Equations):
     def settle(self) -> None:
         """Take out what rounding has left in the equations: sites pass their ends a little before or after them."""
         with suppress(Refused):
-            self.place(self.correct(self.here.y, self.plane(0.0)), self.here.tangent)
+            self._settle_at(self.correct(self.here.y, self.plane(0.0)))
 
     def settle_at_factor(self) -> None:
         """The same with the factor as it is."""
         with suppress(Refused):
             y = self.correct(self.here.y, self.at_factor(self.factor))
-            self.place(np.append(y[:-1], self.here.y[-1]), self.here.tangent)
+            self._settle_at(np.append(y[:-1], self.here.y[-1]))
+
+    def _settle_at(self, y: Array) -> None:
+        self.here = Place(y=y, tangent=self.here.tangent, values=self.sites.values(y[:-1]))
 
     def _in_place(self, site: int) -> Move:
         """No step: a site that is slower than others passed its end by what rounding allows, and goes on from there."""

@@ -6,9 +6,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.linalg.lapack import dgesv
 
 from ...typing import Array
+from .bordered import Bordered
 from .sites import Sites, Values
 
 ROUNDING = 1e-10
@@ -17,6 +17,12 @@ STANDING = 1e-11
 """A site whose rate is this small beside the largest stands."""
 _ROUNDS = 40
 """Corrections of the directions in which vertices at rest set out, at most."""
+_SLOW = 1e-2
+"""Factors of a point nearby serve where a correction is at most this part of the last one, or of the way there."""
+_STEPS = 12
+"""Corrections of a point, at most."""
+_REFINEMENTS = 6
+"""Those of a tangent by factors of a point nearby, at most."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,6 +70,7 @@ class Equations:
         self.unit = 2.0 ** -round(np.log2(largest)) if largest else 1.0
         y = np.append(z, factor / self.unit)
         self.here = Place(y=y, tangent=np.zeros_like(y), values=sites.values(z))
+        self._factors: Bordered | None = None
 
     @property
     def factor(self) -> float:
@@ -97,13 +104,22 @@ class Equations:
         load = self._constant + y[-1] * self.unit * self._rate
         return np.asarray((self.sites.stiffness @ values.x + values.force - load) / self.sites.forces)
 
-    def _matrix(self, values: Values, row: Array) -> Array:
+    def _factorise(self, values: Values, row: Array) -> Bordered:
         n = len(values.x)
-        found = np.empty((n + 1, n + 1))
-        found[:n, :n] = self.sites.jacobian(values) / self.sites.forces[:, None]
-        found[:n, n] = -self.unit * self._rate / self.sites.forces
-        found[n] = row
-        return found
+        matrix = np.empty((n + 1, n + 1), order="F")
+        matrix[:n, :n] = self.sites.jacobian(values) / self.sites.forces[:, None]
+        matrix[:n, n] = -self.unit * self._rate / self.sites.forces
+        matrix[n] = row
+        self._factors = None
+        self._factors = Bordered(matrix)
+        return self._factors
+
+    def _change(self, values: Values, direction: Array) -> Array:
+        """How what is left of the forces changes along a direction of all variables, in their units, (n,)."""
+        sites = self.sites
+        moved = sites.stiffness @ sites.displacement_rate(values, direction[:-1])
+        moved += sites.force_rate(values, direction[:-1]) - direction[-1] * self.unit * self._rate
+        return np.asarray(moved / sites.forces)
 
     def tangent(self, values: Values, row: Array, sign: float = 1.0) -> Array:
         """The direction of the curve in which a linear function grows, of length 1, (n + 1,).
@@ -126,13 +142,26 @@ class Equations:
         return found
 
     def _tangent(self, values: Values, row: Array, sign: float) -> Array:
-        right = np.zeros(len(row))
-        right[-1] = sign
-        with np.errstate(all="ignore"):
-            found = np.linalg.solve(self._matrix(values, row), right)
-        if not np.all(np.isfinite(found)):
+        found = None if self._factors is None else self._refined(self._factors, values)
+        if found is None:
+            found = self._factorise(values, row).along
+        rate = float(row @ found)
+        if rate == 0.0 or not np.all(np.isfinite(found)):
             raise np.linalg.LinAlgError("the equations have no tangent here")
-        return np.asarray(found / np.linalg.norm(found))
+        return np.asarray(found * (sign * np.sign(rate) / np.linalg.norm(found)))
+
+    def _refined(self, factors: Bordered, values: Values) -> Array | None:
+        """The direction in which the equations stay satisfied, by factors of a point nearby; None: they are too far."""
+        found, last, size = factors.along, np.inf, float(np.max(np.abs(factors.along)))
+        for _ in range(_REFINEMENTS):
+            step = factors.across(self._change(values, found))
+            change = float(np.max(np.abs(step)))
+            if not change <= _SLOW * last:
+                return found if change <= 1e-13 * size else None
+            found, last = found - step, change
+            if change <= 1e-15 * size:
+                return found
+        return None
 
     def correct(self, y: Array, condition: Condition) -> Array:
         """The point of the curve that satisfies a condition, by Newton's method.
@@ -147,24 +176,37 @@ class Equations:
         value, gradient = condition
         size, last = 1.0 + float(np.max(np.abs(y))), np.inf
         noise = max(1e-10, 1e-14 / self._sharpness(gradient(y))) * size
-        for _ in range(10):
+        expected = _SLOW * float(np.max(np.abs(y - self.here.y)))
+        for _ in range(_STEPS):
             values = self.sites.values(y[:-1])
-            right = np.append(self.residual(y, values), value(y))
-            if not self.sites.bent and np.max(np.abs(right)) <= 1e-15 * size:
+            left, off = self.residual(y, values), value(y)
+            if not self.sites.bent and max(float(np.max(np.abs(left))), abs(off)) <= 1e-15 * size:
                 return y
-            _, _, step, singular = dgesv(self._matrix(values, gradient(y)), right)
-            if singular:
-                raise Refused
+            step = self._correction(values, left, gradient(y), off, max(expected, noise))
             change = float(np.max(np.abs(step)))
             if not np.isfinite(change) or (change > 2.0 * last and change > 1e-9 * size):
                 break
             y = y - step
             if change <= 1e-14 * size or (change <= noise and change >= 0.1 * last):
                 return y
-            last = change
+            last, expected = change, _SLOW * change
         if last <= noise:
             return y
         raise Refused
+
+    def _correction(self, values: Values, left: Array, row: Array, off: float, expected: float) -> Array:
+        """The change that takes out what is left; by factors of a point nearby where it is as small as expected."""
+        if self._factors is not None and self._factors.takes(row):
+            found = self._factors.step(left, row, off)
+            if np.max(np.abs(found)) <= expected:
+                return found
+        return self._factorised(values, row).step(left, row, off)
+
+    def _factorised(self, values: Values, row: Array) -> Bordered:
+        try:
+            return self._factorise(values, row)
+        except np.linalg.LinAlgError:
+            raise Refused from None
 
     def _sharpness(self, gradient: Array) -> float:
         """How fast a condition's value changes along the curve: what hardly changes fixes a point to few digits."""
@@ -206,13 +248,14 @@ class Equations:
         return lambda y: float(y[-1]) - aim / self.unit, lambda y: last
 
     def place(self, y: Array, tangent: Array) -> None:
-        """Go to a point.
+        """Go to a point, where sites may be on other segments than before.
 
         Args:
             y: coordinates and factor, (n + 1,).
             tangent: of length 1, (n + 1,).
         """
         self.here = Place(y=y, tangent=tangent, values=self.sites.values(y[:-1]))
+        self._factors = None
 
     def head(self, tangent: Array) -> None:
         """Set out from the present point.

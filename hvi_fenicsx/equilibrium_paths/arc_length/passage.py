@@ -9,6 +9,7 @@ sites comes from where they are, so that it is the same on any number of ranks.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -22,6 +23,8 @@ from .equations import ROUNDING, STANDING, Refused
 
 _SLOW = 1e-6
 """A rate of a site's force at which it stands, but for rounding, beside the largest."""
+_ROUND = 3
+"""Times that the passages at one point come to the same cell: a straight line does so once, else they go round."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -80,6 +83,7 @@ class Crossing:
     def __init__(self, curve: Curve, lag: Array, check: Callable[[], None]) -> None:
         self._curve, self._sites, self._check = curve, curve.sites, check
         self._lag, self._left = lag, lag.copy()
+        self._cells: Counter[bytes] = Counter()
         self.passages: list[Passage] = []
 
     def run(self, arrived: int | None = None, *, turned: bool = False) -> list[Passage]:
@@ -109,7 +113,19 @@ class Crossing:
             self._go(rates, float(ways[k]))
             self._left[k] = 0.0
             self._pass(k, rates)
+            self._count()
         raise Refused
+
+    def _count(self) -> None:
+        """Count the cells that the passages come to.
+
+        Raises:
+            Refused: they go round.
+        """
+        cell = self._sites.numbers.tobytes()
+        self._cells[cell] += 1
+        if self._cells[cell] > _ROUND:
+            raise Refused
 
     def _outwards(self, k: int) -> float:
         """The rate of a site that is at an end of its segment, out of it."""

@@ -76,13 +76,16 @@ class Relaxation:
         for _ in range(200 + 20 * len(self._sites)):
             if self._at_rest():
                 return self._settled()
-            if float(np.max(np.abs(self._sites.s(self.z)), initial=0.0)) > self._infinite:
+            if self._is_out_of_reach():
                 self.escapes = True
                 return True
             self._theta *= _FASTER if self._stepped_or_back() else _SLOWER
             if self._theta > 1e12:
                 return False
         return False
+
+    def _is_out_of_reach(self) -> bool:
+        return float(np.max(np.abs(self._sites.s(self.z)), initial=0.0)) > self._infinite
 
     def _left(self) -> Array:
         """What is left of the forces, (n,)."""
@@ -110,7 +113,7 @@ class Relaxation:
         return well
 
     def _stepped(self) -> bool:
-        """One step in time, up to the first drop; whether it went well."""
+        """One step in time, up to the first drop, or to where the body is out of reach; whether it went well."""
         sites, left, values = self._sites, self._left(), self._sites.values(self.z)
         sites.stiffness = self._problem.stiffness + self._theta * self._damping
         if sites.unstable_directions(values):  # what holds back is less than what pushes on: the energy would rise
@@ -126,7 +129,7 @@ class Relaxation:
             self._step()
             move = curve.advance(1.0)
             self.z = curve.here.y[:-1].copy()
-            if move.outcome is Outcome.FACTOR:
+            if move.outcome is Outcome.FACTOR or self._is_out_of_reach():
                 return True
             if move.outcome in (Outcome.AWAY, Outcome.STUCK):
                 return False

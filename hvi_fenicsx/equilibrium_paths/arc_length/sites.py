@@ -148,6 +148,21 @@ class Sites(SiteGraphs):
         found[radials.flat] = across * direction[radials.flat] + (more * along)[radials.owner] * values.directions
         return found
 
+    def force_rate(self, values: Values, direction: Array) -> Array:
+        """How the forces of laws and bounds change along a direction of the coordinates, (n,).
+
+        Args:
+            values: at the point.
+            direction: of the coordinates, (n,).
+        """
+        found, m1, radials = np.zeros(len(values.x)), len(self.one), self.radials
+        found[self.one] = values.rises[:m1] * direction[self.one]
+        if len(radials):
+            rows, others = radials.pairs
+            parts = self._force_rates(values) * direction[radials.flat[others]]
+            found[radials.flat] = np.bincount(rows, parts, minlength=len(radials.flat))
+        return found
+
     def along(self, values: Values, motion: Array) -> Array:
         """What a motion is along the displacements of the sites, (m,).
 
