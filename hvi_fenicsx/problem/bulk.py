@@ -153,9 +153,8 @@ class Bulk:
             The residual at the blocks that this rank owns, (n, d).
         """
         v, test = ufl.TestFunction(space), self.form.arguments()[0]
-        form = -self.between(u, v)
-        for load in loads:
-            form += ufl.replace(load, {test: v})
+        each = [-self.between(u, v), *(ufl.replace(load, {test: v}) for load in loads)]
+        form = ufl.Form([integral for part in each for integral in part.integrals()])
         for part in self.dilatations:
             form -= part.work(part.pressure(u), v)
         return nodal_sum(form)

@@ -30,11 +30,6 @@ _PIECE = 8192
 class Held(Protocol):
     """What holds bubbles at some blocks, as the bounds of a part do."""
 
-    @property
-    def blocks(self) -> Entities:
-        """The bubbles' owned blocks, (k,)."""
-        ...
-
     def project(self, r: Array) -> None:
         """Take out of r (n, d) what is held, in place."""
         ...
@@ -78,26 +73,26 @@ class BubbleStiffness:
         """
         return np.asarray(r * self._inverse[at])
 
-    def descent(self, r: Array, free: Mask, bounds: Sequence[Held]) -> Array:
+    def descent(self, r: Array, free: Mask, bounds: Sequence[Held], at: Entities) -> Array:
         """P D⁻¹ P r, D being the diagonal and P taking out what is not free; overwritten by the next product.
 
         Args:
             r: (n, d).
             free: where a bubble is not prescribed, (n, d).
             bounds: what else is held.
+            at: the blocks of all of them, (k,).
         """
         z = self._out.x.array[: r.size].reshape(r.shape)
-        for at in _pieces(len(r)):
-            np.multiply(r[at], self._inverse[at], out=z[at])
-            z[at] *= free[at]
-        for held in bounds:
-            z[held.blocks] = r[held.blocks] * free[held.blocks]
-        for held in bounds:
-            held.project(z)
-        touched = np.unique(np.concatenate([np.empty(0, np.int32), *(held.blocks for held in bounds)]))
-        z[touched] *= self._inverse[touched] * free[touched]
-        for held in bounds:
-            held.project(z)
+        for piece in _pieces(len(r)):
+            np.multiply(r[piece], self._inverse[piece], out=z[piece])
+            z[piece] *= free[piece]
+        if bounds:
+            z[at] = r[at] * free[at]
+            for held in bounds:
+                held.project(z)
+            z[at] *= self._inverse[at] * free[at]
+            for held in bounds:
+                held.project(z)
         return z
 
     def move(self, r: Array, e: Array, at: Entities, step: Array) -> float:
@@ -250,11 +245,9 @@ class _Affine:
             middle.x.array[:] = dmesh.compute_midpoints(mesh, d, cells)[:, :d].ravel()
             place = place - middle
         height = ufl.dot(self._slopes, ufl.JacobianInverse(mesh) * place)
-        q, whole = ufl.TestFunction(space), ufl.Form([])
-        for i, axis in enumerate(np.eye(d)):
-            v = height * ufl.as_vector(axis.tolist())
-            whole += problem.bulk.energy_form(v, q[i])
-        self._form = forms.compiled(whole)
+        q, axes = ufl.TestFunction(space), [ufl.as_vector([float(x) for x in axis]) for axis in np.eye(d)]
+        each = [problem.bulk.energy_form(height * axis, q[i]) for i, axis in enumerate(axes)]
+        self._form = forms.compiled(ufl.Form([integral for form in each for integral in form.integrals()]))
 
     def energies(self, slopes: Array) -> Array:
         """The energies of the function with these slopes in reference coordinates (d,), along each axis, (d, cells)."""

@@ -7,6 +7,7 @@ Gräser 2011).
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -222,8 +223,8 @@ class LeastEnergy:
         self._bubbles, self._stiffness, self._under, self._thresholds = bubbles, stiffness, under, thresholds
         self.residual, self.energy, self._parts, self._begun = load, 0.0, under.bounds, False
         self._e = bubbles.x.array[: load.size].reshape(load.shape)
-        special = [np.empty(0, np.int32), *(p.blocks for p in under.prescribed), *(p.blocks for p in under.bounds)]
-        self._special = np.unique(np.concatenate(special))
+        self._bounded = _union(part.blocks for part in under.bounds)
+        self._special = _union([self._bounded, *(part.blocks for part in under.prescribed)])
         for given in under.prescribed:
             self._e[given.blocks, given.component] = given.values
 
@@ -263,7 +264,12 @@ class LeastEnergy:
         self.energy += self._stiffness.move(self.residual, self._e, self._special, step)
 
     def _descent(self, r: Array) -> Array:
-        return self._stiffness.descent(r, self._under.free, self._parts)
+        return self._stiffness.descent(r, self._under.free, self._parts, self._bounded)
+
+
+def _union(parts: Iterable[Entities]) -> Entities:
+    """All of some blocks, sorted."""
+    return np.unique(np.concatenate([np.empty(0, np.int32), *parts]))
 
 
 def find_least_energy(
