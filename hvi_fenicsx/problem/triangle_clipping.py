@@ -13,7 +13,7 @@ import numpy as np
 from ..typing import Array, Integers, Mask
 
 CORNERS = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
-"""Of the triangle that clips."""
+"""The triangle that clips."""
 _ONE = 1e-12
 """Distance up to which two corners of a polygon are one."""
 
