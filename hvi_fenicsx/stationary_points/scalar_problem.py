@@ -19,6 +19,9 @@ from .lengths import Lengths
 FAR = 1e6
 """Ends of the first box, relative to the problem's displacements; what is found must stay off them."""
 
+BENT = 0.01
+"""A share of the largest traction by which a traction bends or jumps where it has a joint."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class ScalarProblem:
@@ -61,9 +64,14 @@ class ScalarProblem:
 
     @cached_property
     def joint(self) -> float:
-        """The largest displacement at which a chain has a joint, one unit if there is none but at zero."""
-        ends = (abs(e) for c in self.chains for a in c for e in (a.low, a.high))
-        return max((e for e in ends if 0.0 < e < INF), default=1.0)
+        """The largest displacement at which a traction bends or jumps by a share of its peak; one if there is none."""
+        arcs = self.arcs
+        at, rises = arcs.high[:, :-1], np.abs(arcs.after[:, 1:] - arcs.before[:, :-1])
+        places = np.where(np.isfinite(at), np.abs(at), 0.0)
+        bends = rises + np.abs(np.diff(arcs.slopes, axis=1)) * places
+        peaks = np.maximum(np.abs(arcs.before), np.abs(arcs.after)).max(axis=1)
+        seen = places[np.isfinite(at) & (places > 0.0) & (bends > BENT * peaks[:, None])]
+        return float(seen.max(initial=0.0)) or 1.0
 
     @property
     def size(self) -> int:
