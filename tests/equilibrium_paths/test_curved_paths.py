@@ -263,6 +263,22 @@ def test_passages_that_go_round_end_soon() -> None:
     assert len(crossing.passages) < 10
 
 
+class TurningBack(GoingRound):
+    """Passages that leave all numbers as they are: each site turns back once, to a graph of its own."""
+
+    def _ways(self, rates: Array) -> Array:
+        return np.array([np.inf if k in self._turned else 0.0 for k in range(len(rates))])
+
+    def _pass(self, k: int, rates: Array) -> None:
+        self._turned.add(k)
+        self.passages.append(Passage(site=k, before=self._sites.segment(k), after=self._sites.segment(k)))
+
+
+def test_many_sites_may_turn_back_at_one_state() -> None:
+    follower, _ = path(line(graph(DROP), 30), programme=(0.1,))
+    assert len(TurningBack(follower._curve, follower._lag, lambda: None).run()) == 30
+
+
 def test_smoothed_laws_tend_to_the_law() -> None:
     """The quadratic smoothing of a drop of height c rounds its corner off within ε/c: the peak falls with ε."""
     options = PathOptions(programme=(9.0,), follow=Follow.EXACT)

@@ -18,7 +18,7 @@ STANDING = 1e-11
 _ROUNDS = 40
 """Corrections of the directions in which vertices at rest set out, at most."""
 _SLOW = 1e-2
-"""Factors of a point nearby serve where a correction is at most this part of the last one, or of the way there."""
+"""Factors of a point nearby serve where a correction is at most this part of the last one."""
 _STEPS = 12
 """Corrections of a point, at most."""
 _REFINEMENTS = 6
@@ -176,7 +176,7 @@ class Equations:
         value, gradient = condition
         size, last = 1.0 + float(np.max(np.abs(y))), np.inf
         noise = max(1e-10, 1e-14 / self._sharpness(gradient(y))) * size
-        expected = _SLOW * float(np.max(np.abs(y - self.here.y)))
+        expected = 0.0
         for _ in range(_STEPS):
             values = self.sites.values(y[:-1])
             left, off = self.residual(y, values), value(y)

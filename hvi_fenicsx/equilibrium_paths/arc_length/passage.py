@@ -24,7 +24,10 @@ from .equations import ROUNDING, STANDING, Refused
 _SLOW = 1e-6
 """A rate of a site's force at which it stands, but for rounding, beside the largest."""
 _ROUND = 3
-"""Times that the passages at one point come to the same cell: a straight line does so once, else they go round."""
+"""Times that the passages at one point come to the same cell: a straight line does so once, else they go round.
+
+A site that turns back has another graph from then on, so that the cells are others.
+"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -83,7 +86,8 @@ class Crossing:
     def __init__(self, curve: Curve, lag: Array, check: Callable[[], None]) -> None:
         self._curve, self._sites, self._check = curve, curve.sites, check
         self._lag, self._left = lag, lag.copy()
-        self._cells: Counter[bytes] = Counter()
+        self._cells: Counter[tuple[bytes, frozenset[int]]] = Counter()
+        self._turned: set[int] = set()
         self.passages: list[Passage] = []
 
     def run(self, arrived: int | None = None, *, turned: bool = False) -> list[Passage]:
@@ -122,7 +126,7 @@ class Crossing:
         Raises:
             Refused: they go round.
         """
-        cell = self._sites.numbers.tobytes()
+        cell = self._sites.numbers.tobytes(), frozenset(self._turned)
         self._cells[cell] += 1
         if self._cells[cell] > _ROUND:
             raise Refused
@@ -197,6 +201,7 @@ class Crossing:
         sites, curve, values = self._sites, self._curve, self._curve.here.values
         x, force = float(values.lengths[k]), float(values.tractions[k])
         sites.remember(k, x, force)
+        self._turned.add(k)
         near = [n for n, s in enumerate(sites.chain(k)) if not s.rise and _contains(s, x)]
         sites.enter(k, near[-1] if forward else near[0])
         y = curve.here.y.copy()
