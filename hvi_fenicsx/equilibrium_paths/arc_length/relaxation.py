@@ -39,6 +39,7 @@ class Relaxation:
     Attributes:
         z: the coordinates now, (n,).
         escapes: whether a body is out of reach.
+        theta: what holds back in the next step, in units of the damping.
     """
 
     def __init__(
@@ -54,7 +55,7 @@ class Relaxation:
     ) -> None:
         self._problem, self._sites, self._load, self._lag, self._step = problem, sites, load, lag, step
         self._damping = np.diag(sites.forces / sites.length)
-        self.z, self.escapes, self._theta = z.copy(), False, 1.0
+        self.z, self.escapes, self.theta = z.copy(), False, 1.0
         self._infinite = np.inf if held else _FAR * (1.0 + float(np.max(np.abs(sites.s(z)), initial=0.0)))
 
     def run(self, directions: Array) -> bool:
@@ -79,8 +80,8 @@ class Relaxation:
             if self._is_out_of_reach():
                 self.escapes = True
                 return True
-            self._theta *= _FASTER if self._stepped_or_back() else _SLOWER
-            if self._theta > 1e12:
+            self.theta *= _FASTER if self._stepped_or_back() else _SLOWER
+            if self.theta > 1e12:
                 return False
         return False
 
@@ -115,7 +116,7 @@ class Relaxation:
     def _stepped(self) -> bool:
         """One step in time, up to the first drop, or to where the body is out of reach; whether it went well."""
         sites, left, values = self._sites, self._left(), self._sites.values(self.z)
-        sites.stiffness = self._problem.stiffness + self._theta * self._damping
+        sites.stiffness = self._problem.stiffness + self.theta * self._damping
         if sites.unstable_directions(values):  # what holds back is less than what pushes on: the energy would rise
             return False
         held = sites.stiffness @ values.x + values.force
