@@ -182,7 +182,7 @@ class Equations:
             left, off = self.residual(y, values), value(y)
             if not self.sites.bent and max(float(np.max(np.abs(left))), abs(off)) <= 1e-15 * size:
                 return y
-            step = self._correction(values, left, gradient(y), off, max(expected, noise))
+            step = self._correction(values, left, gradient(y), off, expected)
             change = float(np.max(np.abs(step)))
             if not np.isfinite(change) or (change > 2.0 * last and change > 1e-9 * size):
                 break
@@ -195,7 +195,10 @@ class Equations:
         raise Refused
 
     def _correction(self, values: Values, left: Array, row: Array, off: float, expected: float) -> Array:
-        """The change that takes out what is left; by factors of a point nearby where it is as small as expected."""
+        """The change that takes out what is left; by factors of a point nearby where it is as small as expected.
+
+        A change that hardly falls is rounding only where the factors are those of the point itself.
+        """
         if self._factors is not None and self._factors.takes(row):
             found = self._factors.step(left, row, off)
             if np.max(np.abs(found)) <= expected:
