@@ -10,16 +10,13 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-import ufl
-from dolfinx import fem
+import lame
+from lame import NU, E, Errors, P
 
 import hvi_fenicsx as hvi
-from hvi_fenicsx.problem import spaces
 
 RING = """
 h = {size};
@@ -47,27 +44,9 @@ Physical Surface("first") = {{1}}; Physical Surface("second") = {{2}};
 Mesh.ElementOrder = {order};
 """
 """The same of two bodies, which meet at 1.5; their cells may be of different sizes."""
-E, NU, P = 1e7, 0.3, 1e5
 
 
-@dataclass(frozen=True, kw_only=True)
-class Errors:
-    """Relative errors: in the energy norm, as it is estimated, of the energy, and of the largest nodal displacement."""
-
-    unknowns: int
-    norm: float
-    estimated: float
-    energy: float
-    nodal: float
-
-    def __str__(self) -> str:
-        return (
-            f"{self.unknowns} unknowns: energy norm {self.norm:.2e}, estimated {self.estimated:.2e} (index "
-            f"{self.estimated / self.norm:.2f}), energy {self.energy:.1e}, largest nodal error {self.nodal:.1e}"
-        )
-
-
-def lame(r: Any) -> Any:
+def displacement(r: Any) -> Any:
     """The radial displacement under pressure inside (Lamé)."""
     return (1 + NU) / E * P / 3 * ((1 - 2 * NU) * r + 4 / r)
 
@@ -86,31 +65,8 @@ def solved(script: str, *effects: Any) -> hvi.Solution:
 
 
 def errors(found: hvi.Solution) -> Errors:
-    """The errors of a solution."""
-    x = found.problem.positions[:, :2]
-    r = np.linalg.norm(x, axis=1, keepdims=True)
-    away = spaces.values(found.problem.space, found.u.x.array) - lame(r) * x / r
-    place = ufl.SpatialCoordinate(found.problem.space.mesh)
-    radius = ufl.sqrt(ufl.dot(place, place))
-    assert found.estimate is not None
-    return Errors(
-        unknowns=found.dofs,
-        norm=energy_error(found, lame(radius) / radius * place),
-        estimated=found.estimate.relative,
-        energy=float(found.energy / (-0.25 * np.pi * P * lame(1.0)) - 1),
-        nodal=float(np.abs(away).max() / lame(1.0)),
-    )
-
-
-def energy_error(found: hvi.Solution, exact: Any) -> float:
-    """The relative error in the energy norm, integrated; the displacement is given as a UFL expression."""
-    return float(np.sqrt(_energy(found.u - exact) / _energy(exact)))
-
-
-def _energy(v: Any) -> float:
-    strain, shear = ufl.sym(ufl.grad(v)), E / (1 + NU)
-    density = shear * (ufl.inner(strain, strain) + NU / (1 - 2 * NU) * ufl.tr(strain) ** 2)
-    return float(fem.assemble_scalar(fem.form(density * ufl.dx(metadata={"quadrature_degree": 8}))))
+    """The errors of a solution under pressure."""
+    return lame.errors(found, displacement)
 
 
 def table(cells: Sequence[int]) -> None:

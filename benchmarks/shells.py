@@ -9,16 +9,13 @@ is integrated over the bodies as they are meshed.
 from __future__ import annotations
 
 import tempfile
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-import ufl
-from dolfinx import fem
+import lame
+from lame import BULK, NU, SHEAR, E, Errors, P
 
 import hvi_fenicsx as hvi
-from hvi_fenicsx.problem import spaces
 
 SHELLS = """
 SetFactory("OpenCASCADE");
@@ -35,29 +32,10 @@ MeshSize{{ PointsOf{{ Volume{{5}}; }} }} = {size}; MeshSize{{ PointsOf{{ Volume{
 Mesh.ElementOrder = {order};
 """
 """An eighth of a hollow ball of two bodies, with cells of different sizes; of equal sizes the meshes match."""
-E, NU, P = 1e7, 0.3, 1e5
-BULK, SHEAR = E / (3 * (1 - 2 * NU)), E / (2 * (1 + NU))
 FLAT = ("left", "front", "bottom")
 
 
-@dataclass(frozen=True, kw_only=True)
-class Errors:
-    """Relative errors: in the energy norm, as it is estimated, of the energy, and of the largest nodal displacement."""
-
-    unknowns: int
-    norm: float
-    estimated: float
-    energy: float
-    nodal: float
-
-    def __str__(self) -> str:
-        return (
-            f"{self.unknowns} unknowns: energy norm {self.norm:.2e}, estimated {self.estimated:.2e} (index "
-            f"{self.estimated / self.norm:.2f}), energy {self.energy:.1e}, largest nodal error {self.nodal:.1e}"
-        )
-
-
-def lame(r: Any) -> Any:
+def displacement(r: Any) -> Any:
     """The radial displacement under pressure inside (Lamé)."""
     return P / 7 * (r / (3 * BULK) + 8 / (4 * SHEAR * r**2))
 
@@ -108,30 +86,7 @@ def under_pressure(body: hvi.Body) -> hvi.Solution:
 
 def errors(found: hvi.Solution) -> Errors:
     """The errors of a solution under pressure."""
-    x = found.problem.positions[:, :3]
-    r = np.linalg.norm(x, axis=1, keepdims=True)
-    away = spaces.values(found.problem.space, found.u.x.array) - lame(r) * x / r
-    place = ufl.SpatialCoordinate(found.problem.space.mesh)
-    radius = ufl.sqrt(ufl.dot(place, place))
-    assert found.estimate is not None
-    return Errors(
-        unknowns=found.dofs,
-        norm=energy_error(found, lame(radius) / radius * place),
-        estimated=found.estimate.relative,
-        energy=float(found.energy / (-0.25 * np.pi * P * lame(1.0)) - 1),
-        nodal=float(np.abs(away).max() / lame(1.0)),
-    )
-
-
-def energy_error(found: hvi.Solution, exact: Any) -> float:
-    """The relative error in the energy norm, integrated; the displacement is given as a UFL expression."""
-    return float(np.sqrt(_energy(found.u - exact) / _energy(exact)))
-
-
-def _energy(v: Any) -> float:
-    strain = ufl.sym(ufl.grad(v))
-    density = 2 * SHEAR * ufl.inner(strain, strain) + (BULK - 2 * SHEAR / 3) * ufl.tr(strain) ** 2
-    return float(fem.assemble_scalar(fem.form(density * ufl.dx(metadata={"quadrature_degree": 8}))))
+    return lame.errors(found, displacement)
 
 
 def table() -> None:

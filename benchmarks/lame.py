@@ -1,0 +1,67 @@
+"""What the hollow bodies of Lamé share: material, pressure, and the errors of a solution against a closed form."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import ufl
+from dolfinx import fem
+
+import hvi_fenicsx as hvi
+from hvi_fenicsx.problem import spaces
+
+E, NU, P = 1e7, 0.3, 1e5
+BULK, SHEAR = E / (3 * (1 - 2 * NU)), E / (2 * (1 + NU))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Errors:
+    """Relative errors: in the energy norm, as it is estimated, of the energy, and of the largest nodal displacement."""
+
+    unknowns: int
+    norm: float
+    estimated: float
+    energy: float
+    nodal: float
+
+    def __str__(self) -> str:
+        return (
+            f"{self.unknowns} unknowns: energy norm {self.norm:.2e}, estimated {self.estimated:.2e} (index "
+            f"{self.estimated / self.norm:.2f}), energy {self.energy:.1e}, largest nodal error {self.nodal:.1e}"
+        )
+
+
+def errors(found: hvi.Solution, radial: Callable[[Any], Any]) -> Errors:
+    """The errors of a solution under pressure inside, at the radius 1.
+
+    Args:
+        found: of a quarter of a ring, or of an eighth of a ball: the pressure acts on π/2 in both.
+        radial: the displacement over the radius.
+    """
+    x = found.problem.positions[:, : found.problem.scales.dimension]
+    r = np.linalg.norm(x, axis=1, keepdims=True)
+    away = spaces.values(found.problem.space, found.u.x.array) - radial(r) * x / r
+    place = ufl.SpatialCoordinate(found.problem.space.mesh)
+    radius = ufl.sqrt(ufl.dot(place, place))
+    assert found.estimate is not None
+    return Errors(
+        unknowns=found.dofs,
+        norm=energy_error(found, radial(radius) / radius * place),
+        estimated=found.estimate.relative,
+        energy=float(found.energy / (-0.25 * np.pi * P * radial(1.0)) - 1),
+        nodal=float(np.abs(away).max() / radial(1.0)),
+    )
+
+
+def energy_error(found: hvi.Solution, exact: Any) -> float:
+    """The relative error in the energy norm, integrated; the displacement is given as a UFL expression."""
+    return float(np.sqrt(_energy(found.u - exact) / _energy(exact)))
+
+
+def _energy(v: Any) -> float:
+    strain = ufl.sym(ufl.grad(v))
+    density = 2 * SHEAR * ufl.inner(strain, strain) + (BULK - 2 * SHEAR / 3) * ufl.tr(strain) ** 2
+    return float(fem.assemble_scalar(fem.form(density * ufl.dx(metadata={"quadrature_degree": 8}))))
