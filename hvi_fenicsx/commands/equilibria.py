@@ -15,7 +15,7 @@ from ..preparation import Preparation, prepare
 from ..report.html import equilibria_page
 from ..report.pictures import equilibria as picture
 from ..results.output_folder import Existing
-from ..results.whole import Wanted, write_whole
+from ..results.whole import picture_process, write_whole
 from ..runtime import log
 from ..runtime.mpi import on_root
 from ..runtime.signals import Interrupt
@@ -163,10 +163,13 @@ def _written(request: Request, bodies: Equilibria, found: Found, i: int) -> file
     """Write one equilibrium into a result folder of its own; its row. Collective."""
     solution, folder = bodies.solution(found.points[i]), request.folder
     name = f"equilibrium-{i + 1:0{len(str(len(found.points)))}d}"
-    with results.ResultFolder(COMM, folder.work / name) as own:
+    drawn, dimension = not request.options.no_pictures and i < MOST_DRAWN, request.prepared.scene.dimension
+    with (
+        results.ResultFolder(COMM, folder.work / name) as own,
+        picture_process(own, dimension, telling.LOG.info, wanted=drawn) as pictures,
+    ):
         given = {"command": request.options.given, "petsc": request.options.petsc}
-        wanted = Wanted(pictures=not request.options.no_pictures and i < MOST_DRAWN)
-        write_whole(own, solution, request.prepared.timer, given, telling.LOG.info, wanted)
+        write_whole(own, solution, request.prepared.timer, given, telling.LOG.info, pictures)
         own.commit(request.prepared.scene)
     return files.row(i + 1, bodies, found.points[i], solution, name)
 

@@ -16,7 +16,7 @@ from ..path import last_borne
 from ..preparation import prepare
 from ..report.html import render
 from ..results.output_folder import Existing
-from ..results.whole import Wanted, write_whole
+from ..results.whole import picture_process, write_whole
 from ..runtime import log, terminal
 from ..runtime.mpi import on_root
 from ..runtime.signals import Interrupt
@@ -39,7 +39,8 @@ class RunRequest:
         folder: where the result goes.
         timer: where time goes.
         given: the command line and PETSc's options, for ``summary.json``.
-        wanted: what is made from the other files.
+        pictures: whether pictures are drawn.
+        report: whether the page is written.
     """
 
     scene: Scene
@@ -47,7 +48,8 @@ class RunRequest:
     folder: results.ResultFolder
     timer: Timer
     given: dict[str, str]
-    wanted: Wanted
+    pictures: bool
+    report: bool
 
 
 def execute(options: argparse.Namespace) -> int:
@@ -67,9 +69,9 @@ def execute(options: argparse.Namespace) -> int:
         return code
     existing: Existing = "replace" if options.force or options.resume else "refuse"
     given = {"command": options.given, "petsc": options.petsc}
-    wanted = Wanted(pictures=not options.no_pictures, report=not options.no_report)
+    wanted = {"pictures": not options.no_pictures, "report": not options.no_report}
     with results.ResultFolder(COMM, target, existing, inputs=[options.scene]) as folder:
-        return _run(RunRequest(scene=scene, goal=goal, folder=folder, timer=timer, given=given, wanted=wanted))
+        return _run(RunRequest(scene=scene, goal=goal, folder=folder, timer=timer, given=given, **wanted))
 
 
 def _goal(options: argparse.Namespace) -> Goal | None:
@@ -85,12 +87,16 @@ def _run(request: RunRequest) -> int:
     """Solve, write and tell; the exit code. Collective."""
     interrupt = Interrupt(COMM)
     interrupt.watch()
+    tell = telling.LOG.info
     folder, run_logs = request.folder, telling.on_first_rank(lambda: log.RunLog(request.folder.work / "run.log"))
     with log.Handlers(*telling.on_first_rank(log.TerminalDisplay)):
-        with log.Handlers(*run_logs):
+        with (
+            log.Handlers(*run_logs),
+            picture_process(folder, request.scene.dimension, tell, wanted=request.pictures) as pictures,
+        ):
             solution, reached = _solve(request, interrupt)
             given = {**request.given, **(_accuracy(reached) if reached else {})}
-            record = write_whole(folder, solution, request.timer, given, telling.LOG.info, request.wanted)
+            record = write_whole(folder, solution, request.timer, given, tell, pictures, report=request.report)
         on_root(COMM, lambda: telling.finish(run_logs))
         folder.commit(request.scene)
         kept = [*folder.kept, *petsc_options.unread(str(request.given["petsc"]))]

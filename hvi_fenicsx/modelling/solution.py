@@ -16,7 +16,7 @@ from ..errors import InputError
 from ..problem.cell_stress import mean_stress
 from ..results import ResultFolder, gathering
 from ..results.output_folder import Existing
-from ..results.whole import Wanted, write_whole
+from ..results.whole import picture_process, write_whole
 from ..runtime import log, notebook
 from ..solution import Solution
 from ..solvers.result import SolveResult
@@ -137,8 +137,12 @@ class ModelSolution(Solution):
             InputError: on all ranks alike: the folder holds a result or other files, or cannot be written.
         """
         existing: Existing = "replace" if force else "refuse"
-        with ResultFolder(self.problem.domain.mesh.comm, Path(folder), existing) as target:
-            write_whole(target, self, self.timer, _GIVEN, _LOG.warning, Wanted(pictures=pictures))
+        dimension = self.problem.scales.dimension
+        with (
+            ResultFolder(self.problem.domain.mesh.comm, Path(folder), existing) as target,
+            picture_process(target, dimension, _LOG.warning, wanted=pictures) as process,
+        ):
+            write_whole(target, self, self.timer, _GIVEN, _LOG.warning, process)
             target.commit(self.scene)
 
     @property

@@ -5,14 +5,12 @@ from __future__ import annotations
 import contextlib
 import functools
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 from ..errors import HviError
 from ..problem.cell_stress import mean_stress
 from ..report.html import render
-from ..report.pictures.draw import drawing
+from ..report.pictures.draw import PictureProcess, waiting
 from ..runtime.mpi import asleep_until_all, on_root
 from ..runtime.timing import Timer
 from ..solution import Solution
@@ -23,26 +21,15 @@ _PATIENCE = 120.0
 """Seconds that pictures may take after all else is written."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class Wanted:
-    """What is made from the other files.
-
-    Attributes:
-        pictures: whether pictures are drawn.
-        report: whether the page is written.
-    """
-
-    pictures: bool = True
-    report: bool = True
-
-
 def write_whole(
     folder: ResultFolder,
     solution: Solution,
     timer: Timer,
     given: Mapping[str, Any],
     tell: Callable[[str], None],
-    wanted: Wanted,
+    pictures: PictureProcess | None,
+    *,
+    report: bool = True,
 ) -> dict[str, Any]:
     """Write all files of a result but ``run.log``. Collective.
 
@@ -56,7 +43,8 @@ def write_whole(
         timer: where time goes.
         given: further entries of the summary.
         tell: is given that line, on rank 0.
-        wanted: what is made from the other files.
+        pictures: what draws; None on other ranks than the first, and where nothing is to be drawn.
+        report: whether the page is written.
 
     Returns:
         The summary, on all ranks.
@@ -68,14 +56,17 @@ def write_whole(
         on_root(comm, lambda: write_record(work, record))
         if comm.size > 1:
             write_fields(work, solution, sigma)
-        with _drawn(work, tell, wanted=wanted.pictures and comm.rank == 0):
-            if comm.size == 1:
-                write_fields(work, solution, sigma)
+        if pictures is not None:
+            pictures.begin()
+        if comm.size == 1:
+            write_fields(work, solution, sigma)
+        if pictures is not None:
+            _told("pictures", tell, functools.partial(pictures.finish, _PATIENCE))
         asleep_until_all(comm)
     with timer("output"):
         record["time"] = timer.report()
         on_root(comm, lambda: write_record(work, record))
-        if wanted.report:
+        if report:
             on_root(comm, lambda: _told("report", tell, lambda: render.write(work)))
     record["time"] = timer.report()
     on_root(comm, lambda: write_record(work, record))
@@ -83,15 +74,24 @@ def write_whole(
 
 
 @contextlib.contextmanager
-def _drawn(folder: Path, tell: Callable[[str], None], *, wanted: bool) -> Iterator[None]:
-    """Draw pictures during a block, and wait for them at its end."""
+def picture_process(
+    folder: ResultFolder, dimension: int, tell: Callable[[str], None], *, wanted: bool
+) -> Iterator[PictureProcess | None]:
+    """Start what will draw the pictures of a folder; None on other ranks than the first, and where there is none.
+
+    Its libraries take half a second to load: who starts it before the solution is found need not wait for them.
+
+    Args:
+        folder: being written.
+        dimension: of the body.
+        tell: is given a line where it cannot be started, on rank 0.
+        wanted: whether pictures are drawn.
+    """
     with contextlib.ExitStack() as stack:
-        begun: list[Callable[[float], object]] = []
-        if wanted:
-            _told("pictures", tell, lambda: begun.append(stack.enter_context(drawing(folder))))
-        yield
-        for finish in begun:
-            _told("pictures", tell, functools.partial(finish, _PATIENCE))
+        started: list[PictureProcess] = []
+        if wanted and folder.comm.rank == 0:
+            _told("pictures", tell, lambda: started.append(stack.enter_context(waiting(folder.work, dimension))))
+        yield next(iter(started), None)
 
 
 def _told(what: str, tell: Callable[[str], None], make: Callable[[], object]) -> None:

@@ -348,6 +348,27 @@ def test_a_child_that_takes_too_long_is_ended_with_its_server(
     assert not list(folder.glob(f".*{draw.UNFINISHED}"))
 
 
+def test_the_process_draws_when_told_and_not_before(tmp_path: Path) -> None:
+    folder = result(tmp_path / "r", square(4), pressed)
+    record = (folder / "summary.json").read_text(encoding="utf-8")
+    (folder / "summary.json").unlink()  # the folder is being written when the process starts
+    with draw.waiting(folder) as process:
+        (folder / "summary.json").write_text(record, encoding="utf-8")
+        process.begin()
+        assert_drawn(process.finish(60.0), "body.png", "contact.png")
+
+
+def test_a_process_that_is_never_told_draws_nothing_and_is_gone(
+    tmp_path: Path, left_running: Callable[[], list[str]]
+) -> None:
+    folder = result(tmp_path / "r", square(4), pressed)
+    with draw.waiting(folder) as process:
+        process.child.communicate(timeout=60.0)  # its input ends, as where the caller is killed
+        assert process.child.returncode == 1
+    assert not list(folder.glob("*.png"))
+    assert left_running() == []
+
+
 def test_the_child_is_no_rank_and_the_package_loads_no_plotting(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

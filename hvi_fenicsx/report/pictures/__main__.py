@@ -7,6 +7,7 @@ Exit code 0, or 1 with a message for each picture that failed; the others are th
 from __future__ import annotations
 
 import argparse
+import contextlib
 import multiprocessing
 import signal
 import sys
@@ -21,7 +22,7 @@ from ...errors import HviError
 from ...runtime import processes
 from ..errors import PictureError
 from ..reader import Result, read
-from .draw import COMPLAINT
+from .draw import COMPLAINT, TOLD, WHEN_TOLD
 from .xserver import XServer
 
 if TYPE_CHECKING:
@@ -49,16 +50,30 @@ def main(arguments: Sequence[str] | None = None) -> int:
         prog="python3 -m hvi_fenicsx.report.pictures", description="Draw a result's pictures."
     )
     parser.add_argument("folder", type=Path, help="a finished result folder")
-    folder = parser.parse_args(arguments).folder
+    told = "load what draws a body in this dimension, then wait for a line on the standard input"
+    parser.add_argument(WHEN_TOLD, type=int, choices=(2, 3), metavar="DIMENSION", help=told)
+    options = parser.parse_args(arguments)
     signal.signal(signal.SIGTERM, _terminated)
     processes.die_with_parent()  # or it would write into the folder of the next run
+    if options.when_told is not None and not _told(options.when_told):
+        return 1
     try:
-        failures = draw_all(read(folder))
+        failures = draw_all(read(options.folder))
     except HviError as error:
         failures = [str(error)]
     for failure in failures:
         print(f"{COMPLAINT}{failure}", file=sys.stderr)
     return 1 if failures else 0
+
+
+def _told(dimension: int) -> bool:
+    """Load what draws, and wait; whether there is something to draw."""
+    from . import drawings  # noqa: F401 (loads matplotlib)
+
+    if dimension == 3:
+        with contextlib.suppress(ModuleNotFoundError):  # each picture will say what it lacks
+            import pyvista  # noqa: F401
+    return sys.stdin.readline() == TOLD
 
 
 def _terminated(*_: object) -> NoReturn:

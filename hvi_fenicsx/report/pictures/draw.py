@@ -7,11 +7,11 @@ picture, never a run. Nothing here imports a plotting library; the child does.
 from __future__ import annotations
 
 import contextlib
-import functools
 import os
 import shlex
 import subprocess
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +24,55 @@ PATIENCE = 3.0
 """Seconds for a child to end by itself."""
 COMPLAINT = "pictures: "
 """How the child's message to its caller begins."""
+WHEN_TOLD, TOLD = "--when-told", "draw\n"
+"""The child's option to wait, and the line that ends it."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class PictureProcess:
+    """A process that has loaded what it draws with, or is about to, and waits until the folder can be drawn.
+
+    Attributes:
+        child: the process.
+        folder: whose pictures it draws.
+        command: by which they can be drawn again.
+    """
+
+    child: subprocess.Popen[str]
+    folder: Path
+    command: str
+
+    def begin(self) -> None:
+        """Let it draw: the folder is finished, but for the pictures."""
+        assert self.child.stdin is not None
+        with contextlib.suppress(OSError):  # it has failed already: then `finish` tells
+            self.child.stdin.write(TOLD)
+            self.child.stdin.flush()
+
+    def finish(self, timeout: float) -> list[Path]:
+        """Wait for the pictures.
+
+        Args:
+            timeout: seconds after which the process is given up.
+
+        Returns:
+            The pictures, as paths.
+
+        Raises:
+            PictureError: the process failed; its message says which picture and why.
+        """
+        try:
+            names, errors = self.child.communicate(timeout=timeout)
+        except subprocess.TimeoutExpired:
+            raise PictureError(f"not drawn within {timeout:g} s; {self.command} tries again") from None
+        if self.child.returncode != 0:
+            raise PictureError(_message(errors, self.child.returncode))
+        try:
+            manifest.add(self.folder, names.splitlines())
+        except OSError as error:
+            words = f"{self.folder}/{manifest.NAME}: cannot be written: {error.strerror or error}"
+            raise PictureError(words) from None
+        return [self.folder / name for name in names.splitlines()]
 
 
 def draw(folder: Path, *, timeout: float = 120) -> list[Path]:
@@ -39,19 +88,23 @@ def draw(folder: Path, *, timeout: float = 120) -> list[Path]:
     Raises:
         PictureError: the child failed; its message says which picture and why.
     """
-    with drawing(folder) as finish:
-        return finish(timeout)
+    with waiting(folder) as process:
+        process.begin()
+        return process.finish(timeout)
 
 
 @contextlib.contextmanager
-def drawing(folder: Path) -> Iterator[Callable[[float], list[Path]]]:
-    """Draw while the caller does something else; for rank 0 alone.
+def waiting(folder: Path, dimension: int = 2) -> Iterator[PictureProcess]:
+    """Start what will draw, while the caller does something else; for rank 0 alone.
+
+    At the end of the block it is gone, whether it has drawn or not.
 
     Args:
-        folder: a finished result.
+        folder: a result that will be finished.
+        dimension: of its body, for which libraries are loaded. One of the plane may be in space all the same.
 
     Yields:
-        Waits for the pictures so many seconds, and returns or raises what :func:`draw` does.
+        The process.
 
     Raises:
         PictureError: there is no process for them.
@@ -60,28 +113,14 @@ def drawing(folder: Path) -> Iterator[Callable[[float], list[Path]]]:
     # One thread for linear algebra: the child forks, and what it draws needs none.
     alone = {**processes.environment(), "OMP_NUM_THREADS": "1"}
     # In the result's folder: in the current one matplotlib would read a file of settings.
-    pipes: dict[str, Any] = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    pipes: dict[str, Any] = dict.fromkeys(("stdin", "stdout", "stderr"), subprocess.PIPE)
+    told = [WHEN_TOLD, str(dimension)]
     try:
-        child = subprocess.Popen(command, env=alone, cwd=folder, start_new_session=True, **pipes)
+        child = subprocess.Popen([*command, *told], env=alone, cwd=folder, start_new_session=True, text=True, **pipes)
     except OSError as error:
         raise PictureError(f"no process draws: {error.strerror or error}") from None
     with _ended(child, Path(folder)):
-        yield functools.partial(_pictures, child, Path(folder), shlex.join(command))
-
-
-def _pictures(child: subprocess.Popen[str], folder: Path, command: str, timeout: float) -> list[Path]:
-    """What the child has drawn."""
-    try:
-        names, errors = child.communicate(timeout=timeout)
-    except subprocess.TimeoutExpired:
-        raise PictureError(f"not drawn within {timeout:g} s; {command} tries again") from None
-    if child.returncode != 0:
-        raise PictureError(_message(errors, child.returncode))
-    try:
-        manifest.add(folder, names.splitlines())
-    except OSError as error:
-        raise PictureError(f"{folder}/{manifest.NAME}: cannot be written: {error.strerror or error}") from None
-    return [folder / name for name in names.splitlines()]
+        yield PictureProcess(child=child, folder=Path(folder), command=shlex.join(command))
 
 
 @contextlib.contextmanager
