@@ -69,9 +69,17 @@ def execute(options: argparse.Namespace) -> int:
         return code
     existing: Existing = "replace" if options.force or options.resume else "refuse"
     given = {"command": options.given, "petsc": options.petsc}
-    wanted = {"pictures": not options.no_pictures, "report": not options.no_report}
     with results.ResultFolder(COMM, target, existing, inputs=[options.scene]) as folder:
-        return _run(RunRequest(scene=scene, goal=goal, folder=folder, timer=timer, given=given, **wanted))
+        request = RunRequest(
+            scene=scene,
+            goal=goal,
+            folder=folder,
+            timer=timer,
+            given=given,
+            pictures=not options.no_pictures,
+            report=not options.no_report,
+        )
+        return _run(request)
 
 
 def _goal(options: argparse.Namespace) -> Goal | None:

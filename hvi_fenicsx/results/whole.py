@@ -56,12 +56,9 @@ def write_whole(
         on_root(comm, lambda: write_record(work, record))
         if comm.size > 1:
             write_fields(work, solution, sigma)
-        if pictures is not None:
-            pictures.begin()
-        if comm.size == 1:
-            write_fields(work, solution, sigma)
-        if pictures is not None:
-            _told("pictures", tell, functools.partial(pictures.finish, _PATIENCE))
+        with _drawn(pictures, tell):
+            if comm.size == 1:
+                write_fields(work, solution, sigma)
         asleep_until_all(comm)
     with timer("output"):
         record["time"] = timer.report()
@@ -92,6 +89,17 @@ def picture_process(
         if wanted and folder.comm.rank == 0:
             _told("pictures", tell, lambda: started.append(stack.enter_context(waiting(folder.work, dimension))))
         yield next(iter(started), None)
+
+
+@contextlib.contextmanager
+def _drawn(pictures: PictureProcess | None, tell: Callable[[str], None]) -> Iterator[None]:
+    """Draw pictures during a block, and wait for them at its end."""
+    if pictures is None:
+        yield
+        return
+    pictures.begin()
+    yield
+    _told("pictures", tell, functools.partial(pictures.finish, _PATIENCE))
 
 
 def _told(what: str, tell: Callable[[str], None], make: Callable[[], object]) -> None:

@@ -40,6 +40,7 @@ from hvi_fenicsx.report.pictures.kinds import body_plane, body_space, contact_cu
 from hvi_fenicsx.report.pictures.raster import shade
 from hvi_fenicsx.report.solution_arrays import FILE, PartArrays, SolutionArrays, load, save
 from hvi_fenicsx.results import contact_table
+from hvi_fenicsx.runtime import processes
 
 Array = npt.NDArray[np.float64]
 E, NU, LOAD = 2.15e11, 0.29, 1.0e6
@@ -363,10 +364,26 @@ def test_a_process_that_is_never_told_draws_nothing_and_is_gone(
 ) -> None:
     folder = result(tmp_path / "r", square(4), pressed)
     with draw.waiting(folder) as process:
-        process.child.communicate(timeout=60.0)  # its input ends, as where the caller is killed
-        assert process.child.returncode == 1
+        process.line.close()  # as where the caller is killed
+        assert process.child.wait(60.0) == 1
     assert not list(folder.glob("*.png"))
     assert left_running() == []
+
+
+def test_a_process_that_ends_before_it_is_told_costs_one_line(tmp_path: Path) -> None:
+    """In a program with PETSc's signal handlers, which end it where a pipe breaks."""
+    folder = result(tmp_path / "r", square(4), pressed)
+    code = (
+        "import sys; from pathlib import Path; from petsc4py import PETSc; "
+        "from hvi_fenicsx.report.errors import PictureError; from hvi_fenicsx.report.pictures import draw\n"
+        "with draw.waiting(Path(sys.argv[1])) as process:\n"
+        "    process.child.kill(); process.child.wait(10.0); process.begin()\n"
+        "    try: process.finish(60.0)\n"
+        "    except PictureError as error: print(error)\n"
+    )
+    command = [*processes.PYTHON, "-c", code, str(folder)]
+    done = subprocess.run(command, env=processes.environment(), capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout.strip()) == (0, "the drawing process ended with -9")
 
 
 def test_the_child_is_no_rank_and_the_package_loads_no_plotting(

@@ -9,8 +9,9 @@ from __future__ import annotations
 import contextlib
 import os
 import shlex
+import socket
 import subprocess
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -34,20 +35,21 @@ class PictureProcess:
 
     Attributes:
         child: the process.
+        line: to its standard input.
         folder: whose pictures it draws.
         command: by which they can be drawn again.
     """
 
     child: subprocess.Popen[str]
+    line: socket.socket
     folder: Path
     command: str
 
     def begin(self) -> None:
         """Let it draw: the folder is finished, but for the pictures."""
-        assert self.child.stdin is not None
         with contextlib.suppress(OSError):  # it has failed already: then `finish` tells
-            self.child.stdin.write(TOLD)
-            self.child.stdin.flush()
+            # Without a signal: PETSc's handler of a broken pipe would end the whole program.
+            self.line.send(TOLD.encode(), socket.MSG_NOSIGNAL)
 
     def finish(self, timeout: float) -> list[Path]:
         """Wait for the pictures.
@@ -101,7 +103,7 @@ def waiting(folder: Path, dimension: int = 2) -> Iterator[PictureProcess]:
 
     Args:
         folder: a result that will be finished.
-        dimension: of its body, for which libraries are loaded. One of the plane may be in space all the same.
+        dimension: of its body; what draws it is loaded before the process is told, what only the other one needs after.
 
     Yields:
         The process.
@@ -110,17 +112,23 @@ def waiting(folder: Path, dimension: int = 2) -> Iterator[PictureProcess]:
         PictureError: there is no process for them.
     """
     command = [*processes.PYTHON, "-m", __package__, os.path.abspath(folder)]
+    with contextlib.ExitStack() as stack:
+        try:
+            line, end = (stack.enter_context(one) for one in socket.socketpair())
+            child = _child([*command, WHEN_TOLD, str(dimension)], Path(folder), end)
+        except OSError as error:
+            raise PictureError(f"no process draws: {error.strerror or error}") from None
+        end.close()  # the child has it: there, the input ends where ours is closed
+        stack.enter_context(_ended(child, Path(folder)))
+        yield PictureProcess(child=child, line=line, folder=Path(folder), command=shlex.join(command))
+
+
+def _child(command: Sequence[str], folder: Path, end: socket.socket) -> subprocess.Popen[str]:
     # One thread for linear algebra: the child forks, and what it draws needs none.
     alone = {**processes.environment(), "OMP_NUM_THREADS": "1"}
+    pipes: dict[str, Any] = {"stdin": end, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
     # In the result's folder: in the current one matplotlib would read a file of settings.
-    pipes: dict[str, Any] = dict.fromkeys(("stdin", "stdout", "stderr"), subprocess.PIPE)
-    told = [WHEN_TOLD, str(dimension)]
-    try:
-        child = subprocess.Popen([*command, *told], env=alone, cwd=folder, start_new_session=True, text=True, **pipes)
-    except OSError as error:
-        raise PictureError(f"no process draws: {error.strerror or error}") from None
-    with _ended(child, Path(folder)):
-        yield PictureProcess(child=child, folder=Path(folder), command=shlex.join(command))
+    return subprocess.Popen(command, env=alone, cwd=folder, start_new_session=True, **pipes)
 
 
 @contextlib.contextmanager
