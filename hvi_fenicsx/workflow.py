@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from dolfinx import fem
 from mpi4py import MPI
 
 from .certify import certificate, correction, plausibility
 from .certify.certificate import Examination
-from .certify.estimate.estimator import Estimate, estimate
+from .certify.estimate.estimator import estimate
 from .certify.uniqueness import Uniqueness, uniqueness
 from .errors import SolverError
 from .preparation import DEFAULT, Preparation, Thresholds, prepare
@@ -70,41 +70,63 @@ def finish(
         start: a displacement on the same mesh to begin at, m.
         estimating: whether to estimate the error, which takes about as long as the solve.
     """
-    return finish_with_levels(prepared, progress, interrupted, start, estimating=estimating)[0]
+    found = find_solution(prepared, progress, interrupted, start)
+    return found.estimated() if estimating else found.solution
 
 
-def finish_with_levels(
+@dataclass(frozen=True, kw_only=True)
+class FoundSolution:
+    """What was found of a prepared scene, before its error is estimated.
+
+    Attributes:
+        prepared: the scene, with the system that was solved last.
+        solution: what was found, with its certificate.
+        levels: the coarser levels that were used, for a mesh that will be refined.
+    """
+
+    prepared: Preparation
+    solution: Solution
+    levels: Levels
+
+    def estimated(self) -> Solution:
+        """The solution with an estimate of its error, where one can be given. Collective.
+
+        It takes about as long as the solve.
+        """
+        prepared, found = self.prepared, self.solution
+        if found.solve_result is None or found.examination is None or not prepared.problem.has_potential:
+            return found
+        if not found.examination.certificate.passed:
+            return found
+        with prepared.timer("estimate"):
+            errors = estimate(prepared.system, self.levels, found.solve_result.u, found.examination)
+        return replace(found, estimate=errors, warnings=found.warnings + plausibility.of_estimate(errors))
+
+
+def find_solution(
     prepared: Preparation,
     progress: Progress = newton_step,
     interrupted: Callable[[], bool] = never,
     start: CoarseStart | fem.Function | None = None,
-    *,
-    estimating: bool = True,
-) -> tuple[Solution, Levels]:
-    """As :func:`finish`, with the coarser levels that were used, for a mesh that will be refined. Collective.
+) -> FoundSolution:
+    """As :func:`finish`, up to the certificate. Collective.
 
     Args:
         prepared: the scene.
         progress: called at each Newton step; by default it is logged.
         interrupted: whether to stop (collective, asked at each Newton step).
         start: a solution on a coarser mesh, where the mesh was refined from it; or a displacement on the same mesh, m.
-        estimating: whether to estimate the error.
     """
     if prepared.solvability.state == "escapes":
-        return unsolved(prepared), ()
+        return FoundSolution(prepared=prepared, solution=unsolved(prepared), levels=())
     control = RunControl(timer=prepared.timer, progress=progress, interrupted=interrupted)
     with prepared.timer("solve"):
         solved, balance = _solved(prepared, control, start)
     prepared = replace(prepared, system=solved.system)
     result, examination, warnings = _examined(prepared, solved.result, solved.levels, control)
-    errors = None
-    if estimating and examination.certificate.passed and prepared.problem.has_potential:
-        with prepared.timer("estimate"):
-            errors = estimate(prepared.system, solved.levels, result.u, examination)
-        warnings += plausibility.of_estimate(errors)
     only = _uniqueness(prepared, result, examination)
-    found = _solution(prepared, result, examination, prepared.warnings + warnings, errors, only, balance)
-    return found, solved.levels
+    found = _solution(prepared, result, examination, prepared.warnings + warnings, only, balance)
+    return FoundSolution(prepared=prepared, solution=found, levels=solved.levels)
 
 
 def certified(prepared: Preparation, found: SolveResult) -> Solution:
@@ -196,7 +218,6 @@ def _solution(
     found: SolveResult | None,
     examination: Examination | None,
     warnings: tuple[str, ...],
-    errors: Estimate | None = None,
     only: Uniqueness | None = None,
     balance: ObstacleBalance | None = None,
 ) -> Solution:
@@ -206,7 +227,7 @@ def _solution(
         solvability=prepared.solvability,
         solve_result=found,
         examination=examination,
-        estimate=errors,
+        estimate=None,
         uniqueness=only,
         dofs=prepared.system.dofs,
         epsilon=prepared.options.relative_width(prepared.system),

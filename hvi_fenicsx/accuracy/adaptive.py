@@ -28,7 +28,7 @@ from ..solvers.context import Progress, RunControl, never
 from ..solvers.nested_iteration import refined_levels
 from ..system.levels import Level, Levels
 from ..typing import Entities
-from ..workflow import finish_with_levels
+from ..workflow import find_solution
 from . import first_mesh
 from .thresholds import CONTROL, ControlThresholds
 
@@ -125,8 +125,8 @@ class AdaptiveSolver:
         return self._begun(prepared)
 
     def _begun(self, prepared: Preparation) -> AdaptiveLevel:
-        solution, levels = finish_with_levels(prepared, self.progress, self.interrupted)
-        return AdaptiveLevel(prepared=prepared, solution=solution, levels=levels, step=None)
+        found = find_solution(prepared, self.progress, self.interrupted)
+        return AdaptiveLevel(prepared=prepared, solution=found.estimated(), levels=found.levels, step=None)
 
     def refine(
         self, level: AdaptiveLevel, refined: Refinement, scene: Scene, ahead: fem.Function | None = None
@@ -189,8 +189,8 @@ class AdaptiveSolver:
                 levels=levels,
                 way=None if balance is None else balance.way * level.prepared.problem.scales.displacement,
             )
-        solution, used = finish_with_levels(prepared, self.progress, self.interrupted, start)
-        return AdaptiveLevel(prepared=prepared, solution=solution, levels=used, step=step)
+        finer = find_solution(prepared, self.progress, self.interrupted, start)
+        return AdaptiveLevel(prepared=prepared, solution=finer.estimated(), levels=finer.levels, step=step)
 
 
 def _identity(like: PETSc.Vec) -> PETSc.Mat:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import argparse
+import functools
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -16,7 +18,7 @@ from ..path import last_borne
 from ..preparation import prepare
 from ..report.html import render
 from ..results.output_folder import Existing
-from ..results.whole import picture_process, write_whole
+from ..results.whole import BegunResult, begin_whole, picture_process
 from ..runtime import log, terminal
 from ..runtime.mpi import on_root
 from ..runtime.signals import Interrupt
@@ -24,9 +26,12 @@ from ..runtime.timing import Timer
 from ..scene import Scene, read_scene
 from ..solution import Solution
 from ..system import petsc_options
-from ..workflow import finish
+from ..workflow import find_solution
 from . import telling
 from .telling import COMM
+
+Begin = Callable[[Solution], BegunResult]
+"""Writes what pictures are drawn from, and lets them be drawn. Collective."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -102,9 +107,9 @@ def _run(request: RunRequest) -> int:
             log.Handlers(*run_logs),
             picture_process(folder, request.scene.dimension, tell, wanted=request.pictures) as pictures,
         ):
-            solution, reached = _solve(request, interrupt)
-            given = {**request.given, **(_accuracy(reached) if reached else {})}
-            record = write_whole(folder, solution, request.timer, given, tell, pictures, report=request.report)
+            begin = functools.partial(begin_whole, folder, timer=request.timer, tell=tell, pictures=pictures)
+            solution, begun, given = _solve(request, interrupt, begin)
+            record = begun.finish(solution, {**request.given, **given}, report=request.report)
         on_root(COMM, lambda: telling.finish(run_logs))
         folder.commit(request.scene)
         kept = [*folder.kept, *petsc_options.unread(str(request.given["petsc"]))]
@@ -118,28 +123,32 @@ def _where(request: RunRequest) -> str:
     return f"{request.folder.target}: {request.timer.total:.1f} s in all{first}"
 
 
-def _solve(request: RunRequest, interrupt: Interrupt) -> tuple[Solution, AccuracyResult | None]:
-    """The solution; with it, where an accuracy was asked for, how it was reached. Collective."""
+def _solve(request: RunRequest, interrupt: Interrupt, begin: Begin) -> tuple[Solution, BegunResult, dict[str, Any]]:
+    """The solution, its result, which is begun as soon as it can be, and entries of its summary. Collective."""
     if request.goal is not None:
-        solver = AdaptiveSolver(timer=request.timer, interrupted=interrupt.requested)
-        reached = control.solve_to_goal(request.scene, COMM, request.goal, solver, telling.LOG.info)
-        shown = last_borne.in_place_of(reached.level.prepared, reached.solution, interrupt.requested)
-        reached = replace(reached, solution=shown)
-        telling.say(
-            [
-                *console.outcome(reached.solution),
-                *console.warnings(reached.solution.warnings),
-                *console.accuracy(reached),
-            ]
-        )
-        return reached.solution, reached
+        reached = _to_goal(request, request.goal, interrupt)
+        return reached.solution, begin(reached.solution), _accuracy(reached)
     prepared = prepare(request.scene, COMM, request.timer)
     telling.say(console.heading(prepared, COMM.size))
-    solution = finish(prepared, interrupted=interrupt.requested)
-    solution = last_borne.in_place_of(prepared, solution, interrupt.requested)
+    found = find_solution(prepared, interrupted=interrupt.requested)
+    shown = last_borne.in_place_of(prepared, found.solution, interrupt.requested)
+    begun = begin(shown)
+    solution = found.estimated() if shown is found.solution else shown
     new = (warning for warning in solution.warnings if warning not in prepared.warnings)
     telling.say([*console.outcome(solution), *console.warnings(new)])
-    return solution, None
+    return solution, begun, {}
+
+
+def _to_goal(request: RunRequest, goal: Goal, interrupt: Interrupt) -> AccuracyResult:
+    """The solution of the accuracy that was asked for, and how it was reached. Collective."""
+    solver = AdaptiveSolver(timer=request.timer, interrupted=interrupt.requested)
+    reached = control.solve_to_goal(request.scene, COMM, goal, solver, telling.LOG.info)
+    shown = last_borne.in_place_of(reached.level.prepared, reached.solution, interrupt.requested)
+    reached = replace(reached, solution=shown)
+    telling.say(
+        [*console.outcome(shown), *console.warnings(shown.warnings), *console.accuracy(reached)],
+    )
+    return reached
 
 
 def _accuracy(reached: AccuracyResult) -> dict[str, Any]:

@@ -75,12 +75,13 @@ def solve(
     prepared = check(model, comm, timer=timer, thresholds=thresholds, **options)
     first = None if known is None else _displacement(known, prepared)
     with petsc_options.chosen(petsc or {}, petsc_prefix):
-        found, levels = workflow.finish_with_levels(prepared, progress, start=first, estimating=estimate)
-        if found.solve_result is not None:
+        found = workflow.find_solution(prepared, progress, start=first)
+        solution = found.estimated() if estimate else found.solution
+        if solution.solve_result is not None:
             petsc_options.check_read(petsc or {}, prepared.system.comm)
-        found = last_borne.in_place_of(prepared, found)
-    _free_garbage([prepared.system, *(level.system for level in levels)])
-    return ModelSolution(**_fields(found))
+        solution = last_borne.in_place_of(prepared, solution)
+    _free_garbage([prepared.system, *(level.system for level in found.levels)])
+    return ModelSolution(**_fields(solution))
 
 
 def check(

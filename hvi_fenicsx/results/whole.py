@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import functools
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 from ..errors import HviError
@@ -14,11 +15,98 @@ from ..report.pictures.draw import PictureProcess, waiting
 from ..runtime.mpi import asleep_until_all, on_root
 from ..runtime.timing import Timer
 from ..solution import Solution
+from ..typing import Array
 from .folder import ResultFolder
+from .summary import summary
 from .write import write_basis, write_fields, write_record
 
 _PATIENCE = 120.0
 """Seconds that pictures may take after all else is written."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class BegunResult:
+    """A result of which that is written from which pictures are drawn.
+
+    Attributes:
+        folder: being written.
+        timer: where time goes.
+        tell: is given a line on rank 0 where pictures or page fail; they do not cost the run.
+        pictures: what draws; None on other ranks than the first, and where nothing is to be drawn.
+        sigma: the stress of the cells that this rank owns, N/m², (c, 3, 3); None where nothing was solved.
+    """
+
+    folder: ResultFolder
+    timer: Timer
+    tell: Callable[[str], None]
+    pictures: PictureProcess | None
+    sigma: Array | None
+
+    def finish(self, solution: Solution, given: Mapping[str, Any], *, report: bool = True) -> dict[str, Any]:
+        """Write all other files but ``run.log``. Collective.
+
+        Args:
+            solution: what was found, now with the estimate of its error.
+            given: further entries of the summary.
+            report: whether the page is written.
+
+        Returns:
+            The summary, on all ranks.
+        """
+        work, comm = self.folder.work, self.folder.comm
+        with self.timer("output"):
+            record = {**summary(solution), **given}
+            write_fields(work, solution, self.sigma)
+            self._finish_pictures()
+            asleep_until_all(comm)
+            record["time"] = self.timer.report()
+            on_root(comm, lambda: write_record(work, record))
+            if report:
+                on_root(comm, lambda: _told("report", self.tell, lambda: render.write(work)))
+        record["time"] = self.timer.report()
+        on_root(comm, lambda: write_record(work, record))
+        return record
+
+    def _finish_pictures(self) -> None:
+        if self.pictures is None:
+            return
+        if not _draw_early(self.folder):
+            self.pictures.begin()
+        _told("pictures", self.tell, functools.partial(self.pictures.finish, _PATIENCE))
+
+
+def begin_whole(
+    folder: ResultFolder,
+    solution: Solution,
+    timer: Timer,
+    tell: Callable[[str], None],
+    pictures: PictureProcess | None,
+) -> BegunResult:
+    """Write what pictures are drawn from; no estimate of an error is needed. Collective.
+
+    On one rank they are drawn from now on, while the caller goes on. Several ranks leave them the processors at the
+    end: beside them, each message between the ranks would wait for one.
+
+    Args:
+        folder: being written.
+        solution: what was found.
+        timer: where time goes.
+        tell: is given a line on rank 0 where pictures or page fail.
+        pictures: what draws; None on other ranks than the first, and where nothing is to be drawn.
+    """
+    work, solved = folder.work, solution.solve_result
+    with timer("output"):
+        sigma = None if solved is None else mean_stress(solution.problem.bulk, solved.u)
+        write_basis(work, solution, folder.target, sigma)
+        record = summary(solution)
+        on_root(folder.comm, lambda: write_record(work, record))
+        if pictures is not None and _draw_early(folder):
+            pictures.begin()
+    return BegunResult(folder=folder, timer=timer, tell=tell, pictures=pictures, sigma=sigma)
+
+
+def _draw_early(folder: ResultFolder) -> bool:
+    return folder.comm.size == 1
 
 
 def write_whole(
@@ -28,46 +116,18 @@ def write_whole(
     given: Mapping[str, Any],
     tell: Callable[[str], None],
     pictures: PictureProcess | None,
-    *,
-    report: bool = True,
-) -> dict[str, Any]:
+) -> None:
     """Write all files of a result but ``run.log``. Collective.
-
-    Pictures and report are made from the other files; one that fails costs a line, not the run. A process of its own
-    draws, while one rank writes the fields. Several ranks write them before, and then leave it the processors: beside
-    it each message between them would wait for one.
 
     Args:
         folder: being written.
         solution: what was found.
         timer: where time goes.
         given: further entries of the summary.
-        tell: is given that line, on rank 0.
+        tell: is given a line on rank 0 where pictures or page fail; they do not cost the run.
         pictures: what draws; None on other ranks than the first, and where nothing is to be drawn.
-        report: whether the page is written.
-
-    Returns:
-        The summary, on all ranks.
     """
-    work, comm, solved = folder.work, folder.comm, solution.solve_result
-    with timer("output"):
-        sigma = None if solved is None else mean_stress(solution.problem.bulk, solved.u)
-        record = {**write_basis(work, solution, folder.target, sigma), **given}
-        on_root(comm, lambda: write_record(work, record))
-        if comm.size > 1:
-            write_fields(work, solution, sigma)
-        with _drawn(pictures, tell):
-            if comm.size == 1:
-                write_fields(work, solution, sigma)
-        asleep_until_all(comm)
-    with timer("output"):
-        record["time"] = timer.report()
-        on_root(comm, lambda: write_record(work, record))
-        if report:
-            on_root(comm, lambda: _told("report", tell, lambda: render.write(work)))
-    record["time"] = timer.report()
-    on_root(comm, lambda: write_record(work, record))
-    return record
+    begin_whole(folder, solution, timer, tell, pictures).finish(solution, given)
 
 
 @contextlib.contextmanager
@@ -89,17 +149,6 @@ def picture_process(
         if wanted and folder.comm.rank == 0:
             _told("pictures", tell, lambda: started.append(stack.enter_context(waiting(folder.work, dimension))))
         yield next(iter(started), None)
-
-
-@contextlib.contextmanager
-def _drawn(pictures: PictureProcess | None, tell: Callable[[str], None]) -> Iterator[None]:
-    """Draw pictures during a block, and wait for them at its end."""
-    if pictures is None:
-        yield
-        return
-    pictures.begin()
-    yield
-    _told("pictures", tell, functools.partial(pictures.finish, _PATIENCE))
 
 
 def _told(what: str, tell: Callable[[str], None], make: Callable[[], object]) -> None:

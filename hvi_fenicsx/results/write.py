@@ -15,10 +15,9 @@ from ..scene import dump_scene
 from ..solution import Solution
 from ..typing import Array
 from . import boundary_table, contact_table, gathering, vtk_fields
-from .summary import summary
 
 
-def write_basis(folder: Path, solution: Solution, target: Path, sigma: Array | None) -> dict[str, Any]:
+def write_basis(folder: Path, solution: Solution, target: Path, sigma: Array | None) -> None:
     """Write the arrays, ``contact.csv`` and the scene, from which pictures and page are made. Collective.
 
     ``summary.json`` is written by :func:`write_record`.
@@ -28,16 +27,12 @@ def write_basis(folder: Path, solution: Solution, target: Path, sigma: Array | N
         solution: what was found.
         target: the folder that the files will be in, from which the scene's paths are given.
         sigma: the stress of the cells that this rank owns, N/m², (c, 3, 3); None where nothing was solved.
-
-    Returns:
-        The summary, on all ranks.
     """
     comm = solution.problem.domain.mesh.comm
     stress = None if sigma is None else von_mises(sigma).astype(np.float32)
     arrays = gathering.solution_arrays(solution, stress)
     on_root(comm, lambda: _write_arrays(folder, arrays))
     on_root(comm, lambda: _text(folder / "scene.toml", dump_scene(solution.scene, target)))
-    return summary(solution)
 
 
 def write_fields(folder: Path, solution: Solution, sigma: Array | None) -> None:

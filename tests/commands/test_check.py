@@ -13,7 +13,7 @@ from scenes import model
 
 from hvi_fenicsx import Scene, console, prepare
 from hvi_fenicsx.rigid import Mode, RigidBody
-from hvi_fenicsx.workflow import finish_with_levels
+from hvi_fenicsx.workflow import find_solution
 
 TOWER = ROOT / "demos" / "tipping_tower.toml"
 WEIGHT, WIND = 2.5e4 * 1.0 * 4.0 * 0.5, 5.0e3 * 4.0 * 2.0
@@ -89,6 +89,6 @@ def test_the_linear_solver_is_the_one_that_a_run_takes(cells: int, linear: str) 
     """On 64 x 64 cells a coarser level pays."""
     prepared = prepare(Scene.model_validate(model(cells)))
     assert console.solver(prepared).endswith(linear)
-    solution, levels = finish_with_levels(prepared)
-    assert solution.converged
-    assert bool(levels) == ("multigrid" in linear)
+    found = find_solution(prepared)
+    assert found.solution.converged
+    assert bool(found.levels) == ("multigrid" in linear)
