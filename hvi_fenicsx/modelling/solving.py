@@ -76,10 +76,9 @@ def solve(
     first = None if known is None else _displacement(known, prepared)
     with petsc_options.chosen(petsc or {}, petsc_prefix):
         found = workflow.find_solution(prepared, progress, start=first)
-        solution = found.estimated() if estimate else found.solution
+        solution = last_borne.in_place_of(prepared, found.estimated() if estimate else found.solution)
         if solution.solve_result is not None:
             petsc_options.check_read(petsc or {}, prepared.system.comm)
-        solution = last_borne.in_place_of(prepared, solution)
     _free_garbage([prepared.system, *(level.system for level in found.levels)])
     return ModelSolution(**_fields(solution))
 
