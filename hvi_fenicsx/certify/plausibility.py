@@ -14,7 +14,7 @@ from dolfinx import fem
 from petsc4py import PETSc
 
 from ..effects import Direction
-from ..mesh import facet_sizes, nodes
+from ..mesh import curved_cells, facet_sizes, nodes
 from ..problem.contact_normals import largest_turn
 from ..problem.law_term import LawTerm
 from ..problem.problem import Problem
@@ -150,15 +150,23 @@ def _polygons(problem: Problem, thresholds: PlausibilityThresholds) -> Iterator[
 
 
 def _straightened(problem: Problem) -> Iterator[str]:
-    """A mesh of degree 2 whose cells are straight although curves are known."""
+    """Cells of degree 2 that are straight although the curves of their sides are known. Collective."""
     domain = problem.domain
-    straight = nodes.degree(problem.space) == 2 and problem.space.mesh is domain.mesh
-    if straight and domain.curves:
+    if nodes.degree(problem.space) == 1 or not domain.curves:
+        return
+    unknown = "the error of this polygon is not estimated"
+    if not domain.bends:
+        yield (
+            f"domain: the energy has data of the straight mesh, so all cells stay straight, and {unknown}; write them "
+            "as formulas of the position"
+        )
+    elif (straight := curved_cells.straight_cells(domain)) > 0:
         sides = ", ".join(repr(name) for name in sorted(domain.curves))
-        reason, remedy = f"the mesh is too coarse for its curve ({sides}): cells would turn over", "use smaller cells"
-        if not domain.bends:
-            reason, remedy = "the energy has data of the straight mesh", "write them as formulas of the position"
-        yield f"domain: {reason}, so all cells stay straight, and the error of this polygon is not estimated; {remedy}"
+        cells = "1 cell would turn over and stays" if straight == 1 else f"{straight} cells would turn over and stay"
+        yield (
+            f"domain: the mesh is too coarse for its curve ({sides}): {cells} straight, and {unknown}; use smaller "
+            "cells"
+        )
 
 
 def _weak_laws(problem: Problem, forces: Mapping[str, PETSc.Vec], thresholds: PlausibilityThresholds) -> Iterator[str]:

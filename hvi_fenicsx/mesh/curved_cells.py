@@ -7,6 +7,7 @@ each edge: on the curve where the edge lies on a curved side, else in the middle
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
+from dataclasses import dataclass
 
 import basix
 import numpy as np
@@ -15,7 +16,7 @@ from dolfinx import mesh as dmesh
 
 from .. import compat
 from ..geometry import Curve
-from ..runtime.mpi import agree
+from ..runtime.mpi import total
 from ..typing import Array, Entities
 from . import nodes
 from .domain import Domain
@@ -25,33 +26,74 @@ _MORE_SWEEPS = 2
 """Projections, from one side to the next, that bring a node of two sides onto both; each gains some digits."""
 
 
+@dataclass(frozen=True, kw_only=True)
+class _CurvedMesh:
+    """The mesh of degree 2, and how many cells are straight in it that their curve would turn over, on all ranks."""
+
+    mesh: dmesh.Mesh
+    straight: int
+
+
 def mesh_of(domain: Domain, degree: int, thresholds: Thresholds = DEFAULT) -> dmesh.Mesh:
     """The mesh that displacements of a degree live on. Collective.
 
     Args:
         domain: the body.
         degree: of the elements; at degree 1 cells are straight.
-        thresholds: how much a cell may be bent; where one would be bent more, the whole mesh is straight.
+        thresholds: how much a cell may be bent; a cell that would be bent more has straight edges.
     """
     if degree == 1 or not (domain.curves and domain.bends):
         return domain.mesh
-    return domain.once("curved cells", None, lambda: _curved(domain, sorted(domain.curves), thresholds.least_jacobian))
+    return _found(domain, thresholds).mesh
 
 
-def _curved(domain: Domain, names: Collection[str], least: float) -> dmesh.Mesh:
+def straight_cells(domain: Domain, thresholds: Thresholds = DEFAULT) -> int:
+    """How many cells of degree 2 are straight because their curve would turn them over. Collective.
+
+    Args:
+        domain: the body.
+        thresholds: as for :func:`mesh_of`.
+    """
+    return _found(domain, thresholds).straight if domain.curves and domain.bends else 0
+
+
+def _found(domain: Domain, thresholds: Thresholds) -> _CurvedMesh:
+    least = thresholds.least_jacobian
+    return domain.once("curved cells", None, lambda: _curved(domain, sorted(domain.curves), least))
+
+
+def _curved(domain: Domain, names: Collection[str], least: float) -> _CurvedMesh:
     space = fem.functionspace(domain.mesh, ("Lagrange", 2))
     before, d = nodes.points(space)[:, : domain.dimension], domain.dimension
     on = {name: np.unique(nodes.facet_nodes(space, domain.sides[name])) for name in names}
     after = onto_curves(space.dofmap.index_map, before, on, domain.curves)
     for _ in range(_MORE_SWEEPS if domain.dimension == 3 else 0):  # in space sides share edges
         after = onto_curves(space.dofmap.index_map, after, _shared(on), domain.curves)
-    moved = np.flatnonzero(np.any((after != before)[space.dofmap.list], axis=(1, 2)))
-    cells = space.dofmap.list[moved]
-    kept = bool(np.all(_jacobians(after[cells]) >= least * _jacobians(before[cells])))
-    if not all(agree(domain.mesh.comm, kept)):
-        return domain.mesh
+    after, straight = _straightened(space, before, after, least)
     points = np.pad(after, ((0, 0), (0, 3 - d)))
-    return compat.quadratic_mesh(domain.mesh, space.dofmap, points)
+    return _CurvedMesh(mesh=compat.quadratic_mesh(domain.mesh, space.dofmap, points), straight=straight)
+
+
+def _straightened(space: fem.FunctionSpace, before: Array, after: Array, least: float) -> tuple[Array, int]:
+    """The nodes (n, d), those of cells back that would be bent too much, and the number of these. Collective.
+
+    A straight edge changes the cells beside it, so they are looked at again.
+    """
+    topology, count = space.mesh.topology, 0
+    owned = topology.index_map(topology.dim).size_local
+    while True:
+        moved = np.flatnonzero(np.any((after != before)[space.dofmap.list], axis=(1, 2)))
+        cells = space.dofmap.list[moved]
+        turned = np.any(_jacobians(after[cells]) < least * _jacobians(before[cells]), axis=1)
+        found = round(total(space.mesh.comm, np.count_nonzero(moved[turned] < owned)))
+        if found == 0:
+            return after, count
+        back = la.vector(space.dofmap.index_map, 1)
+        back.array[:] = 0.0
+        back.array[cells[turned]] = 1.0
+        back.scatter_reverse(la.InsertMode.add)
+        back.scatter_forward()
+        after, count = np.where(back.array[:, None] > 0.0, before, after), count + found
 
 
 def _shared(on: Mapping[str, Entities]) -> dict[str, Entities]:
