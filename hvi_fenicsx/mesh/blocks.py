@@ -21,8 +21,9 @@ from .. import compat
 from ..typing import Array, Entities, Integers
 from . import grid_facets, grid_parts
 from .domain import Domain
+from .grid_transfer import GridTransfer, NestedGridTransfer
 from .thresholds import DEFAULT, Thresholds
-from .transfer import GridTransfer, Transfer
+from .transfer import Transfer
 
 _AXIS_OF_SIDE = {"left": (0, 0), "right": (0, 1), "bottom": (-1, 0), "top": (-1, 1), "front": (1, 0), "back": (1, 1)}
 """Axis (-1: the last, the vertical one) and end of each named side."""
@@ -37,7 +38,7 @@ def block(
 ) -> Domain:
     """The rectangle or box [0, size], in cells cut into triangles or tetrahedra. Collective.
 
-    Each coarser level of its mesh hierarchy has half the cells each way, as long as they can be halved.
+    Each coarser level of its mesh hierarchy has half the cells each way, or nearly (:func:`coarser_cells`).
 
     Args:
         comm: the ranks that share it.
@@ -47,9 +48,13 @@ def block(
         reflected: axes along which the parts of the ranks are reflected.
     """
     grid, upper = mesh(comm, size, cells, reflected), np.asarray(size, dtype=float)
+    coarser = coarser_cells(cells, thresholds)
 
     def coarsening() -> tuple[Domain, Transfer]:
-        return block(comm, size, [n // 2 for n in cells], thresholds, reflected), GridTransfer(size, cells)
+        assert coarser is not None
+        nested = all(2 * few == n for few, n in zip(coarser, cells, strict=True))
+        transfer = NestedGridTransfer(size, cells) if nested else GridTransfer(size, coarser)
+        return block(comm, size, coarser, thresholds, reflected), transfer
 
     return Domain(
         mesh=grid,
@@ -58,9 +63,36 @@ def block(
         lower=np.zeros(len(upper)),
         upper=upper,
         one_piece=True,
-        coarsening=coarsening if all(n % 2 == 0 and n // 2 >= thresholds.coarsest_block for n in cells) else None,
+        coarsening=coarsening if coarser is not None else None,
         reflected=lambda axes: block(comm, size, cells, thresholds, axes),
     )
+
+
+def coarser_cells(cells: Sequence[int], thresholds: Thresholds = DEFAULT) -> list[int] | None:
+    """The cells each way of the next coarser block; None where it would not pay.
+
+    They are halved, so that the blocks are nested. Of a large block of which they cannot be halved, the coarser one has
+    nearly half of them, such that these can be halved as often as possible.
+
+    Args:
+        cells: cells each way, (d,).
+        thresholds: how coarse the coarsest level is, and what is large.
+    """
+    if all(n % 2 == 0 for n in cells):
+        fewer = [n // 2 for n in cells]
+    elif len(cells) * math.prod(n + 1 for n in cells) >= thresholds.hierarchy_from:
+        fewer = [_often_halved(n / 2, thresholds.uneven_half) for n in cells]
+    else:
+        return None
+    return fewer if min(fewer) >= thresholds.coarsest_block else None
+
+
+def _often_halved(wanted: float, share: float) -> int:
+    """The number near to the one wanted, up to a share of it, that can be halved most often."""
+    step = 1
+    while abs(round(wanted / (2 * step)) * 2 * step - wanted) <= share * wanted:
+        step *= 2
+    return round(wanted / step) * step
 
 
 def mesh(comm: MPI.Comm, size: Sequence[float], cells: Sequence[int], reflected: Sequence[int] = ()) -> dmesh.Mesh:

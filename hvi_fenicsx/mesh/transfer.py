@@ -1,15 +1,13 @@
 """The transfer from a level of a mesh hierarchy to the next finer one: prolongation.
 
-Where the meshes are nested, each vertex of the finer one is a vertex of the coarser one or the midpoint of an edge:
-between a mesh and its refinement, and between built-in blocks of which one has half the cells each way,
-``create_rectangle``'s right-diagonal pattern (and ``create_box``'s of tetrahedra) being nested in itself. Onto a mesh
-that is not nested the prolongation is linear interpolation.
+Between a mesh and its refinement each vertex of the finer one is a vertex of the coarser one or the midpoint of an
+edge. Onto a mesh that is not nested the prolongation is linear interpolation. Blocks have transfers of their own
+(:mod:`.grid_transfer`).
 """
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -79,7 +77,7 @@ class ParentCellTransfer(Transfer):
     def rows(self, fine: fem.FunctionSpace, coarse: fem.FunctionSpace, points: tuple[Array, Array]) -> Rows:
         """Each fine vertex is the mean of two vertices of its parent cell; at degree 2, its function there. Local."""
         if nodes.degree(coarse) == 1:
-            return _mean_rows(self._parent_vertices(fine, coarse), fine.dofmap.index_map_bs)
+            return mean_rows(self._parent_vertices(fine, coarse), fine.dofmap.index_map_bs)
         return self._function_rows(fine, coarse)
 
     def _function_rows(self, fine: fem.FunctionSpace, coarse: fem.FunctionSpace) -> Rows:
@@ -98,7 +96,7 @@ class ParentCellTransfer(Transfer):
             cell[column[here]], number[column[here]] = here, k
         numbers = coarse.dofmap.index_map.local_to_global(coarse.dofmap.list[self.parents[cell]].ravel())
         shape = (owned, values.shape[2])
-        return _weighted_rows(numbers.reshape(shape), weights[kind.ravel()[cell], number], fine.dofmap.index_map_bs)
+        return weighted_rows(numbers.reshape(shape), weights[kind.ravel()[cell], number], fine.dofmap.index_map_bs)
 
     def _parent_vertices(self, fine: fem.FunctionSpace, coarse: fem.FunctionSpace) -> Numbers:
         """The two coarse vertices (global) whose mean each owned fine vertex is; one twice for a coarse one."""
@@ -125,46 +123,7 @@ class DegreeTransfer(Transfer):
         vertex[fine.dofmap.list[:, :corners]] = coarse.dofmap.list
         ends = vertex[nodes.edge_ends(fine)[: fine.dofmap.index_map.size_local]]
         numbers = coarse.dofmap.index_map.local_to_global(ends.ravel())
-        return _mean_rows(np.asarray(numbers, dtype=PETSc.IntType).reshape(-1, 2), fine.dofmap.index_map_bs)
-
-
-@dataclass(frozen=True)
-class GridTransfer(Transfer):
-    """From a block of half the cells each way to a block.
-
-    Attributes:
-        size: lengths of the block's edges, m, (d,).
-        cells: cells each way of the finer block, (d,).
-    """
-
-    size: Sequence[float]
-    cells: Sequence[int]
-
-    def rows(self, fine: fem.FunctionSpace, coarse: fem.FunctionSpace, points: tuple[Array, Array]) -> Rows:
-        """Each fine vertex is the mean of the two ends of a coarse edge. Collective.
-
-        Odd coordinates run along a coarse edge from its lower to its upper end: an axis, or the diagonal of a face or
-        of a cell.
-        """
-        near, far = points
-        cells = np.array(self.cells, dtype=PETSc.IntType)
-        place = self._grid(near, cells)
-        parents = np.stack([_flat(end, cells // 2) for end in (place // 2, (place + 1) // 2)], axis=1)
-        pairs = np.asarray(self._numbers(coarse, far, cells // 2).app2petsc(parents.ravel()).reshape(-1, 2))
-        return _mean_rows(pairs, fine.dofmap.index_map_bs)
-
-    def _grid(self, points: Array, cells: Numbers) -> Numbers:
-        """Integer grid coordinates of vertices, (n, d)."""
-        size = np.array(self.size)
-        return np.rint(points[:, : len(size)] * (cells / size)).astype(PETSc.IntType)
-
-    def _numbers(self, space: fem.FunctionSpace, points: Array, cells: Numbers) -> PETSc.AO:
-        """From grid numbers to PETSc's (block) numbers. Collective."""
-        start, end = space.dofmap.index_map.local_range
-        application = _flat(self._grid(points[: end - start], cells), cells)
-        return PETSc.AO().createMemoryScalable(
-            application, np.arange(start, end, dtype=PETSc.IntType), comm=space.mesh.comm
-        )
+        return mean_rows(np.asarray(numbers, dtype=PETSc.IntType).reshape(-1, 2), fine.dofmap.index_map_bs)
 
 
 @dataclass(frozen=True)
@@ -174,11 +133,17 @@ class InterpolationTransfer(Transfer):
     def rows(self, fine: fem.FunctionSpace, coarse: fem.FunctionSpace, points: tuple[Array, Array]) -> Rows:
         """Each fine vertex has barycentric weights in the coarse cell that holds it. Collective."""
         corners, weights = point_location.interpolation_weights(points[0], coarse, points[1])
-        return _weighted_rows(corners, weights, fine.dofmap.index_map_bs)
+        return weighted_rows(corners, weights, fine.dofmap.index_map_bs)
 
 
-def _weighted_rows(numbers: Numbers, weights: Array, d: int) -> Rows:
-    """Compressed rows of weights (n, k) of block columns (n, k), component by component."""
+def weighted_rows(numbers: Numbers, weights: Array, d: int) -> Rows:
+    """Compressed rows of a matrix of weighted sums, component by component.
+
+    Args:
+        numbers: block columns, (n, k).
+        weights: of these, (n, k).
+        d: components.
+    """
     order = np.argsort(numbers, axis=1)
     columns = np.take_along_axis(numbers, order, axis=1)[:, None, :] * d + np.arange(d)[None, :, None]
     start = np.arange(0, columns.size + 1, numbers.shape[1])
@@ -186,8 +151,13 @@ def _weighted_rows(numbers: Numbers, weights: Array, d: int) -> Rows:
     return start.astype(PETSc.IntType), columns.ravel().astype(PETSc.IntType), values
 
 
-def _mean_rows(pairs: Numbers, d: int) -> Rows:
-    """Compressed rows of the matrix that takes the mean of each pair of block columns, component by component."""
+def mean_rows(pairs: Numbers, d: int) -> Rows:
+    """Compressed rows of the matrix that takes the mean of each pair of block columns, component by component.
+
+    Args:
+        pairs: block columns, (n, 2); one twice for itself.
+        d: components.
+    """
     low, high = np.minimum(pairs[:, 0], pairs[:, 1]), np.maximum(pairs[:, 0], pairs[:, 1])
     entries = np.repeat(1 + (low < high).astype(np.int8), d)
     start = np.concatenate([[0], np.cumsum(entries)]).astype(PETSc.IntType)
@@ -209,9 +179,3 @@ def _sizes(space: fem.FunctionSpace) -> tuple[int, int]:
     """Local and global number of unknowns."""
     d = space.dofmap.index_map_bs
     return space.dofmap.index_map.size_local * d, space.dofmap.index_map.size_global * d
-
-
-def _flat(place: Numbers, cells: Numbers) -> Numbers:
-    """Numbers of grid vertices by their integer coordinates (n, d), x running fastest."""
-    strides = np.concatenate([[1], np.cumprod(cells[:-1] + 1)]).astype(PETSc.IntType)
-    return sum((place[:, i] * step for i, step in enumerate(strides)), start=np.zeros(len(place), PETSc.IntType))

@@ -24,8 +24,8 @@ from scenes import model, quadratic_linear
 from hvi_fenicsx import InputError, Scene, Solution, compat, solve
 from hvi_fenicsx.mesh import refinement
 from hvi_fenicsx.mesh.domain import Domain
+from hvi_fenicsx.mesh.grid_transfer import NestedGridTransfer
 from hvi_fenicsx.mesh.shapes import Rectangle
-from hvi_fenicsx.mesh.transfer import GridTransfer
 from hvi_fenicsx.results import gathering
 from hvi_fenicsx.studies import axes, cost, interpolation, meshes, plan, scene_tables, sentences, table, thresholds
 from hvi_fenicsx.studies.certainty import Certainty, certainty
@@ -78,7 +78,7 @@ def test_interpolation_between_nested_meshes_is_the_ladders_prolongation(shape: 
         fem.functionspace(s.domain.build(MPI.COMM_SELF, s.dimension).mesh, ("Lagrange", 1, (s.dimension,)))
         for s in (fine, coarse)
     ]
-    step = GridTransfer(size, cells).prolongation(*spaces)
+    step = NestedGridTransfer(size, cells).prolongation(*spaces)
     d = fine.dimension
     points = [s.tabulate_dof_coordinates()[:, :d] for s in spaces]
     source = SolutionFields(points[1], spaces[1].dofmap.list.astype(np.int64), np.zeros_like(points[1]), {})

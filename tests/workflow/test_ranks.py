@@ -40,6 +40,7 @@ SCENES: dict[str, Table] = {
         13, 6e6, 1e6, quadratic_linear(2.5e6) | {"multiplier": "1 + 0.4*x", "length_multiplier": "1 + x/3"}
     ),
     "levels": model(56, 6e6, 1e6, quadratic_linear(3e6)),  # solved by multigrid, its coarser level on one rank
+    "odd-levels": model(101, 6e6, 1e6, quadratic_linear(3e6)),  # a block whose cells cannot be halved
     "gamg": model(24, 6e6, 1e6, quadratic_linear(3e6), linear_solver="gamg"),
     "tresca": model(10, 3e6, 1e6, {"law": "tresca", "yield_traction": 5e5}),
     "fewer-cells-than-ranks": model(1, friction=quadratic_linear(1e6)),
