@@ -80,7 +80,7 @@ def coarser_cells(cells: Sequence[int], thresholds: Thresholds = DEFAULT) -> lis
     """
     if all(n % 2 == 0 for n in cells):
         fewer = [n // 2 for n in cells]
-    elif len(cells) * math.prod(n + 1 for n in cells) >= thresholds.hierarchy_from:
+    elif len(cells) * math.prod(n + 1 for n in cells) >= thresholds.uneven_from:
         fewer = [_often_halved(n / 2, thresholds.uneven_half) for n in cells]
     else:
         return None

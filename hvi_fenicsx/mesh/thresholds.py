@@ -14,11 +14,12 @@ class Thresholds:
     Attributes:
         coarsest_block: cells each way of a block below which a coarser level does not help.
         uneven_half: part by which the cells of a coarser block may differ from half of an odd number.
+        uneven_from: unknowns of a block whose cells cannot be halved from which a coarser one pays.
         bisected_edges: length of the edges of a marked cell that are bisected, relative to its longest one, by
             dimension. In space all six edges would make a step of 4 to 5 times the unknowns; the longest and, in a
             sixth of a cube, the diagonals of its faces make it about 2.
-        hierarchy_from: unknowns of a mesh file, or of a block whose cells cannot be halved, from which coarser meshes
-            pay; with fewer, one factorisation takes less time.
+        hierarchy_from: unknowns of a mesh file from which coarser meshes pay; with fewer, one factorisation takes less
+            time than gmsh.
         coarsest: unknowns of the coarsest mesh of a mesh file, about.
         outline_corner: angle (radian) by which an outline turns at a vertex that is kept in any case.
         outline_turn: angle (radian) by which an outline turns at most between two vertices that are kept: a coarse
@@ -38,6 +39,7 @@ class Thresholds:
 
     coarsest_block: int = 4
     uneven_half: float = 0.07
+    uneven_from: int = 5_000
     bisected_edges: Mapping[int, float] = field(default_factory=lambda: {2: 0.0, 3: 0.76})
     hierarchy_from: int = 20_000
     coarsest: int = 2_500
