@@ -74,14 +74,13 @@ def _guided(problem: ScalarProblem, cell: Box, guide: Guide) -> list[Box]:
 
 
 def _near(problem: ScalarProblem, cell: Box, i: int, x: float) -> Iterator[Box]:
-    """Parts at the joint that is nearest to a place; at the place if there is none."""
+    """Parts at the joint that is nearest to a place; at the place if there is none, or only a bend near an end."""
     low, high = float(cell.low[i]), float(cell.high[i])
-    joints = _joints(problem, cell, i)
-    if joints:
-        yield from _at_joint(problem, cell, i, *min(joints, key=lambda joint: abs(joint[0] - x)))
-        return
     short = OFF_END * (high - low)
-    yield from _halves(cell, i, min(max(x, low + short), high - short))
+    at, jump = min(_joints(problem, cell, i), key=lambda joint: abs(joint[0] - x), default=(low, 0.0))
+    if _jumps(problem, i, jump) or low + short <= at <= high - short:
+        return _at_joint(problem, cell, i, at, jump)
+    return _halves(cell, i, min(max(x, low + short), high - short))
 
 
 def _any(problem: ScalarProblem, cell: Box) -> Iterator[Box]:
@@ -107,9 +106,13 @@ def _joints(problem: ScalarProblem, cell: Box, i: int) -> list[tuple[float, floa
 
 
 def _at_joint(problem: ScalarProblem, cell: Box, i: int, at: float, jump: float) -> Iterator[Box]:
-    if abs(jump) > float(problem.arcs.rounding[i]):  # looked at last: a minimiser is on no drop
+    if _jumps(problem, i, jump):  # looked at last: a minimiser is on no drop
         yield _with(cell, i, at, at)
     yield from _halves(cell, i, at)
+
+
+def _jumps(problem: ScalarProblem, i: int, jump: float) -> bool:
+    return abs(jump) > float(problem.arcs.rounding[i])
 
 
 def _halves(cell: Box, i: int, at: float) -> Iterator[Box]:

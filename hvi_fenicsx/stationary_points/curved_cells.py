@@ -58,11 +58,11 @@ class CurvedCells:
         """
         if np.array_equal(cell.low, cell.high):
             return Verdict(points=[point for point in [self._laws.point(cell.low)] if point is not None])
-        if not self._is_regular(cell.low, cell.high):
-            return self._left(cell)
         smaller = self._smaller(cell)
         if smaller is None:
             return Verdict()
+        if not self._is_regular(smaller.low, smaller.high):
+            return self._left(smaller)
         if self._nearest_is_alone(smaller, known):
             return Verdict()
         for start in (0.5 * (smaller.low + smaller.high), smaller.x):
