@@ -59,6 +59,8 @@ class Enumeration:
     undecided: int = 0
 
     def __post_init__(self) -> None:
+        if self.laws is None and np.any(self.problem.force_error):
+            raise ValueError("of polylines near curved laws the laws themselves are needed")
         self._forces = ForceIntervals(self.problem, joints_at_ends=False)
         self._balance = RigidBalance(self.problem)
         self.points = PointList(self.problem.size)
@@ -87,19 +89,22 @@ class Enumeration:
                 return False
             self.cells += 1
             look = self._looked(self.waiting.pop())
-            if look is not None and (left := self._left(look.cell)) is not None:
-                self.waiting += parts(self.problem, self._balance.pivots, left, look.guide)
+            if look is not None:
+                self.waiting += self._parts(look)
             report(self)
         return True
 
-    def _left(self, cell: Box) -> Box | None:
-        """What is left of a cell to be divided; points that are found on the way are kept."""
-        verdict = self._cells.verdict(cell, self.points)
+    def _parts(self, look: Look) -> list[Box]:
+        """The parts of what is left of a cell; points that are found on the way are kept."""
+        verdict = self._cells.verdict(look.cell, self.points)
         for point in verdict.points:
             self._enter(point)
         self.undecided += verdict.undecided
         left = verdict.left
-        return None if left is None or self._linear.excludes(left.low, left.high) else left
+        if left is None or self._linear.excludes(left.low, left.high):
+            return []
+        guides = [guide for guide in (look.guide, verdict.guide) if guide is not None]
+        return parts(self.problem, self._balance.pivots, left, guides)
 
     def _looked(self, cell: Box) -> Look | None:
         """The cell made smaller, and where to divide it; None if no stationary point is in it."""

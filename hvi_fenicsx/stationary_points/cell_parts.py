@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -23,18 +23,19 @@ OFF_END = 0.2
 """A place between joints is at least this share of the interval from its ends."""
 
 
-def parts(problem: ScalarProblem, pivots: Integers, cell: Box, guide: Guide | None) -> list[Box]:
+def parts(problem: ScalarProblem, pivots: Integers, cell: Box, guides: Sequence[Guide]) -> list[Box]:
     """The parts of a cell, the one to look at first last; each has its share of the search.
 
     Args:
         problem: the problem.
         pivots: unknowns that fix the rigid motions.
         cell: the cell.
-        guide: where means are far from the graphs of laws and bounds; None where this is not known.
+        guides: where means are far from the graphs of laws and bounds; the first that tells is followed.
     """
-    found = list(
-        _far(problem, pivots, cell) or (_guided(problem, cell, guide) if guide else None) or _any(problem, cell)
-    )
+    found = _far(problem, pivots, cell)
+    for guide in guides:
+        found = found or _guided(problem, cell, guide)
+    found = found or list(_any(problem, cell))
     return [replace(part, share=cell.share / len(found)) for part in found]
 
 

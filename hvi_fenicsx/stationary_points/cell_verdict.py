@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from ..typing import Array
+from .balance_programme import Guide
 from .boxes import Box
 from .point_list import PointList, StationaryPoint
 
@@ -18,11 +19,13 @@ class Verdict:
     Attributes:
         points: stationary points that were found, in the cell or near it.
         left: the part of the cell that may hold others; None if there is none.
+        guide: where the laws themselves would have it divided; None where they do not tell.
         undecided: whether it is too small to be divided, and yet may hold a point.
     """
 
     points: Sequence[StationaryPoint] = ()
     left: Box | None = None
+    guide: Guide | None = None
     undecided: bool = False
 
 

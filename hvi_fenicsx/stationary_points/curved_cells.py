@@ -14,6 +14,7 @@ import numpy as np
 
 from ..typing import Array, Integers
 from . import stationarity
+from .balance_programme import Guide
 from .boxes import Box, clipped
 from .cell_verdict import Verdict
 from .curved_laws import CurvedLaws
@@ -74,7 +75,14 @@ class CurvedCells:
     def _left(self, cell: Box) -> Verdict:
         size = 1.0 + float(np.max(np.abs([cell.low, cell.high])))
         small = bool(np.max(cell.high - cell.low) <= SMALLEST * size) or self._is_unknown(cell)
-        return Verdict(left=None if small else cell, undecided=small)
+        return Verdict(left=None if small else cell, guide=self._guide(cell), undecided=small)
+
+    def _guide(self, cell: Box) -> Guide:
+        """In the middle, where the slopes' ranges leave most of the forces open, weighed by displacements."""
+        least, most = self._laws.slopes(cell.low, cell.high)
+        known = np.isfinite(least) & np.isfinite(most)
+        law = np.where(known, most - least, 0.0) * (cell.high - cell.low) ** 2
+        return Guide(x=0.5 * (cell.low + cell.high), law=law, bound=np.zeros(len(law)))
 
     def _is_unknown(self, cell: Box) -> bool:
         """Whether no bound of the slopes is known, and the polylines are straight."""
