@@ -16,6 +16,7 @@ from ..typing import Array, Integers
 from . import stationarity
 from .balance_programme import Guide
 from .boxes import Box, clipped
+from .cell_parts import at_bounds
 from .cell_verdict import Verdict
 from .curved_laws import CurvedLaws
 from .point_list import PointList, StationaryPoint
@@ -73,16 +74,30 @@ class CurvedCells:
         return self._left(smaller)
 
     def _left(self, cell: Box) -> Verdict:
-        size = 1.0 + float(np.max(np.abs([cell.low, cell.high])))
-        small = bool(np.max(cell.high - cell.low) <= SMALLEST * size) or self._is_unknown(cell)
-        return Verdict(left=None if small else cell, guide=self._guide(cell), undecided=small)
+        guide = self._guide(cell)
+        small = np.max(cell.high - cell.low) <= SMALLEST * (1.0 + np.max(np.abs([cell.low, cell.high])))
+        small = bool(small and np.all(np.isfinite(guide.law + guide.bound))) or self._is_unknown(cell)
+        return Verdict(left=None if small else cell, guide=guide, undecided=small)
 
     def _guide(self, cell: Box) -> Guide:
-        """In the middle, where the slopes' ranges leave most of the forces open, weighed by displacements."""
+        """Where the slopes' ranges leave most of the forces open, at a jump or in the middle."""
         least, most = self._laws.slopes(cell.low, cell.high)
-        known = np.isfinite(least) & np.isfinite(most)
-        law = np.where(known, most - least, 0.0) * (cell.high - cell.low) ** 2
-        return Guide(x=0.5 * (cell.low + cell.high), law=law, bound=np.zeros(len(law)))
+        wide, jumps = cell.high - cell.low, self._jumps(cell)
+        bears = (wide > 0.0) & at_bounds(self._near, cell)
+        slopes = np.where(np.isfinite(least) & np.isfinite(most), most - least, 0.0)
+        return Guide(
+            x=np.where(np.isfinite(jumps), jumps, 0.5 * (cell.low + cell.high)),
+            law=np.where(np.isfinite(jumps), np.inf, slopes * wide**2),
+            bound=np.where(bears, np.inf, 0.0),
+        )
+
+    def _jumps(self, cell: Box) -> Array:
+        """The place inside of the largest jump of each traction; not a number where there is none, (n,)."""
+        arcs = self._near.arcs
+        inside = (arcs.high[:, :-1] > cell.low[:, None]) & (arcs.high[:, :-1] < cell.high[:, None])
+        jumps = np.where(inside, np.abs(arcs.after[:, 1:] - arcs.before[:, :-1]), 0.0)
+        at = arcs.high[np.arange(len(jumps)), np.argmax(jumps, axis=1)]
+        return np.where(jumps.max(axis=1, initial=0.0) > arcs.rounding, at, np.nan)
 
     def _is_unknown(self, cell: Box) -> bool:
         """Whether no bound of the slopes is known, and the polylines are straight."""

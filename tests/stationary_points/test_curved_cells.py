@@ -1,18 +1,16 @@
-"""All equilibria of curved laws, with a proof: against scans of two unknowns, random starts, and polylines for ε → 0."""
+"""All equilibria of curved laws, proven: against scans of two unknowns, random starts, and polylines for ε → 0."""
 
 from __future__ import annotations
 
 import condensed
 import numpy as np
 import pytest
-from scipy.optimize import brentq, root
 
 from hvi_fenicsx import laws
 from hvi_fenicsx.laws.smoothing import registered
 from hvi_fenicsx.stationary_points.all_points import Enumeration
 from hvi_fenicsx.stationary_points.condensed_form import scalar_problem
 from hvi_fenicsx.stationary_points.curved_laws import CurvedLaws
-from hvi_fenicsx.stationary_points.stationarity import Kind
 from hvi_fenicsx.system.condensed_problem import CondensedProblem
 from hvi_fenicsx.typing import Array
 
@@ -25,7 +23,9 @@ LAWS = {
     "exponential": laws.Exponential(2.0, 0.5, 1.0),
     "smoothed exponential": registered()["chks"]().relative(laws.Exponential(2.0, 0.5, 1.0), 0.01),
 }
-FAR = 40.0
+FAR = 2000.0
+MOST_PUSH = 20.0
+"""Forces that a bound bears are not larger."""
 
 
 def enumerated(problem: CondensedProblem) -> Enumeration:
@@ -38,21 +38,18 @@ def enumerated(problem: CondensedProblem) -> Enumeration:
 
 
 def graph(law: laws.Superpotential, lower: float) -> tuple[Array, Array]:
-    """Points along the graph of a law and a lower bound, jumps included: displacements and tractions."""
-    least, most = max(lower, -FAR), FAR
-    tails = [np.geomspace(6.0, FAR, 20_000), -np.geomspace(6.0, FAR, 20_000)]
-    x = np.unique(np.concatenate([np.linspace(-6.0, 6.0, 200_001), *tails, law.kinks, [least]]))
-    x = x[(x >= least) & (x <= most)]
-    left, right, share = law.left(x), law.right(x), np.linspace(0.0, 1.0, 2001)
-    if least == lower:
-        left[0] = right[0] - 1e3
-    jumps = np.flatnonzero(right - left > 1e-9)
-    steps = [left[jumps, None] + (right - left)[jumps, None] * share]
-    places = np.concatenate([x, np.repeat(x[jumps], share.size)])
-    tractions = np.concatenate([np.where(np.isin(np.arange(x.size), jumps), left, right), steps[0].ravel()])
-    order = np.lexsort((tractions, places))  # jumps of these laws rise
-    along = np.argsort(places[order], kind="stable")
-    return places[order][along], tractions[order][along]
+    """Points along the graph of a law and a lower bound, jumps included, which rise: displacements and tractions."""
+    tail = np.geomspace(6.0, FAR, 20_000)
+    x = np.unique(np.concatenate([np.linspace(-6.0, 6.0, 200_001), tail, -tail, law.kinks, [max(lower, -FAR)]]))
+    x = x[x >= lower]
+    left, right = law.left(x), law.right(x)
+    left[x == lower] = right[x == lower] - MOST_PUSH
+    places, tractions = [x], [right]
+    for at in np.flatnonzero(right > left):
+        tractions.append(np.linspace(left[at], right[at], 100_000, endpoint=False))
+        places.append(np.full(tractions[-1].size, x[at]))
+    order = np.lexsort((np.concatenate(tractions), np.concatenate(places)))
+    return np.concatenate(places)[order], np.concatenate(tractions)[order]
 
 
 def scanned(problem: CondensedProblem) -> int:
