@@ -18,9 +18,9 @@ from ..runtime import memory, versions
 from ..runtime.mpi import largest, on_root
 from ..scene import Scene, dump_scene
 from ..solution import Solution
-from ..stationary_points.all_points import StationaryPoint
 from ..stationary_points.bodies import Equilibria
 from ..stationary_points.found import Found
+from ..stationary_points.point_list import StationaryPoint
 from ..stationary_points.search import falls_passed
 
 TABLE = "equilibria.csv"

@@ -110,6 +110,16 @@ class Superpotential(ABC):
         """Right derivative of j at x (m,), N/m²."""
         return self.convex.right(x) - self.concave.right(x)
 
+    def slope_range(self, low: Array, high: Array) -> tuple[Array, Array]:
+        """Bounds of j'' off the kinks on intervals, N/m³, (m,) each; infinite where none is known.
+
+        Args:
+            low: begin of the intervals, (m,).
+            high: end of the intervals, (m,).
+        """
+        rises, falls = (part.second_range(low, high) for part in (self.convex, self.concave))
+        return rises[0] - falls[1], rises[1] - falls[0]
+
     @cached_property
     def kinks(self) -> Array:
         """Positions (k,), ascending, of all kinks of j."""

@@ -23,6 +23,16 @@ def quotient(a: Array, b: Array | float) -> Array:
     return result
 
 
+def folded(low: Array, high: Array) -> tuple[Array, Array]:
+    """The least and the largest |x| on intervals, (m,) each.
+
+    Args:
+        low: begin of the intervals, (m,).
+        high: end of the intervals, (m,).
+    """
+    return np.maximum(np.maximum(low, -high), 0.0), np.maximum(np.abs(low), np.abs(high))
+
+
 @dataclass(frozen=True)
 class Directional:
     """A positively homogeneous function on the line, by its values in two directions; they may be infinite.
@@ -63,6 +73,15 @@ class ConvexPart(ABC):
     @abstractmethod
     def second(self, x: Array) -> Array:
         """Second derivative off the kinks; the larger one-sided one where the derivative's slope breaks."""
+
+    def second_range(self, low: Array, high: Array) -> tuple[Array, Array]:
+        """Bounds of the second derivative off the kinks on intervals, (m,) each; 0 and inf where none is known.
+
+        Args:
+            low: begin of the intervals, (m,).
+            high: end of the intervals, (m,).
+        """
+        return np.zeros(np.shape(low)), np.full(np.shape(high), np.inf)
 
     @property
     def jumps(self) -> Array:
@@ -117,6 +136,12 @@ class ScaledPart(ConvexPart):
     @override
     def second(self, x: Array) -> Array:
         return self.part.second(self._original(x)) * (self.length / self.traction)
+
+    @override
+    def second_range(self, low: Array, high: Array) -> tuple[Array, Array]:
+        factor = self.length / self.traction
+        least, most = self.part.second_range(self._original(low), self._original(high))
+        return least * factor, most * factor
 
     def _original(self, x: Array) -> Array:
         """The displacement in the law's own unit, exact at kinks, which kink / length * length may miss."""

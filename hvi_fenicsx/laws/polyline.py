@@ -45,6 +45,10 @@ class PolylinePart(ConvexPart):
     def second(self, x: Array) -> Array:
         return self.graph.slope(x)
 
+    @override
+    def second_range(self, low: Array, high: Array) -> tuple[Array, Array]:
+        return self.graph.slope_range(low, high)
+
 
 class PolylineLaw(Superpotential):
     """A law given by a `TractionGraph`. A subclass writes `build`; all else follows.

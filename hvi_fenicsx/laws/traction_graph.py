@@ -122,6 +122,19 @@ class TractionGraph:
         )
         return np.asarray(np.maximum(self.slopes[before], self.slopes[after]))
 
+    def slope_range(self, low: Array, high: Array) -> tuple[Array, Array]:
+        """The least and the largest slope on closed intervals, (m,) each.
+
+        Args:
+            low: begin of the intervals, (m,).
+            high: end of the intervals, (m,).
+        """
+        first = np.searchsorted(self.breaks, low, side="left")[:, None]
+        last = np.searchsorted(self.breaks, high, side="right")[:, None]
+        pieces = np.arange(len(self.slopes))
+        met = (pieces >= first) & (pieces <= last)
+        return np.where(met, self.slopes, np.inf).min(axis=1), np.where(met, self.slopes, -np.inf).max(axis=1)
+
     def primitive(self, x: Array) -> Array:
         """Integral (m,) of the traction from 0 to x; inf where that is beyond the largest float."""
         # Of a break's two pieces the one nearer to 0, so that an even law is even to the bit.

@@ -5,13 +5,14 @@ from __future__ import annotations
 from abc import abstractmethod
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 from typing_extensions import override
 
 from ..typing import Array
 from .base import Superpotential
-from .convex_parts import ConvexPart, DifferentiablePart, Directional
+from .convex_parts import ConvexPart, DifferentiablePart, Directional, folded
 from .parameter_checks import require_ordered, require_positive
 from .polyline import PolylinePart
 from .traction_bounds import Extremes
@@ -25,8 +26,12 @@ class WeakeningLaw(Superpotential):
     A subclass gives a name and the shape w: w(0) = 0, rising monotonically to w(∞) = 1, with its integral W
     and derivative w'. Split: H = peak |x| and G = (peak - residual) delta W(|x|/delta), which is smooth.
     Tractions in N/m², delta in m; InputError unless 0 ≤ residual ≤ peak, peak > 0 and delta > 0.
+
+    Class attributes:
+        concave_shape: whether w' never rises, so that its values at the ends of an interval bound it.
     """
 
+    concave_shape: ClassVar[bool] = False
     peak_traction: float
     residual_traction: float
     delta: float
@@ -107,6 +112,13 @@ class _Weakened(DifferentiablePart):
     def second(self, x: Array) -> Array:
         return (self._drop / self.law.delta) * self._shape(x)[2]
 
+    @override
+    def second_range(self, low: Array, high: Array) -> tuple[Array, Array]:
+        if not self.law.concave_shape:
+            return super().second_range(low, high)
+        near, far = folded(low, high)
+        return self.second(far), self.second(near)
+
     @property
     def _drop(self) -> float:
         return self.law.peak_traction - self.law.residual_traction
@@ -121,6 +133,7 @@ class Exponential(WeakeningLaw):
     """Exponential slip weakening: traction sign(x) [residual + (peak - residual) exp(-|x|/delta)]."""
 
     name = "exponential"
+    concave_shape = True
 
     @override
     @property

@@ -23,6 +23,8 @@ BETWEEN = (0.25, 0.5, 0.75)
 """Points between the ends of arcs on which h is convex."""
 PRICE = 1e3
 """Price of a force that is missing, relative to the largest displacement of the cell."""
+NOISE = 1e-8
+"""Means off their graphs by a smaller share of the energies are on them: the method is no more exact."""
 LEAST_SCALE = 1e-3
 """Least scale of a force, relative to the largest one."""
 
@@ -149,7 +151,8 @@ class BalanceProgramme:
         bound = np.zeros(n)
         forces = pushes * self._force_scale[self._pushed]
         np.add.at(bound, self._pushed, forces * np.abs(x[self._pushed] - self._bounds))
-        return Guide(x=x, law=np.where(free, x * t + d * x * x - mean, 0.0), bound=np.where(free, bound, 0.0))
+        law, size = x * t + d * x * x - mean, np.abs(x * t) + np.abs(d) * x * x
+        return Guide(x=x, law=np.where(free & (law > NOISE * size), law, 0.0), bound=np.where(free, bound, 0.0))
 
 
 def _points(graphs: Graphs, diagonal: Array) -> _Points:

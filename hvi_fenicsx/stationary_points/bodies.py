@@ -14,10 +14,10 @@ from ..solvers import obstacle_force
 from ..solvers.result import SolveResult
 from ..system.condensation import Condensation
 from ..workflow import certified, finish
-from .all_points import StationaryPoint
 from .condensed_form import scalar_problem
 from .curved_laws import CurvedLaws
 from .found import Found, Keep, Saved, Wanted, forget
+from .point_list import StationaryPoint
 from .progress_words import Unit
 from .scalar_problem import ScalarProblem
 from .search import begun, find

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -23,18 +23,19 @@ OFF_END = 0.2
 """A place between joints is at least this share of the interval from its ends."""
 
 
-def parts(problem: ScalarProblem, pivots: Integers, cell: Box, guide: Guide | None) -> list[Box]:
+def parts(problem: ScalarProblem, pivots: Integers, cell: Box, guides: Sequence[Guide]) -> list[Box]:
     """The parts of a cell, the one to look at first last; each has its share of the search.
 
     Args:
         problem: the problem.
         pivots: unknowns that fix the rigid motions.
         cell: the cell.
-        guide: where means are far from the graphs of laws and bounds; None where this is not known.
+        guides: where means are far from the graphs of laws and bounds; the first that tells is followed.
     """
-    found = list(
-        _far(problem, pivots, cell) or (_guided(problem, cell, guide) if guide else None) or _any(problem, cell)
-    )
+    found = _far(problem, pivots, cell)
+    for guide in guides:
+        found = found or _guided(problem, cell, guide)
+    found = found or list(_any(problem, cell))
     return [replace(part, share=cell.share / len(found)) for part in found]
 
 
@@ -74,14 +75,13 @@ def _guided(problem: ScalarProblem, cell: Box, guide: Guide) -> list[Box]:
 
 
 def _near(problem: ScalarProblem, cell: Box, i: int, x: float) -> Iterator[Box]:
-    """Parts at the joint that is nearest to a place; at the place if there is none."""
+    """Parts at the joint that is nearest to a place; at the place if there is none, or only a bend near an end."""
     low, high = float(cell.low[i]), float(cell.high[i])
-    joints = _joints(problem, cell, i)
-    if joints:
-        yield from _at_joint(problem, cell, i, *min(joints, key=lambda joint: abs(joint[0] - x)))
-        return
     short = OFF_END * (high - low)
-    yield from _halves(cell, i, min(max(x, low + short), high - short))
+    at, jump = min(_joints(problem, cell, i), key=lambda joint: abs(joint[0] - x), default=(low, 0.0))
+    if _jumps(problem, i, jump) or low + short <= at <= high - short:
+        return _at_joint(problem, cell, i, at, jump)
+    return _halves(cell, i, min(max(x, low + short), high - short))
 
 
 def _any(problem: ScalarProblem, cell: Box) -> Iterator[Box]:
@@ -107,9 +107,13 @@ def _joints(problem: ScalarProblem, cell: Box, i: int) -> list[tuple[float, floa
 
 
 def _at_joint(problem: ScalarProblem, cell: Box, i: int, at: float, jump: float) -> Iterator[Box]:
-    if abs(jump) > float(problem.arcs.rounding[i]):  # looked at last: a minimiser is on no drop
+    if _jumps(problem, i, jump):  # looked at last: a minimiser is on no drop
         yield _with(cell, i, at, at)
     yield from _halves(cell, i, at)
+
+
+def _jumps(problem: ScalarProblem, i: int, jump: float) -> bool:
+    return abs(jump) > float(problem.arcs.rounding[i])
 
 
 def _halves(cell: Box, i: int, at: float) -> Iterator[Box]:

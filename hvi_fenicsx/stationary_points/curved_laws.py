@@ -9,7 +9,7 @@ import numpy as np
 from ..system.condensed_problem import Bonds, CondensedProblem
 from ..typing import Array, Mask
 from . import stationarity
-from .all_points import StationaryPoint
+from .point_list import StationaryPoint
 from .scalar_problem import ScalarProblem
 from .stationarity import Subdifferential
 
@@ -19,6 +19,9 @@ FASTER = 0.1
 """Newton's method goes on in a balance that is good enough while each step leaves less than this share of the rest."""
 LONGEST = 0.1
 """Way from the polylines' point, relative to its displacements, beyond which a point is another one."""
+
+ROUNDED = 1e-12
+"""Places nearer than this share of their distance from zero are one."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,6 +62,50 @@ class CurvedLaws:
                 return None
         return None
 
+    @property
+    def bounded(self) -> bool:
+        """Whether bounds of all slopes are known."""
+        return all(
+            np.all(np.isfinite(b.law.slope_range(*np.full((2, 1), b.law.length_scale)))) for b in self.problem.bonds
+        )
+
+    def slopes(self, low: Array, high: Array) -> tuple[Array, Array]:
+        """Bounds of the slopes of all chords of the laws' graphs and of what bounds bear, on intervals, (n,) each.
+
+        They are infinite where a traction jumps inside. At the end of an interval a jump is not counted, a bound is.
+
+        Args:
+            low: of the intervals, (n,).
+            high: of the intervals, (n,).
+        """
+        least, most = np.zeros((2, self.near.size))
+        for bonds in self.problem.bonds:
+            there = bonds.weights > 0.0
+            at, signs, weights = bonds.unknowns[there, 0], bonds.signs[there, 0], bonds.weights[there]
+            ends = np.sort(np.stack([signs * low[at], signs * high[at]]), axis=0)
+            first, last = bonds.law.slope_range(*ends)
+            first = np.where(_inside(bonds.law.concave.kinks, ends), -np.inf, first)
+            last = np.where(_inside(bonds.law.convex.kinks, ends), np.inf, last)
+            np.add.at(least, at, weights * signs**2 * first)
+            np.add.at(most, at, weights * signs**2 * last)
+        bears = (low <= self.near.lower) | (high >= self.near.upper)
+        return least, np.where(bears, np.inf, most)
+
+    def tractions(self, x: Array) -> tuple[Array, Array]:
+        """The forces of the laws where none jumps, and the sum of the sizes of their parts, (n,) each.
+
+        Args:
+            x: displacements, (n,).
+        """
+        total, sizes = np.zeros((2, self.near.size))
+        for bonds in self.problem.bonds:
+            at, argument = bonds.unknowns[:, 0], bonds.argument(x)
+            factors = bonds.weights * bonds.signs[:, 0]
+            rises, falls = bonds.law.convex.right(argument), bonds.law.concave.right(argument)
+            np.add.at(total, at, factors * bonds.law.right(argument))
+            np.add.at(sizes, at, np.abs(factors) * (np.abs(rises) + np.abs(falls)))
+        return total, sizes
+
     def _found(self, x: Array, allowed: Subdifferential) -> StationaryPoint:
         kind = stationarity.kind_at(self.near, x, allowed)
         return StationaryPoint(x=x, energy=self.problem.energy(x), kind=kind, isolated=True)
@@ -96,3 +143,9 @@ def _forces(bonds: Bonds, argument: Array, close: float) -> tuple[Array, Array]:
     factors = bonds.weights * bonds.signs[:, 0]
     ends = [factors * traction for traction in bonds.law.interval(argument, close)]
     return np.minimum(*ends), np.maximum(*ends)
+
+
+def _inside(kinks: Array, ends: Array) -> Mask:
+    """Whether a kink is inside intervals, (m,); one that only rounding tells apart from an end is not."""
+    apart = ROUNDED * np.abs(kinks)
+    return np.asarray(((kinks - apart > ends[0][:, None]) & (kinks + apart < ends[1][:, None])).any(axis=1))

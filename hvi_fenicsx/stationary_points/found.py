@@ -6,9 +6,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 from ..typing import Array
-from .all_points import StationaryPoint
 from .curved_laws import CurvedLaws
 from .passes import Pass
+from .point_list import StationaryPoint
 from .progress_words import Unit
 
 Saved = Mapping[str, Array]

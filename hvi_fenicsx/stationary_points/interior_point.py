@@ -182,4 +182,5 @@ class _Newton:
 def _most(values: Array, change: Array) -> float:
     """The share of a change that leaves all values positive, at most one."""
     falls = change < 0.0
-    return min(1.0, float((-values[falls] / change[falls]).min())) if falls.any() else 1.0
+    with np.errstate(over="ignore"):
+        return min(1.0, float((-values[falls] / change[falls]).min())) if falls.any() else 1.0

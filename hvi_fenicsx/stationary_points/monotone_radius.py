@@ -33,9 +33,9 @@ def tightened(relaxation: Relaxation, box: Box) -> Box:
     y, problem = solved.x, relaxation.problem
     short = -np.minimum(_least_products(problem, box, y, curvature.added), 0.0).sum()
     size = float(np.abs(problem.force) @ np.abs(y)) + problem.energy_size(y)
-    reach = np.where(
-        np.isfinite(curvature.radii), curvature.radii * np.sqrt(short * (1.0 + WIDENED) + 1e-14 * size), np.inf
-    )
+    with np.errstate(invalid="ignore"):
+        reach = curvature.radii * np.sqrt(short * (1.0 + WIDENED) + 1e-14 * size)
+    reach = np.where(np.isfinite(curvature.radii), reach, np.inf)
     low, high = np.maximum(box.low, y - reach), np.minimum(box.high, y + reach)
     fixed = box.low == box.high
     return replace(

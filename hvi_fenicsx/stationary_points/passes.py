@@ -15,8 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..typing import Array
-from .all_points import StationaryPoint
 from .descent import descend
+from .point_list import StationaryPoint
 from .scalar_problem import ScalarProblem
 from .stationarity import Kind, unstable_directions
 

@@ -11,12 +11,13 @@ import numpy as np
 from ..errors import InputError, SolverError
 from ..typing import Array
 from . import systematic
-from .all_points import Enumeration, StationaryPoint
+from .all_points import Enumeration
 from .boxes import fresh_box
 from .found import Found, Keep, Saved, Start, Wanted, forget
 from .length_kinds import kind_of
 from .lowest import LowestSearch, Progress
 from .passes import passes
+from .point_list import StationaryPoint
 from .progress_words import Clock, all_in_words, lowest_in_words
 from .scalar_problem import ScalarProblem
 from .stationarity import Kind
@@ -70,7 +71,9 @@ def find(
     task = _Task(problem=problem, wanted=wanted, stop=stop, report=report, saved=saved, keep=keep)
     if wanted.lowest:
         return _lowest(task)
-    return _without_proof(task) if len(problem.lengths) or problem.error else _all(task)
+    curved = wanted.curved
+    provable = curved.bounded if curved is not None else not (len(problem.lengths) or problem.error)
+    return _all(task) if provable else _without_proof(task)
 
 
 def _only(problem: ScalarProblem) -> Found:
@@ -170,9 +173,15 @@ def _left_of_all(search: Enumeration) -> Saved:
     return {"lowest": np.array(False), "x": found, **_stacked(listed)}
 
 
-def _resumed(problem: ScalarProblem, saved: Saved) -> Enumeration:
+def _fresh(task: _Task) -> Enumeration:
+    """A search for all points; of curved laws with polylines near their tractions."""
+    curved = task.wanted.curved
+    return Enumeration(problem=task.problem if curved is None else curved.near, laws=curved)
+
+
+def _resumed(task: _Task, saved: Saved) -> Enumeration:
     """A search for all points to go on with."""
-    search = Enumeration(problem=problem)
+    search = _fresh(task)
     for x in saved["x"]:
         search.enter(x)
     low, high = saved["low"], saved["high"]
@@ -185,12 +194,12 @@ def _started(task: _Task, search: Enumeration, tell: Callable[[Enumeration], Non
     """A few cells, which often are all; else what is found without a proof."""
     search.start()
     if not search.run(lambda: search.cells >= MOST_BOXES or task.stop(), tell):
-        for x in systematic.candidates(task.problem, search.points, task.stop):
+        for x in systematic.candidates(search.problem, search.points.listed, task.stop):
             search.enter(x)
 
 
 def _all(task: _Task) -> Found:
-    search = Enumeration(problem=task.problem) if task.saved is None else _resumed(task.problem, task.saved)
+    search = _fresh(task) if task.saved is None else _resumed(task, task.saved)
     clock = Clock()
 
     def tell(now: Enumeration) -> None:
@@ -257,7 +266,7 @@ def _cells_of_none(task: _Task, most: float = math.inf) -> int:
     curved = task.wanted.curved
     if task.wanted.bounded or curved is None or not np.all(np.isfinite(curved.near.force_error)):
         return 0
-    search, clock = Enumeration(problem=curved.near), Clock()
+    search, clock = _fresh(task), Clock()
     search.start()
 
     def over() -> bool:

@@ -15,10 +15,10 @@ from dataclasses import replace
 import numpy as np
 
 from ..typing import Array
-from .all_points import StationaryPoint
 from .deflation import DeflatedNewton
 from .descent import descend
 from .length_kinds import kind_of
+from .point_list import StationaryPoint
 from .scalar_problem import ScalarProblem
 
 PROGRAMMES = ((0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875, 1.0), (2.0, 1.5, 1.0), (4.0, 2.0, 1.0), (-1.0, 0.0, 1.0))

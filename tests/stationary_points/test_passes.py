@@ -10,9 +10,10 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from hvi_fenicsx.stationary_points.all_points import Enumeration, StationaryPoint
+from hvi_fenicsx.stationary_points.all_points import Enumeration
 from hvi_fenicsx.stationary_points.condensed_form import scalar_problem
 from hvi_fenicsx.stationary_points.passes import Pass, passes
+from hvi_fenicsx.stationary_points.point_list import StationaryPoint
 from hvi_fenicsx.stationary_points.stationarity import Kind
 from hvi_fenicsx.system.condensed_problem import CondensedProblem
 

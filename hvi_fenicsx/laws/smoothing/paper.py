@@ -19,7 +19,7 @@ from ...errors import InputError
 from ...typing import Array
 from ..base import Superpotential
 from ..catalogue import QuadraticLinear
-from ..convex_parts import ConvexPart, DifferentiablePart
+from ..convex_parts import ConvexPart, DifferentiablePart, folded
 from .base import SmoothedLaw, Smoothing
 from .plus_functions import QUADRATIC
 
@@ -166,6 +166,19 @@ class _PaperConcave(DifferentiablePart):
         rate = np.where(inside, s * y - law.gamma2, 0.0)
         return rate * (rate / self.law.epsilon_absolute)
 
+    @override
+    def second_range(self, low: Array, high: Array) -> tuple[Array, Array]:
+        near, far = folded(low, high)
+        least, most = np.full(near.shape, np.inf), np.zeros(near.shape)
+        for band in self.bands:
+            ends = band.kink + band.low, band.kink + band.high
+            rates = self.law.slope * (np.stack([np.maximum(near, ends[0]), np.minimum(far, ends[1])]) - band.middle)
+            meets, within = (near <= ends[1]) & (far >= ends[0]), (near >= ends[0]) & (far <= ends[1])
+            size = folded(*rates)
+            least = np.where(within, size[0] * (size[0] / self.law.epsilon_absolute), least)
+            most = np.where(meets, np.maximum(most, size[1] * (size[1] / self.law.epsilon_absolute)), most)
+        return np.where(np.isfinite(least), least, 0.0), most
+
 
 @dataclass(frozen=True, eq=False)
 class _PaperConvex(ConvexPart):
@@ -194,3 +207,10 @@ class _PaperConvex(ConvexPart):
     @override
     def second(self, x: Array) -> Array:
         return self.law.slope * (1.0 - self.law.share(np.abs(x)))
+
+    @override
+    def second_range(self, low: Array, high: Array) -> tuple[Array, Array]:
+        near, far = folded(low, high)
+        turn = np.clip(0.5 * self.law.law.delta, near, far)
+        shares = np.stack([self.law.share(y) for y in (near, turn, far)])
+        return self.law.slope * (1.0 - shares.max(axis=0)), self.law.slope * (1.0 - shares.min(axis=0))

@@ -23,6 +23,7 @@ class Quadratic(PlusFunction):
     name = "quadratic"
     kappa = 1.0 / 8.0
     bands = (0.5,)
+    unimodal = True
     parabolic = True
 
     @override
@@ -40,6 +41,7 @@ class Chks(PlusFunction):
 
     name = "chks"
     kappa = 1.0
+    unimodal = True
 
     @override
     def profile(self, z: Array) -> tuple[Array, Array, Array]:
@@ -59,6 +61,7 @@ class LogExp(PlusFunction):
     name = "log_exp"
     kappa = math.log(2.0)
     bands = (2.0, 8.0, 32.0)
+    unimodal = True
 
     @override
     def profile(self, z: Array) -> tuple[Array, Array, Array]:

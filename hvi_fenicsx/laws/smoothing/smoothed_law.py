@@ -21,7 +21,7 @@ from typing_extensions import override
 
 from ...typing import Array
 from ..base import Superpotential
-from ..convex_parts import ConvexPart, DifferentiablePart
+from ..convex_parts import ConvexPart, DifferentiablePart, folded
 from ..polyline import PolylineLaw
 from ..traction_graph import TractionGraph
 from .base import SmoothedLaw, Smoothing
@@ -36,11 +36,13 @@ class PlusFunction(Smoothing):
     Class attributes:
         kappa: the constant of |p(t; e) - max(t, 0)| ≤ κ e; it is attained at t = 0.
         bands: distances |t|/e between which D changes little in shape; beyond the last one it is next to nothing.
+        unimodal: whether D'' never rises with the distance, so that its values at two distances bound it between.
         parabolic: whether D is a parabola up to the only band, and zero beyond it.
     """
 
     kappa: ClassVar[float]
     bands: ClassVar[tuple[float, ...]] = (1.0, 4.0, 16.0, 64.0)
+    unimodal: ClassVar[bool] = False
     parabolic: ClassVar[bool] = False
 
     @abstractmethod
@@ -116,6 +118,19 @@ class SmoothedPart(DifferentiablePart):
         with np.errstate(over="ignore"):
             stiffness = np.minimum(self._heights / self.epsilon * self._heights, _LARGEST)
             return np.asarray(self.part.second(folded) + (curvatures * stiffness).sum(axis=1))
+
+    @override
+    def second_range(self, low: Array, high: Array) -> tuple[Array, Array]:
+        if not self.plus.unimodal:
+            return super().second_range(low, high)
+        if self.even:
+            low, high = folded(low, high)
+        before, behind = (end[:, None] - self._places for end in (low, high))
+        least, most = self.part.second_range(low, high)
+        with np.errstate(over="ignore"):
+            stiffness = np.minimum(self._heights / self.epsilon * self._heights, _LARGEST)
+            near, far = (self.plus.profile(at / self.epsilon * self._heights)[2] for at in folded(before, behind))
+            return least + (far * stiffness).sum(axis=1), most + (near * stiffness).sum(axis=1)
 
     def correction(self, x: Array) -> Array:
         """What the smoothing adds to the part, from 0 to κ ε for each kink."""

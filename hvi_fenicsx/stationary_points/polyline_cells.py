@@ -1,0 +1,116 @@
+"""Cells of laws whose tractions are polylines: those with one stationary point at most, or with a continuum."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.linalg import LinAlgError, cholesky
+from scipy.optimize import linprog
+
+from ..typing import Array, Integers
+from . import stationarity
+from .boxes import Box
+from .cell_parts import at_bounds
+from .cell_verdict import Verdict
+from .convex_programme import Chains, minimise
+from .point_list import SAME, PointList, StationaryPoint
+from .relaxation import envelopes
+from .scalar_problem import ScalarProblem
+
+REGULAR = 1e-6
+"""Least pivot, relative to the largest, of a matrix that counts as positive definite."""
+CONDITION = 1e12
+"""Condition number beyond which a linear system is singular."""
+
+
+class PolylineCells:
+    """Cells of laws whose tractions are polylines.
+
+    Args:
+        problem: the problem.
+    """
+
+    def __init__(self, problem: ScalarProblem) -> None:
+        self._problem = problem
+
+    def verdict(self, cell: Box, known: PointList) -> Verdict:
+        """What is known of a cell.
+
+        Args:
+            cell: the cell.
+            known: points that were found before; they are not needed.
+        """
+        arcs, problem = self._problem.arcs, self._problem
+        fixed = cell.low == cell.high
+        free = np.flatnonzero(~fixed)
+        if not free.size:
+            return self._done(cell.low)
+        if np.any(arcs.drops(cell.low, cell.high) > 0.0):
+            return Verdict(left=cell)
+        slopes = arcs.least_slope(cell.low, cell.high)
+        matrix = problem.stiffness[np.ix_(free, free)] + np.diag(slopes[free])
+        if _positive(matrix):
+            return self._done(self._minimum(cell, np.where(fixed, 0.0, -np.minimum(slopes, 0.0))))
+        if np.any(arcs.meets(cell.low, cell.high)[free].sum(axis=1) > 1) or np.any(at_bounds(problem, cell)[free]):
+            return Verdict(left=cell)
+        return self._linear(cell, free, matrix)
+
+    def point(self, x: Array, *, isolated: bool = True) -> StationaryPoint | None:
+        """The stationary point at a place; None where there is none.
+
+        Args:
+            x: the place, (n,).
+            isolated: False where it is one of a continuum.
+        """
+        problem = self._problem
+        x = np.clip(x, problem.lower, problem.upper)
+        if stationarity.imbalance(problem, x) > stationarity.ACCURACY:
+            return None
+        kind = stationarity.kind(problem, x)
+        return StationaryPoint(x=x, energy=problem.energy(x), kind=kind, isolated=isolated)
+
+    def _done(self, x: Array, *, isolated: bool = True) -> Verdict:
+        """Nothing is left of a cell but perhaps this point."""
+        point = self.point(x, isolated=isolated)
+        return Verdict() if point is None else Verdict(points=[point])
+
+    def _minimum(self, cell: Box, added: Array) -> Array:
+        """The minimiser of a cell on which the energy is convex, the falls of its laws being less than S."""
+        chains = Chains.of(envelopes(self._problem, cell.low, cell.high, added))
+        return minimise(self._problem.stiffness - np.diag(added), self._problem.force, chains, cell.x).x
+
+    def _linear(self, cell: Box, free: Integers, matrix: Array) -> Verdict:
+        """The solutions of a cell in which every law is on one arc."""
+        problem, arcs, rows = self._problem, self._problem.arcs, np.arange(self._problem.size)
+        k = np.argmax(arcs.meets(cell.low, cell.high), axis=1)
+        offset = arcs.tractions[rows, k] - arcs.slopes[rows, k] * arcs.anchors[rows, k]
+        held = np.setdiff1d(rows, free)
+        right = problem.force[free] - offset[free] - problem.stiffness[np.ix_(free, held)] @ cell.low[held]
+        x, low, high = cell.low.copy(), cell.low[free], cell.high[free]
+        if np.linalg.cond(matrix) < CONDITION:
+            x[free] = np.linalg.solve(matrix, right)
+            near = SAME * (1.0 + np.abs(x[free]))
+            inside = np.all((x[free] >= low - near) & (x[free] <= high + near))
+            return self._done(x) if inside else Verdict()
+        if (inner := _some_solution(matrix, right, np.column_stack([low, high]))) is None:
+            return Verdict()
+        x[free] = inner
+        return self._done(x, isolated=False)
+
+
+def _some_solution(matrix: Array, right: Array, sides: Array) -> Array | None:
+    """A solution of a singular linear system within intervals (n, 2), halfway between two; None if there is none."""
+    size, n = float(np.abs(matrix).max()) or 1.0, len(right)
+    ends = [
+        linprog(np.full(n, sign), A_eq=matrix / size, b_eq=right / size, bounds=sides, method="highs")
+        for sign in (1.0, -1.0)
+    ]
+    return None if any(e.status != 0 for e in ends) else np.asarray(0.5 * (ends[0].x + ends[1].x))
+
+
+def _positive(matrix: Array) -> bool:
+    """Whether a matrix is positive definite, and not nearly singular."""
+    try:
+        pivots = np.diag(cholesky(matrix, lower=True))
+    except LinAlgError:
+        return False
+    return bool(pivots.min() > REGULAR * pivots.max())
