@@ -17,13 +17,15 @@ from .found import Found, Keep, Saved, Start, Wanted, forget
 from .length_kinds import kind_of
 from .lowest import LowestSearch, Progress
 from .passes import passes
-from .point_list import StationaryPoint
+from .point_list import PointList, StationaryPoint
 from .progress_words import Clock, all_in_words, lowest_in_words
 from .scalar_problem import ScalarProblem
 from .stationarity import Kind
 
 MOST_BOXES = 50
 """Boxes that are bounded for the gap where what was asked for is not proven."""
+MOST_VAIN = 100
+"""Attempts in a row to find a new point, where a proof goes on after them."""
 OWN_GAP = 0.85
 """Share of the gap that a search may leave where the laws are curved; the rest is for what their polylines differ."""
 NO_POINT = "no equilibrium, proven"
@@ -194,8 +196,21 @@ def _started(task: _Task, search: Enumeration, tell: Callable[[Enumeration], Non
     """A few cells, which often are all; else what is found without a proof."""
     search.start()
     if not search.run(lambda: search.cells >= MOST_BOXES or task.stop(), tell):
-        for x in systematic.candidates(search.problem, search.points.listed, task.stop):
+        for x in systematic.candidates(search.problem, search.points.listed, _patience(task, search.points)):
             search.enter(x)
+
+
+def _patience(task: _Task, known: PointList) -> Callable[[], bool]:
+    """Whether a search that proves nothing is over: to be asked before each attempt."""
+    before, vain = len(known), 0
+
+    def over() -> bool:
+        nonlocal before, vain
+        vain = vain + 1 if len(known) == before else 0
+        before = len(known)
+        return vain > MOST_VAIN or task.stop()
+
+    return over
 
 
 def _all(task: _Task) -> Found:
