@@ -2,7 +2,7 @@
 
     ./hvi exec python3 benchmarks/all_equilibria.py [--only FAMILY ...] [--largest 16] [--limit 120]
 
-`support` is demos/jureczka_ochal.toml, `floor` demos/strong_law.toml with P = 6e6 N/m² and other laws: bodies on n
+`support` is demos/jureczka_ochal.toml, `floor` demos/strong_law.toml with P = 6e6 N/m² and other laws: bodies with n
 cells along Γc. What is timed is the search alone, without mesh, certificates and files.
 """
 

@@ -1,8 +1,9 @@
 """All stationary points: cells that no point satisfies are given up, the others divided until each has one at most.
 
-A cell gives each unknown an interval, or one joint of its law. It needs no division where the laws do not drop inside
-and S with the laws' least slopes is positive definite: then it has at most one stationary point. A drop is divided in
-three: before it, behind it, and on it, where the traction may have any value between.
+A cell gives each unknown an interval, or one joint of its law. It needs no division where its laws tell that it has one
+stationary point at most, and which (:mod:`.polyline_cells`, :mod:`.curved_cells`). A drop is divided in three: before
+it, behind it, and on it, where the traction may have any value between. Of curved laws the tests that make cells
+smaller see polylines near the tractions, and allow for what these differ by.
 """
 
 from __future__ import annotations
@@ -48,7 +49,7 @@ class Enumeration:
         points: found so far.
         cells: looked at so far.
         waiting: a stack of cells not yet decided.
-        undecided: cells given up, so small are they, in which curved laws may have a point.
+        undecided: cells too small to be divided in which curved laws may have a point.
     """
 
     problem: ScalarProblem
@@ -56,7 +57,7 @@ class Enumeration:
     points: PointList = field(init=False)
     cells: int = 0
     waiting: list[Box] = field(default_factory=list)
-    undecided: int = 0
+    undecided: list[Box] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         if self.laws is None and np.any(self.problem.force_error):
@@ -94,12 +95,18 @@ class Enumeration:
             report(self)
         return True
 
+    @property
+    def open_cells(self) -> int:
+        """The number of cells that may hold further points."""
+        return len(self.undecided) + len(self.waiting)
+
     def _parts(self, look: Look) -> list[Box]:
         """The parts of what is left of a cell; points that are found on the way are kept."""
         verdict = self._cells.verdict(look.cell, self.points)
         for point in verdict.points:
             self._enter(point)
-        self.undecided += verdict.undecided
+        if verdict.undecided:
+            self.undecided.append(look.cell)
         left = verdict.left
         if left is None or self._linear.excludes(left.low, left.high):
             return []

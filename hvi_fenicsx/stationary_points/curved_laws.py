@@ -1,4 +1,4 @@
-"""Stationary points of curved laws: Newton's method on the laws themselves, from points of polylines near them."""
+"""Stationary points of curved laws: Newton's method on the laws themselves; and bounds of their slopes."""
 
 from __future__ import annotations
 
@@ -64,10 +64,14 @@ class CurvedLaws:
 
     @property
     def bounded(self) -> bool:
-        """Whether bounds of all slopes are known."""
-        return all(
-            np.all(np.isfinite(b.law.slope_range(*np.full((2, 1), b.law.length_scale)))) for b in self.problem.bonds
-        )
+        """Whether bounds of all slopes are known, and of what the polylines differ by."""
+        ranges = [b.law.slope_range(*np.full((2, 1), b.law.length_scale)) for b in self.problem.bonds]
+        return self.near_enough and bool(np.all(np.isfinite(ranges)))
+
+    @property
+    def near_enough(self) -> bool:
+        """Whether it is known by how much the polylines' forces differ from those of the laws."""
+        return bool(np.all(np.isfinite(self.near.force_error)))
 
     def slopes(self, low: Array, high: Array) -> tuple[Array, Array]:
         """Bounds of the slopes of all chords of the laws' graphs and of what bounds bear, on intervals, (n,) each.

@@ -44,8 +44,8 @@ class Wanted:
         bounded: whether the energy is known to be bounded from below.
         start: where the lowest is, as far as that is known.
         energies: the unit of energies in reports.
-        curved: the curved laws, by which points are made exact, and it may be proven that there is none; None where no
-            law is curved, one acts on a length, or the lowest is wanted.
+        curved: the curved laws, by which cells are decided and points are made exact; None where no law is curved, one
+            acts on a length, or the lowest is wanted.
     """
 
     lowest: bool = False
@@ -76,7 +76,8 @@ class Found:
         nodes: boxes that were bounded or tested.
         reason: how it ended, for people.
         left: what is needed to go on; empty if there is nothing left.
-        passes: the saddles that join two of the minimisers, numbers of the points; none where points may be missing.
+        passes: the saddles that join two of the minimisers, numbers of the points; none where points may be
+            missing, or laws are curved.
     """
 
     points: tuple[StationaryPoint, ...]

@@ -169,7 +169,7 @@ def _left_of_lowest(search: LowestSearch) -> Saved:
 
 
 def _left_of_all(search: Enumeration) -> Saved:
-    listed = [(c.low, c.high, c.weights) for c in search.waiting]
+    listed = [(c.low, c.high, c.weights) for c in (*search.undecided, *search.waiting)]
     points = [p.x for p in sorted(search.points, key=lambda p: p.energy)]
     found = np.array(points) if points else np.empty((0, search.problem.size))
     return {"lowest": np.array(False), "x": found, **_stacked(listed)}
@@ -223,7 +223,7 @@ def _all(task: _Task) -> Found:
 
     if task.saved is None:
         _started(task, search, tell)
-    complete = search.run(task.stop, tell)
+    complete = search.run(task.stop, tell) and not search.undecided
     below = None if complete else _bounded(task, [p.x for p in search.points])
     if below is not None:
         search.enter(below.x)
@@ -236,14 +236,14 @@ def _all(task: _Task) -> Found:
         lower_bound=bound,
         proven=complete,
         nodes=search.cells,
-        reason=_in_words(points) if complete else f"{len(points)} found, and {len(search.waiting)} cells are open",
+        reason=_in_words(points) if complete else f"{len(points)} found, and {search.open_cells} cells are open",
         left={} if complete else _left_of_all(search),
-        passes=passes(task.problem, points) if complete else (),
+        passes=passes(task.problem, points) if complete and task.wanted.curved is None else (),
     )
 
 
 def _without_proof(task: _Task) -> Found:
-    """What is found where it cannot be proven that these are all: laws of lengths, or curved ones."""
+    """What is found where it cannot be proven that these are all: laws of lengths, or of unknown slopes."""
     problem = task.problem
     if cells := _cells_of_none(task, MOST_BOXES):
         return _none(cells)
@@ -263,7 +263,8 @@ def _without_proof(task: _Task) -> Found:
         proven=False,
         nodes=0 if below is None else below.boxes,
         reason=f"{len(points)} found, and there may be more: of laws that "
-        f"{'act on a length' if len(problem.lengths) else 'are curved'} it cannot be proven that these are all",
+        f"{'act on a length' if len(problem.lengths) else 'are curved, and do not bound their slopes,'} "
+        "it cannot be proven that these are all",
     )
 
 
@@ -278,14 +279,13 @@ def _cells_of_none(task: _Task, most: float = math.inf) -> int:
         task: the search.
         most: cells after which the proof is given up.
     """
-    curved = task.wanted.curved
-    if task.wanted.bounded or curved is None or not np.all(np.isfinite(curved.near.force_error)):
+    if task.wanted.bounded or task.wanted.curved is None or not task.wanted.curved.near_enough:
         return 0
     search, clock = _fresh(task), Clock()
     search.start()
 
     def over() -> bool:
-        return search.undecided > 0 or search.cells >= most or task.stop()
+        return bool(search.undecided) or search.cells >= most or task.stop()
 
     none = search.run(over, lambda now: task.report(all_in_words(now, clock)))
     return max(search.cells, 1) if none and not search.undecided else 0

@@ -79,7 +79,7 @@ def _deflated(
 def near_stationary(
     problem: ScalarProblem, known: Sequence[Array], stop: Callable[[], bool], exact: Exact | None = None
 ) -> list[StationaryPoint]:
-    """Points, by energy, where laws act on lengths or are curved.
+    """Points, by energy, where laws act on lengths, or are curved and do not bound their slopes.
 
     Args:
         problem: the problem.
