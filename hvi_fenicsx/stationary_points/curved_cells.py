@@ -15,7 +15,7 @@ import numpy as np
 from ..typing import Array, Integers
 from . import stationarity
 from .balance_programme import Guide
-from .boxes import Box, clipped
+from .boxes import Box, clipped, fresh_box
 from .cell_parts import at_bounds
 from .cell_verdict import Verdict
 from .curved_laws import CurvedLaws
@@ -118,7 +118,19 @@ class CurvedCells:
         wide = np.where(fixed & (np.abs(x - cell.low) <= close), 0.0, close)
         point, beside = np.where(wide > 0.0, x, cell.low), np.where(fixed, wide, 0.0)
         low, high = np.minimum(cell.low - beside, point - wide), np.maximum(cell.high + beside, point + wide)
-        return self._is_regular(low, high)
+        return self._is_regular(low, high) and self._exists(x, close)
+
+    def _exists(self, x: Array, close: float) -> bool:
+        """Whether a stationary point is this close to a computed one: Krawczyk's image of what is close lies within.
+
+        Unknowns that a jump or a bound holds stay.
+        """
+        ends = self._laws.slopes(x - close, x + close)
+        wide = np.where(np.all(np.isfinite(ends), axis=0), close, 0.0)
+        ball = fresh_box(x - wide, x + wide, x)
+        free = np.flatnonzero(wide)
+        image = self._image(ball, free)
+        return image is not None and bool(np.all((image[0] > ball.low[free]) & (image[1] < ball.high[free])))
 
     def _is_regular(self, low: Array, high: Array) -> bool:
         least, most = self._laws.slopes(low, high)

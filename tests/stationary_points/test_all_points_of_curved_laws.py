@@ -240,3 +240,15 @@ def test_of_a_law_without_bounds_of_its_slopes_points_are_found_without_a_proof(
     found = find(near, Wanted(curved=CurvedLaws(near=near, problem=problem)), lambda: False, lambda _: None)
     assert len(found.points) == scanned(problem)
     assert (found.complete, found.proven) == (complete, complete)
+
+
+def test_at_a_fold_a_cell_stays_open_also_when_the_search_goes_on() -> None:
+    """The spring is as stiff as the law falls where the forces meet: two points are one, to rounding."""
+    fall = 1.5 * np.exp(-1.0)
+    problem = condensed.problem([[fall]], [fall + 0.5 + fall], condensed.bonds(LAWS["exponential"], [0]))
+    near = scalar_problem(problem, tractions=True)
+    wanted = Wanted(curved=CurvedLaws(near=near, problem=problem))
+    found = find(near, wanted, lambda: False, lambda _: None)
+    again = find(near, wanted, lambda: False, lambda _: None, saved=found.left)
+    assert (found.complete, again.complete) == (False, False)
+    assert any(abs(p.x[0] - 1.0) < 1e-4 for p in found.points)
