@@ -226,6 +226,19 @@ def test_a_path_that_was_lost_ends_where_the_body_comes_off(name: str) -> None:
     assert record["end"] == "escapes"
 
 
+STOOD = ("c8e5a9caa4", "ba3ba6f79c")
+"""Smoothed laws: a body that leans far, and events near to each other."""
+
+
+@pytest.mark.parametrize("key", STOOD)
+def test_a_path_that_found_no_step_short_enough_reaches_its_end(key: str) -> None:
+    """All rows are certified, and the end is not against what limit analysis proves."""
+    wide = Table.read(BENCHMARKS / "hard_wide.toml")
+    (case,) = (case for case in cases(wide) if case.key == key)
+    record = hard_run.attempt(case, wide.data, "auto", wide.data["limit"])
+    assert record["outcome"] == "certified", record
+
+
 TALL = {
     "on a block": {"body": "stack", "support": "peak", "law": "quadratic_linear", "strength": 10.0, "margin": 0.01,
                    "side": "under", "modulus": 1e3},

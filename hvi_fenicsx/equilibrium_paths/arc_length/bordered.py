@@ -28,10 +28,12 @@ class Bordered:
     """
 
     def __init__(self, matrix: Array) -> None:
+        row = matrix[-1].copy()
         self._factors, self._pivots, singular = dgetrf(matrix, overwrite_a=1)
-        if singular:
+        if not singular:
+            self.along = self._solved(np.eye(1, len(matrix), len(matrix) - 1)[0])
+        if singular or not 0.5 < float(row @ self.along) < 2.0:  # it is 1 where any digit is left
             raise np.linalg.LinAlgError("the equations have no tangent here")
-        self.along = self._solved(np.eye(1, len(matrix), len(matrix) - 1)[0])
         self._length = float(np.linalg.norm(self.along))
 
     def _solved(self, right: Array) -> Array:

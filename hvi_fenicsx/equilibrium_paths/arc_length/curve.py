@@ -19,7 +19,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from ...typing import Array
-from .equations import ROUNDING, STANDING, Equations, Place, Refused
+from .equations import ROUNDING, STANDING, UNDECIDED, Equations, Place, Refused
 from .sites import Sites
 
 _LARGEST_TURN = 0.9
@@ -113,16 +113,29 @@ class Curve(Equations):
     def _goes_on_for_ever(self, aim: float) -> bool:
         """Whether nothing ends the curve."""
         distances, _ = self._ends()
-        if np.any(np.isfinite(distances)) or np.isfinite(self._until(aim)):
-            return False
-        return not self.sites.bent or bool(np.max(np.abs(self.here.values.s), initial=0.0) > _FAR * self._size)
+        nearest = min(float(np.min(distances, initial=np.inf)), self._until(aim))
+        if not self.sites.bent:
+            return not np.isfinite(nearest)
+        if self.factor_rate == 0.0 and nearest > _FAR * self._size and self._is_straight(_FAR * self._size):
+            return True
+        return not np.isfinite(nearest) and bool(np.max(np.abs(self.here.values.s), initial=0.0) > _FAR * self._size)
+
+    def _is_straight(self, way: float) -> bool:
+        """Whether the equations stay satisfied so far along the tangent: a body slides on, and no force changes."""
+        y = self.here.y + way * self.here.tangent
+        load = self.sites.stiffness @ self.here.values.x + self.here.values.force
+        size = 1.0 + float(np.max(np.abs(load / self.sites.forces), initial=0.0))
+        allowed = 1e-9 * size + 4.0 * np.finfo(float).eps * way
+        return bool(np.max(np.abs(self.residual(y, self.sites.values(y[:-1])))) <= allowed)
 
     def _ends(self) -> tuple[Array, Array]:
         """Along the tangent, the ways of all sites to the ends of their segments, and these ends, (m,) each."""
         sites, s = self.sites, self.here.values.s
         rates = self.sites.rates(self.here.y[:-1], self.here.tangent[:-1])
-        moves = np.abs(rates) > STANDING * float(np.max(np.abs(self.here.tangent)))
+        largest = float(np.max(np.abs(self.here.tangent)))
         ends = np.where(rates > 0.0, sites.high, sites.low)
+        there = np.abs(ends - s) <= ROUNDING * (1.0 + np.abs(s))
+        moves = np.abs(rates) > np.where(there & sites.bent, UNDECIDED, STANDING) * largest
         found = np.full(len(sites), np.inf)
         found[moves] = np.maximum((ends - s)[moves] / rates[moves], 0.0)
         return found, ends
@@ -177,7 +190,7 @@ class Curve(Equations):
 
     def _after(self, y: Array) -> Place:
         values, tangent = self.sites.values(y[:-1]), self.here.tangent
-        return Place(y=y, tangent=self.tangent(values, tangent) if self.sites.bent else tangent, values=values)
+        return self._at_place(y, self.tangent(values, tangent) if self.sites.bent else tangent, values)
 
     def _earliest(self, move: Move, aim: float) -> Move:
         """The step up to the first event that it has passed."""
@@ -201,7 +214,7 @@ class Curve(Equations):
             return self._moved(Outcome.FACTOR, None, self.correct(guess, self.at_factor(aim)))
         if shares.size and shares[site] < 1.0:
             if shares[site] == 0.0:
-                return self._in_place(site)
+                return self._back_at(move, site)
             high = move.after.values.s[site] > self.sites.high[site]
             end = float((self.sites.high if high else self.sites.low)[site])
             guess = start.y + shares[site] * (y - start.y)
@@ -238,7 +251,13 @@ class Curve(Equations):
             self._settle_at(np.append(y[:-1], self.here.y[-1]))
 
     def _settle_at(self, y: Array) -> None:
-        self.here = Place(y=y, tangent=self.here.tangent, values=self.sites.values(y[:-1]))
+        self.here = self._at_place(y, self.here.tangent, self.sites.values(y[:-1]))
+
+    def _back_at(self, move: Move, site: int) -> Move:
+        """Where a site passes the end at which it began: a bond that set out from it turned back on the way."""
+        sets_out = self._rate_of(Outcome.TURNED, site)(self.here) * self.sites.outward[site] > 0.0
+        turned = self._up_to(move, Outcome.TURNED, site) if sets_out else None
+        return turned or self._in_place(site)
 
     def _in_place(self, site: int) -> Move:
         """No step: a site that is slower than others passed its end by what rounding allows, and goes on from there."""
@@ -256,9 +275,10 @@ class Curve(Equations):
         if not self.sites.bent or move.outcome in (Outcome.FOLD, Outcome.TURNED):
             return None
         turned = self._turned(move.after)
-        if turned is None:
-            return None
-        outcome, site = turned
+        return None if turned is None else self._up_to(move, *turned)
+
+    def _up_to(self, move: Move, outcome: Outcome, site: int | None) -> Move | None:
+        """The step up to where a rate, of the factor or of a site, is zero; None: it is too short."""
         whole = float(self.here.tangent @ (move.after.y - self.here.y))
         if whole <= _LEAST:
             return None
@@ -275,10 +295,10 @@ class Curve(Equations):
 
     def _turned(self, after: Place) -> tuple[Outcome, int | None] | None:
         largest = float(np.max(np.abs(after.tangent)))
-        if self.trend * after.tangent[-1] < -1e-7 * largest:
+        if self.trend * after.tangent[-1] < -UNDECIDED * largest:
             return Outcome.FOLD, None
         rates = self.sites.rates(after.y[:-1], after.tangent[:-1]) * self.sites.outward
-        back = np.flatnonzero(rates < -1e-7 * largest)
+        back = np.flatnonzero(rates < -UNDECIDED * largest)
         return (Outcome.TURNED, int(back[0])) if back.size else None
 
     def _rate_of(self, outcome: Outcome, site: int | None) -> Callable[[Place], float]:
@@ -304,5 +324,8 @@ class Curve(Equations):
         if not short and disagreement > 1.0:
             self.length *= max(0.3, 1.6 * disagreement**-0.2)  # halved as well where it is refused
             raise Refused
-        self.length = min(self._next, self._moved_by(move) * 0.8 * max(disagreement, 1e-4) ** -0.2)
+        agreed = self._moved_by(move) * 0.8 * max(disagreement, 1e-4) ** -0.2
+        if move.outcome is not Outcome.STEP:  # an event that is near says nothing of the next step's length
+            agreed = max(agreed, self.length)
+        self.length = min(self._next, agreed)
         return move

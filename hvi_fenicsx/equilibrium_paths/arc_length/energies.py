@@ -26,12 +26,14 @@ class Stored:
         potential: <g, u>.
         dissipated: lost in bonds with memory.
         size: of the terms.
+        elastic: ½ a(u, u).
     """
 
     energy: float
     potential: float
     dissipated: float
     size: float
+    elastic: float = 0.0
 
 
 class Balance:
@@ -73,6 +75,7 @@ class Balance:
             potential=problem.potential(x, factor),
             dissipated=lost if self._potential else self._lost,
             size=abs(elastic) + abs(load) + abs(constant) + abs(plain) + abs(back) + lost,
+            elastic=elastic,
         )
 
     def _bonds(self, values: Values) -> tuple[float, float]:
@@ -138,9 +141,15 @@ class Balance:
         if not self._potential:
             return 0.0
         ends = [self.at(place.values, float(place.y[-1]) * unit) for place in (move.before, move.after)]
-        change = sum(sign * (e.energy + e.dissipated) for sign, e in zip((-1.0, 1.0), ends, strict=True))
+        change = sum(sign * (e.energy - e.elastic + e.dissipated) for sign, e in zip((-1.0, 1.0), ends, strict=True))
+        change += self._strained(move)
         size = max(self._size, *(e.size for e in ends))
         return abs(change - self._moved(move, unit)) / (_AGREED * size or 1.0)
+
+    def _strained(self, move: Move) -> float:
+        """The change of ½ xᵀ S x, without the rounding that large displacements leave in each of its ends."""
+        before, after = move.before.values.x, move.after.values.x
+        return 0.5 * float((before + after) @ (self._problem.stiffness @ (after - before)))
 
     def _moved(self, move: Move, unit: float) -> float:
         """The change of the energy's constant less ∫ f1ᵀx dλ."""

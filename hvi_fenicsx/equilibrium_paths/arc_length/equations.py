@@ -15,10 +15,16 @@ ROUNDING = 1e-10
 """A coordinate this near to the end of its segment is there; a factor whose rate is this small stands."""
 STANDING = 1e-11
 """A site whose rate is this small beside the largest stands."""
+UNDECIDED = 1e-7
+"""A rate this small beside the largest may have the wrong sign where the curve bends: the step tells where it goes."""
 _ROUNDS = 40
 """Corrections of the directions in which vertices at rest set out, at most."""
 _SLOW = 1e-2
 """Factors of a point nearby serve where a correction is at most this part of the last one."""
+_DIGITS = 1e-15
+"""Forces that the last digits of coordinates make, in their units and beside the largest coordinate."""
+_PART = 1e-6
+"""Where no more is left, corrections that no longer fall are rounding if they are this part of the step at most."""
 _STEPS = 12
 """Corrections of a point, at most."""
 _REFINEMENTS = 6
@@ -33,11 +39,13 @@ class Place:
         y: coordinates, and the factor in its unit, (n + 1,).
         tangent: of length 1, (n + 1,).
         values: of the sites.
+        left: of the forces, in their units, (n,).
     """
 
     y: Array
     tangent: Array
     values: Values
+    left: Array
 
 
 Condition = tuple[Callable[[Array], float], Callable[[Array], Array]]
@@ -65,11 +73,13 @@ class Equations:
     """
 
     def __init__(self, constant: Array, rate: Array, sites: Sites, z: Array, factor: float) -> None:
-        self._constant, self._rate, self.sites, self._most = constant, rate, sites, 0.0
+        self._rate, self.sites, self._most = rate, sites, 0.0
         largest = float(np.max(np.abs(rate) / sites.forces, initial=0.0))
         self.unit = 2.0 ** -round(np.log2(largest)) if largest else 1.0
         y = np.append(z, factor / self.unit)
-        self.here = Place(y=y, tangent=np.zeros_like(y), values=sites.values(z))
+        values = sites.values(z)
+        left = (sites.stiffness @ values.x + values.force - constant - factor * rate) / sites.forces
+        self.here = Place(y=y, tangent=np.zeros_like(y), values=values, left=left)
         self._factors: Bordered | None = None
 
     @property
@@ -95,14 +105,21 @@ class Equations:
         return abs(self.factor) <= small and bool(np.all(np.abs(values.force) <= 1e-9 * self._most))
 
     def residual(self, y: Array, values: Values) -> Array:
-        """What is left of the forces, in their units, (n,).
+        """What is left of the forces, in their units, (n,): what is left here, and how the forces change from here.
+
+        The whole displacements of a body that leans far would leave rounding that is larger than a short step.
 
         Args:
             y: coordinates and factor, (n + 1,).
             values: of the sites there.
         """
-        load = self._constant + y[-1] * self.unit * self._rate
-        return np.asarray((self.sites.stiffness @ values.x + values.force - load) / self.sites.forces)
+        here, before = self.here, self.here.values
+        change = self.sites.stiffness @ (values.x - before.x) + (values.force - before.force)
+        change -= (y[-1] - here.y[-1]) * self.unit * self._rate
+        return np.asarray(here.left + change / self.sites.forces)
+
+    def _at_place(self, y: Array, tangent: Array, values: Values) -> Place:
+        return Place(y=y, tangent=tangent, values=values, left=self.residual(y, values))
 
     def _factorise(self, values: Values, row: Array) -> Bordered:
         n = len(values.x)
@@ -175,19 +192,22 @@ class Equations:
         """
         value, gradient = condition
         size, last = 1.0 + float(np.max(np.abs(y))), np.inf
-        noise = max(1e-10, 1e-14 / self._sharpness(gradient(y))) * size
+        length = float(np.max(np.abs(y - self.here.y)))
+        noise = max(1e-10 * (1.0 + length), 1e-14 / self._sharpness(gradient(y)) * size)
         expected = 0.0
         for _ in range(_STEPS):
             values = self.sites.values(y[:-1])
             left, off = self.residual(y, values), value(y)
-            if not self.sites.bent and max(float(np.max(np.abs(left))), abs(off)) <= 1e-15 * size:
+            digits = float(np.max(np.abs(left))) <= _DIGITS * size
+            if not self.sites.bent and digits and abs(off) <= _DIGITS * size:
                 return y
             step = self._correction(values, left, gradient(y), off, expected)
             change = float(np.max(np.abs(step)))
             if not np.isfinite(change) or (change > 2.0 * last and change > 1e-9 * size):
                 break
             y = y - step
-            if change <= 1e-14 * size or (change <= noise and change >= 0.1 * last):
+            allowed = max(noise, _PART * length) if digits else noise
+            if change <= 1e-14 * size or (change <= allowed and change >= 0.1 * last):
                 return y
             last, expected = change, _SLOW * change
         if last <= noise:
@@ -257,7 +277,7 @@ class Equations:
             y: coordinates and factor, (n + 1,).
             tangent: of length 1, (n + 1,).
         """
-        self.here = Place(y=y, tangent=tangent, values=self.sites.values(y[:-1]))
+        self.here = self._at_place(y, tangent, self.sites.values(y[:-1]))
         self._factors = None
 
     def head(self, tangent: Array) -> None:

@@ -26,6 +26,8 @@ _BEYOND = 1e-2
 """A step along the path, in units of s."""
 _PUSH = 1e-6
 """How much larger the loads are that take a body off a state at which it would rest."""
+_SAME = 1e-3
+"""Motions that differ by no more lead the same way."""
 _MOST = 40
 """Steps of such a curve at most, at first."""
 _LATER = 20
@@ -74,8 +76,8 @@ class Jump:
         ways: list[Callable[[], Landing | None]] = [
             lambda: self._held_back(_MOST),
             self._released,
-            lambda: self._held_back(_MOST + _LATER * len(self.sites)),
             lambda: self._pushed_off(heading),
+            lambda: self._held_back(_MOST + _LATER * len(self.sites)),
         ]
         kept = self.sites.kept()
         for way in ways:
@@ -197,10 +199,12 @@ def _motions(problem: CondensedProblem, sites: Sites, here: Place, path: Array) 
     lowest = None if drops else _lowest(problem, sites, here)
     if lowest is not None:
         found += [lowest * (np.sign(_into_cell(sites, here, lowest) or float(lowest @ path)) or 1.0)]
+    seen: list[Array] = []
     for motion in (*found, path):
         size = float(np.max(np.abs(motion), initial=0.0))
-        if size:
-            yield np.asarray(motion / size)
+        if size and not any(np.allclose(motion / size, other, rtol=0.0, atol=_SAME) for other in seen):
+            seen.append(np.asarray(motion / size))
+            yield seen[-1]
 
 
 def _into_cell(sites: Sites, here: Place, motion: Array) -> float:

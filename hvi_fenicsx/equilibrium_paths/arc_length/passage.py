@@ -19,7 +19,7 @@ from ...system.condensed_problem import CondensedProblem
 from ...typing import Array, Mask
 from ..segments import Kind, Segment
 from .curve import Curve
-from .equations import ROUNDING, STANDING, Refused
+from .equations import ROUNDING, STANDING, UNDECIDED, Refused
 
 _SLOW = 1e-6
 """A rate of a site's force at which it stands, but for rounding, beside the largest."""
@@ -88,6 +88,7 @@ class Crossing:
         self._lag, self._left = lag, lag.copy()
         self._cells: Counter[tuple[bytes, frozenset[int]]] = Counter()
         self._turned: set[int] = set()
+        self._arrived: int | None = None
         self.passages: list[Passage] = []
 
     def run(self, arrived: int | None = None, *, turned: bool = False) -> list[Passage]:
@@ -101,7 +102,7 @@ class Crossing:
             Refused: there is no end of passing.
         """
         if arrived is not None:
-            self._left[arrived] = 0.0
+            self._left[arrived], self._arrived = 0.0, arrived
             rates = self._rates()
             rates[arrived] = self._outwards(arrived)
             if turned:
@@ -142,9 +143,14 @@ class Crossing:
         return self._sites.rates(here.y[:-1], here.tangent[:-1])
 
     def _rates(self) -> Array:
-        """How fast the sites go; 0 for those that stand but for rounding, (m,)."""
-        here, rates = self._curve.here, self._all_rates()
-        rates[np.abs(rates) <= STANDING * np.max(np.abs(here.tangent))] = 0.0
+        """How fast the sites go; 0 for those that stand but for rounding, (m,).
+
+        So does the one that arrived where its rate may have either sign: it was the step that took it out.
+        """
+        rates, allowed = self._all_rates(), np.full(len(self._sites), STANDING)
+        if self._arrived is not None and self._sites.bent:
+            allowed[self._arrived] = UNDECIDED
+        rates[np.abs(rates) <= allowed * np.max(np.abs(self._curve.here.tangent))] = 0.0
         return rates
 
     def _near(self) -> tuple[Mask, Mask]:

@@ -94,8 +94,10 @@ class Relaxation:
         return np.asarray(self._load - self._problem.stiffness @ values.x - values.force)
 
     def _at_rest(self) -> bool:
-        left = np.abs(self._left() / self._sites.forces)
-        return bool(np.max(left, initial=0.0) <= 1e-9 * (1.0 + float(np.max(np.abs(self._load / self._sites.forces)))))
+        values, forces = self._sites.values(self.z), self._sites.forces
+        acting = (self._load, self._problem.stiffness @ values.x, values.force)
+        size = max(float(np.max(np.abs(force / forces), initial=0.0)) for force in acting)
+        return bool(np.max(np.abs(self._left() / forces), initial=0.0) <= 1e-9 * size)
 
     def _settled(self) -> bool:
         """The equilibrium itself, from where the motion is slow; whether it is stable."""
