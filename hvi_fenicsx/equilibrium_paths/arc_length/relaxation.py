@@ -94,10 +94,13 @@ class Relaxation:
         return np.asarray(self._load - self._problem.stiffness @ values.x - values.force)
 
     def _at_rest(self) -> bool:
-        values, forces = self._sites.values(self.z), self._sites.forces
+        """Whether hardly any force is left, and the body would not leave by itself what is left of it."""
+        values = self._sites.values(self.z)
         acting = (self._load, self._problem.stiffness @ values.x, values.force)
-        size = max(float(np.max(np.abs(force / forces), initial=0.0)) for force in acting)
-        return bool(np.max(np.abs(self._left() / forces), initial=0.0) <= 1e-9 * size)
+        size = max(float(np.max(np.abs(force), initial=0.0)) for force in acting)
+        rests = bool(np.max(np.abs(self._left()), initial=0.0) <= 1e-9 * size)
+        self._sites.stiffness = self._problem.stiffness  # without what holds back
+        return rests and self._sites.unstable_directions(values) == 0
 
     def _settled(self) -> bool:
         """The equilibrium itself, from where the motion is slow; whether it is stable."""
