@@ -14,7 +14,8 @@ from dolfinx import fem
 from petsc4py import PETSc
 
 from ..effects import Direction
-from ..mesh import curved_cells, facet_sizes, nodes
+from ..mesh import facet_sizes, nodes
+from ..mesh.curved_cells import CurvedMesh
 from ..problem.contact_normals import largest_turn
 from ..problem.law_term import LawTerm
 from ..problem.problem import Problem
@@ -150,8 +151,8 @@ def _polygons(problem: Problem, thresholds: PlausibilityThresholds) -> Iterator[
 
 
 def _straightened(problem: Problem) -> Iterator[str]:
-    """Cells of degree 2 that are straight although the curves of their sides are known. Collective."""
-    domain = problem.domain
+    """Cells of degree 2 that are straight although the curves of their sides are known."""
+    domain, mesh = problem.domain, problem.space.mesh
     if nodes.degree(problem.space) == 1 or not domain.curves:
         return
     unknown = "the error of this polygon is not estimated"
@@ -160,7 +161,7 @@ def _straightened(problem: Problem) -> Iterator[str]:
             f"domain: the energy has data of the straight mesh, so all cells stay straight, and {unknown}; write them "
             "as formulas of the position"
         )
-    elif (straight := curved_cells.straight_cells(domain)) > 0:
+    elif isinstance(mesh, CurvedMesh) and (straight := mesh.straight_cells) > 0:
         sides = ", ".join(repr(name) for name in sorted(domain.curves))
         cells = "1 cell would turn over and stays" if straight == 1 else f"{straight} cells would turn over and stay"
         yield (

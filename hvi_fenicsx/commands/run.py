@@ -145,9 +145,7 @@ def _to_goal(request: RunRequest, goal: Goal, interrupt: Interrupt) -> AccuracyR
     reached = control.solve_to_goal(request.scene, COMM, goal, solver, telling.LOG.info)
     shown = last_borne.in_place_of(reached.level.prepared, reached.solution, interrupt.requested)
     reached = replace(reached, solution=shown)
-    telling.say(
-        [*console.outcome(shown), *console.warnings(shown.warnings), *console.accuracy(reached)],
-    )
+    telling.say([*console.outcome(shown), *console.warnings(shown.warnings), *console.accuracy(reached)])
     return reached
 
 

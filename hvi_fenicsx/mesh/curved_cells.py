@@ -7,7 +7,6 @@ each edge: on the curve where the edge lies on a curved side, else in the middle
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
 
 import basix
 import numpy as np
@@ -26,12 +25,20 @@ _MORE_SWEEPS = 2
 """Projections, from one side to the next, that bring a node of two sides onto both; each gains some digits."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class _CurvedMesh:
-    """The mesh of degree 2, and how many cells are straight in it that their curve would turn over, on all ranks."""
+class CurvedMesh(dmesh.Mesh):
+    """A mesh of degree 2.
 
-    mesh: dmesh.Mesh
-    straight: int
+    Args:
+        mesh: of second order.
+        straight_cells: how many of its cells, on all ranks, are straight since their curve would turn them over.
+
+    Attributes:
+        straight_cells: as given.
+    """
+
+    def __init__(self, mesh: dmesh.Mesh, straight_cells: int) -> None:
+        super().__init__(mesh._cpp_object, mesh.ufl_domain())
+        self.straight_cells = straight_cells
 
 
 def mesh_of(domain: Domain, degree: int, thresholds: Thresholds = DEFAULT) -> dmesh.Mesh:
@@ -44,25 +51,10 @@ def mesh_of(domain: Domain, degree: int, thresholds: Thresholds = DEFAULT) -> dm
     """
     if degree == 1 or not (domain.curves and domain.bends):
         return domain.mesh
-    return _found(domain, thresholds).mesh
+    return domain.once("curved cells", None, lambda: _curved(domain, sorted(domain.curves), thresholds.least_jacobian))
 
 
-def straight_cells(domain: Domain, thresholds: Thresholds = DEFAULT) -> int:
-    """How many cells of degree 2 are straight because their curve would turn them over. Collective.
-
-    Args:
-        domain: the body.
-        thresholds: as for :func:`mesh_of`.
-    """
-    return _found(domain, thresholds).straight if domain.curves and domain.bends else 0
-
-
-def _found(domain: Domain, thresholds: Thresholds) -> _CurvedMesh:
-    least = thresholds.least_jacobian
-    return domain.once("curved cells", None, lambda: _curved(domain, sorted(domain.curves), least))
-
-
-def _curved(domain: Domain, names: Collection[str], least: float) -> _CurvedMesh:
+def _curved(domain: Domain, names: Collection[str], least: float) -> CurvedMesh:
     space = fem.functionspace(domain.mesh, ("Lagrange", 2))
     before, d = nodes.points(space)[:, : domain.dimension], domain.dimension
     on = {name: np.unique(nodes.facet_nodes(space, domain.sides[name])) for name in names}
@@ -71,7 +63,7 @@ def _curved(domain: Domain, names: Collection[str], least: float) -> _CurvedMesh
         after = onto_curves(space.dofmap.index_map, after, _shared(on), domain.curves)
     after, straight = _straightened(space, before, after, least)
     points = np.pad(after, ((0, 0), (0, 3 - d)))
-    return _CurvedMesh(mesh=compat.quadratic_mesh(domain.mesh, space.dofmap, points), straight=straight)
+    return CurvedMesh(compat.quadratic_mesh(domain.mesh, space.dofmap, points), straight)
 
 
 def _straightened(space: fem.FunctionSpace, before: Array, after: Array, least: float) -> tuple[Array, int]:
