@@ -67,10 +67,11 @@ class Certificate:
         return asdict(self)
 
     def __str__(self) -> str:
+        mixity = "" if self.mixity is None else f", mixity {self.mixity:.1e}"
         return (
             f"equilibrium {self.equilibrium:.1e}, net force {self.net_force:.1e}, penetration {self.penetration:.1e}, "
-            f"tension {self.tension:.1e}, complementarity {self.complementarity:.1e}, inclusion {self.inclusion:.1e}; "
-            f"{self.second_order}"
+            f"tension {self.tension:.1e}, complementarity {self.complementarity:.1e}, inclusion {self.inclusion:.1e}"
+            f"{mixity}; {self.second_order}"
         )
 
     def _repr_html_(self) -> str:

@@ -270,14 +270,14 @@ class _SnesRun:
         previous, self.last = self.last, self.sizes.worst
         if self.owner.progress:
             self.owner.progress(iteration, self.last, self.owner.in_contact(x))
+        self.far = x.norm(PETSc.NormType.INFINITY) > self.thresholds.runaway
+        if self.last <= self.tolerance and not self.far:
+            return PETSc.SNES.ConvergedReason.CONVERGED_FNORM_RELATIVE
         self.stopped = self.owner.interrupted()
         if self.stopped:
             return PETSc.SNES.ConvergedReason.DIVERGED_FUNCTION_COUNT
-        self.far = x.norm(PETSc.NormType.INFINITY) > self.thresholds.runaway
         if self.far or not np.isfinite(self.last):
             return PETSc.SNES.ConvergedReason.DIVERGED_FNORM_NAN
-        if self.last <= self.tolerance:
-            return PETSc.SNES.ConvergedReason.CONVERGED_FNORM_RELATIVE
         stalls = self._stalls(previous)
         return PETSc.SNES.ConvergedReason.DIVERGED_DTOL if stalls else PETSc.SNES.ConvergedReason.CONVERGED_ITERATING
 

@@ -105,7 +105,7 @@ class Condensation(Method):
             reason="stationary" if converged else failure,
             counts=counts,
             energies=(self.system.energy(found, self.models),),
-            interrupted=self.stopped,
+            interrupted=self.stopped and not converged,
         )
 
     def _minimise(self, mixed: _Complementarity) -> tuple[Array, str, Counts]:

@@ -65,9 +65,12 @@ class ProjectedNewton:
             sizes = test.sizes(x, self._residual, self._lower, self._upper)
             if self._solver.progress:
                 self._solver.progress(iteration, sizes.worst, self._solver.in_contact(x))
+            if sizes.worst <= tolerance:
+                reason = "the residual is small"
+                break
             stopped = self._solver.interrupted()
-            if stopped or sizes.worst <= tolerance:
-                reason = "interrupted" if stopped else "the residual is small"
+            if stopped:
+                reason = "interrupted"
                 break
             stalled = 0 if sizes.worst < 0.5 * best else stalled + 1
             best = min(best, sizes.worst)

@@ -89,12 +89,12 @@ class _SnesRun(SolverRun):
         found, measure = self.judge(snes.getSolution())
         self.context.tell("ssls", self.context.epsilon, iteration, measure, self.solver.in_contact(found))
         found.destroy()
+        if measure <= self.options.tolerance:
+            return _Reason.CONVERGED_FNORM_RELATIVE
         self.stopped = self.solver.interrupted()
         if self.stopped:
             return _Reason.DIVERGED_FUNCTION_COUNT
-        if not np.isfinite(measure):
-            return _Reason.DIVERGED_FNORM_NAN
-        return _Reason.CONVERGED_FNORM_RELATIVE if measure <= self.options.tolerance else _Reason.CONVERGED_ITERATING
+        return _Reason.CONVERGED_ITERATING if np.isfinite(measure) else _Reason.DIVERGED_FNORM_NAN
 
 
 class SemismoothNewton(SmoothMethod):

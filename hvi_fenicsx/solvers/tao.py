@@ -67,13 +67,13 @@ class _TaoRun(SolverRun):
         x, iteration = tao.getSolution(), tao.getIterationNumber()
         _, measure = self.judge(x)
         self.context.tell("tao", self.context.epsilon, iteration, measure, self.solver.in_contact(x))
+        if measure <= self.options.tolerance:
+            return _Reason.CONVERGED_USER
         self.stopped = self.solver.interrupted()
         if self.stopped:
             return _Reason.DIVERGED_USER
         if not np.isfinite(measure):
             return _Reason.DIVERGED_NAN
-        if measure <= self.options.tolerance:
-            return _Reason.CONVERGED_USER
         return _Reason.DIVERGED_MAXITS if iteration >= tao.getMaximumIterations() else _Reason.CONTINUE_ITERATING
 
 

@@ -20,7 +20,7 @@ from scipy.linalg.lapack import dpstrf
 from ..errors import SolverError
 from ..runtime.mpi import total
 from ..typing import Array, Integers
-from . import carriers, condensed_laws, loading
+from . import carriers, condensed_laws, factor_counts, loading
 from .carriers import Carriers
 from .condensed_problem import CondensedProblem
 from .condensed_stiffness import CondensedStiffness, DenseStiffness
@@ -64,13 +64,13 @@ class Condensation:
 
     def _is_large(self, most: int, carrying: int) -> bool:
         """Whether Γc has more unknowns, or products with S of those that carry take longer than solves with factors."""
-        entries = 2.0 * self._interior.entries + self._system.thresholds.solve_overhead
+        entries = 2.0 * factor_counts.entries(self._interior.pc) + self._system.thresholds.solve_overhead
         return self._interior.size > most or carrying**2 > entries
 
     def _reduce(self, carrying: Integers) -> Integers:
         """Keep those unknowns alone that carry something, where they hold the body; which are kept. Collective."""
         interior, every = self._interior, np.arange(self._interior.size)
-        own = np.isin(every[interior.first : interior.first + len(interior.kept)], carrying)
+        own = np.isin(interior.own_part(every), carrying)
         with suppress(SolverError):
             fewer = Interior(self._system, interior.kept[own])
             if fewer.is_held():
@@ -231,7 +231,7 @@ class Condensation:
         interior, whole = self._interior, np.zeros(self._interior.size)
         whole[self._stay] = self.problem.elastic @ x - self.problem.load(factor)
         found = self._system.load.duplicate()
-        found.array[interior.kept] = whole[interior.first : interior.first + len(interior.kept)]
+        found.array[interior.kept] = interior.own_part(whole)
         return found
 
     def unbalanced(self, reaction: PETSc.Vec, carried: PETSc.Vec) -> float:

@@ -20,7 +20,7 @@ from petsc4py import PETSc
 from ..mesh import nodes
 from ..runtime.timing import Timer
 from ..typing import Array, Entities
-from . import schur
+from . import factor_counts, schur
 from .levels import Levels
 from .matrix_copy import MatrixCopy
 from .mixed_multigrid import MixedMultigrid
@@ -194,11 +194,10 @@ class HeldPreconditioner:
             self.settings, self._outdated = LinearSettings("lu", thresholds), True
 
     def _build(self, held: Entities) -> None:
-        kind, affordable = self.settings.kind, self._factorised * self.settings.thresholds.condensing
-        condensing = kind == "lu" and schur.is_worthwhile(self.system, affordable)
+        kind, condensing = self.settings.kind, self._condensing
         if kind != self._kind or self._preconditioner is None or (condensing and not self._condensed):
             self.destroy()
-            self._preconditioner, self._kind = self._new(condensing=condensing), kind
+            self._preconditioner, self._kind, self._factorised = self._new(condensing=condensing), kind, 0
         self._preconditioner.prepare(held)
         self._factorised += 1
 
@@ -206,6 +205,14 @@ class HeldPreconditioner:
     def inner_iterations(self) -> int:
         """Iterations so far of the solves that one application of the preconditioner consists of."""
         return self._preconditioner.iterations if isinstance(self._preconditioner, MixedMultigrid) else 0
+
+    @property
+    def _condensing(self) -> bool:
+        """Whether the body is to be condensed. Collective."""
+        if self._kind != "lu" or not isinstance(self._preconditioner, MatrixCopy):
+            return self._condensed
+        worth = self.settings.thresholds.condensing * factor_counts.solves_worth(self._preconditioner.pc)
+        return schur.is_worthwhile(self.system, self._factorised * worth)
 
     @property
     def _condensed(self) -> bool:

@@ -7,8 +7,11 @@ condensed load f = b_k - A_ki A_ii⁻¹ b_i. Its arrays are the same on all rank
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cached_property
+from typing import TypeVar
 
 import numpy as np
+import numpy.typing as npt
 from mpi4py import MPI
 from petsc4py import PETSc
 from scipy.sparse import csr_matrix
@@ -20,6 +23,9 @@ from .petsc_options import CHOLESKY, default_options, prefix
 from .system import System
 
 _NO_MEMORY = PETSc.PC.FailedReason.FACTOR_OUTMEMORY
+
+
+Number = TypeVar("Number", bound=np.generic)
 
 
 class Interior:
@@ -62,7 +68,7 @@ class Interior:
         """Number n of kept unknowns, over all ranks."""
         return len(self._everywhere)
 
-    @property
+    @cached_property
     def first(self) -> int:
         """The number among all kept unknowns of this rank's first one."""
         return sum(agree(self._comm, len(self.kept))[: self._comm.rank])
@@ -132,14 +138,6 @@ class Interior:
         found -= self.response()
         return np.asarray(0.5 * (found + found.T))
 
-    @property
-    def entries(self) -> float:
-        """Numbers in the factors, over all ranks; infinite where the solver does not tell."""
-        if self.pc.getFactorSolverType() != "mumps":
-            return np.inf
-        count = self.pc.getFactorMatrix().getMumpsInfog(29)
-        return float(count if count >= 0 else -1e6 * count)
-
     def is_held(self) -> bool:
         """Whether the kept unknowns hold the body, other than by rounding (inverse iteration). Collective."""
         largest = max(agree(self._comm, float(np.max(np.abs(self._system.jacobian.matrix.getDiagonal().array_r)))))
@@ -158,6 +156,14 @@ class Interior:
         """
         return np.concatenate(agree(self._comm, values[self.kept]))
 
+    def own_part(self, values: npt.NDArray[Number]) -> npt.NDArray[Number]:
+        """This rank's part of values at all kept unknowns. Collective, at first.
+
+        Args:
+            values: (n, ...).
+        """
+        return values[self.first : self.first + len(self.kept)]
+
     def pulled(self, inner: Array) -> Array:
         """A_ki times displacements of the body inside, (n, k). Collective.
 
@@ -174,7 +180,7 @@ class Interior:
             right: the load, this rank's, (local unknowns,).
         """
         found = self.solve((right - self.coupling @ values)[:, None])[:, 0]
-        found[self.kept] = values[self.first : self.first + len(self.kept)]
+        found[self.kept] = self.own_part(values)
         return found
 
     def free(self) -> None:

@@ -1,7 +1,7 @@
 """A direct solve for many matrices that differ on Γc alone, as those of an active set method do.
 
 The body is factorised once, with all unknowns of Γc held; on Γc remains a dense Schur complement. A new active set or
-tangent then costs one small dense factorisation instead of one of the whole matrix. One process only.
+tangent then costs one small dense factorisation, on each rank, instead of one of the whole matrix.
 """
 
 from __future__ import annotations
@@ -14,25 +14,26 @@ import numpy as np
 from petsc4py import PETSc
 from scipy.linalg import LinAlgWarning, block_diag, lu_factor, lu_solve
 
+from ..runtime.mpi import agree
 from ..typing import Array, Entities, Mask
 from .interior import Interior
 from .petsc_options import prefix
 from .system import System
 
 
-def is_worthwhile(system: System, affordable: int) -> bool:
+def is_worthwhile(system: System, affordable: float) -> bool:
     """Whether the factorisations so far have cost as much as condensing would: then it loses little, and may save much.
 
-    It is not used where free motions are pinned inside the body, on several processes, or with a preconditioner that
-    the user chose.
+    It is not used where free motions are pinned inside the body, or with a preconditioner that the user chose.
+    Collective.
 
     Args:
         system: the system to be condensed.
         affordable: unknowns of Γc whose condensation costs as much as the factorisations so far.
     """
-    if system.comm.size > 1 or system.free_motions is not None or PETSc.Options().hasName(f"{prefix()}pc_type"):
+    if system.free_motions is not None or PETSc.Options().hasName(f"{prefix()}pc_type"):
         return False
-    return 0 < len(system.jacobian.rows.dofs) <= affordable
+    return 0 < sum(agree(system.comm, len(system.jacobian.rows.dofs))) <= affordable
 
 
 class _Application:
@@ -61,11 +62,11 @@ class SchurDirect:
     """
 
     def __init__(self, system: System, options: Mapping[str, object]) -> None:
-        self._system, self._dofs = system, system.jacobian.rows.dofs
-        self._interior = Interior(system, self._dofs, options, "")
+        self._system = system
+        self._interior = Interior(system, system.jacobian.rows.dofs, options, "")
         self._stiffness = self._interior.stiffness()
         self._lu: tuple[Array, Entities] | None = None
-        self._free: Mask = np.ones(len(self._dofs), dtype=bool)
+        self._free: Mask = np.ones(self._interior.size, dtype=bool)
         self._work = system.load.duplicate()
         self.pc, self.matrix = PETSc.PC().create(system.comm), system.jacobian.matrix
         self.pc.setType(PETSc.PC.Type.PYTHON)
@@ -73,9 +74,10 @@ class SchurDirect:
         self.pc.setOperators(self.matrix)
 
     def prepare(self, held: Entities) -> None:
-        """Take the present tangent, and hold these dofs; all that are not prescribed must be on Γc."""
-        self._free = ~np.isin(self._dofs, held)
-        matrix = self._stiffness + block_diag(*self._system.jacobian.rows.tangent)
+        """Take the present tangent, and hold these dofs; all that are not prescribed must be on Γc. Collective."""
+        rows, comm = self._system.jacobian.rows, self._system.comm
+        self._free = np.concatenate(agree(comm, ~np.isin(rows.dofs, held)))
+        matrix = self._stiffness + block_diag(*np.concatenate(agree(comm, rows.tangent)))
         matrix[~self._free] = matrix[:, ~self._free] = 0.0
         matrix[~self._free, ~self._free] = 1.0
         with warnings.catch_warnings():
@@ -83,22 +85,22 @@ class SchurDirect:
             self._lu = lu_factor(matrix, check_finite=False)
 
     def apply(self, pc: PETSc.PC, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        """Solve y = J^-1 x, held dofs being decoupled with a diagonal of 1.
+        """Solve y = J^-1 x, held dofs being decoupled with a diagonal of 1. Collective.
 
         Args:
             pc: the PC whose context this is.
             x: the right-hand side.
             y: where the solution is written.
         """
-        inner, coupling = self._work, self._interior.coupling
+        inner, interior = self._work, self._interior
         x.copy(inner)
-        inner.array[self._dofs] = 0.0
-        self._interior.pc.apply(inner, y)
-        value = x.array_r[self._dofs] - np.where(self._free, coupling.T @ y.array_r, 0.0)
+        inner.array[interior.kept] = 0.0
+        interior.pc.apply(inner, y)
+        value = interior.gathered(x.array_r) - np.where(self._free, interior.pulled(y.array_r), 0.0)
         value = lu_solve(self._lu, value, check_finite=False)
-        inner.array[:] -= coupling @ np.where(self._free, value, 0.0)
-        self._interior.pc.apply(inner, y)
-        y.array[self._dofs] = value
+        inner.array[:] -= interior.coupling @ np.where(self._free, value, 0.0)
+        interior.pc.apply(inner, y)
+        y.array[interior.kept] = interior.own_part(value)
 
     def free(self) -> None:
         """Free the PETSc objects (not named ``destroy``: petsc4py calls that with every PC of the context)."""

@@ -31,8 +31,7 @@ class Thresholds:
             is then in its setup (on cells 1000 times as long as high, ten times that of a factorisation).
         slower: factor of the first iterations from which a preconditioner is made anew.
         krylov_iterations: iterations of a Krylov method at most.
-        condensing: unknowns of Γc for which condensing costs as much as one factorisation of the whole matrix
-            (measured: 13 to 45).
+        condensing: cost of condensing to Γc, in terms of the factorisations so far, up to which it is done.
         dense_columns: right-hand sides that are solved at once where a body is condensed.
         rank_unknowns: unknowns of a rank, on average, from which a coarse level is on all ranks (docs/scaling.md).
         exchanges: columns that are exchanged in factorised equations of a load path before these are factorised anew.
@@ -64,7 +63,7 @@ class Thresholds:
     rebuilt: int = 30
     slower: float = 1.5
     krylov_iterations: int = 2_000
-    condensing: int = 30
+    condensing: float = 1.0
     dense_columns: int = 64
     rank_unknowns: int = 500
     exchanges: int = 60

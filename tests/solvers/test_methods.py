@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import itertools
 import re
 from collections.abc import Iterator
 from typing import Any
@@ -151,6 +152,20 @@ def test_an_interrupt_ends_the_iteration(method: str) -> None:
     assert found.exit_code == 130
     assert found.solve_result is not None
     assert "interrupted" in found.solve_result.reason
+
+
+@pytest.mark.parametrize("method", ["auto", "snes_vi", *METHODS])
+def test_what_has_converged_was_not_interrupted(method: str) -> None:
+    """Whenever the stop is asked for. One at the last Newton step gave a solution that counted as none."""
+    prepared = prepare(Scene.model_validate(strong(8, 3 * P, 1.0e6, epsilon=0.1, method=method)))
+    questions = itertools.count()
+    finish(prepared, interrupted=lambda: next(questions) < 0)
+    for last in range(next(questions) + 1):
+        asked = itertools.count()
+        found = finish(prepared, interrupted=lambda asked=asked, last=last: next(asked) >= last)  # type: ignore[misc]
+        assert found.solve_result is not None
+        assert found.solve_result.converged is not found.solve_result.interrupted
+    assert found.solve_result.converged
 
 
 @pytest.mark.parametrize("method", METHODS)

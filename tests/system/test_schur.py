@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import numpy.typing as npt
 import pytest
+from condensed_ranks import SCENE
 from mpi4py import MPI
+from runs import on_ranks
 from scenes import DELTA, displacement, model, quadratic_linear, solved
 
 from hvi_fenicsx import Scene, prepare
@@ -14,8 +18,10 @@ from hvi_fenicsx.runtime.timing import Timer
 from hvi_fenicsx.solvers.active_set import ActiveSetSolver
 from hvi_fenicsx.solvers.convergence import Outcome, Sizes
 from hvi_fenicsx.solvers.thresholds import Thresholds as SolverThresholds
-from hvi_fenicsx.system import schur
+from hvi_fenicsx.system import factor_counts, schur
 from hvi_fenicsx.system.held_solver import HeldPreconditioner, LinearSettings
+from hvi_fenicsx.system.matrix_copy import MatrixCopy
+from hvi_fenicsx.system.petsc_options import CHOLESKY
 from hvi_fenicsx.system.system import System
 from hvi_fenicsx.system.thresholds import Thresholds as LinearThresholds
 
@@ -46,6 +52,22 @@ def test_condensed_it_solves_what_a_factorisation_of_the_whole_solves(every: int
     condensed.apply(None, load, found)
     found.axpy(-1.0, expected)
     assert found.norm() < 1e-10 * expected.norm()
+
+
+def test_condensed_on_several_ranks_it_solves_the_same() -> None:
+    told = on_ranks(3, str(Path(__file__).parent / "condensed_ranks.py"))
+    assert sum(told["sizes"]) > max(told["sizes"]) > 0, "Γc is on one rank alone"
+    assert told["difference"] < 1e-10
+
+
+def test_what_mumps_counts_is_below_that_of_full_factors() -> None:
+    """Averaged pressures couple far vertices: full factors of n unknowns cost as much as n/6 solves, these nearly."""
+    table = SCENE | {"domain": SCENE["domain"] | {"cells": [5, 5, 5]}}
+    system = prepare(Scene.model_validate(table), MPI.COMM_SELF).system
+    copy = MatrixCopy(system, CHOLESKY, direct=True)
+    copy.prepare(system.jacobian.rows.dofs[:0].astype(np.int32))
+    assert system.dofs**2 / 4 < factor_counts.entries(copy.pc) < system.dofs**2 / 2
+    assert system.dofs / 12 < factor_counts.solves_worth(copy.pc) < system.dofs / 6
 
 
 def test_algebraic_multigrid_that_is_made_again_and_again_gives_way_to_a_direct_solver() -> None:

@@ -16,10 +16,13 @@ _ENTRIES = {
     "tension": "Contact only pushes: the largest pull in contact, as a share of the load's stress",
     "complementarity": "Contact presses only where it is closed: the largest overlap of an open gap with a pressure",
     "inclusion": "The law is obeyed: the largest distance of a traction from what its law allows there",
+    "mixity": "The energies of separation are those of the mode: their largest change if they were taken anew",
 }
 """All that must be within the tolerance."""
-_UNEXCUSED = "net_force"
-"""The entry that must be so even where rounding relaxes the tolerance of the others."""
+_OPTIONAL = "mixity"
+"""The entry that is null where no law depends on the mode."""
+_UNEXCUSED = ("net_force", "mixity")
+"""The entries that must be so even where rounding relaxes the tolerance of the others."""
 _SECOND_ORDER = {
     "local minimiser": "The solution is a local minimiser of the energy: a stable equilibrium.",
     "not a minimiser": "The solution is an equilibrium, but not a minimiser of the energy: it is unstable.",
@@ -43,11 +46,12 @@ def certificate(result: Result) -> dict[str, Any] | None:
         return None
     tolerance = float(found["tolerance"])
     limit = max(tolerance, float(found.get("rounding") or 0.0))
-    limits = dict.fromkeys(_ENTRIES, limit) | {_UNEXCUSED: tolerance}
+    limits = dict.fromkeys(_ENTRIES, limit) | dict.fromkeys(_UNEXCUSED, tolerance)
+    entries = {n: words for n, words in _ENTRIES.items() if n != _OPTIONAL or found.get(n) is not None}
     return {
         "passed": bool(found["passed"]),
         "demand": _demand(tolerance, limit),
-        "rows": [_row(name, words, found[name], limits[name]) for name, words in _ENTRIES.items()],
+        "rows": [_row(name, words, found[name], limits[name]) for name, words in entries.items()],
         "remarks": list(_remarks(result, found)),
     }
 
