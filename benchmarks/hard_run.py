@@ -108,8 +108,11 @@ def _judged(
 
 
 def _unsolved(state: str, found: SolveResult) -> str:
-    """What has neither a proof of existence nor of the opposite may end without; a raised energy or no time may not."""
-    broken = found.interrupted or "raised the energy" in found.reason
+    """What has neither a proof of existence nor of the opposite may end without.
+
+    A raised energy may not, nor no time, nor a solution that the method claims and the certificate refuses.
+    """
+    broken = found.interrupted or found.converged or "raised the energy" in found.reason
     return "no_equilibrium" if state in UNDECIDED and not broken else "failed"
 
 

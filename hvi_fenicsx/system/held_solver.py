@@ -58,10 +58,12 @@ class LinearSettings:
         kind: a factorisation (lu), algebraic multigrid (gamg), geometric multigrid (mg), or that with averaged
             pressures as unknowns (mixed).
         thresholds: when another kind takes over, and when a preconditioner is made anew.
+        replaceable: whether the system is small enough for a direct solver to take over.
     """
 
     kind: Kind
     thresholds: Thresholds = DEFAULT
+    replaceable: bool = False
 
     @classmethod
     def choose(
@@ -80,17 +82,18 @@ class LinearSettings:
             thresholds: up to which size a direct solver is used.
             levels: whether the system has coarser levels when it is solved.
         """
+        small = system.dofs <= thresholds.largest_direct[system.problem.scales.dimension]
         if wanted != "auto":
-            return cls(wanted, thresholds)
+            return cls(wanted, thresholds, small)
         stiff, degree = system.problem.bulk.volumetric_ratio, nodes.degree(system.problem.space)
         if levels and system.free_motions is None:
             if stiff <= thresholds.volumetric_ratio:
-                return cls("mg", thresholds)
+                return cls("mg", thresholds, small)
             if degree > 1:
                 return cls("mixed", thresholds)
         if stiff > 0.0:
             return cls("lu", thresholds)
-        return cls("lu" if _small(system, thresholds) else "gamg", thresholds)
+        return cls("lu" if small else "gamg", thresholds)
 
     @property
     def ksp(self) -> dict[str, str]:
@@ -103,16 +106,14 @@ class LinearSettings:
     @property
     def iterations(self) -> int:
         """Iterations of the Krylov method at most."""
-        return self.thresholds.refinements if self.kind == "mixed" else self.thresholds.krylov_iterations
+        if self.kind == "mixed":
+            return self.thresholds.refinements
+        return self.thresholds.replaced_iterations if self.replaceable else self.thresholds.krylov_iterations
 
     @property
     def pc(self) -> Mapping[str, object]:
         """Default options of the preconditioner."""
         return {"lu": CHOLESKY, "gamg": _GAMG, "mg": _MG, "mixed": _MG}[self.kind]
-
-
-def _small(system: System, thresholds: Thresholds) -> bool:
-    return system.dofs <= thresholds.largest_direct[system.problem.scales.dimension]
 
 
 class Preconditioner(Protocol):
@@ -190,7 +191,7 @@ class HeldPreconditioner:
         self._first_iterations = self._first_iterations or iterations
         self._outdated = failed or iterations > thresholds.slower * self._first_iterations + 5
         rebuilt = self.settings.kind == "gamg" and self._factorised > thresholds.rebuilt
-        if (failed or rebuilt or iterations > thresholds.slow) and _small(self.system, thresholds):
+        if (failed or rebuilt or iterations > thresholds.slow) and self.settings.replaceable:
             self.settings, self._outdated = LinearSettings("lu", thresholds), True
 
     def _build(self, held: Entities) -> None:

@@ -31,6 +31,7 @@ class Thresholds:
             is then in its setup (on cells 1000 times as long as high, ten times that of a factorisation).
         slower: factor of the first iterations from which a preconditioner is made anew.
         krylov_iterations: iterations of a Krylov method at most.
+        replaced_iterations: the same where a direct solver can take over: 2,000 in vain took far longer than that.
         condensing: cost of condensing to Γc, in terms of the factorisations so far, up to which it is done.
         dense_columns: right-hand sides that are solved at once where a body is condensed.
         rank_unknowns: unknowns of a rank, on average, from which a coarse level is on all ranks (docs/scaling.md).
@@ -63,6 +64,7 @@ class Thresholds:
     rebuilt: int = 30
     slower: float = 1.5
     krylov_iterations: int = 2_000
+    replaced_iterations: int = 100
     condensing: float = 1.0
     dense_columns: int = 64
     rank_unknowns: int = 500
