@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
+import numpy as np
+
 from ..system.condensed_problem import CondensedProblem
 from ..typing import Array
 from .bonds import BondTable
@@ -34,7 +36,7 @@ class StraightGraphs:
         self.x, self.force = self._cells.x, self._cells.force
 
     def take(self, load: Array) -> None:
-        """Move along the segments until a small load more is carried, at the same factor.
+        """Move along the segments until a small load more is carried, at the same factor, or an end is reached.
 
         Args:
             load: (n,).
@@ -42,5 +44,15 @@ class StraightGraphs:
         Raises:
             numpy.linalg.LinAlgError: the equations are singular.
         """
-        self._cells.tau += self._cells.inverse().solve(load)
-        self.x, self.force = self._cells.x, self._cells.force
+        cells = self._cells
+        cells.tau += cells.inverse().solve(load)
+        for i in np.flatnonzero((cells.tau < cells.low) | (cells.tau > cells.high)):
+            self._pass_end(int(i))
+        self.x, self.force = cells.x, cells.force
+
+    def _pass_end(self, i: int) -> None:
+        """Put an unknown at the end that it has passed, on the next segment."""
+        forward = bool(self._cells.tau[i] > self._cells.high[i])
+        number = int(self._cells.numbers[i]) + (1 if forward else -1)
+        segment = self._cells.chain(i)[number]
+        self._cells.enter(i, number, segment.low if forward else segment.high)

@@ -92,12 +92,12 @@ class Certifier:
             state: the state.
             number: of its row.
         """
-        on_graphs = self._is_on_graphs(state)
+        on_graphs = self._distance(state) <= self._tolerance
         if not (state.event in ALWAYS or is_examined(number)):
             return Verdict(certified=on_graphs, whole=False)
         if on_graphs and self._passes(state):
             return Verdict(certified=True, whole=True)
-        corrected = self._corrected(state) is not None
+        corrected = on_graphs and self._corrected(state) is not None
         return Verdict(certified=corrected, whole=True, corrected=corrected)
 
     def displacement(self, state: PathState, verdict: Verdict) -> fem.Function:
@@ -109,9 +109,6 @@ class Certifier:
         """
         found = self._corrected(state) if verdict.corrected else None
         return self._expanded(state) if found is None else found
-
-    def _is_on_graphs(self, state: PathState) -> bool:
-        return self._distance(state) <= self._tolerance
 
     def _is_apart(self, state: PathState) -> bool:
         """Whether the certificate of a single run cannot judge a state. Collective."""
@@ -128,20 +125,18 @@ class Certifier:
 
     def _corrected(self, state: PathState) -> fem.Function | None:
         """The displacement that is certified once rounding is taken out of it; None: none is. Collective."""
-        if not self._is_apart(state):
-            u = self._expanded(state)
-            found = self._examination(state, u)
-            if not correction.may_help(found.certificate):
-                return None
-            u = correction.corrected(self._system.with_obstacles_of(self._factored.at(state.factor)), (), u, found)
-            if self._is_on_graphs(state) and self._examination(state, u).certificate.passed:
-                return u
-        return self._refined(state)
+        u = self._expanded(state)
+        found = None if self._is_apart(state) else self._examination(state, u)
+        if found is not None and not correction.may_help(found.certificate):
+            return None
+        refined = self._refined(state)
+        if refined is not None or found is None:
+            return refined
+        u = correction.corrected(self._system.with_obstacles_of(self._factored.at(state.factor)), (), u, found)
+        return u if self._examination(state, u).certificate.passed else None
 
     def _refined(self, state: PathState) -> fem.Function | None:
         """That of Newton steps along the graphs, with what bonds remember; None: they do not help. Collective."""
-        if self._distance(state) > THRESHOLDS.largest_rounding:
-            return None
         problem, factor = self._factored.at(state.factor), state.factor
         try:
             found = refinement.refined(self._system, self._condensation, problem, self._graphs(state), factor)

@@ -21,7 +21,8 @@ from ..system.condensation import Condensation
 from ..system.system import System
 from ..typing import Array
 
-_STEPS = 2
+_STEPS = 3
+"""The first may end where an unknown comes to the end of its piece."""
 
 
 @dataclass(frozen=True, kw_only=True)

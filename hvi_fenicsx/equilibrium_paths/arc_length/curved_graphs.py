@@ -48,7 +48,7 @@ class CurvedGraphs:
         self.x, self.force = values.x / self._factors, values.force * self._factors
 
     def take(self, load: Array) -> None:
-        """Move along the graphs until a small load more is carried, at the same factor.
+        """Move along the graphs until a small load more is carried, at the same factor, or an end is reached.
 
         Args:
             load: (n,).
@@ -58,4 +58,13 @@ class CurvedGraphs:
         """
         matrix = self._sites.jacobian(self._sites.values(self._z))
         self._z = self._z + np.linalg.lstsq(matrix, load / self._factors, rcond=_RANK)[0]
+        s = self._sites.s(self._z)
+        for k in np.flatnonzero((s < self._sites.low) | (s > self._sites.high)):
+            self._pass_end(int(k), forward=bool(s[k] > self._sites.high[k]))
         self._read()
+
+    def _pass_end(self, k: int, *, forward: bool) -> None:
+        """Put a site at the end that it has passed, on the next segment."""
+        end = float(self._sites.high[k] if forward else self._sites.low[k])
+        self._sites.enter(k, int(self._sites.numbers[k]) + (1 if forward else -1))
+        self._sites.set(self._z, k, end)
