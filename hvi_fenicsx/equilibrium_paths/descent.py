@@ -22,6 +22,9 @@ from .segments import Component, Segment, chain
 from .softest import softest
 from .tracer import Tracer
 
+_ROUNDING = 1e-9
+"""Forces that balance may leave so much of the largest one."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Landing:
@@ -134,14 +137,15 @@ class Descent:
             x: where to begin, (n,).
             before: where one comes from: at a drop, its other side counts, (n,).
         """
+        last = x  # of the minimisers: what is done between them bends the body to and fro, however far it goes
         for step in range(1, self._most + 1):
             following = self._convex_minimiser(x, x - before)
-            if self._gone(following, following - x):
+            if self._gone(following, following - last):
                 return Landing(x=following, escapes=True, found=False, steps=step)
             settled = self._settled(following)
             if settled is not None:
                 return Landing(x=settled, escapes=False, found=True, steps=step)
-            before, x = x, self._hastened(following, following - x)
+            before, last, x = x, following, self._hastened(following, following - x)
             x = self._hastened(x, self._curved(x))
         return Landing(x=x, escapes=False, found=False, steps=self._most)
 
@@ -241,7 +245,13 @@ class Descent:
         cells.tau[stands] = cells.rise[stands] * (force - cells.standing_force)[stands]
         slack = 1e-10 * (np.abs(cells.tau) + np.where(np.isfinite(cells.high - cells.low), cells.high - cells.low, 0.0))
         inside = (cells.tau >= cells.low - slack) & (cells.tau <= cells.high + slack)
-        return cells.x if bool(np.all(inside)) else None
+        return cells.x if bool(np.all(inside)) and self._balances(cells) else None
+
+    def _balances(self, cells: Cells) -> bool:
+        """Whether the forces balance: in singular equations, which rounding makes regular, they do not."""
+        elastic, force = self._stiffness @ cells.x, cells.force
+        size = max(float(np.max(np.abs(f), initial=0.0)) for f in (elastic, force, self._load))
+        return float(np.max(np.abs(elastic + force - self._load), initial=0.0)) <= _ROUNDING * size
 
 
 def _number(segments: tuple[Segment, ...], x: float, *, held: bool) -> int:

@@ -9,6 +9,8 @@ from typing import Protocol
 from typing_extensions import override
 
 from ..system.condensed_problem import CondensedProblem
+from ..typing import Array
+from .arc_length.curved_graphs import CurvedGraphs
 from .arc_length.distances import CurvedDistances
 from .arc_length.follower import ArcLengthFollower
 from .bonds import is_piecewise_linear
@@ -16,6 +18,7 @@ from .exact import ExactFollower
 from .programme import Follower
 from .state import PathState
 from .straight_distances import StraightDistances
+from .straight_graphs import StraightGraphs
 
 
 class Distances(Protocol):
@@ -28,8 +31,30 @@ class Distances(Protocol):
 
     def __init__(self, problem: CondensedProblem, remember: Collection[int]) -> None: ...
 
-    def __call__(self, state: PathState) -> float:
-        """The distance of a state."""
+    def __call__(self, state: PathState, carried: Array | None = None) -> float:
+        """The distance of a state, of given forces of laws and bounds or of what the body leaves them."""
+
+
+class Graphs(Protocol):
+    """A state along the graphs on which its laws and bounds are.
+
+    Args:
+        problem: the problem.
+        remember: numbers of the problem's bonds that remember.
+        state: the state.
+
+    Attributes:
+        x: displacements, (n,).
+        force: of laws and bounds, (n,).
+    """
+
+    x: Array
+    force: Array
+
+    def __init__(self, problem: CondensedProblem, remember: Collection[int], state: PathState) -> None: ...
+
+    def take(self, load: Array) -> None:
+        """Move along the graphs until a small load more is carried, (n,)."""
 
 
 class FollowerKind(ABC):
@@ -38,11 +63,13 @@ class FollowerKind(ABC):
     Attributes:
         follower: makes a follower.
         distances: makes the distances of its states.
+        graphs: makes a state along its graphs.
     """
 
     made: list[FollowerKind] = []  # noqa: RUF012
     follower: type[Follower]
     distances: type[Distances]
+    graphs: type[Graphs]
 
     def __init_subclass__(cls) -> None:
         FollowerKind.made.append(cls())
@@ -57,6 +84,7 @@ class ExactKind(FollowerKind):
 
     follower = ExactFollower
     distances = StraightDistances
+    graphs = StraightGraphs
 
     @override
     def follows(self, problem: CondensedProblem) -> bool:
@@ -68,6 +96,7 @@ class ArcLengthKind(FollowerKind):
 
     follower = ArcLengthFollower
     distances = CurvedDistances
+    graphs = CurvedGraphs
 
     @override
     def follows(self, problem: CondensedProblem) -> bool:

@@ -28,15 +28,16 @@ class StraightDistances:
             self._rows[bond.unknown].append(row)
         self._chains: dict[tuple[int, bytes], tuple[Segment, ...]] = {}
 
-    def __call__(self, state: PathState) -> float:
+    def __call__(self, state: PathState, carried: Array | None = None) -> float:
         """The largest distance, relative to the forces.
 
         Args:
             state: the state.
+            carried: forces of laws and bounds, (n,); by default what the condensed body leaves them.
         """
         problem = self._problem
         elastic, load = problem.elastic @ state.x, problem.load(state.factor)
-        force, diagonal = load - elastic, problem.elastic.diagonal
+        force, diagonal = load - elastic if carried is None else carried, problem.elastic.diagonal
         size = max(float(np.max(np.abs(f), initial=0.0)) for f in (elastic, load, problem.force_rate)) or 1.0
         chains = self._all_chains(state.memory)
         values = zip(chains, *(map(float, v) for v in (state.x, force, diagonal)), strict=True)

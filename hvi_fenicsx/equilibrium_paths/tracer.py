@@ -190,10 +190,16 @@ class Tracer:
         distance = np.where(rates > 0.0, cells.high - cells.tau, cells.tau - cells.low)
         small = np.where(rates > 0.0, -self.small, self.small)
         distance, small = np.where(inward, 0.0, distance), np.where(inward, self._behind, small)
-        moves = speed > 1e-11 * self._fastest(speed)
+        steep = self._steepness()
+        moves = speed * steep > 1e-11 * self._fastest(speed)
         at = np.flatnonzero(moves & np.isfinite(distance))
         slack, beyond = np.maximum(distance[at], 0.0), np.maximum(-distance[at], 0.0)
-        return at, slack, small[at], speed[at], np.maximum(1e-11 * size[at] - beyond, 0.0)
+        return at, slack, small[at], speed[at], np.maximum(1e-11 * (size / steep)[at] - beyond, 0.0)
+
+    def _steepness(self) -> Array:
+        """The slopes of pieces over the largest stiffness, 1 at least, (n,): there a short way is a large force."""
+        cells, stiffest = self.cells, self._stiffest or np.inf
+        return np.asarray(np.maximum(np.where(cells.moving, np.abs(cells.slope), 0.0) / stiffest, 1.0))
 
     def _fastest(self, speed: Array) -> Array:
         """The greatest speed of the same kind, of displacements or of forces, (n,).

@@ -6,13 +6,14 @@ where bonds remember, what was judged on Γc must be what these forces leave the
 are nothing beside those of the whole programme: there is nothing else by which to measure what is left of forces.
 
 Where rounding alone may speak against a state, its displacement is corrected as that of a single run
-(:mod:`.certify.correction`); the corrected one is then the state's.
+(:mod:`.certify.correction`) or, with what bonds remember, along the graphs (:mod:`.refinement`); the corrected one is
+then the state's.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Collection
+from dataclasses import dataclass, replace
 
 import numpy as np
 from dolfinx import fem
@@ -22,16 +23,18 @@ from ..certify import balance, certificate, contact_state, correction
 from ..certify.certificate import Examination
 from ..certify.contact_state import Forces
 from ..certify.thresholds import DEFAULT as THRESHOLDS
+from ..equilibrium_paths.kinds import FollowerKind, Graphs
 from ..equilibrium_paths.state import Event, PathState
 from ..problem import references
 from ..problem.factored_problem import FactoredProblem
 from ..problem.problem import Problem
-from ..problem.vectors import turn
 from ..runtime.mpi import total
 from ..solvers import frozen_mixity
 from ..system.condensation import Condensation
 from ..system.system import System
 from ..typing import Array
+from . import refinement
+from .refinement import Refined
 
 ALWAYS = frozenset({Event.START, Event.JUMP, Event.TURN, Event.END})
 """The events whose states are examined with the whole body."""
@@ -62,7 +65,8 @@ class Certifier:
         condensation: its condensation.
         factored: its problem at any factor.
         tolerance: relative.
-        distance: how far a state is from the graphs of Γc, relative to the forces.
+        kind: of the follower, which knows the graphs of Γc.
+        remember: numbers of the condensed problem's bonds that remember.
         largest: factor of the programme, in size.
     """
 
@@ -72,11 +76,13 @@ class Certifier:
         condensation: Condensation,
         factored: FactoredProblem,
         tolerance: float,
-        distance: Callable[[PathState], float],
+        kind: FollowerKind,
+        remember: Collection[int],
         largest: float,
     ) -> None:
         self._system, self._condensation, self._factored = system, condensation, factored
-        self._tolerance, self._distance = tolerance, distance
+        self._tolerance, self._kind, self._remember = tolerance, kind, remember
+        self._distance = kind.distances(condensation.problem, remember)
         self._whole_load = self._load(largest)
 
     def verdict(self, state: PathState, number: int) -> Verdict:
@@ -86,13 +92,13 @@ class Certifier:
             state: the state.
             number: of its row.
         """
-        on_surface = self._distance(state) <= self._tolerance
+        on_graphs = self._distance(state) <= self._tolerance
         if not (state.event in ALWAYS or is_examined(number)):
-            return Verdict(certified=on_surface, whole=False)
-        if not _plain(state) or self._is_unloaded(state):
-            return Verdict(certified=on_surface and self._in_balance(state), whole=True)
-        passed, corrected = self._examined(state)
-        return Verdict(certified=on_surface and passed, whole=True, corrected=corrected)
+            return Verdict(certified=on_graphs, whole=False)
+        if on_graphs and self._passes(state):
+            return Verdict(certified=True, whole=True)
+        corrected = on_graphs and self._corrected(state) is not None
+        return Verdict(certified=corrected, whole=True, corrected=corrected)
 
     def displacement(self, state: PathState, verdict: Verdict) -> fem.Function:
         """The displacement of the whole body that was certified, nondimensional, ghosts updated. Collective.
@@ -101,8 +107,58 @@ class Certifier:
             state: the state.
             verdict: what was found of it.
         """
+        found = self._corrected(state) if verdict.corrected else None
+        return self._expanded(state) if found is None else found
+
+    def _is_apart(self, state: PathState) -> bool:
+        """Whether the certificate of a single run cannot judge a state. Collective."""
+        return not _plain(state) or self._is_unloaded(state)
+
+    def _passes(self, state: PathState) -> bool:
         u = self._expanded(state)
-        return self._corrected(state, u, self._examination(state, u)) if verdict.corrected else u
+        if self._is_apart(state):
+            forces = contact_state.forces(self._factored.at(state.factor), u)
+            return self._in_balance(state, u, forces, self._condensation.carried(state.x, state.factor))
+        return self._examination(state, u).certificate.passed
+
+    # -- where rounding speaks against a state
+
+    def _corrected(self, state: PathState) -> fem.Function | None:
+        """The displacement that is certified once rounding is taken out of it; None: none is. Collective."""
+        u = self._expanded(state)
+        found = None if self._is_apart(state) else self._examination(state, u)
+        if found is not None and not correction.may_help(found.certificate):
+            return None
+        refined = self._refined(state)
+        if refined is not None or found is None:
+            return refined
+        u = correction.corrected(self._system.with_obstacles_of(self._factored.at(state.factor)), (), u, found)
+        return u if self._examination(state, u).certificate.passed else None
+
+    def _refined(self, state: PathState) -> fem.Function | None:
+        """That of Newton steps along the graphs, with what bonds remember; None: they do not help. Collective."""
+        problem, factor = self._factored.at(state.factor), state.factor
+        try:
+            found = refinement.refined(self._system, self._condensation, problem, self._graphs(state), factor)
+        except np.linalg.LinAlgError:
+            return None
+        return found.u if self._is_near(state, found) and self._is_certified(state, found) else None
+
+    def _is_near(self, state: PathState, found: Refined) -> bool:
+        """Whether the steps took out no more than rounding."""
+        change, size = (float(np.max(np.abs(x), initial=0.0)) for x in (found.x - state.x, state.x))
+        return change <= THRESHOLDS.largest_rounding * size
+
+    def _is_certified(self, state: PathState, found: Refined) -> bool:
+        """Whether forces by cell balance, and those on Γc are on the graphs. Collective."""
+        if self._distance(replace(state, x=found.x), found.force) > self._tolerance:
+            return False
+        if self._is_apart(state):
+            return self._in_balance(state, found.u, found.forces, found.carried)
+        return self._examination(state, found.u).certificate.passed
+
+    def _graphs(self, state: PathState) -> Graphs:
+        return self._kind.graphs(self._condensation.problem, self._remember, state)
 
     def _load(self, factor: float) -> float:
         """The Euclidean norm of loads, of what prescribed displacements pull and obstacles push. Collective."""
@@ -113,19 +169,14 @@ class Certifier:
         """Whether the loads are less than the tolerance of those of the whole programme. Collective."""
         return self._load(state.factor) <= self._tolerance * self._whole_load
 
-    def _in_balance(self, state: PathState) -> bool:
+    def _in_balance(self, state: PathState, u: fem.Function, forces: Forces, carried: PETSc.Vec) -> bool:
         """Whether forces from the forms are those that were judged on Γc, and none are left elsewhere. Collective.
 
         What bonds remember is in their graphs on Γc, not in the laws that the certificate of a single run knows. As
         there, what rounding makes of the stresses is excused, and no net force.
         """
-        system, condensation, problem = self._system, self._condensation, self._factored.at(state.factor)
-        u = self._expanded(state)
-        forces, carried = contact_state.forces(problem, u), condensation.carried(state.x, state.factor)
-        reaction = system.load.duplicate()
-        reaction.array[:] = forces.reaction.ravel()
-        turn(reaction, system.rotation)
-        left = condensation.unbalanced(reaction, carried)
+        problem = self._factored.at(state.factor)
+        left = self._condensation.unbalanced(refinement.reaction(self._system, forces), carried)
         size = max(self._norm(f) for f in (forces.load, forces.reaction))
         size = max(size, self._whole_load if self._is_unloaded(state) else 0.0) or 1.0
         return left <= self._tolerance * size or self._is_rounding(left / size, problem, u, forces, carried, size)
@@ -147,15 +198,6 @@ class Certifier:
     def _norm(self, values: Array) -> float:
         return float(np.sqrt(total(self._system.comm, float(np.sum(values**2)))))
 
-    def _examined(self, state: PathState) -> tuple[bool, bool]:
-        """Whether the certificate of the whole body passes, and whether only once it is corrected. Collective."""
-        u = self._expanded(state)
-        found = self._examination(state, u)
-        if found.certificate.passed or not correction.may_help(found.certificate):
-            return found.certificate.passed, False
-        passed = self._examination(state, self._corrected(state, u, found)).certificate.passed
-        return passed, passed
-
     def _expanded(self, state: PathState) -> fem.Function:
         return self._system.displacement(self._condensation.expand(state.x, state.factor))
 
@@ -163,10 +205,6 @@ class Certifier:
         problem = self._factored.at(state.factor)
         frozen_mixity.freeze(problem, u)
         return certificate.examine(problem, u, self._tolerance)
-
-    def _corrected(self, state: PathState, u: fem.Function, found: Examination) -> fem.Function:
-        system = self._system.with_obstacles_of(self._factored.at(state.factor))
-        return correction.corrected(system, (), u, found)
 
 
 def is_examined(number: int) -> bool:

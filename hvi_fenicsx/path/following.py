@@ -81,9 +81,9 @@ class PathRun:
         self._factored = FactoredProblem(system.problem, self.scaled)
         problem = self._condensation.problem
         self._kind = kind_of(problem)
-        distance = self._kind.distances(problem, self._remember)
         tolerance, largest = prepared.options.tolerance, max(wanted.to, key=abs)
-        self._certifier = Certifier(system, self._condensation, self._factored, tolerance, distance, largest)
+        parts = system, self._condensation, self._factored, tolerance, self._kind, self._remember
+        self._certifier = Certifier(*parts, largest)
         self.states: list[PathState] = []
         self._verdicts: list[Verdict] = []
         self._extremes: list[tuple[float, float]] = []

@@ -228,10 +228,48 @@ class Condensation:
             x: the condensed unknowns, (n,).
             factor: λ.
         """
+        return self.spread(self.problem.elastic @ x - self.problem.load(factor))
+
+    def spread(self, forces: Array) -> PETSc.Vec:
+        """Forces on the condensed unknowns as forces on the whole body, in the components of the unknowns.
+
+        Args:
+            forces: (n,).
+        """
         interior, whole = self._interior, np.zeros(self._interior.size)
-        whole[self._stay] = self.problem.elastic @ x - self.problem.load(factor)
+        whole[self._stay] = forces
         found = self._system.load.duplicate()
         found.array[interior.kept] = interior.own_part(whole)
+        return found
+
+    def condensed(self, forces: PETSc.Vec) -> Array:
+        """Forces on the whole body as forces on the condensed unknowns, (n,). Collective.
+
+        Args:
+            forces: in the components of the unknowns.
+        """
+        interior, right = self._interior, self._free(forces.array_r)
+        outer = interior.gathered(right) - interior.pulled(interior.solve(right[:, None]))[:, 0]
+        return np.asarray(outer[self._stay] - self._coupling.T @ self._eliminated(outer[self._gone]))
+
+    def change(self, x: Array, forces: Array) -> Array:
+        """How the unknowns of the whole body change, in balance with forces, where condensed ones do. Collective.
+
+        Args:
+            x: change of the condensed unknowns, (n,).
+            forces: on this rank's unknowns, (local unknowns,).
+        """
+        interior, right = self._interior, self._free(forces)
+        outer = interior.gathered(right) - interior.pulled(interior.solve(right[:, None]))[:, 0]
+        found = np.empty(interior.size)
+        found[self._stay] = x
+        found[self._gone] = self._eliminated(outer[self._gone] - self._coupling @ x)
+        return interior.expand(found, right)
+
+    def _free(self, forces: Array) -> Array:
+        """Forces off the supports, which carry the others, (local unknowns,)."""
+        found = np.array(forces)
+        found[self._system.problem.fixed_here] = 0.0
         return found
 
     def unbalanced(self, reaction: PETSc.Vec, carried: PETSc.Vec) -> float:

@@ -11,7 +11,7 @@ from condensed import bonds, chain, graph, problem
 from test_curved_paths import line, path, peak
 
 from hvi_fenicsx.equilibrium_paths.arc_length.bordered import Bordered
-from hvi_fenicsx.equilibrium_paths.arc_length.curve import Move, Outcome
+from hvi_fenicsx.equilibrium_paths.arc_length.events import Move, Outcome
 from hvi_fenicsx.equilibrium_paths.arc_length.jump import _motions
 from hvi_fenicsx.equilibrium_paths.arc_length.passage import Crossing
 from hvi_fenicsx.equilibrium_paths.arc_length.relaxation import Relaxation

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from runs import ROOT
@@ -123,3 +125,35 @@ def test_the_path_of_a_body_on_nothing_ends_at_once() -> None:
     boundary = {name: part for name, part in table["boundary"].items() if name != "floor"}
     path = hvi.follow(hvi.Scene.model_validate(table | {"boundary": boundary}))
     assert (path.end, len(path.rows), path.uncertified) == ("escapes", 2, 0)
+
+
+def towers() -> hvi.Scene:
+    """A tall block on another, hardly compressible: rounding of the stiffness leaves 2e-8 of the loads on Γc."""
+    block = {"shape": "rectangle", "size": [0.1, 1.0]}
+    law = {"law": "exponential", "peak_traction": 3e6, "residual_traction": 1.5e6, "delta": 9.3e-7}
+    table = {
+        "domain": {
+            "lower": {**block, "cells": [31, 31], "origin": [0.0, -1.0]},
+            "upper": {**block, "cells": [32, 32]},
+        },
+        "material": {"model": "plane_strain", "youngs_modulus": 2.15e11, "poisson_ratio": 0.4999},
+        "boundary": {
+            "pull": {"on": "upper.right", "traction": [9.9e3, 0.0]},
+            "press": {"on": "upper.top", "traction": [0.0, -1e6]},
+            "base": {"on": "lower.bottom", "displacement": [0.0, 0.0]},
+        },
+        "interface": {"floor": {"between": ["upper.bottom", "lower.top"], "contact": {"gap": 0.0}, "friction": law}},
+    }
+    return hvi.Scene.model_validate(table)
+
+
+def test_rounding_of_the_stiffness_is_taken_out_where_bonds_have_turned_back() -> None:
+    path = hvi.follow(towers())
+    run = path.run
+    corrected = [n for n, verdict in enumerate(run._verdicts) if verdict.corrected and np.any(run.states[n].memory)]
+    assert path.end == "reached"
+    assert path.uncertified == 0
+    assert corrected
+    state, certifier = run.states[corrected[-1]], run._certifier
+    wrong = replace(state, memory=state.memory * [1.0, 1.0, 1.0 + 1e-6, 1.0 + 1e-6])
+    assert not certifier.verdict(wrong, 0).certified

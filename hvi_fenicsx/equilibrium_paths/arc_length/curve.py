@@ -12,54 +12,21 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass
-from enum import Enum
 
 import numpy as np
-from scipy.optimize import brentq
 
 from ...typing import Array
-from .equations import ROUNDING, STANDING, UNDECIDED, Equations, Place, Refused
+from .equations import ROUNDING, STANDING, UNDECIDED, Refused
+from .events import LEAST, Events, Move, Outcome
 from .sites import Sites
 
 _LARGEST_TURN = 0.9
 """Least cosine of the angle between the tangents at both ends of a step."""
-_LEAST = 1e-11
-"""The shortest step."""
 _FAR = 1e4
 """A displacement that is infinite, in units of those where the body was."""
 
 
-class Outcome(Enum):
-    """What ended a step."""
-
-    STEP = "nothing"
-    END = "a site reached the end of its segment"
-    TURNED = "a bond with memory turned back"
-    FOLD = "the factor turned"
-    FACTOR = "the factor reached its aim"
-    AWAY = "nothing ends the curve"
-    STUCK = "no step is short enough"
-
-
-@dataclass(frozen=True, kw_only=True)
-class Move:
-    """A step.
-
-    Attributes:
-        outcome: what ended it.
-        site: which site, where one did.
-        before: where it began.
-        after: where it ended.
-    """
-
-    outcome: Outcome
-    site: int | None = None
-    before: Place
-    after: Place
-
-
-class Curve(Equations):
+class Curve(Events):
     """The curve from one of its points on.
 
     Args:
@@ -73,14 +40,13 @@ class Curve(Equations):
     Attributes:
         length: of the next step.
         disagreement: of the work along a step with the energies, 1 where it is as large as is allowed.
-        trend: the sign of the factor's rate since the last fold.
     """
 
     def __init__(
         self, constant: Array, rate: Array, sites: Sites, z: Array, factor: float, fineness: float = 1.0
     ) -> None:
         super().__init__(constant, rate, sites, z, factor)
-        self._fineness, self.length, self.trend = fineness, 0.1 * fineness, 0
+        self._fineness, self.length = fineness, 0.1 * fineness
         self._next = self.length
         self.disagreement: Callable[[Move], float] = lambda move: 0.0
         self._size = self._extent()
@@ -98,7 +64,7 @@ class Curve(Equations):
         """
         if self._goes_on_for_ever(aim):
             return Move(outcome=Outcome.AWAY, before=self.here, after=self.here)
-        while self.length > _LEAST:
+        while self.length > LEAST:
             try:
                 move = self._tried(aim)
             except (Refused, np.linalg.LinAlgError):
@@ -188,57 +154,6 @@ class Curve(Equations):
         grown = min(4.0, np.sqrt(wanted * size / off)) if off > 0.0 else 4.0
         self._next = max(size, self.length if grown > 1.0 else 0.0) * max(grown, 0.3)
 
-    def _after(self, y: Array) -> Place:
-        values, tangent = self.sites.values(y[:-1]), self.here.tangent
-        return self._at_place(y, self.tangent(values, tangent) if self.sites.bent else tangent, values)
-
-    def _earliest(self, move: Move, aim: float) -> Move:
-        """The step up to the first event that it has passed."""
-        for _ in range(20):
-            found = self._passed(move, aim)
-            if found is None:
-                return move
-            move = found
-        raise Refused
-
-    def _passed(self, move: Move, aim: float) -> Move | None:
-        """A shorter step, to an event that was passed; None: there is none."""
-        start, y = self.here, move.after.y
-        shares = self._shares(move)
-        rest = y[-1] - aim / self.unit
-        over = rest * (start.y[-1] - aim / self.unit) < 0.0 and move.outcome is not Outcome.FACTOR
-        beyond = abs(rest) / abs(y[-1] - start.y[-1]) if over and abs(rest) > ROUNDING else 0.0
-        site = int(np.argmin(shares)) if shares.size else 0
-        if over and abs(rest) > 1e-13 * (1.0 + abs(y[-1])) and 1.0 - beyond <= float(np.min(shares, initial=1.0)):
-            guess = start.y + (1.0 - beyond) * (y - start.y)
-            return self._moved(Outcome.FACTOR, None, self.correct(guess, self.at_factor(aim)))
-        if shares.size and shares[site] < 1.0:
-            if shares[site] == 0.0:
-                return self._back_at(move, site)
-            high = move.after.values.s[site] > self.sites.high[site]
-            end = float((self.sites.high if high else self.sites.low)[site])
-            guess = start.y + shares[site] * (y - start.y)
-            return self._moved(Outcome.END, site, self.correct(guess, self.at_end(site, end)))
-        return self._turning(move)
-
-    def _shares(self, move: Move) -> Array:
-        """The part of the step after which each site passed an end; 1 where it did not, (m,)."""
-        sites, s0, s1 = self.sites, move.before.values.s, move.after.values.s
-        found, way = np.ones(len(sites)), np.where(s1 != s0, s1 - s0, 1.0)
-        allowed = ROUNDING * (1.0 + np.abs(s1))
-        above, below = s1 > np.maximum(sites.high + allowed, s0), s1 < np.minimum(sites.low - allowed, s0)
-        for ends, beyond in ((sites.high, above), (sites.low, below)):
-            found[beyond] = np.clip((ends[beyond] - s0[beyond]) / way[beyond], 0.0, 1.0 - 1e-12)
-        return found
-
-    def _moved(self, outcome: Outcome, site: int | None, y: Array) -> Move:
-        if float(self.here.tangent @ (y - self.here.y)) < -ROUNDING:
-            raise Refused
-        move = Move(outcome=outcome, site=site, before=self.here, after=self._after(y))
-        if outcome is Outcome.END and not self._arrives(move):
-            raise Refused
-        return move
-
     def settle(self) -> None:
         """Take out what rounding has left in the equations: sites pass their ends a little before or after them."""
         with suppress(Refused):
@@ -252,63 +167,6 @@ class Curve(Equations):
 
     def _settle_at(self, y: Array) -> None:
         self.here = self._at_place(y, self.here.tangent, self.sites.values(y[:-1]))
-
-    def _back_at(self, move: Move, site: int) -> Move:
-        """Where a site passes the end at which it began: a bond that set out from it turned back on the way."""
-        sets_out = self._rate_of(Outcome.TURNED, site)(self.here) * self.sites.outward[site] > 0.0
-        turned = self._up_to(move, Outcome.TURNED, site) if sets_out else None
-        return turned or self._in_place(site)
-
-    def _in_place(self, site: int) -> Move:
-        """No step: a site that is slower than others passed its end by what rounding allows, and goes on from there."""
-        return Move(outcome=Outcome.END, site=site, before=self.here, after=self.here)
-
-    def _arrives(self, move: Move) -> bool:
-        """Whether the site at an end of its segment goes outwards there, and does not come back to it."""
-        k, after = move.site, move.after
-        rate = float(self.sites.rates(after.y[:-1], after.tangent[:-1])[k])
-        middle_up = after.values.s[k] - self.sites.low[k] > self.sites.high[k] - after.values.s[k]
-        return bool(rate > 0.0) == bool(middle_up)
-
-    def _turning(self, move: Move) -> Move | None:
-        """The step up to where the factor, or a bond with memory, turned on the way; None: none did."""
-        if not self.sites.bent or move.outcome in (Outcome.FOLD, Outcome.TURNED):
-            return None
-        turned = self._turned(move.after)
-        return None if turned is None else self._up_to(move, *turned)
-
-    def _up_to(self, move: Move, outcome: Outcome, site: int | None) -> Move | None:
-        """The step up to where a rate, of the factor or of a site, is zero; None: it is too short."""
-        whole = float(self.here.tangent @ (move.after.y - self.here.y))
-        if whole <= _LEAST:
-            return None
-        rate = self._rate_of(outcome, site)
-        if rate(self.here) * rate(move.after) >= 0.0:
-            return self._moved(outcome, site, move.after.y)
-        ends = {0.0: self.here, whole: move.after}  # corrected anew, their rates may have other signs by rounding
-
-        def rate_at(way: float) -> float:
-            return rate(ends[way] if way in ends else self._at(way))
-
-        root = brentq(rate_at, 0.0, whole, xtol=1e-13 * whole, rtol=1e-13, maxiter=100)
-        return self._moved(outcome, site, self._at(float(root)).y)
-
-    def _turned(self, after: Place) -> tuple[Outcome, int | None] | None:
-        largest = float(np.max(np.abs(after.tangent)))
-        if self.trend * after.tangent[-1] < -UNDECIDED * largest:
-            return Outcome.FOLD, None
-        rates = self.sites.rates(after.y[:-1], after.tangent[:-1]) * self.sites.outward
-        back = np.flatnonzero(rates < -UNDECIDED * largest)
-        return (Outcome.TURNED, int(back[0])) if back.size else None
-
-    def _rate_of(self, outcome: Outcome, site: int | None) -> Callable[[Place], float]:
-        if outcome is Outcome.FOLD or site is None:
-            return lambda place: float(place.tangent[-1])
-        return lambda place: float(self.sites.rates(place.y[:-1], place.tangent[:-1])[site])
-
-    def _at(self, way: float) -> Place:
-        """The point of the curve in the plane across the present tangent at a distance."""
-        return self._after(self.correct(self.here.y + way * self.here.tangent, self.plane(way)))
 
     def _moved_by(self, move: Move) -> float:
         return float(np.max(np.abs(move.after.y - move.before.y)))

@@ -29,11 +29,12 @@ class CurvedDistances:
         self._problem = felt(problem, self._factors)
         self._laws = vertex_laws(self._problem, remember)
 
-    def __call__(self, state: PathState) -> float:
+    def __call__(self, state: PathState, carried: Array | None = None) -> float:
         """The largest distance, relative to the forces.
 
         Args:
             state: the state.
+            carried: forces of laws and bounds, (n,); by default what the condensed body leaves them.
         """
         if state.memory is not None:
             for row, law in enumerate(self._laws):
@@ -41,7 +42,7 @@ class CurvedDistances:
         problem, x = self._problem, state.x * self._factors
         elastic, load = problem.stiffness @ x, problem.load(state.factor)
         size = max(float(np.max(np.abs(f), initial=0.0)) for f in (elastic, load, problem.force_rate)) or 1.0
-        return self._largest(x, load - elastic) / size
+        return self._largest(x, load - elastic if carried is None else carried / self._factors) / size
 
     def _largest(self, x: Array, force: Array) -> float:
         """The largest distance of a force that laws and bounds should give."""

@@ -8,8 +8,8 @@ import numpy as np
 
 from ...system.condensed_problem import CondensedProblem
 from ...typing import Array
-from .curve import Move
 from .equations import Place
+from .events import Move
 from .sites import Sites, Values
 
 _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(4)

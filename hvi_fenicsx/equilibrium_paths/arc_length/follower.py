@@ -13,9 +13,10 @@ from ...typing import Array
 from ..programme import Follower
 from ..state import End, Event, Follow, PathOptions, PathState, Place, Position, place_of
 from ..watch import Stopped, Watch
-from .curve import Curve, Move, Outcome
+from .curve import Curve
 from .energies import Balance, displacement_rate
 from .equations import Refused
+from .events import Move, Outcome
 from .felt import factors, felt
 from .jump import Jump
 from .passage import Crossing, Passage, order

@@ -15,9 +15,10 @@ import numpy as np
 
 from ...system.condensed_problem import CondensedProblem
 from ...typing import Array, Integers
-from .curve import Curve, Outcome
+from .curve import Curve
 from .energies import displacement_rate
 from .equations import ROUNDING, Place, Refused
+from .events import Outcome
 from .passage import Crossing
 from .relaxation import Relaxation
 from .sites import Sites

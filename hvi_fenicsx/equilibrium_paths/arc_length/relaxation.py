@@ -13,8 +13,9 @@ import numpy as np
 
 from ...system.condensed_problem import CondensedProblem
 from ...typing import Array
-from .curve import Curve, Outcome
+from .curve import Curve
 from .equations import Refused
+from .events import Outcome
 from .passage import Crossing
 from .sites import Sites
 
