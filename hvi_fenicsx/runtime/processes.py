@@ -25,6 +25,8 @@ PYTHON = (sys.executable, "-P")
 """Python as our children run it: the current folder is not on its path."""
 STOP = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 """The signals by which a user, a batch system or a terminal that is closed asks a program to stop."""
+_NICENESS = 10
+"""Of a process that stands back: it gets a tenth of the time of one that does not."""
 _PR_SET_PDEATHSIG = 1
 """prctl(2)."""
 _MPI = ("OMPI_", "PMIX_", "PRTE_", "PMI_", "HYDRA_", "MPI_LOCAL")
@@ -203,6 +205,20 @@ def die_with_parent(number: signal.Signals = signal.SIGTERM) -> None:
     """
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, number)
+
+
+def stand_back() -> None:
+    """Have this process take what processors the ranks leave: any of the machine's, and after them.
+
+    An mpirun may bind each rank to a processor of its own, to which its children would be bound as well. Between
+    sessions it is the niceness of the session that counts where Linux groups processes so (sched(7), "autogroup").
+    """
+    os.nice(_NICENESS)
+    if sys.platform == "linux":
+        with contextlib.suppress(OSError):
+            os.sched_setaffinity(0, range(os.cpu_count() or 1))
+        with contextlib.suppress(OSError):
+            Path("/proc/self/autogroup").write_text(str(_NICENESS), encoding="ascii")
 
 
 def end(child: subprocess.Popen[str], patience: float) -> None:
