@@ -26,16 +26,21 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return int(_run_command(_with_petsc_joined(sys.argv[1:] if arguments is None else arguments)))
     finally:
         terminal.finish()
+        processes.forget_interrupt()
 
 
 def _run_command(words: Sequence[str]) -> int:
     processes.raise_on_stop()
     try:
-        with log.Handlers(log.WarningDisplay()), processes.stop_unmasked():
-            return _told(lambda: _dispatch(_parsed(words), words))
+        return processes.stoppable(lambda: _run_stoppable(words))
     except KeyboardInterrupt:
         _print_error("hvi: interrupted; nothing was written")
         return ExitCode.INTERRUPTED
+
+
+def _run_stoppable(words: Sequence[str]) -> int:
+    with log.Handlers(log.WarningDisplay()), processes.stop_unmasked():
+        return _told(lambda: _dispatch(_parsed(words), words))
 
 
 def _told(command: Callable[[], int]) -> int:

@@ -53,8 +53,8 @@ def block(
     def coarsening() -> tuple[Domain, Transfer]:
         assert coarser is not None
         nested = all(2 * few == n for few, n in zip(coarser, cells, strict=True))
-        transfer = NestedGridTransfer(size, cells) if nested else GridTransfer(size, coarser)
-        return block(comm, size, coarser, thresholds, reflected), transfer
+        kind = NestedGridTransfer if nested else GridTransfer
+        return block(comm, size, coarser, thresholds, reflected), kind(size, coarser)
 
     return Domain(
         mesh=grid,

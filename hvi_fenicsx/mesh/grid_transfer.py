@@ -24,11 +24,11 @@ class NestedGridTransfer(Transfer):
 
     Attributes:
         size: lengths of the block's edges, m, (d,).
-        cells: cells each way of the finer block, (d,).
+        coarser_cells: cells each way of the coarser block, (d,).
     """
 
     size: Sequence[float]
-    cells: Sequence[int]
+    coarser_cells: Sequence[int]
 
     def rows(self, fine: fem.FunctionSpace, coarse: fem.FunctionSpace, points: tuple[Array, Array]) -> Rows:
         """Each fine vertex is the mean of the two ends of a coarse edge. Collective.
@@ -37,10 +37,10 @@ class NestedGridTransfer(Transfer):
         of a cell.
         """
         near, far = points
-        cells = np.array(self.cells, dtype=PETSc.IntType)
-        place = np.rint(_places(near, self.size, cells)).astype(PETSc.IntType)
-        parents = np.stack([_flat(end, cells // 2) for end in (place // 2, (place + 1) // 2)], axis=1)
-        pairs = _numbered(parents, coarse, far, self.size, cells // 2)
+        cells = np.array(self.coarser_cells, dtype=PETSc.IntType)
+        place = np.rint(_places(near, self.size, 2 * cells)).astype(PETSc.IntType)
+        parents = np.stack([_flat(end, cells) for end in (place // 2, (place + 1) // 2)], axis=1)
+        pairs = _numbered(parents, coarse, far, self.size, cells)
         return mean_rows(pairs, fine.dofmap.index_map_bs)
 
 
@@ -50,16 +50,16 @@ class GridTransfer(Transfer):
 
     Attributes:
         size: lengths of the block's edges, m, (d,).
-        cells: cells each way of the coarser block, (d,).
+        coarser_cells: cells each way of the coarser block, (d,).
     """
 
     size: Sequence[float]
-    cells: Sequence[int]
+    coarser_cells: Sequence[int]
 
     def rows(self, fine: fem.FunctionSpace, coarse: fem.FunctionSpace, points: tuple[Array, Array]) -> Rows:
         """Each fine vertex has barycentric weights in the coarse simplex that holds it. Collective."""
         near, far = points
-        cells = np.array(self.cells, dtype=PETSc.IntType)
+        cells = np.array(self.coarser_cells, dtype=PETSc.IntType)
         place = _places(near, self.size, cells)
         corner = np.clip(np.floor(place), 0, cells - 1).astype(PETSc.IntType)
         within = np.clip(place - corner, 0.0, 1.0)

@@ -21,7 +21,7 @@ from dolfinx import mesh as dmesh
 
 from .. import compat
 from ..mesh import nodes
-from ..typing import Array
+from ..typing import Array, Entities, Integers
 
 EDGE_SHARE = {2: 0.0, 3: 0.125}
 """The share of an edge's function that goes to each of its ends at degree 2, by dimension (docs/degree-2.md)."""
@@ -54,6 +54,17 @@ def displacement_space(mesh: dmesh.Mesh, degree: int = 1) -> fem.FunctionSpace:
     if degree == 1 or EDGE_SHARE[d] == 0.0:
         return fem.functionspace(mesh, ("Lagrange", degree, (d,)))
     return fem.functionspace(mesh, basix.ufl.blocked_element(_transformed(mesh.topology.cell_name()), shape=(d,)))
+
+
+def global_numbers(space: fem.FunctionSpace, local: Entities) -> Integers:
+    """Local nodes of this rank, in an array of any shape, by their numbers over all ranks.
+
+    Args:
+        space: of the displacements.
+        local: the nodes.
+    """
+    found = space.dofmap.index_map.local_to_global(np.ascontiguousarray(local, dtype=np.int32).ravel())
+    return np.asarray(found, dtype=np.int64).reshape(np.shape(local))
 
 
 def pressure_space(mesh: dmesh.Mesh) -> fem.FunctionSpace:

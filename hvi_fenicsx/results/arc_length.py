@@ -7,22 +7,13 @@ import numpy.typing as npt
 
 from ..geometry import chains
 from ..mesh import nodes
+from ..problem import spaces
 from ..problem.contact_surface import Surface
 from ..problem.problem import Problem
 from ..typing import Array, Integers
 
 _DIGITS = 9
 """Digits of the part's size; coordinates that should be equal may differ in later ones."""
-
-
-def vertices(problem: Problem, surface: Surface) -> Integers:
-    """Global numbers of a part's vertices that this rank owns, (m,).
-
-    Args:
-        problem: what was solved.
-        surface: the part.
-    """
-    return np.asarray(problem.space.dofmap.index_map.local_to_global(surface.blocks), dtype=np.int64)
 
 
 def edges(problem: Problem, surface: Surface) -> Integers:
@@ -47,14 +38,22 @@ def edges(problem: Problem, surface: Surface) -> Integers:
     dofs = np.where(left[:, None], on[:, :2], on[:, 1::-1])
     if nodes.degree(space) == 2:
         dofs = np.vstack([np.column_stack([dofs[:, 0], on[:, 2]]), np.column_stack([on[:, 2], dofs[:, 1]])])
-    found = space.dofmap.index_map.local_to_global(dofs.ravel().astype(np.int32))
-    return np.asarray(found, dtype=np.int64).reshape(-1, 2)
+    return spaces.global_numbers(space, dofs)
 
 
 def lexicographic(points: Array) -> npt.NDArray[np.intp]:
     """The order of points (m, d) by their coordinates, rounded."""
-    size = float(np.max(np.ptp(points, axis=0), initial=0.0)) or 1.0
-    return np.lexsort(np.round(points / size, _DIGITS).T[::-1])
+    return np.lexsort(rounded(points, float(np.max(np.ptp(points, axis=0), initial=0.0))).T[::-1])
+
+
+def rounded(points: Array, size: float) -> Array:
+    """Coordinates over the size of the part, in which those that should be equal are, (m, d).
+
+    Args:
+        points: m, (m, d).
+        size: of the part, m; 0 where it is a point.
+    """
+    return np.round(points / (size or 1.0), _DIGITS)
 
 
 def along(points: Array, numbers: Integers, pairs: Integers) -> tuple[Integers, Array]:

@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
-import csv
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from mpi4py import MPI
 
 from ..certify import placed_forces
 from ..certify.placed_forces import NodalForces
 from ..problem import part_areas, spaces
 from ..problem.problem import Problem
+from ..runtime.row_order import RowOrder
 from ..solution import Solution
 from ..typing import Array, Entities
+from . import table_file
 
 QUANTITIES = ("", "u_", "traction_", "reaction_")
 """The vertex, its displacement, the part's load there, what the part's support, contact and laws put on the body."""
@@ -23,14 +25,14 @@ COLUMNS = ("part", *(quantity + axis for quantity in QUANTITIES for axis in "xyz
 
 
 def rows(solution: Solution) -> dict[str, Array]:
-    """The columns after the first, by part, (m, 12) on rank 0; NaN where a cell is empty. Collective.
+    """This rank's stretch of each part's rows, the columns after the first, (m, 12); NaN: an empty cell. Collective.
 
     Args:
         solution: what was found.
     """
     problem = solution.problem
     loads = placed_forces.loads(problem) if solution.forces is None else solution.forces.loads
-    return {n: _gathered(problem, _columns(solution, loads, n, facets)) for n, facets in _places(solution).items()}
+    return {n: _sorted(problem, _columns(solution, loads, n, facets)) for n, facets in _places(solution).items()}
 
 
 def _places(solution: Solution) -> dict[str, Entities]:
@@ -57,23 +59,27 @@ def _columns(solution: Solution, loads: Mapping[str, NodalForces], part: str, fa
     return found.reshape(len(blocks), len(COLUMNS) - 1)
 
 
-def _gathered(problem: Problem, columns: Array) -> Array:
-    """The rows of all ranks, sorted by their points, on rank 0; elsewhere its own. Collective."""
-    gathered = problem.domain.mesh.comm.gather(columns, root=0)
-    found = columns if gathered is None else np.concatenate(gathered)
-    return np.asarray(found[np.lexsort(found[:, 2::-1].T)])
+def _sorted(problem: Problem, columns: Array) -> Array:
+    """This rank's stretch of the rows of all ranks, sorted by their points. Collective."""
+    points = columns[:, : problem.scales.dimension]
+    return RowOrder.of(problem.domain.mesh.comm, points).sorted(columns)
 
 
-def write_csv(path: Path, table: Mapping[str, Array]) -> None:
-    """Write the table. Rank 0 only.
+def write(comm: MPI.Comm, path: Path, table: Mapping[str, Array]) -> None:
+    """Write the table. Collective.
 
     Args:
+        comm: the ranks.
         path: the file.
-        table: the columns after the first, by part, (m, 12); NaN leaves a cell empty.
+        table: this rank's rows by part, as :func:`rows` gives them.
+
+    Raises:
+        InputError: on all ranks alike: it cannot be written.
     """
-    with path.open("w", newline="", encoding="utf-8") as stream:
-        writer = csv.writer(stream, lineterminator="\n")
-        writer.writerow(COLUMNS)
-        for part, values in table.items():
-            cells: Any = values.tolist()
-            writer.writerows([part, *("" if math.isnan(v) else repr(v) for v in row)] for row in cells)
+    table_file.write(comm, path, COLUMNS, (_cells(part, values) for part, values in table.items()))
+
+
+def _cells(part: str, values: Array) -> Iterator[list[str]]:
+    """The rows of a part as texts."""
+    rows: Any = values.tolist()
+    return ([part, *("" if math.isnan(v) else repr(v) for v in row)] for row in rows)

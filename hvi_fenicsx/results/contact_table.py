@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
+from mpi4py import MPI
 
 from ..certify.contact_state import ContactState
 from ..effects import Direction
 from ..problem.problem import Problem
 from ..report.solution_arrays import PartArrays
 from ..typing import Array
+from . import table_file
 
 COLUMNS = (
     "part",
@@ -64,17 +65,18 @@ def columns(problem: Problem, state: ContactState) -> dict[str, Array]:
     return found
 
 
-def write_csv(path: Path, parts: Mapping[str, PartArrays]) -> None:
-    """Write the table. Rank 0 only.
+def write(comm: MPI.Comm, path: Path, rows: Mapping[str, PartArrays]) -> None:
+    """Write the table. Collective.
 
     Args:
+        comm: the ranks.
         path: the file.
-        parts: the parts of Γc by name, in the order of the table.
+        rows: this rank's stretch of the rows of each part of Γc, by its name, in the order of the table.
+
+    Raises:
+        InputError: on all ranks alike: it cannot be written.
     """
-    with path.open("w", newline="", encoding="utf-8") as stream:
-        writer = csv.writer(stream, lineterminator="\n")
-        writer.writerow(COLUMNS)
-        writer.writerows(cells(parts))
+    table_file.write(comm, path, COLUMNS, (cells({name: own}) for name, own in rows.items()))
 
 
 def cells(parts: Mapping[str, PartArrays]) -> Iterator[tuple[str, ...]]:

@@ -5,7 +5,7 @@ At degree 2 its vertices are the nodes, and its cells and facets the parts of th
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -14,7 +14,7 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from ..certify.contact_state import ContactState
-from ..effects import Direction, SurfaceLoad
+from ..effects import SurfaceLoad
 from ..formula import Formula
 from ..mesh import nodes
 from ..problem import spaces
@@ -23,15 +23,18 @@ from ..report.solution_arrays import LoadArrays, PartArrays, Singles, SolutionAr
 from ..runtime.mpi import agree
 from ..solution import Solution
 from ..typing import Array, Entities, Integers
-from . import arc_length, contact_table
+from . import contact_rows
 
 
-def solution_arrays(solution: Solution, von_mises: Singles | None = None) -> SolutionArrays | None:
+def solution_arrays(
+    solution: Solution, von_mises: Singles | None = None, rows: Mapping[str, PartArrays] | None = None
+) -> SolutionArrays | None:
     """A solution on rank 0; None elsewhere. Collective.
 
     Args:
         solution: what was found.
         von_mises: of the cells that this rank owns, N/m², (c,); left out where it is None.
+        rows: this rank's rows of the parts of Γc, where they are known already.
     """
     problem = solution.problem
     comm, d = problem.domain.mesh.comm, problem.scales.dimension
@@ -47,12 +50,22 @@ def solution_arrays(solution: Solution, von_mises: Singles | None = None) -> Sol
     gathered = {name: _joined(comm, values) for name, values in fields.items()}
     sides = {name: _facets(problem, facets) for name, facets in problem.part_facets.items()}
     loads, regions = _loads(problem), _regions(problem)
-    parts = part_arrays(problem, () if solution.examination is None else solution.examination.states)
+    parts = joined_parts(comm, rows_of_parts(solution) if rows is None else rows)
     if comm.rank:
         return None
     return SolutionArrays(
         **gathered, degree=nodes.degree(problem.space), sides=sides, regions=regions, loads=loads, parts=parts
     )
+
+
+def rows_of_parts(solution: Solution) -> dict[str, PartArrays]:
+    """This rank's rows of the parts of Γc, by name; none where nothing was solved. Collective.
+
+    Args:
+        solution: what was found.
+    """
+    states = () if solution.examination is None else solution.examination.states
+    return contact_rows.of_parts(solution.problem, states)
 
 
 def _by_node(problem: Problem, u: fem.Function) -> Array:
@@ -63,19 +76,18 @@ def _by_node(problem: Problem, u: fem.Function) -> Array:
 
 def _cells(problem: Problem) -> Integers:
     """The cells that this rank owns by their global nodes, at degree 2 their parts, (c, d+1)."""
-    return _globally(problem, nodes.linear_cells(problem.space))
-
-
-def _globally(problem: Problem, vertices: Entities) -> Integers:
-    """Local vertices of any shape by their global numbers."""
-    found = problem.space.dofmap.index_map.local_to_global(np.ascontiguousarray(vertices, dtype=np.int32).ravel())
-    return np.asarray(found, dtype=np.int64).reshape(vertices.shape)
+    return spaces.global_numbers(problem.space, nodes.linear_cells(problem.space))
 
 
 def _facets(problem: Problem, facets: Entities) -> Integers:
     """Local facets by their global nodes, each once and ascending, (k, d); right on rank 0 alone. Collective."""
     corners = nodes.linear_facets(problem.space, facets)
-    return np.unique(np.sort(_joined(problem.domain.mesh.comm, _globally(problem, corners)), axis=1), axis=0)
+    return _distinct(_joined(problem.domain.mesh.comm, spaces.global_numbers(problem.space, corners)))
+
+
+def _distinct(facets: Integers) -> Integers:
+    """Facets each once and ascending, (k, d)."""
+    return np.unique(np.sort(facets, axis=1), axis=0)
 
 
 def _regions(problem: Problem) -> dict[str, Integers]:
@@ -111,52 +123,42 @@ def _load(problem: Problem, facets: Entities, loads: Sequence[SurfaceLoad]) -> L
             traction[:, i] += component.at(problem.positions[local])
         if load.pressure is not None:
             pressure += load.pressure.at(problem.positions[local])
-    vertices, first = np.unique(_joined(comm, _globally(problem, local)), return_index=True)
+    vertices, first = np.unique(_joined(comm, spaces.global_numbers(problem.space, local)), return_index=True)
     return LoadArrays(
         vertices=vertices, traction=_joined(comm, traction)[first], pressure=_joined(comm, pressure)[first]
     )
 
 
 def part_arrays(problem: Problem, states: Sequence[ContactState]) -> dict[str, PartArrays]:
-    """The parts of Γc by name, sorted by it, on rank 0; elsewhere empty. Collective.
+    """The parts of Γc by name, sorted by it, on rank 0; elsewhere this rank's rows of them. Collective.
 
     Args:
         problem: what was solved.
         states: of the parts.
     """
-    ordered = sorted(states, key=lambda state: state.surface.part)
-    found = {state.surface.part: _part(problem, state) for state in ordered}
-    return {name: part for name, part in found.items() if part is not None}
+    return joined_parts(problem.domain.mesh.comm, contact_rows.of_parts(problem, states))
 
 
-def _part(problem: Problem, state: ContactState) -> PartArrays | None:
-    """A part in the order of ``contact.csv``. Collective."""
-    comm, scales, surface = problem.domain.mesh.comm, problem.scales, state.surface
-    columns = {name: _joined(comm, values) for name, values in contact_table.columns(problem, state).items()}
-    vertices = _joined(comm, _globally(problem, surface.blocks))
-    weights = _joined(comm, surface.weights * scales.length ** (scales.dimension - 1))
-    normals = _joined(comm, surface.normals)
-    slips = [law.term for law in state.laws if law.term.direction is Direction.SLIP]
-    each = [term.stretch[:, None] * term.exact.concave.kinks for term in slips]
-    drops = _joined(comm, np.concatenate([np.empty((len(surface.weights), 0)), *each], axis=1))
-    facets = _facets(problem, surface.facets)
-    if scales.dimension == 2:
-        pairs = _joined(comm, arc_length.edges(problem, surface))
-    if comm.rank:
-        return None
-    if scales.dimension == 2:
-        order, s = arc_length.along(np.column_stack([columns["x"], columns["y"]]), vertices, pairs)
-        columns = {name: values[order] for name, values in columns.items()} | {"s": s}
-    else:
-        order = arc_length.lexicographic(np.column_stack([columns[axis] for axis in "xyz"]))
-        columns = {name: values[order] for name, values in columns.items()}
+def joined_parts(comm: MPI.Comm, rows: Mapping[str, PartArrays]) -> dict[str, PartArrays]:
+    """The parts of Γc on rank 0; elsewhere this rank's rows of them. Collective.
+
+    Args:
+        comm: the ranks.
+        rows: of this rank, by part.
+    """
+    return {name: _joined_part(comm, own) for name, own in rows.items()}
+
+
+def _joined_part(comm: MPI.Comm, rows: PartArrays) -> PartArrays:
+    vertices = _joined(comm, rows.vertices)
+    facets = _distinct(_joined(comm, rows.facets))
     return PartArrays(
-        columns=columns,
-        vertices=vertices[order],
+        columns={name: _joined(comm, values) for name, values in rows.columns.items()},
+        vertices=vertices,
         facets=facets[np.isin(facets, vertices).all(axis=1)],
-        weights=weights[order],
-        normals=normals[order],
-        drops=drops[order] * scales.displacement,
+        weights=_joined(comm, rows.weights),
+        normals=_joined(comm, rows.normals),
+        drops=_joined(comm, rows.drops),
     )
 
 

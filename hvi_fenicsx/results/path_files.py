@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,7 +15,7 @@ from ..problem.problem import Problem
 from ..runtime.mpi import on_root
 from ..scene import dump_scene
 from ..solution import Solution
-from . import contact_table, gathering, path_table, vtk_fields
+from . import contact_rows, contact_table, path_table, table_file, vtk_fields
 from .summary import plain, summary
 
 _SHOWN = frozenset({"start", "fold", "jump", "turn", "end"})
@@ -89,8 +88,10 @@ def write(
     """
     problem, comm = solution.problem, solution.problem.domain.mesh.comm
     vtk_fields.write_series(folder / "displacement.pvd", problem, _timed(path, frames))
-    tables = [_contact_rows(one, solution.scene.solver.tolerance) for one in crossings]
-    on_root(comm, lambda: _write_tables(folder, target, solution, path, tables))
+    tables = [rows for one in crossings for rows in _contact_rows(one, solution.scene.solver.tolerance)]
+    on_root(comm, lambda: _write_tables(folder, target, solution, path))
+    if tables:
+        table_file.write(comm, folder / "path_contact.csv", ("row", "factor", *contact_table.COLUMNS), tables)
     return {**summary(solution), **_outcome(path)}
 
 
@@ -99,23 +100,16 @@ def _timed(path: LoadPath, frames: Iterable[tuple[int, fem.Function]]) -> Iterat
     return ((float(row), path.rows[row].factor, u) for row, u in frames)
 
 
-def _contact_rows(crossing: Crossing, tolerance: float) -> list[tuple[Any, ...]]:
-    """The rows of ``path_contact.csv`` of one state; none but on rank 0. Collective."""
+def _contact_rows(crossing: Crossing, tolerance: float) -> list[list[tuple[str, ...]]]:
+    """This rank's rows of ``path_contact.csv`` of one state, by part. Collective."""
     found = certificate.examine(crossing.problem, crossing.u, tolerance)
-    parts = gathering.part_arrays(crossing.problem, found.states)
-    return [(crossing.row, repr(crossing.factor), *cells) for cells in contact_table.cells(parts)]
+    start, parts = (str(crossing.row), repr(crossing.factor)), contact_rows.of_parts(crossing.problem, found.states)
+    return [[(*start, *cells) for cells in contact_table.cells({name: rows})] for name, rows in parts.items()]
 
 
-def _write_tables(
-    folder: Path, target: Path, solution: Solution, path: LoadPath, tables: Sequence[Sequence[tuple[Any, ...]]]
-) -> None:
+def _write_tables(folder: Path, target: Path, solution: Solution, path: LoadPath) -> None:
     path_table.write_csv(folder / "path.csv", path)
     (folder / "scene.toml").write_text(dump_scene(solution.scene, target), encoding="utf-8")
-    if tables:
-        with (folder / "path_contact.csv").open("w", newline="", encoding="utf-8") as stream:
-            writer = csv.writer(stream, lineterminator="\n")
-            writer.writerow(("row", "factor", *contact_table.COLUMNS))
-            writer.writerows(row for table in tables for row in table)
 
 
 def _outcome(path: LoadPath) -> dict[str, Any]:

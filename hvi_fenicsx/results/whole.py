@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import functools
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -57,7 +56,8 @@ class BegunResult:
         with self.timer("output"):
             record = {**summary(solution), **given}
             write_fields(work, solution, self.sigma)
-            self._finish_pictures()
+            if (drawing := self.pictures) is not None:
+                _told("pictures", self.tell, lambda: drawing.finish(_PATIENCE))
             asleep_until_all(comm)
             record["time"] = self.timer.report()
             on_root(comm, lambda: write_record(work, record))
@@ -66,13 +66,6 @@ class BegunResult:
         record["time"] = self.timer.report()
         on_root(comm, lambda: write_record(work, record))
         return record
-
-    def _finish_pictures(self) -> None:
-        if self.pictures is None:
-            return
-        if not _draw_early(self.folder):
-            self.pictures.begin()
-        _told("pictures", self.tell, functools.partial(self.pictures.finish, _PATIENCE))
 
 
 def begin_whole(
@@ -84,8 +77,7 @@ def begin_whole(
 ) -> BegunResult:
     """Write what pictures are drawn from; no estimate of an error is needed. Collective.
 
-    On one rank they are drawn from now on, while the caller goes on. Several ranks leave them the processors at the
-    end: beside them, each message between the ranks would wait for one.
+    They are drawn from now on, by a process that takes what processors the ranks leave.
 
     Args:
         folder: being written.
@@ -100,13 +92,9 @@ def begin_whole(
         write_basis(work, solution, folder.target, sigma)
         record = summary(solution)
         on_root(folder.comm, lambda: write_record(work, record))
-        if pictures is not None and _draw_early(folder):
+        if pictures is not None:
             pictures.begin()
     return BegunResult(folder=folder, timer=timer, tell=tell, pictures=pictures, sigma=sigma)
-
-
-def _draw_early(folder: ResultFolder) -> bool:
-    return folder.comm.size == 1
 
 
 def write_whole(

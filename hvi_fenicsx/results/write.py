@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..problem.stress import von_mises
-from ..report.solution_arrays import FILE, SolutionArrays, save
+from ..report.solution_arrays import FILE, save
 from ..runtime.mpi import on_root
 from ..scene import dump_scene
 from ..solution import Solution
@@ -30,13 +30,16 @@ def write_basis(folder: Path, solution: Solution, target: Path, sigma: Array | N
     """
     comm = solution.problem.domain.mesh.comm
     stress = None if sigma is None else von_mises(sigma).astype(np.float32)
-    arrays = gathering.solution_arrays(solution, stress)
-    on_root(comm, lambda: _write_arrays(folder, arrays))
+    rows = gathering.rows_of_parts(solution)
+    if rows:
+        contact_table.write(comm, folder / "contact.csv", rows)
+    arrays = gathering.solution_arrays(solution, stress, rows)
+    on_root(comm, lambda: None if arrays is None else save(folder / FILE, arrays))
     on_root(comm, lambda: _text(folder / "scene.toml", dump_scene(solution.scene, target)))
 
 
 def write_fields(folder: Path, solution: Solution, sigma: Array | None) -> None:
-    """Write the fields for ParaView (all ranks) and ``boundary.csv`` (rank 0). Collective.
+    """Write the fields for ParaView and ``boundary.csv``. Collective.
 
     Args:
         folder: where to.
@@ -51,16 +54,7 @@ def write_fields(folder: Path, solution: Solution, sigma: Array | None) -> None:
         vtk_fields.write_escape(folder / "displacement.pvd", problem, mode)
     if states:
         vtk_fields.write_contact(folder / "contact.pvd", problem, states)
-    rows = boundary_table.rows(solution)
-    on_root(problem.domain.mesh.comm, lambda: boundary_table.write_csv(folder / "boundary.csv", rows))
-
-
-def _write_arrays(folder: Path, arrays: SolutionArrays | None) -> None:
-    """``solution.npz``, and ``contact.csv`` where there is contact or a law. Rank 0 only."""
-    assert arrays is not None
-    if arrays.parts:
-        contact_table.write_csv(folder / "contact.csv", arrays.parts)
-    save(folder / FILE, arrays)
+    boundary_table.write(problem.domain.mesh.comm, folder / "boundary.csv", boundary_table.rows(solution))
 
 
 def write_record(folder: Path, record: dict[str, Any]) -> None:

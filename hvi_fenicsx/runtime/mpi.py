@@ -40,19 +40,41 @@ def on_root(comm: MPI.Comm, action: Callable[[], T]) -> T:
     Raises:
         HviError: what the action raised; of a file that cannot be read or written, which one and why.
     """
-    error: HviError | None = None
-    result: Any = None
-    if comm.rank == 0:
-        try:
-            result = action()
-        except HviError as caught:
-            error = caught
-        except OSError as caught:
-            error = InputError(f"{caught.filename or 'a file could not be written'}: {caught.strerror or caught}")
-    error, result = comm.bcast((error, result), root=0)
+    error, result = comm.bcast(_tried(action) if comm.rank == 0 else None, root=0)
     if error is not None:
         raise error
     return result
+
+
+def in_turn(comm: MPI.Comm, action: Callable[[], object]) -> None:
+    """Run an action on one rank after the other; none after one that fails, whose error all ranks raise. Collective.
+
+    Args:
+        comm: the ranks.
+        action: what to do; only errors of the program and of the file system may come from it.
+
+    Raises:
+        HviError: what the first action to fail raised; of a file, which one and why.
+    """
+    error: HviError | None = comm.recv(source=comm.rank - 1) if comm.rank else None
+    if error is None:
+        error, _ = _tried(action)
+    if comm.rank + 1 < comm.size:
+        comm.send(error, dest=comm.rank + 1)
+    error = comm.bcast(error, root=comm.size - 1)
+    if error is not None:
+        raise error
+
+
+def _tried(action: Callable[[], Any]) -> tuple[HviError | None, Any]:
+    """The error of an action, or its result; one of the file system in words."""
+    try:
+        return None, action()
+    except HviError as caught:
+        return caught, None
+    except OSError as caught:
+        words = f"{caught.filename or 'a file could not be written'}: {caught.strerror or caught}"
+        return InputError(words), None
 
 
 def on_root_asking(comm: MPI.Comm, action: Callable[[Callable[[], bool]], T], question: Callable[[], bool]) -> T:

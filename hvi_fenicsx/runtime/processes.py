@@ -16,13 +16,17 @@ import tempfile
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from types import FrameType
+from typing import TypeVar
 
 from ..errors import InputError
 
+T = TypeVar("T")
 PYTHON = (sys.executable, "-P")
 """Python as our children run it: the current folder is not on its path."""
 STOP = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 """The signals by which a user, a batch system or a terminal that is closed asks a program to stop."""
+_NICENESS = 10
+"""Of a process that stands back: it gets a tenth of the time of one that does not."""
 _PR_SET_PDEATHSIG = 1
 """prctl(2)."""
 _MPI = ("OMPI_", "PMIX_", "PRTE_", "PMI_", "HYDRA_", "MPI_LOCAL")
@@ -95,6 +99,9 @@ def ensure_home() -> None:
 def catch(numbers: Iterable[signal.Signals], handler: Callable[[int, FrameType | None], None]) -> None:
     """Install a handler of signals; SIGHUP stays ignored where the caller has us ignore it, as nohup does.
 
+    A KeyboardInterrupt that it raises where nobody catches it, outside of :func:`stoppable`, ends the process by the
+    signal itself: Python would end it by SIGINT, with a traceback.
+
     Args:
         numbers: of the signals.
         handler: called for each.
@@ -105,12 +112,40 @@ def catch(numbers: Iterable[signal.Signals], handler: Callable[[int, FrameType |
         try:
             handler(number, frame)
         except KeyboardInterrupt:
+            if not _is_stoppable(frame):
+                signal.signal(number, signal.SIG_DFL)
+                signal.raise_signal(number)
             _RAISED.append(number)
             raise
 
     for number in numbers:
         if number != signal.SIGHUP or signal.getsignal(number) is not signal.SIG_IGN:
             signal.signal(number, caught)
+
+
+def stoppable(action: Callable[[], T]) -> T:
+    """Call an action; signals that are caught may raise KeyboardInterrupt from it, which the caller must catch.
+
+    Raises:
+        KeyboardInterrupt: a signal came.
+    """
+    return action()
+
+
+def _is_stoppable(frame: FrameType | None) -> bool:
+    """Whether a KeyboardInterrupt raised in a frame passes :func:`stoppable`, so that somebody catches it."""
+    while frame is not None and frame.f_code is not stoppable.__code__:
+        frame = frame.f_back
+    return frame is not None
+
+
+def forget_interrupt() -> None:
+    """Have the process end with its exit code after a KeyboardInterrupt that was caught.
+
+    Python remembers one that has passed an ``exec`` of text, as in the making of a dataclass, and ends a program that
+    ``-m`` has started by SIGINT, whoever caught it. The next such ``exec`` forgets it (CPython, ``run_eval_code_obj``).
+    """
+    exec("")
 
 
 def stop_asked() -> bool:
@@ -170,6 +205,20 @@ def die_with_parent(number: signal.Signals = signal.SIGTERM) -> None:
     """
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, number)
+
+
+def stand_back() -> None:
+    """Have this process take what processors the ranks leave: any of the machine's, and after them.
+
+    An mpirun may bind each rank to a processor of its own, to which its children would be bound as well. Between
+    sessions it is the niceness of the session that counts where Linux groups processes so (sched(7), "autogroup").
+    """
+    os.nice(_NICENESS)
+    if sys.platform == "linux":
+        with contextlib.suppress(OSError):
+            os.sched_setaffinity(0, range(os.cpu_count() or 1))
+        with contextlib.suppress(OSError):
+            Path("/proc/self/autogroup").write_text(str(_NICENESS), encoding="ascii")
 
 
 def end(child: subprocess.Popen[str], patience: float) -> None:

@@ -569,7 +569,7 @@ def test_pieces_are_counted_alike_in_the_table_and_on_the_page(tmp_path: Path) -
     part = load(folder / FILE).parts["floor"]
     part = replace(part, columns={**part.columns, "branch_t": np.array([0.0, 2.0, 2.0, -1.0, 0.0])})
     change(folder, parts={"floor": part})
-    contact_table.write_csv(tmp_path / "contact.csv", {"floor": part})
+    contact_table.write(MPI.COMM_SELF, tmp_path / "contact.csv", {"floor": part})
     with (tmp_path / "contact.csv").open(encoding="utf-8") as stream:
         table = Counter(int(row["branch_t"]) for row in csv.DictReader(stream))
     assert table == {0: 2, 2: 2, -1: 1}

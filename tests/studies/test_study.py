@@ -78,7 +78,7 @@ def test_interpolation_between_nested_meshes_is_the_ladders_prolongation(shape: 
         fem.functionspace(s.domain.build(MPI.COMM_SELF, s.dimension).mesh, ("Lagrange", 1, (s.dimension,)))
         for s in (fine, coarse)
     ]
-    step = NestedGridTransfer(size, cells).prolongation(*spaces)
+    step = NestedGridTransfer(size, coarse.domain.cells).prolongation(*spaces)
     d = fine.dimension
     points = [s.tabulate_dof_coordinates()[:, :d] for s in spaces]
     source = SolutionFields(points[1], spaces[1].dofmap.list.astype(np.int64), np.zeros_like(points[1]), {})

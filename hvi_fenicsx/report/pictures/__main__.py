@@ -55,6 +55,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     signal.signal(signal.SIGTERM, _terminated)
     processes.die_with_parent()  # or it would write into the folder of the next run
+    processes.stand_back()  # the ranks may still be computing
     if options.when_told is not None and not _told(options.when_told):
         return 1
     try:

@@ -1,0 +1,52 @@
+"""Tables that all ranks write are those that one rank would write from all rows, byte by byte; none holds all rows."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from runs import RANKS, on_ranks
+
+SAMPLES = 32
+
+
+@pytest.fixture(scope="module", params=RANKS)
+def ranks(request: pytest.FixtureRequest) -> int:
+    return int(request.param)
+
+
+@pytest.fixture(scope="module")
+def found(ranks: int) -> Any:
+    """What ``table_ranks.py`` tells."""
+    return on_ranks(ranks, "tests/results/table_ranks.py")
+
+
+def test_a_table_has_the_bytes_of_one_that_is_gathered(found: Any) -> None:
+    wanted = dict.fromkeys(found["tables"], (True, True))
+    assert {name: (table["same"], table["ordered"]) for name, table in found["tables"].items()} == wanted
+
+
+def test_no_rank_holds_the_rows_of_all_also_where_one_had_none(found: Any, ranks: int) -> None:
+    for table in found["tables"].values():
+        rows = sum(table["had"])
+        assert sum(table["has"]) == rows > 0
+        assert max(table["has"]) <= rows / ranks + 3  # three more for each part
+    if ranks == 3:
+        assert any(0 in table["had"] for table in found["tables"].values())
+
+
+def test_rows_are_sorted_over_all_ranks_in_equal_stretches(found: Any, ranks: int) -> None:
+    """Equal keys stay together: 729 kinds of them, so that a stretch may be longer by one kind."""
+    for same, longest, rows in found["orders"].values():
+        assert same
+        assert longest <= rows / ranks * (1 + ranks / SAMPLES) + max(2, 3 * rows / 729)
+
+
+def test_where_one_rank_cannot_write_all_are_told_and_later_ones_do_not_begin(found: Any, ranks: int) -> None:
+    acted, words = found["failing"]
+    assert acted == [1, 1, 0][:ranks]
+    assert words == ["contact.csv: No space left on device"] * ranks
+
+
+def test_pictures_are_begun_before_the_result_is_finished(found: Any) -> None:
+    assert found["begun"]
