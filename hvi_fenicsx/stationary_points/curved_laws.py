@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -47,7 +48,7 @@ class CurvedLaws:
         near, start, before = self.near, x, np.inf
         size = float(np.max(np.abs(near.force), initial=0.0)) or 1.0
         for _ in range(MOST_STEPS):
-            force, allowed = near.force - near.stiffness @ x, self._subdifferential(x)
+            force, allowed = near.force - near.stiffness @ x, self.subdifferential(x)
             rest = force - np.clip(force, allowed.low, allowed.high)
             missing = float(np.max(np.abs(rest), initial=0.0))
             if missing <= stationarity.ACCURACY * size and missing >= FASTER * before:
@@ -110,6 +111,60 @@ class CurvedLaws:
             np.add.at(sizes, at, np.abs(factors) * (np.abs(rises) + np.abs(falls)))
         return total, sizes
 
+    def sides(self, x: Array) -> tuple[Array, Array]:
+        """The forces of the laws just before and just behind displacements, (n,) each.
+
+        Args:
+            x: displacements, (n,).
+        """
+        before, after = np.zeros((2, self.near.size))
+        for bonds in self.problem.bonds:
+            argument, factors = bonds.argument(x), bonds.weights * bonds.signs[:, 0]
+            ends = [factors * side(argument) for side in (bonds.law.left, bonds.law.right)]
+            there = factors > 0.0
+            np.add.at(before, bonds.unknowns[:, 0], np.where(there, *ends))
+            np.add.at(after, bonds.unknowns[:, 0], np.where(there, *ends[::-1]))
+        return before, after
+
+    def most_slopes(self, low: Array, high: Array) -> Array:
+        """Upper bounds of the slopes of the laws' graphs off the kinks, (k, n).
+
+        Args:
+            low: of k intervals for each unknown, (k, n).
+            high: of them, (k, n).
+        """
+        most = np.zeros(low.shape)
+        for bonds in self.problem.bonds:
+            at, signs = bonds.unknowns[:, 0], bonds.signs[:, 0]
+            ends = np.sort([signs * low[:, at], signs * high[:, at]], axis=0)
+            last = bonds.law.slope_range(*ends.reshape(2, -1))[1].reshape(len(low), -1)
+            np.add.at(most.T, at, (bonds.weights * signs**2 * last).T)
+        return most
+
+    @cached_property
+    def convex_kinks(self) -> Array:
+        """Displacements at which a law of an unknown jumps upwards; infinite where it has fewer than others, (k, n)."""
+        found: list[list[float]] = [[] for _ in range(self.near.size)]
+        for bonds in self.problem.bonds:
+            for i, sign in zip(bonds.unknowns[:, 0], bonds.signs[:, 0], strict=True):
+                found[i] += [float(kink / sign) for kink in bonds.law.convex.kinks]
+        most = max(map(len, found))
+        return np.array([[*kinks, *[np.inf] * (most - len(kinks))] for kinks in found]).T
+
+    def upward_jumps(self, x: Array) -> Array:
+        """How far the forces of the laws jump upwards at places, (k, n); zero off the kinks.
+
+        Args:
+            x: k places for each unknown, (k, n).
+        """
+        total = np.zeros(x.shape)
+        for bonds in self.problem.bonds:
+            at, signs, part = bonds.unknowns[:, 0], bonds.signs[:, 0], bonds.law.convex
+            for kink, jump in zip(part.kinks, part.jumps, strict=True):
+                there = x[:, at] == kink / signs
+                np.add.at(total.T, at, np.where(there, bonds.weights * np.abs(signs) * jump, 0.0).T)
+        return total
+
     def _found(self, x: Array, allowed: Subdifferential) -> StationaryPoint:
         kind = stationarity.kind_at(self.near, x, allowed)
         return StationaryPoint(x=x, energy=self.problem.energy(x), kind=kind, isolated=True)
@@ -124,8 +179,12 @@ class CurvedLaws:
             return None
         return step
 
-    def _subdifferential(self, x: Array) -> Subdifferential:
-        """What the laws and bounds allow at a point."""
+    def subdifferential(self, x: Array) -> Subdifferential:
+        """What the laws and bounds allow at a point.
+
+        Args:
+            x: displacements, (n,).
+        """
         close = stationarity.ACCURACY * (1.0 + float(np.max(np.abs(x), initial=0.0)))
         low, high, slope = np.zeros((3, self.near.size))
         falls = np.zeros(self.near.size, dtype=np.bool_)

@@ -14,6 +14,7 @@ from . import systematic
 from .all_points import Enumeration
 from .boxes import fresh_box
 from .found import Found, Keep, Saved, Start, Wanted, forget
+from .landscapes import CurvedLandscape, Landscape, PolylineLandscape
 from .length_kinds import kind_of
 from .lowest import LowestSearch, Progress
 from .passes import passes
@@ -238,8 +239,13 @@ def _all(task: _Task) -> Found:
         nodes=search.cells,
         reason=_in_words(points) if complete else f"{len(points)} found, and {search.open_cells} cells are open",
         left={} if complete else _left_of_all(search),
-        passes=passes(task.problem, points) if complete and task.wanted.curved is None else (),
+        passes=passes(_landscape(task), points) if complete else (),
     )
+
+
+def _landscape(task: _Task) -> Landscape:
+    curved = task.wanted.curved
+    return PolylineLandscape(task.problem) if curved is None else CurvedLandscape(curved)
 
 
 def _without_proof(task: _Task) -> Found:
