@@ -19,7 +19,7 @@ from .length_kinds import kind_of
 from .lowest import LowestSearch, Progress
 from .passes import passes
 from .point_list import PointList, StationaryPoint
-from .progress_words import Clock, all_in_words, lowest_in_words
+from .progress_words import Clock, all_in_words, counted, lowest_in_words
 from .scalar_problem import ScalarProblem
 from .stationarity import Kind
 
@@ -136,7 +136,7 @@ def begun(problem: ScalarProblem, gap: float, stop: Callable[[], bool], report: 
         search.start()
     except SolverError:
         return None
-    search.run(stop, lambda now: report(f"first search: gap {now.gap:.1e}, {now.boxes} boxes"))
+    search.run(stop, lambda now: report(f"first search: gap {now.gap:.1e}, {counted(now.boxes, 'box', 'boxes')}"))
     low, high = search.region
     return Start(x=search.x, energy=search.upper, low=low, high=high)
 
@@ -160,7 +160,11 @@ def _proof(search: LowestSearch, wanted: float) -> Found:
         lower_bound=lower,
         proven=proven,
         nodes=now.boxes,
-        reason=("the lowest energy, proven" if proven else f"a gap of {open_gap:.1e} is open in {now.waiting} boxes"),
+        reason=(
+            "the lowest energy, proven"
+            if proven
+            else f"a gap of {open_gap:.1e} is open in {counted(now.waiting, 'box', 'boxes')}"
+        ),
         left=left,
     )
 
@@ -237,7 +241,7 @@ def _all(task: _Task) -> Found:
         lower_bound=bound,
         proven=complete,
         nodes=search.cells,
-        reason=_in_words(points) if complete else f"{len(points)} found, and {search.open_cells} cells are open",
+        reason=_in_words(points) if complete else _open_in_words(search),
         left={} if complete else _left_of_all(search),
         passes=passes(_landscape(task), points) if complete else (),
     )
@@ -315,6 +319,16 @@ def _in_words(points: tuple[StationaryPoint, ...]) -> str:
     return f"all equilibria, proven: {len(points)}" + (
         f", of these {continua} stand for a continuum" if continua else ""
     )
+
+
+def _open_in_words(search: Enumeration) -> str:
+    """What is found, and why it is not proven that this is all."""
+    told = f"{len(search.points)} found, and {counted(search.open_cells, 'cell is', 'cells are')} open"
+    if search.waiting:
+        return told
+    continua = sum(not p.isolated for p in search.points)
+    rows = f", of these {continua} stand for a continuum" if continua else ""
+    return f"{told}{rows}: too small to be divided, where points nearly meet or are not isolated"
 
 
 def _stacked(boxes: list[tuple[Array, Array, Array]]) -> dict[str, Array]:
