@@ -73,7 +73,8 @@ def lowest_in_words(now: Progress, energies: Unit, clock: Clock) -> str:
     """
     low, high = (f"{bound * energies.size:.8g}" for bound in (now.lower, now.upper))
     ends = f"between {low} and {high} {energies.name}".rstrip()
-    return f"lowest: {ends}, gap {now.gap:.1e}, {counted(now.boxes, 'box', 'boxes')}, {now.waiting} open{clock.to_go(now.share)}"
+    boxes = counted(now.boxes, "box", "boxes")
+    return f"lowest: {ends}, gap {now.gap:.1e}, {boxes}, {now.waiting} open{clock.to_go(now.share)}"
 
 
 def certified_in_words(done: int, count: int, clock: Clock) -> str:

@@ -251,7 +251,7 @@ def test_two_bodies_at_a_fold_together_end_the_search_with_words() -> None:
 def test_a_block_on_the_straight_tail_of_a_curved_law_is_reported_as_a_continuum() -> None:
     """The load is the residual traction: the block may stand anywhere from the end of the curve to the bound."""
     found = searched(condensed.problem([[0.0]], [1.0], condensed.bonds(LAWS["paper"], [0]), lower=-5.0, upper=5.0))
-    assert "stand for a continuum" in found.reason
+    assert "1 stands for a continuum" in found.reason
     assert [p.isolated for p in found.points] == [False]
 
 
