@@ -149,5 +149,10 @@ class Enumeration:
         self._enter(self._cells.point(x))
 
     def _enter(self, point: StationaryPoint | None) -> None:
-        if point is not None and not self.points.has(point.x):
+        if point is None or self.points.has(point.x):
+            return
+        k = self.points.nearest(point.x)
+        if k is None or not self._cells.joined(self.points.listed[k].x, point.x):
             self.points.add(point)
+        elif not point.isolated:
+            self.points.listed[k] = replace(self.points.listed[k], isolated=False)

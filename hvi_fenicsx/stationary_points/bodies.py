@@ -20,7 +20,8 @@ from .found import Found, Keep, Saved, Wanted, forget
 from .point_list import StationaryPoint
 from .progress_words import Unit
 from .scalar_problem import ScalarProblem
-from .search import begun, find
+from .search import find
+from .search_lowest import begun
 
 COARSE_GAP = 1e-3
 """Gap of the first search where laws are curved, from which the error of their polylines is chosen."""

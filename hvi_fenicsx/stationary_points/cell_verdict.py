@@ -46,3 +46,11 @@ class LawsOfCells(Protocol):
         Args:
             x: the place, (n,).
         """
+
+    def joined(self, x: Array, y: Array) -> bool:
+        """Whether two points cannot be told apart, or are parts of one continuum: all between is in balance.
+
+        Args:
+            x: a stationary point, (n,).
+            y: another one, (n,).
+        """

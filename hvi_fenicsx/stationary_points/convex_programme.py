@@ -49,15 +49,17 @@ class Chains:
     high: Array
 
     @classmethod
-    def of(cls, chains: Sequence[Sequence[Arc]]) -> Chains:
+    def of(cls, chains: Sequence[Sequence[Arc] | Array]) -> Chains:
         """Stack chains, one of each unknown.
 
         Args:
-            chains: with finite ends.
+            chains: with finite ends; as arcs, or as arrays of these (k, 6).
         """
         counts = np.array([len(c) for c in chains])
         m = int(counts.max())
-        table = np.array([[*c, *[c[-1]] * (m - len(c))] for c in chains], dtype=float)
+        table = np.empty((len(chains), m, 6))
+        for rows, arcs in zip(table, chains, strict=True):
+            rows[: len(arcs)], rows[len(arcs) :] = arcs, arcs[-1]
         low, high, anchors, values, tractions, slopes = np.moveaxis(table, 2, 0)
         padded = np.arange(m) >= counts[:, None]
         start = np.where(padded, np.inf, tractions + slopes * (low - anchors))

@@ -19,11 +19,20 @@ from .boxes import Box, clipped, fresh_box
 from .cell_parts import at_bounds
 from .cell_verdict import Verdict
 from .curved_laws import CurvedLaws
+from .linear_points import is_singular, some_solution
 from .point_list import PointList, StationaryPoint
 from .regular_slopes import is_regular
 
 SMALLEST = 1e-9
 """A cell whose sides are all shorter than this share of the displacements is not divided."""
+SMALL = 1e-2
+"""A cell shorter than this share of the displacements on a row of points in balance is not divided,"""
+TINY = 1e-6
+"""and one shorter than this is not where S plus slopes is next to singular."""
+STRAIGHT = 1e-13
+"""A range of slopes below this share of them is one slope."""
+SHARES = (0.2, 0.5, 0.8)
+"""Places between two points at which the balance is looked at."""
 MOST_STEPS = 10
 """Steps of Krawczyk's operator on a cell."""
 SHORTER = 0.7
@@ -64,7 +73,7 @@ class CurvedCells:
         if smaller is None:
             return Verdict()
         if not self._is_regular(smaller.low, smaller.high):
-            return self._left(smaller)
+            return self._singular(smaller)
         if self._nearest_is_alone(smaller, known):
             return Verdict()
         for start in (0.5 * (smaller.low + smaller.high), smaller.x):
@@ -72,6 +81,50 @@ class CurvedCells:
             if point is not None and self._is_alone(smaller, point.x):
                 return Verdict(points=[point])
         return self._left(smaller)
+
+    def joined(self, x: Array, y: Array) -> bool:
+        """Whether two points cannot be told apart, or are parts of one continuum: all between is in balance.
+
+        Args:
+            x: a stationary point, (n,).
+            y: another one, (n,).
+        """
+        return all(self._laws.is_balanced(x + share * (y - x)) for share in SHARES)
+
+    def _singular(self, cell: Box) -> Verdict:
+        """What is known of a cell that may have several points."""
+        free = np.flatnonzero(cell.low < cell.high)
+        least, most = (ends[free] for ends in self._laws.slopes(cell.low, cell.high))
+        matrix = self._near.stiffness[np.ix_(free, free)] + np.diag(np.where(np.isfinite(least), least, 0.0))
+        straight = most - least <= STRAIGHT * np.maximum(np.abs(least), np.abs(most))
+        if np.all(straight) and is_singular(matrix):
+            return self._straight(cell, free, matrix)
+        return Verdict(undecided=True, points=points) if (points := self._degenerate(cell)) else self._left(cell)
+
+    def _straight(self, cell: Box, free: Integers, matrix: Array) -> Verdict:
+        """The continuum of a cell in which all tractions are straight, and S with their slopes is singular."""
+        middle = 0.5 * (cell.low + cell.high)
+        right = matrix @ middle[free] + self._rest(middle)[0][free]
+        inner = some_solution(matrix, right, np.column_stack([cell.low, cell.high])[free])
+        if inner is None:
+            return Verdict()
+        middle[free] = inner
+        point = self._laws.point(middle)
+        return Verdict() if point is None else Verdict(points=[replace(point, isolated=False)])
+
+    def _degenerate(self, cell: Box) -> list[StationaryPoint]:
+        """A point in a small cell at which S plus slopes is next to singular, if dividing the cell tells no more."""
+        wide = float(np.max(cell.high - cell.low))
+        size = 1.0 + float(np.max(np.abs([cell.low, cell.high])))
+        if wide > SMALL * size or (point := self._laws.point(0.5 * (cell.low + cell.high))) is None:
+            return []
+        near = np.all((point.x >= cell.low - wide) & (point.x <= cell.high + wide))
+        if not near or (way := self._laws.soft_direction(point.x)) is None:
+            return []
+        row = any(self._laws.is_balanced(point.x + step * way) for step in (wide, -wide))
+        if row:
+            return [replace(point, isolated=False)]
+        return [point] if wide <= TINY * size else []
 
     def _left(self, cell: Box) -> Verdict:
         guide = self._guide(cell)

@@ -77,7 +77,7 @@ class Found:
         reason: how it ended, for people.
         left: what is needed to go on; empty if there is nothing left.
         passes: the saddles that join two of the minimisers, numbers of the points; none where points may be
-            missing, or laws are curved.
+            missing.
     """
 
     points: tuple[StationaryPoint, ...]

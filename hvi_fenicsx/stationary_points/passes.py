@@ -2,7 +2,8 @@
 
 A saddle with one unstable direction is a pass: on a drop of one law with all other unknowns at a minimum, or with one
 negative eigenvalue. From it the descent leads to a minimiser on each side. Between two points of a descent the energy
-is below that of the first, because it is below a convex majorant that falls. So two minimisers that a pass joins are
+is below that of the first, because it is below a convex majorant that falls; a descent ends where the energy is convex
+between it and a minimiser. So two minimisers that a pass joins are
 joined by a way whose highest energy is that of the pass. Where all equilibria are known and isolated, the lowest such
 way is the least barrier (mountain pass theorem: Ambrosetti and Rabinowitz 1973, Journal of Functional Analysis 14).
 """
@@ -15,17 +16,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..typing import Array
-from .descent import descend
+from .landscapes import Landscape
 from .point_list import StationaryPoint
-from .scalar_problem import ScalarProblem
-from .stationarity import Kind, unstable_directions
+from .stationarity import Kind
 
-MOST_DESCENTS = 10
+MOST_DESCENTS = 60
 """Descents that are made one after the other, each of several steps."""
 STEPS = tuple(10.0**-k for k in range(2, 10))
 """Lengths of the first step off a saddle, relative to the displacements; the first that lowers the energy is taken."""
+SHARES = (0.25, 0.5, 0.75, 1.0)
+"""Shares of this step at which the energy must be lower than at the saddle."""
 NEAR = 1e-4
-"""A descent that ends nearer than this share of the displacements to a minimiser has reached it."""
+"""A descent that ends nearer than this share of the displacements to a minimiser has reached it, too."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,47 +43,57 @@ class Pass:
     minimisers: tuple[int, int]
 
 
-def passes(problem: ScalarProblem, points: Sequence[StationaryPoint]) -> tuple[Pass, ...]:
+def passes(landscape: Landscape, points: Sequence[StationaryPoint]) -> tuple[Pass, ...]:
     """The passes between different minimisers, by energy.
 
     A way over several passes may be lower than the pass that joins its ends.
 
     Args:
-        problem: the problem.
+        landscape: the energy.
         points: stationary points, by energy.
     """
     found = []
     for number, point in enumerate(points):
-        if point.kind is not Kind.SADDLE or (way := _way(problem, point.x)) is None:
+        if point.kind is not Kind.SADDLE or (way := _way(landscape, point.x)) is None:
             continue
-        ends = sorted(_end(problem, points, point, sign * way) for sign in (-1.0, 1.0))
+        ends = sorted(_end(landscape, points, point, sign * way) for sign in (-1.0, 1.0))
         if -1 < ends[0] < ends[1]:
             found.append(Pass(saddle=number, minimisers=(ends[0], ends[1])))
     return tuple(found)
 
 
-def _way(problem: ScalarProblem, x: Array) -> Array | None:
+def _way(landscape: Landscape, x: Array) -> Array | None:
     """The unstable direction of a saddle, with largest component 1; None where there are several, or none is known."""
-    directions = unstable_directions(problem, x)
+    directions = landscape.unstable_directions(x)
     if directions is None or directions.shape[1] != 1:
         return None
     way = directions[:, 0]
     return np.asarray(way / np.max(np.abs(way)))
 
 
-def _end(problem: ScalarProblem, points: Sequence[StationaryPoint], saddle: StationaryPoint, way: Array) -> int:
+def _end(landscape: Landscape, points: Sequence[StationaryPoint], saddle: StationaryPoint, way: Array) -> int:
     """The number of the minimiser that a descent reaches; -1 where it reaches none."""
-    low, high = np.maximum(problem.lower, -problem.far), np.minimum(problem.upper, problem.far)
     size = 1.0 + float(np.max(np.abs(saddle.x), initial=0.0))
-    starts = (np.clip(saddle.x + step * size * way, low, high) for step in STEPS)
-    start = next((x for x in starts if problem.energy(x) < saddle.energy), None)
-    if start is None:
+    x = _start(landscape, saddle, size * way)
+    minimisers = [i for i, p in enumerate(points) if p.kind is Kind.MINIMISER]
+    if x is None or not minimisers:
         return -1
+    places, before = np.array([points[i].x for i in minimisers]), None
     for _ in range(MOST_DESCENTS):
-        x, _ = descend(problem, low, high, start)
-        if np.array_equal(x, start):
+        distances = np.max(np.abs(places - x), axis=1)
+        k = int(np.argmin(distances))
+        if landscape.is_convex(np.minimum(x, places[k]), np.maximum(x, places[k])):
+            return minimisers[k]
+        if before is not None and np.array_equal(x, before):
             break
-        start = x
-    distances = [np.max(np.abs(p.x - start)) if p.kind is Kind.MINIMISER else np.inf for p in points]
-    nearest = int(np.argmin(distances))
-    return nearest if distances[nearest] < NEAR * size else -1
+        before, x = x, landscape.lower(x)
+    return minimisers[k] if distances[k] < NEAR * size else -1
+
+
+def _start(landscape: Landscape, saddle: StationaryPoint, way: Array) -> Array | None:
+    """A place beside a saddle to which the energy falls; None if none is found."""
+    for step in STEPS:
+        places = [np.clip(saddle.x + share * step * way, *landscape.ends) for share in SHARES]
+        if all(landscape.energy(x) < saddle.energy for x in places):
+            return places[-1]
+    return None

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 from scipy.linalg import LinAlgError, cholesky
-from scipy.optimize import linprog
 
 from ..typing import Array, Integers
 from . import stationarity
@@ -12,14 +11,13 @@ from .boxes import Box
 from .cell_parts import at_bounds
 from .cell_verdict import Verdict
 from .convex_programme import Chains, minimise
+from .linear_points import is_singular, some_solution
 from .point_list import SAME, PointList, StationaryPoint
 from .relaxation import envelopes
 from .scalar_problem import ScalarProblem
 
 REGULAR = 1e-6
 """Least pivot, relative to the largest, of a matrix that counts as positive definite."""
-CONDITION = 1e12
-"""Condition number beyond which a linear system is singular."""
 
 
 class PolylineCells:
@@ -68,6 +66,15 @@ class PolylineCells:
         kind = stationarity.kind(problem, x)
         return StationaryPoint(x=x, energy=problem.energy(x), kind=kind, isolated=isolated)
 
+    def joined(self, x: Array, y: Array) -> bool:
+        """Whether two points are parts of one continuum; this is not known here, where each piece has one point.
+
+        Args:
+            x: a stationary point, (n,).
+            y: another one, (n,).
+        """
+        return False
+
     def _done(self, x: Array, *, isolated: bool = True) -> Verdict:
         """Nothing is left of a cell but perhaps this point."""
         point = self.point(x, isolated=isolated)
@@ -86,25 +93,15 @@ class PolylineCells:
         held = np.setdiff1d(rows, free)
         right = problem.force[free] - offset[free] - problem.stiffness[np.ix_(free, held)] @ cell.low[held]
         x, low, high = cell.low.copy(), cell.low[free], cell.high[free]
-        if np.linalg.cond(matrix) < CONDITION:
+        if not is_singular(matrix):
             x[free] = np.linalg.solve(matrix, right)
             near = SAME * (1.0 + np.abs(x[free]))
             inside = np.all((x[free] >= low - near) & (x[free] <= high + near))
             return self._done(x) if inside else Verdict()
-        if (inner := _some_solution(matrix, right, np.column_stack([low, high]))) is None:
+        if (inner := some_solution(matrix, right, np.column_stack([low, high]))) is None:
             return Verdict()
         x[free] = inner
         return self._done(x, isolated=False)
-
-
-def _some_solution(matrix: Array, right: Array, sides: Array) -> Array | None:
-    """A solution of a singular linear system within intervals (n, 2), halfway between two; None if there is none."""
-    size, n = float(np.abs(matrix).max()) or 1.0, len(right)
-    ends = [
-        linprog(np.full(n, sign), A_eq=matrix / size, b_eq=right / size, bounds=sides, method="highs")
-        for sign in (1.0, -1.0)
-    ]
-    return None if any(e.status != 0 for e in ends) else np.asarray(0.5 * (ends[0].x + ends[1].x))
 
 
 def _positive(matrix: Array) -> bool:

@@ -52,6 +52,17 @@ class Clock:
         return f", about {(time.monotonic() - self.start) * share / done:.0f} s to go"
 
 
+def counted(count: int, one: str, several: str) -> str:
+    """A number with the words for what is counted.
+
+    Args:
+        count: the number.
+        one: words for one.
+        several: words for another number.
+    """
+    return f"{count} {one if count == 1 else several}"
+
+
 def lowest_in_words(now: Progress, energies: Unit, clock: Clock) -> str:
     """How far a search for the lowest energy is.
 
@@ -62,7 +73,8 @@ def lowest_in_words(now: Progress, energies: Unit, clock: Clock) -> str:
     """
     low, high = (f"{bound * energies.size:.8g}" for bound in (now.lower, now.upper))
     ends = f"between {low} and {high} {energies.name}".rstrip()
-    return f"lowest: {ends}, gap {now.gap:.1e}, {now.boxes} boxes, {now.waiting} open{clock.to_go(now.share)}"
+    boxes = counted(now.boxes, "box", "boxes")
+    return f"lowest: {ends}, gap {now.gap:.1e}, {boxes}, {now.waiting} open{clock.to_go(now.share)}"
 
 
 def certified_in_words(done: int, count: int, clock: Clock) -> str:
@@ -84,5 +96,5 @@ def all_in_words(search: Enumeration, clock: Clock) -> str:
         clock: since it began.
     """
     share = sum(cell.share for cell in search.waiting)
-    found = f"{len(search.points)} found, {search.cells} cells, {len(search.waiting)} open"
+    found = f"{len(search.points)} found, {counted(search.cells, 'cell', 'cells')}, {len(search.waiting)} open"
     return f"all equilibria: {found}{clock.to_go(share)}"

@@ -9,8 +9,9 @@ import numpy as np
 
 from ..laws.arc import Arc
 from ..typing import Array, Integers, Mask
+from . import envelopes as convex
 from . import motions
-from .arcs import envelope
+from .arcs import arcs_of
 from .boxes import Box
 from .convex_programme import Chains, minimise
 from .curvature import Curvature, CurvatureShare
@@ -30,7 +31,7 @@ LEAST_WEIGHT = 0.1
 """Share of the weights of D that does not follow from where envelopes were not tight."""
 
 
-def envelopes(problem: ScalarProblem, low: Array, high: Array, added: Array) -> list[list[Arc]]:
+def envelopes(problem: ScalarProblem, low: Array, high: Array, added: Array) -> list[Array]:
     """The convex envelopes of all laws with ½ d t² added, on a box; those of lengths reach to zero, and never fall.
 
     Args:
@@ -39,9 +40,8 @@ def envelopes(problem: ScalarProblem, low: Array, high: Array, added: Array) -> 
         high: of the box, (n + m,), finite.
         added: d, (n + m,).
     """
-    sides = zip(problem.chains, map(float, low), map(float, high), map(float, added), strict=True)
-    chains = [envelope(c, begin, end, d) for c, begin, end, d in sides]
-    return [*chains[: problem.size], *map(_risen, chains[problem.size :])]
+    chains = convex.envelopes(problem.arcs, low, high, added)
+    return [*chains[: problem.size], *(np.array(_risen(arcs_of(c))) for c in chains[problem.size :])]
 
 
 def _risen(arcs: list[Arc]) -> list[Arc]:
@@ -115,7 +115,8 @@ class Relaxation:
         curvature, wanted = self._curvature(box, undecided, weights, part, lost)
         chains = envelopes(problem, box.low, box.high, curvature.added)
         lent = self.lent(box, curvature)
-        x, value, bound, steps = self._minimised(box, curvature, lent, chains)
+        stack = Chains.of(chains)
+        x, value, bound, steps = self._minimised(box, curvature, lent, chains, stack)
         self.programmes += steps
         gaps = np.zeros(len(box.motion_low))
         gaps[np.flatnonzero(curvature.lent)] = _above(lent.gaps(x), TIGHT * problem.energy_size(x))
@@ -125,7 +126,7 @@ class Relaxation:
             value=value + problem.constant,
             bound=max(box.bound, bound + problem.constant),
         )
-        return self._examined(box, x, Chains.of(chains), curvature, undecided), curvature
+        return self._examined(box, x, stack, curvature, undecided), curvature
 
     def curvature(self, box: Box, part: float) -> Array:
         """The diagonal D of a box, (n + m,).
@@ -165,17 +166,17 @@ class Relaxation:
         return Lent(shapes=self._share.shapes[:, used], stiffness=curvature.lent[used], low=ends[0], high=ends[1])
 
     def _minimised(
-        self, box: Box, curvature: Curvature, lent: Lent, chains: list[list[Arc]]
+        self, box: Box, curvature: Curvature, lent: Lent, chains: list[Array], stack: Chains
     ) -> tuple[Array, float, float, int]:
         """The minimiser, two lower bounds, that of the point and a better one, and the steps that it took."""
         problem = self.problem
         a = problem.stiffness - np.diag(problem.diagonal(curvature.added)) + lent.matrix
         b = problem.force + lent.force
         if not len(problem.lengths):
-            found = minimise(a, b, Chains.of(chains), box.x)
+            found = minimise(a, b, stack, box.x)
             bound = found.bound + lent.constant
             return found.x, bound, bound, found.steps
-        programme = LengthProgramme.of(problem, a, b, chains, curvature.added[problem.size :])
+        programme = LengthProgramme.of(problem, a, b, list(map(arcs_of, chains)), curvature.added[problem.size :])
         x, steps = programme.minimiser(box.x)
         dual = DualBound(problem=problem, low=box.low, high=box.high, added=curvature.added, lent=lent)
         multipliers = programme.multipliers(x)

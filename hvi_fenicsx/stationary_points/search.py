@@ -4,43 +4,28 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
-from ..errors import InputError, SolverError
+from ..errors import InputError
 from ..typing import Array
 from . import systematic
 from .all_points import Enumeration
 from .boxes import fresh_box
-from .found import Found, Keep, Saved, Start, Wanted, forget
-from .length_kinds import kind_of
-from .lowest import LowestSearch, Progress
+from .found import Found, Keep, Saved, Wanted, forget
+from .landscapes import CurvedLandscape, Landscape, PolylineLandscape
 from .passes import passes
 from .point_list import PointList, StationaryPoint
-from .progress_words import Clock, all_in_words, lowest_in_words
+from .progress_words import Clock, all_in_words, counted
 from .scalar_problem import ScalarProblem
+from .search_lowest import bounded, lowest
+from .search_task import MOST_BOXES, Task, stacked
 from .stationarity import Kind
 
-MOST_BOXES = 50
-"""Boxes that are bounded for the gap where what was asked for is not proven."""
 MOST_VAIN = 100
 """Attempts in a row to find a new point, where a proof goes on after them."""
-OWN_GAP = 0.85
-"""Share of the gap that a search may leave where the laws are curved; the rest is for what their polylines differ."""
 NO_POINT = "no equilibrium, proven"
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Task:
-    """A search to be made: the arguments of :func:`find`."""
-
-    problem: ScalarProblem
-    wanted: Wanted
-    stop: Callable[[], bool]
-    report: Callable[[str], None]
-    saved: Saved | None
-    keep: Keep
 
 
 def find(
@@ -70,9 +55,9 @@ def find(
         raise InputError(
             "--resume: the search there was for something else: give or leave --lowest as then, or --force"
         )
-    task = _Task(problem=problem, wanted=wanted, stop=stop, report=report, saved=saved, keep=keep)
+    task = Task(problem=problem, wanted=wanted, stop=stop, report=report, saved=saved, keep=keep)
     if wanted.lowest:
-        return _lowest(task)
+        return lowest(task)
     curved = wanted.curved
     provable = curved.bounded if curved is not None else not (len(problem.lengths) or problem.error)
     return _all(task) if provable else _without_proof(task)
@@ -92,96 +77,20 @@ def _only(problem: ScalarProblem) -> Found:
     )
 
 
-def _lowest(task: _Task) -> Found:
-    problem, saved = task.problem, task.saved
-    search = LowestSearch(problem=problem, gap=task.wanted.gap * (OWN_GAP if problem.error else 1.0))
-    try:
-        if saved is None:
-            _begin(search, task.wanted.start)
-        else:
-            search.resume(zip(saved["low"], saved["high"], saved["weights"], strict=True), saved["x"][0])
-    except SolverError as error:
-        return Found(points=(), complete=False, lower_bound=None, proven=False, nodes=search.boxes, reason=str(error))
-
-    clock = Clock()
-
-    def tell(now: Progress) -> None:
-        task.report(lowest_in_words(now, task.wanted.energies, clock))
-        if not search.proven:
-            task.keep(lambda: _left_of_lowest(search))
-
-    search.run(task.stop, tell)
-    return _proof(search, task.wanted.gap)
-
-
-def _begin(search: LowestSearch, known: Start | None) -> None:
-    if known is None:
-        search.start()
-    else:
-        search.resume([(known.low, known.high, np.zeros(search.problem.size))], known.x)
-
-
-def begun(problem: ScalarProblem, gap: float, stop: Callable[[], bool], report: Callable[[str], None]) -> Start | None:
-    """A first search; None where there is no lowest energy.
-
-    Args:
-        problem: of polylines near the laws.
-        gap: relative gap that the search may leave.
-        stop: asked before each box.
-        report: told how far it is, in words.
-    """
-    search = LowestSearch(problem=problem, gap=gap)
-    try:
-        search.start()
-    except SolverError:
-        return None
-    search.run(stop, lambda now: report(f"first search: gap {now.gap:.1e}, {now.boxes} boxes"))
-    low, high = search.region
-    return Start(x=search.x, energy=search.upper, low=low, high=high)
-
-
-def _proof(search: LowestSearch, wanted: float) -> Found:
-    """What a search for the lowest energy knows; curved laws are worse by what their polylines may differ."""
-    problem, now = search.problem, search.progress()
-    point = StationaryPoint(
-        x=search.x,
-        energy=search.upper + problem.error,
-        kind=kind_of(problem, search.x),
-        isolated=True,
-    )
-    lower = now.lower - problem.error
-    proven = search.proven and (not problem.error or point.energy - lower <= wanted * abs(point.energy))
-    left = {} if search.proven else _left_of_lowest(search)
-    open_gap = max(point.energy - lower, 0.0) / (abs(point.energy) or 1.0)
-    return Found(
-        points=(point,),
-        complete=False,
-        lower_bound=lower,
-        proven=proven,
-        nodes=now.boxes,
-        reason=("the lowest energy, proven" if proven else f"a gap of {open_gap:.1e} is open in {now.waiting} boxes"),
-        left=left,
-    )
-
-
-def _left_of_lowest(search: LowestSearch) -> Saved:
-    return {"lowest": np.array(True), "x": search.x[None], **_stacked(list(search.open_boxes()))}
-
-
 def _left_of_all(search: Enumeration) -> Saved:
     listed = [(c.low, c.high, c.weights) for c in (*search.undecided, *search.waiting)]
     points = [p.x for p in sorted(search.points, key=lambda p: p.energy)]
     found = np.array(points) if points else np.empty((0, search.problem.size))
-    return {"lowest": np.array(False), "x": found, **_stacked(listed)}
+    return {"lowest": np.array(False), "x": found, **stacked(listed)}
 
 
-def _fresh(task: _Task) -> Enumeration:
+def _fresh(task: Task) -> Enumeration:
     """A search for all points; of curved laws with polylines near their tractions."""
     curved = task.wanted.curved
     return Enumeration(problem=task.problem if curved is None else curved.near, laws=curved)
 
 
-def _resumed(task: _Task, saved: Saved) -> Enumeration:
+def _resumed(task: Task, saved: Saved) -> Enumeration:
     """A search for all points to go on with."""
     search = _fresh(task)
     for x in saved["x"]:
@@ -192,7 +101,7 @@ def _resumed(task: _Task, saved: Saved) -> Enumeration:
     return search
 
 
-def _started(task: _Task, search: Enumeration, tell: Callable[[Enumeration], None]) -> None:
+def _started(task: Task, search: Enumeration, tell: Callable[[Enumeration], None]) -> None:
     """A few cells, which often are all; else what is found without a proof."""
     search.start()
     if not search.run(lambda: search.cells >= MOST_BOXES or task.stop(), tell):
@@ -200,7 +109,7 @@ def _started(task: _Task, search: Enumeration, tell: Callable[[Enumeration], Non
             search.enter(x)
 
 
-def _patience(task: _Task, known: PointList) -> Callable[[], bool]:
+def _patience(task: Task, known: PointList) -> Callable[[], bool]:
     """Whether a search that proves nothing is over: to be asked before each attempt."""
     before, vain = len(known), 0
 
@@ -213,7 +122,7 @@ def _patience(task: _Task, known: PointList) -> Callable[[], bool]:
     return over
 
 
-def _all(task: _Task) -> Found:
+def _all(task: Task) -> Found:
     search = _fresh(task) if task.saved is None else _resumed(task, task.saved)
     clock = Clock()
 
@@ -224,7 +133,7 @@ def _all(task: _Task) -> Found:
     if task.saved is None:
         _started(task, search, tell)
     complete = search.run(task.stop, tell) and not search.undecided
-    below = None if complete else _bounded(task, [p.x for p in search.points])
+    below = None if complete else bounded(task, [p.x for p in search.points])
     if below is not None:
         search.enter(below.x)
     points = tuple(sorted(search.points, key=lambda p: p.energy))
@@ -236,19 +145,24 @@ def _all(task: _Task) -> Found:
         lower_bound=bound,
         proven=complete,
         nodes=search.cells,
-        reason=_in_words(points) if complete else f"{len(points)} found, and {search.open_cells} cells are open",
+        reason=_in_words(points) if complete else _open_in_words(search),
         left={} if complete else _left_of_all(search),
-        passes=passes(task.problem, points) if complete and task.wanted.curved is None else (),
+        passes=passes(_landscape(task), points) if complete else (),
     )
 
 
-def _without_proof(task: _Task) -> Found:
+def _landscape(task: Task) -> Landscape:
+    curved = task.wanted.curved
+    return PolylineLandscape(task.problem) if curved is None else CurvedLandscape(curved)
+
+
+def _without_proof(task: Task) -> Found:
     """What is found where it cannot be proven that these are all: laws of lengths, or of unknown slopes."""
     problem = task.problem
     if cells := _cells_of_none(task, MOST_BOXES):
         return _none(cells)
     task.report("a search without a proof that nothing is missed")
-    below = _bounded(task, [])
+    below = bounded(task, [])
     known = [] if below is None else [below.x]
     if (curved := task.wanted.curved) is None:
         points = tuple(systematic.near_stationary(problem, known, task.stop))
@@ -272,7 +186,7 @@ def _none(cells: int) -> Found:
     return Found(points=(), complete=True, lower_bound=None, proven=True, nodes=cells, reason=NO_POINT)
 
 
-def _cells_of_none(task: _Task, most: float = math.inf) -> int:
+def _cells_of_none(task: Task, most: float = math.inf) -> int:
     """The number of cells by which it is proven that laws of one component, curved ones too, have no point; else 0.
 
     Args:
@@ -291,28 +205,23 @@ def _cells_of_none(task: _Task, most: float = math.inf) -> int:
     return max(search.cells, 1) if none and not search.undecided else 0
 
 
-def _bounded(task: _Task, points: list[Array]) -> LowestSearch | None:
-    """A search for the lowest energy of a few boxes, for its bound; None where there is none."""
-    search = LowestSearch(problem=task.problem, gap=task.wanted.gap)
-    try:
-        search.start(points)
-    except SolverError:
-        return None
-    search.run(lambda: search.boxes > MOST_BOXES or task.stop(), lambda _: None)
-    return search
-
-
 def _in_words(points: tuple[StationaryPoint, ...]) -> str:
     if not points:
         return NO_POINT
     continua = sum(not p.isolated for p in points)
     return f"all equilibria, proven: {len(points)}" + (
-        f", of these {continua} stand for a continuum" if continua else ""
+        f", of these {counted(continua, 'stands', 'stand')} for a continuum" if continua else ""
     )
 
 
-def _stacked(boxes: list[tuple[Array, Array, Array]]) -> dict[str, Array]:
-    return {name: np.array([box[k] for box in boxes]) for k, name in enumerate(("low", "high", "weights"))}
+def _open_in_words(search: Enumeration) -> str:
+    """What is found, and why it is not proven that this is all."""
+    told = f"{len(search.points)} found, and {counted(search.open_cells, 'cell is', 'cells are')} open"
+    if search.waiting:
+        return told
+    continua = sum(not p.isolated for p in search.points)
+    rows = f", of these {counted(continua, 'stands', 'stand')} for a continuum" if continua else ""
+    return f"{told}{rows}: too small to be divided, where points nearly meet or are not isolated"
 
 
 def falls_passed(problem: ScalarProblem, x: Array) -> int:

@@ -108,16 +108,16 @@ def kind_at(problem: ScalarProblem, x: Array, here: Subdifferential) -> Kind:
     return Kind.SADDLE if _definite(problem, surely, here.most[surely]) < 0 else Kind.UNDECIDED
 
 
-def unstable_directions(problem: ScalarProblem, x: Array) -> Array | None:
+def unstable_directions(problem: ScalarProblem, x: Array, here: Subdifferential) -> Array | None:
     """Displacements along which the energy falls from a stationary point, on both sides, (n, k); None if undecided.
 
     One for each unknown on a drop, and one for each negative eigenvalue while these stay.
 
     Args:
-        problem: the problem.
+        problem: the stiffness and the force.
         x: a stationary point, (n,).
+        here: what the laws and bounds allow there.
     """
-    here = subdifferential(problem, x)
     surely, perhaps = _free(problem, x, here)
     drops, free = np.flatnonzero(here.falls), np.setdiff1d(surely, np.flatnonzero(here.falls))
     if len(np.setdiff1d(perhaps, drops)) > len(free) or np.any(here.least[free] != here.most[free]):

@@ -2,48 +2,30 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 from typing import Any
 
 import condensed
 import numpy as np
 import pytest
+from curved import LAWS, enumerated, random_pair, two_bonds
 from scenes import Table, model, quadratic_linear
 from scipy.optimize import root
 
 from hvi_fenicsx import Scene, laws
-from hvi_fenicsx.laws.smoothing import registered
 from hvi_fenicsx.preparation import prepare
-from hvi_fenicsx.stationary_points.all_points import Enumeration
 from hvi_fenicsx.stationary_points.condensed_form import scalar_problem
 from hvi_fenicsx.stationary_points.curved_laws import CurvedLaws
-from hvi_fenicsx.stationary_points.found import Wanted
+from hvi_fenicsx.stationary_points.found import Found, Wanted
 from hvi_fenicsx.stationary_points.search import find
 from hvi_fenicsx.system.condensation import Condensation
 from hvi_fenicsx.system.condensed_problem import CondensedProblem
 from hvi_fenicsx.typing import Array
 
-MODEL = laws.QuadraticLinear(2.0, 1.0, 1.0)
-LAWS = {
-    "chks": registered()["chks"]().relative(MODEL, 0.05),
-    "narrow chks": registered()["chks"]().relative(MODEL, 0.002),
-    "teeth": registered()["log_exp"]().relative(laws.Sawtooth(3.0, 1.0, 0.5, 3), 0.02),
-    "paper": registered()["paper"]().relative(MODEL, 0.1),
-    "exponential": laws.Exponential(2.0, 0.5, 1.0),
-    "smoothed exponential": registered()["chks"]().relative(laws.Exponential(2.0, 0.5, 1.0), 0.01),
-}
 FAR = 2000.0
 MOST_PUSH = 20.0
 """Forces that a bound bears are not larger."""
-
-
-def enumerated(problem: CondensedProblem) -> Enumeration:
-    near = scalar_problem(problem, tractions=True)
-    search = Enumeration(problem=near, laws=CurvedLaws(near=near, problem=problem) if near.error else None)
-    search.start()
-    assert search.run(lambda: search.cells > 5000, lambda _: None)
-    assert not search.undecided
-    return search
 
 
 def graph(law: laws.Superpotential, lower: float, sign: float) -> tuple[Array, Array]:
@@ -72,29 +54,11 @@ def scanned(problem: CondensedProblem) -> int:
     return int(np.count_nonzero(np.diff(np.sign(rest))))
 
 
-def two_bonds(law: laws.Superpotential, share: float, lower: float = -np.inf) -> CondensedProblem:
-    """Two bonds, each of which carries a load, with a spring between them, and another spring to the ground."""
-    pull = share * float(law.right(np.linspace(0.0, 5.0, 5001)).max()) * np.array([1.05, 0.95])
-    stiffness = 0.8 * np.array([[1.0, -1.0], [-1.0, 1.0]]) + 0.1 * np.eye(2)
-    first, second = (condensed.bonds(law, [i]) for i in (0, 1))
-    return condensed.problem(stiffness, pull, first, second, lower=lower)
-
-
 @pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
 @pytest.mark.parametrize("share", [0.3, 0.5, 0.7, 0.9, 1.02])
 def test_all_points_of_two_bonds_are_those_of_a_scan(law: laws.Superpotential, share: float) -> None:
     problem = two_bonds(law, share)
     assert len(enumerated(problem).points) == scanned(problem)
-
-
-def random_pair(seed: int, pair: tuple[laws.Superpotential, laws.Superpotential]) -> CondensedProblem:
-    """Two laws on any stiffness, with any load, and half of the time with a bound."""
-    random = np.random.default_rng(seed)
-    factor = random.normal(size=(2, 2))
-    stiffness = 0.3 * factor @ factor.T + 0.02 * np.eye(2)
-    lower = np.where(random.uniform(size=2) < 0.5, -np.inf, random.uniform(-0.3, 0.6, 2))
-    bonds = [condensed.bonds(law, [i], signs=random.choice([-1.0, 1.0])) for i, law in enumerate(pair)]
-    return condensed.problem(stiffness, random.uniform(-1.0, 3.0, 2), *bonds, lower=lower)
 
 
 @pytest.mark.parametrize("seed", range(24))
@@ -251,4 +215,63 @@ def test_at_a_fold_a_cell_stays_open_also_when_the_search_goes_on() -> None:
     found = find(near, wanted, lambda: False, lambda _: None)
     again = find(near, wanted, lambda: False, lambda _: None, saved=found.left)
     assert (found.complete, again.complete) == (False, False)
-    assert any(abs(p.x[0] - 1.0) < 1e-4 for p in found.points)
+    for one in (found, again):  # the two are listed once
+        np.testing.assert_allclose(sorted(p.x[0] for p in one.points), [0.0, 1.0], atol=1e-7)
+
+
+@pytest.mark.parametrize("above", [1e-10, 1e-8])
+def test_two_points_near_a_fold_are_two_and_each_is_listed_once(above: float) -> None:
+    """By hand: at 1 + z the law bears 0.5 + fall (1 - z + ½ z²), the spring fall (1 + z); ½ fall z² is the excess."""
+    fall = 1.5 * np.exp(-1.0)
+    load = (2.0 * fall + 0.5) * (1.0 + above)
+    problem = condensed.problem([[fall]], [load], condensed.bonds(LAWS["exponential"], [0]))
+    near = scalar_problem(problem, tractions=True)
+    found = find(near, Wanted(curved=CurvedLaws(near=near, problem=problem)), lambda: False, lambda _: None)
+    apart = np.sqrt(2.0 * (2.0 * fall + 0.5) * above / fall)
+    wanted = [0.0, 1.0 - apart, 1.0 + apart]
+    np.testing.assert_allclose(sorted(p.x[0] for p in found.points), wanted, rtol=1e-3 * apart, atol=1e-12)
+
+
+def searched(problem: CondensedProblem, most_cells: int = 5000) -> Found:
+    near, cells = scalar_problem(problem, tractions=True), itertools.count()
+    wanted = Wanted(curved=CurvedLaws(near=near, problem=problem))
+    return find(near, wanted, lambda: next(cells) > most_cells, lambda _: None)
+
+
+def test_two_bodies_at_a_fold_together_end_the_search_with_words() -> None:
+    fall = 1.5 * np.exp(-1.0)
+    stiffness = fall * np.eye(2) + 0.1 * np.array([[1.0, -1.0], [-1.0, 1.0]])
+    found = searched(condensed.problem(stiffness, [2.0 * fall + 0.5] * 2, condensed.bonds(LAWS["exponential"], [0, 1])))
+    assert not found.complete
+    assert "too small to be divided" in found.reason
+    places = np.array(sorted(p.x.tolist() for p in found.points))
+    np.testing.assert_allclose(places, [[0.0, 0.0], [1.0, 1.0]], atol=1e-6)
+
+
+def test_a_block_on_the_straight_tail_of_a_curved_law_is_reported_as_a_continuum() -> None:
+    """The load is the residual traction: the block may stand anywhere from the end of the curve to the bound."""
+    found = searched(condensed.problem([[0.0]], [1.0], condensed.bonds(LAWS["paper"], [0]), lower=-5.0, upper=5.0))
+    assert "1 stands for a continuum" in found.reason
+    assert [p.isolated for p in found.points] == [False]
+
+
+def test_two_blocks_that_slide_together_are_a_continuum_beside_an_isolated_point() -> None:
+    """By hand: x0 - x1 is 0.2 where both bear the residual 1 alone; at rest both bear 2 x."""
+    stiffness = [[1.0, -1.0], [-1.0, 1.0]]
+    found = searched(
+        condensed.problem(stiffness, [1.2, 0.8], condensed.bonds(LAWS["paper"], [0, 1]), lower=-5.0, upper=5.0)
+    )
+    (resting,) = (p for p in found.points if p.isolated)
+    (sliding,) = (p for p in found.points if not p.isolated)
+    np.testing.assert_allclose(resting.x, [0.55, 0.45], rtol=1e-9)
+    assert sliding.x[0] - sliding.x[1] == pytest.approx(0.2, rel=1e-9)
+
+
+def test_what_is_balanced_to_rounding_alone_is_not_called_proven() -> None:
+    """An exponential law comes to its residual only at infinity; far away the rest is below rounding."""
+    stiffness = [[1.0, -1.0], [-1.0, 1.0]]
+    found = searched(
+        condensed.problem(stiffness, [0.7, 0.3], condensed.bonds(LAWS["exponential"], [0, 1]), lower=-5.0, upper=50.0)
+    )
+    assert not found.complete
+    assert any(not p.isolated for p in found.points)

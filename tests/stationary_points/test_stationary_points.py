@@ -17,15 +17,16 @@ from hvi_fenicsx import Scene, prepare
 from hvi_fenicsx.errors import SolverError
 from hvi_fenicsx.laws.traction_graph import TractionGraph
 from hvi_fenicsx.stationary_points.all_points import Enumeration
-from hvi_fenicsx.stationary_points.arcs import FREE, chain, energy, envelope, total
+from hvi_fenicsx.stationary_points.arcs import FREE, arcs_of, chain, energy, total
 from hvi_fenicsx.stationary_points.boxes import fresh_box
 from hvi_fenicsx.stationary_points.condensed_form import scalar_problem
+from hvi_fenicsx.stationary_points.envelopes import envelopes
 from hvi_fenicsx.stationary_points.found import Wanted
 from hvi_fenicsx.stationary_points.lowest import LowestSearch
 from hvi_fenicsx.stationary_points.progress_words import Clock, Unit, lowest_in_words
 from hvi_fenicsx.stationary_points.relaxation import Relaxation
 from hvi_fenicsx.stationary_points.rigid_balance import RigidBalance
-from hvi_fenicsx.stationary_points.scalar_problem import ScalarProblem
+from hvi_fenicsx.stationary_points.scalar_problem import ArcTable, ScalarProblem
 from hvi_fenicsx.stationary_points.stationarity import Kind
 from hvi_fenicsx.system.condensation import Condensation
 
@@ -199,7 +200,8 @@ def test_an_envelope_is_the_hull_of_samples_and_never_above_the_law(seed: int) -
     graph, weight, sign = random_graph(random), random.uniform(0.3, 2.0), random.choice([-1.0, 1.0])
     low, high = np.sort(random.uniform(-4, 4, 2))
     added = random.uniform(0, 3) * random.integers(0, 2)
-    arcs = envelope(chain(graph, weight, sign), float(low), float(high), added)
+    table = ArcTable.of([chain(graph, weight, sign)])
+    arcs = arcs_of(envelopes(table, np.array([low]), np.array([high]), np.array([added]))[0])
     inner = sign * graph.breaks
     x = np.unique(np.concatenate([np.linspace(low, high, 1500), inner[(inner > low) & (inner < high)]]))
     law = weight * graph.primitive(sign * x) + 0.5 * added * x * x

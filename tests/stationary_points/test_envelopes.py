@@ -1,0 +1,64 @@
+"""Convex envelopes on arrays, against those that are found arc by arc."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from curved import LAWS
+from plain_envelope import envelope
+
+from hvi_fenicsx.laws.traction_graph import TractionGraph
+from hvi_fenicsx.stationary_points.arcs import Chain, arcs_of, chain, energy
+from hvi_fenicsx.stationary_points.envelopes import envelopes
+from hvi_fenicsx.stationary_points.law_graphs import near_graph
+from hvi_fenicsx.stationary_points.scalar_problem import ArcTable
+
+
+def random_graph(random: np.random.Generator) -> TractionGraph:
+    """A polyline with jumps both ways, flat pieces and falls, on both sides of zero."""
+    points = [(0.0, 0.0)]
+    for x in np.sort(random.uniform(0.0, 3.0, 8)):
+        points += [(float(x), float(t)) for t in np.round(random.normal(0.0, 2.0, random.integers(1, 3)), 1)]
+    return TractionGraph.from_points(points, one_sided=bool(random.random() < 0.3))
+
+
+def compared(one: Chain, low: float, high: float, added: float) -> None:
+    """The two envelopes have the same values and ends, and the tractions of the new one do not fall."""
+    table = ArcTable.of([one])
+    rows = envelopes(table, np.array([low]), np.array([high]), np.array([added]))[0]
+    plain = envelope(one, low, high, added)
+    assert rows[0, 0] == low
+    assert rows[-1, 1] == high
+    np.testing.assert_array_equal(rows[1:, 0], rows[:-1, 1])
+    size = 1.0 + max(abs(a.at(x)) for a in plain for x in (a.low, a.high))
+    for x in np.unique(np.concatenate([np.linspace(low, high, 101), rows[:, 0], [a.low for a in plain]])):
+        assert energy(arcs_of(rows), x) == pytest.approx(energy(plain, x), abs=1e-12 * size)
+    rates = (rows[:, 4:5] + rows[:, 5:] * (rows[:, :2] - rows[:, 2:3])).ravel()
+    assert np.min(np.diff(rates), initial=0.0) >= -1e-8 * (1.0 + np.abs(rates).max())
+
+
+@pytest.mark.parametrize("seed", range(150))
+def test_envelopes_of_polylines_are_those_found_arc_by_arc(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    one = chain(random_graph(random), random.uniform(0.3, 2.0), random.choice([-1.0, 1.0]))
+    joints = [a.high for a in one[:-1]]
+    low, high = np.sort(random.choice([*joints, *random.uniform(-4.0, 4.0, 8)], 2, replace=False))
+    compared(one, float(low), float(high), random.uniform(0.0, 3.0) * random.integers(0, 2))
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_envelopes_of_curved_laws_are_those_found_arc_by_arc(name: str) -> None:
+    random, law = np.random.default_rng(0), LAWS[name]
+    one = chain(near_graph(law, 1e6, 1e-3 * law.traction_scale).graph, 0.7, -1.0)
+    joints = [a.high for a in one[:-1]]
+    for _ in range(25):
+        low, high = np.sort([random.choice(joints), random.uniform(-4.0, 4.0) * 10.0 ** random.integers(-3, 4)])
+        compared(one, float(low), float(high), random.uniform(0.0, 3.0) * random.integers(0, 2))
+
+
+def test_an_interval_that_is_a_point_has_the_energy_there() -> None:
+    one = chain(near_graph(LAWS["teeth"], 1e6, 1e-2).graph, 0.7, 1.0)
+    for x in (0.3, one[3].high):
+        (arc,) = arcs_of(envelopes(ArcTable.of([one]), np.array([x]), np.array([x]), np.array([0.4]))[0])
+        assert (arc.low, arc.high) == (x, x)
+        assert arc.at(x) == pytest.approx(energy(one, x) + 0.2 * x * x, rel=1e-12)
