@@ -12,6 +12,7 @@ from ..problem.cell_stress import mean_stress
 from ..report.html import render
 from ..report.pictures.draw import PictureProcess, waiting
 from ..runtime.mpi import asleep_until_all, on_root
+from ..runtime.processors import is_processor_free
 from ..runtime.timing import Timer
 from ..solution import Solution
 from ..typing import Array
@@ -55,8 +56,10 @@ class BegunResult:
         work, comm = self.folder.work, self.folder.comm
         with self.timer("output"):
             record = {**summary(solution), **given}
-            write_fields(work, solution, self.sigma)
             if (drawing := self.pictures) is not None:
+                drawing.begin()
+            write_fields(work, solution, self.sigma)
+            if drawing is not None:
                 _told("pictures", self.tell, lambda: drawing.finish(_PATIENCE))
             asleep_until_all(comm)
             record["time"] = self.timer.report()
@@ -77,7 +80,8 @@ def begin_whole(
 ) -> BegunResult:
     """Write what pictures are drawn from; no estimate of an error is needed. Collective.
 
-    They are drawn from now on, by a process that takes what processors the ranks leave.
+    They are drawn from now on where a processor of rank 0's machine is without a rank; else when nothing else but files
+    is left to do, since drawing would then take the time of a rank for which the others wait.
 
     Args:
         folder: being written.
@@ -92,7 +96,7 @@ def begin_whole(
         write_basis(work, solution, folder.target, sigma)
         record = summary(solution)
         on_root(folder.comm, lambda: write_record(work, record))
-        if pictures is not None:
+        if is_processor_free(folder.comm) and pictures is not None:
             pictures.begin()
     return BegunResult(folder=folder, timer=timer, tell=tell, pictures=pictures, sigma=sigma)
 

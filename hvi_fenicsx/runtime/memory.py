@@ -13,6 +13,7 @@ from pathlib import Path
 from mpi4py import MPI
 
 from .mpi import total
+from .processors import on_this_machine
 
 _CGROUPS = Path("/sys/fs/cgroup")
 _LIMIT_FILES = ("memory.max", "memory.limit_in_bytes")
@@ -72,9 +73,8 @@ def free(table: Path = Path("/proc/meminfo")) -> float:
 
 def room(comm: MPI.Comm) -> float:
     """The memory of all machines that the ranks run on, as far as they may use it, MB. Collective."""
-    here = comm.Split_type(MPI.COMM_TYPE_SHARED)
-    machines = total(comm, _of_machine() if here.rank == 0 else 0.0)
-    here.Free()
+    with on_this_machine(comm) as here:
+        machines = total(comm, _of_machine() if here.rank == 0 else 0.0)
     return min(machines, total(comm, _of_process()))
 
 

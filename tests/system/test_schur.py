@@ -73,7 +73,9 @@ def test_what_mumps_counts_is_below_that_of_full_factors() -> None:
 def test_algebraic_multigrid_that_is_made_again_and_again_gives_way_to_a_direct_solver() -> None:
     """Its setup took 0.6 s in each of 300 Newton steps on long cells, where factorising takes 0.05 s."""
     system = assembled()
-    solver = HeldPreconditioner(system, (), LinearSettings("gamg", LinearThresholds(rebuilt=3), replaceable=True), Timer())
+    solver = HeldPreconditioner(
+        system, (), LinearSettings("gamg", LinearThresholds(rebuilt=3), replaceable=True), Timer()
+    )
     dofs, x = system.jacobian.rows.dofs.astype(np.int32), system.load.duplicate()
     kinds = []
     for step in range(5):

@@ -46,7 +46,7 @@ class PictureProcess:
     command: str
 
     def begin(self) -> None:
-        """Let it draw: the folder is finished, but for the pictures."""
+        """Let it draw: the folder has all that pictures are drawn from. To say it again does nothing."""
         with contextlib.suppress(OSError):  # it has failed already: then `finish` tells
             # Without a signal: PETSc's handler of a broken pipe would end the whole program.
             self.line.send(TOLD.encode(), socket.MSG_NOSIGNAL)
