@@ -28,7 +28,7 @@ from hvi_fenicsx.solvers.closed_start import resting_start
 from hvi_fenicsx.solvers.context import RunControl
 from hvi_fenicsx.solvers.thresholds import Thresholds as SolverThresholds
 from hvi_fenicsx.system.assemble import assemble
-from hvi_fenicsx.system.held_solver import LinearSettings
+from hvi_fenicsx.system.linear_settings import LinearSettings
 from hvi_fenicsx.system.thresholds import Thresholds as LinearThresholds
 
 SHARES = (0.02, 0.05, 0.1, 0.125, 0.2, 0.25)

@@ -25,8 +25,8 @@ from hvi_fenicsx.solvers.active_set import ActiveSetSolver
 from hvi_fenicsx.solvers.closed_start import resting_start
 from hvi_fenicsx.solvers.context import RunControl
 from hvi_fenicsx.system.fewer_ranks import joined_ranks
-from hvi_fenicsx.system.held_solver import LinearSettings
 from hvi_fenicsx.system.levels import Levels
+from hvi_fenicsx.system.linear_settings import LinearSettings
 from hvi_fenicsx.system.system import System
 
 COMM = MPI.COMM_WORLD

@@ -32,7 +32,7 @@ from hvi_fenicsx.solvers.closed_start import resting_start
 from hvi_fenicsx.solvers.context import RunControl
 from hvi_fenicsx.system import petsc_options
 from hvi_fenicsx.system.assemble import assemble
-from hvi_fenicsx.system.held_solver import LinearSettings
+from hvi_fenicsx.system.linear_settings import LinearSettings
 from hvi_fenicsx.system.system import System
 from hvi_fenicsx.workflow import finish
 

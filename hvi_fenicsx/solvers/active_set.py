@@ -16,9 +16,10 @@ import numpy as np
 from petsc4py import PETSc
 
 from ..runtime.timing import Timer
-from ..system.held_solver import HeldPreconditioner, LinearSettings
+from ..system.held_solver import HeldPreconditioner
 from ..system.law_model import LawModel
 from ..system.levels import Levels
+from ..system.linear_settings import LinearSettings
 from ..system.petsc_options import configure, prefix
 from ..system.system import System
 from ..typing import Entities

@@ -10,8 +10,8 @@ from ..rigid import Solvability
 from ..runtime.log import newton_step
 from ..runtime.newton_step import NewtonStep
 from ..runtime.timing import Timer
-from ..system.held_solver import LinearSettings
 from ..system.levels import Levels
+from ..system.linear_settings import LinearSettings
 from ..system.system import System
 from .active_set import ActiveSetSolver
 from .options import SolverOptions

@@ -19,8 +19,8 @@ from ..problem.compose import Model
 from ..rigid import Solvability
 from ..runtime.log import logger
 from ..system.assemble import assemble
-from ..system.held_solver import LinearSettings
 from ..system.levels import Level, Levels, prolongation, with_coarser_system
+from ..system.linear_settings import LinearSettings
 from ..system.system import System
 from . import coarse_start, registry
 from .coarse_start import CoarseStart

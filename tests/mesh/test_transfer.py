@@ -24,8 +24,8 @@ from hvi_fenicsx.solvers.closed_start import contact_dofs
 from hvi_fenicsx.solvers.context import RunControl
 from hvi_fenicsx.solvers.nested_iteration import coarser_levels
 from hvi_fenicsx.system import held_solver as linear
-from hvi_fenicsx.system.held_solver import LinearSettings
 from hvi_fenicsx.system.levels import Levels
+from hvi_fenicsx.system.linear_settings import Kind, LinearSettings
 from hvi_fenicsx.system.system import System
 
 DEMOS = Path(__file__).parents[2] / "demos"
@@ -98,7 +98,7 @@ def iterations(cells: int) -> int:
 
 
 @pytest.mark.parametrize("kind", ["lu", "gamg", "mg"])
-def test_a_preconditioner_used_before_is_that_made_anew(kind: linear.Kind) -> None:
+def test_a_preconditioner_used_before_is_that_made_anew(kind: Kind) -> None:
     """Factors, levels and prolongations are kept; what was held before must leave no trace in them."""
     used, new = (
         linear.HeldPreconditioner(*with_levels("wall_left", 32), LinearSettings(kind), Timer()) for _ in range(2)

@@ -10,7 +10,8 @@ from mpi4py import MPI
 from hvi_fenicsx import Scene, prepare
 from hvi_fenicsx.runtime.timing import Timer
 from hvi_fenicsx.system import schur
-from hvi_fenicsx.system.held_solver import HeldPreconditioner, LinearSettings
+from hvi_fenicsx.system.held_solver import HeldPreconditioner
+from hvi_fenicsx.system.linear_settings import LinearSettings
 
 FRICTION = {"law": "quadratic_linear", "gamma1": 3e6, "gamma2": 1.5e6, "delta": 9e-6}
 SCENE = {

@@ -17,8 +17,9 @@ from hvi_fenicsx.runtime.timing import Timer
 from hvi_fenicsx.scene_model import model_of
 from hvi_fenicsx.solvers import nested_iteration
 from hvi_fenicsx.solvers.context import RunControl
-from hvi_fenicsx.system.held_solver import HeldPreconditioner, LinearSettings
+from hvi_fenicsx.system.held_solver import HeldPreconditioner
 from hvi_fenicsx.system.levels import Levels
+from hvi_fenicsx.system.linear_settings import LinearSettings
 
 
 def rubber(nu: float, kind: str = "plane_strain") -> Table:

@@ -19,7 +19,8 @@ from hvi_fenicsx.solvers.active_set import ActiveSetSolver
 from hvi_fenicsx.solvers.convergence import Outcome, Sizes
 from hvi_fenicsx.solvers.thresholds import Thresholds as SolverThresholds
 from hvi_fenicsx.system import factor_counts, schur
-from hvi_fenicsx.system.held_solver import HeldPreconditioner, LinearSettings
+from hvi_fenicsx.system.held_solver import HeldPreconditioner
+from hvi_fenicsx.system.linear_settings import LinearSettings
 from hvi_fenicsx.system.matrix_copy import MatrixCopy
 from hvi_fenicsx.system.petsc_options import CHOLESKY
 from hvi_fenicsx.system.system import System

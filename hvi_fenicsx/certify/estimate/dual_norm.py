@@ -17,8 +17,9 @@ from ...problem.problem import Problem
 from ...problem.vectors import new_vector, turn
 from ...runtime.mpi import total
 from ...runtime.timing import Timer
-from ...system.held_solver import HeldPreconditioner, LinearSettings
+from ...system.held_solver import HeldPreconditioner
 from ...system.levels import Levels
+from ...system.linear_settings import LinearSettings
 from ...system.system import System
 from ...typing import Array, Entities, Integers
 from .. import balance
