@@ -23,7 +23,7 @@ from ..runtime.timing import Timer
 from ..scene import Scene, read_scene
 from ..stationary_points.bodies import Equilibria
 from ..stationary_points.found import Found, Saved
-from ..stationary_points.progress_words import Clock, certified_in_words
+from ..stationary_points.progress_words import Clock, certified_in_words, counted
 from ..system import petsc_options
 from . import equilibria_files as files
 from . import search_file, telling
@@ -102,7 +102,7 @@ def _run(request: Request) -> int:
         )
         on_root(COMM, lambda: kept.write_left(found.left))
         code = _exit_code(prepared, found, interrupted=interrupt.requested())
-        telling.say([f"result: {found.reason}; {found.nodes} boxes"])
+        telling.say([f"result: {found.reason}; {counted(found.nodes, 'box', 'boxes')}"])
         rows = list(_all_written(request, bodies, found))
         files.write(folder, prepared, found, rows, code, request.options.given)
         if rows:
