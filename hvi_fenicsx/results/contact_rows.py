@@ -68,7 +68,7 @@ def _rounded(comm: MPI.Comm, points: Array) -> Array:
 
 
 def _along(problem: Problem, state: ContactState) -> tuple[Array, Array]:
-    """Of the vertices of a plane part on this rank the row in the table, and the arc length, (m,) each. Collective.
+    """The rows in the table and the arc lengths of the vertices of a plane part on this rank, (m,) each. Collective.
 
     A curve is followed from end to end, which rank 0 does: it gets points, numbers and edges, no other column.
     """

@@ -26,7 +26,7 @@ PYTHON = (sys.executable, "-P")
 STOP = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 """The signals by which a user, a batch system or a terminal that is closed asks a program to stop."""
 _NICENESS = 10
-"""Of a process that stands back: it gets a tenth of the time of one that does not."""
+"""The niceness of a process that stands back: it gets a tenth of the time of one that does not."""
 _PR_SET_PDEATHSIG = 1
 """prctl(2)."""
 _MPI = ("OMPI_", "PMIX_", "PRTE_", "PMI_", "HYDRA_", "MPI_LOCAL")
