@@ -1,4 +1,4 @@
-"""On all ranks: how far the condensed direct solver is from a factorisation of the whole matrix, relative."""
+"""Prints what the ranks have of a condensed problem: energies and forces of displacements that are given by place."""
 
 from __future__ import annotations
 
@@ -6,45 +6,31 @@ import json
 
 import numpy as np
 from mpi4py import MPI
+from scenes import DELTA, model, quadratic_linear
 
 from hvi_fenicsx import Scene, prepare
-from hvi_fenicsx.runtime.timing import Timer
-from hvi_fenicsx.system import schur
-from hvi_fenicsx.system.held_solver import HeldPreconditioner
-from hvi_fenicsx.system.linear_settings import LinearSettings
-
-FRICTION = {"law": "quadratic_linear", "gamma1": 3e6, "gamma2": 1.5e6, "delta": 9e-6}
-SCENE = {
-    "domain": {"shape": "box", "size": [1.0, 1.0, 1.0], "cells": [3, 3, 3]},
-    "material": {"youngs_modulus": 2.1e11, "poisson_ratio": 0.49, "model": "three_dimensional"},
-    "boundary": {
-        "wall": {"on": "left", "displacement": [0.0, "free", "free"]},
-        "press": {"on": "top", "traction": [0.0, 0.0, -1e6]},
-        "floor": {"on": "bottom", "contact": {"gap": 0.0}, "friction": FRICTION},
-    },
-}
+from hvi_fenicsx.system.condensation import Condensation
 
 
 def main() -> None:
-    """Unknowns of Γc by rank, and the difference with a tangent and some unknowns held."""
-    system = prepare(Scene.model_validate(SCENE), MPI.COMM_WORLD).system
-    rates = [np.eye(k.shape[1]) * (1.0 + np.arange(len(k)))[:, None, None] for k in system.jacobian.rates]
-    system.jacobian.set_rates(rates)
-    held = system.jacobian.rows.dofs[1::3].astype(np.int32)
-    load, expected, found = (system.load.duplicate() for _ in range(3))
-    load.array[:] = np.cos(np.arange(*load.owner_range))
-    expected.set(0.0)
-    whole = HeldPreconditioner(system, (), LinearSettings("lu"), Timer())
-    condensed = schur.SchurDirect(system, {"pc_type": "cholesky"})
-    whole.prepare(held)
-    whole.solve(load, expected, 1e-12)
-    condensed.prepare(held)
-    condensed.apply(None, load, found)
-    found.axpy(-1.0, expected)
-    sizes = MPI.COMM_WORLD.allgather(len(system.jacobian.rows.dofs))
-    told = {"sizes": sizes, "difference": found.norm() / expected.norm()}
-    if MPI.COMM_WORLD.rank == 0:
-        print(json.dumps(told))
+    """Of the model problem, pulled by a displacement."""
+    comm, table = MPI.COMM_WORLD, model(6, friction=quadratic_linear(3e6, DELTA))
+    table["boundary"]["pull"] = {"on": "right", "displacement": [5e-6, "free"]}
+    condensation = Condensation(prepare(Scene.model_validate(table), comm).system)
+    problem = condensation.problem
+    slip = np.zeros(problem.size, dtype=bool)
+    slip[problem.bonds[0].unknowns[:, 0]] = True
+    x = np.sin(7.0 * problem.points[:, 0] + 2.0 * slip)
+    order = np.lexsort([problem.points[:, 0], slip])
+    force = problem.stiffness @ x - problem.load(0.6)
+    found = {
+        "energies": [problem.energy(x, factor) for factor in (0.0, 0.6, 1.0)],
+        "force": force[order].tolist(),
+        "whole": condensation.expand(x, 0.6).norm(),
+    }
+    everywhere = comm.gather(found)
+    if comm.rank == 0:
+        print(json.dumps(found | {"equal": all(other == found for other in everywhere)}))
 
 
 if __name__ == "__main__":

@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 import pytest
-from condensed_ranks import SCENE
 from mpi4py import MPI
 from runs import on_ranks
 from scenes import DELTA, displacement, model, quadratic_linear, solved
+from schur_ranks import SCENE
 
 from hvi_fenicsx import Scene, prepare
 from hvi_fenicsx.preparation import Thresholds
@@ -56,7 +56,7 @@ def test_condensed_it_solves_what_a_factorisation_of_the_whole_solves(every: int
 
 
 def test_condensed_on_several_ranks_it_solves_the_same() -> None:
-    told = on_ranks(3, str(Path(__file__).parent / "condensed_ranks.py"))
+    told = on_ranks(3, str(Path(__file__).parent / "schur_ranks.py"))
     assert sum(told["sizes"]) > max(told["sizes"]) > 0, "Γc is on one rank alone"
     assert told["difference"] < 1e-10
 
