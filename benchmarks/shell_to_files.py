@@ -39,8 +39,6 @@ def one(words: list[str]) -> None:
 
     if cpu:
         timing.time.perf_counter = processor_time  # type: ignore[attr-defined]
-    from mpi4py import MPI
-
     from hvi_fenicsx import cli
 
     made: list[float] = []
@@ -52,6 +50,8 @@ def one(words: list[str]) -> None:
 
     timing.Timer.__init__ = timed  # type: ignore[method-assign]
     code = cli.main(words)
+    from mpi4py import MPI  # not before: the program starts PETSc first
+
     if MPI.COMM_WORLD.rank == 0:
         print(f"\n{json.dumps([code, made[0]])}", flush=True)
 

@@ -164,7 +164,7 @@ class Condensation:
             Constants and rates, (k, 2); rows, (k, n).
         """
         interior = self._interior
-        outer = interior.gathered(vectors) - interior.pulled(interior.solve(vectors))
+        outer = interior.loads(vectors)
         gone = self._eliminated(outer[self._gone])
         inside = self._system.comm.allreduce(vectors.T @ interior.solve(self._loading.lifted))
         rows = outer[self._stay] - self._coupling.T @ gone
@@ -248,8 +248,7 @@ class Condensation:
         Args:
             forces: in the components of the unknowns.
         """
-        interior, right = self._interior, self._free(forces.array_r)
-        outer = interior.gathered(right) - interior.pulled(interior.solve(right[:, None]))[:, 0]
+        outer = self._interior.loads(self._free(forces.array_r)[:, None])[:, 0]
         return np.asarray(outer[self._stay] - self._coupling.T @ self._eliminated(outer[self._gone]))
 
     def change(self, x: Array, forces: Array) -> Array:
@@ -259,12 +258,12 @@ class Condensation:
             x: change of the condensed unknowns, (n,).
             forces: on this rank's unknowns, (local unknowns,).
         """
-        interior, right = self._interior, self._free(forces)
-        outer = interior.gathered(right) - interior.pulled(interior.solve(right[:, None]))[:, 0]
-        found = np.empty(interior.size)
+        right = self._free(forces)
+        outer = self._interior.loads(right[:, None])[:, 0]
+        found = np.empty(self._interior.size)
         found[self._stay] = x
         found[self._gone] = self._eliminated(outer[self._gone] - self._coupling @ x)
-        return interior.expand(found, right)
+        return self._interior.expand(found, right)
 
     def _free(self, forces: Array) -> Array:
         """Forces off the supports, which carry the others, (local unknowns,)."""

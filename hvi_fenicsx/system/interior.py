@@ -23,8 +23,6 @@ from .petsc_options import CHOLESKY, default_options, prefix
 from .system import System
 
 _NO_MEMORY = PETSc.PC.FailedReason.FACTOR_OUTMEMORY
-
-
 Number = TypeVar("Number", bound=np.generic)
 
 
@@ -171,6 +169,14 @@ class Interior:
             inner: (local unknowns, k), zero at kept unknowns.
         """
         return np.asarray(self._comm.allreduce(self.coupling.T @ inner))
+
+    def loads(self, right: Array) -> Array:
+        """The condensed loads b_k - A_ki A_ii⁻¹ b_i, (n, k). Collective.
+
+        Args:
+            right: loads b of the whole body, this rank's, (local unknowns, k).
+        """
+        return self.gathered(right) - self.pulled(self.solve(right))
 
     def expand(self, values: Array, right: Array) -> Array:
         """The displacement in equilibrium with given ones of Γc, this rank's unknowns, (local unknowns,). Collective.
