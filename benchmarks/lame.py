@@ -11,7 +11,7 @@ import ufl
 from dolfinx import fem
 
 import hvi_fenicsx as hvi
-from hvi_fenicsx.problem import spaces
+from hvi_fenicsx.typing import Array
 
 E, NU, P = 1e7, 0.3, 1e5
 BULK, SHEAR = E / (3 * (1 - 2 * NU)), E / (2 * (1 + NU))
@@ -34,6 +34,12 @@ class Errors:
         )
 
 
+def nodal(found: hvi.Solution) -> tuple[Array, Array]:
+    """Places (n, d) and displacements (n, d) of the local nodes, m."""
+    d = found.problem.scales.dimension
+    return found.u.function_space.tabulate_dof_coordinates()[:, :d], found.u.x.array.reshape(-1, d)
+
+
 def errors(found: hvi.Solution, radial: Callable[[Any], Any]) -> Errors:
     """The errors of a solution under pressure inside, at the radius 1.
 
@@ -41,9 +47,9 @@ def errors(found: hvi.Solution, radial: Callable[[Any], Any]) -> Errors:
         found: of a quarter of a ring, or of an eighth of a ball: the pressure acts on π/2 in both.
         radial: the displacement over the radius.
     """
-    x = found.problem.positions[:, : found.problem.scales.dimension]
+    x, u = nodal(found)
     r = np.linalg.norm(x, axis=1, keepdims=True)
-    away = spaces.values(found.problem.space, found.u.x.array) - radial(r) * x / r
+    away = u - radial(r) * x / r
     place = ufl.SpatialCoordinate(found.problem.space.mesh)
     radius = ufl.sqrt(ufl.dot(place, place))
     assert found.estimate is not None

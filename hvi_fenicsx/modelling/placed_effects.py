@@ -16,6 +16,7 @@ from ..errors import InputError
 from ..laws import Mixity, Superpotential
 from ..mesh.domain import Domain
 from ..schema import input_error
+from ..spatial_value import SpatialValue
 from . import values
 
 Value = Any
@@ -156,7 +157,8 @@ class Contact(OnSide):
 
     Attributes:
         side: the side's name.
-        gap: how far the side may move outward, m; 0 unless another way is given.
+        gap: how far the side may move outward, m; 0 unless another way is given. Between two bodies also
+            ``"measured"``: the distance of their sides as they are meshed.
         lower: bilateral contact: the smallest opening -u·n, m.
         upper: bilateral contact: the largest opening -u·n, m.
         obstacle: a point of a flat obstacle (m), and its normal towards the body; or the table of an obstacle, as a
@@ -174,7 +176,7 @@ class Contact(OnSide):
     def effect(self, mesh: dmesh.Mesh) -> Effect:
         """The bounds."""
         given = {"gap": self.gap, "lower": self.lower, "upper": self.upper}
-        keys: dict[str, Any] = {k: values.spatial_value(v, mesh) for k, v in given.items() if v is not None}
+        keys: dict[str, Any] = {k: _bound(v, mesh) for k, v in given.items() if v is not None}
         if isinstance(self.obstacle, Mapping):
             keys["obstacle"] = dict(self.obstacle)
         elif self.obstacle is not None:
@@ -184,6 +186,13 @@ class Contact(OnSide):
         if self.direction is not None:
             keys["direction"] = tuple(map(float, self.direction))
         return checked(effects.contact.Contact, **keys)
+
+
+def _bound(value: Value, mesh: dmesh.Mesh) -> SpatialValue | str:
+    """A gap or bound as a scene has it."""
+    if isinstance(value, str) and value == effects.contact.MEASURED:
+        return value
+    return values.spatial_value(value, mesh)
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 
 from ..certify.certificate import Examination
 from ..errors import InputError
+from ..problem import spaces
 from ..problem.cell_stress import mean_stress
 from ..results import ResultFolder, gathering
 from ..results.output_folder import Existing
@@ -39,13 +40,14 @@ class ModelSolution(Solution):
 
     @cached_property
     def u(self) -> fem.Function:
-        """The displacement, m, ghosts updated; P1 on the body's mesh. Collective when first used.
+        """The displacement, m, ghosts updated; Lagrange's elements of ``solver.degree``. Collective when first used.
 
         Raises:
             InputError: on all ranks alike: nothing was solved, since no solution exists.
         """
-        field = fem.Function(self.problem.space, name="displacement")
-        field.x.array[:] = self._solved.u.x.array * self.problem.scales.displacement
+        field = spaces.in_lagrange_basis(self._solved.u)
+        field.name = "displacement"
+        field.x.array[:] *= self.problem.scales.displacement
         return field
 
     @cached_property

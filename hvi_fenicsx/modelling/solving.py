@@ -16,6 +16,7 @@ from ..errors import InputError
 from ..mesh.domain import Domain
 from ..path import last_borne
 from ..preparation import DEFAULT, Preparation, Thresholds
+from ..problem import spaces
 from ..runtime.log import newton_step
 from ..runtime.timing import Timer
 from ..scene import Scene, SolverTable
@@ -129,7 +130,11 @@ def _displacement(known: ModelSolution, prepared: Preparation) -> fem.Function |
     """A solution's displacement, as a start; None where there is none, since no solution existed."""
     if known.problem.domain.mesh is not prepared.problem.domain.mesh:
         raise InputError("start: is a solution on another mesh; give one of a model with the same Body")
-    return None if known.solve_result is None else known.u
+    if known.solve_result is None:
+        return None
+    start = spaces.carried_over(known.solve_result.u, prepared.problem.space)
+    start.x.array[:] *= known.problem.scales.displacement
+    return start
 
 
 def _with_options(scene: Scene, options: dict[str, Any]) -> Scene:

@@ -98,6 +98,34 @@ def _values(space: fem.FunctionSpace, found: Array) -> Array:
     return np.asarray((1 - 2 * share) * found + share * found[nodes.edge_ends(space)].sum(axis=1))
 
 
+def in_lagrange_basis(u: fem.Function) -> fem.Function:
+    """The same displacement with its values at the nodes as coefficients, as files and other programs read it.
+
+    Args:
+        u: a displacement, ghosts updated.
+    """
+    space, d = u.function_space, u.function_space.mesh.geometry.dim
+    found = fem.Function(fem.functionspace(space.mesh, ("Lagrange", nodes.degree(space), (d,))))
+    found.x.array.reshape(-1, d)[found.function_space.dofmap.list] = values(space, u.x.array)[space.dofmap.list]
+    return found
+
+
+def carried_over(u: fem.Function, space: fem.FunctionSpace) -> fem.Function:
+    """A displacement in another space on the same cells; at degree 1 it has the values of degree 2 at the vertices.
+
+    Args:
+        u: the displacement, ghosts updated.
+        space: of degree 1 or 2.
+    """
+    d, found = space.mesh.geometry.dim, fem.Function(space)
+    common = min(u.function_space.dofmap.list.shape[1], space.dofmap.list.shape[1])
+    blocks, given = (f.x.array.reshape(-1, d) for f in (found, u))
+    blocks[space.dofmap.list[:, :common]] = given[u.function_space.dofmap.list[:, :common]]
+    if nodes.degree(space) > nodes.degree(u.function_space):
+        blocks[:] = blocks[nodes.edge_ends(space)].mean(axis=1)
+    return found
+
+
 def positions(space: fem.FunctionSpace, coefficients: Array) -> Array:
     """Where the local nodes are, m, (n, 3): the inverse of :func:`coefficients_of` for the position.
 

@@ -18,7 +18,7 @@ from runs import summary
 
 import hvi_fenicsx as hvi
 from hvi_fenicsx import laws
-from hvi_fenicsx.problem import curved_shapes, facet_integrals, spaces
+from hvi_fenicsx.problem import curved_shapes, facet_integrals
 from hvi_fenicsx.problem.curved_polygons import in_space
 from hvi_fenicsx.problem.facet_overlaps import Facets
 
@@ -119,6 +119,45 @@ def test_a_uniform_pressure_on_meshes_that_do_not_match() -> None:
     assert away[1] < away[0] / 4
 
 
+def spheres_that_meet(gap: float) -> tuple[float, Any]:
+    """The pressure on the inner one and the radial displacements when the gap has closed (Lamé), on each by itself."""
+    within, around = 1.5, 1.5 + gap
+
+    def sphere(a: float, b: float, inside: float, outside: float) -> Any:
+        even, odd = (inside * a**3 - outside * b**3) / (3 * BULK), (inside - outside) * a**3 * b**3 / (4 * SHEAR)
+        return lambda r: (even * r + odd / r**2) / (b**3 - a**3)
+
+    def opening(pressure: float) -> float:
+        first, second = each(pressure)
+        return float(first(within) - second(around) - gap)
+
+    def each(pressure: float) -> tuple[Any, Any]:  # the force is the same, on another area
+        return sphere(1.0, within, P, pressure), sphere(around, 2.0, pressure * (within / around) ** 2, 0.0)
+
+    pressure = opening(0.0) / (opening(0.0) - opening(1.0))
+    first, second = each(pressure)
+    return pressure, lambda r: np.where(r < within + gap / 2, first(r), second(r))
+
+
+@pytest.mark.long
+def test_balls_that_are_apart_close_their_measured_distance() -> None:
+    gap, away, pressures = 1e-3, [], []
+    wanted, radial = spheres_that_meet(gap)
+    for size in (0.4, 0.2):
+        made = shells.bodies(size, 0.7 * size, apart=gap)
+        effects = [shells.material(), *shells.symmetry(), hvi.Pressure("inner", P), hvi.Contact("fit", gap="measured")]
+        found = hvi.solve(hvi.Model(made, effects), degree=2)
+        assert found.certificate.passed
+        x, u = lame.nodal(found)
+        r = np.linalg.norm(x, axis=1, keepdims=True)
+        away.append(float(np.sqrt(np.mean((u - radial(r) * x / r) ** 2)) / radial(1.0)))
+        part = found.contact["fit"]
+        pressures.append(float(part.weight @ part.pressure / (0.5 * np.pi * 1.5**2) / wanted - 1))
+        assert part.active.all()
+    assert away[1] < min(4e-4, 0.2 * away[0])
+    assert abs(pressures[1]) < min(2e-3, 0.2 * abs(pressures[0]))
+
+
 TURN, GLUE, B_ = 1e-3, 2e7, 1.5
 
 
@@ -143,8 +182,8 @@ def test_a_law_in_a_twisted_joint_slips_as_in_closed_form_and_the_estimate_is_th
     for size in (0.4, 0.25):
         found = hvi.solve(hvi.Model(shells.bodies(size, 0.7 * size), [shells.material(), *held]), degree=2)
         assert found.certificate.passed
-        x = found.problem.positions[:, :3]
-        r, u = np.linalg.norm(x, axis=1), spaces.values(found.problem.space, found.u.x.array)
+        x, u = lame.nodal(found)
+        r = np.linalg.norm(x, axis=1)
         exact = twist(r, r < B_, np.where)[:, None] * np.column_stack([-x[:, 1], x[:, 0], 0.0 * r])
         off = np.abs(r - B_) > 1e-6  # nodes of both bodies are there
         away.append(float(np.abs(u - exact)[off].max()) / TURN)

@@ -1,0 +1,70 @@
+"""The displacement of a solution as other programs read it, and as the start of a solve at another degree."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import pyvista
+from dolfinx import io
+
+import hvi_fenicsx as hvi
+from hvi_fenicsx.problem import spaces
+from hvi_fenicsx.typing import Array
+
+E, WEIGHT = 2e9, 1e6
+
+
+def column(dimension: int) -> hvi.Model:
+    """A square or cube under its own weight on a floor, ν = 0: the displacement is quadratic in height."""
+    body = hvi.Body.rectangle([1.0, 1.0], [3, 3]) if dimension == 2 else hvi.Body.box([1.0, 1.0, 1.0], [2, 2, 3])
+    *sideways, _ = [0.0] * dimension
+    steel = hvi.Isotropic(youngs_modulus=E, poisson_ratio=0.0)
+    held = [hvi.Displacement("left", [0.0] + [None] * (dimension - 1))]
+    if dimension == 3:
+        held.append(hvi.Displacement("front", [None, 0.0, None]))
+    return hvi.Model(body, [steel, hvi.BodyForce([*sideways, -WEIGHT]), hvi.Contact("bottom"), *held])
+
+
+def sinking(height: Array) -> Array:
+    """How far the column sinks, m."""
+    return np.asarray(-WEIGHT / E * (height - height**2 / 2))
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+@pytest.mark.parametrize("degree", [1, 2])
+def test_coefficients_are_values_at_the_nodes(dimension: int, degree: int) -> None:
+    u = hvi.solve(column(dimension), degree=degree, estimate=False).u
+    height = u.function_space.tabulate_dof_coordinates()[:, dimension - 1]
+    found = u.x.array.reshape(-1, dimension)[:, dimension - 1]
+    np.testing.assert_allclose(found, sinking(height), atol=1e-9 if degree == 2 else 3e-5)
+
+
+@pytest.mark.parametrize("degree", [1, 2])
+def test_a_file_that_dolfinx_writes_of_it_has_them(degree: int, tmp_path: Path) -> None:
+    u = hvi.solve(column(3), degree=degree, estimate=False).u
+    with io.VTKFile(u.function_space.mesh.comm, tmp_path / "u.pvd", "w") as file:
+        file.write_function(u)
+    grid = pyvista.read(tmp_path / "u.pvd")[0]
+    np.testing.assert_allclose(
+        grid["displacement"][:, 2], sinking(grid.points[:, 2]), atol=1e-9 if degree == 2 else 3e-5
+    )
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_a_solution_carried_to_another_degree_is_the_same_at_the_vertices(dimension: int) -> None:
+    model = column(dimension)
+    linear, quadratic = (hvi.solve(model, degree=degree, estimate=False) for degree in (1, 2))
+    for known, other in ((linear, quadratic), (quadratic, linear)):
+        moved = spaces.carried_over(known.solve_result.u, other.problem.space)
+        back = spaces.carried_over(moved, linear.problem.space).x.array
+        expected = spaces.carried_over(known.solve_result.u, linear.problem.space).x.array
+        np.testing.assert_array_equal(back, expected)
+        again = hvi.solve(model, degree=other.scene.solver.degree, start=known, estimate=False)
+        assert again.converged
+        assert again.energy == pytest.approx(other.energy, rel=1e-12)
+    height = linear.u.function_space.tabulate_dof_coordinates()[:, dimension - 1]
+    exact = spaces.carried_over(quadratic.solve_result.u, linear.problem.space).x.array.reshape(-1, dimension)
+    found = exact[:, dimension - 1] * quadratic.problem.scales.displacement
+    np.testing.assert_allclose(found, sinking(height), atol=1e-9)
