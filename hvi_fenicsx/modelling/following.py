@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
 from pathlib import Path
@@ -23,10 +23,11 @@ from ..report.path_reader import PathResult
 from ..results import ResultFolder
 from ..results.output_folder import Existing
 from ..runtime import log
-from ..scene import PathTable, Scene
-from ..schema import located_error
+from ..scene import PathTable, Scene, SolverTable
+from ..schema import located_error, unknown
 from ..typing import Array
 from .model import Model
+from .solution import displacement
 from .solving import check
 
 _LOG = log.logger("modelling")
@@ -90,14 +91,13 @@ class ModelPath(LoadPath):
         return part
 
     def u(self, row: int) -> fem.Function:
-        """The displacement at a row, m, ghosts updated; P1 on the body's mesh. Collective.
+        """The displacement at a row, m, ghosts updated; as :attr:`.ModelSolution.u`. Collective.
 
         Args:
             row: its number.
         """
-        field = self.run.displacement(range(len(self.rows))[row])
-        field.x.array[:] *= self.run.prepared.problem.scales.displacement
-        return field
+        found = self.run.displacement(range(len(self.rows))[row])
+        return displacement(found, self.run.prepared.problem.scales)
 
     def plot(self) -> Figure | None:
         """Force over displacement of the driven part, as a matplotlib figure; None where no part is driven."""
@@ -146,8 +146,7 @@ def follow(
     comm: MPI.Comm | None = None,
     *,
     to: float | Sequence[float] | None = None,
-    tolerance: float | None = None,
-    **path: Any,
+    **options: Any,
 ) -> ModelPath:
     """Follow the equilibria of a model or a scene over a load factor. Collective.
 
@@ -155,14 +154,14 @@ def follow(
         model: what to follow.
         comm: the ranks; by default those of the body, for a scene all.
         to: the factor at which the path ends, or a programme with turns; by default what the scene says, else 1.
-        tolerance: of the certificate.
-        **path: the other keys of the scene's table ``[path]``: scaled, follow, memory.
+        **options: the other keys of the scene's table ``[path]`` (scaled, follow, memory), and those of ``[solver]``,
+            such as ``degree=2`` or ``smoothing="chks", epsilon=0.01``; ``tolerance`` is that of the certificate.
 
     Raises:
         InputError: on all ranks alike: an option is not allowed, or the path cannot be followed.
     """
-    options: dict[str, Any] = {} if tolerance is None else {"tolerance": tolerance}
-    prepared = check(model, comm, **options)
+    path, solver = _by_table(options)
+    prepared = check(model, comm, **solver)
     wanted = _wanted(prepared.scene, path if to is None else {**path, "to": to})
     prepared = type(prepared)(
         **{f.name: getattr(prepared, f.name) for f in fields(prepared)} | {"scene": prepared.scene.changed(path=wanted)}
@@ -170,6 +169,17 @@ def follow(
     run = PathRun(prepared, wanted)
     found = run.follow(Control())
     return ModelPath(**{f.name: getattr(found, f.name) for f in fields(found)}, run=run)
+
+
+def _by_table(options: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
+    """The keys of the table ``[path]`` and those of ``[solver]``."""
+    tables = PathTable.model_fields, SolverTable.model_fields
+    known = [key for table in tables for key in table]
+    for key in options:
+        if key not in known:
+            raise InputError(unknown("key", key, known))
+    of_path, of_solver = ({key: value for key, value in options.items() if key in table} for table in tables)
+    return of_path, of_solver
 
 
 def _wanted(scene: Scene, changes: dict[str, Any]) -> PathTable:

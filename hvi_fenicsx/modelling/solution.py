@@ -15,6 +15,7 @@ from ..certify.certificate import Examination
 from ..errors import InputError
 from ..problem import spaces
 from ..problem.cell_stress import mean_stress
+from ..problem.scaling import Scales
 from ..results import ResultFolder, gathering
 from ..results.output_folder import Existing
 from ..results.whole import picture_process, write_whole
@@ -28,6 +29,19 @@ from .contact_arrays import ContactArrays, ContactParts
 _LOG = log.logger("modelling")
 _GIVEN = {"command": None, "petsc": None}
 """A program has no command line."""
+
+
+def displacement(u: fem.Function, scales: Scales) -> fem.Function:
+    """A displacement in m, with its values at the nodes as coefficients. Collective.
+
+    Args:
+        u: in units of u0, ghosts updated.
+        scales: with u0.
+    """
+    found = spaces.in_lagrange_basis(u)
+    found.name = "displacement"
+    found.x.array[:] *= scales.displacement
+    return found
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -45,10 +59,7 @@ class ModelSolution(Solution):
         Raises:
             InputError: on all ranks alike: nothing was solved, since no solution exists.
         """
-        field = spaces.in_lagrange_basis(self._solved.u)
-        field.name = "displacement"
-        field.x.array[:] *= self.problem.scales.displacement
-        return field
+        return displacement(self._solved.u, self.problem.scales)
 
     @cached_property
     def stress(self) -> fem.Function:

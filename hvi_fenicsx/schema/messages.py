@@ -93,12 +93,18 @@ def message_of(error: ErrorDetails, model: type[BaseModel] | None, also: Iterabl
     if kind == "extra_forbidden":
         return unknown("key", str(error["loc"][-1]), [*_keys(model, error["loc"][:-1]), *also])
     if kind == "literal_error":
-        return unknown("value", value, re.findall(r"'([^']*)'", context.get("expected", "")))
+        return _not_among(value, context.get("expected", ""))
     if kind == "value_error":
         return str(context["error"])
     if kind in _TEXTS:
         return f"{_TEXTS[kind](context)} (is {shown(value)}){_mend(kind, value)}"
     return str(error["msg"])
+
+
+def _not_among(value: Any, expected: str) -> str:
+    """The message on a value that is not one of those listed, numbers or names in quotes."""
+    names = re.findall(r"'([^']*)'", expected)
+    return unknown("value", value, names) if names else f"must be {expected} (is {shown(value)})"
 
 
 _TEXTS: Mapping[str, Callable[[Mapping[str, Any]], str]] = {

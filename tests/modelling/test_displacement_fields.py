@@ -52,6 +52,19 @@ def test_a_file_that_dolfinx_writes_of_it_has_them(degree: int, tmp_path: Path) 
     )
 
 
+def test_a_path_is_followed_at_another_degree_and_its_rows_have_values() -> None:
+    path = hvi.follow(column(3), degree=2, tolerance=1e-10)
+    u = path.u(-1)
+    height = u.function_space.tabulate_dof_coordinates()[:, 2]
+    np.testing.assert_allclose(u.x.array.reshape(-1, 3)[:, 2], sinking(height), atol=1e-9)
+
+
+@pytest.mark.parametrize("wrong", ["memroy", "degre"])
+def test_an_unknown_key_of_a_path_is_refused(wrong: str) -> None:
+    with pytest.raises(hvi.InputError, match="did you mean"):
+        hvi.follow(column(2), **{wrong: 2})
+
+
 @pytest.mark.parametrize("dimension", [2, 3])
 def test_a_solution_carried_to_another_degree_is_the_same_at_the_vertices(dimension: int) -> None:
     model = column(dimension)
