@@ -180,8 +180,7 @@ class ExactFollower(Follower):
         if found is Round.BLOCKED and self._takes_another_way(aim):
             return self._state(state.event, state.place, bifurcation=True)
         if found is not None:
-            where = f"at the factor {state.factor:.6g} the path comes back to where it was"
-            self._lose(self.factor, f"{where}: {found.value}")
+            self._go_round(found)
         return state
 
     def _takes_another_way(self, aim: float) -> bool:

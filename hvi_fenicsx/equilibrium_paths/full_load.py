@@ -86,10 +86,11 @@ def _event_by_event(problem: CondensedProblem, most_events: int, watch: Watch | 
 def _along_the_curve(problem: CondensedProblem, most_events: int, watch: Watch | None) -> FullLoad | None:
     """Where other laws lead: along the curve of equilibria, since a jump takes longer than the whole curve."""
     follower, states = _followed(problem, Follow.EXACT, most_events, watch)
-    if follower.end is End.ESCAPES and _begins(states):
+    if (follower.end is End.ESCAPES or follower.is_closed) and _begins(states):
         largest, stable = _largest(states), list(itertools.takewhile(lambda state: state.stable, states))
         first = len(stable) == len(states) or states[len(stable)].factor == largest.factor
-        reason = f"at the factor {largest.factor:.6g} the equilibria turn back to no load"
+        back = "to no load" if follower.end is End.ESCAPES else "and form a closed curve"
+        reason = f"at the factor {largest.factor:.6g} the equilibria turn back {back}"
         return FullLoad(x=None, reason=reason, borne=largest if first else None)
     return _reached(follower, states)
 

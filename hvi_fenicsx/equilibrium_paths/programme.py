@@ -8,6 +8,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from ..system.condensed_problem import CondensedProblem
+from .rounds import Round
 from .state import End, Event, PathOptions, PathState
 from .watch import Stopped, Watch
 
@@ -27,6 +28,7 @@ class Follower(ABC):
     Attributes:
         end: how the path ended; None before.
         reason: that in a sentence.
+        is_closed: whether it is lost because its equilibria form a closed curve, which it has gone round.
     """
 
     def __init__(
@@ -41,7 +43,7 @@ class Follower(ABC):
         self._leg, self._events, self._unstable, self._peak = 0, 0, 0, 0.0
         self._floats = problem.elastic.is_singular(np.ones(problem.size, dtype=bool), np.zeros(problem.size))
         self.end: End | None = None
-        self.reason = ""
+        self.reason, self.is_closed = "", False
 
     def states(self) -> Iterator[PathState]:
         """The states from start to end; the first one of a path that is resumed is the next one."""
@@ -121,6 +123,12 @@ class Follower(ABC):
             self._finish(End.INTERRUPTED, "interrupted")
         elif self._events > self._options.most_events:
             self._lose(self.factor, f"no end after {self._options.most_events} events")
+
+    def _go_round(self, found: Round) -> None:
+        """End where the path has come back to where it was."""
+        self.is_closed = found is Round.CLOSED
+        where = f"at the factor {self.factor:.6g} the path comes back to where it was"
+        self._lose(self.factor, f"{where}: {found.value}")
 
     def _finish(self, end: End, reason: str) -> None:
         self.end, self.reason = end, reason

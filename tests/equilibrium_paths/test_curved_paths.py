@@ -22,6 +22,7 @@ from hvi_fenicsx.equilibrium_paths.arc_length.follower import ArcLengthFollower
 from hvi_fenicsx.equilibrium_paths.arc_length.passage import Crossing, Passage
 from hvi_fenicsx.equilibrium_paths.arc_length.relaxation import Relaxation
 from hvi_fenicsx.equilibrium_paths.exact import ExactFollower
+from hvi_fenicsx.equilibrium_paths.full_load import at_full_load
 from hvi_fenicsx.equilibrium_paths.graphs import Passed, remembering
 from hvi_fenicsx.equilibrium_paths.kinds import ArcLengthKind, ExactKind, kind_of
 from hvi_fenicsx.equilibrium_paths.programme import Follower
@@ -101,6 +102,25 @@ def test_piecewise_linear_paths_are_the_exact_ones(follow: Follow) -> None:
         assert follower.end is exact.end
         assert peak(states) == pytest.approx(peak(wanted), rel=1e-12)
         assert states[-1].work == pytest.approx(wanted[-1].work, rel=1e-9)
+
+
+def test_a_closed_curve_is_gone_round_once() -> None:
+    """The exact path knows it by its cells; the wanted factor is not on it, so loading does not lead there."""
+    given = random_problem(165)
+    exact = ExactFollower(given, PathOptions(programme=(5.0,), follow=Follow.EXACT))
+    wanted = list(exact.states())
+    follower, states = path(given, programme=(5.0,), follow=Follow.EXACT, most_events=1000)
+    assert follower.is_closed
+    assert follower.reason == exact.reason
+    np.testing.assert_allclose([s.factor for s in states], [s.factor for s in wanted], atol=1e-9)
+
+    smoothed = tuple(replace(b, law=create("chks", b.law, epsilon=1e-4)) for b in given.bonds)
+    found = at_full_load(replace(given, force_rate=5.0 * given.force_rate, bonds=smoothed), 1000)
+    assert found is not None
+    assert found.x is None
+    assert "form a closed curve" in found.reason
+    turn = float(found.reason.split()[3])
+    assert turn == pytest.approx(peak(wanted) / 5.0, rel=1e-2)
 
 
 def mirrored(given: CondensedProblem) -> CondensedProblem:

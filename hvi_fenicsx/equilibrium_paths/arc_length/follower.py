@@ -11,6 +11,7 @@ from typing_extensions import override
 from ...system.condensed_problem import CondensedProblem
 from ...typing import Array
 from ..programme import Follower
+from ..rounds import Round, Rounds
 from ..state import End, Event, Follow, PathOptions, PathState, Place, Position, place_of
 from ..watch import Stopped, Watch
 from .curve import Curve
@@ -61,6 +62,7 @@ class ArcLengthFollower(Follower):
         self._remembers = any(law.passed is not None for law in self._laws)
         self._last: PathState | None = None
         self._curve: Curve
+        self._rounds: Rounds
 
     @property
     @override
@@ -126,6 +128,7 @@ class ArcLengthFollower(Follower):
     @override
     def _towards(self, aim: float) -> Iterator[PathState]:
         self._orient(aim)
+        self._rounds = Rounds(self._curve.here.values.x / self._factors)
         while self.end is None and self._curve.factor != aim:
             if self._options.follow is Follow.STABLE and self._unstable > 0:
                 yield from self._jump(aim)
@@ -188,7 +191,10 @@ class ArcLengthFollower(Follower):
         self._curve.settle()
         self._trend()
         self._unstable = self._sites.unstable_directions(self._curve.here.values)
-        return self._state(_event(passages, folds=before * self._curve.trend < 0), passages)
+        state = self._state(_event(passages, folds=before * self._curve.trend < 0), passages)
+        if self._rounds.note(state) is Round.CLOSED:
+            self._go_round(Round.CLOSED)
+        return state
 
     def _beyond(self, move: Move) -> int:
         """The number of unstable directions after a fold: vᵀH v = λ' f1ᵀv along the curve changes its sign there."""
