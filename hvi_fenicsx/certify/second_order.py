@@ -13,20 +13,18 @@ from __future__ import annotations
 import numpy as np
 from dolfinx import fem
 from mpi4py import MPI
-from petsc4py import PETSc
 
 from ..problem.problem import Problem
 from ..problem.references import References
 from ..runtime.timing import Timer
 from ..solvers.law_models import Cells, ExactLaw
-from ..system.petsc_options import CHOLESKY, default_options, prefix
+from ..system.factorisation import Factorisation, form_of
 from ..system.system import System
 from ..typing import Array, Integers
 from .directional import Growth, growth
 
 LOCAL_MINIMISER, NO_MINIMISER, UNDECIDED = "local minimiser", "not a minimiser", "undecided"
-_NEGATIVE_PIVOTS = 12
-"""MUMPS's INFOG entry."""
+_PREFIX = "inertia_"
 
 
 def status(references: References, u: fem.Function, forces: Array, tolerance: float, *, inertia: bool) -> str:
@@ -71,19 +69,9 @@ def negative_eigenvalues(system: System, held: Integers) -> int | None:
         system: the system, with the tangents that are set.
         held: dofs (local, owned) that are held.
     """
-    matrix = system.jacobian.matrix.copy()
-    start = system.load.owner_range[0]
-    matrix.zeroRowsColumns((held + start).astype(PETSc.IntType), diag=1.0)
-    matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
-    matrix.setOption(PETSc.Mat.Option.SPD, False)
-    pc = PETSc.PC().create(system.comm)
-    pc.setOptionsPrefix(f"{prefix()}inertia_")
-    pc.setOperators(matrix)
-    with default_options(CHOLESKY, "inertia_"):
-        pc.setFromOptions()
-        pc.setUp()
-    failed = bool(pc.getFailedReason())
-    count = None if failed else int(pc.getFactorMatrix().getMumpsInfog(_NEGATIVE_PIVOTS))
-    pc.destroy()
-    matrix.destroy()
+    form = form_of(system, _PREFIX)
+    factors = Factorisation(form, form.matrix(), own_prefix=_PREFIX)
+    factors.factorise(held)
+    count = None if factors.failure else factors.negative
+    factors.free()
     return count

@@ -64,7 +64,7 @@ class Condensation:
 
     def _is_large(self, most: int, carrying: int) -> bool:
         """Whether Γc has more unknowns, or products with S of those that carry take longer than solves with factors."""
-        entries = 2.0 * factor_counts.entries(self._interior.pc) + self._system.thresholds.solve_overhead
+        entries = 2.0 * factor_counts.entries(self._interior.factors.pc) + self._system.thresholds.solve_overhead
         return self._interior.size > most or carrying**2 > entries
 
     def _reduce(self, carrying: Integers) -> Integers:

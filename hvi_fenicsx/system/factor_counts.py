@@ -7,6 +7,7 @@ from petsc4py import PETSc
 
 _FACTOR_FLOPS = 3  # RINFOG: operations of the elimination
 _FACTOR_ENTRIES = 29  # INFOG: numbers in the factors; in millions with a minus, where they are many
+_NEGATIVE_PIVOTS = 12  # INFOG
 _FLOPS_PER_ENTRY = 4.0  # a solve multiplies and adds each number twice, forth and back
 _LEAST = 30.0  # solves; measured: 13 to 45 in the plane, where other things than operations take the time
 
@@ -21,6 +22,15 @@ def entries(pc: PETSc.PC) -> float:
         return np.inf
     count = pc.getFactorMatrix().getMumpsInfog(_FACTOR_ENTRIES)
     return float(count if count >= 0 else -1e6 * count)
+
+
+def negative_pivots(pc: PETSc.PC) -> int:
+    """The number of negative pivots, which is that of negative eigenvalues (Sylvester's law of inertia).
+
+    Args:
+        pc: a symmetric matrix, factorised by MUMPS.
+    """
+    return int(pc.getFactorMatrix().getMumpsInfog(_NEGATIVE_PIVOTS))
 
 
 def solves_worth(pc: PETSc.PC) -> float:

@@ -21,8 +21,9 @@ from typing_extensions import override
 from ..runtime.mpi import agree
 from ..typing import Array, Mask
 from .condensed_stiffness import CellColumns, CellInverse, CondensedStiffness
+from .factorisation import Factorisation, form_of
 from .interior import Interior
-from .petsc_options import CHOLESKY, default_options, prefix
+from .petsc_options import CHOLESKY
 from .system import System
 
 _T = TypeVar("_T")
@@ -41,7 +42,8 @@ class FactorisedStiffness(CondensedStiffness):
 
     def __init__(self, system: System, interior: Interior, added: float = 0.0) -> None:
         self._system, self._interior, self._added = system, interior, added
-        self._matrix, self._own = system.jacobian.matrix.copy(), interior.own()
+        self._form, self._own = form_of(system, _PREFIX), interior.own()
+        self._matrix, self._stiffness = self._form.matrix(), system.jacobian.matrix.copy()
         self._diagonal = self._everywhere(np.asarray(self._own_diagonal())) + added
         sums = np.asarray(np.abs(self._own).sum(axis=1)).ravel()
         self._size = float(np.max(self._everywhere(sums), initial=0.0)) + added
@@ -110,7 +112,9 @@ class FactorisedStiffness(CondensedStiffness):
             numpy.linalg.LinAlgError: it is singular.
         """
         here = self._here
-        return FactorisedCell(self._system, self._interior, self._matrix, moving[here], slope[here] + self._added)
+        factors = Factorisation(self._form, self._matrix.copy(), _INDEFINITE, _PREFIX)
+        slope = slope[here] + self._added
+        return FactorisedCell(self._system, self._interior, self._stiffness, factors, moving[here], slope)
 
 
 class FactorisedCell:
@@ -120,6 +124,7 @@ class FactorisedCell:
         system: the system.
         interior: which unknowns are condensed.
         stiffness: A.
+        factors: of a copy of it, to be made.
         moving: those of them that move, this rank's.
         slope: of the laws' forces, this rank's.
 
@@ -127,44 +132,33 @@ class FactorisedCell:
         numpy.linalg.LinAlgError: it is singular.
     """
 
-    def __init__(self, system: System, interior: Interior, stiffness: PETSc.Mat, moving: Mask, slope: Array) -> None:
+    def __init__(
+        self,
+        system: System,
+        interior: Interior,
+        stiffness: PETSc.Mat,
+        factors: Factorisation,
+        moving: Mask,
+        slope: Array,
+    ) -> None:
         self._system, self._interior, self._stiffness, self._moving = system, interior, stiffness, moving
         PETSc.garbage_cleanup(system.comm)  # on several ranks factors that nothing refers to are freed together
-        self._pc = self._factorised(self._with(slope))
+        factors.add(interior.kept, np.where(moving, slope, 0.0))
+        factors.factorise(np.union1d(interior.kept[~moving], system.pins))
+        self._factors = factors
         self._load, self._found, self._force = (system.load.duplicate() for _ in range(3))
-        if self._pc.getFailedReason():
+        if factors.failure:
             raise np.linalg.LinAlgError("the tangent is singular")
-
-    def _with(self, slope: Array) -> PETSc.Mat:
-        """The matrix with slopes, and what stands held."""
-        system, kept, matrix = self._system, self._interior.kept, self._stiffness.copy()
-        added = system.load.duplicate()
-        added.array[kept] = np.where(self._moving, slope, 0.0)
-        matrix.setDiagonal(added, PETSc.InsertMode.ADD_VALUES)
-        rows = np.union1d(kept[~self._moving], system.pins) + system.load.owner_range[0]
-        matrix.zeroRowsColumns(rows.astype(PETSc.IntType), diag=1.0)
-        matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
-        matrix.setOption(PETSc.Mat.Option.SPD, False)
-        return matrix
-
-    def _factorised(self, matrix: PETSc.Mat) -> PETSc.PC:
-        pc = PETSc.PC().create(self._system.comm)
-        pc.setOptionsPrefix(f"{prefix()}cell_")
-        pc.setOperators(matrix)
-        with default_options(_INDEFINITE, "cell_"):
-            pc.setFromOptions()
-            pc.setUp()
-        return pc
 
     @property
     def negative(self) -> int:
-        """The number of negative eigenvalues."""
-        return int(self._pc.getFactorMatrix().getInertia()[0])
+        """The number of negative eigenvalues. Collective."""
+        return self._factors.negative
 
     @property
     def is_singular(self) -> bool:
         """Whether a pivot is zero."""
-        return bool(self._pc.getFactorMatrix().getInertia()[1])
+        return self._factors.is_singular
 
     def solve(self, right: Array) -> Array:
         """Displacements of what moves, forces on what stands, (n,). Collective.
@@ -177,12 +171,13 @@ class FactorisedCell:
         own = right[first : first + len(kept)]
         self._load.set(0.0)
         self._load.array[kept] = np.where(moving, own, 0.0)
-        self._pc.apply(self._load, self._found)
+        self._factors.apply(self._load, self._found)
         self._stiffness.mult(self._found, self._force)
         felt = own - self._force.array_r[kept]
         return np.concatenate(agree(self._system.comm, np.where(moving, self._found.array_r[kept], felt)))
 
 
+_PREFIX = "cell_"
 _INDEFINITE = {**CHOLESKY, "mat_mumps_icntl_13": 1, "mat_mumps_icntl_24": 1}
 """Options of the factorisation: the pivots of the last block are counted too, and those that are zero are found."""
 

@@ -19,7 +19,8 @@ from scipy.sparse import csr_matrix
 from ..errors import SolverError
 from ..runtime.mpi import agree
 from ..typing import Array, Integers
-from .petsc_options import CHOLESKY, default_options, prefix
+from .factorisation import Factorisation, form_of
+from .petsc_options import CHOLESKY
 from .system import System
 
 _NO_MEMORY = PETSc.PC.FailedReason.FACTOR_OUTMEMORY
@@ -37,7 +38,7 @@ class Interior:
 
     Attributes:
         kept: the unknowns of this rank that are kept.
-        pc: the factorised A_ii; rows and columns of kept and pinned unknowns are those of the identity.
+        factors: of A_ii; rows and columns of kept and pinned unknowns are those of the identity.
         coupling: this rank's rows of A_ik, zero in the kept rows, (local unknowns, n).
 
     Raises:
@@ -56,8 +57,10 @@ class Interior:
         start = system.load.owner_range[0]
         self._everywhere = np.concatenate(agree(self._comm, kept + start)).astype(np.int64)
         self.coupling = self._coupled()
-        self.pc = self._factorised(options, own_prefix)
-        if reason := self.pc.getFailedReason():
+        form = form_of(system, own_prefix)
+        self.factors = Factorisation(form, form.matrix(), options, own_prefix)
+        self.factors.factorise(self._held)
+        if reason := self.factors.failure:
             why = "no memory was left" if reason == _NO_MEMORY else "it is singular, a body is not held"
             raise SolverError(f"the stiffness without the displacements of Γc was not factorised: {why}")
 
@@ -81,37 +84,15 @@ class Interior:
         inner[self._held] = 0.0
         return csr_matrix(self._columns(self._system.jacobian.matrix).multiply(inner[:, None]))
 
-    def _factorised(self, options: Mapping[str, object], own_prefix: str) -> PETSc.PC:
-        matrix = self._system.jacobian.matrix.copy()
-        start = self._system.load.owner_range[0]
-        matrix.zeroRowsColumns((self._held + start).astype(PETSc.IntType), diag=1.0)
-        matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
-        pc = PETSc.PC().create(self._comm)
-        pc.setOptionsPrefix(f"{prefix()}{own_prefix}")
-        pc.setOperators(matrix)
-        with default_options(options, own_prefix):
-            pc.setFromOptions()
-            pc.setUp()
-        return pc
-
     def solve(self, right: Array) -> Array:
         """A_ii⁻¹ times columns, zero at kept unknowns. Collective.
 
         Args:
             right: right-hand sides, this rank's rows, (local unknowns, k).
         """
-        columns = np.array(right, order="F")
+        columns = np.array(right)
         columns[self._held] = 0.0
-        sizes = ((len(columns), PETSc.DECIDE), (PETSc.DECIDE, columns.shape[1]))
-        b = PETSc.Mat().createDense(sizes, array=columns, comm=self._comm)
-        x = PETSc.Mat().createDense(sizes, comm=self._comm)
-        for matrix in (b, x):
-            matrix.assemble()
-        self.pc.getFactorMatrix().matSolve(b, x)
-        found = np.array(x.getDenseArray())
-        b.destroy()
-        x.destroy()
-        return found
+        return self.factors.columns(columns)
 
     def response(self) -> Array:
         """A_ki A_ii⁻¹ A_ik: forces on Γc by the body inside, for unit displacements of Γc, (n, n). Collective."""
@@ -191,4 +172,4 @@ class Interior:
 
     def free(self) -> None:
         """Free the PETSc objects."""
-        self.pc.destroy()
+        self.factors.free()

@@ -48,6 +48,11 @@ class MatrixCopy:
             self.pc.setFromOptions()
             self.pc.setUp()
 
+    @property
+    def factors(self) -> PETSc.PC:
+        """The PC that holds the factors, if it factorises."""
+        return self.pc
+
     def _new(self) -> PETSc.PC:
         pc = PETSc.PC().create(self._system.comm)
         pc.setOptionsPrefix(prefix())

@@ -1,14 +1,10 @@
 """Geometric multigrid for nearly incompressible bodies: displacements and averaged pressures are solved for together.
 
-With p = (λ/V) D u (:mod:`..problem.nodal_averaging`) the equations (S + Dᵀ (λ/V) D) u = f, S being all but the
-volumetric part, are those of a saddle point:
-
-    S u + Dᵀ p = f,    D u - (V/λ) p = 0.
-
-MINRES solves them, preconditioned by multigrid for S and by V (1/λ + 1/μ) for the pressures. At degree 2 displacements
-and pressures are those of Taylor and Hood's element, and its iterations depend neither on the mesh nor on ν (Elman,
-Silvester and Wathen 2014, Finite elements and fast iterative solvers, chapter 4). At degree 1 the pressures are not
-stable: the iterations grow with λ/μ, but not with the mesh.
+MINRES solves the equations of a saddle point (:mod:`.saddle_point`), S u + Dᵀ p = f and D u - (V/λ) p = 0,
+preconditioned by multigrid for S and by V (1/λ + 1/μ) for the pressures. At degree 2 displacements and pressures are
+those of Taylor and Hood's element, and its iterations depend neither on the mesh nor on ν (Elman, Silvester and Wathen
+2014, Finite elements and fast iterative solvers, chapter 4). At degree 1 the pressures are not stable: the iterations
+grow with λ/μ, but not with the mesh.
 """
 
 from __future__ import annotations
@@ -16,17 +12,16 @@ from __future__ import annotations
 import itertools
 import weakref
 from collections.abc import Mapping
-from dataclasses import replace
 
 import numpy as np
 from petsc4py import PETSc
 
 from ..problem.nodal_averaging import Dilatation
-from ..runtime.timing import Timer
 from ..typing import Entities
 from .levels import Level, Levels
 from .multigrid import Multigrid
 from .petsc_options import prefix
+from .saddle_point import nested, without_dilatation
 from .system import System
 
 
@@ -55,7 +50,7 @@ class MixedMultigrid:
         self._ratio = system.problem.bulk.volumetric_ratio
         self._shear, below = _without_dilatation(system, levels)
         self._multigrid = Multigrid(self._shear, below, options)
-        self._saddle_point = _saddle_point(system, self._shear, self._parts)
+        self._saddle_point = nested(system, self._shear, self._parts)
         vectors = [system.load.duplicate(), *(p.stiffness.duplicate() for p in self._parts)]
         self._given = PETSc.Vec().createNest(vectors, comm=system.comm)
         self._found = self._given.duplicate()
@@ -140,46 +135,9 @@ class _Blocks:
 
 def _without_dilatation(system: System, levels: Levels) -> tuple[System, Levels]:
     """The system and its coarser levels without the volumetric part. Collective."""
-    systems = [_sheared(one) for one in (system, *(level.system for level in levels))]
+    systems = [without_dilatation(one) for one in (system, *(level.system for level in levels))]
     pairs = zip(itertools.pairwise(systems), levels, strict=True)
     return systems[0], tuple(Level(finer, coarser, level.prolongation) for (finer, coarser), level in pairs)
-
-
-def _sheared(system: System) -> System:
-    problem = replace(system.problem, bulk=system.problem.bulk.without_dilatation())
-    return System(problem, Timer(), system.thresholds)
-
-
-def _saddle_point(system: System, shear: System, parts: list[Dilatation]) -> PETSc.Mat:
-    """The matrix of displacements and pressures. Collective."""
-    divergences = [_in_unknowns(part.divergence, system) for part in parts]
-    first = [shear.jacobian.matrix, *(PETSc.Mat().createTranspose(d) for d in divergences)]
-    rows = [
-        [d, *(_compliance(part) if i == k else None for i in range(len(parts)))]
-        for k, (d, part) in enumerate(zip(divergences, parts, strict=True))
-    ]
-    return PETSc.Mat().createNest([first, *rows], comm=system.comm)
-
-
-def _in_unknowns(divergence: PETSc.Mat, system: System) -> PETSc.Mat:
-    """D of the system's unknowns; prescribed ones have no part in it. Collective."""
-    found = divergence.copy()
-    if system.problem.coupling is not None:
-        found = found.matMult(system.problem.coupling.matrix)
-    if system.rotation is not None:
-        found = found.matMult(system.rotation)
-    mask = system.load.duplicate()
-    mask.set(1.0)
-    mask.array[system.problem.fixed_here] = 0.0
-    found.diagonalScale(None, mask)
-    return found
-
-
-def _compliance(part: Dilatation) -> PETSc.Mat:
-    """-V/λ; -1 at the vertices outside of the region, whose pressure is zero. Collective."""
-    rate, found = part.stiffness.array_r, part.stiffness.duplicate()
-    found.array[:] = -np.divide(1.0, rate, out=np.ones_like(rate), where=rate > 0)
-    return PETSc.Mat().createDiagonal(found)
 
 
 def _schur_complement(part: Dilatation) -> PETSc.Vec:

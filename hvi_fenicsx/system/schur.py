@@ -95,11 +95,11 @@ class SchurDirect:
         inner, interior = self._work, self._interior
         x.copy(inner)
         inner.array[interior.kept] = 0.0
-        interior.pc.apply(inner, y)
+        interior.factors.apply(inner, y)
         value = interior.gathered(x.array_r) - np.where(self._free, interior.pulled(y.array_r), 0.0)
         value = lu_solve(self._lu, value, check_finite=False)
         inner.array[:] -= interior.coupling @ np.where(self._free, value, 0.0)
-        interior.pc.apply(inner, y)
+        interior.factors.apply(inner, y)
         y.array[interior.kept] = interior.own_part(value)
 
     def free(self) -> None:

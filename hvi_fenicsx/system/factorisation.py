@@ -1,0 +1,196 @@
+"""Factorisations of a system's matrix, in which unknowns are held and slopes are added on Γc.
+
+The volumetric part of a nearly incompressible body joins each vertex to the neighbours of its neighbours. At degree 2
+factors are far smaller with the averaged pressures as further unknowns (:mod:`.saddle_point`), and rounding loses less.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from petsc4py import PETSc
+
+from ..mesh import nodes
+from ..typing import Array, Entities, Integers
+from . import factor_counts
+from .petsc_options import CHOLESKY, default_options, prefix
+from .saddle_point import nested, without_dilatation
+from .system import System
+
+
+class FactorForm:
+    """The system's matrix in the form in which it is factorised.
+
+    Args:
+        system: the system.
+
+    Attributes:
+        system: the system.
+        pressures: unknowns of this rank that follow its displacements.
+    """
+
+    def __init__(self, system: System) -> None:
+        self.system, self.pressures = system, 0
+
+    def matrix(self) -> PETSc.Mat:
+        """A copy of the present matrix. Collective."""
+        return self.system.jacobian.matrix.copy()
+
+    def refresh(self, matrix: PETSc.Mat) -> None:
+        """Copy the present matrix into an earlier copy. Collective."""
+        self.system.jacobian.matrix.copy(matrix, structure=PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
+
+
+class SaddlePointForm(FactorForm):
+    """The matrix of displacements and averaged pressures. Creation is collective.
+
+    Args:
+        system: of a body whose div u is averaged; nothing is held by its matrix.
+    """
+
+    def __init__(self, system: System) -> None:
+        super().__init__(system)
+        parts = system.problem.bulk.dilatations
+        self._shear = without_dilatation(system)
+        self._blocks = nested(system, self._shear, parts)
+        self.pressures = sum(part.stiffness.local_size for part in parts)
+
+    def _update(self) -> None:
+        nothing = np.empty(0, dtype=np.int32)
+        self._shear.jacobian.set_restricted(self.system.jacobian.rows.tangent, nothing)
+
+    def matrix(self) -> PETSc.Mat:
+        """A copy of the present matrix. Collective."""
+        self._update()
+        return self._blocks.convert("aij", out=PETSc.Mat())
+
+    def refresh(self, matrix: PETSc.Mat) -> None:
+        """Copy the present matrix into an earlier copy. Collective."""
+        self._update()
+        self._blocks.convert("aij", out=matrix)
+
+
+def form_of(system: System, own_prefix: str = "") -> FactorForm:
+    """The form in which factors of a system's matrix are smallest. Collective.
+
+    Args:
+        system: the system.
+        own_prefix: of the options of its factorisation: the form with pressures suits no solver that the user chose.
+    """
+    quadratic = nodes.degree(system.problem.space) > 1
+    chosen = PETSc.Options().hasName(f"{prefix()}{own_prefix}pc_type")
+    if quadratic and system.problem.bulk.averages_dilatation and not chosen:
+        return SaddlePointForm(system)
+    return FactorForm(system)
+
+
+class Factorisation:
+    """The factors of a matrix. Creation is collective.
+
+    They keep their memory and the order of elimination when values change.
+
+    Args:
+        form: of the matrix.
+        matrix: of that form, which is changed.
+        options: defaults of the factorisation's options.
+        own_prefix: of the options by which the user changes them, after that of all options.
+
+    Attributes:
+        pc: the PC of the matrix in its form.
+    """
+
+    def __init__(
+        self,
+        form: FactorForm,
+        matrix: PETSc.Mat,
+        options: Mapping[str, object] = CHOLESKY,
+        own_prefix: str = "",
+    ) -> None:
+        self._form, self._matrix, self._options, self._own_prefix = form, matrix, options, own_prefix
+        matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+        matrix.setOption(PETSc.Mat.Option.SPD, False)
+        self._given, self._found = matrix.createVecLeft(), matrix.createVecLeft()
+        self.pc = PETSc.PC().create(form.system.comm)
+        self.pc.setOptionsPrefix(f"{prefix()}{own_prefix}")
+        self.pc.setOperators(matrix)
+
+    def refresh(self) -> None:
+        """Take over the system's present matrix. Collective."""
+        self._form.refresh(self._matrix)
+
+    def add(self, at: Entities | Integers, values: Array) -> None:
+        """Add to the diagonal. Collective.
+
+        Args:
+            at: local unknowns of the system.
+            values: at these.
+        """
+        self._given.set(0.0)
+        self._given.array[at] = values
+        self._matrix.setDiagonal(self._given, PETSc.InsertMode.ADD_VALUES)
+
+    def factorise(self, held: Entities | Integers) -> None:
+        """Hold unknowns: their rows and columns become those of the identity; factorise. Collective.
+
+        Args:
+            held: local unknowns of the system.
+        """
+        rows = held + self._matrix.getOwnershipRange()[0]
+        self._matrix.zeroRowsColumns(rows.astype(PETSc.IntType), diag=1.0)
+        with default_options(self._options, self._own_prefix):
+            self.pc.setFromOptions()
+            self.pc.setUp()
+
+    def apply(self, right: PETSc.Vec, found: PETSc.Vec) -> None:
+        """Solve for the system's unknowns. Collective.
+
+        Args:
+            right: the right-hand side.
+            found: where the solution is written.
+        """
+        count = right.local_size
+        self._given.set(0.0)
+        self._given.array[:count] = right.array_r
+        self.pc.apply(self._given, self._found)
+        found.array[:] = self._found.array_r[:count]
+
+    def columns(self, right: Array) -> Array:
+        """Solve for several right-hand sides. Collective.
+
+        Args:
+            right: this rank's rows, (local unknowns, k).
+        """
+        count, number = right.shape
+        given = np.zeros((count + self._form.pressures, number), order="F")
+        given[:count] = right
+        sizes = ((len(given), PETSc.DECIDE), (PETSc.DECIDE, number))
+        b = PETSc.Mat().createDense(sizes, array=given, comm=self._form.system.comm)
+        x = PETSc.Mat().createDense(sizes, comm=self._form.system.comm)
+        for matrix in (b, x):
+            matrix.assemble()
+        self.pc.getFactorMatrix().matSolve(b, x)
+        found = np.array(x.getDenseArray()[:count])
+        b.destroy()
+        x.destroy()
+        return found
+
+    @property
+    def negative(self) -> int:
+        """The number of negative eigenvalues of the system's matrix. Collective."""
+        return factor_counts.negative_pivots(self.pc) - int(self._form.system.comm.allreduce(self._form.pressures))
+
+    @property
+    def is_singular(self) -> bool:
+        """Whether a pivot is zero."""
+        return bool(self.pc.getFactorMatrix().getInertia()[1])
+
+    @property
+    def failure(self) -> int:
+        """PETSc's reason why it failed; 0 where it did not."""
+        return int(self.pc.getFailedReason())
+
+    def free(self) -> None:
+        """Free the PETSc objects."""
+        for thing in (self.pc, self._matrix, self._given, self._found):
+            thing.destroy()
