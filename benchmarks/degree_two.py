@@ -1,6 +1,6 @@
 """Degree 2: the rule on Γc in space, the pressure, what it saves, penetration between nodes, iterations towards ν = ½.
 
-    ./hvi exec python3 benchmarks/degree_two.py rules|pressure|block|strip|hertz|dips|rubber|starts
+    ./hvi exec python3 benchmarks/degree_two.py rules|pressure|block|strip|hertz|dips|rubber|starts|factors
 
 Energies decide: the square root of the relative error of the energy is the relative error in the energy norm, but for
 what the rule on Γc adds to the energy.
@@ -27,7 +27,9 @@ from hvi_fenicsx.solvers.active_set import ActiveSetSolver
 from hvi_fenicsx.solvers.closed_start import resting_start
 from hvi_fenicsx.solvers.context import RunControl
 from hvi_fenicsx.solvers.thresholds import Thresholds as SolverThresholds
+from hvi_fenicsx.system import factor_counts
 from hvi_fenicsx.system.assemble import assemble
+from hvi_fenicsx.system.factorisation import Factorisation, FactorForm, SaddlePointForm
 from hvi_fenicsx.system.linear_settings import LinearSettings
 from hvi_fenicsx.system.thresholds import Thresholds as LinearThresholds
 
@@ -246,6 +248,28 @@ def starts() -> None:
             )
 
 
+def factors() -> None:
+    """Factors at ν = 0.4999 with averaged pressures as unknowns over those of the displacements' matrix."""
+    for dimension, degree, cells in ((2, 1, 64), (3, 1, 12), (2, 2, 64), (2, 2, 128), (3, 2, 8)):
+        scene = hvi.Scene.model_validate(pressed(dimension, degree, cells, 0.4999))
+        domain = scene.domain.build_hierarchy(MPI.COMM_WORLD, scene.dimension, Thresholds())
+        system = assemble(domain, model_of(scene), Timer())
+        counts, seconds = zip(*(_factorised(form(system)) for form in (SaddlePointForm, FactorForm)), strict=True)
+        print(
+            f"{dimension}D, degree {degree}, {system.dofs:,} unknowns: {counts[0]:.3g} numbers instead of "
+            f"{counts[1]:.3g}, CPU {seconds[0]:.2g} s instead of {seconds[1]:.2g} s",
+            flush=True,
+        )
+
+
+def _factorised(form: FactorForm) -> tuple[float, float]:
+    """Numbers in the factors, and CPU seconds of the factorisation."""
+    made = Factorisation(form, form.matrix())
+    begun = time.process_time()
+    made.factorise(form.system.jacobian.rows.dofs)
+    return factor_counts.entries(made.pc), time.process_time() - begun
+
+
 def suits(kind: str, nu: float, degree: int, *, small: bool) -> bool:
     """Whether a solver is measured: what takes minutes is left out."""
     if degree == 1 and not small:
@@ -293,4 +317,4 @@ def iterations(scene: hvi.Scene, kind: Any) -> tuple[int, float]:
 
 
 if __name__ == "__main__":
-    {f.__name__: f for f in (rules, pressure, block, strip, hertz, dips, rubber, starts)}[sys.argv[1]]()
+    {f.__name__: f for f in (rules, pressure, block, strip, hertz, dips, rubber, starts, factors)}[sys.argv[1]]()
