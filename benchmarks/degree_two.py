@@ -29,7 +29,7 @@ from hvi_fenicsx.solvers.context import RunControl
 from hvi_fenicsx.solvers.thresholds import Thresholds as SolverThresholds
 from hvi_fenicsx.system import factor_counts
 from hvi_fenicsx.system.assemble import assemble
-from hvi_fenicsx.system.factorisation import Factorisation, FactorForm, SaddlePointForm
+from hvi_fenicsx.system.factorisation import FactorForm, Factorisation, SaddlePointForm
 from hvi_fenicsx.system.linear_settings import LinearSettings
 from hvi_fenicsx.system.thresholds import Thresholds as LinearThresholds
 

@@ -11,7 +11,7 @@ import numpy as np
 from mpi4py import MPI
 
 from hvi_fenicsx import Scene, prepare
-from hvi_fenicsx.system.factorisation import Factorisation, FactorForm, form_of
+from hvi_fenicsx.system.factorisation import FactorForm, Factorisation, form_of
 from hvi_fenicsx.system.petsc_options import CHOLESKY
 
 INDEFINITE = {**CHOLESKY, "mat_mumps_icntl_13": 1, "mat_mumps_icntl_24": 1}

@@ -14,7 +14,7 @@ from scenes import quadratic_linear, solved, two_blocks
 
 from hvi_fenicsx import Scene, prepare
 from hvi_fenicsx.system import factor_counts
-from hvi_fenicsx.system.factorisation import Factorisation, FactorForm, form_of
+from hvi_fenicsx.system.factorisation import FactorForm, Factorisation, form_of
 from hvi_fenicsx.system.petsc_options import CHOLESKY
 
 RUBBER = {"youngs_modulus": 1e6, "poisson_ratio": 0.4999}
