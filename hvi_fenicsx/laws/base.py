@@ -110,6 +110,15 @@ class Superpotential(ABC):
         """Right derivative of j at x (m,), N/m²."""
         return self.convex.right(x) - self.concave.right(x)
 
+    def derivatives(self, x: Array) -> tuple[Array, Array]:
+        """Right derivative of j at x (m,), N/m², and j'' off the kinks, N/m³.
+
+        Args:
+            x: displacements, (m,), m.
+        """
+        (rises, steeper), (falls, steep) = (part.derivatives(x) for part in (self.convex, self.concave))
+        return rises - falls, steeper - steep
+
     def slope_range(self, low: Array, high: Array) -> tuple[Array, Array]:
         """Bounds of j'' off the kinks on intervals, N/m³, (m,) each; infinite where none is known.
 

@@ -74,6 +74,14 @@ class ConvexPart(ABC):
     def second(self, x: Array) -> Array:
         """Second derivative off the kinks; the larger one-sided one where the derivative's slope breaks."""
 
+    def derivatives(self, x: Array) -> tuple[Array, Array]:
+        """Right and second derivative, (m,) each; a part whose two have terms in common computes these once.
+
+        Args:
+            x: arguments, (m,).
+        """
+        return self.right(x), self.second(x)
+
     def second_range(self, low: Array, high: Array) -> tuple[Array, Array]:
         """Bounds of the second derivative off the kinks on intervals, (m,) each; 0 and inf where none is known.
 
@@ -136,6 +144,11 @@ class ScaledPart(ConvexPart):
     @override
     def second(self, x: Array) -> Array:
         return self.part.second(self._original(x)) * (self.length / self.traction)
+
+    @override
+    def derivatives(self, x: Array) -> tuple[Array, Array]:
+        right, second = self.part.derivatives(self._original(x))
+        return quotient(right, self.traction), second * (self.length / self.traction)
 
     @override
     def second_range(self, low: Array, high: Array) -> tuple[Array, Array]:

@@ -46,6 +46,10 @@ class PolylinePart(ConvexPart):
         return self.graph.slope(x)
 
     @override
+    def derivatives(self, x: Array) -> tuple[Array, Array]:
+        return self.graph.right_and_slope(x)
+
+    @override
     def second_range(self, low: Array, high: Array) -> tuple[Array, Array]:
         return self.graph.slope_range(low, high)
 
@@ -95,6 +99,10 @@ class PolylineLaw(Superpotential):
     @override
     def right(self, x: Array) -> Array:
         return self.graph.traction(x, "right")
+
+    @override
+    def derivatives(self, x: Array) -> tuple[Array, Array]:
+        return self.graph.right_and_slope(x)
 
     @override
     @cached_property

@@ -108,7 +108,25 @@ class TractionGraph:
             x: displacements (m,).
             side: "left" or "right".
         """
-        next_break, passed = np.searchsorted(self.breaks, x), np.searchsorted(self.breaks, x, side="right")
+        return self._limit(x, *self._pieces(x), side)
+
+    def right_and_slope(self, x: Array) -> tuple[Array, Array]:
+        """Limit from the right and slope, as :meth:`traction` and :meth:`slope`, (m,) each.
+
+        Args:
+            x: displacements (m,).
+        """
+        pieces = self._pieces(x)
+        return self._limit(x, *pieces, "right"), self._steeper(*pieces)
+
+    def _pieces(self, x: Array) -> tuple[Integers, Integers]:
+        """The pieces before and behind x, (m,) each; off the breaks they are one."""
+        return self.breaks.searchsorted(x), self.breaks.searchsorted(x, side="right")
+
+    def _steeper(self, before: Integers, behind: Integers) -> Array:
+        return np.asarray(np.maximum(self.slopes[before], self.slopes[behind]))
+
+    def _limit(self, x: Array, next_break: Integers, passed: Integers, side: str) -> Array:
         piece, limits = (next_break, self.left) if side == "left" else (passed, self.right)
         with np.errstate(over="ignore"):
             inside = self._start[piece] + self.slopes[piece] * (x - self.breaks[self._anchor[piece]])
@@ -116,11 +134,7 @@ class TractionGraph:
 
     def slope(self, x: Array) -> Array:
         """Slope (m,) at x; at a break the larger of the two."""
-        before, after = (
-            np.searchsorted(self.breaks, x, side="left"),
-            np.searchsorted(self.breaks, x, side="right"),
-        )
-        return np.asarray(np.maximum(self.slopes[before], self.slopes[after]))
+        return self._steeper(*self._pieces(x))
 
     def slope_range(self, low: Array, high: Array) -> tuple[Array, Array]:
         """The least and the largest slope on closed intervals, (m,) each.

@@ -113,6 +113,11 @@ class _Weakened(DifferentiablePart):
         return (self._drop / self.law.delta) * self._shape(x)[2]
 
     @override
+    def derivatives(self, x: Array) -> tuple[Array, Array]:
+        _, share, rate = self._shape(x)
+        return self._drop * np.sign(x) * share, (self._drop / self.law.delta) * rate
+
+    @override
     def second_range(self, low: Array, high: Array) -> tuple[Array, Array]:
         if not self.law.concave_shape:
             return super().second_range(low, high)

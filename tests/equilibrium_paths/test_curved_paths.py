@@ -21,6 +21,7 @@ from hvi_fenicsx.equilibrium_paths.arc_length.equations import Refused
 from hvi_fenicsx.equilibrium_paths.arc_length.follower import ArcLengthFollower
 from hvi_fenicsx.equilibrium_paths.arc_length.passage import Crossing, Passage
 from hvi_fenicsx.equilibrium_paths.arc_length.relaxation import Relaxation
+from hvi_fenicsx.equilibrium_paths.arc_length.sites import Sites, Values
 from hvi_fenicsx.equilibrium_paths.exact import ExactFollower
 from hvi_fenicsx.equilibrium_paths.full_load import at_full_load
 from hvi_fenicsx.equilibrium_paths.graphs import Passed, remembering
@@ -31,6 +32,7 @@ from hvi_fenicsx.errors import InputError
 from hvi_fenicsx.laws import Exponential, Superpotential, TractionGraph
 from hvi_fenicsx.laws.smoothing import create
 from hvi_fenicsx.system.condensed_problem import Bonds, CondensedProblem
+from hvi_fenicsx.system.condensed_stiffness import DenseStiffness
 
 Array = npt.NDArray[np.float64]
 DROP = [(0, 0), (1, 1), (1, 0.4)]
@@ -263,6 +265,28 @@ def test_a_body_that_comes_off_is_let_go_where_it_is_out_of_reach() -> None:
     assert motion.run(np.ones(len(sites)))
     assert motion.escapes
     assert float(np.max(np.abs(sites.s(motion.z)))) < 1e6
+
+
+@pytest.mark.parametrize("smoothing", ["chks", "log_exp"])
+def test_a_motion_passes_many_sharp_drops_in_few_steps(smoothing: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It rests where all bonds carry what their drops leave: S x = f - 0.4 w. No way is gone twice on the way there."""
+    evaluated = []
+
+    def counted(sites: Sites, z: Array) -> Values:
+        evaluated.append(1)
+        return values(sites, z)
+
+    values = Sites.values
+    given = line(create(smoothing, graph(DROP), epsilon=1e-6), 8)
+    given = replace(given, elastic=DenseStiffness(given.stiffness + 0.05 * np.eye(8)))
+    follower, _ = path(given, programme=(0.1,))
+    start, sites, load = follower._curve.here.y[:-1], follower._sites, np.linspace(1.0, 1.5, 8)
+    monkeypatch.setattr(Sites, "values", counted)
+    motion = Relaxation(given, sites, start, load, follower._lag, held=True, step=lambda: None)
+    assert motion.run(np.ones(len(sites)))
+    x = np.linalg.solve(given.stiffness, load - 0.4 * given.bonds[0].weights)
+    assert values(sites, motion.z).x == pytest.approx(x, rel=1e-5)
+    assert len(evaluated) < 4000
 
 
 class GoingRound(Crossing):

@@ -169,6 +169,20 @@ def test_second_derivative_of_the_smoothed_parts(law: Superpotential, plus: Plus
 
 @each_law
 @each_plus
+def test_both_derivatives_at_once_are_those_of_the_parts(law: Superpotential, plus: PlusFunction) -> None:
+    smooth = plus.relative(law, 0.1)
+    x = np.random.default_rng(4).uniform(-8, 8, 200) * law.length_scale
+    for some in (law, smooth):
+        traction, slope = some.derivatives(x)
+        size = max(law.traction_scale, float(np.max(np.abs(traction))))
+        assert traction == pytest.approx(some.right(x), rel=1e-12, abs=1e-12 * size)
+        wanted = some.convex.second(x) - some.concave.second(x)
+        parts = max(float(np.max(np.abs(part.second(x)))) for part in (some.convex, some.concave))
+        assert slope == pytest.approx(wanted, rel=1e-12, abs=1e-12 * parts)
+
+
+@each_law
+@each_plus
 def test_gradients_tend_into_the_subdifferential(law: Superpotential, plus: PlusFunction) -> None:
     """Near a kink, where x moves with ε, into the kink's interval; elsewhere to the derivative."""
     for place in law.kinks:

@@ -1,17 +1,42 @@
 """The equations at a point of a curve with a row beside them, factorised: what is near to them is solved with it, too.
 
 The row may be another one: its part of a solution lies along the one direction in which the equations stay satisfied.
+Where a site passes to another segment, only its columns change: they are exchanged beside the factors (the product form
+of the inverse, Dantzig and Orchard-Hays 1954).
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from scipy.linalg.lapack import dgetrf, dgetrs
 
-from ...typing import Array
+from ...typing import Array, Integers
 
 _ACROSS = 1e-3
 """A row that hardly changes along the direction, beside its size, costs digits: it wants factors of its own."""
+_MOST_EXCHANGES = 40
+"""So many exchanges cost as much as new factors, and digits."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Exchange:
+    """Columns that were exchanged.
+
+    Attributes:
+        columns: their numbers, (k,).
+        spike: the new ones as combinations of those before, less the identity in their own places, (n + 1, k).
+        own: the inverse of these combinations' part in their own places, (k, k).
+    """
+
+    columns: Integers
+    spike: Array
+    own: Array
+
+    def applied(self, found: Array) -> Array:
+        """A solution with the new columns from that with the old ones, (n + 1,)."""
+        return np.asarray(found - self.spike @ (self.own @ found[self.columns]))
 
 
 class Bordered:
@@ -28,16 +53,43 @@ class Bordered:
     """
 
     def __init__(self, matrix: Array) -> None:
-        row = matrix[-1].copy()
+        self._row = matrix[-1].copy()
+        self._exchanges: list[_Exchange] = []
         self._factors, self._pivots, singular = dgetrf(matrix, overwrite_a=1)
-        if not singular:
-            self.along = self._solved(np.eye(1, len(matrix), len(matrix) - 1)[0])
-        if singular or not 0.5 < float(row @ self.along) < 2.0:  # it is 1 where any digit is left
+        if singular or not self._has_tangent():
             raise np.linalg.LinAlgError("the equations have no tangent here")
+
+    def _has_tangent(self) -> bool:
+        """Find the direction in which the equations stay satisfied; whether there is one."""
+        self.along = self._solved(np.eye(1, len(self._row), len(self._row) - 1)[0])
         self._length = float(np.linalg.norm(self.along))
+        return 0.5 < float(self._row @ self.along) < 2.0  # it is 1 where any digit is left
 
     def _solved(self, right: Array) -> Array:
-        return np.asarray(dgetrs(self._factors, self._pivots, right)[0])
+        found = np.asarray(dgetrs(self._factors, self._pivots, right)[0])
+        for exchange in self._exchanges:
+            found = exchange.applied(found)
+        return found
+
+    def exchange(self, columns: Integers, values: Array) -> bool:
+        """Put other columns into the equations; whether that went well. If not, the factors are good for nothing.
+
+        Args:
+            columns: their numbers, (k,).
+            values: the new ones, (n, k).
+        """
+        if len(self._exchanges) == _MOST_EXCHANGES:
+            return False
+        spike = np.stack([self._solved(np.append(v, self._row[i])) for i, v in zip(columns, values.T, strict=True)], 1)
+        own = spike[columns]
+        size = float(np.max(np.abs(spike)))
+        if not np.isfinite(size) or np.linalg.svd(own, compute_uv=False)[-1] <= _ACROSS * size:
+            return False
+        spike[columns] -= np.eye(len(columns))
+        self._exchanges.append(
+            _Exchange(columns=columns, spike=spike, own=np.asarray(np.linalg.inv(own), dtype=np.float64))
+        )
+        return self._has_tangent() and self.takes(self._row)
 
     def across(self, left: Array) -> Array:
         """The change of the variables that takes out what is left of the equations and keeps the row, (n + 1,).

@@ -39,6 +39,7 @@ class Curve(Events):
 
     Attributes:
         length: of the next step.
+        shortest: the shortest step that is tried.
         disagreement: of the work along a step with the energies, 1 where it is as large as is allowed.
     """
 
@@ -46,7 +47,7 @@ class Curve(Events):
         self, constant: Array, rate: Array, sites: Sites, z: Array, factor: float, fineness: float = 1.0
     ) -> None:
         super().__init__(constant, rate, sites, z, factor)
-        self._fineness, self.length = fineness, 0.1 * fineness
+        self._fineness, self.length, self.shortest = fineness, 0.1 * fineness, LEAST
         self._next = self.length
         self.disagreement: Callable[[Move], float] = lambda move: 0.0
         self._size = self._extent()
@@ -64,7 +65,7 @@ class Curve(Events):
         """
         if self._goes_on_for_ever(aim):
             return Move(outcome=Outcome.AWAY, before=self.here, after=self.here)
-        while self.length > LEAST:
+        while self.length > self.shortest:
             try:
                 move = self._tried(aim)
             except (Refused, np.linalg.LinAlgError):

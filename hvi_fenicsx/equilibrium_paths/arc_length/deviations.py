@@ -12,8 +12,47 @@ from ...typing import Array, Integers, Mask
 from ..segments import Segment
 from .vertex_laws import VertexLaw
 
+_INSET = 1e-12
+"""The law itself is taken so far inside the ends of its pieces, beside their length."""
 _REACH = 0.25
 """A step changes the argument of a curved law by this part of its length scale and of the argument at most."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Live:
+    """A law at the q vertices where it is on its curve.
+
+    Attributes:
+        sites: numbers, (q,).
+        signs: the law's argument is that times the displacement, (q,).
+        weights: lumped areas, (q,).
+        low: least displacement at which the law itself is taken, but for the inset, (q,).
+        high: greatest one, (q,).
+        inset: by how much less on pieces without end, beside 1 + |x|, (q,).
+        chords: x, traction and slope of the present chords, (3, q).
+    """
+
+    sites: Integers
+    signs: Array
+    weights: Array
+    low: Array
+    high: Array
+    inset: Array
+    chords: Array
+
+    def lacks(self, law: Superpotential, x: Array) -> tuple[Array, Array]:
+        """What the chords lack, and its slope, (q,) each; beyond a piece continued along its tangent.
+
+        Args:
+            law: j.
+            x: displacements, (q,).
+        """
+        inset = self.inset * (1.0 + np.abs(x))
+        inside = np.clip(x, self.low + inset, self.high - inset)
+        at, start, chord = self.chords
+        traction, slope = law.derivatives(self.signs * inside)
+        lacking = self.signs * traction + slope * (x - inside) - start - chord * (x - at)
+        return self.weights * lacking, self.weights * (slope - chord)
 
 
 @dataclass(kw_only=True)
@@ -29,6 +68,7 @@ class _Group:
         live: whether the law is on its curve, (r,).
         chords: x, traction and slope of the present chord, (r, 3).
         ends: of the present piece, (r, 2).
+        at: where the law is on its curve; None: not gathered since a vertex entered another piece.
     """
 
     law: Superpotential
@@ -39,6 +79,25 @@ class _Group:
     live: Mask
     chords: Array
     ends: Array
+    at: _Live | None = None
+
+    def gathered(self) -> _Live:
+        """The vertices where the law is on its curve."""
+        if self.at is None:
+            rows = np.flatnonzero(self.live)
+            low, high = self.ends[rows].T
+            ended = np.isfinite(high - low)
+            inset = np.where(ended, _INSET * np.where(ended, high - low, 0.0), 0.0)
+            self.at = _Live(
+                sites=self.sites[rows],
+                signs=self.signs[rows],
+                weights=self.weights[rows],
+                low=low + inset,
+                high=high - inset,
+                inset=np.where(ended, 0.0, _INSET),
+                chords=self.chords[rows].T,
+            )
+        return self.at
 
 
 class Deviations:
@@ -66,6 +125,7 @@ class Deviations:
             segment: the segment.
         """
         for group, row in self._at.get(k, []):
+            group.at = None
             law, low, high = group.rows[row], segment.x + segment.low, segment.x + segment.high
             middle = between(low, high)
             passed = (0.0, 0.0) if law.passed is None else law.passed.displacements
@@ -85,19 +145,11 @@ class Deviations:
         """
         found, slopes = np.zeros(self._m), np.zeros(self._m)
         for group in self._groups:
-            rows = np.flatnonzero(group.live)
-            if not rows.size:
-                continue
-            sites, (low, high) = group.sites[rows], group.ends[rows].T
-            inset = 1e-12 * np.where(np.isfinite(high - low), high - low, 1.0 + np.abs(x[sites]))
-            inside = np.clip(x[sites], low + inset, high - inset)
-            sign, (at, start, chord) = group.signs[rows], group.chords[rows].T
-            argument = sign * inside
-            slope = group.law.convex.second(argument) - group.law.concave.second(argument)
-            value = sign * group.law.right(argument) + slope * (x[sites] - inside)
-            lacking = value - start - chord * (x[sites] - at)
-            np.add.at(found, sites, group.weights[rows] * lacking)
-            np.add.at(slopes, sites, group.weights[rows] * (slope - chord))
+            live = group.gathered()
+            if live.sites.size:
+                lacking, steeper = live.lacks(group.law, x[live.sites])
+                found += np.bincount(live.sites, lacking, minlength=self._m)
+                slopes += np.bincount(live.sites, steeper, minlength=self._m)
         return found, slopes
 
     def reach(self, x: Array) -> Array:
@@ -108,7 +160,7 @@ class Deviations:
         """
         found = np.full(self._m, np.inf)
         for group in self._groups:
-            sites = group.sites[group.live]
+            sites = group.gathered().sites
             np.minimum.at(found, sites, _REACH * (group.law.length_scale + np.abs(x[sites])))
         return found
 

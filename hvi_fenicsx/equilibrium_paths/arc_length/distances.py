@@ -10,7 +10,7 @@ from ...system.condensed_problem import CondensedProblem
 from ...typing import Array
 from ..state import PathState
 from .felt import factors, felt
-from .vertex_laws import VertexLaw, vertex_laws
+from .law_rows import LawRows, law_rows
 
 _ROUNDING = 1e-10
 """A displacement this near to a break of a law, or to a bound, may be there, relative to itself and to lengths."""
@@ -27,7 +27,7 @@ class CurvedDistances:
     def __init__(self, problem: CondensedProblem, remember: Collection[int]) -> None:
         self._factors = factors(problem)
         self._problem = felt(problem, self._factors)
-        self._laws = vertex_laws(self._problem, remember)
+        self._laws = law_rows(self._problem, remember)
 
     def __call__(self, state: PathState, carried: Array | None = None) -> float:
         """The largest distance, relative to the forces.
@@ -36,29 +36,32 @@ class CurvedDistances:
             state: the state.
             carried: forces of laws and bounds, (n,); by default what the condensed body leaves them.
         """
-        if state.memory is not None:
-            for row, law in enumerate(self._laws):
-                law.restore(state.memory[row, :])
         problem, x = self._problem, state.x * self._factors
         elastic, load = problem.stiffness @ x, problem.load(state.factor)
         size = max(float(np.max(np.abs(f), initial=0.0)) for f in (elastic, load, problem.force_rate)) or 1.0
-        return self._largest(x, load - elastic if carried is None else carried / self._factors) / size
+        force = load - elastic if carried is None else carried / self._factors
+        return self._largest(x, force, self._memories(state)) / size
 
-    def _largest(self, x: Array, force: Array) -> float:
+    def _memories(self, state: PathState) -> list[Array]:
+        """What each group of bonds remembers, (r, 4) each; zeros where it remembers nothing."""
+        ends = np.cumsum([0, *(len(rows.signs) for rows in self._laws)])
+        known = np.zeros((int(ends[-1]), 4)) if state.memory is None else state.memory
+        return [known[a:b] * rows.remembers for rows, a, b in zip(self._laws, ends, ends[1:], strict=False)]
+
+    def _largest(self, x: Array, force: Array, memories: list[Array]) -> float:
         """The largest distance of a force that laws and bounds should give."""
         low, high, worst = np.zeros(len(x)), np.zeros(len(x)), 0.0
-        rest = force.copy()
-        for law in self._laws:
-            if law.radial:
-                group = list(law.unknowns)
-                lower = self._problem.lower[group[0]] if law.opens else -np.inf
-                worst = max(worst, _off(law, x[group], force[group], float(lower)))
-                rest[group] = 0.0
+        rest, problem = force.copy(), self._problem
+        for rows, memory in zip(self._laws, memories, strict=True):
+            unknowns = rows.bonds.unknowns
+            if rows.bonds.radial:
+                lower = problem.lower[unknowns[:, 0]] if rows.bonds.opens else np.full(len(unknowns), -np.inf)
+                worst = max(worst, float(np.max(_off(rows, x[unknowns], force[unknowns], lower, memory), initial=0.0)))
+                rest[unknowns] = 0.0
             else:
-                least, most = _interval(law, float(x[law.unknowns[0]]))
-                low[law.unknowns[0]] += least
-                high[law.unknowns[0]] += most
-        problem = self._problem
+                least, most = _interval(rows, x[unknowns[:, 0]], memory)
+                np.add.at(low, unknowns[:, 0], least)
+                np.add.at(high, unknowns[:, 0], most)
         allowed = _ROUNDING * float(np.max(np.abs(x), initial=0.0))
         low[x <= problem.lower + allowed], high[x >= problem.upper - allowed] = -np.inf, np.inf
         beyond = np.maximum(np.maximum(problem.lower - x, x - problem.upper), 0.0) * np.diag(problem.stiffness)
@@ -66,38 +69,39 @@ class CurvedDistances:
         return max(worst, float(np.max(away, initial=0.0)))
 
 
-def _interval(law: VertexLaw, x: float) -> tuple[float, float]:
-    """The least and the greatest force at a coordinate, but for its rounding."""
-    near = _ROUNDING * (abs(x) + law.law.length_scale)
-    ends = [float(law.traction(np.array([x + s * near]), side)[0]) for s, side in ((-1.0, "left"), (1.0, "right"))]
-    return law.weight * min(ends), law.weight * max(ends)
+def _interval(rows: LawRows, x: Array, memory: Array) -> tuple[Array, Array]:
+    """The least and the greatest forces at coordinates, but for their rounding, (r,) each."""
+    near = _ROUNDING * (np.abs(x) + rows.law.length_scale)
+    ends = rows.traction(x - near, "left", memory), rows.traction(x + near, "right", memory)
+    return rows.bonds.weights * np.minimum(*ends), rows.bonds.weights * np.maximum(*ends)
 
 
-def _off(law: VertexLaw, u: Array, force: Array, lower: float) -> float:
-    """How far a force is from those that a law on a length gives: along u, of a size of its graph.
+def _off(rows: LawRows, u: Array, force: Array, lower: Array, memory: Array) -> Array:
+    """How far forces are from those that a law on a length gives: along u, of a size of its graph, (r,).
 
     An opening that is not positive has none, but for what its bound pushes.
     """
-    near = _ROUNDING * (float(np.max(np.abs(u))) + law.law.length_scale)
-    force, pushed = force.copy(), 0.0
-    if law.opens and u[0] <= near:
-        if u[0] <= lower + near:
-            force[0] = max(force[0], 0.0)
-        pushed, force[0] = max(-float(force[0]), 0.0), max(float(force[0]), 0.0)
-        u = np.array([0.0, *u[1:]])
-    length = float(np.linalg.norm(u))
-    least, most = (_energy(law, u) * end for end in _interval(law, length))
-    if length <= _ROUNDING * law.law.length_scale:
-        return max(float(np.linalg.norm(force)) - max(abs(least), abs(most)), 0.0) + pushed
-    along = float(force @ u) / length
-    across = float(np.linalg.norm(force - along * u / length))
-    return max(least - along, along - most, 0.0) + across + pushed
+    near = _ROUNDING * (np.max(np.abs(u), axis=1) + rows.law.length_scale)
+    pushed = np.zeros(len(u))
+    if rows.bonds.opens:
+        shut, pressed = u[:, 0] <= near, u[:, 0] <= lower + near
+        pushed[shut & ~pressed] = np.maximum(-force[shut & ~pressed, 0], 0.0)
+        force[shut, 0], u[shut, 0] = np.maximum(force[shut, 0], 0.0), 0.0
+    length = np.linalg.norm(u, axis=1)
+    least, most = (_energies(rows, u) * end for end in _interval(rows, length, memory))
+    at_rest = np.maximum(np.linalg.norm(force, axis=1) - np.maximum(np.abs(least), np.abs(most)), 0.0)
+    directions = np.divide(u, length[:, None], out=np.zeros_like(u), where=length[:, None] > 0.0)
+    along = np.sum(force * directions, axis=1)
+    across = np.linalg.norm(force - along[:, None] * directions, axis=1)
+    moved = np.maximum(np.maximum(least - along, along - most), 0.0) + across
+    return np.asarray(np.where(length <= _ROUNDING * rows.law.length_scale, at_rest, moved) + pushed)
 
 
-def _energy(law: VertexLaw, u: Array) -> float:
-    """By what the mode mixity of a vector multiplies a law."""
-    whole = float(u @ u)
-    if law.mixity is None or not whole:
-        return 1.0
-    slips = u[1:] if law.opens else u
-    return float(law.mixity.energy(np.array([float(slips @ slips) / whole]))[0])
+def _energies(rows: LawRows, u: Array) -> Array:
+    """By what the mode mixity of vectors multiplies a law, (r,)."""
+    mixity, whole = rows.bonds.mixity, np.sum(u * u, axis=1)
+    if mixity is None:
+        return np.ones(len(u))
+    slips = u[:, 1:] if rows.bonds.opens else u
+    shares = np.divide(np.sum(slips * slips, axis=1), whole, out=np.zeros(len(u)), where=whole > 0.0)
+    return np.where(whole > 0.0, mixity.energy(shares), 1.0)

@@ -194,7 +194,7 @@ class Equations:
         size, last = 1.0 + float(np.max(np.abs(y))), np.inf
         length = float(np.max(np.abs(y - self.here.y)))
         noise = max(1e-10 * (1.0 + length), 1e-14 / self._sharpness(gradient(y)) * size)
-        expected = 0.0
+        expected = _SLOW * length
         for _ in range(_STEPS):
             values = self.sites.values(y[:-1])
             left, off = self.residual(y, values), value(y)
@@ -255,7 +255,7 @@ class Equations:
         sites, found = self.sites, np.zeros(len(y) - 1)
         p = sites.radial(k)
         if p is None:
-            found[sites.unknowns()[k]] = unit[k]
+            found[sites.unknowns_of(k)] = unit[k]
         else:
             found[sites.radials.groups[p]] = sites.directions(y[:-1])[sites.radials.owner == p]
         return found
@@ -270,15 +270,23 @@ class Equations:
         last[-1] = 1.0
         return lambda y: float(y[-1]) - aim / self.unit, lambda y: last
 
-    def place(self, y: Array, tangent: Array) -> None:
+    def place(self, y: Array, tangent: Array, passed: int | None = None) -> None:
         """Go to a point, where sites may be on other segments than before.
 
         Args:
             y: coordinates and factor, (n + 1,).
             tangent: of length 1, (n + 1,).
+            passed: the only site that is; None: any site may be.
         """
         self.here = self._at_place(y, tangent, self.sites.values(y[:-1]))
-        self._factors = None
+        if self._factors is not None and (passed is None or not self._exchanged(self._factors, passed)):
+            self._factors = None
+
+    def _exchanged(self, factors: Bordered, k: int) -> bool:
+        """Exchange the columns of a site in the factors; whether that went well."""
+        columns = self.sites.columns(k)
+        units = np.eye(len(self.here.y))[columns]
+        return factors.exchange(columns, np.stack([self._change(self.here.values, unit) for unit in units], axis=1))
 
     def head(self, tangent: Array) -> None:
         """Set out from the present point.

@@ -6,15 +6,15 @@ its root is found along the step.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import Enum
 
 import numpy as np
-from scipy.optimize import brentq
+from scipy.optimize import toms748
 
 from ...typing import Array
-from .equations import ROUNDING, UNDECIDED, Equations, Place, Refused
+from .equations import ROUNDING, STANDING, UNDECIDED, Equations, Place, Refused
 
 LEAST = 1e-11
 """The shortest step."""
@@ -113,6 +113,8 @@ class Events(Equations):
         """Where a site passes the end at which it began: a bond that set out from it turned back on the way."""
         sets_out = self._rate_of(Outcome.TURNED, site)(self.here) * self.sites.outward[site] > 0.0
         turned = self._up_to(move, Outcome.TURNED, site) if sets_out else None
+        if turned is not None and turned.after.y is move.after.y:
+            raise Refused  # it turns no earlier, and is beyond its end
         return turned or self._in_place(site)
 
     def _in_place(self, site: int) -> Move:
@@ -141,13 +143,17 @@ class Events(Equations):
         rate = self._rate_of(outcome, site)
         if rate(self.here) * rate(move.after) >= 0.0:
             return self._moved(outcome, site, move.after.y)
-        ends = {0.0: self.here, whole: move.after}  # corrected anew, their rates may have other signs by rounding
+        known = {0.0: self.here, whole: move.after}  # corrected anew, their rates may have other signs by rounding
 
         def rate_at(way: float) -> float:
-            return rate(ends[way] if way in ends else self._at(way))
+            if way not in known:
+                known[way] = self._at(way, known)
+            found = rate(known[way])
+            return found if abs(found) > STANDING * float(np.max(np.abs(known[way].tangent))) else 0.0
 
-        root = brentq(rate_at, 0.0, whole, xtol=1e-13 * whole, rtol=1e-13, maxiter=100)
-        return self._moved(outcome, site, self._at(float(root)).y)
+        root = toms748(rate_at, 0.0, whole, xtol=1e-13 * whole, rtol=1e-13, k=1)
+        rate_at(root)
+        return self._moved(outcome, site, known[root].y)
 
     def _turned(self, after: Place) -> tuple[Outcome, int | None] | None:
         largest = float(np.max(np.abs(after.tangent)))
@@ -162,6 +168,9 @@ class Events(Equations):
             return lambda place: float(place.tangent[-1])
         return lambda place: float(self.sites.rates(place.y[:-1], place.tangent[:-1])[site])
 
-    def _at(self, way: float) -> Place:
-        """The point of the curve in the plane across the present tangent at a distance."""
-        return self._after(self.correct(self.here.y + way * self.here.tangent, self.plane(way)))
+    def _at(self, way: float, known: Mapping[float, Place]) -> Place:
+        """The point of the curve in the plane across the present tangent at a distance, between those known."""
+        low, high = max(w for w in known if w < way), min(w for w in known if w > way)
+        share = (way - low) / (high - low)
+        guess = (1.0 - share) * known[low].y + share * known[high].y
+        return self._after(self.correct(guess, self.plane(way)))

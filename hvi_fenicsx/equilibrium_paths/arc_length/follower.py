@@ -282,7 +282,7 @@ class ArcLengthFollower(Follower):
     def _place(self, passage: Passage) -> Place:
         laws = self._sites.laws_at(passage.site)
         group = laws[0].group if laws and not (passage.closes or passage.opens) else None
-        return place_of(self._problem, int(self._sites.unknowns()[passage.site][0]), group)
+        return place_of(self._problem, int(self._sites.unknowns_of(passage.site)[0]), group)
 
 
 def _event(passages: Sequence[Passage], *, folds: bool) -> Event:

@@ -179,11 +179,12 @@ class Crossing:
         """Into the next segment, and on in the same direction along the graph."""
         sites, curve, before = self._sites, self._curve, self._sites.segment(k)
         forward, slow = bool(rates[k] > 0.0), self._is_slow(k)
+        y = curve.here.y
         if forward * 2.0 - 1.0 == -sites.outward[k] and not self._unmoved(k):
-            self._turn_back(k, forward=forward)
+            y = self._turned_back(k, forward=forward)
         else:
             sites.enter(k, int(sites.numbers[k]) + (1 if forward else -1))
-        curve.place(curve.here.y, curve.here.tangent)
+        curve.place(y, curve.here.tangent, passed=k)
         row = curve.here.tangent if slow else curve.row(k)
         sign = 1.0 if slow or forward else -1.0
         curve.head(curve.tangent(curve.here.values, row, sign))
@@ -202,8 +203,8 @@ class Crossing:
         """Whether the site has not left 0 but for rounding: there is nothing to remember."""
         return abs(float(self._curve.here.values.lengths[k])) <= ROUNDING * self._sites.length
 
-    def _turn_back(self, k: int, *, forward: bool) -> None:
-        """On to the secant of where the bonds have been."""
+    def _turned_back(self, k: int, *, forward: bool) -> Array:
+        """Coordinates and factor on the secant of where the bonds have been, (n + 1,)."""
         sites, curve, values = self._sites, self._curve, self._curve.here.values
         x, force = float(values.lengths[k]), float(values.tractions[k])
         sites.remember(k, x, force)
@@ -212,7 +213,7 @@ class Crossing:
         sites.enter(k, near[-1] if forward else near[0])
         y = curve.here.y.copy()
         sites.set(y, k, sites.coordinate(k, x, force))
-        curve.place(y, curve.here.tangent)
+        return y
 
 
 def _contains(piece: Segment, x: float) -> bool:

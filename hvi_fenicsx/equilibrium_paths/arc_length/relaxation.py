@@ -8,6 +8,7 @@ energy falls all the way until equilibrium is reached or a body is out of all re
 from __future__ import annotations
 
 from collections.abc import Callable
+from enum import Enum
 
 import numpy as np
 
@@ -21,8 +22,19 @@ from .sites import Sites
 
 _FAR = 1e4
 """A displacement that is infinite, in units of s where the motion began."""
-_SLOWER, _FASTER = 8.0, 0.4
-"""Factors of θ after a step that failed, and after one that did not."""
+_STEPS, _MORE_STEPS = 500, 200
+"""Steps in time at most, and so many more for each site: each drop that is smoothed sharply takes some tens."""
+_SHORTEST = 1e-3
+"""A step in time ends where the curve takes no longer step than that: what holds back is too little from there on."""
+
+
+class _Went(Enum):
+    """How a step in time went, and by what θ changes after it."""
+
+    WELL = 0.4
+    PARTLY = 8.0
+    """Up to where what holds back is too little for the rest; the energy has fallen as far as that."""
+    NOWHERE = 64.0
 
 
 class Relaxation:
@@ -75,13 +87,13 @@ class Relaxation:
             self._sites.stiffness = stiffness
 
     def _moved(self) -> bool:
-        for _ in range(200 + 20 * len(self._sites)):
+        for _ in range(_STEPS + _MORE_STEPS * len(self._sites)):
             if self._at_rest():
                 return self._settled()
             if self._is_out_of_reach():
                 self.escapes = True
                 return True
-            self.theta *= _FASTER if self._stepped_or_back() else _SLOWER
+            self.theta *= self._stepped_or_back().value
             if self.theta > 1e12:
                 return False
         return False
@@ -110,26 +122,37 @@ class Relaxation:
         self.z = curve.correct(curve.here.y, curve.at_factor(0.0))[:-1]
         return self._sites.unstable_directions(self._sites.values(self.z)) == 0
 
-    def _stepped_or_back(self) -> bool:
-        """One step in time, if it goes well; else nothing has changed."""
+    def _stepped_or_back(self) -> _Went:
+        """One step in time; where it led nowhere, nothing has changed."""
         kept, z = self._sites.kept(), self.z
-        well = self._stepped()
-        if not well:
+        went = self._stepped()
+        if went is _Went.NOWHERE:
             self._sites.restore(kept)
             self.z = z
-        return well
+        return went
 
-    def _stepped(self) -> bool:
-        """One step in time, up to the first drop, or to where the body is out of reach; whether it went well."""
+    def _stepped(self) -> _Went:
+        """One step in time, up to the first drop, or to where the body is out of reach."""
         sites, left, values = self._sites, self._left(), self._sites.values(self.z)
         sites.stiffness = self._problem.stiffness + self.theta * self._damping
         if sites.unstable_directions(values):  # what holds back is less than what pushes on: the energy would rise
-            return False
+            return _Went.NOWHERE
         held = sites.stiffness @ values.x + values.force
         curve = Curve(held, left, sites, self.z, 0.0)
         row = np.eye(1, len(self.z) + 1, len(self.z))[0]
         curve.head(curve.tangent(curve.here.values, row))
         Crossing(curve, self._lag, self._step).run()
+        curve.shortest = _SHORTEST
+        went = self._followed(curve)
+        self.z = curve.here.y[:-1].copy()
+        if sites.on_drops():
+            self._leave_drops(sites.rates(curve.here.y[:-1], curve.here.tangent[:-1]))
+            return _Went.WELL
+        return went
+
+    def _followed(self, curve: Curve) -> _Went:
+        """Along the curve of one step, until all that was left of the forces is applied or a law drops."""
+        sites = self._sites
         for _ in range(50 + 4 * len(sites)):
             if curve.here.tangent[-1] < 0.0 or sites.on_drops():
                 break
@@ -137,15 +160,14 @@ class Relaxation:
             move = curve.advance(1.0)
             self.z = curve.here.y[:-1].copy()
             if move.outcome is Outcome.FACTOR or self._is_out_of_reach():
-                return True
-            if move.outcome in (Outcome.AWAY, Outcome.STUCK):
-                return False
+                return _Went.WELL
+            if move.outcome is Outcome.AWAY:
+                return _Went.NOWHERE
+            if move.outcome is Outcome.STUCK:
+                break
             if move.outcome in (Outcome.END, Outcome.TURNED):
                 Crossing(curve, self._lag, self._step).run(move.site, turned=move.outcome is Outcome.TURNED)
-        self.z = curve.here.y[:-1].copy()
-        dropped = bool(sites.on_drops())
-        self._leave_drops(sites.rates(curve.here.y[:-1], curve.here.tangent[:-1]))
-        return dropped
+        return _Went.PARTLY if curve.factor > 0.0 else _Went.NOWHERE
 
     def _leave_drops(self, directions: Array) -> None:
         """Let the laws that drop do so."""

@@ -201,7 +201,7 @@ class SiteGraphs(SiteLaws):
         """
         p = self.radial(k)
         if p is None:
-            z[self.unknowns()[k]] = s
+            z[self.unknowns_of(k)] = s
         else:
             here = self.radials.owner == p
             group = self.radials.groups[p]

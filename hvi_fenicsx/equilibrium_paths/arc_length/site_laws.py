@@ -53,7 +53,22 @@ class SiteLaws:
 
     def unknowns(self) -> list[Integers]:
         """The unknowns of each site."""
-        return [*self.one.reshape(-1, 1), *self.radials.groups, *self.radials.opening_unknowns.reshape(-1, 1)]
+        return [self.unknowns_of(k) for k in range(len(self))]
+
+    def unknowns_of(self, k: int) -> Integers:
+        """The unknowns of a site."""
+        p, opening = self.radial(k), self.opening(k)
+        if p is not None:
+            return self.radials.groups[p]
+        return self.one[k : k + 1] if opening is None else self.radials.opening_unknowns[opening : opening + 1]
+
+    def columns(self, k: int) -> Integers:
+        """The unknowns whose equations depend on the segment of a site; of an opening, those of its length."""
+        opening = self.opening(k)
+        return self.unknowns_of(k) if opening is None else self.radials.groups[self._length_of(opening)]
+
+    def _length_of(self, opening: int) -> int:
+        return int(self.radials.owner[self.radials.openings[opening]])
 
     def radial(self, k: int) -> int | None:
         """The number among the sites of lengths of a site; None: it is none of these."""
@@ -70,4 +85,4 @@ class SiteLaws:
         opening = self.opening(k)
         if opening is None:
             return self.laws[k]
-        return self.laws[len(self.one) + int(self.radials.owner[self.radials.openings[opening]])]
+        return self.laws[len(self.one) + self._length_of(opening)]

@@ -217,8 +217,7 @@ class Sites(SiteGraphs):
         """Along a site's vector and across it: the columns that can change, (n, r), and their slopes, (r,)."""
         k, here = len(self.one) + p, (self.radials.owner == p) & self.radials.counts
         unknowns, e = self.radials.flat[here], values.directions[here]
-        axes = np.linalg.svd(e[None])[2].T if len(e) else np.zeros((0, 0))
-        axes[:, :1] = e[:, None]
+        axes = _axes(e)
         moves, steep = bool(values.moves[k]), values.energies[k] * values.rises[k] / (values.moves[k] or 1.0)
         if values.lengths[k] > 0.0:
             across, turns = values.energies[k] * values.tractions[k] / values.lengths[k], True
@@ -237,3 +236,12 @@ class Sites(SiteGraphs):
     def reach(self, values: Values) -> Array:
         """How far the curved sites may move in one step, in units of s, (m,); infinite for the others."""
         return np.asarray(self._deviations.reach(values.lengths) / self.length)
+
+
+def _axes(direction: Array) -> Array:
+    """Orthonormal axes of which a unit vector is the first, as columns; none where the vector has no components."""
+    if len(direction) == 2:
+        return np.array([[direction[0], -direction[1]], [direction[1], direction[0]]])
+    axes = np.linalg.svd(direction[None])[2].T if len(direction) > 1 else np.ones((len(direction), len(direction)))
+    axes[:, :1] = direction[:, None]
+    return axes

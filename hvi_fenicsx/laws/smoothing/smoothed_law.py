@@ -25,8 +25,7 @@ from ..convex_parts import ConvexPart, DifferentiablePart, folded
 from ..polyline import PolylineLaw
 from ..traction_graph import TractionGraph
 from .base import SmoothedLaw, Smoothing
-
-_LARGEST = float(np.finfo(np.float64).max)
+from .rounded_kinks import RoundedKinks
 
 
 @dataclass(frozen=True)
@@ -87,6 +86,11 @@ class PlusFunction(Smoothing):
             return self.profile(np.abs(t) / e)
 
 
+def _fold(x: Array, *, even: bool) -> tuple[Array, Array]:
+    """Where an even function is evaluated, and the sign of its derivative, (m,) each."""
+    return (np.abs(x), np.sign(x)) if even else (x, np.ones_like(x))
+
+
 @dataclass(frozen=True, eq=False)
 class SmoothedPart(DifferentiablePart):
     """A convex part with every kink replaced by the plus function of width ε/jump.
@@ -99,25 +103,24 @@ class SmoothedPart(DifferentiablePart):
     epsilon: float
     even: bool
 
+    @cached_property
+    def rounded(self) -> RoundedKinks:
+        """Its kinks."""
+        return RoundedKinks(self.part.kinks, self.part.jumps, self.plus.profile, self.epsilon)
+
     @override
     def value(self, x: Array) -> Array:
         return self.part.value(x) + self.correction(x)
 
     @override
     def right(self, x: Array) -> Array:
-        folded, sign = self._fold(x)
-        _, slopes, _ = self._profiles(folded)
-        # Right of a kink the plus function's slope is 1 + D', left of it -D'; the 1 is the part's own jump.
-        turned = np.where(folded[:, None] >= self._places, slopes, -slopes)
-        return np.asarray(sign * (self.part.right(folded) + turned @ self._heights))
+        x, sign = _fold(x, even=self.even)
+        return sign * (self.part.right(x) + self.rounded.slopes(x, self.rounded.profiles(x)))
 
     @override
     def second(self, x: Array) -> Array:
-        folded, _ = self._fold(x)
-        _, _, curvatures = self._profiles(folded)
-        with np.errstate(over="ignore"):
-            stiffness = np.minimum(self._heights / self.epsilon * self._heights, _LARGEST)
-            return np.asarray(self.part.second(folded) + (curvatures * stiffness).sum(axis=1))
+        x, _ = _fold(x, even=self.even)
+        return self.part.second(x) + self.rounded.curvatures(self.rounded.profiles(x))
 
     @override
     def second_range(self, low: Array, high: Array) -> tuple[Array, Array]:
@@ -125,33 +128,14 @@ class SmoothedPart(DifferentiablePart):
             return super().second_range(low, high)
         if self.even:
             low, high = folded(low, high)
-        before, behind = (end[:, None] - self._places for end in (low, high))
         least, most = self.part.second_range(low, high)
+        more, most_more = self.rounded.curvature_range(low, high)
         with np.errstate(over="ignore"):
-            stiffness = np.minimum(self._heights / self.epsilon * self._heights, _LARGEST)
-            near, far = (self.plus.profile(at / self.epsilon * self._heights)[2] for at in folded(before, behind))
-            return least + (far * stiffness).sum(axis=1), most + (near * stiffness).sum(axis=1)
+            return least + more, most + most_more
 
     def correction(self, x: Array) -> Array:
         """What the smoothing adds to the part, from 0 to κ ε for each kink."""
-        values, _, _ = self._profiles(self._fold(x)[0])
-        return np.asarray(self.epsilon * values.sum(axis=1))
-
-    def _fold(self, x: Array) -> tuple[Array, Array]:
-        return (np.abs(x), np.sign(x)) if self.even else (x, np.ones_like(x))
-
-    @cached_property
-    def _places(self) -> Array:
-        return self.part.kinks
-
-    @cached_property
-    def _heights(self) -> Array:
-        return self.part.jumps
-
-    def _profiles(self, x: Array) -> tuple[Array, Array, Array]:
-        """D, D', D'' (m, k) of each point and kink, at their distance in units of the kink's width ε/jump."""
-        with np.errstate(over="ignore"):
-            return self.plus.profile(np.abs(x[:, None] - self._places) / self.epsilon * self._heights)
+        return self.rounded.values(self.rounded.profiles(_fold(x, even=self.even)[0]))
 
 
 @dataclass(frozen=True)
@@ -217,13 +201,27 @@ class PlusSmoothedLaw(SmoothedLaw, register=False):
             return max(0.0, -float(np.min(self.graph.slopes)))
         return self.law.steepest_fall  # what smooths an upward jump rises; a drop leaves inf
 
+    @override
+    def derivatives(self, x: Array) -> tuple[Array, Array]:
+        # From the law itself, and at the kinks of both parts at once.
+        x, sign = _fold(x, even=self.even)
+        profiles, (traction, slope) = self._rounded.profiles(x), self.law.derivatives(x)
+        return sign * (traction + self._rounded.slopes(x, profiles)), slope + self._rounded.curvatures(profiles)
+
+    @cached_property
+    def _rounded(self) -> RoundedKinks:
+        return self._smooth_convex.rounded.less(self._smooth_concave.rounded)
+
     @cached_property
     def _smooth_convex(self) -> SmoothedPart:
-        return SmoothedPart(self.law.convex, self.plus, self.epsilon_absolute, self.law.even)
+        return self._smoothed(self.law.convex)
 
     @cached_property
     def _smooth_concave(self) -> SmoothedPart:
-        return SmoothedPart(self.law.concave, self.plus, self.epsilon_absolute, self.law.even)
+        return self._smoothed(self.law.concave)
+
+    def _smoothed(self, part: ConvexPart) -> SmoothedPart:
+        return SmoothedPart(part, self.plus, self.epsilon_absolute, self.law.even)
 
     @override
     def scaled(self, length: float, traction: float) -> Superpotential:
