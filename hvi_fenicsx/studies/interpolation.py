@@ -1,5 +1,6 @@
-"""Fields from one mesh onto the nodes of another, in the body and along Γc: exact where the meshes are nested.
+"""Fields from one mesh onto the nodes of another, in bodies and along Γc: exact where the meshes are nested.
 
+A node takes the field of its own body: where two meet, both have cells at it.
 Where they are not (curved boundaries, meshes made anew), a node outside of all cells takes its nearest cell's field,
 continued.
 """
@@ -11,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from mpi4py import MPI
 from scipy import sparse
+from scipy.sparse import csgraph
 
 from .. import compat
 from ..mesh import nodes, point_location
@@ -26,26 +28,53 @@ _PAIRS = 4_000_000
 """Pairs of vertices and facets that are looked at together."""
 
 
-def body(source: SolutionFields, points: Array) -> sparse.csr_array:
-    """The matrix (m, n) from values at the nodes of a body to those at points. On this process alone.
+def bodies(source: SolutionFields, target: SolutionFields) -> sparse.csr_array:
+    """The matrix (m, n) from values at the nodes of one mesh of some bodies to those of another. On this process alone.
 
     Args:
         source: with n nodes.
-        points: m, (m, d).
+        target: with m nodes, each in a cell.
     """
+    at_source, at_target = _body_of_nodes(source), _body_of_nodes(target)
+    own, wanted = at_source[source.cells[:, 0]], at_target[target.cells[:, 0]]
+    columns = np.empty((len(target.points), source.cells.shape[1]), dtype=np.int64)
+    weights = np.empty(columns.shape)
+    for number in np.unique(wanted):
+        cells, there = source.cells, at_target == number
+        if len(np.unique(own)) > 1:
+            middles = target.points[target.corners[wanted == number]].mean(axis=1)
+            cells = cells[own == np.bincount(own[_containing(source, cells, middles)]).argmax()]
+        columns[there], weights[there] = _functions_at(source, cells, target.points[there])
+    return _rows(columns, weights, len(source.points))
+
+
+def _body_of_nodes(found: SolutionFields) -> Integers:
+    """Numbers of the connected meshes that the nodes belong to, (n,)."""
+    first, other = np.repeat(found.cells[:, :1], found.cells.shape[1], axis=1).ravel(), found.cells.ravel()
+    size = len(found.points)
+    graph = sparse.coo_array((np.ones(len(other), dtype=np.int8), (first, other)), shape=(size, size))
+    return np.asarray(csgraph.connected_components(graph, directed=False)[1], dtype=np.int64)
+
+
+def _containing(source: SolutionFields, cells: Integers, points: Array) -> Integers:
+    """The number of the cell, among some, that holds each point, (m,)."""
     d = source.points.shape[1]
-    kept, corners = np.unique(source.corners, return_inverse=True)
-    corners = corners.reshape(source.corners.shape)
+    kept, corners = np.unique(cells[:, : d + 1], return_inverse=True)
     kind = {2: "triangle", 3: "tetrahedron"}[d]
-    mesh = compat.simplex_mesh(MPI.COMM_SELF, corners, source.points[kept], kind)
-    found = mesh.topology.original_cell_index[
-        point_location.containing_cells(mesh, np.pad(points, ((0, 0), (0, 3 - d))))
-    ]
-    weights = point_location.barycentric_weights(source.points[source.corners[found]], points)
-    degree = 1 if source.cells.shape[1] == d + 1 else 2
+    mesh = compat.simplex_mesh(MPI.COMM_SELF, corners.reshape(-1, d + 1), source.points[kept], kind)
+    found = point_location.containing_cells(mesh, np.pad(points, ((0, 0), (0, 3 - d))))
+    return np.asarray(mesh.topology.original_cell_index[found])
+
+
+def _functions_at(source: SolutionFields, cells: Integers, points: Array) -> tuple[Integers, Array]:
+    """The nodes of the cell, among some, that holds each point, and their functions there, (m, nodes) both."""
+    d = source.points.shape[1]
+    found = cells[_containing(source, cells, points)]
+    weights = point_location.barycentric_weights(source.points[found[:, : d + 1]], points)
+    degree = 1 if cells.shape[1] == d + 1 else 2
     if degree == 2:
-        weights = _in_curved(source.points[source.cells[found]], points, weights)
-    return _rows(source.cells[found], spaces.simplex_functions(degree, weights), len(source.points))
+        weights = _in_curved(source.points[found], points, weights)
+    return found, spaces.simplex_functions(degree, weights)
 
 
 @dataclass(frozen=True)

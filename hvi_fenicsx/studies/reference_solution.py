@@ -58,7 +58,7 @@ class ReferenceSolution:
         key = (found.points.tobytes(), found.cells.tobytes())
         if key not in self._transfers:
             parts = {n: interpolation.surface(found.parts[n], p.points) for n, p in self.fields.parts.items()}
-            self._transfers = {key: (interpolation.body(found, self.fields.points), parts)}
+            self._transfers = {key: (interpolation.bodies(found, self.fields), parts)}
         matrix, by_part = self._transfers[key]
         columns = {name: _on_nodes(found.parts[name], along) for name, along in by_part.items()}
         return TransferredSolution(matrix @ found.u, columns, {name: _width(p) for name, p in found.parts.items()})

@@ -175,6 +175,32 @@ def test_degree_two_against_a_mesh_four_times_finer(name: str) -> None:
     assert 0.75 < row.index < 1.3
 
 
+def held_by_a_bond(cells: list[int], stiffness: float) -> Table:
+    """A slab that is held by nothing but a bond, pulled askew."""
+    bond = {"law": "graph", "points": [[0, 0], [2e6 / stiffness, 2e6], [4e-3, 0]]}
+    d = len(cells)
+    return {
+        "domain": {"shape": "box" if d == 3 else "rectangle", "size": [1.0] * (d - 1) + [0.5], "cells": cells},
+        "material": {
+            "model": "three_dimensional" if d == 3 else "plane_strain",
+            "youngs_modulus": 2.0e9,
+            "poisson_ratio": 0.3,
+        },
+        "boundary": {
+            "lid": {"on": "top", "traction": [1.0e4, *[0.0] * (d - 2), 1.0e5]},
+            "bond": {"on": "bottom", "cohesion": bond},
+        },
+    }
+
+
+@pytest.mark.parametrize("stiffness", [1e11, 1e13])
+@pytest.mark.parametrize("cells", [[4, 2], pytest.param([3, 3, 2], marks=pytest.mark.long)])
+def test_bonds_that_are_stiff_beside_the_cells_at_degree_two(cells: list[int], stiffness: float) -> None:
+    scene = Scene.model_validate(held_by_a_bond(cells, stiffness)).with_solver(degree=2)
+    (row,) = rows(scene, levels=1, extra=5 - len(cells))
+    assert 0.75 < row.index < 1.3
+
+
 @pytest.mark.parametrize(("name", "degree"), [*((n, 1) for n in CASES), ("l-shape", 2), ("block in space", 2)])
 def test_the_bubbles_stiffness_is_dolfinx_own_matrix(name: str, degree: int) -> None:
     problem = prepare(Scene.model_validate(CASES[name]).with_solver(degree=degree)).problem

@@ -52,6 +52,15 @@ def test_a_uniform_stress_has_no_error(between: Table, stress: list[list[float]]
     assert found.estimate.total < 1e-8 * found.estimate.energy_norm
 
 
+def test_stiff_bonds_between_bodies_at_degree_two() -> None:
+    between = {"cohesion": {"law": "graph", "points": [[0, 0], [1e-8, 4e6], [4e-5, 0]], "beta": 0.7}}
+    table = uniform(between, [[0.0, 0.0], [0.0, 1e6]], (0.0, 1.0), 2).model_dump()
+    lid = {"lid": {"on": "upper.top", "traction": [2e5, 1e6]}, "foot": {"on": "lower.bottom", "displacement": [0, 0]}}
+    (row,) = rows(Scene.model_validate(table | {"boundary": lid}).with_solver(tolerance=1e-8), 1, 1)
+    assert row.certified
+    assert 0.75 < row.index < 1.3
+
+
 @pytest.mark.long
 @pytest.mark.parametrize("degree", [1, 2])
 @pytest.mark.parametrize("name", ["single_lap", "two_cylinders"])

@@ -64,7 +64,7 @@ def quadratic(x: Array) -> Array:
 def test_quadratic_fields_are_taken_to_finer_meshes_exactly(dimension: int) -> None:
     source, target = taken(solved(dimension, 2, 2)), taken(solved(dimension, 4, 1))
     assert source.cells.shape[1] == (6, 10)[dimension - 2]
-    found = interpolation.body(source, target.points) @ quadratic(source.points)
+    found = interpolation.bodies(source, target) @ quadratic(source.points)
     np.testing.assert_allclose(found, quadratic(target.points), atol=1e-12)
     (near,), (far,) = source.parts.values(), target.parts.values()
     along = interpolation.surface(near, far.points)

@@ -19,9 +19,9 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 from runs import command, hvi, write_scene
-from scenes import model, quadratic_linear
+from scenes import model, quadratic_linear, two_blocks
 
-from hvi_fenicsx import InputError, Scene, Solution, compat, solve
+from hvi_fenicsx import InputError, Scene, Solution, compat, prepare, solve
 from hvi_fenicsx.mesh import refinement
 from hvi_fenicsx.mesh.domain import Domain
 from hvi_fenicsx.mesh.grid_transfer import NestedGridTransfer
@@ -81,13 +81,35 @@ def test_interpolation_between_nested_meshes_is_the_ladders_prolongation(shape: 
     step = NestedGridTransfer(size, coarse.domain.cells).prolongation(*spaces)
     d = fine.dimension
     points = [s.tabulate_dof_coordinates()[:, :d] for s in spaces]
-    source = SolutionFields(points[1], spaces[1].dofmap.list.astype(np.int64), np.zeros_like(points[1]), {})
-    way = interpolation.body(source, points[0])
+    target, source = (
+        SolutionFields(x, s.dofmap.list.astype(np.int64), np.zeros_like(x), {})
+        for x, s in zip(points, spaces, strict=True)
+    )
+    way = interpolation.bodies(source, target)
     values = np.random.default_rng(1).normal(size=points[1].shape)
     coarse_vector, fine_vector = step.createVecs()
     coarse_vector.array[:] = values.ravel()
     step.mult(coarse_vector, fine_vector)
     np.testing.assert_allclose(way @ values, fine_vector.array.reshape(-1, d), atol=1e-12)
+
+
+@pytest.mark.parametrize("shape", ["rectangle", "box"])
+def test_where_two_bodies_meet_each_node_takes_the_field_of_its_own(shape: str) -> None:
+    def mesh_of(n: int) -> SolutionFields:
+        d = {"rectangle": 2, "box": 3}[shape]
+        elasticity = {"rectangle": "plane_strain", "box": "three_dimensional"}[shape]
+        across = [n] * (d - 1)
+        table = two_blocks(shape, [1.0] * (d - 1), [[*across, n], [*(2 * k for k in across), n]], elasticity)
+        table["domain"]["upper"]["origin"][0] = 0.0
+        problem = prepare(Scene.model_validate(table), MPI.COMM_SELF).problem
+        cells, points = problem.space.dofmap.list.astype(np.int64), problem.points[:, :d]
+        u = 1.0 + points
+        u[np.unique(cells[points[cells].mean(axis=1)[:, -1] > 0.5])] *= -2.0
+        return SolutionFields(points, cells, u, {})
+
+    source, target = mesh_of(2), mesh_of(4)
+    assert len(np.unique(source.points, axis=0)) < len(source.points)
+    np.testing.assert_allclose(interpolation.bodies(source, target) @ source.u, target.u, atol=1e-12)
 
 
 def test_a_surface_in_space_is_interpolated_linearly_and_its_facets_are_found() -> None:

@@ -257,4 +257,4 @@ def test_fields_are_compared_at_places_of_curved_cells(tmp_path: Path) -> None:
         x = nodes.points(space)[:, :2]
         found.append(SolutionFields(points=x, cells=space.dofmap.list.astype(np.int64), u=x, parts={}))
     coarse, fine = found
-    assert np.abs(interpolation.body(coarse, fine.points) @ coarse.points - fine.points).max() < 1e-9
+    assert np.abs(interpolation.bodies(coarse, fine) @ coarse.points - fine.points).max() < 1e-9

@@ -23,6 +23,9 @@ from ...runtime import forms
 from ...typing import Array, Entities, Mask
 from .bubbles import Index, of_cell, quadrature, slope
 
+_WEAK = 0.05
+"""Springs below this part of a bubble's own stiffness need not hold it."""
+
 _PIECE = 8192
 """Blocks of which a few vectors fit into a processor's cache."""
 
@@ -32,6 +35,18 @@ class Held(Protocol):
 
     def project(self, r: Array) -> None:
         """Take out of r (n, d) what is held, in place."""
+        ...
+
+
+class Springs(Protocol):
+    """What holds bubbles elastically, as laws do."""
+
+    def diagonal(self) -> Array:
+        """Forces for a unit of each bubble, at the owned blocks, (n, d). Collective."""
+        ...
+
+    def times(self, e: fem.Function) -> Array:
+        """Forces of bubbles, at the owned blocks, (n, d). Collective."""
         ...
 
 
@@ -54,6 +69,24 @@ class BubbleStiffness:
         np.reciprocal(self._inverse, out=self._inverse)
         self._in, self._out = fem.Function(bubbles), fem.Function(bubbles)
         self._action = forms.compiled(problem.bulk.between(self._in, ufl.TestFunction(bubbles)))
+        self._springs: Springs | None = None
+        self._sprung: tuple[Entities, Array] = np.empty(0, np.int32), np.empty((0, self._inverse.shape[1]))
+
+    def hold(self, springs: Springs) -> bool:
+        """Add springs to the stiffness, in the place of those before; say whether there are strong ones. Collective.
+
+        Args:
+            springs: none are added where all are weaker than a twentieth of the bubbles that they hold.
+        """
+        at, elastic = self._sprung
+        self._inverse[at] = elastic
+        rates = springs.diagonal()
+        strong = bool(self.comm.allreduce(bool(np.any(rates * self._inverse > _WEAK)), op=MPI.LOR))
+        self._springs = springs if strong else None
+        at = np.flatnonzero(rates.any(axis=1) & strong).astype(np.int32)
+        self._sprung = at, self._inverse[at]
+        self._inverse[at] = 1.0 / (1.0 / self._inverse[at] + rates[at])
+        return strong
 
     def times(self, e: Array) -> Array:
         """A e of owned values (n, d), overwritten by the next product. Collective."""
@@ -62,7 +95,14 @@ class BubbleStiffness:
         self._out.x.array[:] = 0.0
         fem.assemble_vector(self._out.x.array, self._action)
         self._out.x.scatter_reverse(la.InsertMode.add)
-        return np.asarray(self._out.x.array[: e.size]).reshape(e.shape)
+        result = np.asarray(self._out.x.array[: e.size]).reshape(e.shape)
+        if self._springs is not None:
+            result += self._springs.times(self._in)
+        return result
+
+    def work(self, e: Array, force: Array) -> float:
+        """The work of a force on bubbles, (n, d) each. Collective."""
+        return self._dot(e, force)
 
     def diagonal_solve(self, r: Array, at: Entities) -> Array:
         """The diagonal's inverse times r at some blocks, (k, d).

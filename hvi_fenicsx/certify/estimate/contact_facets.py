@@ -157,6 +157,15 @@ class PartTrace:
             np.add.at(found, self._facets.bubbles[:, i], np.einsum("fk,fkd->fd", share, middle))
         return found, at_nodes
 
+    def squared(self, rates: Array) -> Array:
+        """∫ Σ rate (v·direction)² ds of rates (f, q, k) over this rank's facets, v each bubble; local blocks (n, d)."""
+        found = np.zeros((local_blocks(self._bubbles), self._vectors.shape[3]))
+        scaled = self.weights[:, :, None] * rates
+        for i, shape, middle in self._bubbles_of_facet:
+            share = np.einsum("fqk,q->fk", scaled, shape**2)
+            np.add.at(found, self._facets.bubbles[:, i], np.einsum("fk,fkd->fd", share, middle**2))
+        return found
+
     def _along(self, u: fem.Function) -> Array:
         """The coefficients of a displacement along the directions by facet, (f, n, k)."""
         blocks = u.x.array.reshape(-1, self._problem.scales.dimension)

@@ -20,6 +20,7 @@ from ..law_state import LawState
 from . import defect
 from .bubble_stiffness import BubbleStiffness
 from .dual_norm import DualNorm
+from .law_springs import LawSprings
 from .law_traces import ErrorField, LawTraces, Trace
 
 
@@ -90,7 +91,7 @@ class Coupled:
 
     def find_bubbles(self) -> None:
         """Find the bubbles that belong to the nodes. Collective."""
-        self._least.find()
+        self._least.find_beside(LawSprings(self._traces, self.error))
 
     def move_nodes(self) -> None:
         """Move the nodes as the bubbles ask; the laws answer that, so it takes a few rounds. Collective."""

@@ -18,7 +18,7 @@ from mpi4py import MPI
 from ...mesh import nodes
 from ...problem.problem import Bounds, Problem
 from ...typing import Array, Entities, Mask
-from .bubble_stiffness import BubbleStiffness
+from .bubble_stiffness import BubbleStiffness, Springs
 from .thresholds import DEFAULT, Thresholds
 
 _FAR = 1e30
@@ -245,6 +245,22 @@ class LeastEnergy:
             if stiffness.comm.allreduce(same, op=MPI.LAND):
                 break
         self._bubbles.x.scatter_forward()
+
+    def find_beside(self, springs: Springs) -> None:
+        """Find them while springs answer their growth; the residual and the energy stay those without. Collective.
+
+        Args:
+            springs: what answers.
+        """
+        if not self._stiffness.hold(springs):
+            self.find()
+            return
+        before = springs.times(self._bubbles) if self._begun else np.zeros_like(self.residual)
+        work = self._stiffness.work(self._e, before)
+        self.find()
+        force = springs.times(self._bubbles)
+        self.residual += force - before
+        self.energy += work - self._stiffness.work(self._e, force)
 
     def _guess(self, part: BubbleBounds) -> Array:
         """The bubbles of a part as they are, at first what the diagonal alone makes of the load, (k, d)."""

@@ -221,20 +221,28 @@ class InterfaceTrace:
         Args:
             tau: against the motion of the first side.
         """
-        d = self._problem.scales.dimension
         scaled = self.weights[:, :, None] * tau
-        vectors = np.einsum("fqk,fqkd->fqd", scaled, self._vectors)
-        found, at_nodes = (np.zeros((local_blocks(s), d)) for s in (self._bubbles, self._problem.space))
-        for sign, side, facet, shapes in self._sides():
-            sums = np.zeros((side.count, d))
-            for i, values in enumerate(shapes):
-                np.add.at(sums, side.of_facet[facet, i], sign * np.einsum("fq,fqd->fd", values, vectors))
-            found[side.blocks] += self._problem.domain.mesh.comm.allreduce(sums)[side.owned]
+        found = self._summed(np.einsum("fqk,fqkd->fqd", scaled, self._vectors), 1)
+        at_nodes = np.zeros((local_blocks(self._problem.space), self._problem.scales.dimension))
         on_facets = np.zeros(self._rotations.shape[:3])
         np.add.at(on_facets, self._points.facets[0], np.einsum("fqk,fqn->fnk", scaled, self._points.functions))
         carried = self._points.spread.summed(tangent_alignment.turned_back(self._rotations, on_facets))
         at_nodes[self._surface.blocks] = np.einsum("mk,mkd->md", carried, self._directions)
         return found, at_nodes
+
+    def squared(self, rates: Array) -> Array:
+        """∫ Σ rate (v·direction)² ds of rates (f, q, k), v each bubble of a side; local blocks (n, d). Collective."""
+        return self._summed(np.einsum("fqk,fqkd->fqd", self.weights[:, :, None] * rates, self._vectors**2), 2)
+
+    def _summed(self, vectors: Array, power: int) -> Array:
+        """Sums of vectors (f, q, d) times powers of both sides' bubbles, local blocks (n, d). Collective."""
+        found = np.zeros((local_blocks(self._bubbles), vectors.shape[2]))
+        for sign, side, facet, shapes in self._sides():
+            sums = np.zeros((side.count, vectors.shape[2]))
+            for i, values in enumerate(shapes):
+                np.add.at(sums, side.of_facet[facet, i], np.einsum("fq,fqd->fd", (sign * values) ** power, vectors))
+            found[side.blocks] += self._problem.domain.mesh.comm.allreduce(sums)[side.owned]
+        return found
 
     def _sides(self) -> Iterator[tuple[float, _SideBubbles, Integers, list[Array]]]:
         """By side: its sign, its bubbles, the facet of each intersection (f,), the bubbles at the points (f, q)."""

@@ -178,16 +178,41 @@ class LawTraces:
             error: added to u_h before the law is evaluated; nothing is added where a whole part of a facet sticks (its
                 nodes on a convex kink), and elsewhere no slip passes a convex kink.
         """
-        term, solved = law.term, self._of_u(state, law)
-        points, nodal = solved.points, solved.nodal
-        asked = term.exact if self.exact and error is not None else term.law
+        solved, (asked, slip) = self._of_u(state, law), self._asked(state, law, error)
+        k, of_law, length = slip.shape[2], solved.nodal / solved.multiplier, law.term.length
+        traction = nearest(asked, length, slip.reshape(-1, k), of_law.reshape(-1, k), self.thresholds.near)
+        return LawTrace(solved.points, solved.nodal, solved.multiplier * traction.reshape(slip.shape))
+
+    def _asked(self, state: ContactState, law: LawState, error: ErrorField | None) -> tuple[Superpotential, Array]:
+        """The law that an error meets, and the slip that it is asked at, over its stretch, (f, q, k). Collective."""
+        solved = self._of_u(state, law)
+        asked = law.term.exact if self.exact and error is not None else law.term.law
         slip = solved.slip_under(asked)
         if error is not None:
-            added = (points.of_field(error.nodes) + points.of_bubbles(error.bubbles)) / solved.stretch
+            added = (solved.points.of_field(error.nodes) + solved.points.of_bubbles(error.bubbles)) / solved.stretch
             slip = stopped(asked, slip, slip + np.where(solved.sticks, 0.0, added))
-        k, of_law = slip.shape[2], nodal / solved.multiplier
-        traction = nearest(asked, term.length, slip.reshape(-1, k), of_law.reshape(-1, k), self.thresholds.near)
-        return LawTrace(points, nodal, solved.multiplier * traction.reshape(slip.shape))
+        return asked, slip
+
+    def rising(self, state: ContactState, law: LawState, error: ErrorField) -> tuple[Trace, Array]:
+        """By how much the tractions of one law rise with the displacement, (f, q, k); none where it falls. Collective.
+
+        Args:
+            state: of its part.
+            law: one of the part's.
+            error: as in :meth:`of_law`.
+
+        Returns:
+            The quadrature points, and the rates along each direction.
+        """
+        solved, (asked, slip) = self._of_u(state, law), self._asked(state, law, error)
+        flat, length = slip.reshape(-1, slip.shape[2]), law.term.length
+        argument = flat[:, 0] if length is None else length.of(flat)
+        second = np.maximum(asked.convex.second(argument) - asked.concave.second(argument), 0.0)
+        rates = second[:, None]
+        if length is not None:  # alike along and across the displacement
+            rates = np.einsum("mkk->mk", length.hessian(flat, second * argument, second))
+        moves = solved.multiplier / solved.stretch * ~solved.sticks
+        return solved.points, moves * rates.reshape(slip.shape)
 
     def _of_u(self, state: ContactState, law: LawState) -> _Solved:
         """What u_h gives a law. Collective."""
@@ -226,7 +251,7 @@ class LawTraces:
                 np.add.at(at_nodes, state.surface.blocks, np.einsum("mk,mkd->md", nodal, law.term.directions))
         if self._carried_between_bodies is not None:
             between += self._carried_between_bodies
-        return _gathered(self.bubbles, between), _gathered(self.problem.space, at_nodes)
+        return gathered(self.bubbles, between), gathered(self.problem.space, at_nodes)
 
     @functools.cached_property
     def _carried_between_bodies(self) -> Array | None:
@@ -246,7 +271,7 @@ class LawTraces:
         return points.tested(points.interpolated_components(np.einsum("mkd,md->mk", axes, force)))[0]
 
 
-def _gathered(space: fem.FunctionSpace, values: Array) -> Array:
+def gathered(space: fem.FunctionSpace, values: Array) -> Array:
     """Local contributions (n_local, d) summed at the owned blocks, (n, d). Collective."""
     if space.mesh.comm.size == 1:
         return values

@@ -1,0 +1,44 @@
+"""The laws as springs on bubbles: by how much their tractions rise as bubbles grow.
+
+A law answers the bubbles. Where a bond is stiff beside a cell of the body, the answer to bubbles that were found
+without it is more force than made them, and bubbles and law drive each other ever further. So springs that are as stiff
+as the rising law hold the bubbles while they are found; what the law gives them then is evaluated as ever.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from dolfinx import fem
+
+from ...typing import Array
+from .law_traces import ErrorField, LawTraces, gathered
+
+
+class LawSprings:
+    """The springs of all laws at a displacement. Creation is collective.
+
+    Args:
+        traces: the laws between the nodes.
+        error: added to u_h.
+    """
+
+    def __init__(self, traces: LawTraces, error: ErrorField) -> None:
+        self._space = traces.bubbles
+        self._rates = [traces.rising(state, law, error) for state in traces.states for law in state.laws]
+
+    def diagonal(self) -> Array:
+        """Forces for a unit of each bubble, at the owned blocks, (n, d). Collective."""
+        return self._summed([points.squared(rates) for points, rates in self._rates])
+
+    def times(self, e: fem.Function) -> Array:
+        """Forces of bubbles, at the owned blocks, (n, d). Collective.
+
+        Args:
+            e: the bubbles, ghosts updated.
+        """
+        return self._summed([points.tested(rates * points.of_bubbles(e))[0] for points, rates in self._rates])
+
+    def _summed(self, local: list[Array]) -> Array:
+        """Contributions at local blocks as one at the owned blocks, (n, d). Collective."""
+        size = self._space.dofmap.index_map.size_local + self._space.dofmap.index_map.num_ghosts
+        return gathered(self._space, sum(local, np.zeros((size, self._space.dofmap.bs))))
