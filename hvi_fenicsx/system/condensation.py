@@ -149,7 +149,7 @@ class Condensation:
         self._force = interior.gathered(lifted) - interior.pulled(inside)
         held = 0.5 * load.prescribed.T @ load.pulled - load.prescribed.T @ load.applied
         moved = self._eliminated(self._force[self._gone])
-        constant = total(held - 0.5 * lifted.T @ inside) - 0.5 * self._force[self._gone].T @ moved
+        constant = total(held - 0.5 * lifted.T @ inside[: len(lifted)]) - 0.5 * self._force[self._gone].T @ moved
         force = self._force[self._stay] - self._coupling.T @ moved
         product, outer = self.products(load.applied)
         return force, outer.T, _quadratic(constant), _quadratic(product)
@@ -166,7 +166,8 @@ class Condensation:
         interior = self._interior
         outer = interior.loads(vectors)
         gone = self._eliminated(outer[self._gone])
-        inside = self._system.comm.allreduce(vectors.T @ interior.solve(self._loading.lifted))
+        inside = interior.solve(self._loading.lifted)[: len(vectors)]
+        inside = self._system.comm.allreduce(vectors.T @ inside)
         rows = outer[self._stay] - self._coupling.T @ gone
         constants = np.asarray(inside + gone.T @ self._force[self._gone])
         constants[:, 1] += rows.T @ self._shift

@@ -6,14 +6,16 @@ factors are far smaller with the averaged pressures as further unknowns (:mod:`.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from petsc4py import PETSc
+from typing_extensions import override
 
 from ..mesh import nodes
 from ..typing import Array, Entities, Integers
 from . import factor_counts
+from .contact_rows import ContactRows
 from .petsc_options import CHOLESKY, default_options, prefix
 from .saddle_point import nested, without_dilatation
 from .system import System
@@ -32,6 +34,16 @@ class FactorForm:
 
     def __init__(self, system: System) -> None:
         self.system, self.pressures = system, 0
+
+    @property
+    def columns(self) -> Sequence[PETSc.Mat]:
+        """The columns of the displacements, in blocks of rows: first those of the displacements."""
+        return (self.system.jacobian.matrix,)
+
+    @property
+    def contact_rows(self) -> ContactRows:
+        """The displacements' rows of Γc."""
+        return self.system.jacobian.rows
 
     def matrix(self) -> PETSc.Mat:
         """A copy of the present matrix. Collective."""
@@ -56,17 +68,27 @@ class SaddlePointForm(FactorForm):
         self._blocks = nested(system, self._shear, parts)
         self.pressures = sum(part.stiffness.local_size for part in parts)
 
+    @property
+    @override
+    def columns(self) -> Sequence[PETSc.Mat]:
+        return [self._blocks.getNestSubMatrix(i, 0) for i in range(self._blocks.getNestSize()[0])]
+
+    @property
+    @override
+    def contact_rows(self) -> ContactRows:
+        return self._shear.jacobian.rows
+
     def _update(self) -> None:
         nothing = np.empty(0, dtype=np.int32)
         self._shear.jacobian.set_restricted(self.system.jacobian.rows.tangent, nothing)
 
+    @override
     def matrix(self) -> PETSc.Mat:
-        """A copy of the present matrix. Collective."""
         self._update()
         return self._blocks.convert("aij", out=PETSc.Mat())
 
+    @override
     def refresh(self, matrix: PETSc.Mat) -> None:
-        """Copy the present matrix into an earlier copy. Collective."""
         self._update()
         self._blocks.convert("aij", out=matrix)
 
@@ -159,18 +181,16 @@ class Factorisation:
         """Solve for several right-hand sides. Collective.
 
         Args:
-            right: this rank's rows, (local unknowns, k).
+            right: this rank's rows, (local unknowns and pressures, k).
         """
-        count, number = right.shape
-        given = np.zeros((count + self._form.pressures, number), order="F")
-        given[:count] = right
-        sizes = ((len(given), PETSc.DECIDE), (PETSc.DECIDE, number))
+        given = np.array(right, order="F")
+        sizes = ((len(given), PETSc.DECIDE), (PETSc.DECIDE, given.shape[1]))
         b = PETSc.Mat().createDense(sizes, array=given, comm=self._form.system.comm)
         x = PETSc.Mat().createDense(sizes, comm=self._form.system.comm)
         for matrix in (b, x):
             matrix.assemble()
         self.pc.getFactorMatrix().matSolve(b, x)
-        found = np.array(x.getDenseArray()[:count])
+        found = np.array(x.getDenseArray())
         b.destroy()
         x.destroy()
         return found

@@ -2,6 +2,9 @@
 
 With A = [[A_kk, A_ki], [A_ik, A_ii]], k the kept unknowns, the Schur complement is S = A_kk - A_ki A_ii⁻¹ A_ik and the
 condensed load f = b_k - A_ki A_ii⁻¹ b_i. Its arrays are the same on all ranks.
+
+Where averaged pressures are unknowns too (:mod:`.factorisation`), they belong to i: S is then no difference of large
+volumetric stiffnesses. "Inner" rows are this rank's unknowns, followed by its pressures.
 """
 
 from __future__ import annotations
@@ -14,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 from mpi4py import MPI
 from petsc4py import PETSc
-from scipy.sparse import csr_matrix
+from scipy.sparse import csr_matrix, vstack
 
 from ..errors import SolverError
 from ..runtime.mpi import agree
@@ -39,7 +42,7 @@ class Interior:
     Attributes:
         kept: the unknowns of this rank that are kept.
         factors: of A_ii; rows and columns of kept and pinned unknowns are those of the identity.
-        coupling: this rank's rows of A_ik, zero in the kept rows, (local unknowns, n).
+        coupling: the inner rows of A_ik, zero in the kept rows, (inner, n).
 
     Raises:
         SolverError: A_ii is singular.
@@ -56,9 +59,9 @@ class Interior:
         self._held = np.union1d(kept, system.pins)
         start = system.load.owner_range[0]
         self._everywhere = np.concatenate(agree(self._comm, kept + start)).astype(np.int64)
-        self.coupling = self._coupled()
-        form = form_of(system, own_prefix)
+        self._form = form = form_of(system, own_prefix)
         self.factors = Factorisation(form, form.matrix(), options, own_prefix)
+        self.coupling = self._coupled()
         self.factors.factorise(self._held)
         if reason := self.factors.failure:
             why = "no memory was left" if reason == _NO_MEMORY else "it is singular, a body is not held"
@@ -80,19 +83,26 @@ class Interior:
         return csr_matrix(matrix.getValuesCSR()[::-1], shape=(rows, total))[:, self._everywhere]
 
     def _coupled(self) -> csr_matrix:
-        inner = np.ones(self._system.load.local_size)
+        found = csr_matrix(vstack([self._columns(block) for block in self._form.columns]))
+        inner = np.ones(found.shape[0])
         inner[self._held] = 0.0
-        return csr_matrix(self._columns(self._system.jacobian.matrix).multiply(inner[:, None]))
+        return csr_matrix(found.multiply(inner[:, None]))
 
     def solve(self, right: Array) -> Array:
-        """A_ii⁻¹ times columns, zero at kept unknowns. Collective.
+        """A_ii⁻¹ times columns, zero at kept unknowns, (inner, k). Collective.
 
         Args:
-            right: right-hand sides, this rank's rows, (local unknowns, k).
+            right: right-hand sides, (inner, k); or without those of pressures, which are zero, (local unknowns, k).
         """
-        columns = np.array(right)
+        columns = self._inner(right)
         columns[self._held] = 0.0
         return self.factors.columns(columns)
+
+    def _inner(self, right: Array) -> Array:
+        """A copy with rows of pressures."""
+        found = np.zeros((self._system.load.local_size + self._form.pressures, *right.shape[1:]))
+        found[: len(right)] = right
+        return found
 
     def response(self) -> Array:
         """A_ki A_ii⁻¹ A_ik: forces on Γc by the body inside, for unit displacements of Γc, (n, n). Collective."""
@@ -106,7 +116,7 @@ class Interior:
 
     def own(self) -> csr_matrix:
         """This rank's rows of A_kk, (kept unknowns here, n)."""
-        rows = self._system.jacobian.rows
+        rows = self._form.contact_rows
         return csr_matrix(self._columns(rows.bulk)[np.searchsorted(rows.dofs, self.kept)])
 
     def stiffness(self) -> Array:
@@ -122,7 +132,7 @@ class Interior:
         largest = max(agree(self._comm, float(np.max(np.abs(self._system.jacobian.matrix.getDiagonal().array_r)))))
         load = np.cos(np.arange(self._system.load.local_size) + 1.0)[:, None]
         for _ in range(2):
-            load = self.solve(load)
+            load = self.solve(load)[: len(load)]
             growth = max(agree(self._comm, float(np.max(np.abs(load), initial=0.0)))) * largest
             load *= largest / (growth or 1.0)
         return bool(growth * self._system.thresholds.rounding < 1.0)
@@ -147,7 +157,7 @@ class Interior:
         """A_ki times displacements of the body inside, (n, k). Collective.
 
         Args:
-            inner: (local unknowns, k), zero at kept unknowns.
+            inner: as :meth:`solve` returns it, (inner, k).
         """
         return np.asarray(self._comm.allreduce(self.coupling.T @ inner))
 
@@ -166,7 +176,7 @@ class Interior:
             values: of all kept unknowns, (n,).
             right: the load, this rank's, (local unknowns,).
         """
-        found = self.solve((right - self.coupling @ values)[:, None])[:, 0]
+        found = self.solve((self._inner(right) - self.coupling @ values)[:, None])[: len(right), 0]
         found[self.kept] = self.own_part(values)
         return found
 

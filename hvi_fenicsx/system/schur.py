@@ -67,7 +67,6 @@ class SchurDirect:
         self._stiffness = self._interior.stiffness()
         self._lu: tuple[Array, Entities] | None = None
         self._free: Mask = np.ones(self._interior.size, dtype=bool)
-        self._work = system.load.duplicate()
         self.pc, self.matrix = PETSc.PC().create(system.comm), system.jacobian.matrix
         self.pc.setType(PETSc.PC.Type.PYTHON)
         self.pc.setPythonContext(_Application(self))
@@ -92,18 +91,14 @@ class SchurDirect:
             x: the right-hand side.
             y: where the solution is written.
         """
-        inner, interior = self._work, self._interior
-        x.copy(inner)
-        inner.array[interior.kept] = 0.0
-        interior.factors.apply(inner, y)
-        value = interior.gathered(x.array_r) - np.where(self._free, interior.pulled(y.array_r), 0.0)
+        interior = self._interior
+        right = x.array_r[:, None]
+        value = interior.gathered(x.array_r) - np.where(self._free, interior.pulled(interior.solve(right))[:, 0], 0.0)
         value = lu_solve(self._lu, value, check_finite=False)
-        inner.array[:] -= interior.coupling @ np.where(self._free, value, 0.0)
-        interior.factors.apply(inner, y)
+        y.array[:] = interior.expand(np.where(self._free, value, 0.0), x.array_r)
         y.array[interior.kept] = interior.own_part(value)
 
     def free(self) -> None:
         """Free the PETSc objects (not named ``destroy``: petsc4py calls that with every PC of the context)."""
-        for thing in (self.pc, self._work):
-            thing.destroy()
+        self.pc.destroy()
         self._interior.free()
