@@ -132,7 +132,7 @@ def add(matrix: PETSc.Mat, parts: Sequence[Dilatation]) -> PETSc.Mat:
     maps: Any = matrix.getLGMap()
     for part in parts:
         wider = part.matrix()
-        wider.axpy(1.0, matrix, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+        wider.axpy(1.0, matrix, PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
         wider.setBlockSize(matrix.getBlockSize())
         matrix.destroy()
         matrix = wider

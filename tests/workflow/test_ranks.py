@@ -33,6 +33,12 @@ CUBE: Table = {
 }
 
 
+RUBBER_BELOW = two_blocks("rectangle", [1.0], [[9, 4], [7, 3]], "plane_strain")
+"""Only one of two bodies is nearly incompressible."""
+RUBBER_BELOW["material"] = {
+    "lower": STEEL | {"model": "plane_strain", "poisson_ratio": 0.499, "region": "lower"},
+    "upper": STEEL | {"model": "plane_strain", "region": "upper"},
+}
 SCENES: dict[str, Table] = {
     "paper": model(16, friction=PAPER, smoothing="paper", epsilon_absolute=0.1),
     "exact": model(16, friction=PAPER),
@@ -52,6 +58,7 @@ SCENES: dict[str, Table] = {
     "joined": two_blocks("rectangle", [1.0], [[9, 4], [7, 3]], "plane_stress"),
     "joined-high": two_blocks("rectangle", [1.0], [[8, 12], [9, 12]], "plane_stress"),  # a rank without the seam
     "joined-degree-2": two_blocks("rectangle", [1.0], [[9, 4], [7, 3]], "plane_stress", degree=2),
+    "joined-rubber": RUBBER_BELOW,
     "joined-in-space": two_blocks("box", [1.0, 1.0], [[4, 3, 2], [3, 4, 2]], "three_dimensional"),
 }
 LIFTING = {"on": "top", "traction": [0.0, "-1e6*(1 - 1.8*x)"]}

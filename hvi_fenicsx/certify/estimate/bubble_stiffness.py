@@ -46,7 +46,11 @@ class Springs(Protocol):
         ...
 
     def times(self, e: fem.Function) -> Array:
-        """Forces of bubbles, at the owned blocks, (n, d). Collective."""
+        """Forces of bubbles, at the owned blocks, (n, d). Collective.
+
+        Args:
+            e: the bubbles, ghosts updated.
+        """
         ...
 
 
@@ -101,7 +105,12 @@ class BubbleStiffness:
         return result
 
     def work(self, e: Array, force: Array) -> float:
-        """The work of a force on bubbles, (n, d) each. Collective."""
+        """The work of a force on bubbles. Collective.
+
+        Args:
+            e: the bubbles, (n, d).
+            force: on them, (n, d).
+        """
         return self._dot(e, force)
 
     def diagonal_solve(self, r: Array, at: Entities) -> Array:

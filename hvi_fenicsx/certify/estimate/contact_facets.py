@@ -158,7 +158,11 @@ class PartTrace:
         return found, at_nodes
 
     def squared(self, rates: Array) -> Array:
-        """∫ Σ rate (v·direction)² ds of rates (f, q, k) over this rank's facets, v each bubble; local blocks (n, d)."""
+        """∫ Σ rate (v·direction)² ds over this rank's facets, v being each bubble; local blocks (n, d).
+
+        Args:
+            rates: along the directions, (f, q, k).
+        """
         found = np.zeros((local_blocks(self._bubbles), self._vectors.shape[3]))
         scaled = self.weights[:, :, None] * rates
         for i, shape, middle in self._bubbles_of_facet:

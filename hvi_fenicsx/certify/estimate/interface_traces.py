@@ -231,7 +231,11 @@ class InterfaceTrace:
         return found, at_nodes
 
     def squared(self, rates: Array) -> Array:
-        """∫ Σ rate (v·direction)² ds of rates (f, q, k), v each bubble of a side; local blocks (n, d). Collective."""
+        """∫ Σ rate (v·direction)² ds, v being each bubble of a side; local blocks (n, d). Collective.
+
+        Args:
+            rates: along the directions, (f, q, k).
+        """
         return self._summed(np.einsum("fqk,fqkd->fqd", self.weights[:, :, None] * rates, self._vectors**2), 2)
 
     def _summed(self, vectors: Array, power: int) -> Array:

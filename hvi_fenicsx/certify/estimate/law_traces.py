@@ -272,7 +272,12 @@ class LawTraces:
 
 
 def gathered(space: fem.FunctionSpace, values: Array) -> Array:
-    """Local contributions (n_local, d) summed at the owned blocks, (n, d). Collective."""
+    """Local contributions summed at the owned blocks, (n, d). Collective.
+
+    Args:
+        space: of the blocks.
+        values: at all local blocks, (n_local, d).
+    """
     if space.mesh.comm.size == 1:
         return values
     field = fem.Function(space)
