@@ -10,6 +10,10 @@ from ..typing import Array
 from .state import PathState
 
 
+_SAME_PLACE = 1e-7
+"""A difference of displacements that does not count, relative."""
+
+
 class Round(Enum):
     """How a path came back."""
 
@@ -28,8 +32,9 @@ class Rounds:
     """
 
     def __init__(self, x: Array) -> None:
-        self._known: dict[int, tuple[float, float]] = {}
+        self._known: dict[int, tuple[float, float, float]] = {}
         self._x, self.came = x, np.zeros_like(x)
+        self._weights = np.random.default_rng(0).uniform(0.5, 1.5, len(x))
         self._way = 0.0
 
     def note(self, state: PathState) -> Round | None:
@@ -44,9 +49,12 @@ class Rounds:
             self.came = step
         self._way += length
         self._x, key = state.x, _key(state)
-        factor, way = self._known.get(key, (np.inf, 0.0))
-        self._known[key] = state.factor, self._way
+        factor, way, place = self._known.get(key, (np.inf, 0.0, 0.0))
+        here = float(self._weights @ state.x)
+        self._known[key] = state.factor, self._way, here
         if abs(factor - state.factor) > 1e-9 * (1.0 + abs(state.factor)):
+            return None
+        if abs(place - here) > _SAME_PLACE * float(self._weights @ np.abs(state.x)):  # what slides bears the same load
             return None
         return Round.CLOSED if self._way - way > 1e-9 * size else Round.BLOCKED
 
