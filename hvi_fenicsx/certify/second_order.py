@@ -71,6 +71,7 @@ def negative_eigenvalues(system: System, held: Integers) -> int | None:
     """
     form = form_of(system, _PREFIX)
     factors = Factorisation(form, form.matrix(), own_prefix=_PREFIX)
+    factors.allow_negative()
     factors.factorise(held)
     count = None if factors.failure else factors.negative
     factors.free()

@@ -131,7 +131,6 @@ class Factorisation:
     ) -> None:
         self._form, self._matrix, self._options, self._own_prefix = form, matrix, options, own_prefix
         matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
-        matrix.setOption(PETSc.Mat.Option.SPD, False)
         self._given, self._found = matrix.createVecLeft(), matrix.createVecLeft()
         self.pc = PETSc.PC().create(form.system.comm)
         self.pc.setOptionsPrefix(f"{prefix()}{own_prefix}")
@@ -163,6 +162,10 @@ class Factorisation:
         with default_options(self._options, self._own_prefix):
             self.pc.setFromOptions()
             self.pc.setUp()
+
+    def allow_negative(self) -> None:
+        """Let eigenvalues be negative; the system's matrix is known to be positive definite, its form may not be."""
+        self._matrix.setOption(PETSc.Mat.Option.SPD, False)
 
     def apply(self, right: PETSc.Vec, found: PETSc.Vec) -> None:
         """Solve for the system's unknowns. Collective.

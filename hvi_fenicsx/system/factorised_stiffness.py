@@ -143,6 +143,7 @@ class FactorisedCell:
     ) -> None:
         self._system, self._interior, self._stiffness, self._moving = system, interior, stiffness, moving
         PETSc.garbage_cleanup(system.comm)  # on several ranks factors that nothing refers to are freed together
+        factors.allow_negative()
         factors.add(interior.kept, np.where(moving, slope, 0.0))
         factors.factorise(np.union1d(interior.kept[~moving], system.pins))
         self._factors = factors

@@ -31,6 +31,7 @@ def compared(table: Mapping[str, Any], comm: MPI.Comm = MPI.COMM_WORLD) -> dict[
     found, negative = [], []
     for form in (form_of(system), FactorForm(system)):
         factors = Factorisation(form, form.matrix(), INDEFINITE)
+        factors.allow_negative()
         factors.factorise(held)  # and once more, as an active set method does
         factors.refresh()
         factors.add(falling, np.full(len(falling), -SLOPE))
