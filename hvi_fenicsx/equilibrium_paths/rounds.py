@@ -9,7 +9,6 @@ import numpy as np
 from ..typing import Array
 from .state import PathState
 
-
 _SAME_PLACE = 1e-7
 """A difference of displacements that does not count, relative."""
 
