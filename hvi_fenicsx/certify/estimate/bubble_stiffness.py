@@ -85,9 +85,10 @@ class BubbleStiffness:
         at, elastic = self._sprung
         self._inverse[at] = elastic
         rates = springs.diagonal()
-        strong = bool(self.comm.allreduce(bool(np.any(rates * self._inverse > _WEAK)), op=MPI.LOR))
+        at = np.unique(np.flatnonzero(rates) // rates.shape[1]).astype(np.int32)  # those of Γc: few
+        strong = bool(self.comm.allreduce(bool(np.any(rates[at] * self._inverse[at] > _WEAK)), op=MPI.LOR))
         self._springs = springs if strong else None
-        at = np.flatnonzero(rates.any(axis=1) & strong).astype(np.int32)
+        at = at if strong else at[:0]
         self._sprung = at, self._inverse[at]
         self._inverse[at] = 1.0 / (1.0 / self._inverse[at] + rates[at])
         return strong

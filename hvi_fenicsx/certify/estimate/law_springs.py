@@ -7,10 +7,13 @@ as the rising law hold the bubbles while they are found; what the law gives them
 
 from __future__ import annotations
 
+import functools
+
 import numpy as np
 from dolfinx import fem
 
 from ...typing import Array
+from .contact_facets import local_blocks
 from .law_traces import ErrorField, LawTraces, gathered
 
 
@@ -40,5 +43,5 @@ class LawSprings:
 
     def _summed(self, local: list[Array]) -> Array:
         """Contributions at local blocks as one at the owned blocks, (n, d). Collective."""
-        size = self._space.dofmap.index_map.size_local + self._space.dofmap.index_map.num_ghosts
-        return gathered(self._space, sum(local, np.zeros((size, self._space.dofmap.bs))))
+        nothing = np.zeros((local_blocks(self._space), self._space.dofmap.bs))
+        return gathered(self._space, functools.reduce(np.add, local) if local else nothing)
