@@ -29,8 +29,11 @@ class FactorForm:
 
     Attributes:
         system: the system.
+        has_pressures: whether averaged pressures are unknowns, on any rank.
         pressures: unknowns of this rank that follow its displacements.
     """
+
+    has_pressures = False
 
     def __init__(self, system: System) -> None:
         self.system, self.pressures = system, 0
@@ -60,6 +63,8 @@ class SaddlePointForm(FactorForm):
     Args:
         system: of a body whose div u is averaged; nothing is held by its matrix.
     """
+
+    has_pressures = True
 
     def __init__(self, system: System) -> None:
         super().__init__(system)

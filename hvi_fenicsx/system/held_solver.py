@@ -19,14 +19,14 @@ from petsc4py import PETSc
 from ..runtime.timing import Timer
 from ..typing import Array, Entities
 from . import factor_counts, schur
-from .factorisation import SaddlePointForm, form_of
+from .algebraic import Algebraic
+from .direct import Direct
+from .factorisation import form_of
 from .levels import Levels
 from .linear_settings import Kind, LinearSettings
-from .matrix_copy import MatrixCopy
 from .mixed_multigrid import MixedMultigrid
 from .multigrid import Multigrid
 from .petsc_options import configure
-from .saddle_point_direct import SaddlePointDirect
 from .system import System
 
 
@@ -124,7 +124,7 @@ class HeldPreconditioner:
     @property
     def _condensing(self) -> bool:
         """Whether the body is to be condensed. Collective."""
-        if self._kind != "lu" or not isinstance(self._preconditioner, MatrixCopy | SaddlePointDirect):
+        if not isinstance(self._preconditioner, Direct):
             return self._condensed
         worth = self.settings.thresholds.condensing * factor_counts.solves_worth(self._preconditioner.factors)
         return schur.is_worthwhile(self.system, self._factorised * worth)
@@ -141,10 +141,9 @@ class HeldPreconditioner:
             return Multigrid(self.system, self.levels, self.settings.pc)
         if self.settings.kind == "mixed":
             return MixedMultigrid(self.system, self.levels, self.settings.pc)
-        direct = self.settings.kind == "lu"
-        if direct and isinstance(form := form_of(self.system), SaddlePointForm):
-            return SaddlePointDirect(form, self.settings.pc)
-        return MatrixCopy(self.system, self.settings.pc, direct=direct)
+        if self.settings.kind == "lu":
+            return Direct(form_of(self.system), self.settings.pc)
+        return Algebraic(self.system, self.settings.pc)
 
     def destroy(self) -> None:
         """Free the PETSc objects."""

@@ -10,7 +10,6 @@ grow with λ/μ, but not with the mesh.
 from __future__ import annotations
 
 import itertools
-import weakref
 from collections.abc import Mapping
 
 import numpy as np
@@ -18,6 +17,7 @@ from petsc4py import PETSc
 
 from ..problem.nodal_averaging import Dilatation
 from ..typing import Entities
+from .applied_by import applied_by
 from .levels import Level, Levels
 from .multigrid import Multigrid
 from .petsc_options import prefix
@@ -56,10 +56,7 @@ class MixedMultigrid:
         self._found = self._given.duplicate()
         self._minres = self._solver()
         self.accuracy, self.iterations = system.thresholds.mixed_accuracy, 0
-        self.pc = PETSc.PC().create(system.comm)
-        self.pc.setOperators(self.matrix)
-        self.pc.setType(PETSc.PC.Type.PYTHON)
-        self.pc.setPythonContext(_Application(self))
+        self.pc = applied_by(self, self.matrix)
 
     def _solver(self) -> PETSc.KSP:
         minres = PETSc.KSP().create(self._system.comm)
@@ -99,19 +96,6 @@ class MixedMultigrid:
         self.pc.destroy()
         self._minres.destroy()
         self._multigrid.free()
-
-
-class _Application:
-    """The context of the PC, which refers to its owner weakly: nothing would free a circle via PETSc."""
-
-    def __init__(self, owner: MixedMultigrid) -> None:
-        self._owner = weakref.ref(owner)
-
-    def apply(self, pc: PETSc.PC, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        """Solve for y of the load x."""
-        owner = self._owner()
-        assert owner is not None
-        owner.apply(x, y)
 
 
 class _Blocks:

@@ -7,7 +7,6 @@ tangent then costs one small dense factorisation, on each rank, instead of one o
 from __future__ import annotations
 
 import warnings
-import weakref
 from collections.abc import Mapping
 
 import numpy as np
@@ -16,6 +15,7 @@ from scipy.linalg import LinAlgWarning, block_diag, lu_factor, lu_solve
 
 from ..runtime.mpi import agree
 from ..typing import Array, Entities, Mask
+from .applied_by import applied_by
 from .interior import Interior
 from .petsc_options import prefix
 from .system import System
@@ -36,19 +36,6 @@ def is_worthwhile(system: System, affordable: float) -> bool:
     return 0 < sum(agree(system.comm, len(system.jacobian.rows.dofs))) <= affordable
 
 
-class _Application:
-    """The context of the PC of a condensed body, to which it refers weakly: nothing would free a circle via PETSc."""
-
-    def __init__(self, owner: SchurDirect) -> None:
-        self._owner = weakref.ref(owner)
-
-    def apply(self, pc: PETSc.PC, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        """Solve y = J^-1 x."""
-        owner = self._owner()
-        assert owner is not None
-        owner.apply(pc, x, y)
-
-
 class SchurDirect:
     """The condensed body, as a preconditioner. Creation is collective.
 
@@ -67,10 +54,8 @@ class SchurDirect:
         self._stiffness = self._interior.stiffness()
         self._lu: tuple[Array, Entities] | None = None
         self._free: Mask = np.ones(self._interior.size, dtype=bool)
-        self.pc, self.matrix = PETSc.PC().create(system.comm), system.jacobian.matrix
-        self.pc.setType(PETSc.PC.Type.PYTHON)
-        self.pc.setPythonContext(_Application(self))
-        self.pc.setOperators(self.matrix)
+        self.matrix = system.jacobian.matrix
+        self.pc = applied_by(self, self.matrix)
 
     def prepare(self, held: Entities) -> None:
         """Take the present tangent, and hold these dofs; all that are not prescribed must be on Γc. Collective."""
@@ -83,11 +68,10 @@ class SchurDirect:
             warnings.simplefilter("ignore", LinAlgWarning)  # a body that nothing holds: the step is not finite
             self._lu = lu_factor(matrix, check_finite=False)
 
-    def apply(self, pc: PETSc.PC, x: PETSc.Vec, y: PETSc.Vec) -> None:
+    def apply(self, x: PETSc.Vec, y: PETSc.Vec) -> None:
         """Solve y = J^-1 x, held dofs being decoupled with a diagonal of 1. Collective.
 
         Args:
-            pc: the PC whose context this is.
             x: the right-hand side.
             y: where the solution is written.
         """
@@ -99,6 +83,6 @@ class SchurDirect:
         y.array[interior.kept] = interior.own_part(value)
 
     def free(self) -> None:
-        """Free the PETSc objects (not named ``destroy``: petsc4py calls that with every PC of the context)."""
+        """Free the PETSc objects."""
         self.pc.destroy()
         self._interior.free()

@@ -39,7 +39,7 @@ def main() -> None:
     whole.prepare(held)
     whole.solve(load, expected, 1e-12)
     condensed.prepare(held)
-    condensed.apply(None, load, found)
+    condensed.apply(load, found)
     found.axpy(-1.0, expected)
     sizes = MPI.COMM_WORLD.allgather(len(system.jacobian.rows.dofs))
     told = {"sizes": sizes, "difference": found.norm() / expected.norm()}

@@ -19,9 +19,10 @@ from hvi_fenicsx.solvers.active_set import ActiveSetSolver
 from hvi_fenicsx.solvers.convergence import Outcome, Sizes
 from hvi_fenicsx.solvers.thresholds import Thresholds as SolverThresholds
 from hvi_fenicsx.system import factor_counts, schur
+from hvi_fenicsx.system.direct import Direct
+from hvi_fenicsx.system.factorisation import FactorForm
 from hvi_fenicsx.system.held_solver import HeldPreconditioner
 from hvi_fenicsx.system.linear_settings import LinearSettings
-from hvi_fenicsx.system.matrix_copy import MatrixCopy
 from hvi_fenicsx.system.petsc_options import CHOLESKY
 from hvi_fenicsx.system.system import System
 from hvi_fenicsx.system.thresholds import Thresholds as LinearThresholds
@@ -50,7 +51,7 @@ def test_condensed_it_solves_what_a_factorisation_of_the_whole_solves(every: int
     whole.prepare(held)
     whole.solve(load, expected, 1e-12)
     condensed.prepare(held)
-    condensed.apply(None, load, found)
+    condensed.apply(load, found)
     found.axpy(-1.0, expected)
     assert found.norm() < 1e-10 * expected.norm()
 
@@ -65,7 +66,7 @@ def test_what_mumps_counts_is_below_that_of_full_factors() -> None:
     """Averaged pressures couple far vertices: full factors of n unknowns cost as much as n/6 solves, these nearly."""
     table = SCENE | {"domain": SCENE["domain"] | {"cells": [5, 5, 5]}}
     system = prepare(Scene.model_validate(table), MPI.COMM_SELF).system
-    copy = MatrixCopy(system, CHOLESKY, direct=True)
+    copy = Direct(FactorForm(system), CHOLESKY)
     copy.prepare(system.jacobian.rows.dofs[:0].astype(np.int32))
     assert system.dofs**2 / 4 < factor_counts.entries(copy.pc) < system.dofs**2 / 2
     assert system.dofs / 12 < factor_counts.solves_worth(copy.pc) < system.dofs / 6
