@@ -12,7 +12,12 @@ class Solver(Protocol):
     """What solves a system."""
 
     def apply(self, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        """Solve for y of the load x. Collective."""
+        """Solve the system. Collective.
+
+        Args:
+            x: the load.
+            y: where the solution goes.
+        """
 
 
 class _Context:
