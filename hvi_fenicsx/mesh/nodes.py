@@ -108,16 +108,28 @@ def middles(corners: Array) -> Array:
     return np.asarray(corners[:, np.array(pairs)].mean(axis=2))
 
 
+def owned_cells(space: fem.FunctionSpace) -> Entities:
+    """The cells that this rank owns, by their nodes, (c, nodes)."""
+    topology = space.mesh.topology
+    return np.asarray(space.dofmap.list[: topology.index_map(topology.dim).size_local])
+
+
 def linear_cells(space: fem.FunctionSpace) -> Entities:
     """The parts of the cells that this rank owns, by their nodes, (c, d+1); those of a cell follow one another."""
-    topology = space.mesh.topology
-    own = space.dofmap.list[: topology.index_map(topology.dim).size_local]
+    own = owned_cells(space)
     return own if degree(space) == 1 else parts(own)
 
 
 def parts_of_cell(space: fem.FunctionSpace) -> int:
     """How many of ``linear_cells`` a cell has."""
     return 1 if degree(space) == 1 else len(_SPLIT[_name(space)])
+
+
+def middles_of_parts(space: fem.FunctionSpace) -> Array:
+    """The middles of the ``linear_cells`` of a cell by their barycentric coordinates, (parts, d+1)."""
+    points = reference_points(space)
+    own = np.arange(len(points))[None]
+    return np.asarray(points[own if degree(space) == 1 else parts(own)].mean(axis=1))
 
 
 def linear_facets(space: fem.FunctionSpace, facets: Entities) -> Entities:

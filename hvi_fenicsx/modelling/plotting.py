@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ..errors import InputError
-from ..problem.cell_stress import mean_stress
+from ..problem.cell_stress import stress_of_parts
 from ..problem.stress import von_mises
 from ..report.pictures.xserver import XServer
 from ..report.reader import Result
@@ -36,7 +36,7 @@ def draw(solution: Solution, picture: str) -> Figure | None:
     found = solution.solve_result
     stress = None
     if found is not None:
-        stress = von_mises(mean_stress(solution.problem.bulk, found.u)).astype(np.float32)
+        stress = von_mises(stress_of_parts(solution.problem.bulk, found.u)).astype(np.float32)
     arrays, record = gathering.solution_arrays(solution, stress), summary(solution)
     figures: list[Figure] = []
 

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from ..certify.certificate import Examination
 from ..errors import InputError
 from ..problem import spaces
-from ..problem.cell_stress import mean_stress
+from ..problem.cell_stress import cell_stress, space_of_stress
 from ..problem.scaling import Scales
 from ..results import ResultFolder, gathering
 from ..results.output_folder import Existing
@@ -63,14 +63,15 @@ class ModelSolution(Solution):
 
     @cached_property
     def stress(self) -> fem.Function:
-        """The stress, N/m², tension positive: (3, 3), constant in each cell. Collective when first used.
+        """The stress, N/m², tension positive: (3, 3), at degree 1 constant in each cell, at degree 2 linear.
+
+        Collective when first used.
 
         Raises:
             InputError: on all ranks alike: nothing was solved, since no solution exists.
         """
-        space = fem.functionspace(self.problem.space.mesh, ("Discontinuous Lagrange", 0, (3, 3)))
-        field = fem.Function(space, name="stress")
-        values = mean_stress(self.problem.bulk, self._solved.u)
+        field = fem.Function(space_of_stress(self.problem.space, (3, 3)), name="stress")
+        values = cell_stress(self.problem.bulk, self._solved.u)
         field.x.array[: values.size] = values.ravel()
         field.x.scatter_forward()
         return field

@@ -1,8 +1,8 @@
-"""The mean stress of each cell, from the elastic operator itself: a new material needs nothing here."""
+"""The stress in each cell, from the elastic operator itself: a new material needs nothing here."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import basix.ufl
@@ -10,18 +10,32 @@ import numpy as np
 import ufl
 from dolfinx import fem
 
+from ..mesh import nodes
 from ..typing import Array
 from . import stress
 from .bulk import Bulk
-from .vectors import nodal_sum
+from .vectors import LinearForm
 
 
-def mean_stress(bulk: Bulk, u: fem.Function) -> Array:
-    """The mean stress of every owned cell, N/m², tension positive; shape (cells, 3, 3). Collective.
+def space_of_stress(space: fem.FunctionSpace, shape: tuple[int, ...] = ()) -> fem.FunctionSpace:
+    """Functions as smooth as the stress of displacements: of one degree less, apart in each cell. Collective.
+
+    Args:
+        space: of the displacements.
+        shape: of their values.
+    """
+    return fem.functionspace(space.mesh, ("Discontinuous Lagrange", nodes.degree(space) - 1, shape))
+
+
+def cell_stress(bulk: Bulk, u: fem.Function) -> Array:
+    """The stress in every owned cell, N/m², tension positive; shape (cells, k, 3, 3). Collective.
+
+    At degree 1 it is the mean of a cell (k = 1), at degree 2 the linear function that is nearest in the mean square, by
+    its values at the corners (k = d+1).
 
     With v = q·x, q being constant in one cell and zero elsewhere, ε(v) is the symmetric part of q, and the stress does
-    the work |K| σ:q in it. σ_33 is zero in plane stress, and what holds the thickness in plane strain. Where div u is
-    averaged by vertex, so is the volumetric stress.
+    the work σ:q in it at each point. σ_33 is zero in plane stress, and what holds the thickness in plane strain. Where
+    div u is averaged by vertex, so is the volumetric stress.
 
     Args:
         bulk: the elastic operator.
@@ -29,14 +43,56 @@ def mean_stress(bulk: Bulk, u: fem.Function) -> Array:
     """
     mesh, scales = bulk.space.mesh, bulk.scales
     one = basix.ufl.element("Discontinuous Lagrange", mesh.topology.cell_name(), 0)
-    count = len(stress.COMPONENTS[scales.dimension]) + 2
-    *q, across, volume = ufl.TestFunction(fem.functionspace(mesh, basix.ufl.blocked_element(one, (count,))))
+    *q, across = ufl.TestFunction(
+        fem.functionspace(mesh, basix.ufl.blocked_element(one, (len(stress.COMPONENTS[scales.dimension]) + 1,)))
+    )
     pressures = bulk.pressures(u)
     v = stress.linear_field(q, ufl.SpatialCoordinate(mesh)) / scales.length
-    found = nodal_sum(sum(_across(bulk, u, pressures, across), _work(bulk, u, pressures, v)))
-    found /= nodal_sum(volume * ufl.dx)[:, -1:]
-    sigma = stress.tensors(found[:, :-2], found[:, -2])
+    work = sum(_across(bulk, u, pressures, across), _work(bulk, u, pressures, v))
+    found = _nearest(bulk.space, work)
+    sigma = stress.tensors(found[..., :-1], found[..., -1])
     return np.asarray(sigma * scales.stress * scales.length**scales.dimension)
+
+
+def stress_of_parts(bulk: Bulk, u: fem.Function) -> Array:
+    """The mean stress of the parts of every owned cell (:func:`.nodes.linear_cells`), N/m², (parts, 3, 3). Collective.
+
+    Args:
+        bulk: the elastic operator.
+        u: the displacement, in units of u0, ghosts updated.
+    """
+    values = cell_stress(bulk, u)
+    if values.shape[1] == 1:
+        return values[:, 0]
+    found = np.einsum("pk,ckij->cpij", nodes.middles_of_parts(bulk.space), values)
+    return np.asarray(found.reshape(-1, 3, 3))
+
+
+def _nearest(space: fem.FunctionSpace, work: Any) -> Array:
+    """The components of the stress in the basis of ``space_of_stress``, (cells, k, components). Collective.
+
+    Args:
+        space: of the displacements.
+        work: the UFL form of the stress's work in uniform strains, by cell.
+    """
+    functions = space_of_stress(space)
+    weight = fem.Function(functions)
+    works = LinearForm(ufl.Form([part.reconstruct(integrand=weight * part.integrand()) for part in work.integrals()]))
+    masses = LinearForm(weight * ufl.TestFunction(functions) * ufl.dx)
+    right, mass = [], []
+    for _ in _each_basis_function(weight):
+        right.append(works.values())
+        mass.append(masses.values().reshape(len(right[0]), -1))
+    return np.asarray(np.linalg.solve(np.stack(mass, axis=1), np.stack(right, axis=1)))
+
+
+def _each_basis_function(weight: fem.Function) -> Iterator[None]:
+    """Let a function be each function of a cell's basis in turn, in all cells."""
+    values = weight.x.array.reshape(-1, weight.function_space.dofmap.list.shape[1])
+    for column in values.T:
+        values[:] = 0.0
+        column[:] = 1.0
+        yield
 
 
 def _work(bulk: Bulk, u: fem.Function, pressures: Sequence[fem.Function], v: Any) -> Any:

@@ -29,17 +29,17 @@ def linear_field(q: Sequence[Any], x: Any) -> Any:
 
 
 def tensors(components: Array, across: Array) -> Array:
-    """Symmetric tensors by cell, (n, 3, 3).
+    """Symmetric tensors, (..., 3, 3).
 
     Args:
-        components: those of ``COMPONENTS``, (n, k).
-        across: σ_33 of a plane body, (n,); in space it is among the components, and this is not used.
+        components: those of ``COMPONENTS``, (..., k).
+        across: σ_33 of a plane body, (...); in space it is among the components, and this is not used.
     """
-    seen = next(places for places in COMPONENTS.values() if len(places) == components.shape[1])
-    sigma = np.zeros((len(components), 3, 3))
-    sigma[:, 2, 2] = across
-    for component, (i, j) in zip(components.T, seen, strict=True):
-        sigma[:, i, j] = sigma[:, j, i] = component
+    seen = next(places for places in COMPONENTS.values() if len(places) == components.shape[-1])
+    sigma = np.zeros((*across.shape, 3, 3))
+    sigma[..., 2, 2] = across
+    for number, (i, j) in enumerate(seen):
+        sigma[..., i, j] = sigma[..., j, i] = components[..., number]
     return sigma
 
 

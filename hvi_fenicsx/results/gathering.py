@@ -33,7 +33,7 @@ def solution_arrays(
 
     Args:
         solution: what was found.
-        von_mises: of the cells that this rank owns, N/m², (c,); left out where it is None.
+        von_mises: of the parts of the cells that this rank owns, N/m², (c,); left out where it is None.
         rows: this rank's rows of the parts of Γc, where they are known already.
     """
     problem = solution.problem
@@ -46,7 +46,7 @@ def solution_arrays(
         points = np.asarray(problem.points / problem.scales.length)
         fields["escape_mode"] = problem.bodies.motion(points, solution.solvability.direction)[:owned]
     if von_mises is not None:
-        fields["von_mises"] = np.repeat(von_mises, nodes.parts_of_cell(problem.space))
+        fields["von_mises"] = von_mises
     gathered = {name: _joined(comm, values) for name, values in fields.items()}
     sides = {name: _facets(problem, facets) for name, facets in problem.part_facets.items()}
     loads, regions = _loads(problem), _regions(problem)

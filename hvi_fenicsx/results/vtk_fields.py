@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -14,13 +14,13 @@ from dolfinx import fem, la
 from ..certify import placed_forces
 from ..certify.contact_state import ContactState
 from ..mesh import nodes
-from ..problem import facet_integrals, spaces
+from ..problem import spaces
 from ..problem.problem import Problem
 from ..problem.stress import von_mises
 from ..rigid import Mode
 from ..solution import Solution
-from ..typing import Array, Entities, Integers
-from . import vtk_files
+from ..typing import Array, Entities
+from . import cell_strain, vtk_files
 from .vtk_files import Grid
 
 _LENGTHS = ("displacement", "u_n", "u_t1", "u_t2", "gap")
@@ -29,14 +29,14 @@ _UNITS = dict.fromkeys(_LENGTHS, "m") | dict.fromkeys(_STRESSES, "N/m²")
 
 
 def write_body(path: Path, solution: Solution, stress: Array) -> None:
-    """Write displacement and reaction by vertex; by cell stress, strain, von Mises stress, estimated error.
+    """Write displacement and reaction by node; by part of a cell stress, strain, von Mises stress, estimated error.
 
-    Collective.
+    The error is that of the whole cell. Collective.
 
     Args:
         path: the file.
         solution: what was found.
-        stress: of the cells that this rank owns, N/m², (c, 3, 3).
+        stress: in the parts of the cells that this rank owns, N/m², (c, 3, 3).
 
     Raises:
         InputError: it cannot be written, on all ranks alike.
@@ -44,11 +44,11 @@ def write_body(path: Path, solution: Solution, stress: Array) -> None:
     problem, solved = solution.problem, solution.solve_result
     assert solved is not None
     u = spaces.values(problem.space, solved.u.x.array) * problem.scales.displacement
-    cells = {"von_mises": von_mises(stress), "stress": stress, "strain": _strain(problem, u)}
+    cells = {"von_mises": von_mises(stress), "stress": stress, "strain": cell_strain.of_parts(problem, u)}
     if (estimate := solution.estimate) is not None:
-        cells["error"] = np.asarray(estimate.cells / (estimate.energy_norm or 1.0), dtype=np.float64)
+        cells["error"] = _in_parts(problem, estimate.cells / (estimate.energy_norm or 1.0))
     if len(problem.bodies.single()) > 1:
-        cells["body"] = problem.bodies.number_at(_owned_cells(problem)[:, 0]).astype(np.float64)
+        cells["body"] = _in_parts(problem, problem.bodies.number_at(nodes.owned_cells(problem.space)[:, 0]))
     _write_on_body(path, problem, {"displacement": u, "reaction": _reactions(solution)}, cells)
 
 
@@ -64,60 +64,13 @@ def _reactions(solution: Solution) -> Array:
     return by_vertex
 
 
-def _strain(problem: Problem, u: Array) -> Array:
-    """The mean symmetric gradient in the owned cells of a displacement (n, d) by its values at the nodes, (c, 3, 3).
-
-    It is zero across a plane body. The mean gradient of a quadratic function is its gradient at the middle, and that of
-    the linear function with these values at the vertices.
-    """
-    d, cells = problem.scales.dimension, _owned_cells(problem)
-    positions, values = problem.positions[:, :d], _linear_at_middle(problem, cells, u)
-    curved = facet_integrals.is_curved(problem.space)
-    points = _linear_at_middle(problem, cells, positions) if curved else positions[cells[:, : d + 1]]
-    slopes = _slopes(points.transpose(1, 2, 0))
-    rises = (values[:, 1:] - values[:, :1]).transpose(1, 2, 0)
-    strain = np.zeros((len(cells), 3, 3))
-    for i, j in itertools.combinations_with_replacement(range(d), 2):
-        products = [rises[k, i] * slopes[k, j] + rises[k, j] * slopes[k, i] for k in range(d)]
-        strain[:, i, j] = strain[:, j, i] = np.sum(products, axis=0) / 2
-    return strain
-
-
-def _linear_at_middle(problem: Problem, cells: Integers, values: Array) -> Array:
-    """The corners' values of linear functions with the gradients that functions have at the middle, (c, d+1, d).
-
-    Args:
-        problem: the space.
-        cells: by their nodes, (c, nodes).
-        values: of the functions at the nodes, (n, d).
-    """
-    d = problem.scales.dimension
-    found = values[cells[:, : d + 1]]
-    if nodes.degree(problem.space) == 1:
-        return found
-    found = found * (4 / (d + 1) - 1)
-    for number, ends in enumerate(nodes.edges(problem.space)):
-        found[:, ends] += 4 / (d + 1) * values[cells[:, [d + 1 + number]]]
-    return found
-
-
-def _slopes(corners: Array) -> Array:
-    """The gradients of the barycentric coordinates after the first of cells by their corners (d+1, d, c), (d, d, c)."""
-    sides = corners[1:] - corners[0]
-    if len(sides) == 2:
-        (a, b), (c, e) = sides
-        return np.array([[e, -c], [-b, a]]) / (a * e - b * c)
-    crossed = [np.cross(sides[i - 2], sides[i - 1], axis=0) for i in range(3)]
-    return np.array(crossed) / np.sum(sides[0] * crossed[0], axis=0)
-
-
-def _owned_cells(problem: Problem) -> Integers:
-    topology = problem.domain.mesh.topology
-    return np.asarray(problem.space.dofmap.list[: topology.index_map(topology.dim).size_local])
+def _in_parts(problem: Problem, values: npt.NDArray[Any]) -> Array:
+    """The values of owned cells in their parts, (parts,)."""
+    return np.repeat(values.astype(np.float64), nodes.parts_of_cell(problem.space))
 
 
 def _write_on_body(path: Path, problem: Problem, at_points: Mapping[str, Array], in_cells: Mapping[str, Array]) -> None:
-    """Write fields at all local nodes and in the owned cells, at degree 2 on their parts. Collective.
+    """Write fields at all local nodes and in the parts of the owned cells. Collective.
 
     More than seven digits of the latter say nothing.
     """
@@ -125,14 +78,14 @@ def _write_on_body(path: Path, problem: Problem, at_points: Mapping[str, Array],
 
 
 def _grid(problem: Problem, at_points: Mapping[str, Array], in_cells: Mapping[str, Array]) -> Grid:
-    """This rank's part of the body with fields at all local vertices and in the owned cells."""
-    cells, parts = nodes.linear_cells(problem.space), nodes.parts_of_cell(problem.space)
+    """This rank's part of the body with fields at all local nodes and in the parts of the owned cells."""
+    cells = nodes.linear_cells(problem.space)
     used, numbered = np.unique(cells, return_inverse=True)
     return Grid(
         points=problem.positions[used],
         cells=numbered.reshape(cells.shape),
         at_points={name: _spatial(values[used]) for name, values in at_points.items()},
-        in_cells={name: _flat(np.repeat(_rounded(values, 7), parts, axis=0)) for name, values in in_cells.items()},
+        in_cells={name: _flat(_rounded(values, 7)) for name, values in in_cells.items()},
         units=_units(problem),
     )
 
@@ -148,8 +101,7 @@ def write_series(path: Path, problem: Problem, states: Iterable[tuple[float, flo
     Raises:
         InputError: it cannot be written, on all ranks alike.
     """
-    topology = problem.domain.mesh.topology
-    count = topology.index_map(topology.dim).size_local
+    count = len(nodes.linear_cells(problem.space))
 
     def grids() -> Iterator[tuple[float, Grid]]:
         for time, factor, u in states:

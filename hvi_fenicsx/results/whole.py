@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..errors import HviError
-from ..problem.cell_stress import mean_stress
+from ..problem.cell_stress import stress_of_parts
 from ..report.html import render
 from ..report.pictures.draw import PictureProcess, waiting
 from ..runtime.mpi import asleep_until_all, on_root
@@ -33,7 +33,7 @@ class BegunResult:
         timer: where time goes.
         tell: is given a line on rank 0 where pictures or page fail; they do not cost the run.
         pictures: what draws; None on other ranks than the first, and where nothing is to be drawn.
-        sigma: the stress of the cells that this rank owns, N/m², (c, 3, 3); None where nothing was solved.
+        sigma: the stress in the parts of the cells that this rank owns, N/m², (c, 3, 3); None where nothing was solved.
     """
 
     folder: ResultFolder
@@ -92,7 +92,7 @@ def begin_whole(
     """
     work, solved = folder.work, solution.solve_result
     with timer("output"):
-        sigma = None if solved is None else mean_stress(solution.problem.bulk, solved.u)
+        sigma = None if solved is None else stress_of_parts(solution.problem.bulk, solved.u)
         write_basis(work, solution, folder.target, sigma)
         record = summary(solution)
         on_root(folder.comm, lambda: write_record(work, record))

@@ -26,7 +26,7 @@ def write_basis(folder: Path, solution: Solution, target: Path, sigma: Array | N
         folder: where to.
         solution: what was found.
         target: the folder that the files will be in, from which the scene's paths are given.
-        sigma: the stress of the cells that this rank owns, N/m², (c, 3, 3); None where nothing was solved.
+        sigma: the stress in the parts of the cells that this rank owns, N/m², (c, 3, 3); None where nothing was solved.
     """
     comm = solution.problem.domain.mesh.comm
     stress = None if sigma is None else von_mises(sigma).astype(np.float32)

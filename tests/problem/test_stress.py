@@ -18,7 +18,7 @@ from scenes import Table, solved
 from hvi_fenicsx import Scene, Solution, prepare, read_scene, solve
 from hvi_fenicsx.effects import Contribution
 from hvi_fenicsx.problem import bulk, stress
-from hvi_fenicsx.problem.cell_stress import mean_stress
+from hvi_fenicsx.problem.cell_stress import stress_of_parts
 from hvi_fenicsx.problem.problem import PlacedContribution
 
 Array = npt.NDArray[np.float64]
@@ -63,7 +63,7 @@ def wood(**more: Any) -> Table:
 
 def stresses(solution: Solution) -> Array:
     assert solution.solve_result is not None
-    return mean_stress(solution.problem.bulk, solution.solve_result.u)
+    return stress_of_parts(solution.problem.bulk, solution.solve_result.u)
 
 
 def assert_uniform(found: Array, *diagonal: float) -> None:
@@ -116,7 +116,7 @@ def test_a_users_own_form_of_the_strain_belongs_to_the_stress() -> None:
     own = bulk.make_bulk(problem.space, problem.scales, made, {})
     stretched = fem.Function(problem.space)
     stretched.interpolate(lambda x: np.stack([x[0], x[1]]))
-    alone, both = (mean_stress(one, stretched) for one in (problem.bulk, own))
+    alone, both = (stress_of_parts(one, stretched) for one in (problem.bulk, own))
     unit = problem.scales.stress * problem.scales.length  # a form's integrals are over m², its gradients in 1/m
     np.testing.assert_allclose(both[:, 0, 0] - alone[:, 0, 0], 0.5 * unit, rtol=1e-10)
     np.testing.assert_allclose(both[:, 1, 1], alone[:, 1, 1], rtol=1e-10)
