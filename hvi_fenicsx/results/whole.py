@@ -56,10 +56,9 @@ class BegunResult:
         work, comm = self.folder.work, self.folder.comm
         with self.timer("output"):
             record = {**summary(solution), **given}
+            write_fields(work, solution, self.sigma)
             if (drawing := self.pictures) is not None:
                 drawing.begin()
-            write_fields(work, solution, self.sigma)
-            if drawing is not None:
                 _told("pictures", self.tell, lambda: drawing.finish(_PATIENCE))
             asleep_until_all(comm)
             record["time"] = self.timer.report()

@@ -490,7 +490,7 @@ def test_shading_is_linear_and_has_no_holes(cells: int) -> None:
             np.column_stack([corner, corner + up + right, corner + up]),
         ]
     )
-    image = shade(points, triangles, points[:, 0] - 2 * points[:, 1], (90, 100))
+    image = shade(points, triangles, (points[:, 0] - 2 * points[:, 1])[triangles], (90, 100))
     rows, columns = np.mgrid[:90, :100] + 0.5
     inside = (columns > 5) & (columns < 95) & (rows > 10) & (rows < 80)
     assert np.array_equal(np.isfinite(image), inside)

@@ -14,7 +14,7 @@ from matplotlib.image import AxesImage
 from matplotlib.patches import PathPatch
 
 from ...geometry import chains
-from ...typing import Array, Integers
+from ...typing import Array
 from ..body_mesh import BodyMesh
 from .deformed import DeformedBody
 from .legend import FOOT
@@ -44,24 +44,20 @@ def canvas(points: Array) -> tuple[Figure, Axes]:
     return fig, axes
 
 
-def paint(
-    axes: Axes, shape: DeformedBody, triangles: Integers, corners: Array, values: Array, colours: Colormap, end: float
-) -> None:
-    """Draw a plane body over its undeformed outline, in the colours of values at the corners of triangles.
+def paint(axes: Axes, shape: DeformedBody, values: Array, colours: Colormap, end: float) -> None:
+    """Draw a plane body over its undeformed outline, in the colours of values at the corners of its cells.
 
     Args:
         axes: to draw on.
         shape: the deformed body.
-        triangles: to be coloured, by their corners, (k, 3).
-        corners: m, (j, 2) or (j, 3).
-        values: at the corners, (j,).
+        values: at the corners of each cell, (c, 3).
         colours: of the values, from zero.
         end: the value at the end of the colours.
     """
     body, points = shape.body, shape.points
     loops = chains(body.boundary)
     outline = closed_path(points, loops)
-    drawn = _shading(axes, corners, triangles, values, lambda image: colours(image / (end or 1.0), bytes=True))
+    drawn = _shading(axes, shape, values, lambda image: colours(image / (end or 1.0), bytes=True))
     drawn.set_clip_path(outline, axes.transData)
     for patch, style in (
         (closed_path(body.points, loops), {"ec": GREY, "ls": (0, (5, 4)), "lw": 1.3, "zorder": 3}),
@@ -78,14 +74,12 @@ def _pixels_between_lines(axes: Axes, body: BodyMesh) -> float:
     return per_metre * float(np.sqrt(np.prod(np.ptp(body.points[:, :2], axis=0)) / len(body.cells)))
 
 
-def _shading(
-    axes: Axes, corners: Array, triangles: Integers, values: Array, coloured: Callable[[Array], Any]
-) -> AxesImage:
+def _shading(axes: Axes, shape: DeformedBody, values: Array, coloured: Callable[[Array], Any]) -> AxesImage:
     """Values as an image of the picture's own pixels, coloured here: matplotlib would resample values and mask."""
     (left, right), (bottom, top) = axes.get_xlim(), axes.get_ylim()
     wide = round(SIDE * DPI)
     tall = round(wide * (top - bottom) / (right - left))
-    pixels = (corners[:, :2] - [left, bottom]) * [wide / (right - left), tall / (top - bottom)]
-    image = shade(pixels, triangles, values, (tall, wide))
+    pixels = (shape.points[:, :2] - [left, bottom]) * [wide / (right - left), tall / (top - bottom)]
+    image = shade(pixels, shape.body.cells, values, (tall, wide))
     extent = (left, right, bottom, top)
     return axes.imshow(coloured(image), origin="lower", extent=extent, interpolation="nearest", aspect="auto", zorder=1)

@@ -26,7 +26,7 @@ def shade(points: Array, triangles: Integers, values: Array, shape: tuple[int, i
     Args:
         points: in pixels from the image's lower left corner, (n, 2).
         triangles: by their points, (k, 3).
-        values: at the points, (n,).
+        values: at the corners of each triangle, (k, 3).
         shape: rows and columns of the image.
 
     Returns:
@@ -39,7 +39,7 @@ def shade(points: Array, triangles: Integers, values: Array, shape: tuple[int, i
     low, high = (np.column_stack(ends) for ends in zip(*boxes, strict=True))
     for chosen, box in _by_box(high - low + 1):
         corners = np.stack([column[triangles[chosen]] for column in columns], axis=2)
-        _fill(image, corners, values[triangles[chosen]], low[chosen], box)
+        _fill(image, corners, values[chosen], low[chosen], box)
     return image
 
 

@@ -34,7 +34,7 @@ def draw(result: Result) -> Figure:
     fig, axes = canvas(np.concatenate([shape.points[:, :2], body.points[:, :2], *(m.extent for m in drawn)]))
     heading(fig, result, "deformed body")
     largest = float(shape.amount.max())
-    paint(axes, shape, body.cells, shape.points, shape.amount, SLATE, largest)
+    paint(axes, shape, shape.amount[body.cells], SLATE, largest)
     for mark in drawn:
         mark.draw(axes)
     unit = unit_for(largest, "m")

@@ -150,7 +150,8 @@ def _image(axes: Axes, flat: FlatPart, values: Array) -> Array:
     wide, tall = round(box.width), round(box.height)
     left, right, bottom, top = _extent(flat)
     scale = np.array([wide / (right - left), tall / ((top - bottom) or 1.0)])
-    return shade((flat.points - [left, bottom]) * scale, flat.triangles, np.nan_to_num(values), (tall, wide))
+    corners = np.nan_to_num(values)[flat.triangles]
+    return shade((flat.points - [left, bottom]) * scale, flat.triangles, corners, (tall, wide))
 
 
 def _grey_where_lifted(axes: Axes, flat: FlatPart, part: ContactPart) -> None:
@@ -169,7 +170,7 @@ def _arrows(axes: Axes, flat: FlatPart, vectors: Array) -> None:
     count = np.maximum(np.round(extent / spacing), 1).astype(int)
     pixels = (flat.points - low) / np.where(extent > 0.0, extent, 1.0) * count
     shape = (int(count[1]), int(count[0]))
-    ways = np.stack([shade(pixels, flat.triangles, component, shape) for component in vectors.T])
+    ways = np.stack([shade(pixels, flat.triangles, component[flat.triangles], shape) for component in vectors.T])
     ways *= 0.9 * spacing / (float(np.linalg.norm(vectors, axis=1).max()) or 1.0)
     ways[:, np.linalg.norm(ways, axis=0) < 0.05 * spacing] = np.nan
     x, y = (low[i] + (np.arange(count[i]) + 0.5) * extent[i] / count[i] for i in (0, 1))

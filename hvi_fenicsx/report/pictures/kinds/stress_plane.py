@@ -36,8 +36,7 @@ def draw(result: Result) -> Figure:
     fig, axes = canvas(np.concatenate([shape.points[:, :2], body.points[:, :2], *(m.extent for m in drawn)]))
     heading(fig, result, "stress in the body")
     scale = scale_of(body, values)
-    apart = np.arange(body.cells.size).reshape(body.cells.shape)  # corners that no two cells share
-    paint(axes, shape, apart, shape.points[body.cells.ravel()], np.repeat(values, 3), EMBER, scale.end)
+    paint(axes, shape, np.broadcast_to(values[:, None], body.cells.shape), EMBER, scale.end)
     for mark in drawn:
         mark.draw(axes)
     bar(fig, scale, times(shape.factor))
