@@ -49,9 +49,8 @@ def cell_stress(bulk: Bulk, u: fem.Function) -> Array:
     pressures = bulk.pressures(u)
     v = stress.linear_field(q, ufl.SpatialCoordinate(mesh)) / scales.length
     work = sum(_across(bulk, u, pressures, across), _work(bulk, u, pressures, v))
-    found = _nearest(bulk.space, work)
-    sigma = stress.tensors(found[..., :-1], found[..., -1])
-    return np.asarray(sigma * scales.stress * scales.length**scales.dimension)
+    found = _nearest(bulk.space, work) * (scales.stress * scales.length**scales.dimension)
+    return stress.tensors(found[..., :-1], found[..., -1])
 
 
 def stress_of_parts(bulk: Bulk, u: fem.Function) -> Array:

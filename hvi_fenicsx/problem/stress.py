@@ -44,7 +44,8 @@ def tensors(components: Array, across: Array) -> Array:
 
 
 def von_mises(sigma: Array) -> Array:
-    """√(3/2 s:s) of stresses (n, 3, 3) with deviators s; shape (n,)."""
-    pressure = np.trace(sigma, axis1=1, axis2=2) / 3
-    deviator = sigma - pressure[:, None, None] * np.eye(3)
-    return np.asarray(np.sqrt(1.5 * np.einsum("nij,nij->n", deviator, deviator)))
+    """√(3/2 s:s) of stresses (n, 3, 3) with deviators s, from their components; shape (n,)."""
+    first, second, third = (sigma[:, i, i] for i in range(3))
+    apart = (first - second) ** 2 + (second - third) ** 2 + (third - first) ** 2
+    shear = sigma[:, 0, 1] ** 2 + sigma[:, 1, 2] ** 2 + sigma[:, 0, 2] ** 2
+    return np.asarray(np.sqrt(apart / 2 + 3 * shear))

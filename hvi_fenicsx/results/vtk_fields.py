@@ -19,7 +19,7 @@ from ..problem.problem import Problem
 from ..problem.stress import von_mises
 from ..rigid import Mode
 from ..solution import Solution
-from ..typing import Array, Entities
+from ..typing import Array, Entities, Integers
 from . import cell_strain, vtk_files
 from .vtk_files import Grid
 
@@ -79,15 +79,24 @@ def _write_on_body(path: Path, problem: Problem, at_points: Mapping[str, Array],
 
 def _grid(problem: Problem, at_points: Mapping[str, Array], in_cells: Mapping[str, Array]) -> Grid:
     """This rank's part of the body with fields at all local nodes and in the parts of the owned cells."""
-    cells = nodes.linear_cells(problem.space)
-    used, numbered = np.unique(cells, return_inverse=True)
+    used, cells = _numbered(problem, nodes.linear_cells(problem.space))
     return Grid(
         points=problem.positions[used],
-        cells=numbered.reshape(cells.shape),
+        cells=cells,
         at_points={name: _spatial(values[used]) for name, values in at_points.items()},
         in_cells={name: _flat(_rounded(values, 7)) for name, values in in_cells.items()},
         units=_units(problem),
     )
+
+
+def _numbered(problem: Problem, cells: Entities) -> tuple[Integers, Integers]:
+    """The local nodes that cells (c, k) have, ascending, and the cells by their numbers among them.
+
+    Nodes are marked, not sorted: that takes a tenth of the time.
+    """
+    used = np.zeros(len(problem.positions), dtype=np.bool_)
+    used[cells] = True
+    return np.flatnonzero(used), (np.cumsum(used) - 1)[cells]
 
 
 def write_series(path: Path, problem: Problem, states: Iterable[tuple[float, float, fem.Function]]) -> None:
@@ -182,11 +191,10 @@ def _on_facets(problem: Problem, facets: Entities, nodal: Mapping[str, Array]) -
     """This rank's facets as a mesh of their own, with some values at all local nodes of the body."""
     mesh, d = problem.domain.mesh, problem.scales.dimension
     owned = facets[facets < mesh.topology.index_map(d - 1).size_local]
-    cells = nodes.linear_facets(problem.space, owned).astype(np.int64)
-    used, numbered = np.unique(cells, return_inverse=True)
+    used, cells = _numbered(problem, nodes.linear_facets(problem.space, owned))
     return Grid(
         points=problem.positions[used],
-        cells=numbered.reshape(cells.shape),
+        cells=cells,
         at_points={name: values[used] for name, values in nodal.items()},
         in_cells={},
         units=_units(problem),
