@@ -75,8 +75,6 @@ def coarsen(domain: Domain, factor: float, thresholds: Thresholds = DEFAULT) -> 
         return None
     points, corners = remeshed
     mine = corners[cells.ranks[_nearest(cells.midpoints, points[corners].mean(axis=1))] == comm.rank]
-    if min(agree(comm, len(mine))) == 0:
-        return None
     mesh = compat.simplex_mesh(comm, mine, points if comm.rank == 0 else points[:0], "tetrahedron")
     sides, regions = _sides(domain, mesh, surface), _regions(domain, mesh, cells)
     found = replace(domain, mesh=mesh, sides=sides, regions=regions, shared=None)

@@ -6,7 +6,7 @@ its coarser meshes are the common ones of the bodies' coarser meshes, and so is 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,7 +19,7 @@ from ..geometry import Curve
 from ..runtime.mpi import agree
 from ..typing import Array, Entities, Integers
 from . import joined_meshes, nodes
-from .domain import Domain
+from .domain import Coarsening, Domain
 from .joined_meshes import PlacedMesh
 from .transfer import Rows, Transfer
 
@@ -29,7 +29,7 @@ class PlacedBody:
     """A body and where it is.
 
     Attributes:
-        name: of the body.
+        name: of the body; empty for a piece of a mesh, whose sides and regions keep their names.
         domain: the body on its mesh, in its own coordinates.
         origin: where the origin of these coordinates is, m, (d,).
         rotation: how they are turned about it, (d, d).
@@ -44,16 +44,20 @@ class PlacedBody:
         """Points of the body's own coordinates (n, d) in their place, m, (n, d)."""
         return np.asarray(points @ self.rotation.T + self.origin)
 
+    def called(self, name: str) -> str:
+        """What a side or a region of the body is called among those of all bodies."""
+        return f"{self.name}.{name}" if self.name else name
+
     def curves(self) -> dict[str, Curve]:
         """The curves of its sides in their place."""
         known = self.domain.curves.items()
-        return {f"{self.name}.{side}": curve.moved(self.origin, self.rotation) for side, curve in known}
+        return {self.called(side): curve.moved(self.origin, self.rotation) for side, curve in known}
 
 
 def joined(comm: MPI.Comm, bodies: Sequence[PlacedBody]) -> Domain:
     """The bodies on one mesh. Collective.
 
-    Sides are called BODY.SIDE, regions BODY and BODY.REGION.
+    Sides are called BODY.SIDE, regions BODY and BODY.REGION. What pieces of a mesh call alike is one.
 
     Args:
         comm: the ranks that share each of the meshes.
@@ -61,16 +65,32 @@ def joined(comm: MPI.Comm, bodies: Sequence[PlacedBody]) -> Domain:
     """
     numbers = [_numbers(comm, bodies, i) for i in range(len(bodies))]
     mesh, cells = joined_meshes.joined(comm, [_placed(body) for body in bodies], numbers)
-    sides: dict[str, Entities] = {}
-    regions: dict[str, Entities] = {}
-    for body, places in zip(bodies, cells, strict=True):
-        sides |= {f"{body.name}.{side}": _facets(mesh, body, places, f) for side, f in body.domain.sides.items()}
-        regions |= _regions(body, places)
+    pairs = list(zip(bodies, cells, strict=True))
+    sides = _united((b.called(side), _facets(mesh, b, at, f)) for b, at in pairs for side, f in b.domain.sides.items())
+    regions = _united(found for body, at in pairs for found in _regions(body, at))
     curves = {name: curve for body in bodies for name, curve in body.curves().items()}
-    domain = Domain.from_mesh(mesh, sides, regions, curves)
+    return replace(Domain.from_mesh(mesh, sides, regions, curves), coarsening=coarsening(mesh, bodies, numbers))
+
+
+def coarsening(mesh: dmesh.Mesh, bodies: Sequence[PlacedBody], numbers: Sequence[Integers]) -> Coarsening | None:
+    """What makes the common mesh of the bodies' coarser meshes; None where no body has any.
+
+    Args:
+        mesh: the common mesh.
+        bodies: in their places.
+        numbers: of each body's local vertices among the input's of the common mesh.
+    """
     if all(body.domain.coarsening is None for body in bodies):
-        return domain
-    return replace(domain, coarsening=lambda: _coarser(mesh, bodies, numbers))
+        return None
+    return lambda: _coarser(mesh, bodies, numbers)
+
+
+def _united(found: Iterable[tuple[str, Entities]]) -> dict[str, Entities]:
+    """The sides or regions of all bodies by name, those of one name together."""
+    parts: dict[str, list[Entities]] = {}
+    for name, entities in found:
+        parts.setdefault(name, []).append(entities)
+    return {name: np.unique(np.concatenate(those)).astype(np.int32) for name, those in parts.items()}
 
 
 def _placed(body: PlacedBody) -> PlacedMesh:
@@ -110,11 +130,12 @@ def _facets(mesh: dmesh.Mesh, body: PlacedBody, cells: Entities, facets: Entitie
     return np.asarray(mesh.topology.connectivity(d, d - 1).array.reshape(-1, d + 1)[cells[beside], ways])
 
 
-def _regions(body: PlacedBody, cells: Entities) -> dict[str, Entities]:
-    """The local cells of a body and of its regions in the common mesh."""
-    known: Mapping[str, Entities] = {f"{body.name}.{name}": c for name, c in body.domain.regions.items()}
-    every = {body.name: np.arange(len(cells), dtype=np.int32), **known}
-    return {name: np.sort(cells[found[found < len(cells)]]).astype(np.int32) for name, found in every.items()}
+def _regions(body: PlacedBody, cells: Entities) -> Iterator[tuple[str, Entities]]:
+    """The local cells of a body that has a name, and of its regions, in the common mesh."""
+    if body.name:
+        yield body.name, cells
+    for name, found in body.domain.regions.items():
+        yield body.called(name), cells[found[found < len(cells)]]
 
 
 def _coarser(

@@ -31,6 +31,8 @@ def interpolation_weights(
     """
     comm, d = space.mesh.comm, space.mesh.geometry.dim
     corners, numbers = _gathered(comm, points, vertices, space)
+    if not len(points):  # nor has it cells to look in
+        return np.empty((0, d + 1), dtype=np.int64), np.empty((0, d + 1))
     distinct, local = np.unique(numbers, return_inverse=True)
     local = local.reshape(numbers.shape)
     x = np.empty((len(distinct), d))

@@ -1,21 +1,20 @@
 """The bodies of a mesh: its parts that share no facet with each other, numbered alike on all ranks.
 
-Bodies that meet in interfaces are taken together: what happens to one of them, the others feel. Each rank joins the
-cells that share a facet; the facets that ranks share join what the ranks found.
+Bodies that meet in interfaces are taken together: what happens to one of them, the others feel.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from dolfinx import fem, la
+from dolfinx import fem
 from mpi4py import MPI
 
 from ..errors import InputError
+from ..mesh import connected_pieces
 from ..mesh.domain import Domain
 from ..rigid import AnyBody, JoinedBodies, Mode, RigidBody, rigid_fields
 from ..runtime.mpi import agree
@@ -101,7 +100,7 @@ def find(domain: Domain, space: fem.FunctionSpace, points: Array, meetings: Sequ
     one = whole(domain)
     if domain.one_piece:
         return MeshBodies((one,), *np.zeros((2, len(points)), np.int64))
-    cells, count = _cells(domain)
+    cells, count = connected_pieces.labels(domain.mesh)
     if count == 1:
         return MeshBodies((one,), *np.zeros((2, len(points)), np.int64))
     labels = _vertices(domain, space, cells, points)
@@ -140,48 +139,13 @@ def _together(bodies: Sequence[RigidBody], labels: Integers, pairs: Sequence[tup
     return MeshBodies(tuple(found), label[labels], member[labels])
 
 
-def _cells(domain: Domain) -> tuple[Integers, int]:
-    """The body of each local cell, and how many there are in all. Collective."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    def joined(pairs: Integers, size: int) -> tuple[int, Integers]:
-        graph = coo_array((np.ones(len(pairs), np.int8), pairs.T), shape=(size, size))
-        count, labels = connected_components(graph, directed=False)
-        return int(count), np.asarray(labels, np.int64)
-
-    mesh, dim = domain.mesh, domain.dimension
-    mesh.topology.create_connectivity(dim - 1, dim)
-    facets, cells = mesh.topology.connectivity(dim - 1, dim), mesh.topology.index_map(dim)
-    first = facets.array[facets.offsets[:-1]]
-    twice = np.flatnonzero(np.diff(facets.offsets) == 2)
-    pairs = np.column_stack([first[twice], facets.array[facets.offsets[twice] + 1]])
-    count, local = joined(pairs, cells.size_local + cells.num_ghosts)
-    counts = agree(mesh.comm, count)
-    local = local + sum(counts[: mesh.comm.rank])
-    mine = local[first]
-    owners = _owners(mesh.topology.index_map(dim - 1), mine)
-    apart = mine != owners
-    shared = np.unique(np.column_stack([mine[apart], owners[apart]]), axis=0)
-    total, merged = joined(np.vstack(agree(mesh.comm, shared)), sum(counts))
-    return merged[local], total
-
-
-def _owners(index_map: Any, values: Integers) -> Integers:
-    """What the owners of shared entities hold, for local values (owned and ghost). Collective."""
-    vector = la.vector(index_map, 1, dtype=np.int64)
-    vector.array[:] = values
-    vector.scatter_forward()
-    return np.array(vector.array)
-
-
 def _vertices(domain: Domain, space: fem.FunctionSpace, cells: Integers, points: Array) -> Integers:
     """The body of each local vertex. Collective; refuses a hinge."""
     labels = np.full(len(points), -1, np.int64)
     corners = space.dofmap.list
     labels[corners] = cells[: len(corners), None]
     hinges = corners[labels[corners] != cells[: len(corners), None]]
-    apart = np.flatnonzero(labels != _owners(space.dofmap.index_map, labels))
+    apart = np.flatnonzero(labels != connected_pieces.of_owners(space.dofmap.index_map, labels))
     first = points[np.concatenate([hinges, apart])[:1]]
     found = [p for rank in agree(domain.mesh.comm, first.tolist()) for p in rank]
     if found:

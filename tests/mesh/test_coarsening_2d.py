@@ -99,7 +99,7 @@ def test_a_notch_is_not_lost() -> None:
     assert measure(coarser_of(body), "notch") == pytest.approx(measure(body, "notch"), rel=1e-12)
 
 
-@pytest.mark.parametrize("body", [meshes.HINGE.replace("0.5)", "0.03)")], ids=["touches itself"])
+@pytest.mark.parametrize("body", [meshes.PINCHED], ids=["touches itself"])
 def test_what_cannot_be_outlined_stands_alone(body: str, tmp_path: Path) -> None:
     assert with_hierarchy(from_file(tmp_path, body), COARSER).coarser() is None
 

@@ -85,11 +85,6 @@ def test_what_is_solved_does_not_change(bored: Path) -> None:
     assert nested.examination.energy == pytest.approx(alone.examination.energy, rel=1e-9)  # type: ignore[union-attr]
 
 
-@pytest.mark.parametrize("body", [meshes.BLOCKS.format(size=0.1, dimension=3, named=True)])
-def test_bodies_that_gmsh_cannot_take_as_one_have_none(body: str, tmp_path: Path) -> None:
-    assert with_hierarchy(gmsh_file.read(COMM, meshes.make(tmp_path / "m.msh", body), 3), COARSER).coarser() is None
-
-
 def test_a_mesher_that_takes_too_long_is_not_waited_for(bored: Path) -> None:
     impatient = replace(COARSER, gmsh_seconds=0.01, gmsh_seconds_per_triangle=0.0)
     assert with_hierarchy(gmsh_file.read(COMM, bored, 3), impatient).coarser() is None

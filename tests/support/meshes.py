@@ -123,6 +123,17 @@ groups(["left", "bottom"])
 body()
 mesh.generate(2)
 """
+PINCHED = """
+gmsh.option.setNumber("Mesh.MeshSizeMax", 0.05)
+places = [(0, 0), (0, -1), (1, -1), (2, -1), (2, 0), (2, 1), (1, 1)]
+parts = [(2, occ.addRectangle(x, y, 0, 1, 1)) for x, y in places]
+occ.fragment(parts[:1], parts[1:])
+occ.synchronize()
+groups(["left"])
+body()
+mesh.generate(2)
+"""
+"""A ring of squares whose first and last one share a vertex."""
 HOLLOW = """
 gmsh.option.setNumber("Mesh.MeshSizeMax", 0.03)
 parts = [(2, occ.addRectangle(0, 0, 0, 0.5, 1)), (2, occ.addRectangle(0.5, 0, 0, 0.5, 1))]
@@ -164,3 +175,23 @@ gmsh.option.setNumber("Mesh.MeshSizeMax", {size})
 gmsh.option.setNumber("Mesh.MeshSizeMin", {size})
 mesh.generate(3)
 """
+TOUCHING = """
+gmsh.option.setNumber("Mesh.MeshSizeMax", {size})
+d = {dimension}
+for y in (0, 1):
+    occ.addRectangle(0, y, 0, 1, 1) if d == 2 else occ.addBox(0, y, 0, 1, 1, 1)
+occ.synchronize()
+for body, name in ((1, "lower"), (2, "upper")):
+    gmsh.model.addPhysicalGroup(d, [body], name=name)
+    sides = [tag for _, tag in gmsh.model.getBoundary([(d, body)], oriented=False)]
+    heights = [gmsh.model.occ.getCenterOfMass(d - 1, tag)[1] for tag in sides]
+    for at, side in ((0, "low"), (1, "high")):
+        chosen = [tag for tag, y in zip(sides, heights) if abs(y - body + 1 - at) < 1e-6]
+        gmsh.model.addPhysicalGroup(d - 1, chosen, name=f"{{name}}_{{side}}")
+ends = [tag for dim, tag in gmsh.model.getEntities(d - 1)
+        if abs(gmsh.model.occ.getCenterOfMass(dim, tag)[0]) < 1e-6]
+gmsh.model.addPhysicalGroup(d - 1, ends, name="left")
+mesh.setSize(gmsh.model.getBoundary([(d, 2)], recursive=True), 0.8 * {size})
+mesh.generate(d)
+"""
+"""A unit block on another that it shares no point with; the meshes differ. To be formatted with size and dimension."""

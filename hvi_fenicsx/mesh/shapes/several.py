@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self
@@ -157,18 +157,22 @@ class SeveralBodies(DomainShape):
 
     def build(self, comm: MPI.Comm, dimension: int) -> Domain:
         """The meshed bodies. Collective."""
-        return self._joined(comm, lambda form: form.build(comm, dimension))
+        return self._joined(comm, [body.form.build(comm, dimension) for body in self.bodies.values()])
 
     def build_hierarchy(self, comm: MPI.Comm, dimension: int, thresholds: MeshThresholds) -> Domain:
         """The meshed bodies, with the coarser meshes of each. Collective."""
-        return self._joined(comm, lambda form: form.build_hierarchy(comm, dimension, thresholds))
+        from ..hierarchy import with_hierarchies
 
-    def _joined(self, comm: MPI.Comm, build: Callable[[DomainShape], Domain]) -> Domain:
+        domains = [body.form.build_hierarchy(comm, dimension, thresholds) for body in self.bodies.values()]
+        return self._joined(comm, with_hierarchies(domains, thresholds))
+
+    def _joined(self, comm: MPI.Comm, domains: Sequence[Domain]) -> Domain:
         from .. import body_overlaps
         from ..joined import joined
         from ..near_parts import near_parts
 
-        placed = [body.placed(name, build(body.form)) for name, body in self.bodies.items()]
+        found = zip(self.bodies.items(), domains, strict=True)
+        placed = [body.placed(name, domain) for (name, body), domain in found]
         body_overlaps.check(comm, placed)
         return joined(comm, near_parts(comm, placed))
 
