@@ -35,7 +35,11 @@ class Piece:
 
 
 def labels(mesh: dmesh.Mesh) -> tuple[Integers, int]:
-    """The piece of each local cell, and how many there are in all. Collective."""
+    """The piece of each local cell, and how many there are in all. Collective.
+
+    Args:
+        mesh: any mesh.
+    """
     d, comm = mesh.topology.dim, mesh.comm
     mesh.topology.create_connectivity(d - 1, d)
     facets, cells = mesh.topology.connectivity(d - 1, d), mesh.topology.index_map(d)
@@ -64,7 +68,12 @@ def _joined(pairs: Integers, size: int) -> tuple[int, Integers]:
 
 
 def of_owners(index_map: Any, values: Integers) -> Integers:
-    """What the owners of shared entities hold, for local values (owned and ghost). Collective."""
+    """What the owners of shared entities hold. Collective.
+
+    Args:
+        index_map: of the entities.
+        values: at the local entities, owned and ghost, (n,).
+    """
     vector = la.vector(index_map, 1, dtype=np.int64)
     vector.array[:] = values
     vector.scatter_forward()
@@ -75,6 +84,9 @@ def pieces(domain: Domain) -> list[Piece]:
     """The pieces of a domain; the domain itself where it is in one piece. Collective.
 
     Pieces that share a vertex (a hinge) each have it.
+
+    Args:
+        domain: on any mesh.
     """
     found, count = labels(domain.mesh)
     if count == 1:

@@ -45,7 +45,11 @@ class PlacedBody:
         return np.asarray(points @ self.rotation.T + self.origin)
 
     def called(self, name: str) -> str:
-        """What a side or a region of the body is called among those of all bodies."""
+        """What a side or a region of the body is called among those of all bodies.
+
+        Args:
+            name: within the body.
+        """
         return f"{self.name}.{name}" if self.name else name
 
     def curves(self) -> dict[str, Curve]:
