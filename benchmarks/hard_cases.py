@@ -139,6 +139,9 @@ def _append(out: Path, record: Record) -> None:
 def _work(table: Table, listed: list[Case], options: argparse.Namespace) -> None:
     from hard_run import COMM, attempt, methods
 
+    from hvi_fenicsx.runtime import processes
+
+    processes.die_with_parent(signal.SIGKILL)  # mpirun, when it is killed: its ranks are no members of its group
     done = {(r["key"], r["method"]) for r in read(options.out) if r["outcome"] != "begun"}
     COMM.barrier()  # all ranks have read before the first one writes
     for case, method in _open(listed, options.method or methods(), done):
