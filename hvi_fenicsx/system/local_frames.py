@@ -11,13 +11,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import numpy.typing as npt
 from petsc4py import PETSc
 
 from ..problem.contact_surface import Surface
 from ..problem.law_term import LawTerm
 from ..problem.problem import Bounds, Problem
 from ..runtime.mpi import agree
-from ..typing import Array, Entities, Integers, Mask
+from ..typing import Array, Entities, Mask
 from .thresholds import DEFAULT, Thresholds
 
 
@@ -35,7 +36,7 @@ class LocalFrames:
     axes: Array
     rounding: float
 
-    def at(self, vertices: Integers) -> Array:
+    def at(self, vertices: npt.NDArray[np.integer]) -> Array:
         """R at vertices of this rank, (m, d, d)."""
         d = self.axes.shape[1]
         result = np.broadcast_to(np.eye(d), (len(vertices), d, d)).copy()
