@@ -258,7 +258,7 @@ class Tracer:
         cells, rates = self.cells, self.rates
         forces = _largest(np.where(cells.moving, cells.slope, cells.rise) * rates)
         size = self._stiffest * _largest(np.where(cells.moving, rates, 0.0)) + forces
-        return abs(self.factor_rate) * self._live <= 1e-10 * size
+        return abs(self.factor_rate) * self._live < 1e-10 * size
 
     def at_end(self, aim: float) -> bool:
         """Whether another unknown is at the end of its segment already.

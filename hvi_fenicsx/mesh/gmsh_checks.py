@@ -71,7 +71,9 @@ def _check_cells(gmsh: Any, path: Path, dimension: int) -> None:
     cells, sides = (set(gmsh.model.mesh.getElements(d)[0]) for d in (dimension, dimension - 1))
     if cells != {_SIMPLEX[dimension]} or not sides <= {_SIMPLEX[dimension - 1]}:
         shape = "triangles" if dimension == 2 else "tetrahedra"
-        raise InputError(f"mesh file {path}: linear {shape} only, or those of order 2; remesh without recombination")
+        orders = [gmsh.model.mesh.getElementProperties(kind)[2] for kind in cells | sides]
+        way = "with -order 2" if max(orders) > 2 else "without recombination"
+        raise InputError(f"mesh file {path}: linear {shape} only, or those of order 2; remesh {way}")
 
 
 def _check_points(gmsh: Any, path: Path, dimension: int, thresholds: Thresholds) -> None:

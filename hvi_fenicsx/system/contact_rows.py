@@ -27,6 +27,7 @@ class ContactRows:
         held_stiffness: diagonal of a held unknown.
 
     Attributes:
+        vertices: their local numbers, sorted, (m,).
         dofs: the vertices' scalar unknowns, local, (m d,).
         bulk: their rows of A.
         tangent: W K, (m, d, d).
@@ -34,13 +35,14 @@ class ContactRows:
 
     def __init__(self, matrix: PETSc.Mat, surfaces: Sequence[Surface], held_stiffness: float) -> None:
         d, self._held_stiffness = matrix.getBlockSize(), held_stiffness
-        self._local = np.unique(np.concatenate([np.empty(0, np.int64), *(s.blocks for s in surfaces)])).astype(np.int64)
-        self.dofs: Integers = (self._local[:, None] * d + np.arange(d)).ravel()
+        blocks = np.concatenate([np.empty(0, np.int64), *(s.blocks for s in surfaces)])
+        self.vertices: Integers = np.unique(blocks).astype(np.int64)
+        self.dofs: Integers = (self.vertices[:, None] * d + np.arange(d)).ravel()
         start = matrix.getOwnershipRange()[0]
         rows = PETSc.IS().createGeneral((self.dofs + start).astype(PETSc.IntType), comm=matrix.comm)
         self.bulk = matrix.createSubMatrix(rows, None)
         self._product = self.bulk.createVecLeft()
-        self._blocks = (self._local + start // d).astype(PETSc.IntType)[:, None]
+        self._blocks = (self.vertices + start // d).astype(PETSc.IntType)[:, None]
         self._elastic = self._diagonal_blocks(matrix, d)
         self.tangent = np.zeros_like(self._elastic)
 
@@ -57,7 +59,7 @@ class ContactRows:
         """
         self.tangent[:] = 0.0
         for term, k in zip(terms, rates, strict=True):
-            at = np.searchsorted(self._local, term.surface.blocks)
+            at = np.searchsorted(self.vertices, term.surface.blocks)
             np.add.at(self.tangent, at, term.weights[:, None, None] * k)
 
     def write(self, matrix: PETSc.Mat, held: npt.NDArray[np.integer]) -> None:

@@ -40,20 +40,36 @@ class Level:
     def update(self) -> None:
         """Take over the finer level's tangent and held unknowns. Collective.
 
-        W K is restricted and lumped. A coarse unknown is held where it moves a held fine one (Hackbusch and Mittelmann
-        1983), so that J remains the finer level's Galerkin product, and the body as well supported. On a curved part
-        the tangent at a vertex has a small component along its neighbour's normal: unknowns of such small weight are
-        not held, since that would keep the coarse body from sliding.
+        W K is restricted and lumped: what it makes of a displacement that is the same at all vertices, which in
+        components of the local frames is none, where these turn along the part or at its corners. A coarse unknown is
+        held where it moves a held fine one (Hackbusch and Mittelmann 1983), so that J remains the finer level's
+        Galerkin product, and the body as well supported. On a curved part the tangent at a vertex has a small component
+        along its neighbour's normal: unknowns of such small weight are not held, since that would keep the coarse body
+        from sliding.
         """
         fine, own = self.finer.jacobian, self.system.jacobian
         at = own.rows.dofs
-        tangent = np.empty_like(own.rows.tangent)
-        for column in range(tangent.shape[1]):
-            moved = self._masked.restricted(fine.rows.tangent[:, :, column].ravel())
-            tangent[:, :, column] = moved[at].reshape(tangent.shape[:2])
+        axes, own_axes = self._axes
+        forces, moved = fine.rows.tangent @ axes, np.empty_like(own.rows.tangent)
+        for direction in range(moved.shape[2]):
+            restricted = self._masked.restricted(forces[:, :, direction].ravel())
+            moved[:, :, direction] = restricted[at].reshape(moved.shape[:2])
         weights = np.abs(self._masked.restricted(np.isin(fine.rows.dofs, fine.held))[at])
         held = at[weights > self.finer.thresholds.held_weight].astype(np.int32)
-        own.set_restricted(tangent, held)
+        own.set_restricted(moved @ own_axes.transpose(0, 2, 1), held)
+
+    @cached_property
+    def _axes(self) -> tuple[Array, Array]:
+        """The local axes at the vertices of Γc on the finer level and on this one, rows, (m, d, d)."""
+        return _axes_on_contact(self.finer), _axes_on_contact(self.system)
+
+
+def _axes_on_contact(system: System) -> Array:
+    """The local axes at the vertices of Γc that this rank owns, as rows, (m, d, d)."""
+    rows = system.jacobian.rows
+    if system.frames is None:
+        return np.broadcast_to(np.eye(rows.tangent.shape[1]), rows.tangent.shape)
+    return system.frames.at(rows.vertices)
 
 
 Levels = tuple[Level, ...]

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import numpy.typing as npt
 from petsc4py import PETSc
 
 from ..problem.contact_surface import Surface
@@ -35,12 +36,12 @@ class LocalFrames:
     axes: Array
     rounding: float
 
-    def at(self, surface: Surface) -> Array:
-        """R at the vertices of a surface, (m, d, d)."""
-        d = surface.normals.shape[1]
-        result = np.broadcast_to(np.eye(d), (len(surface.blocks), d, d)).copy()
+    def at(self, vertices: npt.NDArray[np.integer]) -> Array:
+        """R at vertices of this rank, (m, d, d)."""
+        d = self.axes.shape[1]
+        result = np.broadcast_to(np.eye(d), (len(vertices), d, d)).copy()
         place = {int(b): i for i, b in enumerate(self.blocks)}
-        for i, block in enumerate(surface.blocks):
+        for i, block in enumerate(vertices):
             if int(block) in place:
                 result[i] = self.axes[place[int(block)]]
         return result
@@ -55,7 +56,7 @@ class LocalFrames:
 
     def surface(self, surface: Surface) -> Surface:
         """The surface with its normals and tangents in local components."""
-        axes = self.at(surface)
+        axes = self.at(surface.blocks)
         normals = np.einsum("mij,mj->mi", axes, surface.normals)
         return replace(
             surface,
@@ -72,7 +73,7 @@ class LocalFrames:
 
         A slip that a bound holds on a kink is then the kink itself, not the kink but for rounding.
         """
-        directions = np.einsum("mij,mkj->mki", self.at(term.surface), term.directions)
+        directions = np.einsum("mij,mkj->mki", self.at(term.surface.blocks), term.directions)
         directions = np.where(np.abs(directions) < self.rounding, 0.0, directions)
         directions /= np.linalg.norm(directions, axis=2, keepdims=True)
         return replace(term, surface=self.surface(term.surface), directions=directions)

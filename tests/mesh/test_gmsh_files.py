@@ -205,6 +205,12 @@ def test_a_file_without_a_mesh_says_so(tmp_path: Path) -> None:
         read(written(tmp_path / "m.geo", "a = 1;\n"))
 
 
+@pytest.mark.parametrize(("call", "way"), [("setOrder(3)", "with -order 2"), ("recombine()", "without recombination")])
+def test_cells_that_are_not_taken_are_told_how_to_remesh(call: str, way: str, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=f"linear triangles only, or those of order 2; remesh {way}"):
+        read(meshes.make(tmp_path / "m.msh", f"{meshes.GOOD}\ngmsh.model.mesh.{call}"))
+
+
 @pytest.mark.parametrize(
     ("group", "said"),
     [("", "no physical group holds cells .*put every"), ('Physical Surface("body") = {7};', "body|no physical group")],

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from runs import ROOT
+from scenes import P, model
 
 import hvi_fenicsx as hvi
 
@@ -88,3 +89,17 @@ def test_a_slender_body_comes_off_once_its_bonds_soften_together() -> None:
     assert path.end == "escapes"
     assert path.converged
     assert path.peak_factor > 0.2
+
+
+@pytest.mark.parametrize("programme", [2.0, [1.0, -0.5, 2.0]])
+def test_a_body_without_contact_and_law_follows_its_straight_path(programme: float | list[float]) -> None:
+    """The energy is -½ λ² times the work of the load along the displacement that it alone gives."""
+    table = model(pull=P)
+    del table["boundary"]["floor"]
+    table["boundary"]["wall"]["displacement"] = [0.0, 0.0]
+    scene = hvi.Scene.model_validate(table)
+    path = hvi.follow(scene, to=programme)
+    assert path.converged
+    assert path.end == "reached"
+    assert path.peak_factor == 2.0
+    assert path.rows[-1].energy == pytest.approx(4.0 * hvi.solve(scene).energy, rel=1e-10)

@@ -444,6 +444,16 @@ def test_materials_need_regions_of_their_own(tmp_path: Path, write: Callable[...
     )
 
 
+def test_a_mistake_in_one_of_several_bodies_is_told_at_its_line(write: Callable[..., Path]) -> None:
+    body = '[domain.{}]\nshape = "rectangle"\nsize = [1.0, 1.0]\ncells = [2, {}]\n{}\n'
+    tables = body.format("upper", 2, "origin = [0.0]") + body.format("bodies", 0, "")
+    steel = '[material]\nmodel = "plane_strain"\nyoungs_modulus = 2e11\npoisson_ratio = 0.3\n'
+    assert message(write(tables + steel)) == (
+        "s.toml:5: domain.upper.origin: has 1 components; a rectangle wants 2\n"
+        "s.toml:9: domain.bodies.cells.1: must be greater than 0 (is 0)"
+    )
+
+
 def test_a_scene_from_python() -> None:
     friction = Friction(law=laws.create("quadratic_linear", {"gamma1": 2.0, "gamma2": 1.0, "delta": 1e-3}))
     scene = Scene(

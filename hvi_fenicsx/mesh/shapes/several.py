@@ -10,15 +10,17 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self
 
 from pydantic import (
     Field,
+    ModelWrapValidatorHandler,
     SerializeAsAny,
     SerializerFunctionWrapHandler,
+    ValidationError,
     ValidationInfo,
     model_serializer,
     model_validator,
 )
 
 from ...errors import InputError
-from ...schema import LONGEST, Mistake, Table, choose, shown, validation_error
+from ...schema import LONGEST, Mistake, Table, choose, mistakes_of, shown, validation_error
 from .base import DEFAULT, DomainShape, Thresholds
 
 if TYPE_CHECKING:
@@ -29,6 +31,7 @@ if TYPE_CHECKING:
     from ..thresholds import Thresholds as MeshThresholds
 
 Coordinate = Annotated[float, Field(ge=-LONGEST, le=LONGEST)]
+_SEVERAL = "set of bodies"
 
 
 class PlacedShape(Table):
@@ -99,12 +102,23 @@ class SeveralBodies(DomainShape):
     bodies: dict[str, PlacedShape]
     """by name"""
 
+    @model_validator(mode="wrap")
+    @classmethod
+    def _placed_as_written(cls, data: Any, handler: ModelWrapValidatorHandler[Any]) -> Any:
+        """What is wrong with a body is told at [domain.NAME], where the user wrote it."""
+        try:
+            return handler(data)
+        except ValidationError as error:
+            mistakes = mistakes_of(error)
+        own = ("bodies",)
+        raise validation_error([m._replace(where=m.where[m.where[:1] == own :]) for m in mistakes])
+
     @model_validator(mode="before")
     @classmethod
     def _from_tables(cls, data: Any) -> Any:
-        if not isinstance(data, dict) or "bodies" in data:
+        if not isinstance(data, dict) or data.get("shape") == _SEVERAL:
             return data
-        return {"shape": "set of bodies", "bodies": data}
+        return {"shape": _SEVERAL, "bodies": data}
 
     @model_validator(mode="after")
     def _of_one_dimension(self) -> SeveralBodies:
