@@ -52,7 +52,7 @@ def make(system: System, interior: Interior, prescribed: Array) -> CondensedLaws
         InputError: on all ranks alike: a law of a length where one component has a prescribed value that is not zero.
     """
     number = np.full(system.load.local_size, -1)
-    number[interior.kept] = interior.first + np.arange(len(interior.kept))
+    number[interior.kept] = np.arange(interior.size)[interior.here]
     found = [_Term(system, term, number, prescribed) for term in system.terms]
     bonds = [b for term in found for b in term.bonds()]
     held = [b for term in found for b in term.prescribed_bonds()]

@@ -53,13 +53,8 @@ class FactorisedStiffness(CondensedStiffness):
     def _everywhere(self, own: Array) -> Array:
         return np.concatenate(agree(self._system.comm, own))
 
-    @property
-    def _here(self) -> slice:
-        """The condensed unknowns of this rank."""
-        return slice(self._interior.first, self._interior.first + len(self._interior.kept))
-
     def _own_diagonal(self) -> Array:
-        return np.asarray(self._own[:, self._here].diagonal())
+        return np.asarray(self._own[:, self._interior.here].diagonal())
 
     @property
     @override
@@ -111,10 +106,10 @@ class FactorisedStiffness(CondensedStiffness):
         Raises:
             numpy.linalg.LinAlgError: it is singular.
         """
-        here = self._here
+        own = self._interior.own_part
         factors = Factorisation(self._form, self._matrix.copy(), _INDEFINITE, _PREFIX)
-        slope = slope[here] + self._added
-        return FactorisedCell(self._system, self._interior, self._stiffness, factors, moving[here], slope)
+        slope = own(slope) + self._added
+        return FactorisedCell(self._system, self._interior, self._stiffness, factors, own(moving), slope)
 
 
 class FactorisedCell:
@@ -168,8 +163,7 @@ class FactorisedCell:
             right: of the equations, (n,).
         """
         interior, moving = self._interior, self._moving
-        kept, first = interior.kept, interior.first
-        own = right[first : first + len(kept)]
+        kept, own = interior.kept, interior.own_part(right)
         self._load.set(0.0)
         self._load.array[kept] = np.where(moving, own, 0.0)
         self._factors.apply(self._load, self._found)

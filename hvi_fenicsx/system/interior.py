@@ -73,9 +73,10 @@ class Interior:
         return len(self._everywhere)
 
     @cached_property
-    def first(self) -> int:
-        """The number among all kept unknowns of this rank's first one."""
-        return sum(agree(self._comm, len(self.kept))[: self._comm.rank])
+    def here(self) -> slice:
+        """The numbers of this rank's kept unknowns among those of all ranks. Collective, at first."""
+        first = sum(agree(self._comm, len(self.kept))[: self._comm.rank])
+        return slice(first, first + len(self.kept))
 
     def _columns(self, matrix: PETSc.Mat) -> csr_matrix:
         """The columns of kept unknowns in a matrix, this rank's rows, (rows, n)."""
@@ -122,7 +123,7 @@ class Interior:
     def stiffness(self) -> Array:
         """The Schur complement S, (n, n). Collective."""
         found = np.zeros((self.size, self.size))
-        found[self.first : self.first + len(self.kept)] = self.own().toarray()
+        found[self.here] = self.own().toarray()
         self._comm.Allreduce(MPI.IN_PLACE, found)
         found -= self.response()
         return np.asarray(0.5 * (found + found.T))
@@ -151,7 +152,7 @@ class Interior:
         Args:
             values: (n, ...).
         """
-        return values[self.first : self.first + len(self.kept)]
+        return values[self.here]
 
     def pulled(self, inner: Array) -> Array:
         """A_ki times displacements of the body inside, (n, k). Collective.
