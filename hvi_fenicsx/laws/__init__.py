@@ -43,3 +43,7 @@ __all__ = [
 ]
 
 load_modules(__name__)
+
+
+def __dir__() -> list[str]:
+    return __all__

@@ -94,9 +94,15 @@ class ModelPath(LoadPath):
         """The displacement at a row, m, ghosts updated; as :attr:`.ModelSolution.u`. Collective.
 
         Args:
-            row: its number.
+            row: its number, from 0; a negative one counts from the end.
+
+        Raises:
+            InputError: on all ranks alike: the path has no such row.
         """
-        found = self.run.displacement(range(len(self.rows))[row])
+        count = len(self.rows)
+        if not isinstance(row, int | np.integer) or not -count <= row < count:
+            raise InputError(f"there is no row {row!r}; there are rows 0 to {count - 1}")
+        found = self.run.displacement(int(row) % count)
         return displacement(found, self.run.prepared.problem.scales)
 
     def plot(self) -> Figure | None:

@@ -11,6 +11,8 @@ from dolfinx import mesh as dmesh
 from ..effects import Effect
 from ..effects.anisotropic import OrthotropicElasticity, TensorElasticity
 from ..effects.elasticity import IsotropicElasticity
+from ..errors import InputError
+from . import values
 from .placed_effects import InRegion, checked
 from .user_energy import UserEnergy
 
@@ -33,7 +35,7 @@ class _Elastic(InRegion):
 
     def _material(self, kind: type[Effect], mesh: dmesh.Mesh, **keys: Any) -> Effect:
         usual = "plane_stress" if mesh.geometry.dim == 2 else "three_dimensional"
-        common = {"model": self.model or usual, "thermal_expansion": float(self.thermal_expansion)}
+        common = {"model": self.model or usual, "thermal_expansion": values.number(self.thermal_expansion)}
         return checked(kind, **common, **keys)
 
 
@@ -51,7 +53,10 @@ class Isotropic(_Elastic):
 
     def effect(self, mesh: dmesh.Mesh) -> Effect:
         """The material."""
-        keys = {"youngs_modulus": float(self.youngs_modulus), "poisson_ratio": float(self.poisson_ratio)}
+        keys = {
+            "youngs_modulus": values.number(self.youngs_modulus),
+            "poisson_ratio": values.number(self.poisson_ratio),
+        }
         return self._material(IsotropicElasticity, mesh, **keys)
 
 
@@ -72,7 +77,7 @@ class Orthotropic(_Elastic):
     def effect(self, mesh: dmesh.Mesh) -> Effect:
         """The material."""
         names = ("youngs_moduli", "poisson_ratios", "shear_moduli")
-        keys = {name: [float(value) for value in getattr(self, name)] for name in names}
+        keys = {name: list(values.numbers(getattr(self, name))) for name in names}
         return self._material(OrthotropicElasticity, mesh, **keys)
 
 
@@ -88,7 +93,7 @@ class Anisotropic(_Elastic):
 
     def effect(self, mesh: dmesh.Mesh) -> Effect:
         """The material."""
-        return self._material(TensorElasticity, mesh, matrix=[[float(c) for c in row] for row in self.matrix])
+        return self._material(TensorElasticity, mesh, matrix=[list(values.numbers(row)) for row in self.matrix])
 
 
 @dataclass(frozen=True)
@@ -106,4 +111,6 @@ class Energy(InRegion):
 
     def effect(self, mesh: dmesh.Mesh) -> Effect:
         """The material, after a look at what it does to stretches and rigid motions. Collective."""
+        if not callable(self.form):
+            raise InputError(f"give a function that returns the UFL form a(u, v), not {self.form!r}")
         return UserEnergy.examined(self.form, mesh)

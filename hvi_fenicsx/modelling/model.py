@@ -40,11 +40,10 @@ class Model:
     """
 
     def __init__(self, body: Body, effects: Sequence[PlacedEffect], title: str = "") -> None:
-        _check_kinds(body, effects)
-        self.body, self.effects, self.title = body, tuple(effects), title
+        self.body, self.effects, self.title = _checked_body(body), _listed("model", effects), title
         for one in self.effects:
             _check_place(body, one)
-        self._made = [(one, one.effect(body.mesh)) for one in self.effects]
+        self._made = [(one, _effect(one, body)) for one in self.effects]
         if not any(effect.place is Place.MATERIAL for _, effect in self._made):
             raise InputError("model: no effect is a material; add one, such as hvi.Isotropic(youngs_modulus=..., ...)")
         self.scene = _scene(body, [(one.where, effect) for one, effect in self._made], title)
@@ -62,23 +61,41 @@ class Model:
         """
         places = [_key(one, effect) for one, effect in self._made]
         changed = list(self.effects)
-        for one in effects:
-            changed[_position(places, _key(one, one.effect(self.body.mesh)))] = one
+        for one in _listed("replace", effects):
+            changed[_position(places, _key(one, _effect(one, self.body)))] = one
         return Model(self.body, changed, self.title)
 
     def __repr__(self) -> str:
-        names = ", ".join(f"{type(one).__name__} on {one.where or 'the body'}" for one in self.effects)
-        return f"Model({self.body!r}: {names})"
+        return f"Model({self.body!r}: {', '.join(map(_name, self.effects))})"
 
 
-def _check_kinds(body: Any, effects: Any) -> None:
+def _checked_body(body: Any) -> Body:
     if not isinstance(body, Body):
         raise InputError(f"model: {body!r} is no body; make one of a mesh: hvi.Body(mesh, facets=..., names=...)")
-    if isinstance(effects, PlacedEffect):
-        raise InputError("model: effects are a list; write [...] around them")
-    for one in effects:
+    return body
+
+
+def _listed(user: str, effects: Any) -> tuple[PlacedEffect, ...]:
+    """The effects that a model or a replacement, the user of them, is given."""
+    if isinstance(effects, PlacedEffect) or not isinstance(effects, Iterable):
+        raise InputError(f"{user}: effects are a list; write [...] around them")
+    listed = tuple(effects)
+    for one in listed:
         if not isinstance(one, PlacedEffect):
-            raise InputError(f'model: {one!r} is no effect with a place, such as hvi.Friction("floor", law)')
+            raise InputError(f'{user}: {one!r} is no effect with a place, such as hvi.Friction("floor", law)')
+    return listed
+
+
+def _effect(placed: PlacedEffect, body: Body) -> Effect:
+    """The effect, checked; a refusal names it and its place. Collective."""
+    try:
+        return placed.effect(body.mesh)
+    except InputError as error:
+        raise InputError(f"{_name(placed)}: {error}") from error
+
+
+def _name(placed: PlacedEffect) -> str:
+    return f"{type(placed).__name__} on {placed.where or 'the body'}"
 
 
 def _check_place(body: Body, placed: PlacedEffect) -> None:

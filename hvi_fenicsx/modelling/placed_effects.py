@@ -15,7 +15,7 @@ from ..effects import Effect
 from ..errors import InputError
 from ..laws import Mixity, Superpotential
 from ..mesh.domain import Domain
-from ..schema import input_error
+from ..schema import located_error
 from ..spatial_value import SpatialValue
 from . import values
 
@@ -113,6 +113,10 @@ class On(OnSide):
 
     def effect(self, mesh: dmesh.Mesh) -> Effect:
         """The effect as it is."""
+        if not isinstance(self.placed, Effect):
+            raise InputError(
+                f"{self.placed!r} is no effect; give an object of a subclass of hvi_fenicsx.effects.Effect"
+            )
         return self.placed
 
 
@@ -130,6 +134,8 @@ class Displacement(OnSide):
 
     def effect(self, mesh: dmesh.Mesh) -> Effect:
         """The conditions."""
+        if isinstance(self.values, Sequence) and any(isinstance(v, str) and v == "free" for v in self.values):
+            raise InputError('write None in place of "free", the word of scene files')
         given = ["free" if value is None else value for value in values.components(self.values, mesh)]
         return checked(effects.loads.PrescribedDisplacement, values=tuple(given))
 
@@ -180,12 +186,18 @@ class Contact(OnSide):
         if isinstance(self.obstacle, Mapping):
             keys["obstacle"] = dict(self.obstacle)
         elif self.obstacle is not None:
-            point, normal = (tuple(map(float, vector)) for vector in self.obstacle)
-            keys["obstacle"] = {"point": point, "normal": normal}
+            keys["obstacle"] = _flat(self.obstacle)
         keys = keys or {"gap": values.spatial_value(0.0, mesh)}
         if self.direction is not None:
-            keys["direction"] = tuple(map(float, self.direction))
+            keys["direction"] = values.numbers(self.direction)
         return checked(effects.contact.Contact, **keys)
+
+
+def _flat(given: Any) -> dict[str, tuple[float, ...]]:
+    """A flat obstacle as a scene has it."""
+    if not isinstance(given, Sequence) or len(given) != 2:
+        raise InputError(f"obstacle: give a point and a normal, ([0, 0], [0, 1]), or a table, not {given!r}")
+    return {"point": values.numbers(given[0]), "normal": values.numbers(given[1])}
 
 
 def _bound(value: Value, mesh: dmesh.Mesh) -> SpatialValue | str:
@@ -212,6 +224,8 @@ class _Law(OnSide):
     length_multiplier: Value = field(default=1.0, kw_only=True)
 
     def _keys(self, mesh: dmesh.Mesh) -> dict[str, Any]:
+        if not isinstance(self.law, Superpotential):
+            raise InputError(f"law: give a law as an object, such as hvi.laws.Graph(points), not {self.law!r}")
         given = {"multiplier": self.multiplier, "length_multiplier": self.length_multiplier}
         return {"law": self.law, **{key: values.spatial_value(value, mesh) for key, value in given.items()}}
 
@@ -258,7 +272,7 @@ class Cohesion(_Law):
         keys = self._keys(mesh)
         if self.mixity is not None:
             keys |= {"mixity": self.mixity.name, **asdict(self.mixity)}
-        return checked(effects.cohesion.Cohesion, beta=float(self.beta), **keys)
+        return checked(effects.cohesion.Cohesion, beta=values.number(self.beta), **keys)
 
 
 @dataclass(frozen=True)
@@ -308,4 +322,4 @@ def checked(kind: type[Effect], **keys: Any) -> Effect:
     try:
         return kind(**keys)
     except ValidationError as error:
-        raise InputError(f"{kind.key}: {input_error(error, kind)}") from None
+        raise located_error(error, kind) from None

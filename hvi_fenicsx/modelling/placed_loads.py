@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from dolfinx import mesh as dmesh
@@ -43,7 +43,7 @@ class Force(OnSide):
 
     def effect(self, mesh: dmesh.Mesh) -> Effect:
         """The load."""
-        return checked(total_loads.TotalForce, values=tuple(map(float, self.values)))
+        return checked(total_loads.TotalForce, values=values.numbers(self.values))
 
 
 @dataclass(frozen=True)
@@ -60,5 +60,5 @@ class Moment(OnSide):
 
     def effect(self, mesh: dmesh.Mesh) -> Effect:
         """The load."""
-        given = (self.value,) if isinstance(self.value, int | float) else self.value
-        return checked(total_loads.Moment, values=tuple(map(float, given)))
+        given = self.value if isinstance(self.value, Iterable) else (self.value,)
+        return checked(total_loads.Moment, values=values.numbers(given))

@@ -103,9 +103,9 @@ def _assembled(form: Form, space: fem.FunctionSpace) -> PETSc.Mat:
     try:
         made = form(ufl.TrialFunction(space), ufl.TestFunction(space))
     except ValueError as error:  # so UFL refuses data of several meshes
-        raise InputError(f"energy: UFL refuses the form: {error} Its data must be on body.mesh") from error
+        raise InputError(f"UFL refuses the form: {error} Its data must be on body.mesh") from error
     if not isinstance(made, ufl.Form) or len(made.arguments()) != 2:
-        raise InputError("energy: the function must return a bilinear UFL form a(u, v), such as inner(σ(u), ε(v))*dx")
+        raise InputError("the function must return a bilinear UFL form a(u, v), such as inner(σ(u), ε(v))*dx")
     matrix = assemble_matrix(forms.compiled(made))
     matrix.assemble()
     return matrix
@@ -117,10 +117,10 @@ def _check_symmetry(matrix: PETSc.Mat, rounding: float) -> None:
     gap, size = transposed.norm(PETSc.NormType.FROBENIUS), matrix.norm(PETSc.NormType.FROBENIUS)
     transposed.destroy()
     if not size > 0.0:
-        raise InputError("energy: the form is zero on this body")
+        raise InputError("the form is zero on this body")
     if not gap <= rounding * size:
         raise InputError(
-            f"energy: the form is not symmetric: a(u, v) and a(v, u) differ by {gap / size:.1e} of its size; an energy "
+            f"the form is not symmetric: a(u, v) and a(v, u) differ by {gap / size:.1e} of its size; an energy "
             "is, such as a(u, v) = ∫ C ε(u) : ε(v) dx with a symmetric C"
         )
 
@@ -146,7 +146,7 @@ def _stretch_stiffness(matrix: PETSc.Mat, space: fem.FunctionSpace) -> float:
     energies = [_energy(matrix, points[:, i : i + 1] * np.eye(d)[i]) / volume for i in range(d)]
     if not min(energies) > 0.0:
         axis = "xyz"[int(np.argmin(energies))]
-        raise InputError(f"energy: a stretch along {axis} costs no energy (a(v, v) = {min(energies):.3g}); it must")
+        raise InputError(f"a stretch along {axis} costs no energy (a(v, v) = {min(energies):.3g}); it must")
     return float(max(energies))
 
 
@@ -161,6 +161,6 @@ def _check_rigid_motions(matrix: PETSc.Mat, space: fem.FunctionSpace, stiffness:
     for number, name in enumerate(names):
         if abs(_energy(matrix, fields[:, number])) > rounding * stiffness * length ** (d - 2):
             raise InputError(
-                f"energy: {name} costs energy, as a rigid motion of an elastic body must not; write the form in the "
+                f"{name} costs energy, as a rigid motion of an elastic body must not; write the form in the "
                 "strain sym(grad(u)), and what holds the body as a Displacement, Contact or Support"
             )

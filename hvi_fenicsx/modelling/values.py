@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -37,10 +37,12 @@ class PythonFunction(SpatialValue):
 
     @override
     def at(self, points: Array) -> Array:
-        values = np.asarray(self._function(np.ascontiguousarray(points.T)), dtype=np.float64)
+        values = np.asarray(self._function(np.ascontiguousarray(points.T)))
+        if values.dtype.kind not in "biuf":
+            raise InputError(f"{self.source}: returns {values.dtype} values; return real numbers")
         if values.shape not in ((), (len(points),)):
             raise InputError(f"{self.source}: returns an array {values.shape} at {len(points)} points; return (n,)")
-        return np.broadcast_to(values, (len(points),)).copy()
+        return np.broadcast_to(values, (len(points),)).astype(np.float64)
 
     @override
     def in_ufl(self, mesh: Any, number: Callable[[float], Any]) -> Any:
@@ -140,18 +142,58 @@ def components(given: Any, mesh: dmesh.Mesh) -> list[Any]:
             raise InputError(f"a vector has {d} components in {d}D; the UFL expression has the shape {given.ufl_shape}")
         return [_expression(given[i], mesh) for i in range(d)]
     if callable(given):
-        return [PythonFunction(_component(given, i)) for i in range(d)]
+        return [PythonFunction(_component(given, i, d)) for i in range(d)]
     if not isinstance(given, Sequence | np.ndarray) or isinstance(given, str):
         raise InputError(f"a vector is a list with {d} entries, a function or a UFL expression, not {given!r}")
     return [None if value is None else spatial_value(value, mesh) for value in given]
 
 
-def _component(function: Callable[[Array], Any], number: int) -> Callable[[Array], Any]:
-    def component(x: Array) -> Any:
-        return np.asarray(function(x))[number]
+def numbers(given: Any) -> tuple[float, ...]:
+    """The numbers of a list.
 
-    component.__name__ = f"{getattr(function, '__name__', 'function')}[{number}]"
+    Args:
+        given: what the user gave.
+
+    Raises:
+        InputError: it is no list of numbers.
+    """
+    if not isinstance(given, Iterable):
+        raise InputError(f"must be a list of numbers, not {given!r}")
+    return tuple(map(number, given))
+
+
+def number(given: Any) -> float:
+    """A number of any kind, such as NumPy's, as Python's.
+
+    Args:
+        given: what the user gave.
+
+    Raises:
+        InputError: it is no number.
+    """
+    try:
+        return float(given)
+    except (TypeError, ValueError):
+        raise InputError(f"must be a number, not {given!r}") from None
+
+
+def _component(function: Callable[[Array], Any], i: int, count: int) -> Callable[[Array], Any]:
+    """One of ``count`` components of a function of space."""
+    name = getattr(function, "__name__", type(function).__name__)
+
+    def component(x: Array) -> Any:
+        values = function(x)
+        if not isinstance(values, Sequence | np.ndarray) or len(values) != count:
+            wanted = f"return {count} components, ({count}, n)"
+            raise InputError(f"Python function {name}: returns {_kind(values)}; {wanted}")
+        return values[i]
+
+    component.__name__ = f"{name}[{i}]"
     return component
+
+
+def _kind(values: Any) -> str:
+    return f"an array {np.shape(values)}" if isinstance(values, np.ndarray) else f"{values!r}"
 
 
 def _expression(given: Any, mesh: dmesh.Mesh) -> SpatialValue:

@@ -68,7 +68,8 @@ def located_error(error: ValidationError, model: type[BaseModel] | None = None) 
         error: pydantic's error.
         model: the table that was read, for its allowed keys.
     """
-    return InputError("\n".join(": ".join([".".join(map(str, m.where)), m.text]) for m in mistakes_of(error, model)))
+    lines = ((".".join(map(str, mistake.where)), mistake.text) for mistake in mistakes_of(error, model))
+    return InputError("\n".join(f"{where}: {text}" if where else text for where, text in lines))
 
 
 class Table(BaseModel):

@@ -57,6 +57,9 @@ def test_a_path_is_followed_at_another_degree_and_its_rows_have_values() -> None
     u = path.u(-1)
     height = u.function_space.tabulate_dof_coordinates()[:, 2]
     np.testing.assert_allclose(u.x.array.reshape(-1, 3)[:, 2], sinking(height), atol=1e-9)
+    np.testing.assert_array_equal(path.u(-1).x.array, path.u(len(path.rows) - 1).x.array)
+    with pytest.raises(hvi.InputError, match=f"there is no row 1000; there are rows 0 to {len(path.rows) - 1}"):
+        path.u(1000)
 
 
 @pytest.mark.parametrize("wrong", ["memroy", "degre"])

@@ -335,6 +335,7 @@ def test_what_python_offers_for_help(found: hvi.Solution) -> None:
         assert name in page
     for offered in (hvi.solve, hvi.check, hvi.Body.file, hvi.Model.replace, hvi.Solution.plot, hvi.Solution):
         assert typing.get_type_hints(offered)
+    assert {"Graph", "SampledLaw"} < set(dir(hvi.laws)) <= set(hvi.laws.__all__)
     numbers = pickle.loads(pickle.dumps((found.energy, found.certificate, found.estimate, dict(found.contact))))
     assert numbers[1] == found.certificate
 

@@ -69,7 +69,7 @@ def test_an_energy_with_data_on_the_curved_mesh_is_refused() -> None:
     def energy(u: Any, v: Any) -> Any:
         return stiffness * ufl.inner(ufl.sym(ufl.grad(u)), ufl.sym(ufl.grad(v))) * ufl.dx
 
-    with pytest.raises(hvi.InputError, match=r"energy: .*on body\.mesh"):
+    with pytest.raises(hvi.InputError, match=r"Energy on the body: .*on body\.mesh"):
         hvi.solve(hvi.Model(body(made), [hvi.Energy(energy), *SYMMETRY]), degree=2)
 
 

@@ -1,0 +1,77 @@
+"""A program with many effects must be told which of them is wrong, and no value may be taken for another in silence."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import hvi_fenicsx as hvi
+
+STEEL = hvi.Isotropic(youngs_modulus=2e11, poisson_ratio=0.3)
+
+
+@pytest.fixture(scope="module")
+def square() -> hvi.Body:
+    return hvi.Body.rectangle([1.0, 1.0], [2, 2])
+
+
+def solved(body: hvi.Body, traction: Any) -> hvi.Solution:
+    held = hvi.Displacement("left", [0.0, 0.0])
+    return hvi.solve(hvi.Model(body, [STEEL, held, hvi.Traction("right", traction)]), estimate=False)
+
+
+@pytest.mark.parametrize(
+    ("effect", "reason"),
+    [
+        (hvi.Isotropic(youngs_modulus=1e9, poisson_ratio=0.5), r"^Isotropic on the body: poisson_ratio: must be less"),
+        (hvi.Isotropic(youngs_modulus="steel", poisson_ratio=0.3), "^Isotropic on the body: must be a number"),  # type: ignore[arg-type]
+        (hvi.Energy(3), "^Energy on the body: give a function that returns the UFL form"),  # type: ignore[arg-type]
+        (hvi.Displacement("left", [np.nan, 0.0]), "^Displacement on left: must be a finite number"),
+        (hvi.Displacement("left", [0.0, "free"]), '^Displacement on left: write None in place of "free"'),
+        (hvi.Force("right", [lambda x: x[0], 0.0]), "^Force on right: must be a number"),  # type: ignore[list-item]
+        (hvi.Moment("right", None), "^Moment on right: must be a number"),  # type: ignore[arg-type]
+        (hvi.Contact("bottom", obstacle=3), "^Contact on bottom: obstacle: give a point and a normal"),  # type: ignore[arg-type]
+        (hvi.Friction("bottom", "graph"), "^Friction on bottom: law: give a law as an object"),  # type: ignore[arg-type]
+        (hvi.On("bottom", 3), "^On on bottom: 3 is no effect"),  # type: ignore[arg-type]
+    ],
+)
+def test_a_refusal_names_the_effect_and_its_place(square: hvi.Body, effect: Any, reason: str) -> None:
+    with pytest.raises(hvi.InputError, match=reason):
+        hvi.Model(square, [STEEL, effect] if effect.where else [effect])
+
+
+@pytest.mark.parametrize("effects", [None, 3])
+def test_effects_that_are_no_list_are_refused(square: hvi.Body, effects: Any) -> None:
+    with pytest.raises(hvi.InputError, match="effects are a list"):
+        hvi.Model(square, effects)
+
+
+def test_a_list_where_a_replacement_stands_is_refused(square: hvi.Body) -> None:
+    with pytest.raises(hvi.InputError, match=r"^replace: .* is no effect with a place"):
+        hvi.Model(square, [STEEL]).replace([STEEL])  # type: ignore[arg-type]
+
+
+def test_effects_may_come_one_by_one(square: hvi.Body) -> None:
+    """A generator can be read once only."""
+    assert hvi.Model(square, (one for one in [STEEL])).effects == (STEEL,)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("traction", "reason"),
+    [
+        (lambda x: x, r"returns an array \(3, \d+\); return 2 components"),
+        (lambda x: 1.0, "returns 1.0; return 2 components"),
+        ([lambda x: 1j * x[0], 0.0], "returns complex128 values; return real numbers"),
+    ],
+)
+def test_a_function_with_values_of_another_kind_is_refused(square: hvi.Body, traction: Any, reason: str) -> None:
+    """The third component of a function of points, and an imaginary part, were left away."""
+    with pytest.raises(hvi.InputError, match=reason):
+        solved(square, traction)
+
+
+def test_a_component_of_a_function_may_be_one_number(square: hvi.Body) -> None:
+    pulled = solved(square, lambda x: [1e6 * (1 + x[1]), 0.0])
+    np.testing.assert_allclose(pulled.resultant("right"), [1.5e6, 0.0], atol=1e-6)
