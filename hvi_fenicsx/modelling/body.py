@@ -25,6 +25,7 @@ from ..mesh.thresholds import DEFAULT
 from ..mesh.transfer import Transfer
 from ..problem.interface_sides import Sides
 from ..schema import located_error, unknown
+from .places import read_names
 
 
 class Body:
@@ -141,20 +142,21 @@ class Body:
         body.dimension = dimension
         return body
 
-    def piece(self, name: str, side: str, where: str) -> Self:
+    def piece(self, name: str, side: str | Sequence[str], where: str) -> Self:
         """The body with one more side: a piece of a side, of the facets whose midpoints lie in it. Collective.
 
         Args:
             name: of the piece.
-            side: of which it is a piece.
+            side: of which it is a piece, or a list of sides.
             where: inequalities in x, y, z (m), like ``"x > 0.3"`` or ``"0.1 < x < 0.2 and y < 1"``.
 
         Raises:
             InputError: the name is taken, there is no such side, or these are no inequalities.
         """
-        self._check_new("piece", name, side)
+        sides = read_names(side)
+        self._check_new("piece", name, *sides)
         body = copy.copy(self)
-        body.pieces = {**self.pieces, name: BoundaryPart((side,), Inequalities(where))}
+        body.pieces = {**self.pieces, name: BoundaryPart(sides, Inequalities(where))}
         return body
 
     def interface(self, name: str, first: str, second: str, *, tied: bool = False) -> Self:

@@ -26,12 +26,12 @@ class _Elastic(InRegion):
     Attributes:
         model: by default plane_stress in 2D and three_dimensional in 3D.
         thermal_expansion: 1/K.
-        region: where; None: in the whole body.
+        region: where, a name or a list; None: in the whole body.
     """
 
     model: Plane | None = None
     thermal_expansion: float = 0.0
-    region: str | None = None
+    region: str | Sequence[str] | None = None
 
     def _material(self, kind: type[Effect], mesh: dmesh.Mesh, **keys: Any) -> Effect:
         usual = "plane_stress" if mesh.geometry.dim == 2 else "three_dimensional"
@@ -107,7 +107,7 @@ class Energy(InRegion):
     """
 
     form: Callable[[Any, Any], Any]
-    region: str | None = None
+    region: str | Sequence[str] | None = None
 
     def effect(self, mesh: dmesh.Mesh) -> Effect:
         """The material, after a look at what it does to stretches and rigid motions. Collective."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import Any
 
 from pydantic import ValidationError
@@ -15,9 +15,14 @@ from ..scene import BodyTable, BoundaryTable, InterfaceTable, MaterialTable, Sce
 from ..schema import located_error, unknown
 from .body import Body
 from .placed_effects import OnSide, PlacedEffect
+from .places import Names
 
 _WHOLE = "whole body"
-_Key = tuple[Place, str, str | None]
+_LONGEST_NAME = 90
+"""Characters of the name of a place; a scene allows 100, and a number may follow."""
+_Key = tuple[Place, str, frozenset[str]]
+_Placed = tuple[Names | None, dict[str, Any]]
+"""The place of a table, and its effects by their keys."""
 
 
 class Model:
@@ -95,18 +100,33 @@ def _effect(placed: PlacedEffect, body: Body) -> Effect:
 
 
 def _name(placed: PlacedEffect) -> str:
-    return f"{type(placed).__name__} on {placed.where or 'the body'}"
+    return f"{type(placed).__name__} on {_words(placed.where)}"
 
 
 def _check_place(body: Body, placed: PlacedEffect) -> None:
-    known = [*placed.places(body.domain), *((*body.pieces, *body.interfaces) if isinstance(placed, OnSide) else ())]
-    if placed.where is not None and placed.where not in known:
-        reason = unknown("place", placed.where, known) if known else f"the body has no place {placed.where!r}"
-        raise InputError(f"{type(placed).__name__}: {reason}")
+    alone = (*body.pieces, *body.interfaces) if isinstance(placed, OnSide) else ()
+    names, known = placed.where or (), placed.places(body.domain)
+    for name in names:
+        if name not in (*known, *(alone if len(names) == 1 else ())):
+            raise InputError(f"{type(placed).__name__}: {_no_place(name, known, alone)}")
+
+
+def _no_place(name: str, known: Collection[str], alone: Collection[str]) -> str:
+    """Why a name is none of a place, or none in a list."""
+    if name in alone:
+        return f"{name!r} stands alone, being a piece or an interface; a list is of whole sides: {', '.join(known)}"
+    if not known and not alone:
+        return f"the body has no place {name!r}"
+    return unknown("place", name, [*known, *alone])
+
+
+def _words(where: Collection[str] | None) -> str:
+    """A place in messages."""
+    return ", ".join(where) if where else "the body"
 
 
 def _key(placed: PlacedEffect, effect: Effect) -> _Key:
-    return effect.place, effect.key, placed.where
+    return effect.place, effect.key, frozenset(placed.where or ())
 
 
 def _position(places: Sequence[_Key], wanted: _Key) -> int:
@@ -114,23 +134,24 @@ def _position(places: Sequence[_Key], wanted: _Key) -> int:
     if len(found) == 1:
         return found[0]
     _, kind, where = wanted
-    known = ", ".join(f"{key} on {place or 'the body'}" for _, key, place in places)
+    known = "; ".join(f"{key} on {_words(sorted(place))}" for _, key, place in places)
     count = "no" if not found else "several effects"
-    raise InputError(f"replace: the model has {count} {kind} on {where or 'the body'}; it has {known}")
+    raise InputError(f"replace: the model has {count} {kind} on {_words(sorted(where))}; it has {known}")
 
 
-def _scene(body: Body, effects: Iterable[tuple[str | None, Effect]], title: str) -> Scene:
-    tables: dict[Place, list[tuple[str | None, dict[str, Any]]]] = {place: [] for place in Place}
+def _scene(body: Body, effects: Iterable[tuple[Names | None, Effect]], title: str) -> Scene:
+    tables: dict[Place, list[_Placed]] = {place: [] for place in Place}
     for where, effect in effects:
         _add(tables[effect.place], where, effect)
-    on_interfaces = [table for table in tables[Place.BOUNDARY] if table[0] in body.interfaces]
-    on_sides = [table for table in tables[Place.BOUNDARY] if table[0] not in body.interfaces]
+    seams = [(name,) for name in body.interfaces]
+    on_interfaces = [table for table in tables[Place.BOUNDARY] if table[0] in seams]
+    on_sides = [table for table in tables[Place.BOUNDARY] if table[0] not in seams]
     try:
         return Scene(
             title=title,
             domain=body.shape,
             material=_materials(tables[Place.MATERIAL]),
-            body={where or _WHOLE: BodyTable(region=where, **own) for where, own in tables[Place.BODY]},
+            body={name: BodyTable(region=where, **own) for name, (where, own) in _named(tables[Place.BODY]).items()},
             boundary=dict(_boundary(on_sides, body.pieces)),
             interface={name: _interface(name, sides, on_interfaces) for name, sides in body.interfaces.items()},
         )
@@ -138,7 +159,7 @@ def _scene(body: Body, effects: Iterable[tuple[str | None, Effect]], title: str)
         raise located_error(error, Scene) from None
 
 
-def _add(tables: list[tuple[str | None, dict[str, Any]]], where: str | None, effect: Effect) -> None:
+def _add(tables: list[_Placed], where: Names | None, effect: Effect) -> None:
     """Put an effect into the first table of its place that has none of its kind."""
     for place, own in tables:
         if place == where and effect.key not in own:
@@ -147,28 +168,42 @@ def _add(tables: list[tuple[str | None, dict[str, Any]]], where: str | None, eff
     tables.append((where, {effect.key: effect}))
 
 
-def _materials(tables: Sequence[tuple[str | None, dict[str, Any]]]) -> Any:
-    made = [(where, MaterialTable(region=where, elasticity=e)) for where, own in tables for e in own.values()]
-    if len(made) == 1 and made[0][0] is None:
-        return made[0][1]
-    return {where or f"{_WHOLE} {number}": table for number, (where, table) in enumerate(made)}
+def _joined(where: Names | None) -> str:
+    """The name of a place in results: its sides or regions with hyphens between them."""
+    return "-".join(where or (_WHOLE,))[:_LONGEST_NAME]
 
 
-def _interface(name: str, sides: Sides, tables: Sequence[tuple[str | None, dict[str, Any]]]) -> InterfaceTable:
+def _named(tables: Sequence[_Placed]) -> dict[str, _Placed]:
+    """Tables by the names of their places, with a number from the second one of a name on."""
+    named: dict[str, _Placed] = {}
+    for table in tables:
+        name = joined = _joined(table[0])
+        number = 1
+        while name in named:
+            number += 1
+            name = f"{joined}.{number}"
+        named[name] = table
+    return named
+
+
+def _materials(tables: Sequence[_Placed]) -> Any:
+    each = [(where, {"effect": effect}) for where, own in tables for effect in own.values()]
+    made = {n: MaterialTable(region=where, elasticity=own["effect"]) for n, (where, own) in _named(each).items()}
+    return next(iter(made.values())) if set(made) == {_WHOLE} else made
+
+
+def _interface(name: str, sides: Sides, tables: Sequence[_Placed]) -> InterfaceTable:
     """The table of an interface."""
-    found = [own for where, own in tables if where == name]
+    found = [own for where, own in tables if where == (name,)]
     if len(found) > 1:
         raise InputError(f"{name}: {next(iter(found[1]))} acts there already; give it once")
     return InterfaceTable(between=(sides.first, sides.second), tied=sides.tied, **(found[0] if found else {}))
 
 
-def _boundary(
-    tables: Sequence[tuple[str | None, dict[str, Any]]], pieces: Mapping[str, BoundaryPart]
-) -> Iterable[tuple[str, BoundaryTable]]:
-    """Tables by name: that of the side, with a number from the second one on."""
-    seen: dict[str | None, int] = {}
-    for where, own in tables:
-        seen[where] = seen.get(where, 0) + 1
-        name = f"{where}" if seen[where] == 1 else f"{where}.{seen[where]}"
-        piece = pieces.get(f"{where}", BoundaryPart((f"{where}",)))
-        yield name, BoundaryTable(on=piece.on, where=piece.where, **own)
+def _boundary(tables: Sequence[_Placed], pieces: Mapping[str, BoundaryPart]) -> Iterable[tuple[str, BoundaryTable]]:
+    """Tables of sides and pieces by name."""
+    for name, (where, own) in _named(tables).items():
+        sides = where or ()
+        piece = pieces.get(sides[0]) if len(sides) == 1 else None
+        part = piece or BoundaryPart(sides)
+        yield name, BoundaryTable(on=part.on, where=part.where, **own)

@@ -18,6 +18,7 @@ from ..mesh.domain import Domain
 from ..schema import located_error
 from ..spatial_value import SpatialValue
 from . import values
+from .places import Names, read_names
 
 Value = Any
 """A number, a formula in x, y, z, a Python function of x (3, n), a scalar UFL expression or fem.Function; SI."""
@@ -30,8 +31,8 @@ class PlacedEffect(ABC):
 
     @property
     @abstractmethod
-    def where(self) -> str | None:
-        """A side or region of the body; None: the whole body."""
+    def where(self) -> Names | None:
+        """The names of sides or regions of the body; None: the whole body."""
 
     @abstractmethod
     def places(self, domain: Domain) -> Collection[str]:
@@ -57,15 +58,15 @@ class OnSide(PlacedEffect):
     """An effect on a side.
 
     Attributes:
-        side: a name of the body's.
+        side: a name of the body's, or a list of names.
     """
 
-    side: str
+    side: str | Sequence[str]
 
     @property
-    def where(self) -> str:
-        """The side."""
-        return self.side
+    def where(self) -> Names:
+        """The sides."""
+        return read_names(self.side)
 
     def places(self, domain: Domain) -> Collection[str]:
         """The sides.
@@ -80,15 +81,15 @@ class InRegion(PlacedEffect):
     """An effect in a region.
 
     Attributes:
-        region: a name of the body's; None: the whole body.
+        region: a name of the body's, or a list of names; None: the whole body.
     """
 
-    region: str | None
+    region: str | Sequence[str] | None
 
     @property
-    def where(self) -> str | None:
-        """The region; None: the whole body."""
-        return self.region
+    def where(self) -> Names | None:
+        """The regions; None: the whole body."""
+        return None if self.region is None else read_names(self.region)
 
     def places(self, domain: Domain) -> Collection[str]:
         """The regions.
@@ -104,11 +105,11 @@ class On(OnSide):
     """Any effect on a side, such as one of your own class.
 
     Attributes:
-        side: the side's name.
+        side: the side's name, or a list of sides.
         placed: the effect.
     """
 
-    side: str
+    side: str | Sequence[str]
     placed: Effect
 
     def effect(self, mesh: dmesh.Mesh) -> Effect:
@@ -125,11 +126,11 @@ class Displacement(OnSide):
     """A prescribed displacement.
 
     Attributes:
-        side: the side's name.
+        side: the side's name, or a list of sides.
         values: m, by component; None leaves a component free.
     """
 
-    side: str
+    side: str | Sequence[str]
     values: Vector
 
     def effect(self, mesh: dmesh.Mesh) -> Effect:
@@ -145,11 +146,11 @@ class Traction(OnSide):
     """A surface traction.
 
     Attributes:
-        side: the side's name.
+        side: the side's name, or a list of sides.
         values: N/m², by component.
     """
 
-    side: str
+    side: str | Sequence[str]
     values: Vector
 
     def effect(self, mesh: dmesh.Mesh) -> Effect:
@@ -162,7 +163,7 @@ class Contact(OnSide):
     """Contact: unilateral with a gap, bilateral, or with an obstacle.
 
     Attributes:
-        side: the side's name.
+        side: the side's name, or a list of sides.
         gap: how far the side may move outward, m; 0 unless another way is given. Between two bodies also
             ``"measured"``: the distance of their sides as they are meshed.
         lower: bilateral contact: the smallest opening -u·n, m.
@@ -172,7 +173,7 @@ class Contact(OnSide):
         direction: with a gap: from the body towards the obstacle; stands for the outward normal.
     """
 
-    side: str
+    side: str | Sequence[str]
     gap: Value | None = None
     lower: Value | None = None
     upper: Value | None = None
@@ -212,13 +213,13 @@ class _Law(OnSide):
     """A law on a side.
 
     Attributes:
-        side: the side's name.
+        side: the side's name, or a list of sides.
         law: one of ``hvi_fenicsx.laws``, or of your own class; SI.
         multiplier: what all its tractions are multiplied by, positive.
         length_multiplier: what all its displacements are multiplied by, positive.
     """
 
-    side: str
+    side: str | Sequence[str]
     law: Superpotential
     multiplier: Value = field(default=1.0, kw_only=True)
     length_multiplier: Value = field(default=1.0, kw_only=True)
@@ -281,11 +282,11 @@ class BodyForce(InRegion):
 
     Attributes:
         values: N/m³, by component.
-        region: where; None: in the whole body.
+        region: where, a name or a list; None: in the whole body.
     """
 
     values: Vector
-    region: str | None = None
+    region: str | Sequence[str] | None = None
 
     def effect(self, mesh: dmesh.Mesh) -> Effect:
         """The load."""
@@ -298,11 +299,11 @@ class Temperature(InRegion):
 
     Attributes:
         value: K.
-        region: where; None: in the whole body.
+        region: where, a name or a list; None: in the whole body.
     """
 
     value: Value
-    region: str | None = None
+    region: str | Sequence[str] | None = None
 
     def effect(self, mesh: dmesh.Mesh) -> Effect:
         """The thermal strain."""

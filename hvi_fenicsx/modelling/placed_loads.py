@@ -17,11 +17,11 @@ class Pressure(OnSide):
     """A pressure against the side.
 
     Attributes:
-        side: the side's name.
+        side: the side's name, or a list of sides.
         value: N/m²; negative: suction.
     """
 
-    side: str
+    side: str | Sequence[str]
     value: Value
 
     def effect(self, mesh: dmesh.Mesh) -> Effect:
@@ -34,11 +34,11 @@ class Force(OnSide):
     """A force on the whole side, spread evenly over it.
 
     Attributes:
-        side: the side's name.
+        side: the side's name, or a list of sides.
         values: N (N/m in 2D), by component.
     """
 
-    side: str
+    side: str | Sequence[str]
     values: Sequence[float]
 
     def effect(self, mesh: dmesh.Mesh) -> Effect:
@@ -51,11 +51,11 @@ class Moment(OnSide):
     """A moment on the whole side about its centroid, by tractions as in a bent or twisted beam.
 
     Attributes:
-        side: the side's name.
+        side: the side's name, or a list of sides.
         value: N m (N in 2D): a number about z in 2D, three components in 3D.
     """
 
-    side: str
+    side: str | Sequence[str]
     value: float | Sequence[float]
 
     def effect(self, mesh: dmesh.Mesh) -> Effect:

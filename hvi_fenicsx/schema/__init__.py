@@ -4,7 +4,7 @@ Light: it loads pydantic and nothing heavier, and knows no particular table.
 """
 
 from .descriptions import descriptions
-from .fields import LONGEST, SHORTEST, Count, Length, Names, OneOf, Positive, vector
+from .fields import LONGEST, SHORTEST, Count, Length, Names, OneOf, Positive, names_of, vector
 from .files import ExistingFile
 from .messages import refusal, shown, unknown
 from .tables import Key, Mistake, Table, choose, input_error, located_error, mistakes_of, validation_error
@@ -26,6 +26,7 @@ __all__ = [
     "input_error",
     "located_error",
     "mistakes_of",
+    "names_of",
     "refusal",
     "shown",
     "unknown",

@@ -45,7 +45,15 @@ def vector(length: int) -> BeforeValidator:
     return BeforeValidator(read)
 
 
-def _names(value: Any) -> Any:
+def names_of(value: Any) -> tuple[str, ...]:
+    """One name or a list of names as a tuple.
+
+    Args:
+        value: as a scene file or a Python program has it.
+
+    Raises:
+        PydanticCustomError: it is something else, empty, or has a name twice.
+    """
     names = (value,) if isinstance(value, str) else value
     if not isinstance(names, list | tuple) or not all(isinstance(n, str) and n.strip() for n in names):
         raise refusal('must be a name or a list of names in quotes, like "left" or ["left", "top"]')
@@ -58,7 +66,7 @@ def _names(value: Any) -> Any:
 
 Names = Annotated[
     tuple[str, ...],
-    BeforeValidator(_names),
+    BeforeValidator(names_of),
     PlainSerializer(lambda names: names[0] if len(names) == 1 else list(names)),
 ]
 """One name or a list of names."""

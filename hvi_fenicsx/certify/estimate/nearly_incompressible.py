@@ -18,7 +18,8 @@ from ...typing import Array
 from . import defect
 from .bubble_stiffness import BubbleStiffness
 from .dual_norm import DualNorm
-from .law_traces import LawTraces
+from .law_springs import LawSprings
+from .law_traces import ErrorField, LawTraces
 from .thresholds import Thresholds
 
 
@@ -118,6 +119,7 @@ def squares(traces: LawTraces, inverse: DualNorm) -> Array:
     if problem.terms:
         load -= stiffness.on_bubbles(unmet)
     bubbles, under = fem.Function(traces.bubbles), defect.constraints(problem, u, traces.bubbles)
+    stiffness.hold(LawSprings(traces, ErrorField(fem.Function(problem.space), bubbles)))
     defect.find_least_energy(bubbles, stiffness, under, load, traces.thresholds)
     stiffness.follow(bubbles.x.array.reshape(-1, unmet.shape[1])[: len(between)], unmet)
     shear = problem.bulk.energy_by_cell(bubbles + stiffness.at_nodes)
