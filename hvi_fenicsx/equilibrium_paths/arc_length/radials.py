@@ -70,7 +70,7 @@ class Radials:
         Args:
             z: all coordinates, (n,) or more.
         """
-        return np.asarray(np.sqrt(self._sums(self._vectors(z) ** 2)))
+        return self.polar(z)[0]
 
     def directions(self, z: Array) -> Array:
         """Unit vectors, (N,); where the length is 0 the first unknown that counts.
@@ -78,14 +78,26 @@ class Radials:
         Args:
             z: all coordinates, (n,) or more.
         """
-        vectors, lengths = self._vectors(z), self.lengths(z)
-        found = np.divide(vectors, lengths[self.owner], out=np.zeros_like(vectors), where=lengths[self.owner] > 0.0)
+        return self.polar(z)[1]
+
+    def polar(self, z: Array) -> tuple[Array, Array]:
+        """The lengths of the vectors, (p,), and their directions as above, (N,).
+
+        Args:
+            z: all coordinates, (n,) or more.
+        """
+        if not self.groups:
+            return np.zeros(0), np.zeros(0)
+        vectors = np.where(self.counts, z[self.flat], 0.0)
+        lengths = np.sqrt(self._sums(vectors**2))
         if np.all(lengths > 0.0):
-            return found
+            return lengths, vectors / lengths[self.owner]
+        spread = lengths[self.owner]
+        found = np.divide(vectors, spread, out=np.zeros_like(vectors), where=spread > 0.0)
         counted = np.flatnonzero(self.counts)
         sites, first = np.unique(self.owner[counted], return_index=True)
         found[counted[first[lengths[sites] == 0.0]]] = 1.0
-        return found
+        return lengths, found
 
     def along(self, directions: Array, change: Array) -> Array:
         """The products of unit vectors with a change of the coordinates, (p,).
@@ -132,8 +144,5 @@ class Radials:
         """The share of the slip in the square of each length, (p,)."""
         return np.minimum(self._sums(self._slips * directions**2), 1.0)
 
-    def _vectors(self, z: Array) -> Array:
-        return np.where(self.counts, z[self.flat], 0.0)
-
     def _sums(self, values: Array) -> Array:
-        return np.bincount(self.owner, values, minlength=len(self)).astype(np.float64)
+        return np.asarray(np.bincount(self.owner, values, minlength=len(self)), dtype=np.float64)

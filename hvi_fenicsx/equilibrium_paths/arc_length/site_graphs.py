@@ -207,9 +207,18 @@ class SiteGraphs(SiteLaws):
             group = self.radials.groups[p]
             z[group] = np.where(self.radials.counts[here], s * self.directions(z)[here], z[group])
 
+    def polar(self, z: Array) -> tuple[Array, Array]:
+        """The coordinates along the graphs, (m,), and the unit vectors of the sites of lengths, (N,).
+
+        Args:
+            z: the coordinates, (n,).
+        """
+        lengths, directions = self.radials.polar(z)
+        return np.concatenate([z[self.one], lengths, z[self.radials.opening_unknowns]]), directions
+
     def s(self, z: Array) -> Array:
         """The coordinates along the graphs, (m,)."""
-        return np.concatenate([z[self.one], self.radials.lengths(z), z[self.radials.opening_unknowns]])
+        return self.polar(z)[0]
 
     def directions(self, z: Array) -> Array:
         """Unit vectors of the sites of lengths, (N,)."""
@@ -223,8 +232,8 @@ class SiteGraphs(SiteLaws):
             direction: of them, (n,).
         """
         radials = self.radials
-        along = radials.along(radials.directions(z), direction)
-        along = np.where(radials.lengths(z) > _NO_LENGTH, along, radials.lengths(direction))
+        lengths, directions = radials.polar(z)
+        along = np.where(lengths > _NO_LENGTH, radials.along(directions, direction), radials.lengths(direction))
         return np.concatenate([direction[self.one], along, direction[radials.opening_unknowns]])
 
     def on_drops(self) -> list[int]:

@@ -49,7 +49,7 @@ class Sites(SiteGraphs):
         Args:
             z: the coordinates, (n,).
         """
-        s, e = self.s(z), self.directions(z)
+        s, e = self.polar(z)
         tau = s - self._base
         lengths, tractions = self._x + self._moves * tau, self._force + self._rises * tau
         more, slopes = self._deviations.values(lengths)
@@ -88,6 +88,8 @@ class Sites(SiteGraphs):
         """What values along the sites are by unknown, (n,)."""
         m1, radials, found = len(self.one), self.radials, np.zeros(len(self.forces))
         found[self.one] = values[:m1]
+        if not len(radials):
+            return found
         parts = values[m1:][radials.owner] * e
         beside = radials.openings
         parts[beside] = np.where(radials.counts[beside], parts[beside], values[m1 + len(radials) :])
@@ -143,6 +145,8 @@ class Sites(SiteGraphs):
         """
         found, m1, radials = np.zeros(len(values.x)), len(self.one), self.radials
         found[self.one] = values.moves[:m1] * direction[self.one]
+        if not len(radials):
+            return found
         across, more = self._blocks(values, "moves")
         along = radials.along(values.directions, direction)
         found[radials.flat] = across * direction[radials.flat] + (more * along)[radials.owner] * values.directions

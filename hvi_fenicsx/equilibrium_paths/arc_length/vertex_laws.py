@@ -28,6 +28,7 @@ class VertexLaw:
         weight: lumped area.
         passed: what it remembers, along its coordinate; None without memory.
         mixity: how the energy of separation depends on the mode; None: it does not.
+        lost: the energy that is lost for good, and the memory of which it is; None: not asked for yet.
     """
 
     group: int
@@ -40,6 +41,7 @@ class VertexLaw:
     weight: float
     passed: Passed | None
     mixity: Mixity | None = None
+    lost: tuple[Passed, float] | None = None
 
     @property
     def curved(self) -> bool:
@@ -118,6 +120,11 @@ class VertexLaw:
         if self.passed is None:
             return 0.0
         passed = self._reached(x, traction)
+        if self.lost is None or self.lost[0] != passed:
+            self.lost = passed, self._lost_behind(passed)
+        return self.lost[1]
+
+    def _lost_behind(self, passed: Passed) -> float:
         ends, tractions = np.array(passed.displacements), np.array(passed.tractions)
         lost = self.law.value(self.sign * ends) - 0.5 * ends * tractions
         return self.weight * float(lost[1] if self.law.even else lost.sum())
