@@ -174,7 +174,7 @@ def percent(value: float) -> str:
 
 
 def accuracy(reached: AccuracyResult) -> Iterator[str]:
-    """What was chosen for an accuracy, what it cost, and what a tenth of the error would cost."""
+    """What was chosen for an accuracy, what it cost, and what this accuracy or a tenth of the error would cost."""
     goal, steps = reached.goal, reached.steps
     if reached.why is not None:
         yield f"accuracy not reached: {reached.why}"

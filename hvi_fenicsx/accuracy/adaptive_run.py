@@ -63,6 +63,9 @@ class AdaptiveRun:
         self._failures = 0
         self._why: str | None = None
         self.level: AdaptiveLevel
+        self._estimated: AdaptiveLevel | None = None
+        self._asked = self.solver.interrupted
+        self.solver = replace(self.solver, interrupted=self._interrupted)
 
     def begin(self) -> None:
         """Solve on the first mesh. Collective.
@@ -86,6 +89,8 @@ class AdaptiveRun:
             found = self._next(self.level)
             if isinstance(found, str):
                 self._why = found
+            elif self._stopped_by_budget(found):
+                self._give_up(found)
             else:
                 self.level = found
                 self._why = self._record(self.level, start)
@@ -99,6 +104,28 @@ class AdaptiveRun:
             more=self._cost_of_more(),
         )
 
+    def _interrupted(self) -> bool:
+        """Whether the solve on a mesh shall stop. Collective."""
+        return self._asked() or self._overrun()
+
+    def _overrun(self) -> bool:
+        """Whether the time has passed, and there is a mesh whose solution can be given. Collective."""
+        if self.goal.seconds is None or self._estimated is None:
+            return False
+        return largest(self.comm, self.solver.timer.total) > self.goal.seconds
+
+    def _stopped_by_budget(self, level: AdaptiveLevel) -> bool:
+        """Whether a solve was stopped, and only by the time. Collective."""
+        result = level.solution.solve_result
+        return result is not None and result.interrupted and not self._asked() and self._overrun()
+
+    def _give_up(self, level: AdaptiveLevel) -> None:
+        """Keep the last mesh with an error instead of one whose solve was stopped."""
+        assert self._estimated is not None
+        self.level, self._failures = self._estimated, 0
+        self._why = f"the mesh of {level.dofs:,} unknowns was not solved when the time had passed"
+        self.report(self._why)
+
     def _first(self) -> AdaptiveLevel:
         """The coarsest mesh that sees the data, solved to a loose tolerance. Collective."""
         scene = adaptive.coarsest(self.scene)
@@ -109,10 +136,12 @@ class AdaptiveRun:
         return cost_forecast.cost(self.steps, accuracy, self.elements, self.base, self.quantity.power_of_energy)
 
     def _cost_of_more(self) -> Cost | None:
-        """What a tenth of the error would cost."""
+        """What the accuracy asked for would cost, or a tenth of the error where it was reached or none was asked."""
         if not self.steps or not math.isfinite(self.steps[-1].error) or self.steps[-1].error <= 0:
             return None
         wanted = (self.goal.accuracy or self.steps[-1].error) / 10
+        if self.goal.accuracy is not None and self.steps[-1].error > self.goal.accuracy:
+            wanted = self.goal.accuracy
         needed = self._cost(wanted)
         return needed if math.isfinite(needed.dofs) else None
 
@@ -129,6 +158,7 @@ class AdaptiveRun:
             self.report(f"{level.dofs:,} unknowns: {solution.reason}")
             return solution.reason if self._failures >= self.thresholds.failures else None
         self._failures = 0
+        self._estimated = level
         self.steps.append(self._step(level, largest(self.comm, time.perf_counter() - start)))
         self.report(_line(len(self.steps), self.steps[-1], self.solver.timer.total))
         return None

@@ -59,7 +59,8 @@ class AccuracyResult:
         degree: of the elements.
         steps: all adaptive steps.
         why: why it ended without reaching the goal; None where it was reached.
-        more: what a tenth of the error would cost; None where no error is known.
+        more: what the accuracy asked for would cost, or a tenth of the error where it was reached or none was asked;
+            None where no error is known.
         choice: how the degree was chosen; None where the scene states it, or there was no choice.
     """
 

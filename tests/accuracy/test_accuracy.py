@@ -389,6 +389,38 @@ def test_a_time_budget_ends_before_the_step_that_would_exceed_it(seconds: float,
     assert (len(best.steps), best.exit_code) == (1, 0)
 
 
+class Stopwatch(Timer):
+    """A clock that stands at `now`."""
+
+    now = 0.0
+
+    @property
+    def total(self) -> float:
+        return self.now
+
+
+@pytest.mark.parametrize("accuracy", [None, 1e-6])
+def test_a_mesh_whose_solve_outlasts_the_budget_leaves_the_last_one(accuracy: float | None) -> None:
+    """The time passes in the solve on the third mesh, whatever its forecast was."""
+    clock, lines = Stopwatch(), list[str]()
+
+    def passing() -> bool:
+        clock.now = 1e4 if len(lines) == 2 else 0.0
+        return False
+
+    goal, solver = Goal(accuracy, seconds=1e3), AdaptiveSolver(timer=clock, interrupted=passing)
+    scene = Scene.model_validate(STRONG).with_solver(degree=1)
+    reached = control.solve_to_goal(scene, COMM, goal, solver, lines.append)
+    assert len(reached.steps) == 2
+    assert reached.solution.converged
+    assert reached.level.dofs == reached.steps[-1].dofs
+    assert "when the time had passed" in lines[-1]
+    assert reached.why == (None if accuracy is None else lines[-1])
+    assert reached.exit_code == (0 if accuracy is None else 4)
+    assert reached.more is not None
+    assert reached.more.accuracy == (accuracy or reached.steps[-1].error / 10)
+
+
 def test_an_accuracy_out_of_reach_leaves_the_best_that_the_time_allows() -> None:
     """Without a budget it is refused on the first mesh."""
     goal, few = Goal(1e-200, seconds=1e3), replace(CONTROL, most_levels=3)

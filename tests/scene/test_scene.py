@@ -20,7 +20,7 @@ from hvi_fenicsx.effects import Contribution, Effect, FormContext, Place
 from hvi_fenicsx.effects.contact import Contact
 from hvi_fenicsx.effects.friction import Friction
 from hvi_fenicsx.errors import InputError
-from hvi_fenicsx.mesh.shapes import MeshFile, Rectangle
+from hvi_fenicsx.mesh.shapes import MeshFile, Rectangle, SeveralBodies
 from hvi_fenicsx.scene import BoundaryTable, Scene, SolverTable, dump_scene, read_scene
 from hvi_fenicsx.scene.reference_doc import reference
 from hvi_fenicsx.scene.toml_lines import lines_of
@@ -603,3 +603,9 @@ def test_any_tables_are_refused_in_one_way(data: dict[str, Any]) -> None:
 def test_any_override_is_applied_or_refused(assignment: str) -> None:
     with contextlib.suppress(InputError):
         assert isinstance(read_scene(DEMOS[-1], [assignment]), Scene)
+
+
+def test_a_misspelt_place_of_a_body_is_told_with_the_keys_of_its_place() -> None:
+    body = {"shape": "rectangle", "size": [1.0, 1.0], "cells": [2, 2], "orign": [0.0, 0.0]}
+    with pytest.raises(ValidationError, match=r'did you mean "origin"\? allowed: .*size, cells, .*origin, angle'):
+        SeveralBodies.model_validate({"upper": body})

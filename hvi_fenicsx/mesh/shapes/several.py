@@ -20,7 +20,7 @@ from pydantic import (
 )
 
 from ...errors import InputError
-from ...schema import LONGEST, Mistake, Table, choose, mistakes_of, shown, validation_error
+from ...schema import LONGEST, Mistake, Table, choose, mistakes_of, shown, unknown, validation_error
 from .base import DEFAULT, DomainShape, Thresholds
 
 if TYPE_CHECKING:
@@ -32,6 +32,18 @@ if TYPE_CHECKING:
 
 Coordinate = Annotated[float, Field(ge=-LONGEST, le=LONGEST)]
 _SEVERAL = "set of bodies"
+_PLACE = ("origin", "angle")
+
+
+def _refuse_unknown_keys(table: Mapping[str, Any]) -> None:
+    """Refuse what neither the shape nor its place knows: the shape itself would not name the keys of the place."""
+    name = table.get("shape")
+    kind = DomainShape.registry.get(name) if isinstance(name, str) else None
+    if kind is None:
+        return
+    keys = [*kind.model_fields, *_PLACE]
+    if mistakes := [Mistake((key,), unknown("key", key, keys)) for key in table if key not in keys]:
+        raise validation_error(mistakes)
 
 
 class PlacedShape(Table):
@@ -48,8 +60,9 @@ class PlacedShape(Table):
     def _from_table(cls, data: Any, info: ValidationInfo) -> Any:
         if not isinstance(data, dict) or "form" in data:
             return data
-        own = {key: value for key, value in data.items() if key in ("origin", "angle")}
+        own = {key: value for key, value in data.items() if key in _PLACE}
         rest = {key: value for key, value in data.items() if key not in own}
+        _refuse_unknown_keys(rest)
         return {**own, "form": choose(rest, "shape", DomainShape.registry, info.context)}
 
     @model_validator(mode="after")

@@ -15,6 +15,8 @@ from .style import GREY, WIDTH, area
 FOOT = 1.55
 """Height of the foot, inches."""
 _BAR, _START = 3.2, 0.42
+_LETTERS = 66.0
+"""Points: the largest size of letters times the number of lines that fit in the foot."""
 
 
 def colour_bar(
@@ -49,12 +51,13 @@ def legend(fig: Figure, keys: Sequence[Artist]) -> None:
         fig: the picture.
         keys: the lines.
     """
+    lines = sum(str(key.get_label()).count("\n") + 1 for key in keys)
     fig.legend(
         handles=list(keys),
         loc="center left",
         bbox_to_anchor=(4.05 / WIDTH, 0.74 / fig.get_figheight()),
         frameon=False,
-        fontsize=12,
+        fontsize=min(12.0, _LETTERS / max(lines, 1)),
         handlelength=1.8,
         labelspacing=0.38,
         borderpad=0.0,
