@@ -78,10 +78,10 @@ def _nearest(space: fem.FunctionSpace, work: Any) -> Array:
     weight = fem.Function(functions)
     works = LinearForm(ufl.Form([part.reconstruct(integrand=weight * part.integrand()) for part in work.integrals()]))
     masses = LinearForm(weight * ufl.TestFunction(functions) * ufl.dx)
-    right, mass = [], []
+    right, mass, basis = [], [], functions.dofmap.list.shape[1]
     for _ in _each_basis_function(weight):
         right.append(works.values())
-        mass.append(masses.values().reshape(len(right[0]), -1))
+        mass.append(masses.values().reshape(len(right[0]), basis))
     return np.asarray(np.linalg.solve(np.stack(mass, axis=1), np.stack(right, axis=1)))
 
 

@@ -39,7 +39,7 @@ JOINT: dict[str, Any] = {
 @pytest.mark.parametrize(("dimension", "size"), [(2, 0.05), (3, 0.13)])
 def test_each_body_has_its_own_coarser_mesh(dimension: int, size: float, ranks: int, tmp_path: Path) -> None:
     file = meshes.make(tmp_path / "two.msh", meshes.TOUCHING.format(size=size, dimension=dimension))
-    found = on_ranks(ranks, "tests/mesh/pieces_ranks.py", file, dimension)
+    found = on_ranks(ranks, "tests/mesh/connected_pieces_ranks.py", file, dimension)
     assert found["error"] < 1e-10
     assert all(found["names"])
     assert all(found["facets"])
