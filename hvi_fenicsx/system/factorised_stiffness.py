@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from collections.abc import Callable
+from copy import copy
 from typing import Self, TypeVar
 
 import numpy as np
@@ -37,16 +38,20 @@ class FactorisedStiffness(CondensedStiffness):
     Args:
         system: the system, nothing held and without tangents of laws.
         interior: the body with the condensed unknowns held.
-        added: what is added to the diagonal of S.
     """
 
-    def __init__(self, system: System, interior: Interior, added: float = 0.0) -> None:
-        self._system, self._interior, self._added = system, interior, added
+    def __init__(self, system: System, interior: Interior) -> None:
+        self._system, self._interior = system, interior
         self._form, self._own = form_of(system, _PREFIX), interior.own()
         self._matrix, self._stiffness = self._form.matrix(), system.jacobian.matrix.copy()
-        self._diagonal = self._everywhere(np.asarray(self._own_diagonal())) + added
+        self._diagonal = self._everywhere(np.asarray(self._own_diagonal()))
         sums = np.asarray(np.abs(self._own).sum(axis=1)).ravel()
-        self._size = float(np.max(self._everywhere(sums), initial=0.0)) + added
+        self._size = float(np.max(self._everywhere(sums), initial=0.0))
+        self._add(0.0)
+
+    def _add(self, added: float) -> None:
+        """Let so much be added to the diagonal; nothing is known of this one yet."""
+        self._added = added
         self._products: OrderedDict[bytes, Array] = OrderedDict()
         self._counts: OrderedDict[bytes, int] = OrderedDict()
 
@@ -64,7 +69,7 @@ class FactorisedStiffness(CondensedStiffness):
     @property
     @override
     def diagonal(self) -> Array:
-        return self._diagonal
+        return self._diagonal + self._added
 
     @override
     def __matmul__(self, x: Array) -> Array:
@@ -81,7 +86,9 @@ class FactorisedStiffness(CondensedStiffness):
 
     @override
     def raised(self, by: float) -> CondensedStiffness:
-        return FactorisedStiffness(self._system, self._interior, self._added + by)
+        found = copy(self)  # the matrices are shared, none of them changes
+        found._add(self._added + by)
+        return found
 
     @override
     def inverse(self, columns: CellColumns) -> CellInverse:
@@ -92,7 +99,7 @@ class FactorisedStiffness(CondensedStiffness):
     @override
     def negative_directions(self, moving: Mask, slope: Array, negligible: float) -> int:
         steepest = float(np.max(np.abs(slope[moving]), initial=0.0))
-        shift = negligible * (self._size + steepest)
+        shift = negligible * (self._size + self._added + steepest)
         key = np.concatenate([moving, np.where(moving, slope, 0.0), [shift]]).tobytes()
         return _known(self._counts, key, lambda: self.factorised(moving, slope + shift).negative)
 

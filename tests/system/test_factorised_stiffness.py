@@ -57,6 +57,17 @@ def cell(n: int, seed: int, driver: int | None) -> CellColumns:
     return CellColumns(slope=slope, rise=rise, driver=driver, factor=rng.standard_normal(n))
 
 
+def test_raised_stiffness_is_that_of_the_matrix_at_first() -> None:
+    system = prepare(plane()).system
+    unformed = Condensation(system, None, 0).problem.elastic
+    formed, right = DenseStiffness(unformed.array), np.random.default_rng(0).standard_normal(len(unformed.diagonal))
+    system.jacobian.matrix.scale(2.0)
+    columns = cell(len(right), 0, None)
+    expected = formed.raised(0.5).inverse(columns).solve(right)
+    found = unformed.raised(0.3).raised(0.2).inverse(columns).solve(right)
+    assert found == pytest.approx(expected, abs=1e-10 * float(np.max(np.abs(expected))))
+
+
 @pytest.mark.parametrize("driver", [None, 0, 3, 4])
 def test_cells_are_inverted_and_their_columns_exchanged(driver: int | None) -> None:
     formed, unformed = both(plane())
