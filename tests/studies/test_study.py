@@ -433,6 +433,7 @@ def test_a_study_leaves_numbers_and_pictures(studied: Path) -> None:
         assert float(line["seconds"]) == pytest.approx(sum(point["phases"].values()))
         assert point["peak_memory_mb"] > 50
     assert found["own"] == found["exact"]
+    assert [set(errors) for errors in found["reference"]["errors_of_coarser_meshes"]] == [set(ERROR_NORMS)] * 2
     assert set(found["quantities"]) == set(ERROR_NORMS)
     assert {p.name for p in (studied / "out").glob("*.png")} == {"work_precision.png", "error_epsilon.png", "time.png"}
 
