@@ -42,6 +42,20 @@ def test_a_refusal_names_the_effect_and_its_place(square: hvi.Body, effect: Any,
         hvi.Model(square, [STEEL, effect] if effect.where else [effect])
 
 
+@pytest.mark.parametrize(
+    ("argument", "reason"),
+    [
+        ({"estimate": "no"}, "^estimate: must be True or False .is 'no'"),
+        ({"estimate": None}, "^estimate: must be True or False .is None"),
+        ({"progress": True}, "^progress: give a function of one hvi.NewtonStep, such as print, not True"),
+    ],
+)
+def test_what_is_no_switch_or_no_function_is_refused(square: hvi.Body, argument: Any, reason: str) -> None:
+    model = hvi.Model(square, [STEEL, hvi.Displacement("left", [0.0, 0.0])])
+    with pytest.raises(hvi.InputError, match=reason):
+        hvi.solve(model, **argument)
+
+
 @pytest.mark.parametrize("effects", [None, 3])
 def test_effects_that_are_no_list_are_refused(square: hvi.Body, effects: Any) -> None:
     with pytest.raises(hvi.InputError, match="effects are a list"):
