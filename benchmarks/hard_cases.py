@@ -151,7 +151,13 @@ def _work(table: Table, listed: list[Case], options: argparse.Namespace) -> None
         record = {**begun, **attempt(case, table.data, method, options.limit)}
         if COMM.rank == 0:
             _append(options.out, record)
-            print(case.number, method, record["outcome"], f"{record['seconds']:.1f} s", record["reason"], flush=True)
+            print(told(record), flush=True)
+
+
+def told(record: Record) -> str:
+    """A result in a line; its time is that of the limit, processor time."""
+    took = f"{record['cpu']:.1f} s of processor time"
+    return f"{record['number']} {record['method']} {record['outcome']}, {took}: {record['reason']}".rstrip(": ")
 
 
 def _open(listed: list[Case], wanted: list[str], done: set[tuple[str, str]]) -> Iterator[tuple[Case, str]]:

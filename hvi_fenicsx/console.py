@@ -150,6 +150,8 @@ def outcome(solution: Solution) -> Iterator[str]:
         yield f"smoothing: -σ_t is up to {away:.3g} N/m² from what the unsmoothed law gives there"
     if solution.estimate is not None:
         yield error(solution.estimate)
+        if solution.estimate.coarse:
+            yield "`hvi run SCENE --accuracy 0.05` lets the program refine the coarse mesh"
     energy = solution.examination.energy * solution.problem.scales.energy
     unit = "J/m" if solution.problem.scales.dimension == 2 else "J"
     yield (

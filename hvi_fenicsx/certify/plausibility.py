@@ -103,7 +103,7 @@ def of_estimate(errors: Estimate) -> tuple[str, ...]:
     size = f"{100 * share:.2g} % of the solution" if np.isfinite(share) else "as large as the solution"
     return (
         f"the mesh is coarse: its estimated error is {size} in the energy norm, although the equations on this mesh "
-        "are solved and certified; refine the mesh, or let the program do it: --accuracy 0.05",
+        "are solved and certified; refine the mesh",
     )
 
 

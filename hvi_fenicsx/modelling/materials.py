@@ -77,7 +77,7 @@ class Orthotropic(_Elastic):
     def effect(self, mesh: dmesh.Mesh) -> Effect:
         """The material."""
         names = ("youngs_moduli", "poisson_ratios", "shear_moduli")
-        keys = {name: list(values.numbers(getattr(self, name))) for name in names}
+        keys = {name: values.numbers(getattr(self, name)) for name in names}
         return self._material(OrthotropicElasticity, mesh, **keys)
 
 
@@ -93,7 +93,7 @@ class Anisotropic(_Elastic):
 
     def effect(self, mesh: dmesh.Mesh) -> Effect:
         """The material."""
-        return self._material(TensorElasticity, mesh, matrix=[list(values.numbers(row)) for row in self.matrix])
+        return self._material(TensorElasticity, mesh, matrix=values.numbers(self.matrix, values.numbers))
 
 
 @dataclass(frozen=True)

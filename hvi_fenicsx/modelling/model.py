@@ -96,7 +96,7 @@ def _effect(placed: PlacedEffect, body: Body) -> Effect:
     try:
         return placed.effect(body.mesh)
     except InputError as error:
-        raise InputError(f"{_name(placed)}: {error}") from error
+        raise InputError("\n".join(f"{_name(placed)}: {line}" for line in str(error).splitlines())) from error
 
 
 def _name(placed: PlacedEffect) -> str:

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import fields, replace
 from typing import Any
 
+import numpy as np
 from dolfinx import fem
 from mpi4py import MPI
 from petsc4py import PETSc
@@ -67,9 +68,10 @@ def solve(
         **options: the other keys of the scene's table ``[solver]``, such as ``tolerance=1e-8``.
 
     Raises:
-        InputError: on all ranks alike: an option is not allowed, no solver reads an option for PETSc, or the model does
-            not fit its mesh.
+        InputError: on all ranks alike: an argument or option is not allowed, no solver reads an option for PETSc, or
+            the model does not fit its mesh.
     """
+    _check_arguments(progress, estimate)
     known = start if isinstance(start, ModelSolution) else None
     if known is None and start is not None:
         options["start"] = start
@@ -113,6 +115,13 @@ def check(
     scene, comm = _with_options(scene, options), comm or MPI.COMM_WORLD
     prepared = preparation.prepare(scene, comm, timer, domain, thresholds=thresholds)
     return ModelPreparation(**_fields(prepared))
+
+
+def _check_arguments(progress: Any, estimate: Any) -> None:
+    if not callable(progress):
+        raise InputError(f"progress: give a function of one hvi.NewtonStep, such as print, not {progress!r}")
+    if not isinstance(estimate, bool | np.bool_):
+        raise InputError(f"estimate: must be True or False (is {estimate!r})")
 
 
 def _fields(made: Preparation | Solution) -> dict[str, Any]:

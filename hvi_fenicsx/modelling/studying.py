@@ -11,6 +11,7 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from mpi4py import MPI
 
 from ..errors import InputError
@@ -79,7 +80,7 @@ def study(
         model: what to study.
         folder: where tables, pictures and page go, as by ``hvi study``; None: nowhere.
         comm: the ranks; by default those of the body, for a scene all.
-        repeats: of each point at most, for the median of its time.
+        repeats: of each point at most, for the median of its time; 1 or more.
         force: whether a study that is in the folder already is replaced.
         **axes: values by axis, such as ``epsilon=["exact", 0.1]``, ``mesh=[0, 1, 2]``, ``tolerance``, ``method``,
             ``smoothing``, ``linear_solver``, ``degree``, ``accuracy``; all combinations are run. Without axes: those of
@@ -87,12 +88,14 @@ def study(
             block.
 
     Raises:
-        InputError: on all ranks alike: there is no such axis or value, or the model has not this axis.
+        InputError: on all ranks alike: there is no such axis or value, the model has not this axis, or ``repeats`` is
+            no number of solves.
         NoReferenceError: on all ranks alike: no solution exists, or the reference is not certified.
     """
     if not isinstance(model, Model | Scene):
         raise InputError(f"{model!r} is no model and no scene; a file is read by hvi.read_scene(path)")
     scene = model if isinstance(model, Scene) else _scene(model)
+    _check_repeats(repeats)
     comm = comm or (MPI.COMM_WORLD if isinstance(model, Scene) else model.body.comm)
     with _in_python_words():
         plan = study_plan.make(scene, [_axis(name, values) for name, values in axes.items()])
@@ -112,6 +115,11 @@ def _finished(found: Study, store: Store, output: OutputFolder | None) -> ModelS
         sentences=tuple(said(found)),
         uncertainty={name: known.error for name, known in found.certain.items()},
     )
+
+
+def _check_repeats(given: Any) -> None:
+    if isinstance(given, bool) or not isinstance(given, int | np.integer) or given < 1:
+        raise InputError(f"study: repeats must be a whole number, 1 or more (is {given!r}); 1 solves each point once")
 
 
 def _axis(name: str, values: Any) -> study_axes.AxisValues:

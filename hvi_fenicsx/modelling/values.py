@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -148,33 +148,30 @@ def components(given: Any, mesh: dmesh.Mesh) -> list[Any]:
     return [None if value is None else spatial_value(value, mesh) for value in given]
 
 
-def numbers(given: Any) -> tuple[float, ...]:
-    """The numbers of a list.
+def numbers(given: Any, each: Callable[[Any], Any] | None = None) -> Any:
+    """A list of numbers of any kind, as a tuple of Python's; what is no list as it is, for the effect to refuse.
 
     Args:
         given: what the user gave.
-
-    Raises:
-        InputError: it is no list of numbers.
+        each: what reads an entry; None: :func:`number`.
     """
-    if not isinstance(given, Iterable):
-        raise InputError(f"must be a list of numbers, not {given!r}")
-    return tuple(map(number, given))
+    if isinstance(given, str) or not np.iterable(given):
+        return given
+    return tuple(map(each or number, given))
 
 
-def number(given: Any) -> float:
-    """A number of any kind, such as NumPy's, as Python's.
+def number(given: Any) -> Any:
+    """A number of any kind, such as NumPy's, as Python's; what is none as it is, for the effect to refuse.
+
+    The effect knows the field, and finds all that is wrong at once.
 
     Args:
         given: what the user gave.
-
-    Raises:
-        InputError: it is no number.
     """
     try:
-        return float(given)
-    except (TypeError, ValueError):
-        raise InputError(f"must be a number, not {given!r}") from None
+        return given if isinstance(given, str) else float(given)
+    except (TypeError, ValueError, OverflowError):
+        return given
 
 
 def _component(function: Callable[[Array], Any], i: int, count: int) -> Callable[[Array], Any]:

@@ -166,7 +166,7 @@ def as_data(study: Study) -> dict[str, Any]:
         "reference": {
             **asdict(study.reference),
             "certainty": {q: asdict(c) for q, c in study.certain.items()},
-            "errors_of_coarser_rungs": list(study.coarser),
+            "errors_of_coarser_meshes": list(study.coarser),
         },
         "fronts": {q: [r.point for r in table.front(study.rows, q, study.certain)] for q in ERROR_NORMS},
         "points": table.as_data(study.rows),

@@ -8,6 +8,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from ..errors import InputError
+from ..schema import unknown
 from .certainty import Certainty
 from .cost import PHASES
 from .error_norms import ERROR_NORMS, Errors
@@ -97,7 +99,16 @@ class Row:
         return ", ".join(parts)
 
     def error(self, quantity: str) -> float | None:
-        """Relative; None where there is none."""
+        """Relative; None where there is none.
+
+        Args:
+            quantity: one of ``ERROR_NORMS``.
+
+        Raises:
+            InputError: there is no such quantity.
+        """
+        if quantity not in ERROR_NORMS:
+            raise InputError(unknown("quantity", quantity, ERROR_NORMS))
         return self.errors[quantity] if self.converged and self.errors else None
 
 

@@ -10,7 +10,7 @@ import pytest
 from runs import ROOT, hvi, summary, write_scene
 from scenes import block, model, quadratic_linear
 
-from hvi_fenicsx import Scene, prepare, read_scene, solve
+from hvi_fenicsx import Scene, console, prepare, read_scene, solve
 from hvi_fenicsx.certify import plausibility
 from hvi_fenicsx.certify.thresholds import PlausibilityThresholds
 from hvi_fenicsx.mesh.shapes import MeshFile
@@ -102,6 +102,12 @@ def test_a_coarse_mesh_is_told_with_its_error() -> None:
     assert solution.estimate is not None
     assert solution.estimate.discretisation > 0.1 * solution.estimate.energy_norm
     assert f"error is {100 * solution.estimate.discretisation / solution.estimate.energy_norm:.2g} %" in warning
+    assert warning.endswith("refine the mesh")  # a program from Python has no --accuracy
+    assert [line for line in console.outcome(solution) if "`hvi run SCENE --accuracy 0.05`" in line]
+
+
+def test_a_fine_mesh_is_left_in_peace() -> None:
+    assert not [line for line in console.outcome(solve(Scene.model_validate(model(16)))) if "--accuracy" in line]
 
 
 @pytest.mark.parametrize("demo", sorted((ROOT / "demos").glob("*.toml")), ids=lambda d: d.stem)

@@ -71,6 +71,12 @@ def test_what_is_no_axis_of_a_model_is_refused(body: hvi.Body, axes: Any, reason
         hvi.study(steel_square(body=body), **axes)
 
 
+@pytest.mark.parametrize("repeats", [0, -1, 1.5, "3", True, None])
+def test_repeats_that_are_no_number_of_solves_are_refused(body: hvi.Body, repeats: Any) -> None:
+    with pytest.raises(hvi.InputError, match=r"^study: repeats must be a whole number, 1 or more \(is .*\); 1 solves"):
+        hvi.study(steel_square(body=body), tolerance=[1e-4], repeats=repeats)
+
+
 @pytest.mark.long
 def test_two_ranks_find_the_errors_of_one() -> None:
     alone = hvi.study(steel_square(body=own_square(MPI.COMM_SELF, COARSE)), mesh=[0, 1], accuracy=[0.1], repeats=1)

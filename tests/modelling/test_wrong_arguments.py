@@ -26,12 +26,23 @@ def solved(body: hvi.Body, traction: Any) -> hvi.Solution:
     ("effect", "reason"),
     [
         (hvi.Isotropic(youngs_modulus=1e9, poisson_ratio=0.5), r"^Isotropic on the body: poisson_ratio: must be less"),
-        (hvi.Isotropic(youngs_modulus="steel", poisson_ratio=0.3), "^Isotropic on the body: must be a number"),  # type: ignore[arg-type]
+        (
+            hvi.Isotropic(youngs_modulus="steel", poisson_ratio=0.3),
+            "^Isotropic on the body: youngs_modulus: must be a number",
+        ),  # type: ignore[arg-type]
+        (hvi.Isotropic(youngs_modulus="2e11", poisson_ratio=0.3), "youngs_modulus: must be a number .*without quotes"),  # type: ignore[arg-type]
+        (
+            hvi.Isotropic(youngs_modulus=10**400, poisson_ratio=0.3),
+            "^Isotropic on the body: youngs_modulus: must be a n",
+        ),
+        (hvi.Anisotropic(matrix=3), "^Anisotropic on the body: matrix: must be a list"),  # type: ignore[arg-type]
+        (hvi.Anisotropic(matrix=[[1, 0, 0], 4, [0, 0, 1]]), "^Anisotropic on the body: matrix.1: must be a list"),  # type: ignore[list-item]
+        (hvi.Orthotropic(youngs_moduli=[1, 1], poisson_ratios=[0], shear_moduli=3), "shear_moduli: must be a list"),  # type: ignore[arg-type]
         (hvi.Energy(3), "^Energy on the body: give a function that returns the UFL form"),  # type: ignore[arg-type]
         (hvi.Displacement("left", [np.nan, 0.0]), "^Displacement on left: must be a finite number"),
         (hvi.Displacement("left", [0.0, "free"]), '^Displacement on left: write None in place of "free"'),
-        (hvi.Force("right", [lambda x: x[0], 0.0]), "^Force on right: must be a number"),  # type: ignore[list-item]
-        (hvi.Moment("right", None), "^Moment on right: must be a number"),  # type: ignore[arg-type]
+        (hvi.Force("right", [lambda x: x[0], 0.0]), "^Force on right: values.0: must be a number"),  # type: ignore[list-item]
+        (hvi.Moment("right", None), "^Moment on right: values.0: must be a number"),  # type: ignore[arg-type]
         (hvi.Contact("bottom", obstacle=3), "^Contact on bottom: obstacle: give a point and a normal"),  # type: ignore[arg-type]
         (hvi.Friction("bottom", "graph"), "^Friction on bottom: law: give a law as an object"),  # type: ignore[arg-type]
         (hvi.On("bottom", 3), "^On on bottom: 3 is no effect"),  # type: ignore[arg-type]
@@ -40,6 +51,38 @@ def solved(body: hvi.Body, traction: Any) -> hvi.Solution:
 def test_a_refusal_names_the_effect_and_its_place(square: hvi.Body, effect: Any, reason: str) -> None:
     with pytest.raises(hvi.InputError, match=reason):
         hvi.Model(square, [STEEL, effect] if effect.where else [effect])
+
+
+@pytest.mark.parametrize(
+    ("argument", "reason"),
+    [
+        ({"estimate": "no"}, "^estimate: must be True or False .is 'no'"),
+        ({"estimate": None}, "^estimate: must be True or False .is None"),
+        ({"progress": True}, "^progress: give a function of one hvi.NewtonStep, such as print, not True"),
+    ],
+)
+def test_what_is_no_switch_or_no_function_is_refused(square: hvi.Body, argument: Any, reason: str) -> None:
+    model = hvi.Model(square, [STEEL, hvi.Displacement("left", [0.0, 0.0])])
+    with pytest.raises(hvi.InputError, match=reason):
+        hvi.solve(model, **argument)
+
+
+def test_each_wrong_value_of_an_effect_has_a_line_with_its_name(square: hvi.Body) -> None:
+    with pytest.raises(hvi.InputError) as refused:
+        hvi.Model(square, [hvi.Isotropic(youngs_modulus="steel", poisson_ratio=0.7)])  # type: ignore[arg-type]
+    assert str(refused.value).splitlines() == [
+        'Isotropic on the body: youngs_modulus: must be a number (is "steel")',
+        "Isotropic on the body: poisson_ratio: must be less than 0.5 (is 0.7)",
+    ]
+
+
+def test_numbers_may_be_of_any_kind(square: hvi.Body) -> None:
+    """NumPy's are no Python floats, and its arrays no lists."""
+    diagonal = hvi.Model(square, [hvi.Anisotropic(matrix=np.diag(np.float32([2, 2, 1])))])  # type: ignore[arg-type]
+    single = hvi.Model(square, [hvi.Isotropic(youngs_modulus=np.float32(2), poisson_ratio=np.array(0.0))])  # type: ignore[arg-type]
+    plain = hvi.Model(square, [hvi.Isotropic(youngs_modulus=2.0, poisson_ratio=0.0)])
+    assert single.scene == plain.scene
+    assert hvi.Model(square, [hvi.Anisotropic(matrix=[[2, 0, 0], [0, 2, 0], [0, 0, 1]])]).scene == diagonal.scene
 
 
 @pytest.mark.parametrize("effects", [None, 3])

@@ -210,6 +210,12 @@ def test_a_point_is_repeated_until_its_median_is_steady() -> None:
     assert cost.spread(list(values)) == pytest.approx(1.2533 * 0.05 / math.sqrt(4001), rel=0.1)
 
 
+def test_an_unknown_quantity_is_refused_with_those_there_are() -> None:
+    (one,) = rows_of([(1.0, 0.1)])
+    with pytest.raises(InputError, match=r'unknown quantity "energy_nrom"; did you mean "energy_norm".*u_t_l2'):
+        one.error("energy_nrom")
+
+
 def rows_of(pairs: list[tuple[float, float]]) -> list[table.Row]:
     record = {"converged": True, "reason": "certified", "exit_code": 0, "dofs": 1}
     certain = dict.fromkeys(ERROR_NORMS, Certainty(1e-4, None))
@@ -433,6 +439,7 @@ def test_a_study_leaves_numbers_and_pictures(studied: Path) -> None:
         assert float(line["seconds"]) == pytest.approx(sum(point["phases"].values()))
         assert point["peak_memory_mb"] > 50
     assert found["own"] == found["exact"]
+    assert [set(errors) for errors in found["reference"]["errors_of_coarser_meshes"]] == [set(ERROR_NORMS)] * 2
     assert set(found["quantities"]) == set(ERROR_NORMS)
     assert {p.name for p in (studied / "out").glob("*.png")} == {"work_precision.png", "error_epsilon.png", "time.png"}
 

@@ -28,7 +28,8 @@ from hvi_fenicsx.stationary_points.bodies import Equilibria
 BENCHMARKS = Path(__file__).resolve().parents[2] / "benchmarks"
 sys.path.insert(0, str(BENCHMARKS))
 
-import hard_enumeration  # noqa: E402 (a script's neighbour, not a package)
+import hard_cases  # noqa: E402 (a script's neighbour, not a package)
+import hard_enumeration  # noqa: E402
 import hard_run  # noqa: E402
 import hard_scenes  # noqa: E402
 from covering import Case, Table, cases  # noqa: E402
@@ -54,6 +55,12 @@ def solve_and_judge(case: Case, degree: int = 1) -> None:
 @pytest.mark.parametrize("case", parameters(FAST))
 def test_auto_solves_a_small_case(case: Case) -> None:
     solve_and_judge(case)
+
+
+def test_a_line_has_the_time_that_the_limit_is_of() -> None:
+    ended = {"number": 7, "method": "auto", "outcome": "failed", "reason": "time limit", "seconds": 45.0, "cpu": 20.1}
+    assert hard_cases.told(ended) == "7 auto failed, 20.1 s of processor time: time limit"
+    assert hard_cases.told({**ended, "reason": ""}) == "7 auto failed, 20.1 s of processor time"
 
 
 def test_a_bonded_block_just_below_its_peak_has_no_equilibrium_proven_in_few_cells() -> None:

@@ -45,7 +45,9 @@ def _rough(result: Result) -> str:
     found = result.summary["estimate"]
     norm, part = found.get("energy_norm"), found.get("discretisation")
     size = f"{100 * part / norm:.2g} % of the solution" if norm and part is not None else "as large as the solution"
-    return f"the estimated error is {size}, so its numbers are rough; refine the mesh, or ask for an --accuracy"
+    return (
+        f"the estimated error is {size}, so its numbers are rough; refine the mesh, or ask `hvi run` for an --accuracy"
+    )
 
 
 def existence(result: Result) -> Iterator[str]:
