@@ -12,7 +12,7 @@ from __future__ import annotations
 import matplotlib.pyplot as plt
 from common import Figures, document, median, parser, picture, repeated, square, table
 
-TOLERANCES = ("1e-1", "1e-2", "1e-3", "1e-4", "1e-5", "1e-6", "1e-8")
+TOLERANCES = ("1e-1", "5e-2", "3e-2", "1e-2", "1e-3", "1e-4", "1e-5", "1e-6", "1e-8")
 HEAD = ("scene", "dofs", "tolerance", "algebraic over discretisation error", "work units", "linear (all levels)")
 
 

@@ -95,9 +95,13 @@ class Certifier:
         on_graphs = self._distance(state) <= self._tolerance
         if not (state.event in ALWAYS or is_examined(number)):
             return Verdict(certified=on_graphs, whole=False)
-        if on_graphs and self._passes(state):
+        if not on_graphs:
+            return Verdict(certified=False, whole=True)
+        u = self._expanded(state)
+        found = self._examination(state, u)
+        if self._passes(state, u, found):
             return Verdict(certified=True, whole=True)
-        corrected = on_graphs and self._corrected(state) is not None
+        corrected = self._corrected(state, u, found) is not None
         return Verdict(certified=corrected, whole=True, corrected=corrected)
 
     def displacement(self, state: PathState, verdict: Verdict) -> fem.Function:
@@ -107,33 +111,36 @@ class Certifier:
             state: the state.
             verdict: what was found of it.
         """
-        found = self._corrected(state) if verdict.corrected else None
-        return self._expanded(state) if found is None else found
-
-    def _is_apart(self, state: PathState) -> bool:
-        """Whether the certificate of a single run cannot judge a state. Collective."""
-        return not _plain(state) or self._is_unloaded(state)
-
-    def _passes(self, state: PathState) -> bool:
         u = self._expanded(state)
-        if self._is_apart(state):
-            forces = contact_state.forces(self._factored.at(state.factor), u)
-            return self._in_balance(state, u, forces, self._condensation.carried(state.x, state.factor))
-        return self._examination(state, u).certificate.passed
+        found = self._corrected(state, u, self._examination(state, u)) if verdict.corrected else None
+        return u if found is None else found
+
+    def _examination(self, state: PathState, u: fem.Function) -> Examination | None:
+        """What the certificate of a single run says of a displacement; None: it cannot judge the state. Collective."""
+        if not _plain(state) or self._is_unloaded(state):
+            return None
+        problem = self._factored.at(state.factor)
+        frozen_mixity.freeze(problem, u)
+        return certificate.examine(problem, u, self._tolerance)
+
+    def _passes(self, state: PathState, u: fem.Function, found: Examination | None) -> bool:
+        if found is not None:
+            return found.certificate.passed
+        forces = contact_state.forces(self._factored.at(state.factor), u)
+        return self._in_balance(state, u, forces, self._condensation.carried(state.x, state.factor))
 
     # -- where rounding speaks against a state
 
-    def _corrected(self, state: PathState) -> fem.Function | None:
-        """The displacement that is certified once rounding is taken out of it; None: none is. Collective."""
-        u = self._expanded(state)
-        found = None if self._is_apart(state) else self._examination(state, u)
+    def _corrected(self, state: PathState, u: fem.Function, found: Examination | None) -> fem.Function | None:
+        """The displacement that is certified once rounding is taken out of u; None: none is. Collective."""
         if found is not None and not correction.may_help(found.certificate):
             return None
         refined = self._refined(state)
         if refined is not None or found is None:
             return refined
         u = correction.corrected(self._system.with_obstacles_of(self._factored.at(state.factor)), (), u, found)
-        return u if self._examination(state, u).certificate.passed else None
+        again = self._examination(state, u)
+        return u if again is not None and again.certificate.passed else None
 
     def _refined(self, state: PathState) -> fem.Function | None:
         """That of Newton steps along the graphs, with what bonds remember; None: they do not help. Collective."""
@@ -153,9 +160,10 @@ class Certifier:
         """Whether forces by cell balance, and those on Γc are on the graphs. Collective."""
         if self._distance(replace(state, x=found.x), found.force) > self._tolerance:
             return False
-        if self._is_apart(state):
+        judged = self._examination(state, found.u)
+        if judged is None:
             return self._in_balance(state, found.u, found.forces, found.carried)
-        return self._examination(state, found.u).certificate.passed
+        return judged.certificate.passed
 
     def _graphs(self, state: PathState) -> Graphs:
         return self._kind.graphs(self._condensation.problem, self._remember, state)
@@ -200,11 +208,6 @@ class Certifier:
 
     def _expanded(self, state: PathState) -> fem.Function:
         return self._system.displacement(self._condensation.expand(state.x, state.factor))
-
-    def _examination(self, state: PathState, u: fem.Function) -> Examination:
-        problem = self._factored.at(state.factor)
-        frozen_mixity.freeze(problem, u)
-        return certificate.examine(problem, u, self._tolerance)
 
 
 def is_examined(number: int) -> bool:
