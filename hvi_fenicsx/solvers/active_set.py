@@ -25,7 +25,8 @@ from ..system.system import System
 from ..typing import Entities
 from .convergence import NOT_MEASURED, ConvergenceTest, Outcome
 from .snes_views import ReducedPreconditioner, unextracted
-from .thresholds import DEFAULT, Thresholds
+from .stalls import StallTest
+from .thresholds import DEFAULT, FULL_STEPS, Thresholds
 
 StepReport = Callable[[int, float, int], None]
 """Called with iteration, residual, and vertices in contact (of all ranks)."""
@@ -200,13 +201,13 @@ class _SnesRun:
         self.lower, self.upper = lower, upper
         self.last, self.linear, self.iterations, self.reason = float("inf"), 0, 0, 0
         self.sizes = NOT_MEASURED
-        self._stalled = self._slow = 0
         self._inner = owner.held.inner_iterations
         self.stopped = self.far = False
 
     def create(self, line_search: str, max_iterations: int) -> PETSc.SNES:
         """The configured SNES."""
         system, linear = self.owner.system, self.owner.settings
+        self._stalls = StallTest(self.thresholds, full_steps=line_search == FULL_STEPS)
         snes = PETSc.SNES().create(system.comm)
         snes.setType("vinewtonrsls")
         snes.setFunction(self._function, system.load.duplicate())
@@ -268,7 +269,7 @@ class _SnesRun:
         if iteration:
             self.owner.held.report(snes.getKSP().getIterationNumber())
         self.sizes = self.owner.convergence.sizes(x, f, self.lower, self.upper)
-        previous, self.last = self.last, self.sizes.worst
+        self.last = self.sizes.worst
         if self.owner.progress:
             self.owner.progress(iteration, self.last, self.owner.in_contact(x))
         self.far = x.norm(PETSc.NormType.INFINITY) > self.thresholds.runaway
@@ -279,13 +280,5 @@ class _SnesRun:
             return PETSc.SNES.ConvergedReason.DIVERGED_FUNCTION_COUNT
         if self.far or not np.isfinite(self.last):
             return PETSc.SNES.ConvergedReason.DIVERGED_FNORM_NAN
-        stalls = self._stalls(previous)
-        return PETSc.SNES.ConvergedReason.DIVERGED_DTOL if stalls else PETSc.SNES.ConvergedReason.CONVERGED_ITERATING
-
-    def _stalls(self, previous: float) -> bool:
-        """Whether further steps will not lower the residual."""
-        thresholds, most = self.thresholds, self.thresholds.stalled_steps
-        self._stalled = self._stalled + 1 if abs(self.last - previous) < thresholds.still * previous else 0
-        self._slow = self._slow + 1 if self.last > 0.5 * previous else 0
-        at_rounding = self.last < thresholds.rounding_below
-        return self._stalled >= most or (at_rounding and self._slow >= 2 * most)
+        reasons = PETSc.SNES.ConvergedReason
+        return reasons.DIVERGED_DTOL if self._stalls.gives_up(self.last) else reasons.CONVERGED_ITERATING

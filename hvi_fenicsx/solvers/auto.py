@@ -25,7 +25,7 @@ from .closed_start import resting_start
 from .context import SolveContext
 from .continuation import Continuation
 from .law_models import Majorant
-from .load_path_start import PathStart, softens
+from .load_path_start import PathStart
 from .result import Counts, SolveResult
 from .rigid_start import at_rest
 
@@ -90,7 +90,7 @@ class Auto(BranchIteration):
 
     def _search(self, start: PETSc.Vec | None, branches: PETSc.Vec | None) -> SolveResult:
         follows = start is None and branches is None and self._asks_for_path()
-        self._limit.next_start(self.options.thresholds.path.quick_steps if follows and self._soft() else None)
+        self._limit.next_start(self._most_without_path() if follows else None)
         first = super().solve(start, branches)
         cut = self._limit.cut
         self._limit.next_start()
@@ -113,12 +113,13 @@ class Auto(BranchIteration):
                 return replace(other, counts=counts)
         return first
 
-    def _soft(self) -> bool:
-        return any(softens(term.exact) for term in self.system.terms)
+    def _most_without_path(self) -> int | None:
+        laws = [term.exact for term in self.system.terms]
+        return load_path_start.first_steps(laws, self.options.thresholds.path)
 
     def _asks_for_path(self) -> bool:
         """Whether loading decides which equilibrium is meant, or if there is one."""
-        undecided = not self._held or self._soft()
+        undecided = not self._held or self._most_without_path() is not None
         return bool(self.system.terms) and self.options.start == "unbroken" and undecided
 
     def _along_path(self, first: SolveResult) -> SolveResult | None:

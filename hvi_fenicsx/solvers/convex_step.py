@@ -24,6 +24,7 @@ from .convergence import Outcome
 from .fallbacks import Attempt, first_success
 from .law_models import Cells, ExactLaw, Majorant, SecantMajorant
 from .result import Counts
+from .thresholds import FULL_STEPS
 
 UNBOUNDED = "the body slides away on what is left of its bonds"
 
@@ -196,7 +197,7 @@ class ConvexStep:
         exact = [ExactLaw(law, c) for law, c in zip(self._laws, cells, strict=True)]
         most = self._thresholds.newton_steps
         found = self._solver.solve(
-            x, exact, self._options.tolerance, lower=lower, upper=upper, line_search="basic", max_iterations=most
+            x, exact, self._options.tolerance, lower=lower, upper=upper, line_search=FULL_STEPS, max_iterations=most
         )
         self._counts.add_outcome(found)
         if drops is None or not found.converged:

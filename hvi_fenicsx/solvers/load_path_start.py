@@ -7,7 +7,7 @@ load, or it ends before.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 
@@ -44,13 +44,30 @@ class PathStart:
 
 
 def softens(law: Superpotential) -> bool:
-    """Whether a law's piecewise linear traction falls, other than by jumps.
+    """Whether a law's traction falls, other than by jumps.
 
     Args:
         law: the law.
     """
     graph = graph_of(law)
-    return graph is not None and bool(np.any(graph.slopes < 0.0))
+    return 0.0 < law.steepest_fall < np.inf if graph is None else bool(np.any(graph.slopes < 0.0))
+
+
+def first_steps(laws: Sequence[Superpotential], thresholds: PathThresholds) -> int | None:
+    """Newton steps of a start without the path, before the path is followed; None: any number.
+
+    Args:
+        laws: the laws.
+        thresholds: these numbers.
+    """
+    if not any(softens(law) for law in laws):
+        return None
+    return thresholds.quick_steps if _are_straight(laws) else thresholds.curved_steps
+
+
+def _are_straight(laws: Sequence[Superpotential]) -> bool:
+    """Whether the tractions of all laws are piecewise linear."""
+    return all(graph_of(law) is not None for law in laws)
 
 
 def follow(system: System, thresholds: PathThresholds, interrupted: Callable[[], bool]) -> PathStart | None:
@@ -63,8 +80,9 @@ def follow(system: System, thresholds: PathThresholds, interrupted: Callable[[],
         thresholds: how large the condensed system may be.
         interrupted: whether to stop (collective); then None.
     """
-    known = all(graph_of(term.exact) is not None for term in system.terms)
-    if not known or system.comm.allreduce(len(system.jacobian.rows.dofs)) > thresholds.vertex_unknowns:
+    laws = [term.exact for term in system.terms]
+    most = thresholds.vertex_unknowns if _are_straight(laws) else _most_on_curve(laws, thresholds)
+    if system.comm.allreduce(len(system.jacobian.rows.dofs)) > most:
         return None
     system.jacobian.set_rates([np.zeros_like(rates) for rates in system.jacobian.rates])
     try:
@@ -104,6 +122,9 @@ def _on_first_rank(
 
 def _is_short(system: System, problem: CondensedProblem, thresholds: PathThresholds) -> bool:
     """Whether the path is piecewise linear, or a curve of few unknowns that softening makes worth while."""
-    if is_piecewise_linear(problem):
-        return True
-    return problem.size <= thresholds.whole_curve_unknowns and any(softens(term.exact) for term in system.terms)
+    return is_piecewise_linear(problem) or problem.size <= _most_on_curve([t.exact for t in system.terms], thresholds)
+
+
+def _most_on_curve(laws: Sequence[Superpotential], thresholds: PathThresholds) -> int:
+    """The unknowns up to which a curve is followed: none where no law softens, which makes it worth while."""
+    return thresholds.whole_curve_unknowns if any(softens(law) for law in laws) else 0

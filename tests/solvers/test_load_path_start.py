@@ -37,6 +37,16 @@ def bar(pull: float, cells: int = 95) -> Table:
     }
 
 
+def exponential_bar(share: float) -> Table:
+    """The bar under a share of what its bond bears if the traction falls exponentially from the first slip on."""
+    peak, delta, stiffness, length = 7.2e6, 6.4e-5, 4.224e7, 0.190
+    process = np.sqrt(2.0 * stiffness * delta / peak)  # E t u" = peak exp(-u/delta), u = u' = 0 at the far end
+    table = bar(share * np.sqrt(2.0 * stiffness * peak * delta) * np.tanh(length / process), 48)
+    law = {"law": "exponential", "peak_traction": peak, "residual_traction": 0.0, "delta": delta}
+    table["boundary"]["glue"]["friction"] = law
+    return table
+
+
 def strip(**solver: object) -> Table:
     """An arm of a double cantilever whose end is lifted until a third of the glue is broken."""
     glue = {"law": "graph", "points": [[0, 0], [4e-6, 5e6], [20e-6, 0]], "one_sided": True}
@@ -93,6 +103,13 @@ def test_above_its_strength_in_space_with_friction_on_a_length_the_curve_says_wh
     borne = said_factor(found.solve_result.reason) * 1.5
     assert borne == pytest.approx(1.43225, rel=1e-5)  # the stable path of docs/paths.md
     assert solved(anchor(0.999 * borne)).converged
+
+
+def test_where_a_bond_weakens_exponentially_the_curve_says_which_load_is_borne() -> None:
+    found = solved(exponential_bar(1.05))
+    assert found.exit_code == 4
+    assert said_factor(found.solve_result.reason) * 1.05 == pytest.approx(1.0, rel=3e-3)
+    assert solved(exponential_bar(0.99)).converged
 
 
 @pytest.mark.long
