@@ -51,7 +51,7 @@ class Obstacle(BaseModel):
         dimensions: of space, in which it makes sense.
     """
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
     shape: ClassVar[str]
     dimensions: ClassVar[tuple[int, ...]] = (2, 3)
     registry: ClassVar[dict[str, type[Obstacle]]] = {}

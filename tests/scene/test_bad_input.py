@@ -22,6 +22,8 @@ from hvi_fenicsx import InputError, Scene, prepare, read_scene
 LAW = quadratic_linear(1e3)
 TABLE: dict[str, tuple[str, str]] = {
     "a degree that there is not": ("solver.degree=3", "--set solver.degree: must be 1 or 2 (is 3)"),
+    "true for a degree": ("solver.degree=true", "--set solver.degree: must be 1 or 2 (is true)"),
+    "a degree that is no whole number": ("solver.degree=1.0", "--set solver.degree: must be 1 or 2 (is 1.0)"),
     "unknown key": ("domain.sell=[4, 4]", "sell: unknown key"),
     "unknown table": ("boundry.x.on='left'", "boundry"),
     "misspelt side": ("boundary.wall.on='lefft'", 'did you mean "left"'),
