@@ -35,9 +35,9 @@ clock, lines, questions = OneLateClock(), list[str](), list[int]()
 
 
 def asked() -> bool:
-    """No signal has come; the second question on the third mesh finds the time over."""
+    """No signal has come; from the first question on the third mesh on the time is over."""
     questions.append(len(lines))
-    clock.late = questions.count(2) > 1
+    clock.late = len(lines) >= 2
     return False
 
 
