@@ -11,7 +11,7 @@ from typing_extensions import override
 
 from ..errors import InputError
 from ..laws import Mixity, mixities
-from ..schema import OneOf, Positive, refusal
+from ..schema import OneOf, refusal
 from .base import FormContext
 from .contribution import Contribution, Direction
 from .law_effect import LawEffect
@@ -24,15 +24,15 @@ class Cohesion(LawEffect):
     term: ClassVar[str] = "∫ j⁰(u; v - u) ds on Γc, j = g(δ), δ² = ⟨-u_n⟩₊² + β² |u_t|², vertex quadrature"
     direction: ClassVar[Direction] = Direction.SEPARATION
 
-    beta: Annotated[float, Field(gt=0.0, allow_inf_nan=False)] = 1.0
+    beta: Annotated[float, Field(ge=1e-9, le=1e9)] = 1.0
     """what a slip is multiplied by beside an opening: the strength in shear is beta times that in tension, and both
     modes take the same energy"""
     mixity: Annotated[str | None, OneOf(mixities)] = None
     """the criterion by which the energy of separation depends on the mode; by default it does not"""
-    energy_ratio: Positive | None = None
+    energy_ratio: Annotated[float | None, Field(ge=1e-9, le=1e9)] = None
     """with mixity: the energy of slip alone over that of opening alone; the strength in shear is beta energy_ratio
     times that in tension"""
-    exponent: Annotated[float | None, Field(ge=1.0, allow_inf_nan=False)] = None
+    exponent: Annotated[float | None, Field(ge=1.0, le=100.0)] = None
     """with mixity: the exponent of the criterion"""
 
     @model_validator(mode="after")

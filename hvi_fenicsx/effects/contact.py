@@ -25,7 +25,7 @@ MEASURED = "measured"
 """The gap between two bodies is the distance of their sides as they are meshed."""
 Gap = Annotated[
     SpatialValue | Literal["measured"],
-    BeforeValidator(lambda value: value if value == MEASURED else as_formula(value)),
+    BeforeValidator(lambda value: value if isinstance(value, str) and value == MEASURED else as_formula(value)),
     PlainSerializer(lambda gap: gap if isinstance(gap, str) else gap.source),
 ]
 """A number, a formula in x, y, z (SI), or "measured"."""

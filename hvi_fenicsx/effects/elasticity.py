@@ -73,7 +73,7 @@ class Elasticity(Effect):
         """Plane models are for 2D, the other for 3D."""
         if self.dimension() != dimension:
             allowed = "three_dimensional" if dimension == 3 else "plane_stress or plane_strain"
-            raise InputError(f'model = "{self.model}" in a {dimension}D scene; use {allowed}')
+            raise InputError(f'model = "{self.model}" is not for {dimension}D; use {allowed}')
 
 
 class IsotropicElasticity(Elasticity):

@@ -47,4 +47,4 @@ def require_components(formulas: tuple[Any, ...], dimension: int, key: str) -> N
         InputError: with the number of components wanted.
     """
     if len(formulas) != dimension:
-        raise InputError(f"{key} has {len(formulas)} components; a {dimension}D scene wants {dimension}")
+        raise InputError(f"{key} has {len(formulas)} components; in {dimension}D it has {dimension}")

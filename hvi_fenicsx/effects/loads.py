@@ -75,8 +75,10 @@ class BodyForce(Listed):
 
 
 def _component(value: Any) -> Any:
+    if value is None or (isinstance(value, str) and value == "free"):
+        return "free"
     try:
-        return value if isinstance(value, SpatialValue) or value == "free" else Formula(value)
+        return value if isinstance(value, SpatialValue) else Formula(value)
     except InputError as error:
         raise refusal(f'{error}; or write "free" to leave the component alone') from None
 

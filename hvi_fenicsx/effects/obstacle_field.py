@@ -48,7 +48,7 @@ def read(value: Any, info: ValidationInfo) -> Obstacle:
         raise refusal("must be a table, like { point = [0, 0], normal = [0, 1] }")
     keys = dict(value)
     name = keys.pop("shape", Plane.shape)
-    if name not in Obstacle.registry:
+    if not isinstance(name, str) or name not in Obstacle.registry:
         raise refusal(unknown("shape", name, Obstacle.registry))
     return Obstacle.registry[name].model_validate(keys, context=info.context)
 

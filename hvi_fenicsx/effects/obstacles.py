@@ -51,7 +51,7 @@ class Obstacle(BaseModel):
         dimensions: of space, in which it makes sense.
     """
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
     shape: ClassVar[str]
     dimensions: ClassVar[tuple[int, ...]] = (2, 3)
     registry: ClassVar[dict[str, type[Obstacle]]] = {}
@@ -228,7 +228,8 @@ class _Round(Obstacle):
         away, along = self.across(points - np.asarray(self.center)), self.across(direction[None])[0]
         square, middle = float(along @ along), away @ along
         with np.errstate(all="ignore"):
-            root = np.sqrt(middle**2 - square * (np.sum(away**2, axis=1) - self.radius**2))
+            length = np.linalg.norm(away, axis=1)
+            root = np.sqrt(middle**2 - square * (length - self.radius) * (length + self.radius))
             return np.asarray((-middle + (root if self.hollow else -root)) / square)
 
 

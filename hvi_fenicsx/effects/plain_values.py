@@ -43,7 +43,7 @@ class Listed(Effect):
     def _entries(cls, data: Any) -> tuple[Any, ...]:
         if isinstance(data, list | tuple):
             return tuple(data)
-        raise refusal("must be a list in square brackets, one entry for each component, like [1e6, 0.0]")
+        raise refusal("must be a list, one entry for each component, like [1e6, 0.0]")
 
     @model_serializer(mode="wrap")
     def _as_list(self, handler: SerializerFunctionWrapHandler) -> Any:

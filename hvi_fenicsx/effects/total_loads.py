@@ -105,7 +105,7 @@ class Moment(_Total):
         """One component in 2D, three in 3D."""
         if len(self.values) != (1 if dimension == 2 else 3):
             wanted = "one number (about z)" if dimension == 2 else "three numbers"
-            raise InputError(f"moment has {len(self.values)} components; a {dimension}D scene wants {wanted}")
+            raise InputError(f"moment has {len(self.values)} components; in {dimension}D it is {wanted}")
 
     @override
     def contribute(self, context: FormContext, where: str | None) -> Contribution:

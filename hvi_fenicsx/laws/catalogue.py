@@ -197,6 +197,8 @@ class Graph(PolylineLaw):
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "points", _checked_points(self.name, self.points))
+        if not isinstance(self.one_sided, bool):
+            raise InputError(f"law {self.name!r}: one_sided = {self.one_sided!r} is not usable; give True or False")
         if not any(traction for _, traction in self.points):
             raise InputError(f"law {self.name!r}: the traction of every point is 0; leave the law away")
 
@@ -211,8 +213,10 @@ class Graph(PolylineLaw):
 
 def _checked_points(law: str, points: Sequence[Sequence[float]]) -> tuple[tuple[float, float], ...]:
     """The points as pairs of floats; InputError where they are not the graph of a law."""
+    if isinstance(points, str) or not isinstance(points, Sequence | np.ndarray):
+        raise InputError(f"law {law!r}: points = {points!r} is not a list of pairs [displacement, traction]")
     for point in points:
-        if isinstance(point, str) or len(point) != 2:
+        if isinstance(point, str) or not isinstance(point, Sequence | np.ndarray) or len(point) != 2:
             raise InputError(f"law {law!r}: point {point!r} is not a pair [displacement, traction]")
         require_number(law, displacement=point[0], traction=point[1])
     pairs = tuple((float(x), float(t)) for x, t in points)

@@ -25,6 +25,7 @@ from ..mesh.thresholds import DEFAULT
 from ..mesh.transfer import Transfer
 from ..problem.interface_sides import Sides
 from ..schema import located_error, unknown
+from . import values
 from .places import read_names
 
 
@@ -95,7 +96,7 @@ class Body:
         Raises:
             InputError: a number is not allowed.
         """
-        return cls.from_shape(_shape(Rectangle, size=_plain(size), cells=_plain(cells)), comm)
+        return cls.from_shape(_shape(Rectangle, size=values.plain(size), cells=values.plain(cells)), comm)
 
     @classmethod
     def box(cls, size: Sequence[float], cells: Sequence[int], comm: MPI.Comm = MPI.COMM_WORLD) -> Self:
@@ -111,7 +112,7 @@ class Body:
         Raises:
             InputError: a number is not allowed.
         """
-        return cls.from_shape(_shape(Box, size=_plain(size), cells=_plain(cells)), comm)
+        return cls.from_shape(_shape(Box, size=values.plain(size), cells=values.plain(cells)), comm)
 
     @classmethod
     def file(
@@ -137,7 +138,10 @@ class Body:
         Raises:
             InputError: there is no such file, or a number is not allowed.
         """
-        keys = {"file": os.fspath(path), "scale": float(scale), "refinements": refinements}
+        if isinstance(dimension, bool) or dimension not in (2, 3):
+            raise InputError(f"dimension: must be 2 or 3 (is {dimension!r})")
+        file = os.fspath(path) if isinstance(path, os.PathLike) else path
+        keys = {"file": file, "scale": values.number(scale), "refinements": values.plain(refinements)}
         body = cls.from_shape(_shape(MeshFile, **keys), comm)
         body.dimension = dimension
         return body
@@ -217,8 +221,8 @@ class Body:
 
 def _by_name(what: str, tags: Any) -> dict[str, int]:
     """Tags by name, as a user gives them."""
-    numbers = isinstance(tags, Mapping) and all(isinstance(tag, (int, np.integer)) for tag in tags.values())
-    if not (numbers and all(isinstance(name, str) for name in tags)):
+    named = isinstance(tags, Mapping) and all(isinstance(name, str) for name in tags)
+    if not named or any(isinstance(tag, bool) or not isinstance(tag, int | np.integer) for tag in tags.values()):
         raise InputError(f'body: {what} are numbers of tags by name, such as {what}={{"wall": 1}}, not {tags!r}')
     return {name: int(tag) for name, tag in tags.items()}
 
@@ -248,11 +252,6 @@ def _remembering(domain: Domain) -> Domain:
         return _remembering(found), transfer
 
     return replace(domain, coarsening=coarser)
-
-
-def _plain(values: Sequence[float]) -> Any:
-    """Numbers of any kind, such as NumPy's, as Python's."""
-    return np.asarray(values).tolist()
 
 
 def _shape(kind: type[DomainShape], **keys: Any) -> DomainShape:

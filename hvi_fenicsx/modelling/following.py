@@ -26,6 +26,7 @@ from ..runtime import log
 from ..scene import PathTable, Scene, SolverTable
 from ..schema import located_error, unknown
 from ..typing import Array
+from . import values
 from .model import Model
 from .solution import displacement
 from .solving import check
@@ -116,8 +117,8 @@ class ModelPath(LoadPath):
         """As the report reads it from its folder."""
         columns = {"factor": self.factors, "stable": self.stable.astype(float)}
         for part in self.parts:
-            for kind, values in (("f", self.force(part)), ("u", self.displacement(part))):
-                columns |= {f"{part}.{kind}{'xyz'[i]}": values[:, i] for i in range(self.dimension)}
+            for kind, rows in (("f", self.force(part)), ("u", self.displacement(part))):
+                columns |= {f"{part}.{kind}{'xyz'[i]}": rows[:, i] for i in range(self.dimension)}
         return PathResult(
             folder=Path("."),
             scene={"title": self.run.prepared.scene.title},
@@ -190,7 +191,8 @@ def _by_table(options: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any
 
 def _wanted(scene: Scene, changes: dict[str, Any]) -> PathTable:
     known = scene.path or PathTable()
+    given = {key: values.plain(value) for key, value in changes.items()}
     try:
-        return scene.changed(path=known.changed(**changes)).path or known
+        return scene.changed(path=known.changed(**given)).path or known
     except ValidationError as error:
         raise located_error(error, Scene) from None

@@ -35,7 +35,10 @@ class _Elastic(InRegion):
 
     def _material(self, kind: type[Effect], mesh: dmesh.Mesh, **keys: Any) -> Effect:
         usual = "plane_stress" if mesh.geometry.dim == 2 else "three_dimensional"
-        common = {"model": self.model or usual, "thermal_expansion": values.number(self.thermal_expansion)}
+        common = {
+            "model": usual if self.model is None else self.model,
+            "thermal_expansion": values.number(self.thermal_expansion),
+        }
         return checked(kind, **common, **keys)
 
 

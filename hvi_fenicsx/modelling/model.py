@@ -2,27 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from typing import Any
-
-from pydantic import ValidationError
 
 from ..effects import Effect, Place
 from ..errors import InputError
-from ..mesh.boundary_part import BoundaryPart
-from ..problem.interface_sides import Sides
-from ..scene import BodyTable, BoundaryTable, InterfaceTable, MaterialTable, Scene
-from ..schema import located_error, unknown
+from ..schema import unknown
 from .body import Body
+from .model_tables import ModelTables, in_python, in_words
 from .placed_effects import OnSide, PlacedEffect
-from .places import Names
 
-_WHOLE = "whole body"
-_LONGEST_NAME = 90
-"""Characters of the name of a place; a scene allows 100, and a number may follow."""
 _Key = tuple[Place, str, frozenset[str]]
-_Placed = tuple[Names | None, dict[str, Any]]
-"""The place of a table, and its effects by their keys."""
 
 
 class Model:
@@ -41,6 +31,7 @@ class Model:
     Attributes:
         body: the body.
         effects: the effects, with their places.
+        tables: the effects by the tables of a scene.
         scene: the same as a scene.
     """
 
@@ -51,7 +42,8 @@ class Model:
         self._made = [(one, _effect(one, body)) for one in self.effects]
         if not any(effect.place is Place.MATERIAL for _, effect in self._made):
             raise InputError("model: no effect is a material; add one, such as hvi.Isotropic(youngs_modulus=..., ...)")
-        self.scene = _scene(body, [(one.where, effect) for one, effect in self._made], title)
+        self.tables = ModelTables.of((one.where, effect) for one, effect in self._made)
+        self.scene = self.tables.scene(body, title)
 
     def replace(self, *effects: PlacedEffect) -> Model:
         """The model with other effects in the place of those of the same kind at the same place. Collective.
@@ -94,13 +86,17 @@ def _listed(user: str, effects: Any) -> tuple[PlacedEffect, ...]:
 def _effect(placed: PlacedEffect, body: Body) -> Effect:
     """The effect, checked; a refusal names it and its place. Collective."""
     try:
-        return placed.effect(body.mesh)
+        effect = placed.effect(body.mesh)
+        effect.check(body.mesh.geometry.dim)
     except InputError as error:
-        raise InputError("\n".join(f"{_name(placed)}: {line}" for line in str(error).splitlines())) from error
+        raise InputError(
+            "\n".join(f"{_name(placed)}: {line}" for line in in_python(str(error)).splitlines())
+        ) from error
+    return effect
 
 
 def _name(placed: PlacedEffect) -> str:
-    return f"{type(placed).__name__} on {_words(placed.where)}"
+    return f"{type(placed).__name__} on {in_words(placed.where)}"
 
 
 def _check_place(body: Body, placed: PlacedEffect) -> None:
@@ -120,11 +116,6 @@ def _no_place(name: str, known: Collection[str], alone: Collection[str]) -> str:
     return unknown("place", name, [*known, *alone])
 
 
-def _words(where: Collection[str] | None) -> str:
-    """A place in messages."""
-    return ", ".join(where) if where else "the body"
-
-
 def _key(placed: PlacedEffect, effect: Effect) -> _Key:
     return effect.place, effect.key, frozenset(placed.where or ())
 
@@ -134,76 +125,6 @@ def _position(places: Sequence[_Key], wanted: _Key) -> int:
     if len(found) == 1:
         return found[0]
     _, kind, where = wanted
-    known = "; ".join(f"{key} on {_words(sorted(place))}" for _, key, place in places)
+    known = "; ".join(f"{key} on {in_words(sorted(place))}" for _, key, place in places)
     count = "no" if not found else "several effects"
-    raise InputError(f"replace: the model has {count} {kind} on {_words(sorted(where))}; it has {known}")
-
-
-def _scene(body: Body, effects: Iterable[tuple[Names | None, Effect]], title: str) -> Scene:
-    tables: dict[Place, list[_Placed]] = {place: [] for place in Place}
-    for where, effect in effects:
-        _add(tables[effect.place], where, effect)
-    seams = [(name,) for name in body.interfaces]
-    on_interfaces = [table for table in tables[Place.BOUNDARY] if table[0] in seams]
-    on_sides = [table for table in tables[Place.BOUNDARY] if table[0] not in seams]
-    try:
-        return Scene(
-            title=title,
-            domain=body.shape,
-            material=_materials(tables[Place.MATERIAL]),
-            body={name: BodyTable(region=where, **own) for name, (where, own) in _named(tables[Place.BODY]).items()},
-            boundary=dict(_boundary(on_sides, body.pieces)),
-            interface={name: _interface(name, sides, on_interfaces) for name, sides in body.interfaces.items()},
-        )
-    except ValidationError as error:
-        raise located_error(error, Scene) from None
-
-
-def _add(tables: list[_Placed], where: Names | None, effect: Effect) -> None:
-    """Put an effect into the first table of its place that has none of its kind."""
-    for place, own in tables:
-        if place == where and effect.key not in own:
-            own[effect.key] = effect
-            return
-    tables.append((where, {effect.key: effect}))
-
-
-def _joined(where: Names | None) -> str:
-    """The name of a place in results: its sides or regions with hyphens between them."""
-    return "-".join(where or (_WHOLE,))[:_LONGEST_NAME]
-
-
-def _named(tables: Sequence[_Placed]) -> dict[str, _Placed]:
-    """Tables by the names of their places, with a number from the second one of a name on."""
-    named: dict[str, _Placed] = {}
-    for table in tables:
-        name = joined = _joined(table[0])
-        number = 1
-        while name in named:
-            number += 1
-            name = f"{joined}.{number}"
-        named[name] = table
-    return named
-
-
-def _materials(tables: Sequence[_Placed]) -> Any:
-    each = [(where, {"effect": effect}) for where, own in tables for effect in own.values()]
-    made = {n: MaterialTable(region=where, elasticity=own["effect"]) for n, (where, own) in _named(each).items()}
-    return next(iter(made.values())) if set(made) == {_WHOLE} else made
-
-
-def _interface(name: str, sides: Sides, tables: Sequence[_Placed]) -> InterfaceTable:
-    """The table of an interface."""
-    found = [own for where, own in tables if where == (name,)]
-    if len(found) > 1:
-        raise InputError(f"{name}: {next(iter(found[1]))} acts there already; give it once")
-    return InterfaceTable(between=(sides.first, sides.second), tied=sides.tied, **(found[0] if found else {}))
-
-
-def _boundary(tables: Sequence[_Placed], pieces: Mapping[str, BoundaryPart]) -> Iterable[tuple[str, BoundaryTable]]:
-    """Tables of sides and pieces by name."""
-    for name, (where, own) in _named(tables).items():
-        sides = where or ()
-        piece = pieces.get(sides[0]) if len(sides) == 1 else None
-        part = piece or BoundaryPart(sides)
-        yield name, BoundaryTable(on=part.on, where=part.where, **own)
+    raise InputError(f"replace: the model has {count} {kind} on {in_words(sorted(where))}; it has {known}")

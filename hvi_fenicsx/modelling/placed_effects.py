@@ -16,7 +16,6 @@ from ..errors import InputError
 from ..laws import Mixity, Superpotential
 from ..mesh.domain import Domain
 from ..schema import located_error
-from ..spatial_value import SpatialValue
 from . import values
 from .places import Names, read_names
 
@@ -137,8 +136,7 @@ class Displacement(OnSide):
         """The conditions."""
         if isinstance(self.values, Sequence) and any(isinstance(v, str) and v == "free" for v in self.values):
             raise InputError('write None in place of "free", the word of scene files')
-        given = ["free" if value is None else value for value in values.components(self.values, mesh)]
-        return checked(effects.loads.PrescribedDisplacement, values=tuple(given))
+        return checked(effects.loads.PrescribedDisplacement, values=tuple(values.components(self.values, mesh)))
 
 
 @dataclass(frozen=True)
@@ -183,12 +181,12 @@ class Contact(OnSide):
     def effect(self, mesh: dmesh.Mesh) -> Effect:
         """The bounds."""
         given = {"gap": self.gap, "lower": self.lower, "upper": self.upper}
-        keys: dict[str, Any] = {k: _bound(v, mesh) for k, v in given.items() if v is not None}
+        keys: dict[str, Any] = {k: values.spatial_value(v, mesh) for k, v in given.items() if v is not None}
         if isinstance(self.obstacle, Mapping):
-            keys["obstacle"] = dict(self.obstacle)
+            keys["obstacle"] = {key: values.plain(value) for key, value in self.obstacle.items()}
         elif self.obstacle is not None:
             keys["obstacle"] = _flat(self.obstacle)
-        keys = keys or {"gap": values.spatial_value(0.0, mesh)}
+        keys = keys or {"gap": 0.0}
         if self.direction is not None:
             keys["direction"] = values.numbers(self.direction)
         return checked(effects.contact.Contact, **keys)
@@ -199,13 +197,6 @@ def _flat(given: Any) -> dict[str, tuple[float, ...]]:
     if not isinstance(given, Sequence) or len(given) != 2:
         raise InputError(f"obstacle: give a point and a normal, ([0, 0], [0, 1]), or a table, not {given!r}")
     return {"point": values.numbers(given[0]), "normal": values.numbers(given[1])}
-
-
-def _bound(value: Value, mesh: dmesh.Mesh) -> SpatialValue | str:
-    """A gap or bound as a scene has it."""
-    if isinstance(value, str) and value == effects.contact.MEASURED:
-        return value
-    return values.spatial_value(value, mesh)
 
 
 @dataclass(frozen=True)

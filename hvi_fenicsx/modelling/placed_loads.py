@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from dolfinx import mesh as dmesh
 
 from ..effects import Effect, total_loads
+from ..errors import InputError
+from ..schema import shown
 from . import values
 from .placed_effects import OnSide, Value, checked
 
@@ -60,5 +63,8 @@ class Moment(OnSide):
 
     def effect(self, mesh: dmesh.Mesh) -> Effect:
         """The load."""
-        given = self.value if isinstance(self.value, Iterable) else (self.value,)
-        return checked(total_loads.Moment, values=values.numbers(given))
+        given = values.numbers(self.value)
+        listed = given if isinstance(given, tuple) else (values.number(given),)
+        if not all(isinstance(one, float) and math.isfinite(one) for one in listed):
+            raise InputError(f"value: must be a finite number, in 3D a list of three (is {shown(self.value)})")
+        return checked(total_loads.Moment, values=listed)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import fields, replace
 from typing import Any
 
@@ -26,6 +27,7 @@ from ..solution import Solution
 from ..solvers.context import Progress
 from ..system import petsc_options
 from ..system.system import System
+from . import values
 from .model import Model
 from .solution import ModelSolution
 from .user_energy import UserEnergy
@@ -113,7 +115,8 @@ def check(
     else:
         scene, domain, comm = model.scene, _domain(model), model.body.comm
     scene, comm = _with_options(scene, options), comm or MPI.COMM_WORLD
-    prepared = preparation.prepare(scene, comm, timer, domain, thresholds=thresholds)
+    with model.tables.naming() if isinstance(model, Model) else nullcontext():
+        prepared = preparation.prepare(scene, comm, timer, domain, thresholds=thresholds)
     return ModelPreparation(**_fields(prepared))
 
 
@@ -147,8 +150,9 @@ def _displacement(known: ModelSolution, prepared: Preparation) -> fem.Function |
 
 
 def _with_options(scene: Scene, options: dict[str, Any]) -> Scene:
+    given = {key: values.plain(value) for key, value in options.items()}
     try:
-        return scene.with_solver(**options) if options else scene
+        return scene.with_solver(**given) if given else scene
     except ValidationError as error:
         raise located_error(error, SolverTable) from None
 

@@ -6,6 +6,7 @@ import logging
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields
+from numbers import Real
 from typing import Any
 
 from mpi4py import MPI
@@ -79,13 +80,19 @@ def equilibria(
     Raises:
         InputError: on all ranks alike: a law is of a kind that is not searched, or a number is not allowed.
     """
-    if not 0.0 < gap < 1.0:
-        raise InputError(f"gap: must be between 0 and 1 (is {gap!r})")
+    _check_numbers(gap, limit)
     prepared = check(model, comm, **options)
     searched = bodies.Equilibria(prepared)
     stop = _stop(prepared.system.comm, limit)
     found = searched.find(lowest=lowest, gap=gap, stop=stop, report=_LOG.debug)
     return _result(found, tuple(_certified(searched, found)), prepared.problem.scales.energy)
+
+
+def _check_numbers(gap: Any, limit: Any) -> None:
+    if isinstance(gap, bool) or not isinstance(gap, Real) or not 0.0 < float(gap) < 1.0:
+        raise InputError(f"gap: must be a number between 0 and 1 (is {gap!r})")
+    if limit is not None and (isinstance(limit, bool) or not isinstance(limit, Real) or not float(limit) > 0.0):
+        raise InputError(f"limit: must be a number of seconds above 0, or None (is {limit!r})")
 
 
 def _certified(searched: bodies.Equilibria, found: Found) -> Iterator[Solution]:

@@ -38,7 +38,7 @@ class PythonFunction(SpatialValue):
     @override
     def at(self, points: Array) -> Array:
         values = np.asarray(self._function(np.ascontiguousarray(points.T)))
-        if values.dtype.kind not in "biuf":
+        if values.dtype.kind not in "iuf":
             raise InputError(f"{self.source}: returns {values.dtype} values; return real numbers")
         if values.shape not in ((), (len(points),)):
             raise InputError(f"{self.source}: returns an array {values.shape} at {len(points)} points; return (n,)")
@@ -106,27 +106,23 @@ class Expression(SpatialValue):
         return found
 
 
-def spatial_value(given: Any, mesh: dmesh.Mesh) -> SpatialValue:
-    """A value in space.
+def spatial_value(given: Any, mesh: dmesh.Mesh) -> Any:
+    """A value in space that only Python has, or a number; what is neither as it is, for the effect to read.
 
     Args:
         given: a number, a formula in x, y, z, a Python function, a scalar UFL expression or a scalar fem.Function.
         mesh: the body's mesh.
 
     Raises:
-        InputError: it is none of these, or of another mesh.
+        InputError: a UFL expression is no scalar, or of another mesh.
     """
-    if isinstance(given, SpatialValue):
-        return given
     if isinstance(given, ufl.core.expr.Expr):
         return _expression(given, mesh)
-    if callable(given):
-        return PythonFunction(given)
-    return Formula(float(given) if isinstance(given, np.floating | np.integer) else given)
+    return PythonFunction(given) if callable(given) else number(given)
 
 
 def components(given: Any, mesh: dmesh.Mesh) -> list[Any]:
-    """The components of a vector; None where a component is left alone.
+    """The components of a vector, each as :func:`spatial_value` has it.
 
     Args:
         given: a list with an entry for each component, or the whole vector as a Python function with values (d, n), a
@@ -145,7 +141,7 @@ def components(given: Any, mesh: dmesh.Mesh) -> list[Any]:
         return [PythonFunction(_component(given, i, d)) for i in range(d)]
     if not isinstance(given, Sequence | np.ndarray) or isinstance(given, str):
         raise InputError(f"a vector is a list with {d} entries, a function or a UFL expression, not {given!r}")
-    return [None if value is None else spatial_value(value, mesh) for value in given]
+    return [spatial_value(value, mesh) for value in given]
 
 
 def numbers(given: Any, each: Callable[[Any], Any] | None = None) -> Any:
@@ -163,15 +159,29 @@ def numbers(given: Any, each: Callable[[Any], Any] | None = None) -> Any:
 def number(given: Any) -> Any:
     """A number of any kind, such as NumPy's, as Python's; what is none as it is, for the effect to refuse.
 
-    The effect knows the field, and finds all that is wrong at once.
+    The effect knows the field, and finds all that is wrong at once. A boolean is no number; pydantic would take NumPy's
+    for one.
 
     Args:
         given: what the user gave.
     """
+    if getattr(given, "dtype", None) == np.bool_:
+        return plain(given)
     try:
-        return given if isinstance(given, str) else float(given)
+        return given if isinstance(given, str | bool) else float(given)
     except (TypeError, ValueError, OverflowError):
         return given
+
+
+def plain(given: Any) -> Any:
+    """NumPy's number or array as Python's number or list, its kind kept; lists of such too; all else as it is.
+
+    Args:
+        given: what the user gave.
+    """
+    if isinstance(given, np.generic | np.ndarray):
+        return given.tolist()
+    return [plain(one) for one in given] if isinstance(given, list | tuple) else given
 
 
 def _component(function: Callable[[Array], Any], i: int, count: int) -> Callable[[Array], Any]:

@@ -24,7 +24,7 @@ from .law_term import LawTerm
 from .problem import PlacedContribution
 from .scaling import Scales
 from .spaces import contact_rule
-from .thresholds import Thresholds
+from .thresholds import DEFAULT, Thresholds
 
 Modification = Callable[[Superpotential], Superpotential]
 """The law that is solved in the place of a law, SI: the same law, smoothed for example."""
@@ -129,7 +129,7 @@ def _term(
     by_rule: bool,
 ) -> LawTerm:
     length = law.direction.length(where.tangents.shape[1], law.slip)
-    solved, exact = (_scaled(j, scales, f"boundary.{where.part}.{key}") for j in (modify(law.law), law.law))
+    solved, exact = (_scaled(j, scales, f"boundary.{where.part}.{key}", law.slip) for j in (modify(law.law), law.law))
     if length is not None and np.any(solved.convex.kinks > 0):
         raise InputError(
             f'boundary.{where.part}: law = "{law.law.name}" jumps upwards at a length > 0 of a vector, which is a '
@@ -166,29 +166,49 @@ def _check_formulas(context: DomainForms, where: Surface, key: str, law: Boundar
         raise InputError(f"boundary.{where.part}.{key}: {text}")
 
 
-def _factor(context: DomainForms, where: Surface, key: str, given: SpatialValue) -> Array:
+def _factor(
+    context: DomainForms, where: Surface, key: str, given: SpatialValue, thresholds: Thresholds = DEFAULT
+) -> Array:
     """What tractions or lengths of a law are multiplied by at the vertices of its part, (m,). Collective.
 
     Raises:
         InputError: on all ranks alike: it is not a positive number somewhere.
     """
-    found = given.at(where.points)
-    bad = np.flatnonzero(~(np.isfinite(found) & (found > 0.0)))
+    found, most = given.at(where.points), thresholds.largest_scale
+    bad = np.flatnonzero(~((found >= 1.0 / most) & (found <= most)))
     said = [f"{found[i]:g} at {tuple(map(float, where.points[i]))}" for i in bad[:1]]
     for text in (text for rank in agree(context.domain.mesh.comm, said) for text in rank):
-        reason = "it must be positive at every vertex. Where there is no law, leave that piece out: `where`"
+        reason = (
+            f"it must be positive at every vertex, from {1.0 / most:g} to {most:g}. Where there is no law, leave that "
+            "piece out: `where`"
+        )
         raise InputError(f"boundary.{where.part}.{key} = {given.source!r} is {text}; {reason}")
     return found
 
 
-def _scaled(law: Superpotential, scales: Scales, place: str) -> Superpotential:
+def _scaled(
+    law: Superpotential, scales: Scales, place: str, slip: float, thresholds: Thresholds = DEFAULT
+) -> Superpotential:
     """The law in the problem's units.
+
+    Args:
+        law: in SI.
+        scales: what one unit is in SI.
+        place: where the scene states it.
+        slip: what its slips are multiplied by.
+        thresholds: which numbers can be computed with.
 
     Raises:
         InputError: its parameters are too large or too small for these.
     """
+    most = thresholds.largest_scale
     try:
-        return law.scaled(scales.displacement, scales.stress)
+        scaled = law.scaled(scales.displacement, scales.stress)
+        if not all(1.0 / most <= size <= most for size in (scaled.length_scale, slip)) or scaled.energy_scale > most:
+            raise InputError(
+                f"its displacements are about {law.length_scale / slip:.0e} m; give all numbers in m and N/m²"
+            )
+        return scaled
     except InputError as error:
         units = f"beside displacements of {scales.displacement:.0e} m and stresses of {scales.stress:.0e} N/m²"
         raise InputError(f"{place}: {units} it cannot be computed with: {error}") from None

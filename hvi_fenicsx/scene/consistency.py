@@ -152,7 +152,7 @@ def _one_by_one(scene: Tables) -> Iterator[Mistake]:
 def _start(scene: Tables) -> Iterator[Mistake]:
     start = scene.solver.start
     if not isinstance(start, str) and len(start) != scene.dimension:
-        text = f"has {len(start)} components; a {scene.dimension}D scene wants {scene.dimension}"
+        text = f"has {len(start)} components; in {scene.dimension}D it has {scene.dimension}"
         yield Mistake(("solver", "start"), text)
 
 
@@ -221,7 +221,7 @@ def _against(
         idle = [i for i, formula in enumerate(load.components) if i in prescribed and formula.source != 0.0]
         for axis in idle:
             reason = f'{_axis(axis)} is prescribed on "{side}" by {_dotted(prescribed[axis])}'
-            text = f'component {axis + 1} does nothing: {reason}; write 0 here or "free" there'
+            text = f'component {axis + 1} does nothing: {reason}; write "free" there or 0 here'
             yield Mistake(key, text)
 
 

@@ -11,12 +11,17 @@ from pydantic import BeforeValidator, Field, PlainSerializer
 
 from ..schema import Names, Table, refusal, shown
 
+_LARGEST = 1e100
+"""A factor beyond this makes work of which squares are no numbers."""
+
 
 def _factors(value: Any) -> tuple[float, ...]:
     entries = value if isinstance(value, list | tuple) else [value]
     for entry in entries:
         if isinstance(entry, bool) or not isinstance(entry, int | float) or not math.isfinite(entry):
             raise refusal(f"must be a number, or a list of numbers like [1.0, 0.2, 1.5] (is {shown(value)})")
+        if abs(entry) > _LARGEST:
+            raise refusal(f"must be factors between {-_LARGEST:g} and {_LARGEST:g} (is {shown(value)})")
     return tuple(float(entry) for entry in entries)
 
 

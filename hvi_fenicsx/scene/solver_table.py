@@ -14,6 +14,13 @@ from ..schema import Count, Mistake, OneOf, Positive, Table, refusal, shown, val
 _STARTS = ("unbroken", "resting", "broken")
 
 
+def _degree(value: Any) -> Any:
+    """Refuses what is equal to a degree and none: true and 1.0 are equal to 1."""
+    if isinstance(value, bool | float):
+        raise refusal(f"must be 1 or 2 (is {shown(value)})")
+    return value
+
+
 def _start(value: Any) -> Any:
     if isinstance(value, list | tuple):
         return tuple(v if isinstance(v, Formula) else _formula(v) for v in value)
@@ -42,7 +49,7 @@ Start = Annotated[
 class SolverTable(Table):
     """How the problem is solved. Without `smoothing` and `epsilon` the law itself is solved, not a smoothed one."""
 
-    degree: Literal[1, 2] | None = None
+    degree: Annotated[Literal[1, 2] | None, BeforeValidator(_degree)] = None
     """the degree of the elements: 1, or 2, which needs far fewer unknowns for the same accuracy; without it 1, but with
     `--accuracy` or `--time-budget` the cheaper one"""
     method: str = "auto"

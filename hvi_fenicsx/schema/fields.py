@@ -37,7 +37,7 @@ def vector(length: int) -> BeforeValidator:
 
     def read(value: Any) -> Any:
         if not isinstance(value, list | tuple):
-            raise refusal(f"must be a list of {length} in square brackets (is {shown(value)})")
+            raise refusal(f"must be a list of {length}, as in [{', '.join(['...'] * length)}] (is {shown(value)})")
         if len(value) != length:
             raise refusal(f"must have {length} entries, not {len(value)}")
         return tuple(value)

@@ -68,7 +68,8 @@ def located_error(error: ValidationError, model: type[BaseModel] | None = None) 
         error: pydantic's error.
         model: the table that was read, for its allowed keys.
     """
-    lines = ((".".join(map(str, mistake.where)), mistake.text) for mistake in mistakes_of(error, model))
+    found = mistakes_of(error, model)
+    lines = ((".".join(str(key) for key in mistake.where if key != ""), mistake.text) for mistake in found)
     return InputError("\n".join(f"{where}: {text}" if where else text for where, text in lines))
 
 

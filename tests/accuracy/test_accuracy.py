@@ -6,6 +6,7 @@ What is promised is held to solutions on much finer meshes; the forecasts to ste
 from __future__ import annotations
 
 import itertools
+import json
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -15,7 +16,7 @@ import numpy as np
 import pytest
 from dolfinx import fem
 from mpi4py import MPI
-from runs import hvi, summary, write_scene
+from runs import RANKS, hvi, on_ranks, summary, write_scene
 from scenes import STEEL, model, quadratic_linear
 
 from hvi_fenicsx import Scene, read_scene
@@ -419,6 +420,19 @@ def test_a_mesh_whose_solve_outlasts_the_budget_leaves_the_last_one(accuracy: fl
     assert reached.exit_code == (0 if accuracy is None else 4)
     assert reached.more is not None
     assert reached.more.accuracy == (accuracy or reached.steps[-1].error / 10)
+
+
+@pytest.mark.parametrize("ranks", RANKS[1:])
+def test_all_ranks_stop_where_the_time_has_passed_on_one(ranks: int) -> None:
+    """Ranks whose clocks differ would else wait for each other for ever; the mesh before is that of one rank."""
+    scene = STRONG | {"solver": {"degree": 1}}
+    found = on_ranks(ranks, str(Path(__file__).with_name("budget_ranks.py")), json.dumps(scene))
+    alone = on_ranks(1, str(Path(__file__).with_name("budget_ranks.py")), json.dumps(scene))
+    assert found == [found[0]] * ranks
+    meshes, _, told, energy, unknowns = found[0]
+    assert meshes == 2
+    assert "when the time had passed" in told
+    assert (energy, unknowns) == (pytest.approx(alone[0][3], rel=1e-8), alone[0][4])
 
 
 def test_an_accuracy_out_of_reach_leaves_the_best_that_the_time_allows() -> None:

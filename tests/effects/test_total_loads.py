@@ -79,9 +79,9 @@ def test_a_force_in_space_has_its_resultant() -> None:
 @pytest.mark.parametrize(
     ("loads", "words"),
     [
-        ({"force": [1.0]}, "force has 1 components; a 2D scene wants 2"),
+        ({"force": [1.0]}, "force has 1 components; in 2D it has 2"),
         ({"force": ["x", 0.0]}, "is the sum over the part: numbers only"),
-        ({"moment": [1.0, 2.0, 3.0]}, "a 2D scene wants one number"),
+        ({"moment": [1.0, 2.0, 3.0]}, "in 2D it is one number"),
     ],
 )
 def test_what_makes_no_sense_is_refused(loads: Table, words: str) -> None:

@@ -39,10 +39,18 @@ def solved(body: hvi.Body, traction: Any) -> hvi.Solution:
         (hvi.Anisotropic(matrix=[[1, 0, 0], 4, [0, 0, 1]]), "^Anisotropic on the body: matrix.1: must be a list"),  # type: ignore[list-item]
         (hvi.Orthotropic(youngs_moduli=[1, 1], poisson_ratios=[0], shear_moduli=3), "shear_moduli: must be a list"),  # type: ignore[arg-type]
         (hvi.Energy(3), "^Energy on the body: give a function that returns the UFL form"),  # type: ignore[arg-type]
-        (hvi.Displacement("left", [np.nan, 0.0]), "^Displacement on left: must be a finite number"),
+        (hvi.Displacement("left", [np.nan, 0.0]), "^Displacement on left: values.0: must be a finite number"),
         (hvi.Displacement("left", [0.0, "free"]), '^Displacement on left: write None in place of "free"'),
         (hvi.Force("right", [lambda x: x[0], 0.0]), "^Force on right: values.0: must be a number"),  # type: ignore[list-item]
-        (hvi.Moment("right", None), "^Moment on right: values.0: must be a number"),  # type: ignore[arg-type]
+        (hvi.Moment("right", None), "^Moment on right: value: must be a finite number, .*is None"),  # type: ignore[arg-type]
+        (hvi.Moment("right", [np.inf]), "^Moment on right: value: must be a finite number"),
+        (hvi.Moment("right", [1.0, 2.0, 3.0]), "^Moment on right: moment has 3 components; in 2D it is one number"),
+        (hvi.Traction("right", [0.0, None]), "^Traction on right: values.1: must be a number or a formula"),
+        (hvi.Force("right", [1.0]), "^Force on right: force has 1 components; in 2D it has 2"),
+        (hvi.Displacement("left", [[0.0], 0.0]), "values.0: .*; or write None to leave the component alone"),
+        (hvi.Contact("bottom", lower=0.0, upper=np.inf), "^Contact on bottom: upper: must be a finite number"),
+        (hvi.Contact("bottom", gap=0.0, direction=[0, 0, 1]), "contact.direction has 3 components; in 2D it has 2"),
+        (hvi.Isotropic(youngs_modulus=1e9, poisson_ratio=0.3, model="three_dimensional"), "is not for 2D; use plane"),
         (hvi.Contact("bottom", obstacle=3), "^Contact on bottom: obstacle: give a point and a normal"),  # type: ignore[arg-type]
         (hvi.Friction("bottom", "graph"), "^Friction on bottom: law: give a law as an object"),  # type: ignore[arg-type]
         (hvi.On("bottom", 3), "^On on bottom: 3 is no effect"),  # type: ignore[arg-type]
@@ -118,3 +126,101 @@ def test_a_function_with_values_of_another_kind_is_refused(square: hvi.Body, tra
 def test_a_component_of_a_function_may_be_one_number(square: hvi.Body) -> None:
     pulled = solved(square, lambda x: [1e6 * (1 + x[1]), 0.0])
     np.testing.assert_allclose(pulled.resultant("right"), [1.5e6, 0.0], atol=1e-6)
+
+
+@pytest.mark.parametrize("true", [True, np.True_, np.array(True)])
+@pytest.mark.parametrize(
+    "effect",
+    [
+        lambda true: hvi.Isotropic(youngs_modulus=true, poisson_ratio=0.3),
+        lambda true: hvi.Isotropic(youngs_modulus=1e9, poisson_ratio=0.3, thermal_expansion=true),
+        lambda true: hvi.Orthotropic(youngs_moduli=[1.0, true], poisson_ratios=[0.0], shear_moduli=[1.0]),
+        lambda true: hvi.Anisotropic(matrix=[[2, 0, 0], [0, true, 0], [0, 0, 1]]),
+        lambda true: hvi.Displacement("left", [true, 0.0]),
+        lambda true: hvi.Traction("right", [true, 0.0]),
+        lambda true: hvi.Pressure("right", true),
+        lambda true: hvi.Force("right", [true, 0.0]),
+        lambda true: hvi.Moment("right", true),
+        lambda true: hvi.BodyForce([true, 0.0]),
+        lambda true: hvi.Temperature(true),
+        lambda true: hvi.Contact("bottom", gap=true),
+        lambda true: hvi.Contact("bottom", direction=[true, 1.0]),
+        lambda true: hvi.Contact("bottom", obstacle=([0.0, 0.0], [true, 1.0])),
+        lambda true: hvi.Contact("bottom", obstacle={"shape": "sphere", "center": [0.0, -1.0], "radius": true}),
+        lambda true: hvi.Contact("bottom", obstacle={"point": [0, true], "normal": [0, 1]}),
+        lambda true: hvi.Friction("bottom", hvi.laws.Tresca(1.0), multiplier=true),
+        lambda true: hvi.Cohesion("bottom", hvi.laws.Tresca(1.0), beta=true),
+    ],
+)
+def test_a_boolean_is_no_number(square: hvi.Body, effect: Any, true: Any) -> None:
+    """Python counts True as 1, and so it was taken."""
+    with pytest.raises(hvi.InputError, match=r"must be .*number.*|must be greater than|usable"):
+        hvi.Model(square, [STEEL, effect(true)] if effect(true).where else [effect(true)])
+
+
+@pytest.mark.parametrize(
+    "made",
+    [
+        lambda: hvi.Body.rectangle([True, 1.0], [2, 2]),
+        lambda: hvi.Body.rectangle([1.0, 1.0], [2, True]),
+        lambda: hvi.Body.box([1.0, 1.0, 1.0], np.array([True, True, True])),  # type: ignore[arg-type]
+        lambda: hvi.Body.file(__file__, scale=True),
+        lambda: hvi.Body.file(__file__, refinements=True),
+        lambda: hvi.Body.file(__file__, dimension=True),
+        lambda: hvi.laws.QuadraticLinear(gamma1=2.0, gamma2=True, delta=1e-6),
+        lambda: hvi.laws.Graph([(0, 0), (True, 1.0)]),
+        lambda: hvi.laws.PowerLaw(energy_ratio=True, exponent=2.0),
+        lambda: hvi.Scene(domain={"shape": "rectangle", "size": [1.0, True], "cells": [2, 2]}, material={}),
+    ],
+)
+def test_a_boolean_is_no_number_of_a_body_or_a_law(made: Any) -> None:
+    with pytest.raises(hvi.InputError, match=r"number|must be 2 or 3"):
+        made()
+
+
+@pytest.mark.parametrize(
+    "options",
+    [{"tolerance": True}, {"max_iterations": True}, {"epsilon": True}, {"start": [True, 0.0]}, {"degree": True}],
+)
+def test_a_boolean_is_no_option(square: hvi.Body, options: Any) -> None:
+    with pytest.raises(hvi.InputError, match=r"must be .*is true|must be a number .*not true"):
+        hvi.check(hvi.Model(square, [STEEL, hvi.Displacement("left", [0.0, 0.0])]), **options)
+
+
+def test_options_may_be_numbers_of_numpy(square: hvi.Body) -> None:
+    model = hvi.Model(square, [STEEL, hvi.Displacement("left", [0.0, 0.0])])
+    plain, given = hvi.check(model, max_iterations=7), hvi.check(model, max_iterations=np.int64(7))  # type: ignore[arg-type]
+    assert plain.scene == given.scene
+
+
+@pytest.mark.parametrize(
+    ("argument", "named"), [({"gap": "1e-3"}, "gap"), ({"limit": True}, "limit"), ({"limit": -1}, "limit")]
+)
+def test_a_search_names_its_wrong_argument(square: hvi.Body, argument: Any, named: str) -> None:
+    with pytest.raises(hvi.InputError, match=f"^{named}: must be a number"):
+        hvi.equilibria(hvi.Model(square, [STEEL]), **argument)
+
+
+@pytest.mark.parametrize("points", [3, [1, 2], "graph", [(0, 0), 1.0]])
+def test_a_graph_of_other_things_than_pairs_is_refused(points: Any) -> None:
+    """Some of them raised a bare TypeError."""
+    with pytest.raises(hvi.InputError, match=r"pairs? .displacement, traction"):
+        hvi.laws.Graph(points)
+
+
+def test_a_contradiction_names_effects_and_not_the_tables_of_a_scene(square: hvi.Body) -> None:
+    with pytest.raises(hvi.InputError) as refused:
+        hvi.Model(square, [STEEL, hvi.Displacement("bottom", [None, 0.0]), hvi.Contact("bottom")])
+    assert str(refused.value) == (
+        'contact on bottom: the displacement normal to "bottom" is prescribed by displacement on bottom; '
+        "leave contact out or write None there"
+    )
+
+
+def test_what_the_mesh_shows_names_effects_too(square: hvi.Body) -> None:
+    """A piece shares facets with the whole side; a scene has this as boundary.left.contact."""
+    body = square.piece("lower", "bottom", "x < 0.6")
+    with pytest.raises(
+        hvi.InputError, match=r"^contact on (bottom|lower): shares facets with (bottom|lower), which has"
+    ):
+        hvi.check(hvi.Model(body, [STEEL, hvi.Contact("bottom"), hvi.Contact("lower")]))

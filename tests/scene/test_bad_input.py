@@ -22,6 +22,8 @@ from hvi_fenicsx import InputError, Scene, prepare, read_scene
 LAW = quadratic_linear(1e3)
 TABLE: dict[str, tuple[str, str]] = {
     "a degree that there is not": ("solver.degree=3", "--set solver.degree: must be 1 or 2 (is 3)"),
+    "true for a degree": ("solver.degree=true", "--set solver.degree: must be 1 or 2 (is true)"),
+    "a degree that is no whole number": ("solver.degree=1.0", "--set solver.degree: must be 1 or 2 (is 1.0)"),
     "unknown key": ("domain.sell=[4, 4]", "sell: unknown key"),
     "unknown table": ("boundry.x.on='left'", "boundry"),
     "misspelt side": ("boundary.wall.on='lefft'", 'did you mean "left"'),
@@ -92,6 +94,28 @@ TABLE: dict[str, tuple[str, str]] = {
         "boundary.press.traction=[0.0, '-exp(1e7*x*(0.25-x)*(0.5-x)*(0.75-x)*(1-x)*(0.375-x))']",
         "boundary.press.traction: the formula is not finite everywhere there, between the vertices",
     ),
+    "a law on no way": (
+        "boundary.floor.friction.delta=1e-320",
+        "its displacements are about 1e-320 m; give all numbers",
+    ),
+    "a multiplier that is rounding": (
+        "boundary.floor.friction.multiplier=1e-320",
+        "at every vertex, from 1e-100 to 1e+100",
+    ),
+    "a ball beyond all numbers": (
+        "boundary.floor.contact={obstacle={shape='sphere', center=[0.5, -9], radius=1e308, direction=[0, -1]}}",
+        "boundary.floor.contact: the formula",
+    ),
+    "true for a radius": (
+        "boundary.floor.contact={obstacle={shape='sphere', center=[0.5, -9], radius=true}}",
+        "radius: must be a number (is true)",
+    ),
+    "a text for a radius": (
+        "boundary.floor.contact={obstacle={shape='sphere', center=[0.5, -9], radius='2'}}",
+        'radius: must be a number (is "2"); write it without quotes',
+    ),
+    "a shape that is a list": ("boundary.floor.contact={obstacle={shape=[1]}}", "must be one of plane, sphere"),
+    "a factor beyond all numbers": ("path.to=1e308", "--set path.to: must be factors between -1e+100 and 1e+100"),
     "too many unknowns": ("domain.cells=[100000, 100000]", "fewer cells"),
 }
 

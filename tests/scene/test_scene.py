@@ -156,14 +156,12 @@ REFUSED = {
     "list wanted": (
         "[1.0e6, 0.0]",
         "1.0e6",
-        "s.toml:15: boundary.pull.traction: must be a list in square brackets, one entry for each "
-        "component, like "
-        "[1e6, 0.0]",
+        "s.toml:15: boundary.pull.traction: must be a list, one entry for each component, like [1e6, 0.0]",
     ),
     "three components": (
         "[1.0e6, 0.0]",
         "[1, 2, 3]",
-        "s.toml:15: boundary.pull.traction: traction has 3 components; a 2D scene wants 2",
+        "s.toml:15: boundary.pull.traction: traction has 3 components; in 2D it has 2",
     ),
     "foreign name": (
         "[1.0e6, 0.0]",
@@ -180,7 +178,7 @@ REFUSED = {
     "model of the other dimension": (
         '"plane_stress"',
         '"three_dimensional"',
-        's.toml:6: material: model = "three_dimensional" in a 2D scene; use plane_stress or plane_strain',
+        's.toml:6: material: model = "three_dimensional" is not for 2D; use plane_stress or plane_strain',
     ),
     "misspelt model": (
         '"plane_stress"',
@@ -221,7 +219,7 @@ REFUSED = {
         'on = "right"',
         'on = "left"',
         's.toml:15: boundary.pull.traction: component 1 does nothing: u_x is prescribed on "left" by '
-        'boundary.wall.displacement; write 0 here or "free" there',
+        'boundary.wall.displacement; write "free" there or 0 here',
     ),
     "smoothing without a width": (
         "epsilon_absolute = 0.1",
@@ -249,7 +247,7 @@ REFUSED = {
     "start of three components": (
         "[solver]",
         "[solver]\nstart = [0.0, 0.0, 0.0]",
-        "s.toml:21: solver.start: has 3 components; a 2D scene wants 2",
+        "s.toml:21: solver.start: has 3 components; in 2D it has 2",
     ),
     "text without quotes": (
         'on = "left"',

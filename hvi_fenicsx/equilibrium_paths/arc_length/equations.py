@@ -75,7 +75,7 @@ class Equations:
     def __init__(self, constant: Array, rate: Array, sites: Sites, z: Array, factor: float) -> None:
         self._rate, self.sites, self._most = rate, sites, 0.0
         largest = float(np.max(np.abs(rate) / sites.forces, initial=0.0))
-        self.unit = 2.0 ** -round(np.log2(largest)) if largest else 1.0
+        self.unit = 2.0 ** -round(np.log2(largest)) if largest > np.finfo(float).tiny else 1.0
         y = np.append(z, factor / self.unit)
         values = sites.values(z)
         left = (sites.stiffness @ values.x + values.force - constant - factor * rate) / sites.forces
