@@ -12,10 +12,11 @@ import numpy as np
 from dolfinx import fem
 
 from ..problem.contact_surface import Surface
+from ..problem.nodal_forces import NodalForces
 from ..problem.problem import Problem
 from ..problem.references import References
 from ..system import net_forces as rigid_balance
-from ..system.net_forces import ActingForces, Holder, PartForces
+from ..system.net_forces import ActingForces, Holder
 from ..system.supported_body import SupportedBody
 from ..typing import Array, Mask
 from .contact_state import ContactState, Forces
@@ -93,7 +94,7 @@ def net_forces_carried(
         thresholds: what rounding is.
     """
     acting = _acting(references, forces, [], u, thresholds)
-    acting = replace(acting, left=acting.left + carried, carried=[*acting.carried, PartForces.nonzero(carried)])
+    acting = replace(acting, left=acting.left + carried, carried=[*acting.carried, NodalForces.of(carried)])
     return _along_motions(acting, references, [], thresholds)
 
 
@@ -120,8 +121,8 @@ def _acting(
         left[given.blocks] += given.values
     return ActingForces(
         left=left,
-        loads=PartForces.nonzero(forces.pushing),
-        carried=[PartForces.nonzero(foundation)],
+        loads=NodalForces.of(forces.pushing),
+        carried=[NodalForces.of(foundation)],
         holders=holders,
         capable=rigid_balance.capable(problem),
         noise=np.zeros(references.count),

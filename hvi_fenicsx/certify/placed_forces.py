@@ -12,6 +12,7 @@ from mpi4py import MPI
 
 from ..effects import Place
 from ..problem.contact_surface import Surface
+from ..problem.nodal_forces import NodalForces
 from ..problem.problem import Problem
 from ..problem.vectors import nodal, nodal_values
 from ..typing import Array, Entities
@@ -19,40 +20,6 @@ from .contact_state import ContactState, Forces
 
 SECOND = ".second"
 """What the name of an interface is followed by where the forces on its second body are meant."""
-
-
-@dataclass(frozen=True)
-class NodalForces:
-    """Forces at some of the vertices that this rank owns (m of them).
-
-    Attributes:
-        blocks: local indices of the vertices, ascending, (m,).
-        values: the forces, (m, d).
-    """
-
-    blocks: Entities
-    values: Array
-
-    @classmethod
-    def of(cls, values: Array) -> NodalForces:
-        """Those that are not zero, of forces at all vertices that this rank owns, (n, d)."""
-        blocks = np.flatnonzero(values.any(axis=1)).astype(np.int32)
-        return cls(blocks, values[blocks])
-
-    def at(self, blocks: Entities) -> Array:
-        """The forces at k vertices, zero where there is none, (k, d).
-
-        Args:
-            blocks: their local indices, each once, (k,).
-        """
-        found = np.zeros((len(blocks), self.values.shape[1]))
-        _, there, here = np.intersect1d(blocks, self.blocks, assume_unique=True, return_indices=True)
-        found[there] = self.values[here]
-        return found
-
-    def __add__(self, other: NodalForces) -> NodalForces:
-        blocks = np.union1d(self.blocks, other.blocks).astype(np.int32)
-        return NodalForces(blocks, self.at(blocks) + other.at(blocks))
 
 
 @dataclass(frozen=True)

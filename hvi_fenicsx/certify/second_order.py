@@ -10,6 +10,9 @@ with them held means none, anything else stays undecided.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
 import numpy as np
 from dolfinx import fem
 from mpi4py import MPI
@@ -57,22 +60,33 @@ def _by_inertia(problem: Problem, u: fem.Function, found: Growth) -> str:
         models.append(ExactLaw(term.law, Cells.around(term.law.convex, argument, radial=term.radial)))
     system.jacobian.set_rates(system.tangents(x, models))
     strong, weak = np.flatnonzero(found.strong), np.flatnonzero(found.weak)
-    if negative_eigenvalues(system, strong) == 0:
-        return LOCAL_MINIMISER
-    return NO_MINIMISER if (negative_eigenvalues(system, np.union1d(strong, weak)) or 0) > 0 else UNDECIDED
+    with negative_eigenvalues(system) as negative:
+        if negative(strong) == 0:
+            status = LOCAL_MINIMISER
+        else:
+            status = NO_MINIMISER if (negative(np.union1d(strong, weak)) or 0) > 0 else UNDECIDED
+    system.free()
+    return status
 
 
-def negative_eigenvalues(system: System, held: Integers) -> int | None:
-    """How many eigenvalues of a system's matrix are negative, by a factorisation; None where it failed. Collective.
+@contextmanager
+def negative_eigenvalues(system: System) -> Iterator[Callable[[Integers], int | None]]:
+    """How many eigenvalues of a system's matrix are negative, by factorisations.
+
+    The function takes the dofs (local, owned) that are held, and says None where the factorisation failed. Collective.
 
     Args:
         system: the system, with the tangents that are set.
-        held: dofs (local, owned) that are held.
     """
     form = form_of(system, _PREFIX)
-    factors = Factorisation(form, form.matrix(), own_prefix=_PREFIX)
-    factors.allow_negative()
-    factors.factorise(held)
-    count = None if factors.failure else factors.negative
-    factors.free()
-    return count
+
+    def negative(held: Integers) -> int | None:
+        factors = Factorisation(form, form.matrix(), own_prefix=_PREFIX)
+        factors.allow_negative()
+        factors.factorise(held)
+        count = None if factors.failure else factors.negative
+        factors.free()
+        return count
+
+    yield negative
+    form.free()

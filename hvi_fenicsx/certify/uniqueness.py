@@ -182,9 +182,10 @@ def _stiffer(system: System, modes: Sequence[Mode], falls: Sequence[Array], thre
     pins = free_motions.create(vectors, modes).pins.astype(np.int64) if modes else np.empty(0, np.int64)
     enlarged = 1.0 + thresholds.enlarged
     system.jacobian.set_rates([_rate(t, -enlarged * c) for t, c in zip(system.terms, falls, strict=True)])
-    negative = negative_eigenvalues(system, pins)
+    with negative_eigenvalues(system) as negative:
+        count = negative(pins)
     system.jacobian.set_rates([np.zeros_like(rates) for rates in system.jacobian.rates])
-    return negative == 0
+    return count == 0
 
 
 def _rate(term: LawTerm, slope: Array) -> Array:

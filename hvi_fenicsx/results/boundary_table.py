@@ -11,8 +11,8 @@ import numpy as np
 from mpi4py import MPI
 
 from ..certify import placed_forces
-from ..certify.placed_forces import NodalForces
 from ..problem import part_areas, spaces
+from ..problem.nodal_forces import NodalForces
 from ..problem.problem import Problem
 from ..runtime.row_order import RowOrder
 from ..solution import Solution

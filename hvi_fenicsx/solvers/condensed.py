@@ -19,7 +19,8 @@ from scipy.sparse import csr_matrix
 
 from ..errors import InputError
 from ..laws import Superpotential
-from ..system.interior import Interior
+from ..system.factorisation import form_of
+from ..system.interior import PREFIX, Interior
 from ..system.law_model import LawModel
 from ..system.system import System
 from ..typing import Array, Integers
@@ -172,7 +173,7 @@ class _Schur:
         self.system = system
         system.jacobian.set_rates([np.zeros_like(k) for k in system.jacobian.rates])
         self.kept = _kept(system)
-        self._interior = Interior(system, self.kept)
+        self._interior = Interior(form_of(system, PREFIX), self.kept)
         self.G = self._interior.response()
         self.g = self._interior.pulled(self._interior.solve(system.load.array_r[:, None]))[:, 0]
         self.lower, self.upper = system.lower.array_r[self.kept], system.upper.array_r[self.kept]

@@ -6,8 +6,9 @@ import numpy as np
 from petsc4py import PETSc
 
 from ..problem.contact_surface import Surface
+from ..problem.nodal_forces import NodalForces
 from ..system import net_forces
-from ..system.net_forces import ActingForces, Holder, NetForces, PartForces
+from ..system.net_forces import ActingForces, Holder, NetForces
 from ..system.supported_body import Motions, SupportedBody
 from ..system.system import System
 from ..typing import Array, Mask
@@ -26,7 +27,7 @@ class NetForceTest:
         self._system, self._thresholds = system, thresholds
         self._d = system.problem.scales.dimension
         self._contact = (system.jacobian.rows.dofs[:: self._d] // self._d).astype(np.int32)
-        self._loads = PartForces.nonzero(self._local(system.pushing))
+        self._loads = NodalForces.of(self._local(system.pushing))
         self._capable = [self._local_part(force) for force in net_forces.capable(system.problem)]
         bodies = (SupportedBody.of(system.problem, body) for body in system.problem.bodies)
         self._bodies = [body.in_components(self._local) for body in bodies]
@@ -49,7 +50,7 @@ class NetForceTest:
         acting = ActingForces(
             left=-self._blocks(projected),
             loads=self._loads,
-            carried=[PartForces(self._contact, -self._blocks(laws))],
+            carried=[NodalForces(self._contact, -self._blocks(laws))],
             holders=self._holders(residual[at] - projected[at], *on),
             capable=self._capable,
             noise=np.ones(system.references.count),
@@ -95,11 +96,11 @@ class NetForceTest:
         frames = self._system.frames
         return vectors if frames is None else frames.local_components(vectors)
 
-    def _local_part(self, forces: PartForces) -> PartForces:
+    def _local_part(self, forces: NodalForces) -> NodalForces:
         """Forces in the components of the unknowns."""
         every = np.zeros((len(self._system.pushing), self._d))
         every[forces.blocks] = forces.values
-        return PartForces(forces.blocks, self._local(every)[forces.blocks])
+        return NodalForces(forces.blocks, self._local(every)[forces.blocks])
 
     def _blocks(self, values: Array) -> Array:
         return values.reshape(-1, self._d)

@@ -24,8 +24,9 @@ from . import carriers, condensed_laws, factor_counts, loading
 from .carriers import Carriers
 from .condensed_problem import CondensedProblem
 from .condensed_stiffness import CondensedStiffness, DenseStiffness
+from .factorisation import form_of
 from .factorised_stiffness import FactorisedStiffness
-from .interior import Interior
+from .interior import PREFIX, Interior
 from .rigid_defect import RigidMotions
 from .system import System
 
@@ -51,7 +52,8 @@ class Condensation:
     def __init__(self, system: System, scaled: Collection[str] | None = None, largest_dense: int | None = None) -> None:
         self._system, self._loading = system, loading.make(system, scaled)
         kept = np.setdiff1d(system.jacobian.rows.dofs, np.union1d(system.problem.fixed, system.pins))
-        self._interior = interior = Interior(system, kept)
+        self._form = form_of(system, PREFIX)
+        self._interior = interior = Interior(self._form, kept)
         laws = condensed_laws.make(system, interior, self._loading.prescribed)
         found = carriers.find(system, interior, laws, loading.obstacle_shift(system, scaled or ()))
         if largest_dense is not None and self._is_large(largest_dense, len(found.carrying)):
@@ -72,7 +74,7 @@ class Condensation:
         interior, every = self._interior, np.arange(self._interior.size)
         own = np.isin(interior.own_part(every), carrying)
         with suppress(SolverError):
-            fewer = Interior(self._system, interior.kept[own])
+            fewer = Interior(self._form, interior.kept[own])
             if fewer.is_held():
                 interior.free()
                 self._interior = fewer
@@ -85,7 +87,7 @@ class Condensation:
         every = np.arange(self._interior.size)
         self._gone, self._stay, self._factor = every[:0], every, None
         self._coupling = np.zeros((0, len(every)))
-        return FactorisedStiffness(self._system, self._interior)
+        return FactorisedStiffness(self._interior)
 
     def _formed(self, whole: Array, carrying: Integers) -> CondensedStiffness:
         """S of the unknowns that stay, the others being eliminated."""
@@ -287,8 +289,10 @@ class Condensation:
         return float(np.sqrt(total(self._system.comm, float(left @ left))))
 
     def free(self) -> None:
-        """Free the PETSc objects."""
+        """Free the PETSc objects, those of the problem's stiffness too. Collective."""
+        self.problem.elastic.free()
         self._interior.free()
+        self._form.free()
 
 
 def _regular(matrix: Array, tolerance: float) -> Integers:

@@ -134,6 +134,10 @@ class CondensedStiffness(ABC):
             negligible: an eigenvalue that is zero, relative to the largest sum of a row.
         """
 
+    @abstractmethod
+    def free(self) -> None:
+        """Free the PETSc objects, where there are any: those of all that it was raised to, too. Collective."""
+
     def is_singular(self, moving: Mask, slope: Array) -> bool:
         """Whether some displacement of the unknowns that move meets no stiffness, or a negative one. Collective.
 
@@ -216,6 +220,10 @@ class DenseStiffness(CondensedStiffness):
     def negative_directions(self, moving: Mask, slope: Array, negligible: float) -> int:
         free = np.flatnonzero(moving)
         return spectrum.negative_directions(self._moving(free, slope), negligible)
+
+    @override
+    def free(self) -> None:
+        pass  # arrays only
 
 
 class DenseInverse(CellInverse):

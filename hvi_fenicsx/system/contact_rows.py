@@ -92,3 +92,8 @@ class ContactRows:
             out: the product with J, changed in place.
         """
         out.array[self.dofs] = self.elastic(x)
+
+    def free(self) -> None:
+        """Free the PETSc objects. Collective."""
+        self.bulk.destroy()
+        self._product.destroy()

@@ -56,6 +56,17 @@ class FactorForm:
         """Copy the present matrix into an earlier copy. Collective."""
         self.system.jacobian.matrix.copy(matrix, structure=PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
 
+    def suiting(self, own_prefix: str) -> FactorForm:
+        """This form, or the system's own matrix where the user chose another solver, for which pressures are not meant.
+
+        Args:
+            own_prefix: of the options of the factorisation.
+        """
+        return FactorForm(self.system) if _is_chosen(own_prefix) else self
+
+    def free(self) -> None:
+        """Free the PETSc objects that the form has of its own. Collective."""
+
 
 class SaddlePointForm(FactorForm):
     """The matrix of displacements and averaged pressures. Creation is collective.
@@ -97,6 +108,16 @@ class SaddlePointForm(FactorForm):
         self._update()
         self._blocks.convert("aij", out=matrix)
 
+    @override
+    def free(self) -> None:
+        self._blocks.destroy()
+        self._shear.free()
+
+
+def _is_chosen(own_prefix: str) -> bool:
+    """Whether the user chose the solver of factorisations with this prefix."""
+    return bool(PETSc.Options().hasName(f"{prefix()}{own_prefix}pc_type"))
+
 
 def form_of(system: System, own_prefix: str = "") -> FactorForm:
     """The form in which factors of a system's matrix are smallest. Collective.
@@ -106,8 +127,7 @@ def form_of(system: System, own_prefix: str = "") -> FactorForm:
         own_prefix: of the options of its factorisation: the form with pressures suits no solver that the user chose.
     """
     quadratic = nodes.degree(system.problem.space) > 1
-    chosen = PETSc.Options().hasName(f"{prefix()}{own_prefix}pc_type")
-    if quadratic and system.problem.bulk.averages_dilatation and not chosen:
+    if quadratic and system.problem.bulk.averages_dilatation and not _is_chosen(own_prefix):
         return SaddlePointForm(system)
     return FactorForm(system)
 

@@ -22,7 +22,7 @@ from typing_extensions import override
 from ..runtime.mpi import agree
 from ..typing import Array, Mask
 from .condensed_stiffness import CellColumns, CellInverse, CondensedStiffness
-from .factorisation import Factorisation, form_of
+from .factorisation import Factorisation
 from .interior import Interior
 from .petsc_options import CHOLESKY
 from .system import System
@@ -36,14 +36,13 @@ class FactorisedStiffness(CondensedStiffness):
     """S by factorisations.
 
     Args:
-        system: the system, nothing held and without tangents of laws.
-        interior: the body with the condensed unknowns held.
+        interior: the body with the condensed unknowns held; else nothing is held in its system, without laws' tangents.
     """
 
-    def __init__(self, system: System, interior: Interior) -> None:
-        self._system, self._interior = system, interior
-        self._form, self._own = form_of(system, _PREFIX), interior.own()
-        self._matrix, self._stiffness = self._form.matrix(), system.jacobian.matrix.copy()
+    def __init__(self, interior: Interior) -> None:
+        self._interior, self._form, self._own = interior, interior.form.suiting(_PREFIX), interior.own()
+        self._system = self._form.system
+        self._matrix, self._stiffness = self._form.matrix(), self._system.jacobian.matrix.copy()
         self._diagonal = self._everywhere(np.asarray(self._own_diagonal()))
         sums = np.asarray(np.abs(self._own).sum(axis=1)).ravel()
         self._size = float(np.max(self._everywhere(sums), initial=0.0))
@@ -101,7 +100,13 @@ class FactorisedStiffness(CondensedStiffness):
         steepest = float(np.max(np.abs(slope[moving]), initial=0.0))
         shift = negligible * (self._size + self._added + steepest)
         key = np.concatenate([moving, np.where(moving, slope, 0.0), [shift]]).tobytes()
-        return _known(self._counts, key, lambda: self.factorised(moving, slope + shift).negative)
+        return _known(self._counts, key, lambda: self._counted(moving, slope + shift))
+
+    def _counted(self, moving: Mask, slope: Array) -> int:
+        cell = self.factorised(moving, slope)
+        count = cell.negative
+        cell.free()
+        return count
 
     def factorised(self, moving: Mask, slope: Array) -> FactorisedCell:
         """A with slopes, and the unknowns that stand held. Collective.
@@ -117,6 +122,11 @@ class FactorisedStiffness(CondensedStiffness):
         factors = Factorisation(self._form, self._matrix.copy(), _INDEFINITE, _PREFIX)
         slope = own(slope) + self._added
         return FactorisedCell(self._system, self._interior, self._stiffness, factors, own(moving), slope)
+
+    @override
+    def free(self) -> None:
+        self._matrix.destroy()
+        self._stiffness.destroy()
 
 
 class FactorisedCell:
@@ -151,6 +161,7 @@ class FactorisedCell:
         self._factors = factors
         self._load, self._found, self._force = (system.load.duplicate() for _ in range(3))
         if factors.failure:
+            self.free()
             raise np.linalg.LinAlgError("the tangent is singular")
 
     @property
@@ -177,6 +188,12 @@ class FactorisedCell:
         self._stiffness.mult(self._found, self._force)
         felt = own - self._force.array_r[kept]
         return np.concatenate(agree(self._system.comm, np.where(moving, self._found.array_r[kept], felt)))
+
+    def free(self) -> None:
+        """Free the PETSc objects. Collective."""
+        self._factors.free()
+        for vector in (self._load, self._found, self._force):
+            vector.destroy()
 
 
 _PREFIX = "cell_"

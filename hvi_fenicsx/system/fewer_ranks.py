@@ -55,6 +55,12 @@ class PlacedMatrix:
         """
         return matrix.createSubMatrix(finer.rows, self.rows) if self._moved or finer._moved else matrix
 
+    def free(self) -> None:
+        """Free the PETSc objects; the source stays. Collective."""
+        self.rows.destroy()
+        if self._moved:
+            self.matrix.destroy()
+
 
 def _rows(matrix: PETSc.Mat, joined: int) -> PETSc.IS:
     ranges, rank = matrix.getOwnershipRanges(), matrix.comm.rank

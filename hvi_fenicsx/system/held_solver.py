@@ -21,7 +21,7 @@ from ..typing import Array, Entities
 from . import factor_counts, schur
 from .algebraic import Algebraic
 from .direct import Direct
-from .factorisation import form_of
+from .factorisation import FactorForm, form_of
 from .levels import Levels
 from .linear_settings import Kind, LinearSettings
 from .mixed_multigrid import MixedMultigrid
@@ -67,6 +67,7 @@ class HeldPreconditioner:
         self._rates: list[Array] = []
         self._first_iterations, self._outdated = 0, False
         self._preconditioner: Preconditioner | None = None
+        self._form: FactorForm | None = None
         self._kind: Kind | None = None
         self._factorised = 0
         self._in, self._out = system.load.duplicate(), system.load.duplicate()
@@ -111,7 +112,7 @@ class HeldPreconditioner:
     def _build(self, held: Entities) -> None:
         kind, condensing = self.settings.kind, self._condensing
         if kind != self._kind or self._preconditioner is None or (condensing and not self._condensed):
-            self.destroy()
+            self._free_preconditioner()
             self._preconditioner, self._kind, self._factorised = self._new(condensing=condensing), kind, 0
         self._preconditioner.prepare(held)
         self._factorised += 1
@@ -136,17 +137,30 @@ class HeldPreconditioner:
     def _new(self, *, condensing: bool) -> Preconditioner:
         """A new preconditioner; condensing, one factorisation of the body serves all matrices that differ on Γc."""
         if condensing:
-            return schur.SchurDirect(self.system, self.settings.pc)
+            return schur.SchurDirect(self._factored_form, self.settings.pc)
         if self.settings.kind == "mg":
             return Multigrid(self.system, self.levels, self.settings.pc)
         if self.settings.kind == "mixed":
             return MixedMultigrid(self.system, self.levels, self.settings.pc)
         if self.settings.kind == "lu":
-            return Direct(form_of(self.system), self.settings.pc)
+            return Direct(self._factored_form, self.settings.pc)
         return Algebraic(self.system, self.settings.pc)
 
+    @property
+    def _factored_form(self) -> FactorForm:
+        """The form in which the matrix is factorised. Collective when first used."""
+        if self._form is None:
+            self._form = form_of(self.system)
+        return self._form
+
     def destroy(self) -> None:
-        """Free the PETSc objects."""
+        """Free the PETSc objects. Collective."""
+        self._free_preconditioner()
+        if self._form is not None:
+            self._form.free()
+        self._form = None
+
+    def _free_preconditioner(self) -> None:
         if self._preconditioner is not None:
             self._preconditioner.free()
         self._preconditioner = self._held = None

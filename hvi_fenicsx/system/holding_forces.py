@@ -62,3 +62,8 @@ class HoldingForces:
         self._rows.multTranspose(values, found)
         values.destroy()
         return found
+
+    def free(self) -> None:
+        """Free the PETSc objects. Collective."""
+        self._rows.destroy()
+        self._product.destroy()

@@ -22,11 +22,12 @@ from scipy.sparse import csr_matrix, vstack
 from ..errors import SolverError
 from ..runtime.mpi import agree
 from ..typing import Array, Integers
-from .factorisation import Factorisation, form_of
+from .factorisation import FactorForm, Factorisation
 from .petsc_options import CHOLESKY
-from .system import System
 
 _NO_MEMORY = PETSc.PC.FailedReason.FACTOR_OUTMEMORY
+PREFIX = "condensed_"
+"""Of the options of factorisations that condense a body."""
 Number = TypeVar("Number", bound=np.generic)
 
 
@@ -34,12 +35,13 @@ class Interior:
     """A_ii, factorised. Creation is collective.
 
     Args:
-        system: the system; where motions are free, their pins are held too.
+        form: of the system's matrix; where motions are free, their pins are held too.
         kept: unknowns of Γc (local, owned, sorted) that are kept.
         options: defaults of the factorisation's options.
         own_prefix: of the options by which the user changes them, after that of all options.
 
     Attributes:
+        form: of the system's matrix.
         kept: the unknowns of this rank that are kept.
         factors: of A_ii; rows and columns of kept and pinned unknowns are those of the identity.
         coupling: the inner rows of A_ik, zero in the kept rows, (inner, n).
@@ -50,20 +52,20 @@ class Interior:
 
     def __init__(
         self,
-        system: System,
+        form: FactorForm,
         kept: Integers,
         options: Mapping[str, object] = CHOLESKY,
-        own_prefix: str = "condensed_",
+        own_prefix: str = PREFIX,
     ) -> None:
-        self._system, self._comm, self.kept = system, system.comm, kept
-        self._held = np.union1d(kept, system.pins)
-        start = system.load.owner_range[0]
+        self.form, self.kept, self._system = form, kept, form.system
+        self._comm, self._held = self._system.comm, np.union1d(kept, self._system.pins)
+        start = self._system.load.owner_range[0]
         self._everywhere = np.concatenate(agree(self._comm, kept + start)).astype(np.int64)
-        self._form = form = form_of(system, own_prefix)
         self.factors = Factorisation(form, form.matrix(), options, own_prefix)
         self.coupling = self._coupled()
         self.factors.factorise(self._held)
         if reason := self.factors.failure:
+            self.free()
             why = "no memory was left" if reason == _NO_MEMORY else "it is singular, a body is not held"
             raise SolverError(f"the stiffness without the displacements of Γc was not factorised: {why}")
 
@@ -84,7 +86,7 @@ class Interior:
         return csr_matrix(matrix.getValuesCSR()[::-1], shape=(rows, total))[:, self._everywhere]
 
     def _coupled(self) -> csr_matrix:
-        found = csr_matrix(vstack([self._columns(block) for block in self._form.columns]))
+        found = csr_matrix(vstack([self._columns(block) for block in self.form.columns]))
         inner = np.ones(found.shape[0])
         inner[self._held] = 0.0
         return csr_matrix(found.multiply(inner[:, None]))
@@ -101,7 +103,7 @@ class Interior:
 
     def _inner(self, right: Array) -> Array:
         """A copy with rows of pressures."""
-        found = np.zeros((self._system.load.local_size + self._form.pressures, *right.shape[1:]))
+        found = np.zeros((self._system.load.local_size + self.form.pressures, *right.shape[1:]))
         found[: len(right)] = right
         return found
 
@@ -117,7 +119,7 @@ class Interior:
 
     def own(self) -> csr_matrix:
         """This rank's rows of A_kk, (kept unknowns here, n)."""
-        rows = self._form.contact_rows
+        rows = self.form.contact_rows
         return csr_matrix(self._columns(rows.bulk)[np.searchsorted(rows.dofs, self.kept)])
 
     def stiffness(self) -> Array:
@@ -182,5 +184,5 @@ class Interior:
         return found
 
     def free(self) -> None:
-        """Free the PETSc objects."""
+        """Free the factors; the form stays. Collective."""
         self.factors.free()

@@ -127,3 +127,9 @@ class Jacobian:
             return x
         self._strained.array[:] = rest
         return self._strained
+
+    def free(self) -> None:
+        """Free the PETSc objects. Collective."""
+        self.matrix.destroy()
+        self._strained.destroy()
+        self.rows.free()

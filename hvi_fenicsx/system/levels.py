@@ -28,6 +28,17 @@ class Level:
     def __init__(self, finer: System, system: System, prolongation: PETSc.Mat) -> None:
         self.finer, self.system, self.prolongation = finer, system, prolongation
 
+    def of_systems(self, finer: System, system: System) -> Level:
+        """The same level of other systems that have these unknowns, prescribed ones and parts of Γc too. Collective.
+
+        Args:
+            finer: on the next finer level.
+            system: on this level.
+        """
+        found = Level(finer, system, self.prolongation)
+        found._masked = self._masked
+        return found
+
     @property
     def interpolation(self) -> PETSc.Mat:
         """The prolongation without the unknowns prescribed on either level. Collective when first used."""

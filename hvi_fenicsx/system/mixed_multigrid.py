@@ -18,7 +18,7 @@ from petsc4py import PETSc
 from ..problem.nodal_averaging import Dilatation
 from ..typing import Entities
 from .applied_by import applied_by
-from .levels import Level, Levels
+from .levels import Levels
 from .multigrid import Multigrid
 from .petsc_options import prefix
 from .saddle_point import nested, without_dilatation
@@ -48,9 +48,9 @@ class MixedMultigrid:
         self._system, self.matrix = system, system.jacobian.matrix
         self._parts = system.problem.bulk.dilatations
         self._ratio = system.problem.bulk.volumetric_ratio
-        self._shear, below = _without_dilatation(system, levels)
-        self._multigrid = Multigrid(self._shear, below, options)
-        self._saddle_point = nested(system, self._shear, self._parts)
+        self._shears, below = _without_dilatation(system, levels)
+        self._multigrid = Multigrid(self._shears[0], below, options)
+        self._saddle_point = nested(system, self._shears[0], self._parts)
         vectors = [system.load.duplicate(), *(p.stiffness.duplicate() for p in self._parts)]
         self._given = PETSc.Vec().createNest(vectors, comm=system.comm)
         self._found = self._given.duplicate()
@@ -70,7 +70,7 @@ class MixedMultigrid:
 
     def prepare(self, held: Entities) -> None:
         """Take over the system's tangent, hold these unknowns (local, owned, sorted). Collective."""
-        self._shear.jacobian.set_restricted(self._system.jacobian.rows.tangent, held)
+        self._shears[0].jacobian.set_restricted(self._system.jacobian.rows.tangent, held)
         self._multigrid.prepare(held)
 
     def apply(self, x: PETSc.Vec, y: PETSc.Vec) -> None:
@@ -93,9 +93,11 @@ class MixedMultigrid:
 
     def free(self) -> None:
         """Free the PETSc objects."""
-        self.pc.destroy()
-        self._minres.destroy()
         self._multigrid.free()
+        for thing in (self.pc, self._minres, self._saddle_point, self._given, self._found):
+            thing.destroy()
+        for shear in self._shears:
+            shear.free()
 
 
 class _Blocks:
@@ -116,12 +118,17 @@ class _Blocks:
         for pressure, compliance, dilatation in zip(pressures, self._compliances, dilatations, strict=True):
             pressure.pointwiseMult(compliance, dilatation)
 
+    def destroy(self, pc: PETSc.PC) -> None:
+        """Free the diagonals: petsc4py calls this where the PC is freed."""
+        for compliance in self._compliances:
+            compliance.destroy()
 
-def _without_dilatation(system: System, levels: Levels) -> tuple[System, Levels]:
-    """The system and its coarser levels without the volumetric part. Collective."""
+
+def _without_dilatation(system: System, levels: Levels) -> tuple[list[System], Levels]:
+    """The system and those of its coarser levels without the volumetric part, and these levels. Collective."""
     systems = [without_dilatation(one) for one in (system, *(level.system for level in levels))]
     pairs = zip(itertools.pairwise(systems), levels, strict=True)
-    return systems[0], tuple(Level(finer, coarser, level.prolongation) for (finer, coarser), level in pairs)
+    return systems, tuple(level.of_systems(finer, coarser) for (finer, coarser), level in pairs)
 
 
 def _schur_complement(part: Dilatation) -> PETSc.Vec:

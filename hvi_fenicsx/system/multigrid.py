@@ -64,6 +64,8 @@ class Multigrid:
     def free(self) -> None:
         """Free the PETSc objects."""
         self.pc.destroy()
+        for matrix in self._placed:
+            matrix.free()
 
 
 def _placed(system: System, levels: Levels) -> list[PlacedMatrix]:

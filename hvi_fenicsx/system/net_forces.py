@@ -8,34 +8,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Self
 
 import numpy as np
 from mpi4py import MPI
 
+from ..problem.nodal_forces import NodalForces
 from ..problem.problem import Problem
 from ..problem.references import References
 from ..typing import Array, Entities, Mask
 from .supported_body import Motions
-
-
-@dataclass(frozen=True)
-class PartForces:
-    """Nodal forces at some of this rank's vertices.
-
-    Attributes:
-        blocks: the vertices, each once, (m,).
-        values: in the components of the motions, (m, d).
-    """
-
-    blocks: Entities
-    values: Array
-
-    @classmethod
-    def nonzero(cls, values: Array) -> Self:
-        """Forces at all of this rank's vertices (vertices, d), where there are any."""
-        blocks = np.flatnonzero(values.any(axis=1)).astype(np.int32)
-        return cls(blocks, values[blocks])
 
 
 @dataclass(frozen=True)
@@ -57,9 +38,9 @@ class Holder:
     most: Array
 
     @property
-    def forces(self) -> PartForces:
+    def forces(self) -> NodalForces:
         """The forces as vectors."""
-        return PartForces(self.blocks, self.direction * self.force[:, None])
+        return NodalForces(self.blocks, self.direction * self.force[:, None])
 
     def spare(self, motions: Motions, tiny: float) -> tuple[Array, Array]:
         """By how much its work in motions may fall and rise, (j,) each.
@@ -91,10 +72,10 @@ class ActingForces:
     """
 
     left: Array
-    loads: PartForces
-    carried: Sequence[PartForces]
+    loads: NodalForces
+    carried: Sequence[NodalForces]
     holders: Sequence[Holder]
-    capable: Sequence[PartForces]
+    capable: Sequence[NodalForces]
     noise: Array
     summation: float
     tiny: float
@@ -136,12 +117,12 @@ class NetForces:
         return float(np.max(found, initial=0.0))
 
 
-def capable(problem: Problem) -> list[PartForces]:
+def capable(problem: Problem) -> list[NodalForces]:
     """Forces of the laws' own size along each of their directions."""
     found = []
     for term in problem.terms:
         size = term.weights[:, None] * term.exact.traction_scale
-        found += [PartForces(term.surface.blocks, size * along) for along in np.moveaxis(term.directions, 1, 0)]
+        found += [NodalForces(term.surface.blocks, size * along) for along in np.moveaxis(term.directions, 1, 0)]
     return found
 
 
@@ -168,7 +149,7 @@ def along(references: References, motions: Motions, acting: ActingForces) -> Net
     return NetForces(np.maximum(np.abs(left) - np.where(left > 0, fall, rise), 0.0), rounding, scale, sizes)
 
 
-def _works(motions: Motions, forces: Sequence[PartForces]) -> Array:
+def _works(motions: Motions, forces: Sequence[NodalForces]) -> Array:
     """The work of forces in motions, the sum of its sizes by vertex, and of the products of lengths there, (3, j)."""
     found = np.zeros((3, motions.combined.shape[1]))
     for force in forces:

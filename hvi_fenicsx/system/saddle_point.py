@@ -40,25 +40,30 @@ def nested(system: System, shear: System, parts: Sequence[Dilatation]) -> PETSc.
         parts: the regions that are averaged.
     """
     divergences = [_in_unknowns(part.divergence, system) for part in parts]
-    first = [shear.jacobian.matrix, *(d.transpose(PETSc.Mat()) for d in divergences)]
+    transposed, compliances = [d.transpose(PETSc.Mat()) for d in divergences], [_compliance(part) for part in parts]
     rows = [
-        [d, *(_compliance(part) if i == k else None for i in range(len(parts)))]
-        for k, (d, part) in enumerate(zip(divergences, parts, strict=True))
+        [d, *(compliance if i == k else None for i in range(len(parts)))]
+        for k, (d, compliance) in enumerate(zip(divergences, compliances, strict=True))
     ]
-    return PETSc.Mat().createNest([first, *rows], comm=system.comm)
+    found = PETSc.Mat().createNest([[shear.jacobian.matrix, *transposed], *rows], comm=system.comm)
+    for block in (*divergences, *transposed, *compliances):
+        block.destroy()  # they are found's alone
+    return found
 
 
 def _in_unknowns(divergence: PETSc.Mat, system: System) -> PETSc.Mat:
     """D of the system's unknowns; prescribed ones have no part in it. Collective."""
-    found = divergence.copy()
-    if system.problem.coupling is not None:
-        found = found.matMult(system.problem.coupling.matrix)
-    if system.rotation is not None:
-        found = found.matMult(system.rotation)
+    coupling, found = system.problem.coupling, divergence.copy()
+    for step in (coupling and coupling.matrix, system.rotation):
+        if step is not None:
+            product = found.matMult(step)
+            found.destroy()
+            found = product
     mask = system.load.duplicate()
     mask.set(1.0)
     mask.array[system.problem.fixed_here] = 0.0
     found.diagonalScale(None, mask)
+    mask.destroy()
     return found
 
 
@@ -70,4 +75,5 @@ def _compliance(part: Dilatation) -> PETSc.Mat:
     matrix = PETSc.Mat().createAIJ((sizes, sizes), nnz=(1, 0), comm=found.comm)
     matrix.setDiagonal(found)
     matrix.assemble()
+    found.destroy()
     return matrix

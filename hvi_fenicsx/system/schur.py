@@ -16,6 +16,7 @@ from scipy.linalg import LinAlgWarning, block_diag, lu_factor, lu_solve
 from ..runtime.mpi import agree
 from ..typing import Array, Entities, Mask
 from .applied_by import applied_by
+from .factorisation import FactorForm
 from .interior import Interior
 from .petsc_options import prefix
 from .system import System
@@ -40,7 +41,7 @@ class SchurDirect:
     """The condensed body, as a preconditioner. Creation is collective.
 
     Args:
-        system: the system, whose stiffness is condensed to the n unknowns of Γc.
+        form: of the matrix of the system, whose stiffness is condensed to the n unknowns of Γc.
         options: defaults of the factorisation's options.
 
     Attributes:
@@ -48,9 +49,9 @@ class SchurDirect:
         matrix: the system's matrix, which it preconditions.
     """
 
-    def __init__(self, system: System, options: Mapping[str, object]) -> None:
-        self._system = system
-        self._interior = Interior(system, system.jacobian.rows.dofs, options, "")
+    def __init__(self, form: FactorForm, options: Mapping[str, object]) -> None:
+        self._system = system = form.system
+        self._interior = Interior(form, system.jacobian.rows.dofs, options, "")
         self._stiffness = self._interior.stiffness()
         self._lu: tuple[Array, Entities] | None = None
         self._free: Mask = np.ones(self._interior.size, dtype=bool)

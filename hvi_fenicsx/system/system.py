@@ -51,7 +51,6 @@ class System:
         lower: lower bounds of u; infinite on Dirichlet rows.
         upper: upper bounds, likewise.
         references: what residuals are relative to, by body.
-        holding: the elastic forces at prescribed unknowns.
         forces: the assembled load vectors by name, unlifted (for the virtual work of rigid motions).
         pushing: the sum of those that do work on rigid motions, Cartesian, (vertices, d).
         free_motions: the rigid motions that nothing holds and no load moves; None where there are none.
@@ -322,3 +321,12 @@ class System:
         shuffled.array[:] = x.array_r * signs * np.finfo(float).eps
         self.jacobian.elastic_product(shuffled, out)
         shuffled.destroy()
+
+    def free(self) -> None:
+        """Free the PETSc objects: those too that systems made of this one share. Collective."""
+        for vector in (self.load, self.lower, self.upper, self._work, *self.forces.values()):
+            vector.destroy()
+        if self.rotation is not None:
+            self.rotation.destroy()
+        self.jacobian.free()
+        self.holding.free()

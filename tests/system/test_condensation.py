@@ -17,6 +17,7 @@ from hvi_fenicsx import Scene, prepare
 from hvi_fenicsx.equilibrium_paths.bonds import is_piecewise_linear
 from hvi_fenicsx.errors import InputError, SolverError
 from hvi_fenicsx.system.condensation import Condensation
+from hvi_fenicsx.system.factorisation import form_of
 from hvi_fenicsx.system.interior import Interior
 from hvi_fenicsx.system.petsc_options import CHOLESKY
 from hvi_fenicsx.system.system import System
@@ -235,4 +236,4 @@ def test_a_factorisation_without_memory_is_not_called_a_body_that_is_not_held() 
     system = prepare(Scene.model_validate(model(8, friction=STRONG))).system
     little = {**CHOLESKY, "mat_mumps_icntl_14": -95}
     with pytest.raises(SolverError, match="no memory was left"):
-        Interior(system, np.empty(0, dtype=np.int32), little)
+        Interior(form_of(system), np.empty(0, dtype=np.int32), little)

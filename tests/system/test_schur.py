@@ -20,7 +20,7 @@ from hvi_fenicsx.solvers.convergence import Outcome, Sizes
 from hvi_fenicsx.solvers.thresholds import Thresholds as SolverThresholds
 from hvi_fenicsx.system import factor_counts, schur
 from hvi_fenicsx.system.direct import Direct
-from hvi_fenicsx.system.factorisation import FactorForm
+from hvi_fenicsx.system.factorisation import FactorForm, form_of
 from hvi_fenicsx.system.held_solver import HeldPreconditioner
 from hvi_fenicsx.system.linear_settings import LinearSettings
 from hvi_fenicsx.system.petsc_options import CHOLESKY
@@ -46,7 +46,7 @@ def test_condensed_it_solves_what_a_factorisation_of_the_whole_solves(every: int
     expected.set(0.0)
     whole, condensed = (
         HeldPreconditioner(system, (), DIRECT, Timer()),
-        schur.SchurDirect(system, {"pc_type": "cholesky"}),
+        schur.SchurDirect(form_of(system), {"pc_type": "cholesky"}),
     )
     whole.prepare(held)
     whole.solve(load, expected, 1e-12)
