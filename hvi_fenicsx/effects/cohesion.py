@@ -24,7 +24,7 @@ class Cohesion(LawEffect):
     term: ClassVar[str] = "∫ j⁰(u; v - u) ds on Γc, j = g(δ), δ² = ⟨-u_n⟩₊² + β² |u_t|², vertex quadrature"
     direction: ClassVar[Direction] = Direction.SEPARATION
 
-    beta: Annotated[float, Field(gt=0.0, allow_inf_nan=False)] = 1.0
+    beta: Positive = 1.0
     """what a slip is multiplied by beside an opening: the strength in shear is beta times that in tension, and both
     modes take the same energy"""
     mixity: Annotated[str | None, OneOf(mixities)] = None
