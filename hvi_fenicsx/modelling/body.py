@@ -25,6 +25,7 @@ from ..mesh.thresholds import DEFAULT
 from ..mesh.transfer import Transfer
 from ..problem.interface_sides import Sides
 from ..schema import located_error, unknown
+from . import values
 from .places import read_names
 
 
@@ -137,7 +138,7 @@ class Body:
         Raises:
             InputError: there is no such file, or a number is not allowed.
         """
-        keys = {"file": os.fspath(path), "scale": float(scale), "refinements": refinements}
+        keys = {"file": os.fspath(path), "scale": values.number(scale), "refinements": refinements}
         body = cls.from_shape(_shape(MeshFile, **keys), comm)
         body.dimension = dimension
         return body
@@ -250,9 +251,9 @@ def _remembering(domain: Domain) -> Domain:
     return replace(domain, coarsening=coarser)
 
 
-def _plain(values: Sequence[float]) -> Any:
+def _plain(numbers: Sequence[float]) -> Any:
     """Numbers of any kind, such as NumPy's, as Python's."""
-    return np.asarray(values).tolist()
+    return np.asarray(numbers).tolist()
 
 
 def _shape(kind: type[DomainShape], **keys: Any) -> DomainShape:

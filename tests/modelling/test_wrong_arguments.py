@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -65,6 +66,31 @@ def test_what_is_no_switch_or_no_function_is_refused(square: hvi.Body, argument:
     model = hvi.Model(square, [STEEL, hvi.Displacement("left", [0.0, 0.0])])
     with pytest.raises(hvi.InputError, match=reason):
         hvi.solve(model, **argument)
+
+
+@pytest.mark.parametrize(
+    ("argument", "reason"),
+    [
+        ({"gap": "1e-8"}, "^gap: must be a number above 0 and below 1 .is '1e-8'"),
+        ({"gap": 1}, "^gap: must be a number above 0 and below 1 .is 1"),
+        ({"limit": "60"}, "^limit: must be a number above 0 .is '60'"),
+        ({"limit": 0}, "^limit: must be a number above 0 .is 0"),
+        ({"lowest": "no"}, "^lowest: must be True or False .is 'no'"),
+    ],
+)
+def test_a_search_for_equilibria_refuses_numbers_that_mean_nothing(
+    square: hvi.Body, argument: Any, reason: str
+) -> None:
+    model = hvi.Model(square, [STEEL, hvi.Displacement("left", [0.0, 0.0])])
+    with pytest.raises(hvi.InputError, match=reason):
+        hvi.equilibria(model, **argument)
+
+
+def test_a_scale_that_is_no_number_is_refused(tmp_path: Path) -> None:
+    file = tmp_path / "part.msh"
+    file.touch()
+    with pytest.raises(hvi.InputError, match="scale: must be a number"):
+        hvi.Body.file(file, scale="mm")  # type: ignore[arg-type]
 
 
 def test_each_wrong_value_of_an_effect_has_a_line_with_its_name(square: hvi.Body) -> None:
