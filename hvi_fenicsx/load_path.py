@@ -14,7 +14,7 @@ from .typing import Array
 REACHED, ESCAPES, LOST, INTERRUPTED = "reached", "escapes", "lost", "interrupted"
 """How a path ends: at the end of its programme; where the body comes off; where it was lost; by the user."""
 _ROUNDING = 1e-9
-"""Factors that are so small beside the largest are zero."""
+"""A part of the largest factor that is zero beside it."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -133,9 +133,14 @@ class LoadPath:
         if self.end in (LOST, INTERRUPTED):
             return f"the path is {self.end} at {self._shown(-1)}" + (f" ({self.reason})" if self.reason else "")
         after = next((n for n in self.jumps if n > self.peak), None)
-        if after is not None and self.rows[after].factor >= self.rows[self.peak].factor * (1 - 1e-9):
+        if after is not None and self._at_peak(self.rows[after].factor):
             return f"there the body jumps to the next stable state, {self.ending}"
         return self.ending
+
+    def _at_peak(self, factor: float) -> bool:
+        """Whether a factor is the largest one but for rounding; both are negative where a path begins that way."""
+        peak = self.rows[self.peak].factor
+        return abs(factor - peak) <= _ROUNDING * abs(peak)
 
     @property
     def ending(self) -> str:

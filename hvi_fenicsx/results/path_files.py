@@ -18,8 +18,8 @@ from ..solution import Solution
 from . import contact_rows, contact_table, path_table, table_file, vtk_fields
 from .summary import plain, summary
 
-_SHOWN = frozenset({"start", "fold", "jump", "turn", "end"})
-"""The events whose states a film shows first."""
+_SHOWN = frozenset({"start", "jump", "turn", "end"})
+"""The events whose states a film shows first; limit points come after them."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,7 +49,7 @@ def shown_rows(path: LoadPath, most: int) -> list[int]:
     if not path.rows:
         return []
     last = len(path.rows) - 1
-    marked = [n for n, row in enumerate(path.rows) if row.event in _SHOWN - {"fold"}]
+    marked = [n for n, row in enumerate(path.rows) if row.event in _SHOWN]
     chosen = set(_evenly([*{*marked, path.peak, 0, last}], most))
     for others in (path.folds, range(last + 1)):
         rest = sorted(set(others) - chosen)
