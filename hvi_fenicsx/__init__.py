@@ -53,7 +53,7 @@ _HOME = {
     "dump_scene": "scene",
     "equilibria": "modelling",
     "follow": "modelling",
-    "prepare": "workflow",
+    "prepare": "preparation",
     "read_scene": "scene",
     "set_log_level": "runtime.log",
     "solve": "modelling",
