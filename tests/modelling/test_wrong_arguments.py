@@ -9,8 +9,27 @@ import numpy as np
 import pytest
 
 import hvi_fenicsx as hvi
+from hvi_fenicsx.effects import Contribution, Effect, FormContext, Place
 
 STEEL = hvi.Isotropic(youngs_modulus=2e11, poisson_ratio=0.3)
+
+
+class Weight(Effect):
+    """The weight of steel, as a user would write it."""
+
+    key = "weight"
+    place = Place.BODY
+    term = "<g, v> += -∫ ρ g v_y dx"
+
+    def contribute(self, context: FormContext, where: str | None) -> Contribution:
+        weight = context.number(-7850.0 * 9.81 * context.length / context.stress)
+        return Contribution(linear=(weight * context.test[1] * context.cells(where),))
+
+
+class Pull(Weight):
+    key = "pull of a test"
+    place = Place.BOUNDARY
+    in_files = False
 
 
 @pytest.fixture(scope="module")
@@ -47,6 +66,9 @@ def solved(body: hvi.Body, traction: Any) -> hvi.Solution:
         (hvi.Contact("bottom", obstacle=3), "^Contact on bottom: obstacle: give a point and a normal"),  # type: ignore[arg-type]
         (hvi.Friction("bottom", "graph"), "^Friction on bottom: law: give a law as an object"),  # type: ignore[arg-type]
         (hvi.On("bottom", 3), "^On on bottom: 3 is no effect"),  # type: ignore[arg-type]
+        (hvi.In(3), "^In on the body: 3 is no effect"),  # type: ignore[arg-type]
+        (hvi.On("bottom", Weight()), r"^On on bottom: weight acts in a body: write hvi.In\("),
+        (hvi.In(Pull()), r"^In on the body: pull of a test acts on a side: write hvi.On\("),
     ],
 )
 def test_a_refusal_names_the_effect_and_its_place(square: hvi.Body, effect: Any, reason: str) -> None:
@@ -139,6 +161,17 @@ def test_a_function_with_values_of_another_kind_is_refused(square: hvi.Body, tra
     """The third component of a function of points, and an imaginary part, were left away."""
     with pytest.raises(hvi.InputError, match=reason):
         solved(square, traction)
+
+
+def test_an_effect_of_the_users_own_acts_in_the_volume(square: hvi.Body) -> None:
+    """Against the body force of the program itself."""
+    held = hvi.Displacement("bottom", [0.0, 0.0])
+    known = hvi.BodyForce([0.0, -7850.0 * 9.81])
+    energies = [
+        hvi.solve(hvi.Model(square, [STEEL, held, load]), estimate=False).energy for load in (known, hvi.In(Weight()))
+    ]
+    assert energies[1] == pytest.approx(energies[0], rel=1e-10)
+    assert energies[0] < 0.0
 
 
 def test_a_component_of_a_function_may_be_one_number(square: hvi.Body) -> None:
