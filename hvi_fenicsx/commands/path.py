@@ -9,7 +9,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from .. import console, path_output, results
-from ..load_path import INTERRUPTED, PathRow
+from ..equilibrium_paths.state import End
+from ..load_path import PathRow
 from ..path import journal
 from ..path.following import Control, PathRun
 from ..path.journal import Journal, Record
@@ -87,7 +88,7 @@ def _known(folder: results.ResultFolder, scene: Scene) -> list[Record]:
 
 def _done(record: dict[str, Any]) -> bool:
     """Whether a summary is of a path that came to its end."""
-    return record.get("path") is not None and record["path"]["end"] != INTERRUPTED
+    return record.get("path") is not None and record["path"]["end"] != End.INTERRUPTED
 
 
 def _run(request: PathRequest) -> int:

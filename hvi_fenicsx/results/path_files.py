@@ -10,6 +10,7 @@ from typing import Any
 from dolfinx import fem
 
 from ..certify import certificate
+from ..equilibrium_paths.state import Event
 from ..load_path import LoadPath
 from ..problem.problem import Problem
 from ..runtime.mpi import on_root
@@ -18,7 +19,7 @@ from ..solution import Solution
 from . import contact_rows, contact_table, path_table, table_file, vtk_fields
 from .summary import plain, summary
 
-_SHOWN = frozenset({"start", "jump", "turn", "end"})
+_SHOWN = frozenset({Event.START, Event.JUMP, Event.TURN, Event.END})
 """The events whose states a film shows first; limit points come after them."""
 
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from hvi_fenicsx.load_path import ESCAPES, REACHED, LoadPath, PathRow
+from hvi_fenicsx.equilibrium_paths.state import End
+from hvi_fenicsx.load_path import LoadPath, PathRow
 
 
 def row(factor: float, event: str) -> PathRow:
@@ -35,11 +36,11 @@ def path(sign: float, events: dict[str, float], end: str) -> LoadPath:
     [
         (
             {"start": 0.0, "fold": 2.0, "jump": 2.0, "end": 1.5},
-            REACHED,
+            End.REACHED,
             "there the body jumps to the next",
         ),
-        ({"start": 0.0, "fold": 2.0, "jump": 1.0, "end": 1.5}, REACHED, "the path ends where it was to end"),
-        ({"start": 0.0, "fold": 2.0, "end": 2.0}, ESCAPES, "then the body comes off"),
+        ({"start": 0.0, "fold": 2.0, "jump": 1.0, "end": 1.5}, End.REACHED, "the path ends where it was to end"),
+        ({"start": 0.0, "fold": 2.0, "end": 2.0}, End.ESCAPES, "then the body comes off"),
     ],
     ids=["jump", "jump elsewhere", "off"],
 )
