@@ -147,8 +147,8 @@ def _add_study_options(study: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="NAME=VALUE,...",
-        help="solve the scene for each VALUE of mesh, epsilon, epsilon_absolute, smoothing, method, tolerance, "
-        "linear_solver or accuracy; several axes: all combinations; none: the program plans the study",
+        help="solve the scene for each VALUE of mesh, epsilon, epsilon_absolute, smoothing, degree, method, "
+        "tolerance, linear_solver or accuracy; several axes: all combinations; none: the program plans the study",
     )
     study.add_argument("--repeat", type=_repetitions, metavar="N", help="solve a point at most N times for its time")
     study.add_argument("--limit", type=_seconds, metavar="SECONDS", help="give a point up after so many seconds")

@@ -43,12 +43,22 @@ def load_modules(package: str) -> None:
         importlib.import_module(f"{package}.{module.name}")
 
 
-def closest(name: object, names: Iterable[str]) -> str:
-    """The name that was probably meant, as the end of a message: `` (did you mean 'graph'?)``, or nothing.
+def closest(name: str, known: Iterable[str]) -> str | None:
+    """The known name that was probably meant; None where none is near.
+
+    Args:
+        name: as it was written.
+        known: the names to choose from.
+    """
+    return next(iter(difflib.get_close_matches(name.lower(), list(known), 1, 0.5)), None)
+
+
+def hint(name: object, known: Iterable[str]) -> str:
+    """The same as the end of a message: `` (did you mean 'graph'?)``, or nothing.
 
     Args:
         name: what was given.
-        names: all that are known.
+        known: the names to choose from.
     """
-    match = difflib.get_close_matches(str(name), list(names), n=1)
-    return f" (did you mean {match[0]!r}?)" if match else ""
+    meant = closest(str(name), known)
+    return f" (did you mean {meant!r}?)" if meant else ""

@@ -8,6 +8,7 @@ from typing import Any
 
 from .accuracy import quantities
 from .accuracy.goal import AccuracyResult
+from .certify.certificate import Examination
 from .certify.estimate.estimator import Estimate
 from .load_path import LoadPath
 from .preparation import Preparation
@@ -16,6 +17,7 @@ from .rigid import AnyBody, LoadFactors, Mode
 from .scene import PathTable
 from .solution import Solution
 from .solvers import nested_iteration, registry
+from .solvers.result import Counts
 from .system import loading
 
 NO_HISTORY = (
@@ -86,21 +88,24 @@ def motions(found: Sequence[Mode], bodies: Sequence[AnyBody]) -> str:
 def load_factors(factors: Mapping[str, LoadFactors]) -> Iterator[str]:
     """One line on each load: between which factors of it the body is held, the others as they are."""
     for name, f in factors.items():
-        if not f.never_held:
-            ends = [f"above {f.held_from:.6g}"] if math.isfinite(f.held_from) else []
-            ends += [f"up to {f.held:.6g}"] if math.isfinite(f.held) else []
-            held = f"held at factors {' and '.join(ends)}" if ends else "held at any factor"
-        else:
-            held = "held at no factor"
-        mode = f" ({f.mode.name})" if f.mode else ""
-        peak = (
-            f"peak at {f.peak:.6g}"
-            if math.isfinite(f.peak)
-            else "no peak"
-            if f.peak > 0
-            else "beyond the peak at every factor"
-        )
-        yield f"load {name} alone: {held}{mode}; {peak}" + (f" ({f.peak_mode.name})" if f.peak_mode else "")
+        mode, peak_mode = (f" ({motion.name})" if motion else "" for motion in (f.mode, f.peak_mode))
+        yield f"load {name} alone: {_held(f)}{mode}; {_peak(f.peak)}{peak_mode}"
+
+
+def _held(f: LoadFactors) -> str:
+    """Between which factors a body is held."""
+    if f.never_held:
+        return "held at no factor"
+    ends = [f"above {f.held_from:.6g}"] if math.isfinite(f.held_from) else []
+    ends += [f"up to {f.held:.6g}"] if math.isfinite(f.held) else []
+    return f"held at factors {' and '.join(ends)}" if ends else "held at any factor"
+
+
+def _peak(factor: float) -> str:
+    """The factor of peak strength."""
+    if math.isfinite(factor):
+        return f"peak at {factor:.6g}"
+    return "no peak" if factor > 0 else "beyond the peak at every factor"
 
 
 def effects(prepared: Preparation) -> Iterator[str]:
@@ -127,36 +132,51 @@ def solver(prepared: Preparation) -> str:
 def outcome(solution: Solution) -> Iterator[str]:
     """What was found and how sure it is."""
     yield f"result: {solution.reason}"
-    if not solution.converged and solution.solvability.state in ("metastable", "escapes"):
-        yield "`hvi path SCENE` follows the load to the last state that is borne, and beyond"
-    if not solution.converged and solution.solvability.state == "metastable":
-        yield "`hvi equilibria SCENE` looks for all equilibria, and can prove that there is none"
+    if not solution.converged:
+        yield from _what_next(solution.solvability.state)
     if solution.examination is None or solution.solve_result is None:
         return
-    c, counts = solution.examination.certificate, solution.solve_result.counts
-    of = "" if (last := solution.last_borne) is None else f" of the state at load factor {last.factor:.6g}"
     if solution.obstacle is not None:
         yield f"obstacle of {solution.obstacle.part}: {solution.obstacle}"
-    yield f"certificate{of} ({c.tolerance:g}): {c}"
+    of = "" if (last := solution.last_borne) is None else f" of the state at load factor {last.factor:.6g}"
+    yield f"certificate{of} ({solution.examination.certificate.tolerance:g}): {solution.examination.certificate}"
     if solution.uniqueness is not None:
         yield f"other equilibria: {_OTHERS[solution.uniqueness.state]}; {solution.uniqueness.why}"
+    yield from _deviations(solution, solution.examination)
+    yield _cost(solution, solution.examination.energy, solution.solve_result.counts)
+
+
+def _what_next(state: str) -> Iterator[str]:
+    """Which commands may tell more, by the state of existence of a scene without a certified solution."""
+    if state in ("metastable", "escapes"):
+        yield "`hvi path SCENE` follows the load to the last state that is borne, and beyond"
+    if state == "metastable":
+        yield "`hvi equilibria SCENE` looks for all equilibria, and can prove that there is none"
+
+
+def _deviations(solution: Solution, examination: Examination) -> Iterator[str]:
+    """What rounding, smoothing and the mesh leave of it."""
+    c = examination.certificate
     if c.rounding is not None and c.rounding > c.tolerance:
         yield (
             f"tolerance {c.tolerance:g} is below the rounding errors at this displacement: {c.rounding:.1e} was asked "
             f"for instead (of the net force {c.tolerance:g})"
         )
     if solution.scene.solver.smoothing is not None:
-        away = solution.examination.smoothing_error * solution.problem.scales.stress
+        away = examination.smoothing_error * solution.problem.scales.stress
         yield f"smoothing: -σ_t is up to {away:.3g} N/m² from what the unsmoothed law gives there"
     if solution.estimate is not None:
         yield error(solution.estimate)
         if solution.estimate.coarse:
             yield "`hvi run SCENE --accuracy 0.05` lets the program refine the coarse mesh"
-    energy = solution.examination.energy * solution.problem.scales.energy
-    unit = "J/m" if solution.problem.scales.dimension == 2 else "J"
-    yield (
-        f"energy {energy:.10g} {unit}; {counts.branch} branch steps, {counts.newton} Newton steps, {counts.linear} "
-        f"linear iterations, {solution.timer.seconds['setup'] + solution.timer.seconds['solve']:.2f} s"
+
+
+def _cost(solution: Solution, energy: float, counts: Counts) -> str:
+    """The energy, and what it took to find it."""
+    unit, times = "J/m" if solution.problem.scales.dimension == 2 else "J", solution.timer.seconds
+    return (
+        f"energy {energy * solution.problem.scales.energy:.10g} {unit}; {counts.branch} branch steps, {counts.newton} "
+        f"Newton steps, {counts.linear} linear iterations, {times['setup'] + times['solve']:.2f} s"
     )
 
 

@@ -7,7 +7,6 @@ A formula is checked once, when the scene is read, and then rendered into whatev
 from __future__ import annotations
 
 import ast
-import difflib
 import math
 import operator
 import warnings
@@ -18,6 +17,7 @@ from typing import Any
 import numpy as np
 from typing_extensions import override
 
+from .class_registry import closest
 from .errors import InputError
 from .spatial_value import SpatialValue
 from .typing import Array
@@ -244,8 +244,8 @@ def _check_name(name: str, text: str) -> None:
 
 def _check_call(name: str, count: int, text: str) -> None:
     if name not in FUNCTIONS:
-        close = difflib.get_close_matches(name, FUNCTIONS, 1)
-        hint = f"did you mean {close[0]}? " if close else ""
+        close = closest(name, FUNCTIONS)
+        hint = f"did you mean {close}? " if close else ""
         raise InputError(f"function {name!r} in {text!r} is not known; {hint}allowed: {', '.join(FUNCTIONS)}")
     wanted = 2 if name in _TWO_ARGUMENTS else 1
     if count != wanted:

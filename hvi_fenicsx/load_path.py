@@ -8,13 +8,12 @@ from functools import cached_property
 
 import numpy as np
 
+from .equilibrium_paths.state import End, Event
 from .errors import ExitCode
 from .typing import Array
 
-REACHED, ESCAPES, LOST, INTERRUPTED = "reached", "escapes", "lost", "interrupted"
-"""How a path ends: at the end of its programme; where the body comes off; where it was lost; by the user."""
 _ROUNDING = 1e-9
-"""Factors that are so small beside the largest are zero."""
+"""A part of the largest factor that is zero beside it."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -23,7 +22,7 @@ class PathRow:
 
     Attributes:
         factor: λ.
-        event: what happens here, a word of ``path.csv``.
+        event: what happens here, a word of :class:`.Event`.
         part: where it happens; None where no vertex is meant.
         point: the vertex, m, (d,); None likewise.
         energy: potential energy.
@@ -63,7 +62,7 @@ class LoadPath:
         dimension: of space.
         scaled: what the factor multiplies, by name.
         rows: the states, from the first to the last.
-        end: reached, escapes, lost or interrupted.
+        end: how it ended, a word of :class:`.End`.
         reason: why it ended so; may be empty.
         examined: rows whose certificate is that of the whole body; the others' is that of Γc.
     """
@@ -95,12 +94,12 @@ class LoadPath:
     @property
     def folds(self) -> tuple[int, ...]:
         """The rows at limit points."""
-        return tuple(number for number, row in enumerate(self.rows) if row.event == "fold")
+        return tuple(number for number, row in enumerate(self.rows) if row.event == Event.FOLD)
 
     @property
     def jumps(self) -> tuple[int, ...]:
         """The rows that a jump leads to."""
-        return tuple(number for number, row in enumerate(self.rows) if row.event == "jump")
+        return tuple(number for number, row in enumerate(self.rows) if row.event == Event.JUMP)
 
     @property
     def uncertified(self) -> int:
@@ -110,12 +109,12 @@ class LoadPath:
     @property
     def converged(self) -> bool:
         """Whether the path was followed to its end, and every row is certified."""
-        return self.end in (REACHED, ESCAPES) and not self.uncertified
+        return self.end in (End.REACHED, End.ESCAPES) and not self.uncertified
 
     @property
     def exit_code(self) -> int:
         """By the contract."""
-        if self.end == INTERRUPTED:
+        if self.end == End.INTERRUPTED:
             return ExitCode.INTERRUPTED
         return ExitCode.CERTIFIED if self.converged else ExitCode.NOT_CONVERGED
 
@@ -125,22 +124,27 @@ class LoadPath:
         if not self.rows:
             return f"no state is borne: {self.reason or self.end}"
         row = self.rows[self.peak]
-        kind = "limit point" if row.event == "fold" else f"{'stable' if row.stable else 'unstable'} state"
+        kind = "limit point" if row.event == Event.FOLD else f"{'stable' if row.stable else 'unstable'} state"
         return f"largest factor that is borne: {self._shown(self.peak)} ({kind}, row {self.peak}); {self._then()}"
 
     def _then(self) -> str:
         """What happens after the largest factor."""
-        if self.end in (LOST, INTERRUPTED):
+        if self.end in (End.LOST, End.INTERRUPTED):
             return f"the path is {self.end} at {self._shown(-1)}" + (f" ({self.reason})" if self.reason else "")
         after = next((n for n in self.jumps if n > self.peak), None)
-        if after is not None and self.rows[after].factor >= self.rows[self.peak].factor * (1 - 1e-9):
+        if after is not None and self._at_peak(self.rows[after].factor):
             return f"there the body jumps to the next stable state, {self.ending}"
         return self.ending
+
+    def _at_peak(self, factor: float) -> bool:
+        """Whether a factor is the largest one but for rounding; both are negative where a path begins that way."""
+        peak = self.rows[self.peak].factor
+        return abs(factor - peak) <= _ROUNDING * abs(peak)
 
     @property
     def ending(self) -> str:
         """How the path ends, in words."""
-        if self.end == ESCAPES:
+        if self.end == End.ESCAPES:
             return f"then the body comes off, at {self._shown(-1)}"
         return f"the path ends where it was to end, at {self._shown(-1)}"
 
@@ -162,7 +166,7 @@ class LoadPath:
         last, peak = (self.rows[-1], self.rows[self.peak]) if self.rows else (None, None)
         return {
             "rows": len(self.rows),
-            "events": sum(row.event in ("kink", "contact", "release") for row in self.rows),
+            "events": sum(row.event in (Event.KINK, Event.CONTACT, Event.RELEASE) for row in self.rows),
             "peak_factor": peak and peak.factor,
             "peak_row": peak and self.peak,
             "folds": len(self.folds),

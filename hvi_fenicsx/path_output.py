@@ -6,8 +6,9 @@ import shutil
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
+from .equilibrium_paths.state import End
 from .errors import HviError
-from .load_path import INTERRUPTED, LoadPath
+from .load_path import LoadPath
 from .path import journal
 from .path.following import PathRun
 from .report.html import path_page
@@ -64,7 +65,7 @@ def _from_files(
 ) -> None:
     """Picture and page, from the other files; one that fails costs a line. Rank 0 only."""
     write_record(folder.work, record)
-    if path.end == INTERRUPTED and (folder.target / journal.NAME).exists():
+    if path.end == End.INTERRUPTED and (folder.target / journal.NAME).exists():
         shutil.copyfile(folder.target / journal.NAME, folder.work / journal.NAME)
     if not path.rows:
         return

@@ -26,10 +26,8 @@ def unresolved(problem: Problem, thresholds: ControlThresholds = CONTROL) -> Ent
         problem: the data and the mesh.
         thresholds: which deviation is too much.
     """
-    space, found = (
-        bubbles.space(problem.space.mesh, nodes.degree(problem.space)),
-        list[Entities]([np.empty(0, dtype=np.int32)]),
-    )
+    space = bubbles.space(problem.space.mesh, nodes.degree(problem.space))
+    found: list[Entities] = [np.empty(0, dtype=np.int32)]
     for facets, value in boundary_data.everything(problem):
         at = boundary_data.sample(problem, space, facets, SAMPLING)
         squares, area = at.beyond_nodes(value) ** 2 @ at.weights, at.facets.areas

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from ..class_registry import closest
+from ..class_registry import hint
 from ..errors import InputError
 from ..typing import Array
 from .quantity_base import Observable, Quantity, contact_norm
@@ -218,7 +218,7 @@ def find(name: str) -> type[Quantity]:
         InputError: there is none.
     """
     if name not in Quantity.registry:
-        raise InputError(f"--quantity: unknown name {name!r}{closest(name, names())}; allowed: {', '.join(names())}")
+        raise InputError(f"--quantity: unknown name {name!r}{hint(name, names())}; allowed: {', '.join(names())}")
     return Quantity.registry[name]
 
 

@@ -33,6 +33,7 @@ class Quantity(ABC):
         name: for ``--quantity`` and ``summary.json``.
         description: what it is, for messages: "the slip on Γc in L2".
         in_energy_norm: whether its error is the estimate's own, in the energy norm.
+        estimated: whether there is an estimate of its error on one mesh, for most scenes at least.
         needs_existence: whether existence (with it the load factors) is analysed on every mesh, not on the first only.
         registry: the quantities by their names.
     """

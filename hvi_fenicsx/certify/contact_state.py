@@ -1,6 +1,6 @@
 """The state of Γc at a given displacement: gaps, slips, tractions, pieces of the laws; from (u, problem) alone.
 
-Tractions are nodal residual forces over lumped areas (design.md). Where a component is prescribed, the residual holds
+Tractions are nodal residual forces over lumped areas. Where a component is prescribed, the residual holds
 the support's reaction too, so there the law's own traction stands.
 """
 

@@ -14,19 +14,18 @@ from ..errors import ExitCode, HviError
 from ..preparation import Preparation, prepare
 from ..report.html import equilibria_page
 from ..report.pictures import equilibria as picture
-from ..results.output_folder import Existing
 from ..results.whole import picture_process, write_whole
 from ..runtime import log
-from ..runtime.mpi import on_root
+from ..runtime.mpi import on_root, time_over
 from ..runtime.signals import Interrupt
 from ..runtime.timing import Timer
-from ..scene import Scene, read_scene
+from ..scene import read_scene
 from ..stationary_points.bodies import Equilibria
 from ..stationary_points.found import Found, Saved
 from ..stationary_points.progress_words import Clock, certified_in_words, counted
 from ..system import petsc_options
 from . import equilibria_files as files
-from . import search_file, telling
+from . import search_file, target, telling
 from .search_file import SearchFile
 from .telling import COMM
 
@@ -64,23 +63,19 @@ def execute(options: argparse.Namespace) -> int:
     timer = Timer()
     petsc_options.insert(options.petsc)
     scene = on_root(COMM, lambda: read_scene(options.scene, options.overrides))
-    default = Path("results") / f"{options.scene.stem}-equilibria"
-    target = on_root(COMM, lambda: results.resolved(options.out or default))
-    if options.resume and (record := on_root(COMM, lambda: _proven(target, scene))) is not None:
-        telling.say([f"{target}: finished already ({record['reason']})"])
-        return int(record["exit_code"])
-    saved = on_root(COMM, lambda: search_file.read(target, scene)) if options.resume else None
-    existing: Existing = "replace" if options.force or options.resume else "refuse"
+    goes_to = target.path_of(options, "-equilibria")
+    if options.resume and (code := target.finished(goes_to, scene, "the search is made again", _proven)) is not None:
+        return code
+    saved = on_root(COMM, lambda: search_file.read(goes_to, scene)) if options.resume else None
     display = telling.on_first_rank(log.TerminalDisplay)
-    with results.ResultFolder(COMM, target, existing, inputs=[options.scene]) as folder, log.Handlers(*display):
+    with target.opened(options, goes_to) as folder, log.Handlers(*display):
         prepared = prepare(scene, COMM, timer)
         return _run(Request(options=options, prepared=prepared, folder=folder, saved=saved))
 
 
-def _proven(target: Path, scene: Scene) -> dict[str, Any] | None:
-    """The summary of an earlier search of the same scene that came to its end. Rank 0 only."""
-    record = results.finished.read(target, scene).record
-    return record if record is not None and record.get("equilibria", {}).get("proven") else None
+def _proven(record: dict[str, Any]) -> bool:
+    """Whether a summary is of a search that came to its end."""
+    return bool(record.get("equilibria", {}).get("proven"))
 
 
 def _run(request: Request) -> int:
@@ -110,16 +105,14 @@ def _run(request: Request) -> int:
         telling.say(_lines(prepared, found, rows))
     on_root(COMM, lambda: telling.finish(run_logs))
     folder.commit(prepared.scene)
-    telling.say([f"{folder.target}: {prepared.timer.total:.1f} s in all"])
+    telling.say([*console.warnings(folder.kept), target.where(folder.target, prepared.timer)])
     return int(code)
 
 
 def _stop(interrupt: Interrupt, limit: float | None) -> Callable[[], bool]:
-    """Whether to stop: a signal, or the time is over on rank 0. Collective."""
-    start = time.monotonic()
-    return lambda: (
-        interrupt.requested() or bool(COMM.bcast(limit is not None and time.monotonic() - start > limit, root=0))
-    )
+    """Whether to stop: a signal, or the time is over. Collective."""
+    late = time_over(COMM, limit)
+    return lambda: interrupt.requested() or late()
 
 
 def _reporter() -> Callable[[str], None]:
@@ -168,8 +161,8 @@ def _written(request: Request, bodies: Equilibria, found: Found, i: int) -> file
         results.ResultFolder(COMM, folder.work / name) as own,
         picture_process(own, dimension, telling.LOG.info, wanted=drawn) as pictures,
     ):
-        given = {"command": request.options.given, "petsc": request.options.petsc}
-        write_whole(own, solution, request.prepared.timer, given, telling.LOG.info, pictures)
+        given, timer = target.given(request.options), request.prepared.timer
+        write_whole(own, solution, timer, given, telling.LOG.info, pictures)
         own.commit(request.prepared.scene)
     return files.row(i + 1, bodies, found.points[i], solution, name)
 

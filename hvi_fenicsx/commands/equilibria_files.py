@@ -110,7 +110,7 @@ def write(
 
 def _write(folder: results.ResultFolder, scene: Scene, found: Found, rows: list[Row], record: dict[str, Any]) -> None:
     with (folder.work / TABLE).open("w", encoding="utf-8", newline="") as file:
-        table = csv.writer(file)
+        table = csv.writer(file, lineterminator="\n")
         table.writerow(COLUMNS)
         table.writerows([_cell(getattr(r, name)) for name in COLUMNS] for r in rows)
     (folder.work / "scene.toml").write_text(dump_scene(scene, folder.target), encoding="utf-8")

@@ -3,31 +3,25 @@
 from __future__ import annotations
 
 import argparse
-import hashlib
-import json
 from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 from .. import console, path_output, results
-from ..load_path import INTERRUPTED, PathRow
+from ..equilibrium_paths.state import End
+from ..load_path import PathRow
 from ..path import journal
 from ..path.following import Control, PathRun
 from ..path.journal import Journal, Record
 from ..preparation import prepare
-from ..report.html.render import NAME as PAGE
-from ..results.folder import inputs_of
-from ..results.output_folder import Existing
-from ..runtime import log, terminal
+from ..runtime import log
 from ..runtime.mpi import on_root
 from ..runtime.signals import Interrupt
 from ..runtime.timing import Timer
-from ..runtime.versions import __version__
-from ..scene import PathTable, Scene, dump_scene, read_scene
+from ..scene import PathTable, Scene, read_scene
 from ..system import petsc_options
-from . import telling
+from . import target, telling
 from .telling import COMM
 
 
@@ -56,7 +50,7 @@ class PathRequest:
     @property
     def identity(self) -> str:
         """What the journal says that it is of."""
-        return _identity(self.scene, self.folder.target)
+        return target.identity(self.scene, self.folder.target)
 
 
 def execute(options: argparse.Namespace) -> int:
@@ -70,11 +64,10 @@ def execute(options: argparse.Namespace) -> int:
     read = on_root(COMM, lambda: read_scene(options.scene, options.overrides))
     wanted = read.path or PathTable()
     scene = read.changed(path=wanted)
-    target = on_root(COMM, lambda: results.resolved(options.out or Path("results") / f"{options.scene.stem}-path"))
-    if options.resume and (code := on_root(COMM, lambda: _finished(target, scene))) is not None:
+    goes_to = target.path_of(options, "-path")
+    if options.resume and (code := target.finished(goes_to, scene, "the path is followed again", _done)) is not None:
         return code
-    existing: Existing = "replace" if options.force or options.resume else "refuse"
-    with results.ResultFolder(COMM, target, existing, inputs=[options.scene]) as folder:
+    with target.opened(options, goes_to) as folder:
         known = on_root(COMM, lambda: _known(folder, scene) if options.resume else [])
         request = PathRequest(
             scene=scene,
@@ -82,32 +75,20 @@ def execute(options: argparse.Namespace) -> int:
             folder=folder,
             known=known,
             timer=timer,
-            given={"command": options.given, "petsc": options.petsc},
+            given=target.given(options),
             draw=not options.no_pictures,
         )
         return _run(request)
 
 
-def _identity(scene: Scene, target: Path) -> str:
-    """What a path depends on; on another number of ranks the unknowns have another order."""
-    parts = [__version__, COMM.size, dump_scene(scene, target), sorted(inputs_of(scene, target).items())]
-    return hashlib.sha256(json.dumps(parts).encode()).hexdigest()
-
-
 def _known(folder: results.ResultFolder, scene: Scene) -> list[Record]:
     """The records of a path that was begun. Rank 0 only."""
-    return journal.read(folder.target / journal.NAME, _identity(scene, folder.target))
+    return journal.read(folder.target / journal.NAME, target.identity(scene, folder.target))
 
 
-def _finished(target: Path, scene: Scene) -> int | None:
-    """The exit code of a finished path of the same scene; None where there is none. Rank 0 only."""
-    record, fault = results.finished.read(target, scene)
-    if fault is not None:
-        terminal.say(f"{target}: {fault}; the path is followed again")
-    if record is None or record.get("path") is None or record["path"]["end"] == INTERRUPTED:
-        return None
-    terminal.say(f"{target}: finished already ({record['reason']})")
-    return int(record["exit_code"])
+def _done(record: dict[str, Any]) -> bool:
+    """Whether a summary is of a path that came to its end."""
+    return record.get("path") is not None and record["path"]["end"] != End.INTERRUPTED
 
 
 def _run(request: PathRequest) -> int:
@@ -120,14 +101,8 @@ def _run(request: PathRequest) -> int:
             record = _followed(request, interrupt)
         on_root(COMM, lambda: telling.finish(run_logs))
         folder.commit(request.scene)
-        telling.say([*(f"warning: {text}" for text in folder.kept), on_root(COMM, lambda: _where(request))])
+        telling.say([*console.warnings(folder.kept), target.where(folder.target, request.timer)])
     return int(record["exit_code"])
-
-
-def _where(request: PathRequest) -> str:
-    """Where the result is, and with what to begin."""
-    first = f"; open {PAGE} there" if (request.folder.target / PAGE).is_file() else ""
-    return f"{request.folder.target}: {request.timer.total:.1f} s in all{first}"
 
 
 def _followed(request: PathRequest, interrupt: Interrupt) -> dict[str, Any]:

@@ -16,10 +16,8 @@ from ..accuracy.goal import AccuracyResult, Goal
 from ..errors import ExitCode, InputError
 from ..path import last_borne
 from ..preparation import prepare
-from ..report.html import render
-from ..results.output_folder import Existing
 from ..results.whole import BegunResult, begin_whole, picture_process
-from ..runtime import log, terminal
+from ..runtime import log
 from ..runtime.mpi import on_root
 from ..runtime.signals import Interrupt
 from ..runtime.timing import Timer
@@ -27,7 +25,7 @@ from ..scene import Scene, read_scene
 from ..solution import Solution
 from ..system import petsc_options
 from ..workflow import find_solution
-from . import telling
+from . import target, telling
 from .telling import COMM
 
 Begin = Callable[[Solution], BegunResult]
@@ -69,18 +67,16 @@ def execute(options: argparse.Namespace) -> int:
     scene = on_root(COMM, lambda: read_scene(options.scene, options.overrides))
     if goal is not None:
         quantities.find(goal.quantity)  # known only now: a plugin of the scene may define it
-    target = on_root(COMM, lambda: results.resolved(options.out or Path("results") / options.scene.stem))
-    if options.resume and (code := on_root(COMM, lambda: _finished(target, scene, goal))) is not None:
+    goes_to = target.path_of(options)
+    if options.resume and (code := _finished(goes_to, scene, goal)) is not None:
         return code
-    existing: Existing = "replace" if options.force or options.resume else "refuse"
-    given = {"command": options.given, "petsc": options.petsc}
-    with results.ResultFolder(COMM, target, existing, inputs=[options.scene]) as folder:
+    with target.opened(options, goes_to) as folder:
         request = RunRequest(
             scene=scene,
             goal=goal,
             folder=folder,
             timer=timer,
-            given=given,
+            given=target.given(options),
             pictures=not options.no_pictures,
             report=not options.no_report,
         )
@@ -113,14 +109,8 @@ def _run(request: RunRequest) -> int:
         on_root(COMM, lambda: telling.finish(run_logs))
         folder.commit(request.scene)
         kept = [*folder.kept, *petsc_options.unread(str(request.given["petsc"]))]
-        telling.say([*(f"warning: {text}" for text in kept), on_root(COMM, lambda: _where(request))])
+        telling.say([*console.warnings(kept), target.where(folder.target, request.timer)])
     return int(record["exit_code"])
-
-
-def _where(request: RunRequest) -> str:
-    """Where the result is, and with what to begin."""
-    first = f"; open {render.NAME} there" if (request.folder.target / render.NAME).is_file() else ""
-    return f"{request.folder.target}: {request.timer.total:.1f} s in all{first}"
 
 
 def _solve(request: RunRequest, interrupt: Interrupt, begin: Begin) -> tuple[Solution, BegunResult, dict[str, Any]]:
@@ -154,21 +144,15 @@ def _accuracy(reached: AccuracyResult) -> dict[str, Any]:
     return {"accuracy": results.plain(reached.as_dict()), "exit_code": reached.exit_code}
 
 
-def _finished(target: Path, scene: Scene, goal: Goal | None) -> int | None:
-    """The exit code of a finished result of the same scene and goal; None where there is none. Rank 0 only."""
-    record, fault = results.finished.read(target, scene)
-    if fault is not None:
-        terminal.say(f"{target}: {fault}; the scene is run again")
-    if (
-        record is None
-        or record.get("path") is not None
-        or record["exit_code"] not in (ExitCode.CERTIFIED, ExitCode.NO_SOLUTION)
-    ):
-        return None
-    if not _same_goal(goal, record["accuracy"]):
-        return None
-    terminal.say(f"{target}: finished already ({record['reason']})")
-    return int(record["exit_code"])
+def _finished(folder: Path, scene: Scene, goal: Goal | None) -> int | None:
+    """The exit code of a finished result of the same scene and goal; None where there is none. Collective."""
+
+    def done(record: dict[str, Any]) -> bool:
+        of_run = all(record.get(other) is None for other in ("path", "equilibria"))
+        ended = record["exit_code"] in (ExitCode.CERTIFIED, ExitCode.NO_SOLUTION)
+        return of_run and ended and _same_goal(goal, record["accuracy"])
+
+    return target.finished(folder, scene, "the scene is run again", done)
 
 
 def _same_goal(goal: Goal | None, recorded: dict[str, Any] | None) -> bool:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
 import os
 import time
 import zipfile
@@ -14,11 +12,10 @@ import numpy as np
 
 from .. import results
 from ..errors import InputError
-from ..results.folder import inputs_of
-from ..runtime.versions import __version__
-from ..scene import Scene, dump_scene
+from ..scene import Scene
 from ..stationary_points.found import Saved
 from . import telling
+from .target import identity
 from .telling import COMM
 
 NAME = "search.npz"
@@ -74,17 +71,6 @@ class SearchFile:
         if state:
             content = {_IDENTITY: self._identity, **state}
             np.savez_compressed(self._folder.work / NAME, allow_pickle=False, **content)
-
-
-def identity(scene: Scene, target: Path) -> str:
-    """What a search depends on; on another number of ranks the unknowns have another order.
-
-    Args:
-        scene: the scene.
-        target: the folder of the result.
-    """
-    parts = [__version__, COMM.size, dump_scene(scene, target), sorted(inputs_of(scene, target).items())]
-    return hashlib.sha256(json.dumps(parts).encode()).hexdigest()
 
 
 def read(target: Path, scene: Scene) -> Saved | None:

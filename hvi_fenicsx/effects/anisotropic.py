@@ -2,30 +2,28 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
-from pydantic import BeforeValidator, Field, model_validator
+from pydantic import BeforeValidator, model_validator
 from typing_extensions import override
 
-from ..schema import refusal
+from ..schema import Finite, Positive, refusal
 from ..typing import Array
 from .base import FormContext
 from .contribution import Contribution
-from .elasticity import Elasticity, strain
+from .elasticity import Elasticity, strain, voigt
 
-Finite = Annotated[float, Field(allow_inf_nan=False)]
 _SYMMETRIC = 1e-9
 """Difference of two entries of C, over the largest one, that still counts as none."""
-_PAIRS = {2: ((0, 0), (1, 1), (0, 1)), 3: ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))}
-"""Voigt's order of tensor components, by dimension."""
 
 
 def _tuples(value: Any) -> Any:
     return tuple(_tuples(v) for v in value) if isinstance(value, list | tuple) else value
 
 
-Numbers = Annotated[tuple[Annotated[float, Field(gt=0, allow_inf_nan=False)], ...], BeforeValidator(_tuples)]
+Numbers = Annotated[tuple[Positive, ...], BeforeValidator(_tuples)]
 Ratios = Annotated[tuple[Finite, ...], BeforeValidator(_tuples)]
 Rows = Annotated[tuple[tuple[Finite, ...], ...], BeforeValidator(_tuples)]
 
@@ -33,15 +31,15 @@ Rows = Annotated[tuple[tuple[Finite, ...], ...], BeforeValidator(_tuples)]
 class _ByMatrix(Elasticity):
     """An elasticity known by its Voigt matrix."""
 
+    @abstractmethod
     def stiffness(self) -> Array:
         """C with σ = C ε in Voigt's order, N/m²; shape (3, 3) or (6, 6)."""
-        raise NotImplementedError
 
     @override
     def contribute(self, context: FormContext, where: str | None) -> Contribution:
         """The bilinear form, strains multiplied by L. The pattern of zeros of C is compiled, its values are not."""
         length, cells = context.number(context.length), context.cells(where)
-        given, virtual = (_voigt(length * strain(v), context.dimension) for v in (context.trial, context.test))
+        given, virtual = (voigt(length * strain(v), context.dimension) for v in (context.trial, context.test))
         c = self.stiffness() / context.modulus
         density = sum(context.number(c[i, j]) * given[j] * virtual[i] for i, j in np.argwhere(c != 0.0))
         return Contribution(bilinear=(density * cells,), across=self.across(context, cells))
@@ -55,11 +53,6 @@ class _ByMatrix(Elasticity):
     def modulus_scale(self) -> float:
         """The largest diagonal entry of C."""
         return float(np.max(np.diag(self.stiffness())))
-
-
-def _voigt(tensor: Any, dimension: int) -> list[Any]:
-    """A strain in Voigt's order."""
-    return [tensor[i, j] if i == j else 2 * tensor[i, j] for i, j in _PAIRS[dimension]]
 
 
 def _definite(matrix: Array, hint: str) -> None:

@@ -17,6 +17,7 @@ from typing import Any, ClassVar, Protocol
 from pydantic import BaseModel, ConfigDict
 
 from ..class_registry import enter
+from ..errors import InputError
 from ..laws import Superpotential
 from ..spatial_value import SpatialValue
 from ..typing import Array
@@ -261,6 +262,21 @@ class Effect(BaseModel):
         """What it is, in a sentence or two: the first paragraph of its docstring."""
         text = inspect.cleandoc(cls.__doc__ or "")
         return text.split("\n\n")[0].replace("\n", " ").replace("`", "")
+
+
+def part_of(where: str | None, key: str) -> str:
+    """The boundary part that an effect acts on, which cannot do without one.
+
+    Args:
+        where: the part, or None for the whole body.
+        key: the effect's, for the message.
+
+    Raises:
+        InputError: it is the whole body.
+    """
+    if where is None:
+        raise InputError(f"a {key} needs a boundary part")
+    return where
 
 
 def load_name(where: str | None, effect: Effect) -> str:

@@ -19,7 +19,7 @@ from .base import Drive, Effect, Evaluate, FormContext, Place, Sizes
 from .contribution import Contribution, NormalBounds, ObstacleForce, ObstacleMove
 from .formula_field import FormulaField, as_formula, require_components
 from .obstacle_field import ObstacleField, ObstacleGap
-from .obstacles import Obstacle, Vector, unit
+from .obstacles import NonzeroVector, Obstacle, unit
 
 MEASURED = "measured"
 """The gap between two bodies is the distance of their sides as they are meshed."""
@@ -80,7 +80,7 @@ class Contact(Effect):
     upper: FormulaField | None = None
     """bilateral contact, with `lower`: the largest opening -u·n, m, a number or a formula"""
 
-    direction: Vector | None = None
+    direction: NonzeroVector | None = None
     """with `gap`: from the body towards the obstacle, of any length; stands for the outward normal"""
     obstacle: ObstacleField | None = None
     """instead of `gap`: a flat obstacle near a curved part, { point = [0, 0], normal = [0, 1] }, or one of another
@@ -93,8 +93,8 @@ class Contact(Effect):
             raise refusal(
                 "needs one of gap = 0.0, both lower and upper, or obstacle = { point = [...], normal = [...] }"
             )
-        if self.direction is not None and (not any(self.direction) or not isinstance(self.gap, SpatialValue)):
-            raise refusal("direction goes with a gap that is a number or a formula, and is not zero")
+        if self.direction is not None and not isinstance(self.gap, SpatialValue):
+            raise refusal("direction goes with a gap that is a number or a formula")
         ends = [f.source for f in (self.lower, self.upper) if f is not None and f.is_number]
         if len(ends) == 2 and ends[0] > ends[1]:  # type: ignore[operator]
             raise refusal(f"lower = {ends[0]:g} is above upper = {ends[1]:g}; swap them")
@@ -143,7 +143,7 @@ class Contact(Effect):
             return NormalBounds(lower=least, upper=None, towards=self.obstacle, move=move, force=force)
         if isinstance(self.gap, str):
             return NormalBounds(lower=Formula(0.0), upper=None, measured=True)
-        towards = _Straight(tuple(map(float, unit(self.direction)))) if self.direction else None
+        towards = _Straight(tuple(map(float, unit(self.direction)))) if self.direction is not None else None
         lower = self.lower if self.gap is None else self.gap.negative()
         return NormalBounds(lower=lower, upper=self.upper, towards=towards)
 

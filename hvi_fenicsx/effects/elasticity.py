@@ -10,12 +10,15 @@ from pydantic import Field
 from typing_extensions import override
 
 from ..errors import InputError
+from ..schema import Finite, Positive
 from ..typing import Array
 from .base import Effect, FormContext, Place
 from .contribution import Averaged, Contribution
 
 _LOCKING = 0.45
 """Poisson's ratio above which P1 cells answer too stiffly (docs/methods.md)."""
+_PAIRS = {2: ((0, 0), (1, 1), (0, 1)), 3: ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))}
+"""Voigt's order of tensor components, by dimension."""
 
 
 def strain(v: Any) -> Any:
@@ -23,6 +26,16 @@ def strain(v: Any) -> Any:
     import ufl  # here and below: a scene is read without it
 
     return ufl.sym(ufl.grad(v))
+
+
+def voigt(tensor: Any, dimension: int) -> list[Any]:
+    """A strain in Voigt's order, shear strains doubled.
+
+    Args:
+        tensor: the strain, in UFL.
+        dimension: of space.
+    """
+    return [tensor[i, j] if i == j else 2 * tensor[i, j] for i, j in _PAIRS[dimension]]
 
 
 class Elasticity(Effect):
@@ -35,7 +48,7 @@ class Elasticity(Effect):
 
     model: Literal["plane_stress", "plane_strain", "three_dimensional"]
     """the kind of elastic problem; the paper uses plane_stress"""
-    thermal_expansion: Annotated[float, Field(allow_inf_nan=False)] = 0.0
+    thermal_expansion: Finite = 0.0
     """the coefficient α of thermal expansion, 1/K; used by `temperature` in a body table"""
 
     @abstractmethod
@@ -82,7 +95,7 @@ class IsotropicElasticity(Elasticity):
     key: ClassVar[str] = "isotropic"
     term: ClassVar[str] = "a(u, v) = ∫ σ(u):ε(v) dx, isotropic"
 
-    youngs_modulus: Annotated[float, Field(gt=0, allow_inf_nan=False)]
+    youngs_modulus: Positive
     """Young's modulus E, N/m²"""
     poisson_ratio: Annotated[float, Field(gt=-1, lt=0.5, allow_inf_nan=False)]
     """Poisson's ratio ν, between -1 and 0.5"""

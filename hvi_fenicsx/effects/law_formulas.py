@@ -17,6 +17,7 @@ import numpy as np
 from .. import laws
 from ..errors import InputError
 from ..formula import Formula
+from ..schema import Keys
 from ..spatial_value import SpatialValue
 from ..typing import Array, Mask
 from .contribution import ONE
@@ -25,9 +26,6 @@ _PLACES = [(0.0, 0.0, 0.0), *((s, s, s) for s in (1e-3, 1e-2, 0.1, 1.0, 10.0, 10
 """Where formulas are evaluated, m, until the law has a number for each of its parameters."""
 _ROUNDING = 1e-9
 """A relative difference of parameters that is none."""
-
-Place = tuple[str | int, ...]
-"""Keys and indices that lead to one number of a law's table."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -118,7 +116,7 @@ def create(name: str, table: Mapping[str, Any]) -> PlacedLaw:
     return _multiplied(_with_numbers(name, table, formulas), formulas)
 
 
-def _numbers(value: Any, place: Place = ()) -> Iterator[tuple[Place, Any]]:
+def _numbers(value: Any, place: Keys = ()) -> Iterator[tuple[Keys, Any]]:
     """The entries of nested tables and lists."""
     if isinstance(value, Mapping):
         entries: Any = value.items()
@@ -143,7 +141,7 @@ def _formula(value: Any) -> Formula | None:
     return None
 
 
-def _with_numbers(name: str, table: Mapping[str, Any], formulas: Mapping[Place, Formula]) -> laws.Superpotential:
+def _with_numbers(name: str, table: Mapping[str, Any], formulas: Mapping[Keys, Formula]) -> laws.Superpotential:
     """The law at the first place where all formulas are numbers that it can have."""
     refused: InputError | None = None
     for point in _PLACES:
@@ -159,7 +157,7 @@ def _with_numbers(name: str, table: Mapping[str, Any], formulas: Mapping[Place, 
     raise refused or InputError(f"law {name!r}: {said}: is a finite number other than 0 at none of the places tried")
 
 
-def _filled(value: Any, values: Mapping[Place, float], place: Place = ()) -> Any:
+def _filled(value: Any, values: Mapping[Keys, float], place: Keys = ()) -> Any:
     """A table with numbers in the place of formulas."""
     if isinstance(value, Mapping):
         return {key: _filled(entry, values, (*place, key)) for key, entry in value.items()}
@@ -168,7 +166,7 @@ def _filled(value: Any, values: Mapping[Place, float], place: Place = ()) -> Any
     return values.get(place, value)
 
 
-def _multiplied(law: laws.Superpotential, formulas: Mapping[Place, Formula]) -> PlacedLaw:
+def _multiplied(law: laws.Superpotential, formulas: Mapping[Keys, Formula]) -> PlacedLaw:
     found = _parameters(law, formulas)
     missing = [_key(place) for place in formulas if _key(place) not in {p.key for p in found}]
     first, second = _telling(found)
@@ -189,7 +187,7 @@ def _multiplied(law: laws.Superpotential, formulas: Mapping[Place, Formula]) -> 
     )
 
 
-def _parameters(law: laws.Superpotential, formulas: Mapping[Place, Formula]) -> list[Parameter]:
+def _parameters(law: laws.Superpotential, formulas: Mapping[Keys, Formula]) -> list[Parameter]:
     """The numbers of a law that have a unit, with the powers of it; formulas first."""
     longer, stronger = law.scaled(0.5, 1.0), law.scaled(1.0, 0.5)
     if not type(law) is type(longer) is type(stronger):
@@ -240,5 +238,5 @@ def times(one: SpatialValue, other: SpatialValue) -> SpatialValue:
     return Formula(f"({one.source})*({other.source})")
 
 
-def _key(place: Place) -> str:
+def _key(place: Keys) -> str:
     return "".join(f"[{key}]" if isinstance(key, int) else str(key) for key in place)

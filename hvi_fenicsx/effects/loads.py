@@ -11,7 +11,7 @@ from ..errors import InputError
 from ..formula import Formula
 from ..schema import refusal
 from ..spatial_value import SpatialValue
-from .base import Drive, Evaluate, FormContext, Place, Sizes, SurfaceLoad
+from .base import Drive, Evaluate, FormContext, Place, Sizes, SurfaceLoad, part_of
 from .contribution import Condition, Contribution
 from .formula_field import FormulaField
 from .plain_values import Listed
@@ -32,10 +32,9 @@ class Traction(Listed):
         """The linear form over its part."""
         import ufl  # here and below: a scene is read without it
 
-        if where is None:
-            raise InputError("a traction needs a boundary part")
+        part = part_of(where, self.key)
         vector = ufl.as_vector([context.render(f) for f in self.values]) / context.number(context.stress)
-        return Contribution(linear=(ufl.inner(vector, context.test) * context.facets(where, *self.values),))
+        return Contribution(linear=(ufl.inner(vector, context.test) * context.facets(part, *self.values),))
 
     @override
     def surface_load(self) -> SurfaceLoad:

@@ -8,32 +8,34 @@ from __future__ import annotations
 import math
 from abc import abstractmethod
 from pathlib import Path
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar, get_args
 
 import numpy as np
-from pydantic import (
-    BaseModel,
-    BeforeValidator,
-    ConfigDict,
-    Field,
-    model_validator,
-)
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, model_validator
+from pydantic.fields import FieldInfo
 from typing_extensions import override
 
 from ..class_registry import enter
 from ..errors import InputError
-from ..schema import ExistingFile, Positive, refusal
+from ..schema import ExistingFile, Finite, Positive, refusal
 from ..typing import Array
 from .formula_field import require_components
 from .surface_files import distances_along
 
-Vector = Annotated[
-    tuple[Annotated[float, Field(allow_inf_nan=False)], ...],
-    BeforeValidator(lambda value: tuple(value) if isinstance(value, list) else value),
-]
-"""Components in m, as many as the scene has dimensions."""
+_AS_TUPLE = BeforeValidator(lambda value: tuple(value) if isinstance(value, list) else value)
+"""What makes a field a vector."""
+Vector = Annotated[tuple[Finite, ...], _AS_TUPLE]
+"""Components, as many as the scene has dimensions."""
 
 
+def _not_zero(vector: tuple[float, ...]) -> tuple[float, ...]:
+    if not any(vector):
+        raise refusal("is zero; give a direction")
+    return vector
+
+
+NonzeroVector = Annotated[Vector, AfterValidator(_not_zero)]
+"""A vector that is not zero."""
 _ACROSS = 1e-12
 """A displacement with no larger part than this across a direction is along it."""
 
@@ -43,8 +45,15 @@ def unit(vector: Vector) -> Array:
     return np.asarray(vector, dtype=np.float64) / math.hypot(*vector) + 0.0
 
 
+def _is_vector(field: FieldInfo) -> bool:
+    """Whether a field is a vector, or one or None."""
+    return _AS_TUPLE in field.metadata or any(_AS_TUPLE in get_args(one) for one in get_args(field.annotation))
+
+
 class Obstacle(BaseModel):
     """A rigid obstacle. Points are given as (m, d), distances as (m,), in m.
+
+    A field of the type :data:`Vector` must have as many components as the scene has dimensions.
 
     Class attributes:
         shape: the name in scenes.
@@ -56,11 +65,11 @@ class Obstacle(BaseModel):
     dimensions: ClassVar[tuple[int, ...]] = (2, 3)
     registry: ClassVar[dict[str, type[Obstacle]]] = {}
 
-    direction: Vector | None = None
+    direction: NonzeroVector | None = None
     """from the body towards the obstacle, of any length: gaps are measured along it; by default to the nearest point"""
     displacement: Vector | None = None
     """by which the obstacle is moved from where it is described, m"""
-    force: Vector | None = None
+    force: NonzeroVector | None = None
     """instead of a displacement: the force that presses it, N/m in 2D, N in 3D; it slides along it until contact bears
     it, and does not turn"""
 
@@ -71,10 +80,7 @@ class Obstacle(BaseModel):
             enter(Obstacle.registry, cls, cls.shape, "obstacle")
 
     @model_validator(mode="after")
-    def _no_zero_directions(self) -> Obstacle:
-        for key in ("direction", "normal", "axis", "force"):
-            if (vector := getattr(self, key, None)) is not None and not any(vector):
-                raise refusal(f"{key} of the obstacle is zero; give a direction")
+    def _moved_in_one_way(self) -> Obstacle:
         if self.force is not None and self.displacement is not None:
             raise refusal("an obstacle is moved by a displacement or pressed by a force; give one of them")
         return self
@@ -87,14 +93,18 @@ class Obstacle(BaseModel):
         """
         if dimension not in self.dimensions:
             raise InputError(f'contact.obstacle: shape = "{self.shape}" needs {self.dimensions[0]}D')
-        for key in type(self).model_fields:
-            if isinstance(value := getattr(self, key), tuple):
-                require_components(value, dimension, f"contact.obstacle.{key}")
+        for key, vector in self._vectors().items():
+            require_components(vector, dimension, f"contact.obstacle.{key}")
+
+    def _vectors(self) -> dict[str, tuple[float, ...]]:
+        """Its vectors by key."""
+        known = {key: getattr(self, key) for key, field in type(self).model_fields.items() if _is_vector(field)}
+        return {key: vector for key, vector in known.items() if vector is not None}
 
     @property
     def dimension(self) -> int:
         """The number of components of its vectors."""
-        return next(len(v) for key in type(self).model_fields if isinstance(v := getattr(self, key), tuple))
+        return len(next(iter(self._vectors().values())))
 
     @property
     def unmoved(self) -> Obstacle:
@@ -172,7 +182,7 @@ class Plane(Obstacle):
     shape: ClassVar[str] = "plane"
     point: Vector
     """a point of its surface, m"""
-    normal: Vector
+    normal: NonzeroVector
     """its normal, towards the body; of any length"""
 
     @override
@@ -248,7 +258,7 @@ class Cylinder(_Round):
 
     shape: ClassVar[str] = "cylinder"
     dimensions: ClassVar[tuple[int, ...]] = (3,)
-    axis: Vector
+    axis: NonzeroVector
     """along it; of any length"""
 
     @override

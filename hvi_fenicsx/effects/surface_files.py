@@ -14,9 +14,8 @@ _STEEP = 1e-9
 """A triangle whose normal is orthogonal to the direction up to this is not met by it."""
 
 
-@lru_cache(maxsize=8)
 def triangles(file: Path) -> Array:
-    """The triangles of a file, (n, 3, 3), m.
+    """The triangles of a file, (n, 3, 3), in the file's unit of length; one that has not changed is read once.
 
     Args:
         file: STL, binary or text.
@@ -24,6 +23,13 @@ def triangles(file: Path) -> Array:
     Raises:
         InputError: there is none, or VTK, which reads it, is missing.
     """
+    state = file.stat() if file.exists() else None
+    return _read(file, state and (state.st_mtime_ns, state.st_size))
+
+
+@lru_cache(maxsize=8)
+def _read(file: Path, state: tuple[int, int] | None) -> Array:
+    """The triangles of a file in a state."""
     try:
         from vtkmodules.util.numpy_support import vtk_to_numpy
         from vtkmodules.vtkCommonCore import vtkObject
@@ -32,9 +38,10 @@ def triangles(file: Path) -> Array:
         raise InputError(f"{file}: VTK reads STL files; install python3-vtk9 (Debian) or vtk (pip, conda)") from None
     reader = vtkSTLReader()
     reader.SetFileName(str(file))
+    shown = vtkObject.GetGlobalWarningDisplay()
     vtkObject.GlobalWarningDisplayOff()
     reader.Update()
-    vtkObject.GlobalWarningDisplayOn()
+    vtkObject.SetGlobalWarningDisplay(shown)
     surface = reader.GetOutput()
     if surface.GetNumberOfCells() == 0:
         raise InputError(f"{file}: is no STL file with triangles")
@@ -46,9 +53,11 @@ def triangles(file: Path) -> Array:
 def distances_along(file: Path, points: Array, direction: Array) -> Array:
     """How far points are from the nearest triangle that faces them, negative behind it; NaN where there is none, (m,).
 
+    All lengths are in the file's unit.
+
     Args:
         file: STL; the normals of its triangles, by their order of corners, look out of the obstacle.
-        points: (m, 3), m.
+        points: (m, 3).
         direction: unit vector towards the surface, (3,).
 
     Raises:

@@ -10,7 +10,7 @@ from typing_extensions import override
 from ..errors import InputError
 from .base import Drive, Evaluate, FormContext, Place, Sizes
 from .contribution import Contribution
-from .elasticity import Elasticity, strain
+from .elasticity import Elasticity, strain, voigt
 from .plain_values import OneValue
 
 
@@ -45,15 +45,8 @@ class Temperature(OneValue):
     def _load(self, context: FormContext, material: Elasticity) -> Any:
         """(C : αI) : ε(v) ΔT, nondimensional."""
         virtual = context.number(context.length) * strain(context.test)
-        stress = material.thermal_stress() / context.stress
-        normal = range(context.dimension)
-        pairs = [(i, i) for i in normal] + ([(0, 1)] if len(normal) == 2 else [(1, 2), (0, 2), (0, 1)])
-        work = sum(
-            context.number(float(s)) * (virtual[i, j] if i == j else 2 * virtual[i, j])
-            for s, (i, j) in zip(stress, pairs, strict=True)
-            if s
-        )
-        return context.render(self.value) * work
+        pairs = zip(material.thermal_stress() / context.stress, voigt(virtual, context.dimension), strict=True)
+        return context.render(self.value) * sum(context.number(float(s)) * e for s, e in pairs if s)
 
     @override
     def stress_scale(self, largest: Evaluate, sizes: Sizes) -> float:

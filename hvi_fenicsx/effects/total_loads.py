@@ -11,7 +11,7 @@ from typing_extensions import override
 from ..errors import InputError
 from ..schema import refusal
 from ..typing import Array
-from .base import Drive, Evaluate, FormContext, Place, Sizes, SurfaceLoad
+from .base import Drive, Evaluate, FormContext, Place, Sizes, SurfaceLoad, part_of
 from .contribution import Contribution
 from .plain_values import Listed, OneValue
 
@@ -31,7 +31,7 @@ class Pressure(OneValue):
 
         pressure = context.render(self.value) / context.number(context.stress)
         work = -pressure * ufl.inner(context.normal, context.test)
-        return Contribution(linear=(work * context.facets(_part(where, self.key), self.value),))
+        return Contribution(linear=(work * context.facets(part_of(where, self.key), self.value),))
 
     @override
     def surface_load(self) -> SurfaceLoad:
@@ -78,7 +78,7 @@ class TotalForce(_Total):
         """The linear form over its part."""
         import ufl
 
-        part = _part(where, self.key)
+        part = part_of(where, self.key)
         scale = context.side_moments(part).area * context.stress
         mean = ufl.as_vector([context.number(force / scale) for force in self.values])
         return Contribution(linear=(ufl.inner(mean, context.test) * context.facets(part),))
@@ -116,7 +116,7 @@ class Moment(_Total):
         """
         import ufl
 
-        part = _part(where, self.key)
+        part = part_of(where, self.key)
         moments = context.side_moments(part)
         rate = _rotation(moments.second, self.values, part) / context.stress
         x = ufl.SpatialCoordinate(context.test.ufl_function_space().mesh)
@@ -132,12 +132,6 @@ class Moment(_Total):
     def stress_scale(self, largest: Evaluate, sizes: Sizes) -> float:
         """The largest component over the body's length squared, cubed in 3D."""
         return max(map(abs, self.values)) / sizes.length ** (2 if len(self.values) == 1 else 3)
-
-
-def _part(where: str | None, key: str) -> str:
-    if where is None:
-        raise InputError(f"a {key} needs a boundary part")
-    return where
 
 
 def _rotation(second: Array, moment: tuple[float, ...], part: str) -> Array:

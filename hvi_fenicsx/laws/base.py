@@ -46,9 +46,14 @@ class Superpotential(ABC):
         if register and "name" in cls.__dict__:
             enter(_REGISTRY, cls, cls.name, "law")
 
+    @property
+    def _title(self) -> str:
+        """How messages name it."""
+        return f"law {self.name!r}"
+
     @abstractmethod
     def value(self, x: Array) -> Array:
-        """J at the displacements x (m,), in N/m, with j(0) = 0 (smoothed laws: to within their bound)."""
+        """The energy j at displacements x (m,), N/m, with j(0) = 0 (smoothed laws: to within their bound)."""
 
     @property
     @abstractmethod
@@ -261,7 +266,7 @@ class ScaledLaw(Superpotential, register=False):
     traction: float
 
     def __post_init__(self) -> None:
-        require_positive(self.name, length=self.length, traction=self.traction)
+        require_positive(self._title, length=self.length, traction=self.traction)
 
     @override
     def value(self, x: Array) -> Array:

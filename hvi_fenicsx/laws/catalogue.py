@@ -35,10 +35,10 @@ class QuadraticLinear(PolylineLaw):
     delta: float
 
     def __post_init__(self) -> None:
-        require_positive(self.name, gamma1=self.gamma1, gamma2=self.gamma2, delta=self.delta)
+        require_positive(self._title, gamma1=self.gamma1, gamma2=self.gamma2, delta=self.delta)
         if abs(self.gamma1 - 2.0 * self.gamma2) > 1e-12 * self.gamma1:
             raise InputError(
-                f"law {self.name!r}: gamma1 = {self.gamma1!r} must be 2 gamma2 = {2 * self.gamma2!r}: then "
+                f"{self._title}: gamma1 = {self.gamma1!r} must be 2 gamma2 = {2 * self.gamma2!r}: then "
                 f'the drop lies at delta. For any other drop state the graph: law = "graph", points = '
                 f"[[0, 0], [{self.delta!r}, {self.gamma1!r}], [{self.delta!r}, {self.gamma2!r}]]"
             )
@@ -66,7 +66,7 @@ class QuadraticLinearLiteral(PolylineLaw):
     delta: float
 
     def __post_init__(self) -> None:
-        require_positive(self.name, gamma1=self.gamma1, gamma2=self.gamma2, delta=self.delta)
+        require_positive(self._title, gamma1=self.gamma1, gamma2=self.gamma2, delta=self.delta)
 
     @override
     def build(self) -> TractionGraph:
@@ -96,7 +96,7 @@ class Tresca(PolylineLaw):
     reference_slip: float = 1e-6
 
     def __post_init__(self) -> None:
-        require_positive(self.name, yield_traction=self.yield_traction, reference_slip=self.reference_slip)
+        require_positive(self._title, yield_traction=self.yield_traction, reference_slip=self.reference_slip)
 
     @override
     @property
@@ -121,7 +121,7 @@ class LinearSpring(PolylineLaw):
     reference_slip: float = 1e-6
 
     def __post_init__(self) -> None:
-        require_positive(self.name, stiffness=self.stiffness, reference_slip=self.reference_slip)
+        require_positive(self._title, stiffness=self.stiffness, reference_slip=self.reference_slip)
 
     @override
     @property
@@ -154,14 +154,14 @@ class Sawtooth(PolylineLaw):
     drops: int
 
     def __post_init__(self) -> None:
-        require_positive(self.name, delta=self.delta)
-        require_ordered(self.name, residual_traction=self.residual_traction, peak_traction=self.peak_traction)
+        require_positive(self._title, delta=self.delta)
+        require_ordered(self._title, residual_traction=self.residual_traction, peak_traction=self.peak_traction)
         if self.residual_traction == self.peak_traction:
             raise InputError(
-                f"law {self.name!r}: residual_traction = peak_traction = {self.peak_traction!r} leaves no "
+                f"{self._title}: residual_traction = peak_traction = {self.peak_traction!r} leaves no "
                 f"drop; lower residual_traction"
             )
-        require_count(self.name, DEFAULT.most_drops, drops=self.drops)
+        require_count(self._title, DEFAULT.most_drops, drops=self.drops)
 
     @override
     def build(self) -> TractionGraph:
@@ -196,11 +196,11 @@ class Graph(PolylineLaw):
     one_sided: bool = False
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "points", _checked_points(self.name, self.points))
+        object.__setattr__(self, "points", _checked_points(self._title, self.points))
         if not isinstance(self.one_sided, bool):
-            raise InputError(f"law {self.name!r}: one_sided = {self.one_sided!r} is not usable; give True or False")
+            raise InputError(f"{self._title}: one_sided = {self.one_sided!r} is not usable; give True or False")
         if not any(traction for _, traction in self.points):
-            raise InputError(f"law {self.name!r}: the traction of every point is 0; leave the law away")
+            raise InputError(f"{self._title}: the traction of every point is 0; leave the law away")
 
     @override
     def build(self) -> TractionGraph:
@@ -211,43 +211,43 @@ class Graph(PolylineLaw):
         return replace(self, points=tuple((x / length, t / traction) for x, t in self.points))
 
 
-def _checked_points(law: str, points: Sequence[Sequence[float]]) -> tuple[tuple[float, float], ...]:
+def _checked_points(owner: str, points: Sequence[Sequence[float]]) -> tuple[tuple[float, float], ...]:
     """The points as pairs of floats; InputError where they are not the graph of a law."""
     if isinstance(points, str) or not isinstance(points, Sequence | np.ndarray):
-        raise InputError(f"law {law!r}: points = {points!r} is not a list of pairs [displacement, traction]")
+        raise InputError(f"{owner}: points = {points!r} is not a list of pairs [displacement, traction]")
     for point in points:
         if isinstance(point, str) or not isinstance(point, Sequence | np.ndarray) or len(point) != 2:
-            raise InputError(f"law {law!r}: point {point!r} is not a pair [displacement, traction]")
-        require_number(law, displacement=point[0], traction=point[1])
+            raise InputError(f"{owner}: point {point!r} is not a pair [displacement, traction]")
+        require_number(owner, displacement=point[0], traction=point[1])
     pairs = tuple((float(x), float(t)) for x, t in points)
     if not pairs or pairs[0][0] != 0.0:
-        raise InputError(f"law {law!r}: the first point must have the displacement 0, for example [0, 0]")
+        raise InputError(f"{owner}: the first point must have the displacement 0, for example [0, 0]")
     for before, after in itertools.pairwise(pairs):
-        _check_segment(law, before, after)
-    _check_jumps(law, pairs)
+        _check_segment(owner, before, after)
+    _check_jumps(owner, pairs)
     return pairs
 
 
-def _check_segment(law: str, before: tuple[float, float], after: tuple[float, float]) -> None:
+def _check_segment(owner: str, before: tuple[float, float], after: tuple[float, float]) -> None:
     step = after[0] - before[0]
     if step < 0.0:
-        raise InputError(f"law {law!r}: the displacement falls from {before[0]!r} to {after[0]!r}; order the points")
+        raise InputError(f"{owner}: the displacement falls from {before[0]!r} to {after[0]!r}; order the points")
     if step > 0.0 and not math.isfinite((after[1] - before[1]) / step):
         raise InputError(
-            f"law {law!r}: the segment from {before!r} to {after!r} is too steep for a float; "
+            f"{owner}: the segment from {before!r} to {after!r} is too steep for a float; "
             f"make it vertical, which is a jump"
         )
 
 
-def _check_jumps(law: str, pairs: tuple[tuple[float, float], ...]) -> None:
+def _check_jumps(owner: str, pairs: tuple[tuple[float, float], ...]) -> None:
     for first, _, third in zip(pairs, pairs[1:], pairs[2:], strict=False):
         if first[0] == third[0]:
             raise InputError(
-                f"law {law!r}: three points at the displacement {first[0]!r}; a jump has two ends, "
+                f"{owner}: three points at the displacement {first[0]!r}; a jump has two ends, "
                 f"leave out the one in between"
             )
     if len(pairs) > 1 and pairs[1][0] == 0.0 and pairs[0][1] != 0.0:
         raise InputError(
-            f"law {law!r}: two points at the displacement 0, the first with traction {pairs[0][1]!r}; "
+            f"{owner}: two points at the displacement 0, the first with traction {pairs[0][1]!r}; "
             f"a jump at 0 starts at [0, 0]"
         )

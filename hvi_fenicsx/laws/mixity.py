@@ -42,10 +42,15 @@ class Mixity(ABC):
         enter(_REGISTRY, cls, cls.name, "mixity")
 
     def __post_init__(self) -> None:
-        require_positive(self.name, energy_ratio=self.energy_ratio)
-        require_number(self.name, exponent=self.exponent)
+        require_positive(self._title, energy_ratio=self.energy_ratio)
+        require_number(self._title, exponent=self.exponent)
         if self.exponent < 1.0:
-            raise InputError(f"mixity {self.name!r}: exponent = {self.exponent!r} must be at least 1")
+            raise InputError(f"{self._title}: exponent = {self.exponent!r} must be at least 1")
+
+    @property
+    def _title(self) -> str:
+        """How messages name it."""
+        return f"mixity {self.name!r}"
 
     @abstractmethod
     def energy(self, share: Array) -> Array:

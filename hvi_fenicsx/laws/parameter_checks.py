@@ -1,4 +1,4 @@
-"""Checks of a law's parameters, with messages that say what is wrong, what is allowed and how to correct it."""
+"""Checks of numbers that a law or a criterion is made of; messages say what is wrong, and how to correct it."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from numbers import Real
 from ..errors import InputError
 
 
-def require_number(law: str, **parameters: object) -> None:
+def require_number(owner: str, **parameters: object) -> None:
     """Refuse anything but finite real numbers.
 
     Args:
-        law: the law's name, for the message.
+        owner: whose they are, for the message: ``law 'tresca'``.
         parameters: by name.
 
     Raises:
@@ -20,30 +20,30 @@ def require_number(law: str, **parameters: object) -> None:
     """
     for key, value in parameters.items():
         if isinstance(value, bool) or not isinstance(value, Real) or not math.isfinite(value):
-            raise InputError(f"law {law!r}: {key} = {value!r} is not usable; give a finite number")
+            raise InputError(f"{owner}: {key} = {value!r} is not usable; give a finite number")
 
 
-def require_positive(law: str, **parameters: object) -> None:
+def require_positive(owner: str, **parameters: object) -> None:
     """Refuse anything but finite numbers > 0.
 
     Args:
-        law: the law's name, for the message.
+        owner: whose they are, for the message: ``law 'tresca'``.
         parameters: by name.
 
     Raises:
         InputError: with the first that is none.
     """
-    require_number(law, **parameters)
+    require_number(owner, **parameters)
     for key, value in parameters.items():
         if not float(value) > 0.0:  # type: ignore[arg-type]
-            raise InputError(f"law {law!r}: {key} = {value!r} must be > 0; give its magnitude, in the scene's units")
+            raise InputError(f"{owner}: {key} = {value!r} must be > 0; give its magnitude")
 
 
-def require_count(law: str, most: int, **parameters: object) -> None:
+def require_count(owner: str, most: int, **parameters: object) -> None:
     """Refuse anything but whole numbers from 1 on.
 
     Args:
-        law: the law's name, for the message.
+        owner: whose they are, for the message: ``law 'tresca'``.
         most: the largest number allowed.
         parameters: by name.
 
@@ -52,23 +52,23 @@ def require_count(law: str, most: int, **parameters: object) -> None:
     """
     for key, value in parameters.items():
         if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= most:
-            raise InputError(f"law {law!r}: {key} = {value!r} must be a whole number from 1 to {most}")
+            raise InputError(f"{owner}: {key} = {value!r} must be a whole number from 1 to {most}")
 
 
-def require_ordered(law: str, **parameters: float) -> None:
+def require_ordered(owner: str, **parameters: float) -> None:
     """Refuse a residual below 0 or above the peak.
 
     Args:
-        law: the law's name, for the message.
+        owner: whose they are, for the message: ``law 'tresca'``.
         parameters: the residual and the peak, in this order, by name.
 
     Raises:
         InputError: they are not 0 ≤ residual ≤ peak, peak > 0.
     """
-    require_number(law, **parameters)
+    require_number(owner, **parameters)
     (low_name, low), (high_name, high) = parameters.items()
     if not 0.0 <= low <= high or high == 0.0:
         raise InputError(
-            f"law {law!r}: {low_name} = {low!r} and {high_name} = {high!r} do not fit; "
+            f"{owner}: {low_name} = {low!r} and {high_name} = {high!r} do not fit; "
             f"allowed is 0 <= {low_name} <= {high_name} with {high_name} > 0"
         )

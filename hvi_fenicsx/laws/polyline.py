@@ -199,7 +199,7 @@ class PolylineLaw(Superpotential):
             traction = self._largest(float(a))
             if traction > 0.0:
                 return float(a), 0.5 * float(a) * traction
-        raise InputError(f"law {self.name!r}: the traction is zero everywhere; leave the law away")
+        raise InputError(f"{self._title}: the traction is zero everywhere; leave the law away")
 
     def _largest(self, a: float) -> float:
         """Largest |traction| over [-a, a], the limits of the breaks in it included."""

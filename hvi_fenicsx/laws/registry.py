@@ -9,7 +9,7 @@ from typing import Any, get_type_hints
 
 from pydantic import ConfigDict, ValidationError, create_model
 
-from ..class_registry import closest
+from ..class_registry import hint
 from ..errors import InputError
 from .base import Superpotential, registered
 
@@ -45,7 +45,7 @@ def create(name: str, parameters: Mapping[str, Any]) -> Superpotential:
             "the traction μ p"
         )
     if law is None:
-        raise InputError(f"unknown law {name!r}{closest(name, available())}; available: {', '.join(available())}")
+        raise InputError(f"unknown law {name!r}{hint(name, available())}; available: {', '.join(available())}")
     allowed = inspect.signature(law).parameters
     _check_keys(name, parameters, allowed)
     return law(**_checked(law, parameters, allowed))
@@ -65,7 +65,7 @@ def _check_keys(name: str, given: Mapping[str, Any], allowed: Mapping[str, inspe
     listing = f"law {name!r} takes {', '.join(allowed) or 'no parameters'}"
     for key in given:
         if key not in allowed:
-            raise InputError(f"law {name!r}: unknown parameter {key!r}{closest(key, allowed)}; {listing}")
+            raise InputError(f"law {name!r}: unknown parameter {key!r}{hint(key, allowed)}; {listing}")
     missing = [key for key, p in allowed.items() if p.default is p.empty and key not in given]
     if missing:
         raise InputError(f"law {name!r}: {', '.join(missing)} missing; {listing}")

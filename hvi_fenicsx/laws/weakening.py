@@ -37,8 +37,8 @@ class WeakeningLaw(Superpotential):
     delta: float
 
     def __post_init__(self) -> None:
-        require_positive(self.name, delta=self.delta)
-        require_ordered(self.name, residual_traction=self.residual_traction, peak_traction=self.peak_traction)
+        require_positive(self._title, delta=self.delta)
+        require_ordered(self._title, residual_traction=self.residual_traction, peak_traction=self.peak_traction)
 
     @abstractmethod
     def shape(self, z: Array) -> tuple[Array, Array, Array]:

@@ -5,6 +5,7 @@ from .contact_arrays import ContactArrays
 from .following import ModelPath, follow
 from .materials import Anisotropic, Energy, Isotropic, Orthotropic
 from .model import Model
+from .own_effects import In, On
 from .placed_effects import (
     Adhesion,
     BodyForce,
@@ -12,7 +13,6 @@ from .placed_effects import (
     Contact,
     Displacement,
     Friction,
-    On,
     PlacedEffect,
     Support,
     Temperature,
@@ -37,6 +37,7 @@ __all__ = [
     "Equilibria",
     "Force",
     "Friction",
+    "In",
     "Isotropic",
     "Model",
     "ModelPath",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -21,15 +21,15 @@ from ..load_path import LoadPath
 from ..path.following import Control, PathRun
 from ..report.path_reader import PathResult
 from ..results import ResultFolder
-from ..results.output_folder import Existing
+from ..results.output_folder import existing
 from ..runtime import log
 from ..scene import PathTable, Scene, SolverTable
 from ..schema import located_error, unknown
 from ..typing import Array
 from . import values
 from .model import Model
-from .solution import displacement
-from .solving import check
+from .solution import GIVEN, displacement
+from .solving import check, fields_of
 
 _LOG = log.logger("modelling")
 
@@ -138,10 +138,9 @@ class ModelPath(LoadPath):
         Raises:
             InputError: on all ranks alike: the folder holds a result or other files, or cannot be written.
         """
-        existing: Existing = "replace" if force else "refuse"
-        given = {"command": None, "petsc": None}
-        with ResultFolder(self.run.prepared.system.comm, Path(folder), existing) as target:
-            path_output.write(target, self.run, self, given, _LOG.warning, draw=pictures)
+        comm = self.run.prepared.system.comm
+        with ResultFolder(comm, Path(folder), existing(force=force)) as target:
+            path_output.write(target, self.run, self, GIVEN, _LOG.warning, draw=pictures)
             target.commit(self.run.prepared.scene)
 
     def __repr__(self) -> str:
@@ -159,7 +158,7 @@ def follow(
 
     Args:
         model: what to follow.
-        comm: the ranks; by default those of the body, for a scene all.
+        comm: the ranks of a scene; by default all. A model has those of its body.
         to: the factor at which the path ends, or a programme with turns; by default what the scene says, else 1.
         **options: the other keys of the scene's table ``[path]`` (scaled, follow, memory), and those of ``[solver]``,
             such as ``degree=2`` or ``smoothing="chks", epsilon=0.01``; ``tolerance`` is that of the certificate.
@@ -169,13 +168,10 @@ def follow(
     """
     path, solver = _by_table(options)
     prepared = check(model, comm, **solver)
-    wanted = _wanted(prepared.scene, path if to is None else {**path, "to": to})
-    prepared = type(prepared)(
-        **{f.name: getattr(prepared, f.name) for f in fields(prepared)} | {"scene": prepared.scene.changed(path=wanted)}
-    )
-    run = PathRun(prepared, wanted)
-    found = run.follow(Control())
-    return ModelPath(**{f.name: getattr(found, f.name) for f in fields(found)}, run=run)
+    scene = _with_path(prepared.scene, path if to is None else {**path, "to": to})
+    assert scene.path is not None
+    run = PathRun(replace(prepared, scene=scene), scene.path)
+    return ModelPath(**fields_of(run.follow(Control())), run=run)
 
 
 def _by_table(options: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
@@ -189,10 +185,10 @@ def _by_table(options: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any
     return of_path, of_solver
 
 
-def _wanted(scene: Scene, changes: dict[str, Any]) -> PathTable:
-    known = scene.path or PathTable()
+def _with_path(scene: Scene, changes: dict[str, Any]) -> Scene:
+    """The scene with a table ``[path]``, of which some keys are changed."""
     given = {key: values.plain(value) for key, value in changes.items()}
     try:
-        return scene.changed(path=known.changed(**given)).path or known
+        return scene.changed(path=(scene.path or PathTable()).changed(**given))
     except ValidationError as error:
         raise located_error(error, Scene) from None

@@ -5,12 +5,16 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Sequence
 from typing import Any
 
+from mpi4py import MPI
+
 from ..effects import Effect, Place
 from ..errors import InputError
+from ..scene import Scene
 from ..schema import unknown
 from .body import Body
 from .model_tables import ModelTables, in_python, in_words
 from .placed_effects import OnSide, PlacedEffect
+from .user_energy import UserEnergy
 
 _Key = tuple[Place, str, frozenset[str]]
 
@@ -64,6 +68,33 @@ class Model:
 
     def __repr__(self) -> str:
         return f"Model({self.body!r}: {', '.join(map(_name, self.effects))})"
+
+
+def scene_and_ranks(model: Model | Scene, comm: MPI.Comm | None) -> tuple[Scene, MPI.Comm]:
+    """The scene of what a user gives, and the ranks that work on it.
+
+    Args:
+        model: a model or a scene.
+        comm: the ranks of a scene; None: all. A model has those of its body.
+
+    Raises:
+        InputError: it is neither.
+    """
+    if isinstance(model, Model):
+        return model.scene, model.body.comm
+    if not isinstance(model, Scene):
+        raise InputError(f"{model!r} is no model and no scene; a file is read by hvi.read_scene(path)")
+    return model, comm or MPI.COMM_WORLD
+
+
+def is_portable(model: Model) -> bool:
+    """Whether a model can be assembled on other meshes than its body's: no energy has data of that one.
+
+    Args:
+        model: the model.
+    """
+    own = (material.elasticity for material in model.scene.material.values())
+    return all(energy.is_portable(model.body.mesh) for energy in own if isinstance(energy, UserEnergy))
 
 
 def _checked_body(body: Any) -> Body:

@@ -100,27 +100,6 @@ class InRegion(PlacedEffect):
 
 
 @dataclass(frozen=True)
-class On(OnSide):
-    """Any effect on a side, such as one of your own class.
-
-    Attributes:
-        side: the side's name, or a list of sides.
-        placed: the effect.
-    """
-
-    side: str | Sequence[str]
-    placed: Effect
-
-    def effect(self, mesh: dmesh.Mesh) -> Effect:
-        """The effect as it is."""
-        if not isinstance(self.placed, Effect):
-            raise InputError(
-                f"{self.placed!r} is no effect; give an object of a subclass of hvi_fenicsx.effects.Effect"
-            )
-        return self.placed
-
-
-@dataclass(frozen=True)
 class Displacement(OnSide):
     """A prescribed displacement.
 

@@ -17,7 +17,7 @@ from ..problem import spaces
 from ..problem.cell_stress import cell_stress, space_of_stress
 from ..problem.scaling import Scales
 from ..results import ResultFolder, gathering
-from ..results.output_folder import Existing
+from ..results.output_folder import existing
 from ..results.whole import picture_process, write_whole
 from ..runtime import log, notebook
 from ..solution import Solution
@@ -27,8 +27,8 @@ from . import plotting
 from .contact_arrays import ContactArrays, ContactParts
 
 _LOG = log.logger("modelling")
-_GIVEN = {"command": None, "petsc": None}
-"""A program has no command line."""
+GIVEN = {"command": None, "petsc": None}
+"""The entries of ``summary.json`` for the command line, which a program has not."""
 
 
 def displacement(u: fem.Function, scales: Scales) -> fem.Function:
@@ -150,13 +150,12 @@ class ModelSolution(Solution):
         Raises:
             InputError: on all ranks alike: the folder holds a result or other files, or cannot be written.
         """
-        existing: Existing = "replace" if force else "refuse"
-        dimension = self.problem.scales.dimension
+        comm, dimension = self.problem.domain.mesh.comm, self.problem.scales.dimension
         with (
-            ResultFolder(self.problem.domain.mesh.comm, Path(folder), existing) as target,
+            ResultFolder(comm, Path(folder), existing(force=force)) as target,
             picture_process(target, dimension, _LOG.warning, wanted=pictures) as process,
         ):
-            write_whole(target, self, self.timer, _GIVEN, _LOG.warning, process)
+            write_whole(target, self, self.timer, GIVEN, _LOG.warning, process)
             target.commit(self.scene)
 
     @property

@@ -7,7 +7,6 @@ from contextlib import nullcontext
 from dataclasses import fields, replace
 from typing import Any
 
-import numpy as np
 from dolfinx import fem
 from mpi4py import MPI
 from petsc4py import PETSc
@@ -15,6 +14,7 @@ from pydantic import ValidationError
 
 from .. import console, preparation, workflow
 from ..errors import InputError
+from ..load_path import LoadPath
 from ..mesh.domain import Domain
 from ..path import last_borne
 from ..preparation import DEFAULT, Preparation, Thresholds
@@ -28,9 +28,9 @@ from ..solvers.context import Progress
 from ..system import petsc_options
 from ..system.system import System
 from . import values
-from .model import Model
+from .argument_checks import require_switch
+from .model import Model, is_portable, scene_and_ranks
 from .solution import ModelSolution
-from .user_energy import UserEnergy
 
 
 class ModelPreparation(Preparation):
@@ -57,7 +57,7 @@ def solve(
 
     Args:
         model: what to solve.
-        comm: the ranks; by default those of the body, for a scene all.
+        comm: the ranks of a scene; by default all. A model has those of its body.
         progress: called at each Newton step; by default it is logged.
         timer: where time goes; by default a new one.
         thresholds: the numbers that tune the run.
@@ -85,7 +85,7 @@ def solve(
         if solution.solve_result is not None:
             petsc_options.check_read(petsc or {}, prepared.system.comm)
     _free_garbage([prepared.system, *(level.system for level in found.levels)])
-    return ModelSolution(**_fields(solution))
+    return ModelSolution(**fields_of(solution))
 
 
 def check(
@@ -100,7 +100,7 @@ def check(
 
     Args:
         model: what to check.
-        comm: the ranks; by default those of the body, for a scene all.
+        comm: the ranks of a scene; by default all. A model has those of its body.
         timer: where time goes; by default a new one.
         thresholds: the numbers that tune the run.
         **options: the keys of the scene's table ``[solver]``.
@@ -108,26 +108,26 @@ def check(
     Raises:
         InputError: on all ranks alike: an option is not allowed, or the model does not fit its mesh.
     """
-    if isinstance(model, Scene):
-        scene, domain = model, None
-    elif not isinstance(model, Model):
-        raise InputError(f"{model!r} is no model and no scene; a file is read by hvi.read_scene(path)")
-    else:
-        scene, domain, comm = model.scene, _domain(model), model.body.comm
-    scene, comm = _with_options(scene, options), comm or MPI.COMM_WORLD
+    scene, ranks = scene_and_ranks(model, comm)
+    domain = _domain(model) if isinstance(model, Model) else None
+    scene = _with_options(scene, options)
     with model.tables.naming() if isinstance(model, Model) else nullcontext():
-        prepared = preparation.prepare(scene, comm, timer, domain, thresholds=thresholds)
-    return ModelPreparation(**_fields(prepared))
+        prepared = preparation.prepare(scene, ranks, timer, domain, thresholds=thresholds)
+    return ModelPreparation(**fields_of(prepared))
 
 
 def _check_arguments(progress: Any, estimate: Any) -> None:
     if not callable(progress):
         raise InputError(f"progress: give a function of one hvi.NewtonStep, such as print, not {progress!r}")
-    if not isinstance(estimate, bool | np.bool_):
-        raise InputError(f"estimate: must be True or False (is {estimate!r})")
+    require_switch("estimate", estimate)
 
 
-def _fields(made: Preparation | Solution) -> dict[str, Any]:
+def fields_of(made: Preparation | Solution | LoadPath) -> dict[str, Any]:
+    """The fields of what a lower room made, for a class with more to say of it.
+
+    Args:
+        made: a dataclass of that room.
+    """
     return {field.name: getattr(made, field.name) for field in fields(made)}
 
 
@@ -163,6 +163,4 @@ def _domain(model: Model) -> Domain:
     The data may change between two solves.
     """
     domain = model.body.domain
-    own = [m.elasticity for m in model.scene.material.values() if isinstance(m.elasticity, UserEnergy)]
-    portable = all(energy.is_portable(domain.mesh) for energy in own)
-    return domain if portable else replace(domain, coarsening=None, shared=None, bends=False)
+    return domain if is_portable(model) else replace(domain, coarsening=None, shared=None, bends=False)

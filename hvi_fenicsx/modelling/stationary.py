@@ -2,27 +2,26 @@
 
 from __future__ import annotations
 
-import logging
-import time
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, fields
-from numbers import Real
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from mpi4py import MPI
 
-from ..errors import InputError
+from ..runtime import log
+from ..runtime.mpi import time_over
 from ..scene import Scene
 from ..solution import Solution
 from ..stationary_points import bodies
 from ..stationary_points.found import Found
 from ..stationary_points.passes import Pass
 from ..stationary_points.progress_words import Clock, certified_in_words
+from .argument_checks import require_between, require_switch
 from .model import Model
 from .solution import ModelSolution
-from .solving import check
+from .solving import check, fields_of
 
-_LOG = logging.getLogger(__name__)
+_LOG = log.logger("modelling")
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -71,7 +70,7 @@ def equilibria(
     Args:
         model: what to search; that all equilibria were found can be proven where the tractions of its laws are
             polylines of one component each.
-        comm: the ranks; by default those of the body, for a scene all.
+        comm: the ranks of a scene; by default all. A model has those of its body.
         lowest: the lowest energy with a proof, instead of all equilibria.
         gap: what that proof may leave open, relative to the energy.
         limit: seconds after which the search stops; None: none.
@@ -80,19 +79,15 @@ def equilibria(
     Raises:
         InputError: on all ranks alike: a law is of a kind that is not searched, or a number is not allowed.
     """
-    _check_numbers(gap, limit)
+    require_switch("lowest", lowest)
+    require_between("gap", gap, 1.0)
+    if limit is not None:
+        require_between("limit", limit)
     prepared = check(model, comm, **options)
     searched = bodies.Equilibria(prepared)
-    stop = _stop(prepared.system.comm, limit)
+    stop = time_over(prepared.system.comm, limit)
     found = searched.find(lowest=lowest, gap=gap, stop=stop, report=_LOG.debug)
     return _result(found, tuple(_certified(searched, found)), prepared.problem.scales.energy)
-
-
-def _check_numbers(gap: Any, limit: Any) -> None:
-    if isinstance(gap, bool) or not isinstance(gap, Real) or not 0.0 < float(gap) < 1.0:
-        raise InputError(f"gap: must be a number between 0 and 1 (is {gap!r})")
-    if limit is not None and (isinstance(limit, bool) or not isinstance(limit, Real) or not float(limit) > 0.0):
-        raise InputError(f"limit: must be a number of seconds above 0, or None (is {limit!r})")
 
 
 def _certified(searched: bodies.Equilibria, found: Found) -> Iterator[Solution]:
@@ -103,15 +98,9 @@ def _certified(searched: bodies.Equilibria, found: Found) -> Iterator[Solution]:
         _LOG.debug(certified_in_words(i + 1, count, clock))
 
 
-def _stop(ranks: MPI.Comm, limit: float | None) -> Callable[[], bool]:
-    """Whether the time is over on rank 0. Collective."""
-    start = time.monotonic()
-    return lambda: bool(ranks.bcast(limit is not None and time.monotonic() - start > limit))
-
-
 def _result(found: Found, solutions: Sequence[Solution], energy: float) -> Equilibria:
     return Equilibria(
-        solutions=tuple(ModelSolution(**{f.name: getattr(s, f.name) for f in fields(s)}) for s in solutions),
+        solutions=tuple(ModelSolution(**fields_of(solution)) for solution in solutions),
         kinds=tuple(str(point.kind) for point in found.points),
         complete=found.complete,
         lower_bound=None if found.lower_bound is None else found.lower_bound * energy,

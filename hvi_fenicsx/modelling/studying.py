@@ -16,7 +16,7 @@ from mpi4py import MPI
 
 from ..errors import InputError
 from ..mesh.shapes import OnlyMesh
-from ..results.output_folder import OutputFolder
+from ..results.output_folder import OutputFolder, existing
 from ..runtime.mpi import on_root
 from ..scene import Scene
 from ..spatial_value import SpatialValue
@@ -27,8 +27,7 @@ from ..studies.run import fill, said
 from ..studies.store import Store
 from ..studies.study import Study, evaluate
 from ..studies.table import Row
-from .model import Model
-from .user_energy import UserEnergy
+from .model import Model, is_portable, scene_and_ranks
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -79,7 +78,7 @@ def study(
     Args:
         model: what to study.
         folder: where tables, pictures and page go, as by ``hvi study``; None: nowhere.
-        comm: the ranks; by default those of the body, for a scene all.
+        comm: the ranks of a scene; by default all. A model has those of its body.
         repeats: of each point at most, for the median of its time; 1 or more.
         force: whether a study that is in the folder already is replaced.
         **axes: values by axis, such as ``epsilon=["exact", 0.1]``, ``mesh=[0, 1, 2]``, ``tolerance``, ``method``,
@@ -92,17 +91,15 @@ def study(
             no number of solves.
         NoReferenceError: on all ranks alike: no solution exists, or the reference is not certified.
     """
-    if not isinstance(model, Model | Scene):
-        raise InputError(f"{model!r} is no model and no scene; a file is read by hvi.read_scene(path)")
-    scene = model if isinstance(model, Scene) else _scene(model)
+    scene, ranks = scene_and_ranks(model, comm)
+    scene = _scene(model) if isinstance(model, Model) else scene
     _check_repeats(repeats)
-    comm = comm or (MPI.COMM_WORLD if isinstance(model, Scene) else model.body.comm)
     with _in_python_words():
         plan = study_plan.make(scene, [_axis(name, values) for name, values in axes.items()])
-    with _target(folder, comm, force=force) as (target, output):
-        store = Store(target, comm.size)
-        run_here(plan, store, comm, repeats)
-        return on_root(comm, lambda: _finished(evaluate(plan, store), store, output))
+    with _target(folder, ranks, force=force) as (target, output):
+        store = Store(target, ranks.size)
+        run_here(plan, store, ranks, repeats)
+        return on_root(ranks, lambda: _finished(evaluate(plan, store), store, output))
 
 
 def _finished(found: Study, store: Store, output: OutputFolder | None) -> ModelStudy:
@@ -156,7 +153,7 @@ def _target(
 
 def _opened(folder: Path, made: list[OutputFolder], *, force: bool) -> Path:
     output = OutputFolder(folder, "study")
-    output.check("replace" if force else "refuse")
+    output.check(existing(force=force))
     made.append(output)
     output.clear()
     return output.target
@@ -164,8 +161,7 @@ def _opened(folder: Path, made: list[OutputFolder], *, force: bool) -> Path:
 
 def _scene(model: Model) -> Scene:
     """The model's scene; on its own mesh alone, where it has data on that."""
-    energies = [m.elasticity for m in model.scene.material.values() if isinstance(m.elasticity, UserEnergy)]
-    portable = all(energy.is_portable(model.body.mesh) for energy in energies)
+    portable = is_portable(model)
     if portable and not any(_is_of_one_mesh(placed.effect) for placed in model.scene.effects()):
         return model.scene
     domain = replace(model.body.domain, shared=None)

@@ -12,8 +12,8 @@ from dataclasses import replace
 import numpy as np
 
 from ..certify import certificate, plausibility
+from ..equilibrium_paths.state import End
 from ..errors import InputError, SolverError
-from ..load_path import INTERRUPTED
 from ..preparation import Preparation
 from ..problem.factored_problem import FactoredProblem
 from ..problem.problem import Problem
@@ -62,7 +62,7 @@ def _at_the_limit(prepared: Preparation, failed: Solution, interrupted: Callable
         return failed
     path = run.follow(Control(interrupted=interrupted))
     assert failed.solve_result is not None
-    if path.end == INTERRUPTED:
+    if path.end == End.INTERRUPTED:
         return replace(failed, solve_result=replace(failed.solve_result, interrupted=True))
     borne = path.rows and 0.0 < path.rows[path.peak].factor < 1.0
     if not borne:

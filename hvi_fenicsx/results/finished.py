@@ -46,13 +46,3 @@ def read(target: Path, scene: Scene) -> Finished:
     if found.inputs != inputs_of(scene, target):
         return Finished(fault="a file that the scene reads has changed")
     return Finished(json.loads((target / MARKS["result"]).read_text(encoding="utf-8")))
-
-
-def is_result(folder: Path) -> bool:
-    """Whether the program wrote a result into a folder.
-
-    Args:
-        folder: the folder.
-    """
-    found = manifest.read(folder)
-    return found is not None and found.kind == "result"

@@ -20,7 +20,7 @@ from ..mesh import nodes
 from ..problem import spaces
 from ..problem.problem import Problem
 from ..report.solution_arrays import LoadArrays, PartArrays, Singles, SolutionArrays
-from ..runtime.mpi import agree
+from ..runtime.mpi import agree, joined
 from ..solution import Solution
 from ..typing import Array, Entities, Integers
 from . import contact_rows
@@ -47,7 +47,7 @@ def solution_arrays(
         fields["escape_mode"] = problem.bodies.motion(points, solution.solvability.direction)[:owned]
     if von_mises is not None:
         fields["von_mises"] = von_mises
-    gathered = {name: _joined(comm, values) for name, values in fields.items()}
+    gathered = {name: joined(comm, values) for name, values in fields.items()}
     sides = {name: _facets(problem, facets) for name, facets in problem.part_facets.items()}
     loads, regions = _loads(problem), _regions(problem)
     parts = joined_parts(comm, rows_of_parts(solution) if rows is None else rows)
@@ -82,7 +82,7 @@ def _cells(problem: Problem) -> Integers:
 def _facets(problem: Problem, facets: Entities) -> Integers:
     """Local facets by their global nodes, each once and ascending, (k, d); right on rank 0 alone. Collective."""
     corners = nodes.linear_facets(problem.space, facets)
-    return _distinct(_joined(problem.domain.mesh.comm, spaces.global_numbers(problem.space, corners)))
+    return _distinct(joined(problem.domain.mesh.comm, spaces.global_numbers(problem.space, corners)))
 
 
 def _distinct(facets: Integers) -> Integers:
@@ -100,7 +100,7 @@ def _regions(problem: Problem) -> dict[str, Integers]:
         own = np.asarray(cells[cells < owned], dtype=np.int64)
         return np.asarray((first + own[:, None] * parts + np.arange(parts)).ravel())
 
-    return {name: _joined(comm, numbers(cells)) for name, cells in sorted(problem.domain.regions.items())}
+    return {name: joined(comm, numbers(cells)) for name, cells in sorted(problem.domain.regions.items())}
 
 
 def _loads(problem: Problem) -> dict[str, LoadArrays]:
@@ -123,10 +123,8 @@ def _load(problem: Problem, facets: Entities, loads: Sequence[SurfaceLoad]) -> L
             traction[:, i] += component.at(problem.positions[local])
         if load.pressure is not None:
             pressure += load.pressure.at(problem.positions[local])
-    vertices, first = np.unique(_joined(comm, spaces.global_numbers(problem.space, local)), return_index=True)
-    return LoadArrays(
-        vertices=vertices, traction=_joined(comm, traction)[first], pressure=_joined(comm, pressure)[first]
-    )
+    vertices, first = np.unique(joined(comm, spaces.global_numbers(problem.space, local)), return_index=True)
+    return LoadArrays(vertices=vertices, traction=joined(comm, traction)[first], pressure=joined(comm, pressure)[first])
 
 
 def part_arrays(problem: Problem, states: Sequence[ContactState]) -> dict[str, PartArrays]:
@@ -150,19 +148,13 @@ def joined_parts(comm: MPI.Comm, rows: Mapping[str, PartArrays]) -> dict[str, Pa
 
 
 def _joined_part(comm: MPI.Comm, rows: PartArrays) -> PartArrays:
-    vertices = _joined(comm, rows.vertices)
-    facets = _distinct(_joined(comm, rows.facets))
+    vertices = joined(comm, rows.vertices)
+    facets = _distinct(joined(comm, rows.facets))
     return PartArrays(
-        columns={name: _joined(comm, values) for name, values in rows.columns.items()},
+        columns={name: joined(comm, values) for name, values in rows.columns.items()},
         vertices=vertices,
         facets=facets[np.isin(facets, vertices).all(axis=1)],
-        weights=_joined(comm, rows.weights),
-        normals=_joined(comm, rows.normals),
-        drops=_joined(comm, rows.drops),
+        weights=joined(comm, rows.weights),
+        normals=joined(comm, rows.normals),
+        drops=joined(comm, rows.drops),
     )
-
-
-def _joined(comm: MPI.Comm, values: npt.NDArray[Any]) -> Any:
-    """What all ranks have, one after the other, on rank 0; elsewhere their own. Collective."""
-    pieces = comm.gather(np.ascontiguousarray(values), root=0)
-    return values if pieces is None else np.concatenate(pieces)

@@ -38,6 +38,15 @@ _UNFINISHED = "--resume goes on with it, --force begins anew"
 """And with one that a killed process has left."""
 
 
+def existing(*, force: bool) -> Existing:
+    """What to do with a folder of this kind that is there already.
+
+    Args:
+        force: whether it may be replaced.
+    """
+    return "replace" if force else "refuse"
+
+
 class OutputFolder:
     """A folder that this process alone writes, from its making to :meth:`close`. Not collective.
 

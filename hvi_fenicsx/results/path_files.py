@@ -10,6 +10,7 @@ from typing import Any
 from dolfinx import fem
 
 from ..certify import certificate
+from ..equilibrium_paths.state import Event
 from ..load_path import LoadPath
 from ..problem.problem import Problem
 from ..runtime.mpi import on_root
@@ -18,8 +19,8 @@ from ..solution import Solution
 from . import contact_rows, contact_table, path_table, table_file, vtk_fields
 from .summary import plain, summary
 
-_SHOWN = frozenset({"start", "fold", "jump", "turn", "end"})
-"""The events whose states a film shows first."""
+_SHOWN = frozenset({Event.START, Event.JUMP, Event.TURN, Event.END})
+"""The events whose states a film shows first; limit points come after them."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,7 +50,7 @@ def shown_rows(path: LoadPath, most: int) -> list[int]:
     if not path.rows:
         return []
     last = len(path.rows) - 1
-    marked = [n for n, row in enumerate(path.rows) if row.event in _SHOWN - {"fold"}]
+    marked = [n for n, row in enumerate(path.rows) if row.event in _SHOWN]
     chosen = set(_evenly([*{*marked, path.peak, 0, last}], most))
     for others in (path.folds, range(last + 1)):
         rest = sorted(set(others) - chosen)

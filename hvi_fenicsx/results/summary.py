@@ -1,4 +1,4 @@
-"""``summary.json``: the run in numbers, by the contract (design.md)."""
+"""``summary.json``: the run in numbers (docs/results.md)."""
 
 from __future__ import annotations
 

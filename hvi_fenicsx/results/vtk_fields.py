@@ -178,7 +178,7 @@ def write_contact(path: Path, problem: Problem, states: Sequence[ContactState]) 
     Raises:
         InputError: it cannot be written, on all ranks alike.
     """
-    facets = np.unique(np.concatenate([s.facets for s in (state.surface for state in states)])).astype(np.int32)
+    facets = np.unique(np.concatenate([state.surface.facets for state in states])).astype(np.int32)
     first = _on_facets(problem, facets, _nodal(problem, states))
     second = {}
     if problem.interfaces:

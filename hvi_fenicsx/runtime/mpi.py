@@ -10,6 +10,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any, TypeVar
 
+import numpy as np
+import numpy.typing as npt
 from mpi4py import MPI
 
 from ..errors import HviError, InputError
@@ -144,6 +146,28 @@ def asleep_until_all(comm: MPI.Comm, seconds: float = math.inf) -> bool:
     while not (done := request.Test()) and time.monotonic() < end:
         time.sleep(0.01)
     return bool(done)
+
+
+def time_over(comm: MPI.Comm, limit: float | None) -> Callable[[], bool]:
+    """Whether a time from now on is over, by the clock of rank 0; to be asked by all ranks. Collective when asked.
+
+    Args:
+        comm: the ranks.
+        limit: seconds; None: it is never over.
+    """
+    start = time.monotonic()
+    return lambda: bool(comm.bcast(limit is not None and time.monotonic() - start > limit, root=0))
+
+
+def joined(comm: MPI.Comm, values: npt.NDArray[Any]) -> Any:
+    """What all ranks have, one after the other, on rank 0; elsewhere their own. Collective.
+
+    Args:
+        comm: the ranks.
+        values: of this rank, with the same shape on all but for the first axis.
+    """
+    pieces = comm.gather(np.ascontiguousarray(values), root=0)
+    return values if pieces is None else np.concatenate(pieces)
 
 
 def total(comm: MPI.Comm, value: float) -> float:

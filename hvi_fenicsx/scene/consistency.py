@@ -11,14 +11,13 @@ from ..errors import InputError
 from ..laws import smoothing
 from ..mesh.boundary_part import BoundaryPart
 from ..mesh.shapes import DomainShape
-from ..schema import Mistake, shown, unknown
+from ..schema import Keys, Mistake, shown, unknown
 from .effect_tables import BodyTable, BoundaryTable, InterfaceTable, MaterialTable
 from .named_tables import WHOLE
 from .path_table import PathTable
 from .solver_table import SolverTable
 
-_Keys = tuple[str, ...]
-_Item = tuple[_Keys, BoundaryPart, Effect]
+_Item = tuple[Keys, BoundaryPart, Effect]
 """The place in the scene, the sides or their piece, the effect."""
 
 
@@ -195,8 +194,8 @@ def _exclusive(items: Iterable[_Item]) -> Iterator[Mistake]:
             yield Mistake(other, text)
 
 
-def _on_side(side: str, effects: list[tuple[_Keys, Effect]], scene: Tables) -> Iterator[Mistake]:
-    prescribed: dict[int, _Keys] = {}
+def _on_side(side: str, effects: list[tuple[Keys, Effect]], scene: Tables) -> Iterator[Mistake]:
+    prescribed: dict[int, Keys] = {}
     for key, effect in effects:
         for axis in effect.prescribed():
             if axis in prescribed:
@@ -209,7 +208,7 @@ def _on_side(side: str, effects: list[tuple[_Keys, Effect]], scene: Tables) -> I
 
 
 def _against(
-    key: _Keys, effect: Effect, side: str, prescribed: Mapping[int, _Keys], normal: int | None, dimension: int
+    key: Keys, effect: Effect, side: str, prescribed: Mapping[int, Keys], normal: int | None, dimension: int
 ) -> Iterator[Mistake]:
     """Contact and tractions in a direction that is prescribed anyway."""
     blocking = normal if normal in prescribed else 0 if len(prescribed) == dimension else None
@@ -233,5 +232,5 @@ def _quoted(names: Iterable[str]) -> str:
     return ", ".join(map(shown, names))
 
 
-def _dotted(key: _Keys) -> str:
-    return ".".join(step for step in key if step != WHOLE)
+def _dotted(key: Keys) -> str:
+    return ".".join(str(step) for step in key if step != WHOLE)

@@ -22,7 +22,7 @@ from pydantic import (
 from ..effects import Effect, Place
 from ..errors import InputError
 from ..mesh.boundary_part import Inequalities
-from ..schema import Key, Mistake, Names, Table, mistakes_of, refusal, unknown, validation_error, vector
+from ..schema import Keys, Mistake, Names, Table, mistakes_of, refusal, unknown, validation_error, vector
 from .named_tables import WHOLE, named_or_whole
 
 
@@ -81,7 +81,7 @@ class EffectTable(Table):
 def read_effect(
     kind: type[Effect],
     value: Any,
-    where: tuple[str, ...],
+    where: Keys,
     mistakes: list[Mistake],
     also: tuple[str, ...] = (),
 ) -> Any:
@@ -103,7 +103,7 @@ def read_effect(
     return value
 
 
-def _inside(mistake: Mistake, value: Any) -> tuple[Key, ...]:
+def _inside(mistake: Mistake, value: Any) -> Keys:
     """The keys within the effect, as the scene file has it."""
     if not isinstance(value, dict):
         return mistake.where[1:]  # a bare list is kept in a field that the file does not name

@@ -6,12 +6,10 @@ import tomllib
 from typing import Any
 
 from ..errors import InputError
-from ..schema import shown, unknown
-
-Path = tuple[str | int, ...]
+from ..schema import Keys, shown, unknown
 
 
-def override(data: dict[str, Any], assignment: str) -> Path:
+def override(data: dict[str, Any], assignment: str) -> Keys:
     """Set one value in the tables; tables that are not there are made.
 
     Args:
@@ -61,7 +59,7 @@ def _value(text: str, assignment: str) -> Any:
     )
 
 
-def _put(data: dict[str, Any], steps: list[str], value: Any, assignment: str) -> Path:
+def _put(data: dict[str, Any], steps: list[str], value: Any, assignment: str) -> Keys:
     table: Any = data
     place: list[str | int] = []
     for step in steps[:-1]:

@@ -15,7 +15,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from ..errors import InputError
-from ..schema import Mistake, mistakes_of
+from ..schema import Keys, Mistake, mistakes_of
 from .named_tables import WHOLE
 from .overrides import override
 from .scene import Scene
@@ -23,12 +23,11 @@ from .toml_lines import line_of, lines_of
 
 _LARGEST = 1_000_000
 """Bytes of a scene file at most."""
-_KEY = re.compile(r"((?:title|plugins|domain|material|body|boundary|interface|solver|path)\.[^:]+): ")
+_KEY = re.compile(rf"((?:{'|'.join(Scene.model_fields)})\.[^:]+): ")
 """How a message begins that names a key of the scene."""
 _MOST_MISTAKES = 10
 """Mistakes that one message lists."""
 _TOO_LARGE = "is a whole number beyond 64 bits, which TOML does not have; write 1e20 for 100000000000000000000"
-_Place = tuple[str | int, ...]
 
 
 def read_scene(path: str | os.PathLike[str], overrides: Sequence[str] = ()) -> Scene:
@@ -77,7 +76,7 @@ class _Source:
     file: Path
     text: str
     tables: dict[str, Any]
-    overridden: Sequence[_Place]
+    overridden: Sequence[Keys]
 
     @classmethod
     def read(cls, path: str | os.PathLike[str], overrides: Sequence[str]) -> _Source:
@@ -96,7 +95,7 @@ class _Source:
         raise InputError(self._listed(mistakes))
 
     @cached_property
-    def _lines(self) -> Mapping[_Place, int]:
+    def _lines(self) -> Mapping[Keys, int]:
         return lines_of(self.text)
 
     def _listed(self, mistakes: Iterable[Mistake]) -> str:
@@ -107,7 +106,7 @@ class _Source:
         rest = len(texts) - _MOST_MISTAKES
         return "\n".join(texts[:_MOST_MISTAKES] + ([f"... and {rest} more"] if rest > 0 else []))
 
-    def path(self, key: str) -> _Place:
+    def path(self, key: str) -> Keys:
         """The keys down to a place that a message names, joined by dots; names may have dots in them, too."""
         known = {".".join(map(str, place)): place for place in (*self._lines, *self.overridden)}
         known |= _effects_by_region(self.tables.get("body", {})) | _interfaces(self.tables.get("interface"))
@@ -116,7 +115,7 @@ class _Source:
         rest = key[len(nearest) :].strip(".")
         return (*known.get(nearest, ()), *(rest.split(".") if rest else ()))
 
-    def place(self, where: _Place) -> str:
+    def place(self, where: Keys) -> str:
         """A place as messages name it: file and line, or ``--set``; then the key."""
         key = ".".join(map(str, where))
         if any(where[: len(place)] == place for place in self.overridden):
@@ -125,7 +124,7 @@ class _Source:
         return f"{self.file}:{line}: {key}" if line else f"{self.file}: {key}"
 
 
-def _large_numbers(value: Any, place: _Place) -> Iterator[_Place]:
+def _large_numbers(value: Any, place: Keys) -> Iterator[Keys]:
     """Where whole numbers stand that TOML does not have, however deep."""
     waiting = [(value, place)]
     while waiting:
@@ -136,12 +135,12 @@ def _large_numbers(value: Any, place: _Place) -> Iterator[_Place]:
         waiting += [(entry, (*where, key)) for key, entry in entries]
 
 
-def _effects_by_region(body: Any) -> dict[str, _Place]:
+def _effects_by_region(body: Any) -> dict[str, Keys]:
     """The places of what acts in the body, by region and key, as errors that the mesh shows name them."""
     named = isinstance(body, dict) and all(isinstance(table, dict) for table in body.values())
-    whole: list[tuple[_Place, Any]] = [(("body",), body)]
+    whole: list[tuple[Keys, Any]] = [(("body",), body)]
     tables = [(("body", name), table) for name, table in body.items()] if named else whole
-    found: dict[str, _Place] = {}
+    found: dict[str, Keys] = {}
     for place, table in tables:
         regions = table.get("region") if isinstance(table, dict) else None
         for region in regions if isinstance(regions, list) else [regions]:
@@ -150,7 +149,7 @@ def _effects_by_region(body: Any) -> dict[str, _Place]:
     return found
 
 
-def _interfaces(tables: Any) -> dict[str, _Place]:
+def _interfaces(tables: Any) -> dict[str, Keys]:
     """The places of the interfaces by the names that they have among the boundary parts."""
     return {f"boundary.{name}": ("interface", name) for name in tables} if isinstance(tables, dict) else {}
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import inspect
 import math
+import textwrap
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, TypeVar
 
@@ -14,7 +15,7 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 from ..effects import Effect, Place
-from ..formula import Formula
+from ..formula import FUNCTIONS, Formula
 from ..laws.base import registered
 from ..mesh.shapes import DomainShape, PlacedShape
 from ..schema import OneOf, descriptions
@@ -25,6 +26,10 @@ from .solver_table import SolverTable
 
 T = TypeVar("T")
 
+_FORMULAS = (
+    'A *formula* is a number, or a text in the coordinates x, y, z (m), such as `"-1e6*(1 - 1.8*x)"`. It may contain '
+    f"numbers, `pi`, `+ - * / **`, `a if x < 1 else b`, and the functions {', '.join(FUNCTIONS)}."
+)
 _INTRODUCTION = """\
 # Scene reference
 
@@ -34,9 +39,7 @@ checks that it is up to date.*
 A scene is a TOML file in SI units. An unknown key is an error. A whole number may stand where a number is expected;
 a text or a boolean may not. `nan` and `inf` are refused.
 
-A *formula* is a number, or a text in the coordinates x, y, z (m), such as `"-1e6*(1 - 1.8*x)"`. It may contain
-numbers, `pi`, `+ - * / **`, `a if x < 1 else b`, and the functions abs, sqrt, exp, log, sin, cos, tan, sinh, cosh,
-tanh, min, max.
+{formulas}
 
 The command line can change every value:
 
@@ -58,7 +61,7 @@ def reference() -> str:
 
 
 def _document() -> Iterator[str]:
-    yield _INTRODUCTION
+    yield _INTRODUCTION.replace("{formulas}", textwrap.fill(_FORMULAS, 116))
     yield from _table("Top level", Scene, ["title", "plugins"])
     for name, shape in _provided(DomainShape.registry).items():
         yield from _table(f'`[domain]` with `shape = "{name}"`', shape)

@@ -6,11 +6,12 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import BeforeValidator, Field, PlainSerializer, model_validator
 
-from ..errors import InputError
-from ..formula import Formula
+from ..effects.formula_field import as_formula
 from ..laws.smoothing import registered as smoothings
 from ..schema import Count, Mistake, OneOf, Positive, Table, refusal, shown, validation_error
 
+LinearSolver = Literal["auto", "lu", "gamg"]
+Degree = Literal[1, 2]
 _STARTS = ("unbroken", "resting", "broken")
 
 
@@ -23,19 +24,12 @@ def _degree(value: Any) -> Any:
 
 def _start(value: Any) -> Any:
     if isinstance(value, list | tuple):
-        return tuple(v if isinstance(v, Formula) else _formula(v) for v in value)
+        return tuple(map(as_formula, value))
     if value not in _STARTS:
         words = ", ".join(map(shown, _STARTS))
         text = f"must be one of {words}, or a list of formulas, one for each component (is {shown(value)})"
         raise refusal(text)
     return value
-
-
-def _formula(value: Any) -> Formula:
-    try:
-        return Formula(value)
-    except InputError as error:
-        raise refusal(str(error)) from None
 
 
 Start = Annotated[
@@ -49,7 +43,7 @@ Start = Annotated[
 class SolverTable(Table):
     """How the problem is solved. Without `smoothing` and `epsilon` the law itself is solved, not a smoothed one."""
 
-    degree: Annotated[Literal[1, 2] | None, BeforeValidator(_degree)] = None
+    degree: Annotated[Degree | None, BeforeValidator(_degree)] = None
     """the degree of the elements: 1, or 2, which needs far fewer unknowns for the same accuracy; without it 1, but with
     `--accuracy` or `--time-budget` the cheaper one"""
     method: str = "auto"
@@ -66,7 +60,7 @@ class SolverTable(Table):
     in which every law is a spring), "broken" (beyond every drop of the laws), or a displacement (m, formulas)"""
     tolerance: Annotated[float, Field(gt=0, lt=1, allow_inf_nan=False)] = 1e-8
     """the iteration ends when the relative residual of the inequality is below it"""
-    linear_solver: Literal["auto", "lu", "gamg"] = "auto"
+    linear_solver: LinearSolver = "auto"
     """the linear solver; auto chooses by the number of unknowns; PETSc options override it"""
     second_order: bool | None = None
     """if a softening law leaves open whether the solution is a local minimiser, factorise the Hessian; by default up to

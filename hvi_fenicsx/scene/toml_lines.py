@@ -12,7 +12,7 @@ import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-Path = tuple[str | int, ...]
+from ..schema import Keys
 
 _TOKEN = re.compile(
     r'(?P<comment>#[^\n]*)|(?P<text>"""(?:\\.|[^\\])*?"""+|\'\'\'.*?\'\'\'+|"(?:\\.|[^"\\\n])*"|\'[^\'\n]*\')'
@@ -21,7 +21,7 @@ _TOKEN = re.compile(
 )
 
 
-def lines_of(text: str) -> Mapping[Path, int]:
+def lines_of(text: str) -> Mapping[Keys, int]:
     """The line of each key and table by its way through the tables; as far as the scan came."""
     scan = _Scan([(m.lastgroup or "", m.group(), m.start()) for m in _TOKEN.finditer(text)], text)
     with contextlib.suppress(IndexError, RecursionError, ValueError):
@@ -29,7 +29,7 @@ def lines_of(text: str) -> Mapping[Path, int]:
     return scan.lines
 
 
-def line_of(lines: Mapping[Path, int], where: Path) -> int | None:
+def line_of(lines: Mapping[Keys, int], where: Keys) -> int | None:
     """The line of a place, or of the innermost table around it that has one.
 
     Args:
@@ -47,11 +47,11 @@ class _Scan:
     tokens: list[tuple[str, str, int]]
     source: str
     position: int = 0
-    lines: dict[Path, int] = field(default_factory=dict)
-    counts: dict[Path, int] = field(default_factory=dict)
+    lines: dict[Keys, int] = field(default_factory=dict)
+    counts: dict[Keys, int] = field(default_factory=dict)
 
     def document(self) -> None:
-        table: Path = ()
+        table: Keys = ()
         while self.position < len(self.tokens):
             kind, token, _ = self.tokens[self.position]
             if kind in ("comment", "newline"):
@@ -61,7 +61,7 @@ class _Scan:
             else:
                 self.entry(table)
 
-    def header(self) -> Path:
+    def header(self) -> Keys:
         start = self.position
         while self.token() == "[":
             self.position += 1
@@ -73,12 +73,12 @@ class _Scan:
             self.position += 1
         return path
 
-    def entry(self, table: Path) -> None:
+    def entry(self, table: Keys) -> None:
         path = self.key(table)
         self.position += 1  # the equals sign
         self.value(path)
 
-    def key(self, table: Path) -> Path:
+    def key(self, table: Keys) -> Keys:
         """A dotted key; each of its steps is noted at its line."""
         path = table
         while True:
@@ -90,7 +90,7 @@ class _Scan:
                 return path
             self.position += 1
 
-    def value(self, path: Path) -> None:
+    def value(self, path: Keys) -> None:
         opening = self.token()
         if opening == "{":
             self.inline_table(path)
@@ -100,13 +100,13 @@ class _Scan:
             while self.position < len(self.tokens) and self.token() not in (",", "}", "]", "\n"):
                 self.position += 1
 
-    def inline_table(self, path: Path) -> None:
+    def inline_table(self, path: Keys) -> None:
         self.position += 1
         while self.skip() != "}":
             self.entry(path)
         self.position += 1
 
-    def array(self, path: Path) -> None:
+    def array(self, path: Keys) -> None:
         self.position += 1
         index = 0
         while self.skip() != "]":

@@ -4,17 +4,18 @@ Light: it loads pydantic and nothing heavier, and knows no particular table.
 """
 
 from .descriptions import descriptions
-from .fields import LONGEST, SHORTEST, Count, Length, Names, OneOf, Positive, names_of, vector
+from .fields import LONGEST, SHORTEST, Count, Finite, Length, Names, OneOf, Positive, names_of, vector
 from .files import ExistingFile
-from .messages import refusal, shown, unknown
-from .tables import Key, Mistake, Table, choose, input_error, located_error, mistakes_of, validation_error
+from .messages import Keys, refusal, shown, unknown
+from .tables import Mistake, Table, choose, input_error, located_error, mistakes_of, validation_error
 
 __all__ = [
     "LONGEST",
     "SHORTEST",
     "Count",
     "ExistingFile",
-    "Key",
+    "Finite",
+    "Keys",
     "Length",
     "Mistake",
     "Names",

@@ -70,6 +70,8 @@ Names = Annotated[
     PlainSerializer(lambda names: names[0] if len(names) == 1 else list(names)),
 ]
 """One name or a list of names."""
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+"""A finite number."""
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 """A finite number above 0."""
 SHORTEST, LONGEST = 1e-9, 1e9

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import json
 import re
 from collections.abc import Callable, Iterable, Mapping
@@ -11,8 +10,11 @@ from typing import Any, get_args
 from pydantic import BaseModel
 from pydantic_core import ErrorDetails, PydanticCustomError
 
+from ..class_registry import closest
 from .descriptions import descriptions
 
+Keys = tuple[str | int, ...]
+"""A place: the keys from the outermost table down to it; the entries of a list have numbers."""
 _LONGEST = 60
 """Characters of a value that a message shows."""
 
@@ -57,16 +59,6 @@ def unknown(kind: str, name: Any, allowed: Iterable[str]) -> str:
     close = closest(name, known)
     hint = f"did you mean {shown(close)}? " if close else ""
     return f"unknown {kind} {shown(name)}; {hint}allowed: {', '.join(known) or 'none'}"
-
-
-def closest(name: str, known: Iterable[str]) -> str | None:
-    """The known name that was probably meant.
-
-    Args:
-        name: as it was written.
-        known: the names to choose from.
-    """
-    return next(iter(difflib.get_close_matches(name.lower(), list(known), 1, 0.5)), None)
 
 
 def suggestion(error: ErrorDetails, model: type[BaseModel] | None) -> str | None:
@@ -142,18 +134,18 @@ def _mend(kind: str, value: Any) -> str:
     return ""
 
 
-def _described(model: type[BaseModel] | None, loc: tuple[str | int, ...]) -> str:
+def _described(model: type[BaseModel] | None, loc: Keys) -> str:
     field = model_at(model, loc[:-1])
     known = descriptions(field).get(str(loc[-1])) if field else None
     return f": {known}" if known else ""
 
 
-def _keys(model: type[BaseModel] | None, loc: tuple[str | int, ...]) -> list[str]:
+def _keys(model: type[BaseModel] | None, loc: Keys) -> list[str]:
     found = model_at(model, loc)
     return [info.alias or name for name, info in found.model_fields.items()] if found else []
 
 
-def model_at(model: type[BaseModel] | None, loc: tuple[str | int, ...]) -> type[BaseModel] | None:
+def model_at(model: type[BaseModel] | None, loc: Keys) -> type[BaseModel] | None:
     """The table that stands at a place within another, as far as the fields' types tell.
 
     Args:

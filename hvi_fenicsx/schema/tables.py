@@ -9,10 +9,8 @@ from pydantic import BaseModel, ConfigDict, ModelWrapValidatorHandler, Validatio
 from pydantic_core import InitErrorDetails
 
 from ..errors import InputError
-from .messages import message_of, refusal, shown, suggestion, unknown
+from .messages import Keys, message_of, refusal, shown, suggestion, unknown
 
-Key = str | int
-"""A key of a table, or the number of an entry of a list."""
 Kind = TypeVar("Kind", bound=BaseModel)
 
 
@@ -20,11 +18,11 @@ class Mistake(NamedTuple):
     """What is wrong with the user's tables, and where.
 
     Attributes:
-        where: the keys from the outermost table down to the place.
+        where: the place.
         text: what is wrong, what is allowed, how to mend it.
     """
 
-    where: tuple[Key, ...]
+    where: Keys
     text: str
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..class_registry import closest
+from ..class_registry import hint
 from ..errors import InputError
 from ..system.system import System
 from .method import Method, load_all
@@ -25,8 +25,8 @@ def find(name: str) -> type[Method]:
     load_all()
     if name in Method.registry:
         return Method.registry[name]
-    hint = closest(name, available())
-    raise InputError(f"solver.method: unknown method {name!r}{hint}; allowed: {', '.join(available())}")
+    known = available()
+    raise InputError(f"solver.method: unknown method {name!r}{hint(name, known)}; allowed: {', '.join(known)}")
 
 
 def choose(options: SolverOptions, system: System) -> type[Method]:

@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, get_args
 
 from ..errors import InputError
 from ..laws import smoothing
 from ..scene import Scene
+from ..scene.solver_table import Degree, LinearSolver
 from ..schema import unknown
 from ..solvers import registry
 from . import meshes
@@ -164,7 +165,7 @@ class DegreeAxis(_Choice):
 
     def allowed(self) -> Sequence[str]:
         """See the base class."""
-        return ("1", "2")
+        return tuple(map(str, get_args(Degree)))
 
     def apply(self, tables: Tables, value: str, beside: Collection[str]) -> Tables:
         """See the base class."""
@@ -195,7 +196,7 @@ class LinearSolverAxis(_Choice):
 
     def allowed(self) -> Sequence[str]:
         """See the base class."""
-        return ("auto", "lu", "gamg")
+        return get_args(LinearSolver)
 
 
 class AccuracyAxis(_Number):

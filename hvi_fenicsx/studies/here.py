@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from mpi4py import MPI
 
-from ..errors import ExitCode, HviError
+from ..errors import HviError
 from ..runtime.mpi import on_root
 from .errors import NotStoredError
 from .measured_point import MeasuredPoint
 from .plan import Plan
 from .run import check_reference
 from .setting import Setting
-from .store import Store, write_json
+from .store import Store, failed, write_json
 
 
 def run_here(plan: Plan, store: Store, comm: MPI.Comm, repeat: int) -> None:
@@ -49,5 +49,5 @@ def _measure(setting: Setting, store: Store, comm: MPI.Comm, repeat: int, *, sti
     except NotStoredError:
         raise
     except HviError as error:
-        record = {"converged": False, "reason": str(error), "exit_code": ExitCode(error.exit_code), "cost": None}
+        record = failed(str(error), error.exit_code)
         on_root(comm, lambda: write_json(store.path(setting).with_suffix(".json"), record))

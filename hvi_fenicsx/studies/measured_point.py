@@ -19,7 +19,7 @@ from ..preparation import prepare
 from ..report.solution_arrays import SolutionArrays, save
 from ..results.gathering import solution_arrays
 from ..results.summary import summary
-from ..runtime.mpi import on_root
+from ..runtime.mpi import largest, on_root
 from ..runtime.timing import Timer
 from ..scene import Scene
 from ..solution import Solution
@@ -105,7 +105,7 @@ class MeasuredPoint:
             gc.collect()
             timer = Timer()
             self._solved(timer)
-            found.append({k: self.comm.allreduce(v, op=MPI.MAX) for k, v in timer.report().items()})
+            found.append({phase: largest(self.comm, seconds) for phase, seconds in timer.report().items()})
         return found or times
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import logging
 import sys
 import time
 from types import TracebackType
@@ -12,7 +11,9 @@ from typing import Self
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
-_LOG = logging.getLogger(__name__)
+from ..runtime import log
+
+_LOG = log.logger("studies")
 
 
 class StudyProgress:

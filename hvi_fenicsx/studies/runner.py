@@ -17,7 +17,7 @@ from ..scene import dump_scene
 from .errors import NotStoredError, StudyInterruptedError
 from .progress import StudyProgress
 from .setting import Setting
-from .store import Store, is_whole, write_json, write_text
+from .store import Store, failed, is_whole, write_json, write_text
 from .thresholds import DEFAULT, Thresholds
 
 _OWN_FAULTS = (signal.SIGSEGV, signal.SIGBUS, signal.SIGABRT, signal.SIGFPE, signal.SIGILL)
@@ -166,7 +166,7 @@ class Runner:
             raise InputError(
                 f"--out {self.store.folder}: {reason}; finished points are kept, --resume goes on from there"
             )
-        record = {"converged": False, "reason": reason, "exit_code": code, "cost": None}
+        record = failed(reason, code)
         if (killer := _killer(code)) is not None:
             record |= {"reason": f"killed from outside ({killer.name}); --resume runs it again", "killed": True}
         write_json(path.with_suffix(".json"), record)
@@ -174,14 +174,8 @@ class Runner:
     def _given_up(self, path: Path, limit: float) -> None:
         """A method that hangs must not hang a study: the point is run again only with a longer limit."""
         reason = f"not finished after {limit:g} s; --limit SECONDS --resume gives it longer"
-        record = {
-            "converged": False,
-            "reason": reason,
-            "exit_code": ExitCode.NOT_CONVERGED,
-            "cost": None,
-            "limit": limit,
-        }
-        write_json(path.with_suffix(".json"), record)
+        record = failed(reason, ExitCode.NOT_CONVERGED)
+        write_json(path.with_suffix(".json"), {**record, "limit": limit})
 
 
 def _killer(code: int) -> signal.Signals | None:

@@ -11,6 +11,21 @@ ADAPTIVE = "adaptive to "
 """How the text of an adaptive mesh begins."""
 
 
+def law_text(smoothing: str | None, epsilon: float | None, epsilon_absolute: float | None) -> str:
+    """The law in words: exact, or how it is smoothed.
+
+    Args:
+        smoothing: its kind; None for the exact law.
+        epsilon: its relative width.
+        epsilon_absolute: its width in N/m, where the scene says it so.
+    """
+    if smoothing is None:
+        return "exact law"
+    width = f"{epsilon_absolute:g} N/m" if epsilon_absolute is not None else f"{epsilon:.3g}"
+    kind = "" if smoothing == "quadratic" else f"{smoothing}, "
+    return f"{kind}ε = {width}"
+
+
 @dataclass(frozen=True)
 class Setting:
     """What one point solves.
@@ -34,8 +49,7 @@ class Setting:
     def law(self) -> str:
         """The law: exact, or how it is smoothed."""
         solver = self.scene.solver
-        width = solver.epsilon if solver.epsilon is not None else solver.epsilon_absolute
-        return "exact law" if width is None else f"{solver.smoothing}, ε = {width:g}"
+        return law_text(solver.smoothing, solver.epsilon, solver.epsilon_absolute)
 
     @property
     def unknowns(self) -> float:

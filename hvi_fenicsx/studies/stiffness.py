@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-import numpy.typing as npt
 from dolfinx import fem
-from mpi4py import MPI
 from scipy import sparse
 
 from ..mesh import nodes
 from ..problem import spaces
+from ..runtime.mpi import joined
 from ..solution import Solution
 from ..typing import Integers
 
@@ -29,7 +26,7 @@ def stiffness(solution: Solution) -> sparse.csr_array | None:
     size = matrix.getSize()[0]
     matrix.destroy()
     comm = problem.space.mesh.comm
-    counts, columns, values = (_joined(comm, a) for a in (np.diff(starts), columns, values))
+    counts, columns, values = (joined(comm, a) for a in (np.diff(starts), columns, values))
     if comm.rank:
         return None
     found = sparse.csr_array((values, columns, np.append(0, np.cumsum(counts))), (size, size))
@@ -42,7 +39,7 @@ def _edge_ends(space: fem.FunctionSpace) -> Integers:
     index_map = space.dofmap.index_map
     own = nodes.edge_ends(space)[: index_map.size_local]
     numbers = index_map.local_to_global(np.ascontiguousarray(own.ravel()))
-    found: Integers = _joined(space.mesh.comm, np.asarray(numbers, dtype=np.int64).reshape(own.shape))
+    found: Integers = joined(space.mesh.comm, np.asarray(numbers, dtype=np.int64).reshape(own.shape))
     return found
 
 
@@ -64,9 +61,3 @@ def _of_values(matrix: sparse.csr_array, ends: Integers, share: float) -> sparse
     coefficients = sparse.coo_array((np.concatenate([own, others]), (rows, columns)), shape=(count, count))
     change = sparse.csr_array(sparse.kron(coefficients, sparse.eye_array(matrix.shape[0] // count)))
     return sparse.csr_array(change.T @ matrix @ change)
-
-
-def _joined(comm: MPI.Comm, values: npt.NDArray[Any]) -> Any:
-    """What all ranks have, one after the other, on rank 0; elsewhere their own. Collective."""
-    pieces = comm.gather(np.ascontiguousarray(values), root=0)
-    return values if pieces is None else np.concatenate(pieces)

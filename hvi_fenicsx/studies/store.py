@@ -25,8 +25,6 @@ from .setting import Setting
 POINTS = "points"
 _ENDINGS = (".toml", ".json", ".npz", ".stiffness.npz")
 """How the names of a point's files end."""
-_RECORDED = {"converged", "reason", "exit_code", "cost"}
-"""What every record has, also that of a point that failed."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +64,7 @@ class Store:
             found = json.loads(self.path(setting).with_suffix(".json").read_text(encoding="utf-8"))
         except (OSError, ValueError):
             return None
-        return found if isinstance(found, dict) and found.keys() >= _RECORDED else None
+        return found if isinstance(found, dict) and found.keys() >= failed("", 0).keys() else None
 
     def open(self) -> None:
         """Make the folder ready for points.
@@ -91,6 +89,16 @@ class Store:
         """The files of all points, as a manifest lists them."""
         found = manifest.read(self.folder)
         return {name: known for name, known in (found.files if found else {}).items() if name.startswith(f"{POINTS}/")}
+
+
+def failed(reason: str, code: int) -> dict[str, Any]:
+    """The record of a point that has no certified solution.
+
+    Args:
+        reason: why.
+        code: the exit code.
+    """
+    return {"converged": False, "reason": reason, "exit_code": code, "cost": None}
 
 
 def is_whole(archive: Path) -> bool:

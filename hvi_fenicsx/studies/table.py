@@ -9,11 +9,12 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from ..errors import InputError
+from ..scene import SolverTable
 from ..schema import unknown
 from .certainty import Certainty
 from .cost import PHASES
 from .error_norms import ERROR_NORMS, Errors
-from .setting import ADAPTIVE, Setting
+from .setting import ADAPTIVE, Setting, law_text
 from .thresholds import DEFAULT, Thresholds
 
 
@@ -83,18 +84,14 @@ class Row:
     @property
     def law(self) -> str:
         """The law in words: exact, or how it is smoothed."""
-        if self.smoothing is None:
-            return "exact law"
-        width = f"{self.epsilon_absolute:g} N/m" if self.epsilon_absolute is not None else f"{self.epsilon:.3g}"
-        kind = "" if self.smoothing == "quadratic" else f"{self.smoothing}, "
-        return f"{kind}ε = {width}"
+        return law_text(self.smoothing, self.epsilon, self.epsilon_absolute)
 
     @property
     def text(self) -> str:
         """The setting in words; what is as the program chooses is left out."""
         parts = [self.mesh, *(["degree 2"] if self.degree == 2 else []), self.law]
         parts += [self.method] if self.method != "auto" else []
-        parts += [f"tolerance {self.tolerance:g}"] if self.tolerance != 1e-8 else []
+        parts += [f"tolerance {self.tolerance:g}"] if self.tolerance != SolverTable().tolerance else []
         parts += [self.linear_solver] if self.linear_solver != "auto" else []
         return ", ".join(parts)
 

@@ -1,4 +1,4 @@
-"""The contract that scripts rely on (design.md): files, keys, columns, exit codes, results that are whole or absent.
+"""What scripts rely on (docs/results.md): files, keys, columns, exit codes, results that are whole or absent.
 
 Every file is read again by a reader of another make: VTK, NumPy, tomllib, json.
 """
@@ -118,7 +118,7 @@ def test_the_table_has_the_columns_in_order_and_the_floor_along_its_length(resul
 
 
 def test_the_table_obeys_signorini_and_the_law(result: Path) -> None:
-    """The signs of design.md: u_n outward, gap the current one, compression negative, friction_t = -σ_t."""
+    """The signs of docs/results.md: u_n outward, gap the current one, compression negative, friction_t = -σ_t."""
     table = contact(result)
     closed = table["contact"] == 1
     assert closed.any()

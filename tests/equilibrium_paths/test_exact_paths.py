@@ -229,6 +229,7 @@ def test_energies_balance_where_bonds_remember(seed: int, follow: Follow) -> Non
         assert "no combination of their directions leads on" in follower.reason
         assert directions_on(given, states[-1]) == 0
         earlier = [state for state in states if abs(state.factor - states[-1].factor) > 1e-6]
+        assert earlier
         assert all(directions_on(given, state) == 2 for state in earlier)
     else:
         assert follower.end in (End.REACHED, End.ESCAPES), follower.reason

@@ -398,6 +398,15 @@ def test_refusals(name: str, parameters: dict[str, Any], said: str) -> None:
         laws.create(name, parameters)
 
 
+@pytest.mark.parametrize(
+    ("numbers", "said"),
+    [((-1.0, 2.0), "energy_ratio = -1.0 must be > 0"), ((2.0, 0.5), "exponent = 0.5 must be at least 1")],
+)
+def test_a_criterion_of_mixed_mode_is_refused_as_what_it_is(numbers: tuple[float, float], said: str) -> None:
+    with pytest.raises(InputError, match=f"^mixity 'power_law': {said}"):
+        laws.PowerLaw(*numbers)
+
+
 @pytest.mark.parametrize("value", ["3", True, None, float("nan"), -1.0, 0.0])
 def test_direct_construction_refuses_as_well(value: Any) -> None:
     with pytest.raises(InputError):

@@ -2,14 +2,34 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
 import hvi_fenicsx as hvi
+from hvi_fenicsx.effects import Contribution, Effect, FormContext, Place
 
 STEEL = hvi.Isotropic(youngs_modulus=2e11, poisson_ratio=0.3)
+
+
+class Weight(Effect):
+    """The weight of steel, as a user would write it."""
+
+    key = "weight"
+    place = Place.BODY
+    term = "<g, v> += -∫ ρ g v_y dx"
+
+    def contribute(self, context: FormContext, where: str | None) -> Contribution:
+        weight = context.number(-7850.0 * 9.81 * context.length / context.stress)
+        return Contribution(linear=(weight * context.test[1] * context.cells(where),))
+
+
+class Pull(Weight):
+    key = "pull of a test"
+    place = Place.BOUNDARY
+    in_files = False
 
 
 @pytest.fixture(scope="module")
@@ -54,6 +74,9 @@ def solved(body: hvi.Body, traction: Any) -> hvi.Solution:
         (hvi.Contact("bottom", obstacle=3), "^Contact on bottom: obstacle: give a point and a normal"),  # type: ignore[arg-type]
         (hvi.Friction("bottom", "graph"), "^Friction on bottom: law: give a law as an object"),  # type: ignore[arg-type]
         (hvi.On("bottom", 3), "^On on bottom: 3 is no effect"),  # type: ignore[arg-type]
+        (hvi.In(3), "^In on the body: 3 is no effect"),  # type: ignore[arg-type]
+        (hvi.On("bottom", Weight()), r"^On on bottom: weight acts in a body: write hvi.In\("),
+        (hvi.In(Pull()), r"^In on the body: pull of a test acts on a side: write hvi.On\("),
     ],
 )
 def test_a_refusal_names_the_effect_and_its_place(square: hvi.Body, effect: Any, reason: str) -> None:
@@ -73,6 +96,31 @@ def test_what_is_no_switch_or_no_function_is_refused(square: hvi.Body, argument:
     model = hvi.Model(square, [STEEL, hvi.Displacement("left", [0.0, 0.0])])
     with pytest.raises(hvi.InputError, match=reason):
         hvi.solve(model, **argument)
+
+
+@pytest.mark.parametrize(
+    ("argument", "reason"),
+    [
+        ({"gap": "1e-8"}, "^gap: must be a number above 0 and below 1 .is '1e-8'"),
+        ({"gap": 1}, "^gap: must be a number above 0 and below 1 .is 1"),
+        ({"limit": "60"}, "^limit: must be a number above 0 .is '60'"),
+        ({"limit": 0}, "^limit: must be a number above 0 .is 0"),
+        ({"lowest": "no"}, "^lowest: must be True or False .is 'no'"),
+    ],
+)
+def test_a_search_for_equilibria_refuses_numbers_that_mean_nothing(
+    square: hvi.Body, argument: Any, reason: str
+) -> None:
+    model = hvi.Model(square, [STEEL, hvi.Displacement("left", [0.0, 0.0])])
+    with pytest.raises(hvi.InputError, match=reason):
+        hvi.equilibria(model, **argument)
+
+
+def test_a_scale_that_is_no_number_is_refused(tmp_path: Path) -> None:
+    file = tmp_path / "part.msh"
+    file.touch()
+    with pytest.raises(hvi.InputError, match="scale: must be a number"):
+        hvi.Body.file(file, scale="mm")  # type: ignore[arg-type]
 
 
 def test_each_wrong_value_of_an_effect_has_a_line_with_its_name(square: hvi.Body) -> None:
@@ -121,6 +169,17 @@ def test_a_function_with_values_of_another_kind_is_refused(square: hvi.Body, tra
     """The third component of a function of points, and an imaginary part, were left away."""
     with pytest.raises(hvi.InputError, match=reason):
         solved(square, traction)
+
+
+def test_an_effect_of_the_users_own_acts_in_the_volume(square: hvi.Body) -> None:
+    """Against the body force of the program itself."""
+    held = hvi.Displacement("bottom", [0.0, 0.0])
+    known = hvi.BodyForce([0.0, -7850.0 * 9.81])
+    energies = [
+        hvi.solve(hvi.Model(square, [STEEL, held, load]), estimate=False).energy for load in (known, hvi.In(Weight()))
+    ]
+    assert energies[1] == pytest.approx(energies[0], rel=1e-10)
+    assert energies[0] < 0.0
 
 
 def test_a_component_of_a_function_may_be_one_number(square: hvi.Body) -> None:

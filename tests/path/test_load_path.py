@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from hvi_fenicsx.load_path import ESCAPES, REACHED, LoadPath, PathRow
+from hvi_fenicsx.equilibrium_paths.state import End
+from hvi_fenicsx.load_path import LoadPath, PathRow
 
 
-def path(*factors: float, end: str = REACHED) -> LoadPath:
+def path(*factors: float, end: str = End.REACHED) -> LoadPath:
     """A path with these factors, and nothing else in its rows."""
     rows = tuple(
         PathRow(
@@ -40,4 +41,4 @@ def test_a_path_that_begins_downwards_has_its_largest_factor_there() -> None:
 
 
 def test_an_end_at_zero_is_told_as_zero() -> None:
-    assert path(0.0, 1.1, -1e-12, end=ESCAPES).ending == "then the body comes off, at 0"
+    assert path(0.0, 1.1, -1e-12, end=End.ESCAPES).ending == "then the body comes off, at 0"

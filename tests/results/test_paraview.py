@@ -73,10 +73,11 @@ def test_each_array_tells_its_unit(result: tuple[int, Path]) -> None:
             for data in (grid.GetPointData(), grid.GetCellData()):
                 arrays = (data.GetArray(i) for i in range(data.GetNumberOfArrays()))
                 told |= {a.GetName(): a.GetInformation().Get(vtkDataArray.UNITS_LABEL()) for a in arrays}
+    if folder.name == "escapes":
+        assert told == {"escape_mode": "1"}
+        return
     assert all(told.values())
-    assert {name: told[name] for name in wanted.keys() & told.keys()} == {
-        n: wanted[n] for n in wanted.keys() & told.keys()
-    }
+    assert {name: told.get(name) for name in wanted} == wanted
 
 
 def test_every_array_that_the_macro_names_is_there(result: tuple[int, Path]) -> None:

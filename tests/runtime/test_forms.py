@@ -117,7 +117,9 @@ def test_a_damaged_form_is_compiled_again(kept: Path, tmp_path: Path) -> None:
     for file in entry(kept).iterdir():
         (damaged / file.name).touch()
     assert value(FormCache(tmp_path).compiled(area())) == pytest.approx(3.0)
-    assert all(file.stat().st_size for file in damaged.glob("*.so"))
+    sizes = [file.stat().st_size for file in damaged.glob("*.so")]
+    assert sizes
+    assert min(sizes) > 0
 
 
 @pytest.mark.parametrize(("patience", "waits"), [(300.0, True), (0.1, False)])

@@ -17,7 +17,7 @@ from scenes import DELTA, Table, block, model, quadratic_linear
 
 import hvi_fenicsx as hvi
 from hvi_fenicsx.cli import main
-from hvi_fenicsx.commands import search_file
+from hvi_fenicsx.commands import search_file, target
 from hvi_fenicsx.commands.search_file import SearchFile
 from hvi_fenicsx.report.pictures.style import BLUE, ORANGE, PALE, VERMILION
 from hvi_fenicsx.stationary_points.found import Saved
@@ -54,7 +54,9 @@ def test_python_finds_all_certified_and_proves_the_lowest(caplog: pytest.LogCapt
     assert energies()[0] * (1 + 2e-8) <= lowest.lower_bound <= energies()[0]
 
 
-def test_the_command_writes_each_equilibrium_and_refuses_what_is_there(tmp_path: Path) -> None:
+def test_the_command_writes_each_equilibrium_and_refuses_what_is_there(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     out = tmp_path / "out"
     words = ["equilibria", str(written(tmp_path)), "--out", str(out), "--no-pictures"]
     assert main(words) == 0
@@ -75,8 +77,14 @@ def test_the_command_writes_each_equilibrium_and_refuses_what_is_there(tmp_path:
     page = (out / "report.html").read_text(encoding="utf-8")
     assert "All equilibria, proven: 3." in page
     assert f"{saddle:.10g}" in page
+    assert b"\r" not in (out / "equilibria.csv").read_bytes()
     assert main(words) == 2
+    capsys.readouterr()
     assert main([*words, "--resume"]) == 0
+    assert capsys.readouterr().out == f"{out}: finished already (all equilibria, proven: 3)\n"
+    assert main(["run", *words[1:], "--resume"]) == 0  # the folder has the same scene, but no result of a run
+    assert "finished already" not in capsys.readouterr().out
+    assert "equilibria" not in json.loads((out / "summary.json").read_text())
 
 
 class Killed(BaseException):
@@ -137,7 +145,7 @@ def test_a_search_on_another_number_of_ranks_begins_anew(tmp_path: Path, monkeyp
     class OtherRanks:
         size = 2
 
-    monkeypatch.setattr(search_file, "COMM", OtherRanks)
+    monkeypatch.setattr(target, "COMM", OtherRanks)
     assert search_file.read(out, read) is None
 
 

@@ -6,6 +6,7 @@ import csv
 import json
 import math
 import os
+import re
 import signal
 import subprocess
 import time
@@ -22,6 +23,7 @@ from runs import command, hvi, write_scene
 from scenes import model, quadratic_linear, two_blocks
 
 from hvi_fenicsx import InputError, Scene, Solution, compat, prepare, solve
+from hvi_fenicsx.arguments import parser
 from hvi_fenicsx.mesh import refinement
 from hvi_fenicsx.mesh.domain import Domain
 from hvi_fenicsx.mesh.grid_transfer import NestedGridTransfer
@@ -301,6 +303,18 @@ def test_a_plan_is_the_product_of_its_axes_with_the_exact_law_on_every_mesh() ->
     assert found == {(2, 1.0), (2, None), (8, 1.0), (8, None), (4, None)}
     assert [s.scene.domain.cells[0] for s in made.reference] == [32, 16, 8]  # type: ignore[union-attr]
     assert all(s.scene.solver.smoothing is None for s in made.reference)
+
+
+def test_help_names_every_axis(capsys: pytest.CaptureFixture[str]) -> None:
+    """Help is instant: it must not load the axes to tell them."""
+    with pytest.raises(SystemExit):
+        parser().parse_args(["study", "--help"])
+    told = " ".join(capsys.readouterr().out.split()).partition("for each VALUE of ")[2].partition(";")[0]
+    assert set(re.split(r", | or ", told)) == {name for name, kind in axes.Axis.registry.items() if is_own(kind)}
+
+
+def is_own(axis: axes.Axis) -> bool:
+    return type(axis).__module__ == axes.__name__
 
 
 def test_combinations_that_are_no_scene_are_left_out() -> None:

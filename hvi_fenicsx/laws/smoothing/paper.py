@@ -86,7 +86,7 @@ class PaperSmoothedLaw(SmoothedLaw, register=False):
         return self.law.gamma1 / self.law.delta
 
     def gap(self, y: Array) -> Array:
-        """D = g2 - g1 at slips y ≥ 0, in N/m; inf where beyond the largest float."""
+        """The difference d = g2 - g1 at slips y ≥ 0, in N/m; inf where beyond the largest float."""
         with np.errstate(over="ignore"):
             return 0.5 * self.slope * y * (y - self.law.delta)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ...class_registry import closest
+from ...class_registry import hint
 from ...errors import InputError
 from ..base import Superpotential
 from .base import SmoothedLaw, registered, require_epsilon
@@ -31,7 +31,7 @@ def create(
     kind = registered().get(name)
     if kind is None:
         names = available()
-        raise InputError(f"unknown smoothing {name!r}{closest(name, names)}; available: {', '.join(names)}")
+        raise InputError(f"unknown smoothing {name!r}{hint(name, names)}; available: {', '.join(names)}")
     if epsilon is not None and epsilon_absolute is None:
         return kind().relative(law, epsilon)
     if epsilon_absolute is not None and epsilon is None:

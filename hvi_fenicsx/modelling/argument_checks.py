@@ -1,0 +1,42 @@
+"""Checks of the arguments that functions of this room are given, with messages that name them."""
+
+from __future__ import annotations
+
+import math
+from numbers import Real
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError
+
+
+def require_switch(name: str, given: Any) -> None:
+    """Refuse anything but True and False.
+
+    Args:
+        name: of the argument.
+        given: what the user gave.
+
+    Raises:
+        InputError: it is something else.
+    """
+    if not isinstance(given, bool | np.bool_):
+        raise InputError(f"{name}: must be True or False (is {given!r})")
+
+
+def require_between(name: str, given: Any, high: float = math.inf) -> None:
+    """Refuse anything but a number above 0 and below a limit.
+
+    Args:
+        name: of the argument.
+        given: what the user gave.
+        high: the limit.
+
+    Raises:
+        InputError: it is something else.
+    """
+    number = isinstance(given, Real) and not isinstance(given, bool | np.bool_)
+    if not number or not 0.0 < float(given) < high:
+        wanted = "above 0" if math.isinf(high) else f"above 0 and below {high:g}"
+        raise InputError(f"{name}: must be a number {wanted} (is {given!r})")
