@@ -28,6 +28,7 @@ SOFT_FLOOR = 'boundary.floor.friction={law="graph", points=[[0,0],[2e-6,1e6],[1.
 TEETH = 'boundary.floor.friction={law="graph", points=[[0,0],[4e-6,1e6],[4e-6,6e5],[9e-6,1e6],[9e-6,6e5]]}'
 SOFT_BASE = "boundary.base.adhesion.points=[[0,0],[5e-6,1e6],[100e-6,0]]"
 SPRING = 'boundary.base.friction={law="linear_spring", stiffness=1e11}'
+WEAKENING = 'boundary.glue.friction={law="exponential", peak_traction=7.2e6, residual_traction=0.0, delta=6e-5}'
 BAR = "boundary.pull.traction=[{:g}, 0.0]"
 PUSH = "boundary.push.traction=[{:g}, 0.0]"
 LIFT = 'boundary.pull.traction=[0.0, 0.0, "{:g}*(1 + (x - 0.1)/0.3)"]'
@@ -65,6 +66,9 @@ CASES = {
         size=2.206e8,
         below=0.98,
         above=1.05,
+    ),
+    "glued bar, exponential": Case(
+        demo="glued_bar", changes=("domain.cells=[190,2]", WEAKENING), load=BAR, size=1.91038e8, below=0.95, above=1.05
     ),
     "pushed block": Case(
         demo="pushed_block", changes=("domain.cells=[32,32]",), load=PUSH, size=6e5, below=1.2, above=1.5
