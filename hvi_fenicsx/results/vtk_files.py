@@ -111,7 +111,8 @@ def _write_piece(path: Path, grid: Grid) -> bool:
     from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridWriter  # a tenth of a second
 
     writer = vtkXMLUnstructuredGridWriter()
-    writer.AddObserver("ErrorEvent", lambda *_: None)  # told by what it returns
+    for source in (writer, writer.GetExecutive()):
+        source.AddObserver("ErrorEvent", lambda *_: None)  # told by what it returns, in our words
     writer.SetFileName(str(path))
     writer.SetDataModeToAppended()
     writer.EncodeAppendedDataOff()
