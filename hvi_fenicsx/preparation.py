@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 from mpi4py import MPI
 
-from .certify import plausibility
+from .certify import plausible_problem
 from .mesh import nodes
 from .mesh.domain import Domain, check_affordable
 from .mesh.thresholds import Thresholds as MeshThresholds
@@ -139,8 +139,8 @@ def _warnings(scene: Scene, system: System, solvability: Solvability) -> tuple[s
     """Warnings about numbers that may be mistakes, logged. Collective."""
     found = (
         *scene.domain.implausible(system.problem.domain.length),
-        *plausibility.before_solving(system.problem, system.forces),
-        *plausibility.of_existence(solvability),
+        *plausible_problem.before_solving(system.problem, system.forces),
+        *plausible_problem.of_existence(solvability),
     )
     warn(_LOG, found)
     return found

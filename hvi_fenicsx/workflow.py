@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 from dolfinx import fem
 from mpi4py import MPI
+from petsc4py import PETSc
 
 from .certify import certificate, correction, plausibility
 from .certify.certificate import Examination
@@ -50,7 +51,10 @@ def solve(
     Raises:
         InputError: the scene does not fit its mesh, on all ranks alike.
     """
-    return finish(prepare(scene, comm, timer, thresholds=thresholds), progress)
+    found = find_solution(prepare(scene, comm, timer, thresholds=thresholds), progress)
+    solution = found.estimated()
+    found.free()
+    return solution
 
 
 def finish(
@@ -101,6 +105,13 @@ class FoundSolution:
         with prepared.timer("estimate"):
             errors = estimate(prepared.system, self.levels, found.solve_result.u, found.examination)
         return replace(found, estimate=errors, warnings=found.warnings + plausibility.of_estimate(errors))
+
+    def free(self) -> None:
+        """Free the systems, and what solving them has left: on several ranks Python alone frees nothing. Collective."""
+        for system in (self.prepared.system, *(level.system for level in self.levels)):
+            system.free()
+            PETSc.garbage_cleanup(system.comm)
+            PETSc.garbage_cleanup(system.problem.space.dofmap.index_map.comm)  # dolfinx's vectors are on this one
 
 
 def find_solution(

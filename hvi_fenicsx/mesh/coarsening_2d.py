@@ -12,7 +12,8 @@ import numpy as np
 from .. import compat
 from ..runtime.mpi import on_root
 from ..typing import Entities, Integers
-from . import gmsh_arrays, gmsh_model, refinement, thinned_outline
+from . import gmsh_arrays, gmsh_model, thinned_outline
+from .cell_facets import cell_facets
 from .domain import Domain
 from .thinned_outline import NONE, HalfEdges, ThinnedOutline
 from .thresholds import DEFAULT, Thresholds
@@ -45,7 +46,7 @@ def coarsen(domain: Domain, factor: float, thresholds: Thresholds = DEFAULT) -> 
 def _half_edges(domain: Domain, sides: Sequence[str], regions: Sequence[str]) -> HalfEdges:
     """This rank's edges without a second cell, on a side, or between regions; lengths relative to the body's."""
     mesh = domain.mesh
-    facets, nodes = refinement.cell_facets(mesh), compat.geometry_dofmap(mesh)
+    facets, nodes = cell_facets(mesh), compat.geometry_dofmap(mesh)
     region = _numbered(domain.regions, regions, len(facets))
     side = _numbered(domain.sides, sides, facets.max(initial=-1) + 1)
     cells = np.repeat(np.arange(len(facets)), 3)

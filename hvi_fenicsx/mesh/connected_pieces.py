@@ -17,7 +17,7 @@ from mpi4py import MPI
 from .. import compat
 from ..runtime.mpi import agree, total
 from ..typing import Entities, Integers, Mask
-from . import refinement
+from . import cell_facets
 from .domain import Domain
 
 
@@ -34,15 +34,18 @@ class Piece:
     numbers: Integers
 
 
-def labels(mesh: dmesh.Mesh) -> tuple[Integers, int]:
+def labels(domain: Domain) -> tuple[Integers, int]:
     """The piece of each local cell, and how many there are in all. Collective.
 
     Args:
-        mesh: any mesh.
+        domain: on any mesh.
     """
-    d, comm = mesh.topology.dim, mesh.comm
+    mesh, d, comm = domain.mesh, domain.dimension, domain.mesh.comm
+    cells = mesh.topology.index_map(d)
+    if domain.one_piece:
+        return np.zeros(cells.size_local + cells.num_ghosts, np.int64), 1
     mesh.topology.create_connectivity(d - 1, d)
-    facets, cells = mesh.topology.connectivity(d - 1, d), mesh.topology.index_map(d)
+    facets = mesh.topology.connectivity(d - 1, d)
     first = facets.array[facets.offsets[:-1]]
     twice = np.flatnonzero(np.diff(facets.offsets) == 2)
     pairs = np.column_stack([first[twice], facets.array[facets.offsets[twice] + 1]])
@@ -88,7 +91,7 @@ def pieces(domain: Domain) -> list[Piece]:
     Args:
         domain: on any mesh.
     """
-    found, count = labels(domain.mesh)
+    found, count = labels(domain)
     if count == 1:
         return [Piece(domain=domain, numbers=np.asarray(domain.mesh.geometry.input_global_indices, dtype=np.int64))]
     return [_piece(domain, found == number) for number in range(count)]
@@ -109,7 +112,7 @@ def _piece(domain: Domain, within: Mask) -> Piece:
     own[compat.geometry_dofmap(mesh)] = compat.geometry_dofmap(whole)[parents]
     return Piece(
         domain=Domain.from_mesh(
-            mesh, _sides(domain, mesh, parents), _regions(domain, parents), domain.curves, one_piece=True
+            mesh, _sides(domain, parents, mesh), _regions(domain, parents), domain.curves, one_piece=True
         ),
         numbers=np.asarray(whole.geometry.input_global_indices, dtype=np.int64)[own],
     )
@@ -136,22 +139,17 @@ def _numbered(mesh: dmesh.Mesh, corners: Entities) -> tuple[Integers, Entities]:
     return of_owners(index_map, numbers), points.astype(np.int32)
 
 
-def _sides(domain: Domain, mesh: dmesh.Mesh, parents: Entities) -> dict[str, Entities]:
+def _sides(domain: Domain, parents: Entities, mesh: dmesh.Mesh) -> dict[str, Entities]:
     """The facets of a piece on each side that it has a part of. Collective.
 
     Args:
         domain: the whole.
+        parents: the cell of the whole that each cell of the piece is, (c,).
         mesh: of the piece.
-        parents: the cell of the whole that each of its cells is, (c,); a cell keeps the order of its facets.
     """
-    whole, own = refinement.cell_facets(domain.mesh)[parents], refinement.cell_facets(mesh)[: len(parents)]
-    facets = domain.mesh.topology.index_map(domain.dimension - 1)
-    on, found = np.zeros(facets.size_local + facets.num_ghosts, dtype=np.bool_), {}
-    for name, side in domain.sides.items():
-        on[:] = False
-        on[side] = True
-        found[name] = np.unique(own[on[whole]]).astype(np.int32)
-    return _present(mesh.comm, found)
+    own = np.arange(len(parents), dtype=np.int32)
+    sides = {n: cell_facets.in_copies(side, domain.mesh, parents, mesh, own) for n, side in domain.sides.items()}
+    return _present(mesh.comm, sides)
 
 
 def _regions(domain: Domain, parents: Entities) -> dict[str, Entities]:

@@ -33,10 +33,9 @@ def with_hierarchy(domain: Domain, thresholds: Thresholds = DEFAULT) -> Domain:
     d, unknowns = domain.dimension, _unknowns(domain)
     if domain.coarsening is not None or unknowns < thresholds.hierarchy_from:
         return domain
-    if not domain.one_piece:
-        if len(found := connected_pieces.pieces(domain)) > 1:
-            return _in_pieces(domain, found, thresholds)
-        domain = replace(domain, one_piece=True)  # known from now on
+    if len(found := connected_pieces.pieces(domain)) > 1:
+        return _in_pieces(domain, found, thresholds)
+    domain = replace(domain, one_piece=True)  # known from now on
     factor = 2.0 ** max(1, round(np.log2(unknowns / thresholds.coarsest) / d))
     coarsen = coarsening_2d.coarsen if d == 2 else coarsening_3d.coarsen
     coarsest = coarsen(domain, factor, thresholds)

@@ -18,7 +18,7 @@ from petsc4py import PETSc
 from ..geometry import Curve
 from ..runtime.mpi import agree
 from ..typing import Array, Entities, Integers
-from . import joined_meshes, nodes
+from . import cell_facets, joined_meshes, nodes
 from .domain import Coarsening, Domain
 from .joined_meshes import PlacedMesh
 from .transfer import Rows, Transfer
@@ -70,7 +70,7 @@ def joined(comm: MPI.Comm, bodies: Sequence[PlacedBody]) -> Domain:
     numbers = [_numbers(comm, bodies, i) for i in range(len(bodies))]
     mesh, cells = joined_meshes.joined(comm, [_placed(body) for body in bodies], numbers)
     pairs = list(zip(bodies, cells, strict=True))
-    sides = _united((b.called(side), _facets(mesh, b, at, f)) for b, at in pairs for side, f in b.domain.sides.items())
+    sides = _united(found for body, at in pairs for found in _sides(mesh, body, at))
     regions = _united(found for body, at in pairs for found in _regions(body, at))
     curves = {name: curve for body in bodies for name, curve in body.curves().items()}
     return replace(Domain.from_mesh(mesh, sides, regions, curves), coarsening=coarsening(mesh, bodies, numbers))
@@ -122,16 +122,11 @@ def _numbers(comm: MPI.Comm, bodies: Sequence[PlacedBody], number: int) -> Integ
     return np.asarray(before[rank] + every - starts[rank], dtype=np.int64)
 
 
-def _facets(mesh: dmesh.Mesh, body: PlacedBody, cells: Entities, facets: Entities) -> Entities:
-    """The local facets of the common mesh that a body's facets are; a cell has its facets in the same order."""
-    d, topology = body.domain.dimension, body.domain.mesh.topology
-    for one in (topology, mesh.topology):
-        one.create_connectivity(d - 1, d)
-        one.create_connectivity(d, d - 1)
-    behind, own = topology.connectivity(d - 1, d), topology.connectivity(d, d - 1).array.reshape(-1, d + 1)
-    beside = behind.array[behind.offsets[facets]]
-    ways = np.argmax(own[beside] == facets[:, None], axis=1)
-    return np.asarray(mesh.topology.connectivity(d, d - 1).array.reshape(-1, d + 1)[cells[beside], ways])
+def _sides(mesh: dmesh.Mesh, body: PlacedBody, cells: Entities) -> Iterator[tuple[str, Entities]]:
+    """The local facets of a body's sides in the common mesh, where its local cells have these numbers."""
+    own = np.arange(len(cells), dtype=np.int32)
+    for name, facets in body.domain.sides.items():
+        yield body.called(name), cell_facets.in_copies(facets, body.domain.mesh, own, mesh, cells)
 
 
 def _regions(body: PlacedBody, cells: Entities) -> Iterator[tuple[str, Entities]]:

@@ -17,6 +17,7 @@ from .. import compat
 from ..geometry import Curve
 from ..typing import Array, Entities
 from . import curved_cells
+from .cell_facets import cell_facets
 from .domain import Domain, check_affordable
 from .thresholds import DEFAULT, Thresholds
 from .transfer import Halves, ParentCellTransfer, Transfer
@@ -132,15 +133,6 @@ def _halves(coarse: dmesh.Mesh, fine: dmesh.Mesh, parents: Entities) -> Halves:
     inner = inner.transpose(0, 2, 1)
     both = np.concatenate([1.0 - inner.sum(axis=2, keepdims=True), inner], axis=2)
     return np.rint(2.0 * both).astype(np.int8)
-
-
-def cell_facets(mesh: dmesh.Mesh) -> Entities:
-    """Local facets of each local cell, shape (cells, d+1); the i-th lies opposite to the i-th vertex."""
-    d = mesh.topology.dim
-    mesh.topology.create_entities(d - 1)
-    mesh.topology.create_connectivity(d, d - 1)
-    mesh.topology.create_connectivity(d - 1, d)
-    return np.asarray(mesh.topology.connectivity(d, d - 1).array).reshape(-1, d + 1)
 
 
 def _sides(domain: Domain, fine: dmesh.Mesh, parents: Entities, halves: Halves) -> dict[str, Entities]:

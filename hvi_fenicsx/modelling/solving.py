@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import fields, replace
 from typing import Any
 
 from dolfinx import fem
 from mpi4py import MPI
-from petsc4py import PETSc
 from pydantic import ValidationError
 
 from .. import console, preparation, workflow
@@ -26,7 +25,6 @@ from ..schema import located_error
 from ..solution import Solution
 from ..solvers.context import Progress
 from ..system import petsc_options
-from ..system.system import System
 from . import values
 from .argument_checks import require_switch
 from .model import Model, is_portable, scene_and_ranks
@@ -84,7 +82,7 @@ def solve(
         solution = last_borne.in_place_of(prepared, found.estimated() if estimate else found.solution)
         if solution.solve_result is not None:
             petsc_options.check_read(petsc or {}, prepared.system.comm)
-    _free_garbage([prepared.system, *(level.system for level in found.levels)])
+    found.free()
     return ModelSolution(**fields_of(solution))
 
 
@@ -129,13 +127,6 @@ def fields_of(made: Preparation | Solution | LoadPath) -> dict[str, Any]:
         made: a dataclass of that room.
     """
     return {field.name: getattr(made, field.name) for field in fields(made)}
-
-
-def _free_garbage(systems: Iterable[System]) -> None:
-    """Free what earlier solves have left: on several ranks that is collective, and Python alone cannot. Collective."""
-    for system in systems:
-        PETSc.garbage_cleanup(system.comm)
-        PETSc.garbage_cleanup(system.problem.space.dofmap.index_map.comm)  # dolfinx's vectors are on this one
 
 
 def _displacement(known: ModelSolution, prepared: Preparation) -> fem.Function | None:

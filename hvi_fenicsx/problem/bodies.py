@@ -98,9 +98,7 @@ def find(domain: Domain, space: fem.FunctionSpace, points: Array, meetings: Sequ
         InputError: on all ranks alike: two bodies meet at a vertex (in 3D perhaps along an edge) only, a hinge.
     """
     one = whole(domain)
-    if domain.one_piece:
-        return MeshBodies((one,), *np.zeros((2, len(points)), np.int64))
-    cells, count = connected_pieces.labels(domain.mesh)
+    cells, count = connected_pieces.labels(domain)
     if count == 1:
         return MeshBodies((one,), *np.zeros((2, len(points)), np.int64))
     labels = _vertices(domain, space, cells, points)

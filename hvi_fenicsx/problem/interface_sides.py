@@ -8,7 +8,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..mesh import nodes, second_order
-from ..mesh.refinement import cell_facets
+from ..mesh.cell_facets import cell_facets
 from ..runtime.mpi import agree
 from ..typing import Array, Entities, Mask
 from . import curved_overlaps, curved_polygons, facet_overlaps, facet_polygons, spaces

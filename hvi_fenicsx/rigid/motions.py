@@ -1,4 +1,4 @@
-"""Rigid motions of one body, or of bodies that meet: their fields, and what they are called.
+"""Rigid motions of one body, or of bodies that meet: their basis and its fields.
 
 Basis of one body: in 2D (t1, t2, r) with the rotation field (-(x2 - c2), x1 - c1); in 3D (t1, t2, t3, r1, r2, r3) with
 r × (x - c). c is the body's centre; all lengths are nondimensional. Of several bodies: first the translations of all,
@@ -7,16 +7,13 @@ body by body, then the rotations of all.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 
 from ..typing import Array, Integers
-
-NEGLIGIBLE = 1e-9
-"""A coefficient this small beside the largest is not named."""
-AXES = "xyz"
+from . import motion_names
 
 
 @dataclass(frozen=True)
@@ -54,13 +51,14 @@ class RigidBody:
         return self.dimension
 
     def describe(self, coefficients: Array, *, signed: bool) -> str:
-        """A motion in words; see :func:`describe`.
+        """A motion in words, and whose it is.
 
         Args:
             coefficients: (3|6,), on the basis of this module.
             signed: whether the name has the sense too.
         """
-        return describe(coefficients, self, signed=signed)
+        whose = f" of {self.name}" if self.name else ""
+        return motion_names.describe(coefficients, self.centre, self.length, signed=signed) + whose
 
 
 @dataclass(frozen=True)
@@ -115,8 +113,9 @@ class JoinedBodies:
         found: dict[str, list[str]] = {}
         for number, body in enumerate(self.bodies):
             own = np.asarray(coefficients)[self.own(number)]
-            if np.abs(own).max() > NEGLIGIBLE * np.abs(coefficients).max():
-                found.setdefault(describe(own, replace(body, name=""), signed=signed), []).append(body.name)
+            if np.abs(own).max() > motion_names.NEGLIGIBLE * np.abs(coefficients).max():
+                motion = motion_names.describe(own, body.centre, body.length, signed=signed)
+                found.setdefault(motion, []).append(body.name)
         return ", ".join(f"{motion} of {' and '.join(names)}" for motion, names in found.items())
 
 
@@ -246,59 +245,3 @@ def motion_at(points: Array, body: RigidBody, coefficients: tuple[float, ...] | 
         coefficients: (3|6,), on the basis of this module.
     """
     return np.asarray(np.einsum("n,mnd->md", np.asarray(coefficients), rigid_fields(points, body)))
-
-
-def describe(coefficients: Array, body: RigidBody, *, signed: bool) -> str:
-    """A motion in words, such as "translation along y"; points in it are in metres.
-
-    Args:
-        coefficients: (3|6,), on the basis of this module.
-        body: the body that moves.
-        signed: whether the name has the sense too: "translation along +y".
-    """
-    z = np.where(np.abs(coefficients) <= NEGLIGIBLE * np.abs(coefficients).max(), 0.0, coefficients)
-    shift, spin = z[: body.dimension], z[body.dimension :]
-    whose = f" of {body.name}" if body.name else ""
-    if not spin.any():
-        return f"translation along {_direction(shift, signed)}{whose}"
-    rotation = _rotation_2d if body.dimension == 2 else _rotation_3d
-    return rotation(shift, spin, body, signed) + whose
-
-
-def _rotation_2d(shift: Array, spin: Array, body: RigidBody, signed: bool) -> str:
-    pole = body.centre[:2] + np.array([-shift[1], shift[0]]) / spin[0]
-    sense = (", counterclockwise" if spin[0] > 0.0 else ", clockwise") if signed else ""
-    return f"rotation about {_point(pole * body.length)}{sense}"
-
-
-def _rotation_3d(shift: Array, spin: Array, body: RigidBody, signed: bool) -> str:
-    """Every motion in space is a screw; the point named is the one of its axis nearest the centre."""
-    square = float(spin @ spin)
-    pole, pitch = body.centre + np.cross(spin, shift) / square, float(shift @ spin) / square
-    axis = f"about the axis through {_point(pole * body.length)} along {_direction(spin, signed)}"
-    if abs(pitch) <= NEGLIGIBLE:
-        return f"rotation {axis}"
-    return f"screw motion {axis}, advancing {_number(pitch * body.length)} per radian"
-
-
-def _direction(vector: Array, signed: bool) -> str:
-    """An axis by its letter, else a unit vector; without a sign its first largest entry is positive."""
-    unit = vector / np.linalg.norm(vector)
-    if not signed and unit[np.abs(unit).round(6).argmax()] < 0.0:
-        unit = -unit
-    if np.abs(unit).max() < 1.0 - NEGLIGIBLE:
-        return "(" + ", ".join(f"{_clean(c):.2f}" for c in unit) + ")"
-    i = int(np.abs(unit).argmax())
-    return (("+" if unit[i] > 0.0 else "-") if signed else "") + AXES[i]
-
-
-def _point(point: Array) -> str:
-    return "(" + ", ".join(_number(c) for c in point) + ")"
-
-
-def _number(value: float) -> str:
-    return f"{_clean(value):.4g}"
-
-
-def _clean(value: float) -> float:
-    return 0.0 if abs(value) < NEGLIGIBLE else float(value)

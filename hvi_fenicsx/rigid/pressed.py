@@ -9,7 +9,8 @@ import numpy as np
 
 from ..typing import Array
 from .kernel import FixedDirections
-from .motions import NEGLIGIBLE, Mode, MotionFields, Movable, fields_at
+from .motion_names import NEGLIGIBLE
+from .motions import Mode, MotionFields, Movable, fields_at
 from .reduction import ContactCone, Resistance, RigidProblem
 
 

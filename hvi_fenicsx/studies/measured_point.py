@@ -15,7 +15,6 @@ from ..accuracy.adaptive import AdaptiveSolver
 from ..accuracy.control import solve_to_goal
 from ..accuracy.goal import Goal
 from ..errors import InputError
-from ..preparation import prepare
 from ..report.solution_arrays import SolutionArrays, save
 from ..results.gathering import solution_arrays
 from ..results.summary import summary
@@ -23,7 +22,7 @@ from ..runtime.mpi import largest, on_root
 from ..runtime.timing import Timer
 from ..scene import Scene
 from ..solution import Solution
-from ..workflow import finish
+from ..workflow import solve
 from . import cost
 from .errors import NotStoredError
 from .solution_fields import fields, width
@@ -74,7 +73,7 @@ class MeasuredPoint:
     def _solved(self, timer: Timer) -> Solution:
         """The scene on its mesh, or on one made for an accuracy. Collective."""
         if self.accuracy is None:
-            return finish(prepare(self.scene, self.comm, timer))
+            return solve(self.scene, self.comm, timer=timer)
         solver = AdaptiveSolver(timer=timer)
         found = solve_to_goal(self.scene, self.comm, Goal(self.accuracy), solver, lambda line: None).solution
         timer.seconds["solve"] += timer.seconds["estimate"]  # which steers the refinement: part of what it costs

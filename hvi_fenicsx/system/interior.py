@@ -27,7 +27,7 @@ from .petsc_options import CHOLESKY
 
 _NO_MEMORY = PETSc.PC.FailedReason.FACTOR_OUTMEMORY
 PREFIX = "condensed_"
-"""The prefix of the options of factorisations that condense a body."""
+"""The prefix of options of factorisations that condense a body."""
 Number = TypeVar("Number", bound=np.generic)
 
 

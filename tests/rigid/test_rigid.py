@@ -28,7 +28,6 @@ from hvi_fenicsx.rigid import (
     Solvability,
     analyse,
     combine,
-    describe,
     gives_way,
     kernel,
     load_factors,
@@ -660,7 +659,7 @@ def test_a_screw_is_called_a_screw() -> None:
     body = RigidBody(3, np.zeros(3))
     screw = np.array([0.0, 0.0, 0.5, 0.0, 0.0, -1.0])
     expected = "screw motion about the axis through (0, 0, 0) along -z, advancing -0.5 per radian"
-    assert describe(screw, body, signed=True) == expected
+    assert body.describe(screw, signed=True) == expected
 
 
 def test_bodies_that_do_not_touch_are_as_weak_as_the_weakest() -> None:

@@ -17,7 +17,7 @@ from ...laws import Superpotential
 from ...runtime.mpi import total
 from ...typing import Array
 from ..law_state import LawState
-from . import defect
+from . import bubble_constraints, defect
 from .bubble_stiffness import BubbleStiffness
 from .dual_norm import DualNorm
 from .law_springs import LawSprings
@@ -70,7 +70,7 @@ class Coupled:
         load = problem.bulk.residual_in(space, traces.u, problem.linear.values())
         self._laws, _ = traces.tested()
         load -= self._laws
-        stiffness, under = BubbleStiffness(problem, space), defect.constraints(problem, traces.u, space)
+        stiffness, under = BubbleStiffness(problem, space), bubble_constraints.constraints(problem, traces.u, space)
         self._least = defect.LeastEnergy(self.error.bubbles, stiffness, under, load, self._thresholds)
         self._moved = fem.Function(problem.space)
         self._of_moved = problem.bulk.force_in(space, self._moved)

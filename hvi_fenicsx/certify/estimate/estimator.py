@@ -19,7 +19,7 @@ from ...system.levels import Levels
 from ...system.system import System
 from ...typing import Array
 from ..certificate import Examination
-from . import coupled_errors, data_errors, defect, dual_norm, nearly_incompressible
+from . import bubble_constraints, coupled_errors, data_errors, defect, dual_norm, nearly_incompressible
 from .bubble_stiffness import BubbleStiffness
 from .contact_errors import ratio
 from .law_traces import ErrorField, LawTraces
@@ -135,7 +135,7 @@ def _between_nodes(traces: LawTraces, inverse: dual_norm.DualNorm) -> Array:
     load *= -1.0
     load += problem.bulk.residual_in(traces.bubbles, u, problem.linear.values())
     stiffness = BubbleStiffness(problem, traces.bubbles)
-    bubbles, under = fem.Function(traces.bubbles), defect.constraints(problem, u, traces.bubbles)
+    bubbles, under = fem.Function(traces.bubbles), bubble_constraints.constraints(problem, u, traces.bubbles)
     defect.find_least_energy(bubbles, stiffness, under, load, traces.thresholds)
     cells = problem.bulk.energy_by_cell(bubbles)
     if problem.terms:

@@ -23,7 +23,8 @@ from ..law_state import LawState
 from ..placed_forces import traction
 from . import bubbles, tangent_alignment
 from .contact_facets import PartTrace, local_blocks
-from .interface_traces import InterfacePoints, InterfaceTrace
+from .interface_points import InterfacePoints
+from .interface_traces import InterfaceTrace
 from .thresholds import DEFAULT, Thresholds
 
 Trace = PartTrace | InterfaceTrace

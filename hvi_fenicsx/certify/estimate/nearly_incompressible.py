@@ -15,7 +15,7 @@ from dolfinx import fem, la
 from ...problem.problem import Problem
 from ...runtime import forms
 from ...typing import Array
-from . import defect
+from . import bubble_constraints, defect
 from .bubble_stiffness import BubbleStiffness
 from .dual_norm import DualNorm
 from .law_springs import LawSprings
@@ -118,7 +118,7 @@ def squares(traces: LawTraces, inverse: DualNorm) -> Array:
     load = problem.bulk.residual_in(traces.bubbles, u, problem.linear.values()) - between
     if problem.terms:
         load -= stiffness.on_bubbles(unmet)
-    bubbles, under = fem.Function(traces.bubbles), defect.constraints(problem, u, traces.bubbles)
+    bubbles, under = fem.Function(traces.bubbles), bubble_constraints.constraints(problem, u, traces.bubbles)
     stiffness.hold(LawSprings(traces, ErrorField(fem.Function(problem.space), bubbles)))
     defect.find_least_energy(bubbles, stiffness, under, load, traces.thresholds)
     stiffness.follow(bubbles.x.array.reshape(-1, unmet.shape[1])[: len(between)], unmet)
