@@ -36,7 +36,14 @@ from hvi_fenicsx.report import png_file, reader, units
 from hvi_fenicsx.report.body_mesh import BodyMesh, body_mesh
 from hvi_fenicsx.report.html import numbers
 from hvi_fenicsx.report.pictures import draw, loads_supports
-from hvi_fenicsx.report.pictures.kinds import body_plane, body_space, contact_curves, contact_maps
+from hvi_fenicsx.report.pictures.kinds import (
+    body_plane,
+    body_space,
+    contact_curves,
+    contact_maps,
+    scene_plane,
+    scene_space,
+)
 from hvi_fenicsx.report.pictures.raster import shade
 from hvi_fenicsx.report.solution_arrays import FILE, PartArrays, SolutionArrays, load, save
 from hvi_fenicsx.results import contact_table
@@ -576,3 +583,61 @@ def test_pieces_are_counted_alike_in_the_table_and_on_the_page(tmp_path: Path) -
     page = dict(numbers.contact(reader.read(folder).parts[0])["rows"])["pieces of the friction law in use, from 0"]
     wanted = {f"{n} on piece {piece}" if piece >= 0 else f"{n} on a kink" for piece, n in table.items()}
     assert set(page.split(", ")) == wanted
+
+
+def test_what_is_lifted_is_said_where_no_curve_is(tmp_path: Path) -> None:
+    """A stretch of two vertices at the end, whose bond pulls hardest there."""
+    folder = result(tmp_path / "r", square(), peeled)
+    part = load(folder / FILE).parts["floor"]
+    lifted = part.columns["x"] < 0.1
+    columns = {**part.columns, "contact": np.where(lifted, 0.0, 1.0)}
+    columns["sigma_n"] = np.where(lifted, 3 * LOAD, -LOAD)
+    change(folder, parts={"floor": replace(part, columns=columns)})
+    found = reader.read(folder)
+    fig = contact_curves.draw(found, found.parts[0])
+    fig.canvas.draw()
+    said = [text for text in fig.findobj(Text) if "lifted" in text.get_text()]
+    assert len(said) == 1
+    box = said[0].get_window_extent()
+    assert 0.0 <= box.x0 <= box.x1 <= fig.bbox.width
+    others = [text for text in fig.findobj(Text) if text.get_text() and text is not said[0]]
+    assert not any(box.overlaps(other.get_window_extent()) for other in [*fig.axes, *others])
+
+
+def test_a_slip_that_is_rounding_beside_the_body_is_drawn_as_zero(tmp_path: Path) -> None:
+    """As on a joint that is tied, in a body that moves."""
+    folder = result(tmp_path / "r", square(), pressed)
+    part = load(folder / FILE).parts["floor"]
+    noise = 1e-22 * (-1.0) ** np.arange(len(part.vertices))
+    change(
+        folder,
+        parts={"floor": replace(part, columns={**part.columns, "u_t1": noise, "u_n": 0 * noise, "gap": 0 * noise})},
+    )
+    found = reader.read(folder)
+    axes = contact_curves.draw(found, found.parts[0]).axes[-1]
+    assert axes.get_title(loc="left").startswith("slip")
+    assert not np.any(axes.get_lines()[0].get_ydata())
+    assert [float(tick) for tick in axes.get_yticks()] == [0.0]
+
+
+@pytest.mark.parametrize("body", [square, box], ids=["plane", "space"])
+def test_the_value_of_a_load_stands_in_the_picture_and_below_its_heading(
+    tmp_path: Path, body: Callable[[], mesh.Mesh], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Loads on the top and on the right, of a body as wide as the picture."""
+    for kind in (body_space, scene_space):
+        monkeypatch.setattr(kind, "render", lambda *_: None)
+    folder, d = result(tmp_path / "r", body(), pressed), body().geometry.dim
+    loads = {"right": [1e6, *[0.0] * (d - 1)], "top": [*[0.0] * (d - 1), -1.234e8]}
+    write_words(folder, d, effects=[role(name, "traction", traction=values) for name, values in loads.items()])
+    high = body().geometry.x[:, d - 1].max()
+    write_sides(folder, body(), right=lambda x: x[0] == 1, top=lambda x: x[d - 1] == high)
+    found = reader.read(folder)
+    drawn = (scene_plane, body_plane) if d == 2 else (scene_space, body_space)
+    for fig in (kind.draw(found) for kind in drawn):
+        fig.canvas.draw()
+        values = [text for text in fig.findobj(Text) if text.get_text().endswith("Pa") and text in fig.axes[0].texts]
+        assert len(values) == 2
+        for box in (value.get_window_extent() for value in values):
+            assert 0.0 <= box.x0 <= box.x1 <= fig.bbox.width
+            assert not any(box.overlaps(text.get_window_extent()) for text in fig.texts)

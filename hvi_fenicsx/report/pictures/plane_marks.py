@@ -18,6 +18,7 @@ from ..units import quantity
 from .deformed import DeformedBody, PartGeometry
 from .loads_supports import HeldSide, LoadedSide
 from .outline import normals
+from .reach import Label, Reach
 from .style import GREY, INK, ORANGE, PURPLE, VERMILION
 
 LOAD, PRESSURE, ROLLER = 0.13, 0.15, 0.011
@@ -33,13 +34,13 @@ class Mark:
     """Something to draw around the body.
 
     Attributes:
-        extent: the points that it reaches, m, (n, 2).
+        reach: the points that it reaches.
         draw: draws it.
         key: its line in the legend.
         words: of that line; empty for none.
     """
 
-    extent: Array
+    reach: Reach
     draw: Callable[[Axes], None]
     key: Callable[[], Artist]
     words: str
@@ -79,15 +80,8 @@ def _label(feet: Array, outward: Array, words: str, size: float) -> Mark:
     """A load's largest value beyond its arrows, where the middle of the side is."""
     normal = outward[len(outward) // 2]
     middle = (feet[(len(feet) - 1) // 2] + feet[len(feet) // 2]) / 2
-    at = middle + (LOAD + 0.015) * size * normal
-    room = at + size * normal * np.where(np.abs(normal) > 0.5, [0.12, 0.045], 0.0)
-
-    def draw(axes: Axes) -> None:
-        across = {1: "left", 0: "center", -1: "right"}[round(float(normal[0]))]
-        upright = {1: "bottom", 0: "center", -1: "top"}[round(float(normal[1]))]
-        axes.text(at[0], at[1], words, ha=across, va=upright, size=12.5, weight="bold", color=INK)
-
-    return Mark(np.array([at, room]), draw, Artist, "")
+    label = Label(words, middle + LOAD * size * normal, normal)
+    return Mark(label.reach, label.draw, Artist, "")
 
 
 def _lengths(points: Array) -> Array:
@@ -115,7 +109,7 @@ def _arrows(tails: Array, arrows: Array, colour: str, words: str, size: float) -
 
     key = Line2D([], [], color=colour, marker=">", ms=7, markevery=(1, 1), lw=1.6, label=words)
     key.set_data([0, 1], [0, 0])
-    return Mark(np.concatenate([tails, tails + arrows]), draw, lambda: key, words)
+    return Mark(Reach(np.concatenate([tails, tails + arrows])), draw, lambda: key, words)
 
 
 _ARROW: dict[str, Any] = {
@@ -154,7 +148,7 @@ def _support(wall: Array, rollers: Array, outward: Array, size: float) -> Mark:
         axes.plot(*rollers.T, "o", ms=2 * ROLLER * size * per_metre, **style)
 
     key = Line2D([], [], color=INK, lw=2.2, marker="o" if len(rollers) else "", mfc="white", ms=7, label=words)
-    return Mark(np.concatenate([wall, wall + 0.03 * size * outward]), draw, lambda: key, words)
+    return Mark(Reach(np.concatenate([wall, wall + 0.03 * size * outward])), draw, lambda: key, words)
 
 
 def _hatched(axes: Axes, line: Array, outward: Array, size: float) -> None:
@@ -195,7 +189,7 @@ def _obstacle(base: Array) -> Mark:
     def draw(axes: Axes) -> None:
         axes.plot(*base.T, color=GREY, lw=4, solid_capstyle="butt", clip_on=False, zorder=3.5)
 
-    return Mark(base, draw, lambda: Line2D([], [], color=GREY, lw=4, label="obstacle"), "obstacle")
+    return Mark(Reach(base), draw, lambda: Line2D([], [], color=GREY, lw=4, label="obstacle"), "obstacle")
 
 
 def _lifted(points: Array, off: Mask, gap: float) -> Mark:
@@ -206,7 +200,7 @@ def _lifted(points: Array, off: Mask, gap: float) -> Mark:
     def draw(axes: Axes) -> None:
         axes.plot(*line.T, **style, clip_on=False, zorder=5.5)
 
-    return Mark(points, draw, lambda: Line2D([], [], **style, label=words), words)
+    return Mark(Reach(points), draw, lambda: Line2D([], [], **style, label=words), words)
 
 
 def _profile(base: Array, outward: Array, pressure: Array, largest: float, size: float) -> Iterator[Mark]:
@@ -230,4 +224,6 @@ def _filled(base: Array, tips: Array, colour: str, words: str) -> Mark:
         axes.fill(*np.concatenate([base, ends[::-1]]).T, color=colour, alpha=0.16, lw=0, clip_on=False, zorder=2)
         axes.plot(*tips.T, color=colour, lw=1.8, clip_on=False, zorder=5)
 
-    return Mark(tips[np.isfinite(tips[:, 0])], draw, lambda: Patch(fc=colour, alpha=0.5, ec=colour, label=words), words)
+    return Mark(
+        Reach(tips[np.isfinite(tips[:, 0])]), draw, lambda: Patch(fc=colour, alpha=0.5, ec=colour, label=words), words
+    )

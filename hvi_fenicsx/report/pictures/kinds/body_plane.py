@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
 from matplotlib.figure import Figure
 
 from ...reader import Result
@@ -12,6 +11,7 @@ from ..deformed import deform, largest_stress, part_geometries
 from ..legend import colour_bar, legend
 from ..loads_supports import borne_loads, held_sides
 from ..plane_canvas import canvas, paint
+from ..reach import Reach
 from ..registry import picture
 from ..style import SLATE, heading
 
@@ -31,7 +31,7 @@ def draw(result: Result) -> Figure:
         *marks.loads(shape, borne_loads(result)),
         *(m for part in parts for m in marks.contact(shape, part, largest_stress(parts))),
     ]
-    fig, axes = canvas(np.concatenate([shape.points[:, :2], body.points[:, :2], *(m.extent for m in drawn)]))
+    fig, axes = canvas([Reach(shape.points[:, :2]), Reach(body.points[:, :2]), *(m.reach for m in drawn)])
     heading(fig, result, "deformed body")
     largest = float(shape.amount.max())
     paint(axes, shape, shape.amount[body.cells], SLATE, largest)
