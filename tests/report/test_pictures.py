@@ -25,7 +25,8 @@ import pytest
 import tomli_w
 from dolfinx import mesh
 from matplotlib.figure import Figure
-from matplotlib.text import Text
+from matplotlib.quiver import Quiver
+from matplotlib.text import Annotation, Text
 from mpi4py import MPI
 from runs import hvi, write_scene
 from scenes import model
@@ -513,6 +514,17 @@ def test_numbers_are_said_as_people_say_them() -> None:
 SAID = [(1e6, "Pa"), (0.999e6, "Pa"), (9e-6, "m"), (1.26e-7, "m"), (1.5, "m"), (2500.0, "m"), (0.0, "Pa")]
 
 
+def test_where_no_prefix_suits_a_power_of_ten_is_said() -> None:
+    said = [units.quantity(value, unit) for value, unit in ((1e-9, "Pa"), (8.49e-21, "m"), (2.5e24, "Pa"))]
+    assert said == ["1 × 10⁻⁹ Pa", "8.49 × 10⁻²¹ m", "2.5 × 10²⁴ Pa"]
+    assert units.quantity(0.89, "Pa").replace("\N{NARROW NO-BREAK SPACE}", " ") == "0.89 Pa"
+    assert [units.times(f) for f in (1e19, 5e9, 100.0)] == [
+        "displacements × 10¹⁹",
+        "displacements × 5 × 10⁹",
+        "displacements × 100",
+    ]
+
+
 def test_a_column_that_is_not_there_is_nothing_and_not_zero(tmp_path: Path) -> None:
     folder = result(tmp_path / "r", square(4), peeled)
     part = reader.read(folder).parts[0]
@@ -641,3 +653,46 @@ def test_the_value_of_a_load_stands_in_the_picture_and_below_its_heading(
         for box in (value.get_window_extent() for value in values):
             assert 0.0 <= box.x0 <= box.x1 <= fig.bbox.width
             assert not any(box.overlaps(text.get_window_extent()) for text in fig.texts)
+
+
+def test_the_legend_says_once_what_is_largest_on_all_parts(tmp_path: Path) -> None:
+    folder = result(tmp_path / "r", square(), peeled)
+    small = floor(square(), peeled)
+    small = replace(small, columns={**small.columns, "sigma_n": 0.5 * small.columns["sigma_n"]})
+    change(folder, parts={"a": small, "b": floor(square(), peeled)})
+    fig = body_plane.draw(reader.read(folder))
+    words = [text.get_text().replace("\N{NARROW NO-BREAK SPACE}", " ") for text in fig.legends[0].get_texts()]
+    assert [line for line in words if "pressure" in line or "lifted" in line] == [
+        "lifted, up to 2 µm",
+        "contact pressure, up to 1 MPa",
+    ]
+
+
+def test_a_load_on_short_stretches_has_arrows_on_each_and_its_value_beside_one(tmp_path: Path) -> None:
+    """Stretches of one edge each, between the places of arrows that are spread over the whole side."""
+    folder = result(tmp_path / "r", square(), pressed)
+    change(folder, parts={})
+    load = "(-1e6 if x > 0.3 else 0) if x < 0.45 else (-1e6 if x > 0.8 else 0)"
+    write_words(folder, 2, effects=[role("top", "traction", traction=[0.0, load])])
+    write_sides(folder, square(), top=lambda x: x[1] == 1)
+    fig = scene_plane.draw(reader.read(folder))
+    (arrows,) = fig.axes[0].findobj(Quiver)
+    feet = np.asarray(arrows.get_offsets())[:, 0]
+    assert set(np.digitize(feet, [0.3, 0.45, 0.8])) == {1, 3}
+    assert np.min(np.diff(np.sort(feet))) > 0.02
+    (value,) = [text for text in fig.axes[0].texts if text.get_text().endswith("Pa")]
+    assert isinstance(value, Annotation)
+    assert 0.8 < value.xy[0] < 1.0
+
+
+def test_the_axes_of_a_map_are_in_a_unit_that_suits_and_inside_of_the_picture(tmp_path: Path) -> None:
+    """A part of some millimetres on both sides of the origin."""
+    small = box()
+    small.geometry.x[:] = 0.02 * small.geometry.x - [0.01, 0.006, 0.0]
+    folder = result(tmp_path / "r", small, pressed)
+    found = reader.read(folder)
+    fig = contact_maps.draw(found, found.parts[0])
+    fig.canvas.draw()
+    named = [label for axes in fig.axes for label in (axes.xaxis.label, axes.yaxis.label) if label.get_text()]
+    assert {label.get_text() for label in named} == {"x in mm", "y in mm"}
+    assert min(label.get_window_extent().x0 for label in named) >= 0.0

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from ...reader import Result
 from ...units import times
 from .. import plane_marks as marks
-from ..deformed import deform, largest_stress, part_geometries
+from ..deformed import deform, part_geometries
 from ..legend import legend
 from ..loads_supports import borne_loads, held_sides
 from ..plane_canvas import canvas, paint
@@ -32,7 +32,7 @@ def draw(result: Result) -> Figure:
     drawn = [
         *marks.supports(shape, held_sides(result)),
         *marks.loads(shape, borne_loads(result)),
-        *(m for part in parts for m in marks.contact(shape, part, largest_stress(parts))),
+        *marks.contacts(shape, parts),
     ]
     fig, axes = canvas([Reach(shape.points[:, :2]), Reach(body.points[:, :2]), *(m.reach for m in drawn)])
     heading(fig, result, "stress in the body")
