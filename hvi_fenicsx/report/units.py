@@ -15,15 +15,17 @@ class Unit:
 
     Attributes:
         size: of the unit, in the unit without its prefix.
-        name: with the prefix.
+        name: with the prefix, or with a power of ten where no prefix suits.
+        joint: between a value and the name.
     """
 
     size: float
     name: str
+    joint: str = _NARROW
 
     def text(self, value: float) -> str:
         """A value in this unit, to three digits."""
-        return f"{self.number(value)}{_NARROW}{self.name}"
+        return f"{self.number(value)}{self.joint}{self.name}"
 
     def number(self, value: float) -> str:
         """The same without the unit, for a column that names it at its head."""
@@ -42,8 +44,10 @@ def unit_for(largest: float, name: str) -> Unit:
     exponent = 3 * math.floor(math.log10(abs(largest) * (1.0 + 1e-9)) / 3)
     least = 0 if name == "Pa" else -12  # mPa would be read as MPa
     most = 0 if name == "m" else 12  # nobody says megametre
-    exponent = min(max(exponent, least), most)
-    return Unit(10.0**exponent, _PREFIXES[exponent] + name)
+    nearest = min(max(exponent, least), most)
+    if nearest - exponent in range(-6, 6):
+        return Unit(10.0**nearest, _PREFIXES[nearest] + name)
+    return Unit(10.0**exponent, f"{_power(exponent)} {name}", " × ")
 
 
 def quantity(value: float, name: str) -> str:
@@ -66,12 +70,23 @@ def round_below(value: float) -> float:
 
 def times(factor: float) -> str:
     """A magnification in words."""
-    return "displacements to scale" if factor == 1.0 else f"displacements × {_digits(factor)}"
+    if factor == 1.0:
+        return "displacements to scale"
+    exponent = math.floor(math.log10(factor) + 1e-9)
+    if exponent in range(-4, 9):
+        return f"displacements × {_digits(factor)}"
+    digits = _digits(factor / 10.0**exponent)
+    return f"displacements × {'' if digits == '1' else f'{digits} × '}{_power(exponent)}"
 
 
 def thousands(number: int) -> str:
     """A whole number, its thousands apart."""
     return f"{number:,}".replace(",", _NARROW)
+
+
+def _power(exponent: int) -> str:
+    """A power of ten in letters."""
+    return "10" + str(exponent).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
 
 
 def _digits(value: float) -> str:

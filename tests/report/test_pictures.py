@@ -25,7 +25,8 @@ import pytest
 import tomli_w
 from dolfinx import mesh
 from matplotlib.figure import Figure
-from matplotlib.text import Text
+from matplotlib.quiver import Quiver
+from matplotlib.text import Annotation, Text
 from mpi4py import MPI
 from runs import hvi, write_scene
 from scenes import model
@@ -36,7 +37,14 @@ from hvi_fenicsx.report import png_file, reader, units
 from hvi_fenicsx.report.body_mesh import BodyMesh, body_mesh
 from hvi_fenicsx.report.html import numbers
 from hvi_fenicsx.report.pictures import draw, loads_supports
-from hvi_fenicsx.report.pictures.kinds import body_plane, body_space, contact_curves, contact_maps
+from hvi_fenicsx.report.pictures.kinds import (
+    body_plane,
+    body_space,
+    contact_curves,
+    contact_maps,
+    scene_plane,
+    scene_space,
+)
 from hvi_fenicsx.report.pictures.raster import shade
 from hvi_fenicsx.report.solution_arrays import FILE, PartArrays, SolutionArrays, load, save
 from hvi_fenicsx.results import contact_table
@@ -506,6 +514,17 @@ def test_numbers_are_said_as_people_say_them() -> None:
 SAID = [(1e6, "Pa"), (0.999e6, "Pa"), (9e-6, "m"), (1.26e-7, "m"), (1.5, "m"), (2500.0, "m"), (0.0, "Pa")]
 
 
+def test_where_no_prefix_suits_a_power_of_ten_is_said() -> None:
+    said = [units.quantity(value, unit) for value, unit in ((1e-9, "Pa"), (8.49e-21, "m"), (2.5e24, "Pa"))]
+    assert said == ["1 × 10⁻⁹ Pa", "8.49 × 10⁻²¹ m", "2.5 × 10²⁴ Pa"]
+    assert units.quantity(0.89, "Pa").replace("\N{NARROW NO-BREAK SPACE}", " ") == "0.89 Pa"
+    assert [units.times(f) for f in (1e19, 5e9, 100.0)] == [
+        "displacements × 10¹⁹",
+        "displacements × 5 × 10⁹",
+        "displacements × 100",
+    ]
+
+
 def test_a_column_that_is_not_there_is_nothing_and_not_zero(tmp_path: Path) -> None:
     folder = result(tmp_path / "r", square(4), peeled)
     part = reader.read(folder).parts[0]
@@ -576,3 +595,104 @@ def test_pieces_are_counted_alike_in_the_table_and_on_the_page(tmp_path: Path) -
     page = dict(numbers.contact(reader.read(folder).parts[0])["rows"])["pieces of the friction law in use, from 0"]
     wanted = {f"{n} on piece {piece}" if piece >= 0 else f"{n} on a kink" for piece, n in table.items()}
     assert set(page.split(", ")) == wanted
+
+
+def test_what_is_lifted_is_said_where_no_curve_is(tmp_path: Path) -> None:
+    """A stretch of two vertices at the end, whose bond pulls hardest there."""
+    folder = result(tmp_path / "r", square(), peeled)
+    part = load(folder / FILE).parts["floor"]
+    lifted = part.columns["x"] < 0.1
+    columns = {**part.columns, "contact": np.where(lifted, 0.0, 1.0)}
+    columns["sigma_n"] = np.where(lifted, 3 * LOAD, -LOAD)
+    change(folder, parts={"floor": replace(part, columns=columns)})
+    found = reader.read(folder)
+    fig = contact_curves.draw(found, found.parts[0])
+    fig.canvas.draw()
+    said = [text for text in fig.findobj(Text) if "lifted" in text.get_text()]
+    assert len(said) == 1
+    box = said[0].get_window_extent()
+    assert 0.0 <= box.x0 <= box.x1 <= fig.bbox.width
+    others = [text for text in fig.findobj(Text) if text.get_text() and text is not said[0]]
+    assert not any(box.overlaps(other.get_window_extent()) for other in [*fig.axes, *others])
+
+
+def test_a_slip_that_is_rounding_beside_the_body_is_drawn_as_zero(tmp_path: Path) -> None:
+    """As on a joint that is tied, in a body that moves."""
+    folder = result(tmp_path / "r", square(), pressed)
+    part = load(folder / FILE).parts["floor"]
+    noise = 1e-22 * (-1.0) ** np.arange(len(part.vertices))
+    change(
+        folder,
+        parts={"floor": replace(part, columns={**part.columns, "u_t1": noise, "u_n": 0 * noise, "gap": 0 * noise})},
+    )
+    found = reader.read(folder)
+    axes = contact_curves.draw(found, found.parts[0]).axes[-1]
+    assert axes.get_title(loc="left").startswith("slip")
+    assert not np.any(axes.get_lines()[0].get_ydata())
+    assert [float(tick) for tick in axes.get_yticks()] == [0.0]
+
+
+@pytest.mark.parametrize("body", [square, box], ids=["plane", "space"])
+def test_the_value_of_a_load_stands_in_the_picture_and_below_its_heading(
+    tmp_path: Path, body: Callable[[], mesh.Mesh], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Loads on the top and on the right, of a body as wide as the picture."""
+    for kind in (body_space, scene_space):
+        monkeypatch.setattr(kind, "render", lambda *_: None)
+    folder, d = result(tmp_path / "r", body(), pressed), body().geometry.dim
+    loads = {"right": [1e6, *[0.0] * (d - 1)], "top": [*[0.0] * (d - 1), -1.234e8]}
+    write_words(folder, d, effects=[role(name, "traction", traction=values) for name, values in loads.items()])
+    high = body().geometry.x[:, d - 1].max()
+    write_sides(folder, body(), right=lambda x: x[0] == 1, top=lambda x: x[d - 1] == high)
+    found = reader.read(folder)
+    drawn = (scene_plane, body_plane) if d == 2 else (scene_space, body_space)
+    for fig in (kind.draw(found) for kind in drawn):
+        fig.canvas.draw()
+        values = [text for text in fig.findobj(Text) if text.get_text().endswith("Pa") and text in fig.axes[0].texts]
+        assert len(values) == 2
+        for box in (value.get_window_extent() for value in values):
+            assert 0.0 <= box.x0 <= box.x1 <= fig.bbox.width
+            assert not any(box.overlaps(text.get_window_extent()) for text in fig.texts)
+
+
+def test_the_legend_says_once_what_is_largest_on_all_parts(tmp_path: Path) -> None:
+    folder = result(tmp_path / "r", square(), peeled)
+    small = floor(square(), peeled)
+    small = replace(small, columns={**small.columns, "sigma_n": 0.5 * small.columns["sigma_n"]})
+    change(folder, parts={"a": small, "b": floor(square(), peeled)})
+    fig = body_plane.draw(reader.read(folder))
+    words = [text.get_text().replace("\N{NARROW NO-BREAK SPACE}", " ") for text in fig.legends[0].get_texts()]
+    assert [line for line in words if "pressure" in line or "lifted" in line] == [
+        "lifted, up to 2 µm",
+        "contact pressure, up to 1 MPa",
+    ]
+
+
+def test_a_load_on_short_stretches_has_arrows_on_each_and_its_value_beside_one(tmp_path: Path) -> None:
+    """Stretches of one edge each, between the places of arrows that are spread over the whole side."""
+    folder = result(tmp_path / "r", square(), pressed)
+    change(folder, parts={})
+    load = "(-1e6 if x > 0.3 else 0) if x < 0.45 else (-1e6 if x > 0.8 else 0)"
+    write_words(folder, 2, effects=[role("top", "traction", traction=[0.0, load])])
+    write_sides(folder, square(), top=lambda x: x[1] == 1)
+    fig = scene_plane.draw(reader.read(folder))
+    (arrows,) = fig.axes[0].findobj(Quiver)
+    feet = np.asarray(arrows.get_offsets())[:, 0]
+    assert set(np.digitize(feet, [0.3, 0.45, 0.8])) == {1, 3}
+    assert np.min(np.diff(np.sort(feet))) > 0.02
+    (value,) = [text for text in fig.axes[0].texts if text.get_text().endswith("Pa")]
+    assert isinstance(value, Annotation)
+    assert 0.8 < value.xy[0] < 1.0
+
+
+def test_the_axes_of_a_map_are_in_a_unit_that_suits_and_inside_of_the_picture(tmp_path: Path) -> None:
+    """A part of some millimetres on both sides of the origin."""
+    small = box()
+    small.geometry.x[:] = 0.02 * small.geometry.x - [0.01, 0.006, 0.0]
+    folder = result(tmp_path / "r", small, pressed)
+    found = reader.read(folder)
+    fig = contact_maps.draw(found, found.parts[0])
+    fig.canvas.draw()
+    named = [label for axes in fig.axes for label in (axes.xaxis.label, axes.yaxis.label) if label.get_text()]
+    assert {label.get_text() for label in named} == {"x in mm", "y in mm"}
+    assert min(label.get_window_extent().x0 for label in named) >= 0.0

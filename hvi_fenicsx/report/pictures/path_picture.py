@@ -82,7 +82,11 @@ def _unit(result: PathResult, force: Array) -> Unit:
 
 def _subject(result: PathResult) -> str:
     path = result.path
-    return f"load path · largest factor {path['peak_factor']:.5g} · {path['events'] + path['folds']} events"
+    return f"load path · largest factor {path['peak_factor']:.5g} · {_events(path['events'] + path['folds'])}"
+
+
+def _events(count: int) -> str:
+    return "1 event" if count == 1 else f"{count} events"
 
 
 def _verdict(result: PathResult) -> tuple[str, str]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -20,6 +20,7 @@ from .deformed import DeformedBody
 from .legend import FOOT
 from .outline import closed_path
 from .raster import shade
+from .reach import Reach, corners, largest_scale
 from .style import DPI, GREY, HEADING, INK, area, figure
 
 MARGIN, SIDE = 0.3, 7.4
@@ -29,16 +30,19 @@ FEWEST_PIXELS = 13
 """Mesh lines are drawn if they are so far apart."""
 
 
-def canvas(points: Array) -> tuple[Figure, Axes]:
-    """Axes without a frame for points (n, 2): a picture just high enough for them, or as wide as they need it."""
-    low, high = points.min(axis=0), points.max(axis=0)
-    extent = np.maximum(high - low, 1e-3 * float(np.max(high - low)) or 1.0)
-    scale = min(SIDE / extent[0], TALLEST / extent[1])
-    tall = max(FLATTEST, scale * extent[1])
+def canvas(reaches: Sequence[Reach]) -> tuple[Figure, Axes]:
+    """Axes without a frame for all that is drawn: a picture just high enough for it, or as wide as it needs it.
+
+    Args:
+        reaches: what is drawn.
+    """
+    scale = largest_scale(reaches, (SIDE, TALLEST))
+    low, high = corners(reaches, scale)
+    tall = max(FLATTEST, float(high[1] - low[1]))
     fig = figure(HEADING + tall + FOOT + 0.1)
     axes = area(fig, MARGIN, FOOT, SIDE, tall)
     axes.set_axis_off()
-    middle, half = (low + high) / 2, np.array([SIDE, tall]) / scale / 2
+    middle, half = (low + high) / scale / 2, np.array([SIDE, tall]) / scale / 2
     axes.set_xlim(middle[0] - half[0], middle[0] + half[0])
     axes.set_ylim(middle[1] - half[1], middle[1] + half[1])
     return fig, axes

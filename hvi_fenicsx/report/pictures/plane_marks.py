@@ -18,14 +18,15 @@ from ..units import quantity
 from .deformed import DeformedBody, PartGeometry
 from .loads_supports import HeldSide, LoadedSide
 from .outline import normals
+from .reach import Label, Reach
 from .style import GREY, INK, ORANGE, PURPLE, VERMILION
 
 LOAD, PRESSURE, ROLLER = 0.13, 0.15, 0.011
 """Parts of the body's size: the longest arrow, the highest pressure, a roller's radius."""
 OBSTACLE, NOTHING = 0.004, 1e-6
 """How far behind its face an obstacle's line is drawn, of the body's size; what counts as no stress, of the largest."""
-ARROWS = 9
-"""Along a side of the body's size."""
+ARROWS, APART, LEAST = 9, 0.03, 0.02
+"""Along a side of the body's size; the least way between two, of that size; what has no arrow, of the largest."""
 
 
 @dataclass(frozen=True)
@@ -33,13 +34,13 @@ class Mark:
     """Something to draw around the body.
 
     Attributes:
-        extent: the points that it reaches, m, (n, 2).
+        reach: the points that it reaches.
         draw: draws it.
         key: its line in the legend.
         words: of that line; empty for none.
     """
 
-    extent: Array
+    reach: Reach
     draw: Callable[[Axes], None]
     key: Callable[[], Artist]
     words: str
@@ -64,30 +65,23 @@ def loads(shape: DeformedBody, found: list[LoadedSide]) -> Iterator[Mark]:
     """
     size = shape.body.size
     for load in found:
-        points = shape.points[load.side.vertices, :2]
-        largest = float(np.linalg.norm(load.traction, axis=1).max())
-        at = _spread(points, size)
+        points, amount = shape.points[load.side.vertices, :2], np.linalg.norm(load.traction, axis=1)
+        largest = float(amount.max())
+        at, label = _on_stretches(points, amount, size, ARROWS)
         arrows = _along(points, load.traction[:, :2], at) * float(LOAD * size / largest)
         feet, outward = _along(points, points, at), _along(points, load.side.normals[:, :2], at)
         pushed = np.einsum("ki,ki->k", arrows, outward) < -1e-6 * LOAD * size
         tails = feet - np.where(pushed[:, None], arrows, 0.0)
         yield _arrows(tails, arrows, INK, "load", size)
-        yield _label(feet, outward, quantity(largest, "Pa"), size)
+        ends = np.concatenate([tails - feet, tails + arrows - feet])
+        reach = float(np.einsum("ki,ki->k", ends, np.concatenate([outward, outward])).max(initial=0.0))
+        foot, way = _along(points, points, label)[0], _along(points, load.side.normals[:, :2], label)[0]
+        yield _label(foot + reach * way, way, quantity(largest, "Pa"))
 
 
-def _label(feet: Array, outward: Array, words: str, size: float) -> Mark:
-    """A load's largest value beyond its arrows, where the middle of the side is."""
-    normal = outward[len(outward) // 2]
-    middle = (feet[(len(feet) - 1) // 2] + feet[len(feet) // 2]) / 2
-    at = middle + (LOAD + 0.015) * size * normal
-    room = at + size * normal * np.where(np.abs(normal) > 0.5, [0.12, 0.045], 0.0)
-
-    def draw(axes: Axes) -> None:
-        across = {1: "left", 0: "center", -1: "right"}[round(float(normal[0]))]
-        upright = {1: "bottom", 0: "center", -1: "top"}[round(float(normal[1]))]
-        axes.text(at[0], at[1], words, ha=across, va=upright, size=12.5, weight="bold", color=INK)
-
-    return Mark(np.array([at, room]), draw, Artist, "")
+def _label(at: Array, way: Array, words: str) -> Mark:
+    label = Label(words, at, way / (float(np.linalg.norm(way)) or 1.0))
+    return Mark(label.reach, label.draw, Artist, "")
 
 
 def _lengths(points: Array) -> Array:
@@ -95,10 +89,34 @@ def _lengths(points: Array) -> Array:
     return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
 
 
-def _spread(points: Array, size: float, fewest: int = 2) -> Array:
-    """Where to put arrows on a line, as lengths along it."""
-    length = float(_lengths(points)[-1])
-    return np.linspace(0.0, length, max(fewest, round(ARROWS * length / size)), dtype=np.float64)
+def _spread(length: float, size: float, count: int = ARROWS, fewest: int = 2) -> Array:
+    """Where to put arrows on a stretch of a line, as lengths along it: so many on one of the body's size.
+
+    On a short one there are as many as stand apart; one alone stands in the middle.
+    """
+    number = min(max(fewest, round(count * length / size)), 1 + int(length / (APART * size)))
+    return np.linspace(0.0, length, number, dtype=np.float64) if number > 1 else np.array([length / 2])
+
+
+def _on_stretches(points: Array, amount: Array, size: float, count: int, fewest: int = 2) -> tuple[Array, Array]:
+    """Where to put arrows on a line, and the middle of the longest stretch on which there is something to show.
+
+    Args:
+        points: of the line, m, (m, 2).
+        amount: how much there is at them, (m,).
+        size: of the body, m.
+        count: arrows on a line of that size.
+        fewest: on a stretch.
+
+    Returns:
+        Lengths along the line, (k,) and (1,).
+    """
+    s, loaded = _lengths(points), np.concatenate([[0], amount > LEAST * amount.max(), [0]]).astype(int)
+    runs = np.flatnonzero(np.diff(loaded)).reshape(-1, 2) - [0, 1]
+    stretches = [(float(s[a]), float(s[b])) for a, b in runs]
+    start, end = max(stretches, key=lambda stretch: stretch[1] - stretch[0])
+    at = [a + _spread(b - a, size, count, fewest) for a, b in stretches]
+    return np.concatenate(at), np.array([(start + end) / 2])
 
 
 def _along(points: Array, values: Array, at: Array) -> Array:
@@ -115,7 +133,7 @@ def _arrows(tails: Array, arrows: Array, colour: str, words: str, size: float) -
 
     key = Line2D([], [], color=colour, marker=">", ms=7, markevery=(1, 1), lw=1.6, label=words)
     key.set_data([0, 1], [0, 0])
-    return Mark(np.concatenate([tails, tails + arrows]), draw, lambda: key, words)
+    return Mark(Reach(np.concatenate([tails, tails + arrows])), draw, lambda: key, words)
 
 
 _ARROW: dict[str, Any] = {
@@ -139,7 +157,8 @@ def supports(shape: DeformedBody, found: list[HeldSide]) -> Iterator[Mark]:
     for support in found:
         points, outward = shape.points[support.side.vertices, :2], support.side.normals[:, :2]
         radius = ROLLER * shape.body.size if support.rolling else 0.0
-        rollers = _along(points, points + radius * outward, _spread(points, shape.body.size))
+        places = _spread(float(_lengths(points)[-1]), shape.body.size)
+        rollers = _along(points, points + radius * outward, places)
         shown = rollers if support.rolling else rollers[:0]
         yield _support(points + 2 * radius * outward, shown, outward, shape.body.size)
 
@@ -154,7 +173,7 @@ def _support(wall: Array, rollers: Array, outward: Array, size: float) -> Mark:
         axes.plot(*rollers.T, "o", ms=2 * ROLLER * size * per_metre, **style)
 
     key = Line2D([], [], color=INK, lw=2.2, marker="o" if len(rollers) else "", mfc="white", ms=7, label=words)
-    return Mark(np.concatenate([wall, wall + 0.03 * size * outward]), draw, lambda: key, words)
+    return Mark(Reach(np.concatenate([wall, wall + 0.03 * size * outward])), draw, lambda: key, words)
 
 
 def _hatched(axes: Axes, line: Array, outward: Array, size: float) -> None:
@@ -167,14 +186,36 @@ def _hatched(axes: Axes, line: Array, outward: Array, size: float) -> None:
     axes.plot(*strokes.T, color=GREY, lw=0.9, clip_on=False, zorder=2)
 
 
-def contact(shape: DeformedBody, geometry: PartGeometry, largest: float) -> Iterator[Mark]:
-    """The obstacle of a part, where the part is off it, and the pressure on it as arrows that end there.
+@dataclass(frozen=True)
+class Largest:
+    """What the legend says of all contact parts together.
+
+    Attributes:
+        pressure: the largest -σ_n, N/m².
+        tension: the largest σ_n, N/m².
+        gap: the largest distance of a lifted vertex from its obstacle, m.
+    """
+
+    pressure: float
+    tension: float
+    gap: float
+
+
+def contacts(shape: DeformedBody, parts: Sequence[PartGeometry]) -> Iterator[Mark]:
+    """The obstacle of each part, where the part is off it, and the pressure on it as arrows that end there.
 
     Args:
         shape: the deformed body.
-        geometry: where the part lies on the body.
-        largest: the stress that is drawn longest, N/m².
+        parts: where the parts lie on the body.
     """
+    stress = np.nan_to_num(np.concatenate([[0.0], *(geometry.part.pressure for geometry in parts)]))
+    gap = max((geometry.part.largest_gap for geometry in parts), default=0.0)
+    largest = Largest(float(stress.max()), -float(stress.min()), gap)
+    for geometry in parts:
+        yield from _contact(shape, geometry, largest)
+
+
+def _contact(shape: DeformedBody, geometry: PartGeometry, largest: Largest) -> Iterator[Mark]:
     for chain in chains(geometry.facets):
         outward = normals(shape.body.points, chain)
         if geometry.obstacle is not None:
@@ -187,15 +228,15 @@ def contact(shape: DeformedBody, geometry: PartGeometry, largest: float) -> Iter
             yield _obstacle(base + OBSTACLE * shape.body.size * outward)
         off = geometry.part.lifted[geometry.row[chain]]
         if off.any():
-            yield _lifted(shape.points[chain, :2], off, geometry.part.largest_gap)
-        yield from _profile(base, outward, pressure, largest or 1.0, shape.body.size)
+            yield _lifted(shape.points[chain, :2], off, largest.gap)
+        yield from _profile(base, outward, pressure, largest, shape.body.size)
 
 
 def _obstacle(base: Array) -> Mark:
     def draw(axes: Axes) -> None:
         axes.plot(*base.T, color=GREY, lw=4, solid_capstyle="butt", clip_on=False, zorder=3.5)
 
-    return Mark(base, draw, lambda: Line2D([], [], color=GREY, lw=4, label="obstacle"), "obstacle")
+    return Mark(Reach(base), draw, lambda: Line2D([], [], color=GREY, lw=4, label="obstacle"), "obstacle")
 
 
 def _lifted(points: Array, off: Mask, gap: float) -> Mark:
@@ -206,20 +247,23 @@ def _lifted(points: Array, off: Mask, gap: float) -> Mark:
     def draw(axes: Axes) -> None:
         axes.plot(*line.T, **style, clip_on=False, zorder=5.5)
 
-    return Mark(points, draw, lambda: Line2D([], [], **style, label=words), words)
+    return Mark(Reach(points), draw, lambda: Line2D([], [], **style, label=words), words)
 
 
-def _profile(base: Array, outward: Array, pressure: Array, largest: float, size: float) -> Iterator[Mark]:
-    for sign, colour, words in ((1, VERMILION, "contact pressure"), (-1, PURPLE, "contact tension")):
+def _profile(base: Array, outward: Array, pressure: Array, largest: Largest, size: float) -> Iterator[Mark]:
+    longest = max(largest.pressure, largest.tension)
+    for sign, colour, words, most in (
+        (1, VERMILION, "contact pressure", largest.pressure),
+        (-1, PURPLE, "contact tension", largest.tension),
+    ):
         part = np.maximum(sign * pressure, 0.0)
-        if part.max() <= NOTHING * largest:
+        if part.max() <= NOTHING * longest:
             continue
-        tips = base + PRESSURE * size / largest * part[:, None] * outward
-        tips[np.convolve(part > NOTHING * largest, [1, 1, 1])[1:-1] == 0] = np.nan  # no line where there is no stress
-        yield _filled(base, tips, colour, f"{words}, up to {quantity(float(part.max()), 'Pa')}")
+        tips = base + PRESSURE * size / longest * part[:, None] * outward
+        tips[np.convolve(part > NOTHING * longest, [1, 1, 1])[1:-1] == 0] = np.nan  # no line where there is no stress
+        yield _filled(base, tips, colour, f"{words}, up to {quantity(most, 'Pa')}")
         tips = np.where(np.isnan(tips), base, tips)
-        first, last = np.flatnonzero(part > 0.02 * part.max())[[0, -1]]
-        at = _lengths(base)[first] + _spread(base[first : last + 1], size / 2, fewest=5)
+        at = _on_stretches(base, part, size, 2 * ARROWS, fewest=5)[0]
         feet, ends = _along(base, base, at), _along(base, tips, at)
         yield _arrows(ends if sign > 0 else feet, sign * (feet - ends), colour, "", size)
 
@@ -230,4 +274,6 @@ def _filled(base: Array, tips: Array, colour: str, words: str) -> Mark:
         axes.fill(*np.concatenate([base, ends[::-1]]).T, color=colour, alpha=0.16, lw=0, clip_on=False, zorder=2)
         axes.plot(*tips.T, color=colour, lw=1.8, clip_on=False, zorder=5)
 
-    return Mark(tips[np.isfinite(tips[:, 0])], draw, lambda: Patch(fc=colour, alpha=0.5, ec=colour, label=words), words)
+    return Mark(
+        Reach(tips[np.isfinite(tips[:, 0])]), draw, lambda: Patch(fc=colour, alpha=0.5, ec=colour, label=words), words
+    )

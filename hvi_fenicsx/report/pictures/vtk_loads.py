@@ -1,18 +1,15 @@
-"""Loads on the sides of a body in space: arrows that VTK draws, and values in letters."""
+"""Loads on the sides of a body in space: arrows that VTK draws."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.axes import Axes
 
 from ...typing import Array, Integers
-from ..units import quantity
 from .deformed import DeformedBody
 from .loads_supports import LoadedSide
 from .style import INK
-from .vtk_view import View
 
 if TYPE_CHECKING:
     import pyvista
@@ -68,20 +65,3 @@ def _sparse(points: Array, size: float) -> Integers:
     distance = np.round(np.linalg.norm(place - node, axis=1), 6)
     order = np.lexsort((*np.round(place, 6).T[::-1], distance))
     return np.asarray(order[np.unique(node[order], axis=0, return_index=True)[1]])
-
-
-def labels(axes: Axes, view: View, shape: DeformedBody, pulled: list[LoadedSide]) -> None:
-    """Write each load's largest value, over the middle of its side, off the tips of its arrows.
-
-    Args:
-        axes: to write on.
-        view: from where the body is seen.
-        shape: the deformed body.
-        pulled: the loads.
-    """
-    halo = {"boxstyle": "round,pad=0.15", "fc": "white", "ec": "none", "alpha": 0.85}
-    for load in pulled:
-        middle = shape.points[load.side.vertices].mean(axis=0) + 1.3 * ARROW * shape.body.size * load.side.normal
-        words = quantity(float(np.linalg.norm(load.traction, axis=1).max()), "Pa")
-        x, y = view.project(middle[None])[0]
-        axes.text(x, y, words, size=12.5, weight="bold", ha="center", va="center", bbox=halo)

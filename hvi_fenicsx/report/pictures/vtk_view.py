@@ -89,15 +89,21 @@ def surface(points: Array, facets: Integers) -> pyvista.PolyData:
     return fig
 
 
-def creases(points: Array, facets: Integers, angle: float = 25.0) -> pyvista.PolyData:
-    """The edges at which facets meet at an angle, and those of one facet only.
+def draw_edges(plotter: pyvista.Plotter, points: Array, edges: Integers, colour: str, width: float) -> None:
+    """Put edges into VTK's scene; a ball has none.
 
     Args:
+        plotter: that draws it.
         points: m, (n, 3).
-        facets: (k, 3).
-        angle: the least one that counts, degrees.
+        edges: (k, 2).
+        colour: of the lines.
+        width: of the lines, pixels.
     """
-    return surface(points, facets).extract_feature_edges(angle, manifold_edges=False, non_manifold_edges=False)
+    import pyvista
+
+    if len(edges):
+        ends = np.insert(np.arange(2 * len(edges)).reshape(-1, 2), 0, 2, axis=1)
+        plotter.add_mesh(pyvista.PolyData(points[edges.ravel()], lines=ends.ravel()), color=colour, line_width=width)
 
 
 def render(axes: Axes, view: View, depths: tuple[float, float], fill: Callable[[pyvista.Plotter], None]) -> None:

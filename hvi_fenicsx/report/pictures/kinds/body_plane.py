@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import numpy as np
 from matplotlib.figure import Figure
 
 from ...reader import Result
 from ...units import times, unit_for
 from .. import plane_marks as marks
-from ..deformed import deform, largest_stress, part_geometries
+from ..deformed import deform, part_geometries
 from ..legend import colour_bar, legend
 from ..loads_supports import borne_loads, held_sides
 from ..plane_canvas import canvas, paint
+from ..reach import Reach
 from ..registry import picture
 from ..style import SLATE, heading
 
@@ -29,9 +29,9 @@ def draw(result: Result) -> Figure:
     drawn = [
         *marks.supports(shape, held_sides(result)),
         *marks.loads(shape, borne_loads(result)),
-        *(m for part in parts for m in marks.contact(shape, part, largest_stress(parts))),
+        *marks.contacts(shape, parts),
     ]
-    fig, axes = canvas(np.concatenate([shape.points[:, :2], body.points[:, :2], *(m.extent for m in drawn)]))
+    fig, axes = canvas([Reach(shape.points[:, :2]), Reach(body.points[:, :2]), *(m.reach for m in drawn)])
     heading(fig, result, "deformed body")
     largest = float(shape.amount.max())
     paint(axes, shape, shape.amount[body.cells], SLATE, largest)

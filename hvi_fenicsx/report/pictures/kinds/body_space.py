@@ -9,18 +9,20 @@ import numpy as np
 from matplotlib.colors import Colormap
 from matplotlib.figure import Figure
 
-from ....typing import Array
+from ....typing import Array, Integers
 from ...reader import Result
 from ...units import quantity, times, unit_for
 from .. import vtk_loads
+from ..creases import creases
 from ..deformed import DeformedBody, PartGeometry, deform, largest_stress, part_geometries
 from ..footprints import Footprint, footprints, guides
 from ..legend import colour_bar
+from ..load_labels import labels, reaches
 from ..loads_supports import borne_loads
 from ..plane_canvas import canvas
 from ..registry import picture
 from ..style import GREY, INK, PALE, SLATE, heading, pressure_scale
-from ..vtk_view import area_vectors, best_view, creases, render, surface
+from ..vtk_view import area_vectors, best_view, draw_edges, render, surface
 
 if TYPE_CHECKING:
     import pyvista
@@ -45,14 +47,15 @@ def draw(result: Result) -> Figure:
     shown = footprints(shape, view, parts, normals)
     arrows = [vtk_loads.arrows(shape, load) for load in pulled]
     reached = [shape.points, body.points, *(s.points[s.geometry.vertices] for s in shown)]
-    reached += [end for tails, ways in arrows for end in (tails, tails + ways)]
-    everything = np.concatenate(reached)
-    fig, axes = canvas(view.project(everything))
+    everything = np.concatenate([*reached, *(end for tails, ways in arrows for end in (tails, tails + ways))])
+    found = labels(view, reached, pulled, arrows)
+    fig, axes = canvas([*reaches(view, np.concatenate(reached), arrows), *(label.reach for label in found)])
     heading(fig, result, "deformed body")
     scale = pressure_scale(_lowest(parts), largest_stress(parts))
     depths = (float(view.depth(everything).min()), float(view.depth(everything).max()))
     render(axes, view, depths, partial(_fill, shape=shape, shown=shown, arrows=arrows, scale=scale))
-    vtk_loads.labels(axes, view, shape, pulled)
+    for label in found:
+        label.draw(axes)
     for patch in shown:
         guides(axes, view, shape, patch)
     _foot(fig, shape, shown, scale)
@@ -83,15 +86,18 @@ def _fill(
         diffuse=0.45,
         show_scalar_bar=False,
     )
-    plotter.add_mesh(creases(shape.points, facets), color=INK, line_width=3)
-    plotter.add_mesh(creases(shape.body.points, facets), color=GREY, line_width=2)
+    edges = creases(shape.body.points, facets)
+    draw_edges(plotter, shape.points, edges, INK, 3)
+    draw_edges(plotter, shape.body.points, edges, GREY, 2)
     for part in shown:
-        _fill_part(plotter, part, scale)
+        _fill_part(plotter, part, creases(shape.body.points, part.geometry.facets), scale)
     for tails, ways in arrows:
         vtk_loads.fill(plotter, tails, ways)
 
 
-def _fill_part(plotter: pyvista.Plotter, part: Footprint, scale: tuple[Colormap, float, float]) -> None:
+def _fill_part(
+    plotter: pyvista.Plotter, part: Footprint, edges: Integers, scale: tuple[Colormap, float, float]
+) -> None:
     patch = surface(part.points, part.geometry.facets)
     patch.point_data["pressure"] = part.pressure[patch.point_data["vertex"]]
     plotter.add_mesh(
@@ -103,7 +109,7 @@ def _fill_part(plotter: pyvista.Plotter, part: Footprint, scale: tuple[Colormap,
         show_scalar_bar=False,
         lighting=False,
     )
-    plotter.add_mesh(creases(part.points, part.geometry.facets), color=INK, line_width=3)
+    draw_edges(plotter, part.points, edges, INK, 3)
 
 
 def _lowest(parts: list[PartGeometry]) -> float:

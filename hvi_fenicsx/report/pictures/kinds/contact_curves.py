@@ -2,25 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
+from matplotlib.patches import Patch
+from matplotlib.ticker import FixedLocator, MaxNLocator
 
 from ....typing import Array, Mask
 from ...reader import ContactPart, Result
 from ...units import Unit, quantity, unit_for
 from ..registry import picture
-from ..style import BLUE, GREEN, GREY, HEADING, INK, ORANGE, VERMILION, area, figure, heading
+from ..style import BLUE, GREEN, GREY, HEADING, INK, ORANGE, VERMILION, WIDTH, area, figure, heading
 
+LEFT, ACROSS = 0.95, 6.75
+"""Inches: left of the panels, and their width."""
 PANEL, GAP, FOOT = 1.75, 0.62, 0.72
 """Inches: a panel, the room for its title, the axis below the last."""
+VEIL = 0.16
+"""How much of its colour a lifted stretch has."""
 MARKED = 80
 """Vertices up to which each is marked."""
+STRESSES = ("sigma_n", "friction_t1")
 SHORT = 0.2
 """Part of a part's length; a closed stretch shorter than this is shown alone."""
 IN_RANGE = 1.6
@@ -35,20 +41,21 @@ def draw(result: Result, part: ContactPart) -> Figure:
         result: the result.
         part: the part of Γc, in the plane.
     """
-    part = _worth_seeing(part)
+    whole, part = part, _worth_seeing(part)
     length = unit_for(float(np.max(part["s"])), "m")
     panels = list(_panels(result, part, length))
     fig = figure(HEADING + len(panels) * (PANEL + GAP) + FOOT)
     heading(fig, result, f"on “{part.name}”")
     lifted = _lifted_spans(part)
     for above, panel in enumerate(reversed(panels)):
-        axes = area(fig, 0.95, FOOT + above * (PANEL + GAP), 6.75, PANEL)
+        axes = area(fig, LEFT, FOOT + above * (PANEL + GAP), ACROSS, PANEL)
         panel(axes)
         for start, end in lifted:
-            axes.axvspan(start / length.size, end / length.size, color=ORANGE, alpha=0.16, lw=0)
+            axes.axvspan(start / length.size, end / length.size, color=ORANGE, alpha=VEIL, lw=0)
         _finish(axes, part, length)
         axes.tick_params(labelbottom=above == 0)
-    _say_lifted(fig.axes[0], lifted, part, length)
+    if lifted:
+        _say_lifted(fig, whole.largest_gap)
     fig.axes[0].set_xlabel(f"s along “{part.name}” in {length.name}")
     return fig
 
@@ -69,7 +76,8 @@ def _panels(result: Result, part: ContactPart, length: Unit) -> Iterator[Callabl
 
     def displacement(values: Array, words: str, direction: str) -> Callable[[Axes], None]:
         drops = _drops(result, part, direction)
-        return partial(_displacement, part=part, values=values, drops=drops, words=words, length=length)
+        shown = _without_noise(values, part, ("u_n", "u_t1", "gap"), result.body.displacement)
+        return partial(_displacement, part=part, values=shown, drops=drops, words=words, length=length)
 
     yield displacement(part.slip, "slip $u_t$", "slip")
     if result.resists(part.name, "slip", "separation"):
@@ -78,7 +86,7 @@ def _panels(result: Result, part: ContactPart, length: Unit) -> Iterator[Callabl
         yield displacement(-part["u_n"], "opening $-u_n$", "opening")
     if result.resists(part.name, "penetration"):
         yield displacement(part["u_n"], "penetration $u_n$", "penetration")
-    yield partial(_pressure, part=part, length=length)
+    yield partial(_pressure, part=part, result=result, length=length)
 
 
 def _drops(result: Result, part: ContactPart, direction: str) -> Array:
@@ -91,7 +99,6 @@ def _drops(result: Result, part: ContactPart, direction: str) -> Array:
 
 def _displacement(axes: Axes, part: ContactPart, values: Array, drops: Array, words: str, length: Unit) -> None:
     """What a law acts on, and the values at which the law drops."""
-    values = _without_noise(values, part)
     unit = unit_for(_largest(values), "m")
     _line(axes, part, values, length, unit, BLUE)
     if np.any(np.ptp(drops, axis=0) > 0.0):
@@ -134,7 +141,7 @@ def _listed(kinks: Array) -> str:
 
 
 def _friction(axes: Axes, *, part: ContactPart, result: Result, length: Unit) -> None:
-    values = part.friction
+    values = _without_noise(part.friction, part, STRESSES, result.body.von_mises)
     unit = unit_for(_largest(values), "Pa")
     law, note = result.law(part.name) if result.summary.get("smoothing") else None, ""
     if law is not None and (multipliers := result.multipliers(part)) is not None:
@@ -156,8 +163,8 @@ def _pieces(axes: Axes, part: ContactPart, length: Unit, unit: Unit) -> str:
     return f"hollow: past the drop ({np.count_nonzero(fallen)} of {len(fallen)} vertices)"
 
 
-def _pressure(axes: Axes, *, part: ContactPart, length: Unit) -> None:
-    values = part.pressure
+def _pressure(axes: Axes, *, part: ContactPart, result: Result, length: Unit) -> None:
+    values = _without_noise(part.pressure, part, STRESSES, result.body.von_mises)
     unit = unit_for(_largest(values), "Pa")
     _line(axes, part, values, length, unit, VERMILION)
     axes.fill_between(part["s"] / length.size, values / unit.size, color=VERMILION, alpha=0.15, lw=0)
@@ -189,7 +196,8 @@ def _finish(axes: Axes, part: ContactPart, length: Unit) -> None:
     axes.axhline(0.0, color=GREY, lw=0.8, zorder=1)
     start, end = float(np.min(part["s"])) / length.size, float(np.max(part["s"])) / length.size
     axes.set_xlim(start - 0.015 * (end - start), end + 0.015 * (end - start))
-    axes.yaxis.set_major_locator(MaxNLocator(nbins=4, min_n_ticks=3, steps=[1, 2, 2.5, 5, 10]))
+    ticks = MaxNLocator(nbins=4, min_n_ticks=3, steps=[1, 2, 2.5, 5, 10])
+    axes.yaxis.set_major_locator(ticks if high > low else FixedLocator([0.0]))
     axes.grid(axis="y", color="#e6e6e6", lw=0.8)
     axes.set_axisbelow(True)
 
@@ -207,21 +215,19 @@ def _runs(flags: Mask) -> Iterator[tuple[int, int]]:
     yield from zip(map(int, edges[::2]), map(int, edges[1::2]), strict=True)
 
 
-def _say_lifted(axes: Axes, spans: list[tuple[float, float]], part: ContactPart, length: Unit) -> None:
-    if not spans:
-        return
-    start, end = max(spans, key=lambda span: span[1] - span[0])
-    gap = quantity(part.largest_gap, "m")
-    middle = (start + end) / 2 / length.size
-    words = f"lifted\nup to {gap}"
-    axes.text(middle, 0.93, words, transform=axes.get_xaxis_transform(), ha="center", va="top", size=12, color=INK)
+def _say_lifted(fig: Figure, gap: float) -> None:
+    """What the veil means, above the panels, where no curve is."""
+    key = Patch(fc=ORANGE, alpha=2 * VEIL, label=f"lifted, up to {quantity(gap, 'm')}")
+    place = ((LEFT + ACROSS) / WIDTH, 1 - (HEADING + 0.08) / fig.get_figheight())
+    fig.legend(handles=[key], loc="center right", bbox_to_anchor=place, frameon=False, fontsize=12, borderpad=0.0,
+               borderaxespad=0.0)  # fmt: skip
 
 
 def _largest(values: Array) -> float:
     return float(np.nanmax(np.abs(values), initial=0.0))
 
 
-def _without_noise(values: Array, part: ContactPart) -> Array:
-    """Displacements that are rounding beside the part's others are zero, and are drawn so."""
-    whole = max(_largest(part[name]) for name in ("u_n", "u_t1", "gap") if part.has(name))
-    return values if _largest(values) > 1e-9 * whole else 0.0 * values
+def _without_noise(values: Array, part: ContactPart, names: Sequence[str], body: Array | None) -> Array:
+    """Values that are rounding beside these columns of the part, or beside the body's, are zero, and are drawn so."""
+    beside = [part[name] for name in names] + ([] if body is None else [body])
+    return values if _largest(values) > 1e-9 * max(map(_largest, beside)) else 0.0 * values

@@ -10,6 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import Colormap
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 from matplotlib.tri import Triangulation
 
 from ....typing import Array, Integers
@@ -135,7 +136,7 @@ def _map(fig: Figure, axes: Axes, flat: FlatPart, values: Array, colours: Colorm
     box = axes.get_position()
     bar = fig.add_axes((box.x1 + 0.02, box.y0, 0.02, box.height))
     fig.colorbar(drawn, cax=bar)
-    bar.locator_params(axis="y", nbins=4)
+    bar.yaxis.set_major_locator(MaxNLocator(_intervals(axes)))
     bar.spines[:].set_visible(False)
     axes.set_title(words, loc="left", size=14, parse_math=True)
 
@@ -183,11 +184,19 @@ def _frame(axes: Axes, flat: FlatPart, *, last: bool) -> None:
     axes.set_xlim(left, right)
     axes.set_ylim(bottom, top)
     axes.spines[:].set_visible(False)
-    axes.locator_params(axis="y", nbins=4)
-    axes.set_ylabel(f"{flat.names[1]} in m")
+    unit = unit_for(max(map(abs, (left, right, bottom, top))), "m")
+    for axis, intervals in ((axes.xaxis, 6), (axes.yaxis, _intervals(axes))):
+        axis.set_major_locator(MaxNLocator(intervals))
+        axis.set_major_formatter(lambda value, _: f"{value / unit.size:.4g}".replace("-", "−"))
+    axes.set_ylabel(f"{flat.names[1]} in {unit.name}")
     axes.tick_params(labelbottom=last, bottom=last)
     if last:
-        axes.set_xlabel(f"{flat.names[0]} in m")
+        axes.set_xlabel(f"{flat.names[0]} in {unit.name}")
+
+
+def _intervals(axes: Axes) -> int:
+    """Between the ticks of a map's height, so many that their numbers stand apart."""
+    return max(1, min(4, int(axes.get_window_extent().height / axes.figure.dpi / 0.5)))
 
 
 def _notes(fig: Figure, result: Result, part: ContactPart, flat: FlatPart) -> None:

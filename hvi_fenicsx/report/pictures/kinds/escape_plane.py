@@ -18,6 +18,7 @@ from ..finite_motion import fitted, followed
 from ..loads_supports import held_sides, loaded_sides
 from ..outline import closed_path
 from ..plane_canvas import canvas
+from ..reach import Reach
 from ..registry import picture
 from ..style import INK, PALE, VERMILION, heading
 
@@ -36,8 +37,8 @@ def draw(result: Result) -> Figure:
     drawn = [*marks.supports(rest, held_sides(result)), *marks.loads(rest, loaded_sides(result))]
     ghost, posts = motion.at(mover.points), followed(mover, motion)
     ways = np.stack([motion.at(posts, part)[:, :2] for part in WAY], axis=1)
-    reached = [body.points[:, :2], ghost[:, :2], ways.reshape(-1, 2), *(mark.extent for mark in drawn)]
-    fig, axes = canvas(np.concatenate(reached))
+    moved = np.concatenate([body.points[:, :2], ghost[:, :2], ways.reshape(-1, 2)])
+    fig, axes = canvas([Reach(moved), *(mark.reach for mark in drawn)])
     heading(fig, result, "rigid motion")
     _bodies(axes, body, mover, ghost)
     for mark in drawn:

@@ -12,14 +12,16 @@ from ....typing import Array
 from ...body_mesh import BodyMesh
 from ...reader import Result
 from .. import vtk_loads
+from ..creases import creases
 from ..deformed import DeformedBody
 from ..escape_marks import WAY, arrow, keys, say
 from ..finite_motion import fitted, followed
+from ..load_labels import labels, reaches
 from ..loads_supports import loaded_sides
 from ..plane_canvas import canvas
 from ..registry import picture
 from ..style import INK, PALE, VERMILION, heading
-from ..vtk_view import best_view, creases, render, surface
+from ..vtk_view import best_view, draw_edges, render, surface
 
 if TYPE_CHECKING:
     import pyvista
@@ -41,14 +43,16 @@ def draw(result: Result) -> Figure:
     ghost, posts = motion.at(mover.points), followed(mover, motion)
     posts = posts[view.depth(posts) >= np.quantile(view.depth(posts), 0.15)]  # not the one behind the body
     ways = np.stack([motion.at(posts, part) for part in WAY], axis=1)
-    reached = [end for tails, along in arrows for end in (tails, tails + along)]
-    everything = np.concatenate([body.points, ghost, ways.reshape(-1, 3), *reached])
-    fig, axes = canvas(view.project(everything))
+    reached = [body.points, ghost, ways.reshape(-1, 3)]
+    everything = np.concatenate([*reached, *(end for tails, along in arrows for end in (tails, tails + along))])
+    found = labels(view, reached, pulled, arrows)
+    fig, axes = canvas([*reaches(view, np.concatenate(reached), arrows), *(label.reach for label in found)])
     heading(fig, result, "rigid motion")
     depths = (float(view.depth(everything).min()), float(view.depth(everything).max()))
     nearer = ghost + 1e-3 * body.size * view.toward  # where the two share a face, the ghost's is seen
     render(axes, view, depths, partial(_fill, body=body, mover=mover, ghost=nearer, arrows=arrows))
-    vtk_loads.labels(axes, view, rest, pulled)
+    for label in found:
+        label.draw(axes)
     for way in ways:
         arrow(axes, view.project(way))
     say(fig, result, keys())
@@ -60,9 +64,9 @@ def _fill(
 ) -> None:
     facets = body.boundary
     plotter.add_mesh(surface(body.points, facets), color=PALE, ambient=0.75, diffuse=0.3)
-    plotter.add_mesh(creases(body.points, facets), color=INK, line_width=3)
+    draw_edges(plotter, body.points, creases(body.points, facets), INK, 3)
     facets = mover.boundary
     plotter.add_mesh(surface(ghost, facets), color=VERMILION, opacity=0.16, lighting=False)
-    plotter.add_mesh(creases(ghost, facets), color=VERMILION, line_width=4)
+    draw_edges(plotter, ghost, creases(mover.points, facets), VERMILION, 4)
     for tails, ways in arrows:
         vtk_loads.fill(plotter, tails, ways)

@@ -21,6 +21,7 @@ from ..legend import legend
 from ..loads_supports import Side, held_sides, loaded_sides, roles_by_side
 from ..outline import closed_path
 from ..plane_canvas import canvas
+from ..reach import Reach
 from ..regions import TINTS, regions
 from ..regions import keys as region_keys
 from ..registry import picture
@@ -43,7 +44,7 @@ def draw(result: Result) -> Figure:
     body = result.body
     rest = DeformedBody(body, np.zeros_like(body.points), 1.0)
     drawn = [*marks.supports(rest, held_sides(result)), *marks.loads(rest, loaded_sides(result))]
-    fig, axes = canvas(np.concatenate([body.points[:, :2], *(mark.extent for mark in drawn)]))
+    fig, axes = canvas([Reach(body.points[:, :2]), *(mark.reach for mark in drawn)])
     heading(fig, result, "the scene")
     areas = regions(result)
     for region in areas:

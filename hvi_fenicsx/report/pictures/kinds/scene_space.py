@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.artist import Artist
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
@@ -16,16 +15,19 @@ from ....typing import Array
 from ...body_mesh import BodyMesh
 from ...reader import Result
 from .. import apart, vtk_loads
+from ..creases import creases
 from ..deformed import DeformedBody
 from ..legend import legend
+from ..load_labels import labels, reaches
 from ..loads_supports import Side, held_sides, loaded_sides, roles_by_side
 from ..plane_canvas import canvas
+from ..reach import Label
 from ..regions import Region, regions
 from ..regions import keys as region_keys
 from ..registry import picture
 from ..scene_legend import inside, say, touches
 from ..style import BLUE, INK, PALE, heading
-from ..vtk_view import View, area_vectors, best_view, creases, render, surface
+from ..vtk_view import View, area_vectors, best_view, draw_edges, render, surface
 
 if TYPE_CHECKING:
     import pyvista
@@ -69,15 +71,17 @@ def draw(result: Result) -> Figure:
     arrows = [vtk_loads.arrows(rest, load) for load in pulled]
     reached = [body.points, *(body.points[s.side.vertices] + s.away for s in shown)]
     everything = np.concatenate([*reached, *(end for tails, ways in arrows for end in (tails, tails + ways))])
-    fig, axes = canvas(view.project(everything))
+    names = [_name(view, body, part) for part in shown]
+    values = labels(view, reached, pulled, arrows, [name.reach for name in names])
+    words = [*names, *values]
+    fig, axes = canvas([*reaches(view, np.concatenate(reached), arrows), *(one.reach for one in words)])
     heading(fig, result, "the scene")
     depths = (float(view.depth(everything).min()), float(view.depth(everything).max()))
     areas = regions(result)
     fill = partial(_fill, body=body, areas=areas, shown=shown, arrows=arrows, toward=view.toward)
     render(axes, view, depths, fill)
-    for part in shown:
-        _name(axes, view, body, part)
-    vtk_loads.labels(axes, view, rest, pulled)
+    for one in words:
+        one.draw(axes)
     say(fig, body)
     legend(fig, [*keys(shown), *region_keys(areas), *inside(result)])
     return fig
@@ -102,16 +106,15 @@ def _fill(
     for facets, colour in skins or [(body.boundary, PALE)]:
         if len(facets):
             plotter.add_mesh(surface(body.points, facets), color=colour, ambient=0.75, diffuse=0.3)
-    plotter.add_mesh(creases(body.points, body.boundary), color=INK, line_width=3)
+    draw_edges(plotter, body.points, creases(body.points, body.boundary), INK, 3)
     for part in shown:
         points = body.points + part.away + 1e-3 * body.size * toward
         plotter.add_mesh(surface(points, part.side.facets), color=part.colour, lighting=False)
-        plotter.add_mesh(creases(points, part.side.facets), color=INK, line_width=2)
+        draw_edges(plotter, points, creases(points, part.side.facets), INK, 2)
     for tails, ways in arrows:
         vtk_loads.fill(plotter, tails, ways)
 
 
-def _name(axes: Axes, view: View, body: BodyMesh, part: ColouredSide) -> None:
-    x, y = view.project((body.points[part.side.vertices].mean(axis=0) + part.away)[None])[0]
-    halo = {"boxstyle": "round,pad=0.15", "fc": "white", "ec": "none", "alpha": 0.85}
-    axes.text(x, y, part.side.part, size=12.5, color=BLUE, ha="center", va="center", bbox=halo, zorder=9)
+def _name(view: View, body: BodyMesh, part: ColouredSide) -> Label:
+    middle = view.project((body.points[part.side.vertices].mean(axis=0) + part.away)[None])[0]
+    return Label(part.side.part, middle, np.zeros(2), weight="normal", colour=BLUE)

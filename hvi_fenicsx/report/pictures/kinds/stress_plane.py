@@ -8,10 +8,11 @@ from matplotlib.figure import Figure
 from ...reader import Result
 from ...units import times
 from .. import plane_marks as marks
-from ..deformed import deform, largest_stress, part_geometries
+from ..deformed import deform, part_geometries
 from ..legend import legend
 from ..loads_supports import borne_loads, held_sides
 from ..plane_canvas import canvas, paint
+from ..reach import Reach
 from ..registry import picture
 from ..stress_scale import bar, scale_of
 from ..style import EMBER, heading
@@ -31,9 +32,9 @@ def draw(result: Result) -> Figure:
     drawn = [
         *marks.supports(shape, held_sides(result)),
         *marks.loads(shape, borne_loads(result)),
-        *(m for part in parts for m in marks.contact(shape, part, largest_stress(parts))),
+        *marks.contacts(shape, parts),
     ]
-    fig, axes = canvas(np.concatenate([shape.points[:, :2], body.points[:, :2], *(m.extent for m in drawn)]))
+    fig, axes = canvas([Reach(shape.points[:, :2]), Reach(body.points[:, :2]), *(m.reach for m in drawn)])
     heading(fig, result, "stress in the body")
     scale = scale_of(body, values)
     paint(axes, shape, np.broadcast_to(values[:, None], body.cells.shape), EMBER, scale.end)

@@ -12,14 +12,16 @@ from ....typing import Array, Integers
 from ...reader import Result
 from ...units import times
 from .. import vtk_loads
+from ..creases import creases
 from ..deformed import DeformedBody, deform, part_geometries
 from ..footprints import Footprint, footprints, guides
+from ..load_labels import labels, reaches
 from ..loads_supports import borne_loads
 from ..plane_canvas import canvas
 from ..registry import picture
 from ..stress_scale import bar, scale_of
 from ..style import EMBER, GREY, INK, heading
-from ..vtk_view import area_vectors, best_view, creases, render, surface
+from ..vtk_view import area_vectors, best_view, draw_edges, render, surface
 
 if TYPE_CHECKING:
     import pyvista
@@ -43,12 +45,14 @@ def draw(result: Result) -> Figure:
     arrows = [vtk_loads.arrows(shape, load) for load in pulled]
     reached = [shape.points, body.points, *(p.points[p.geometry.vertices] for p in apart)]
     everything = np.concatenate([*reached, *(end for tails, ways in arrows for end in (tails, tails + ways))])
-    fig, axes = canvas(view.project(everything))
+    found = labels(view, reached, pulled, arrows)
+    fig, axes = canvas([*reaches(view, np.concatenate(reached), arrows), *(label.reach for label in found)])
     heading(fig, result, "stress in the body")
     scale = scale_of(body, values)
     depths = (float(view.depth(everything).min()), float(view.depth(everything).max()))
     render(axes, view, depths, partial(_fill, shape=shape, apart=apart, arrows=arrows, values=values, end=scale.end))
-    vtk_loads.labels(axes, view, shape, pulled)
+    for label in found:
+        label.draw(axes)
     for part in apart:
         guides(axes, view, shape, part)
     bar(fig, scale, times(shape.factor))
@@ -68,11 +72,14 @@ def _fill(
     end: float,
 ) -> None:
     body = shape.body
+    edges = creases(body.points, body.boundary)
     _paint(plotter, shape.points, body.boundary, values[body.behind], end)
-    plotter.add_mesh(creases(body.points, body.boundary), color=GREY, line_width=2)
+    draw_edges(plotter, shape.points, edges, INK, 3)
+    draw_edges(plotter, body.points, edges, GREY, 2)
     for part in apart:
         own = body.among(part.geometry.facets)
         _paint(plotter, part.points, body.boundary[own], values[body.behind[own]], end)
+        draw_edges(plotter, part.points, creases(body.points, body.boundary[own]), INK, 3)
     for tails, ways in arrows:
         vtk_loads.fill(plotter, tails, ways)
 
@@ -84,4 +91,3 @@ def _paint(plotter: pyvista.Plotter, points: Array, facets: Integers, values: Ar
     plotter.add_mesh(
         skin, scalars="von_mises", cmap=EMBER, clim=(0.0, end or 1.0), show_scalar_bar=False, lighting=False
     )
-    plotter.add_mesh(creases(points, facets), color=INK, line_width=3)

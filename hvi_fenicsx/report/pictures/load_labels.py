@@ -1,0 +1,85 @@
+"""Values of loads on a body in space, each beside arrows of its own, where it covers least."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import shapely
+
+from ...typing import Array
+from ..units import quantity
+from .loads_supports import LoadedSide
+from .plane_canvas import SIDE, TALLEST
+from .reach import LINE, Label, Reach, largest_scale
+from .vtk_view import View
+
+HEAD = 0.09
+"""Inches: half of the head of an arrow."""
+SPOILS, FAR = 10.0, 0.3
+"""What it counts to cover an arrow or other words, or to be a body's size off the middle; to cover the body is 1."""
+_TURNS = np.radians(np.arange(0.0, 360.0, 45.0))
+WAYS = np.column_stack([np.cos(_TURNS), np.sin(_TURNS)])
+"""Where a label may stand beside the end of an arrow."""
+
+
+def reaches(view: View, points: Array, arrows: Sequence[tuple[Array, Array]]) -> list[Reach]:
+    """What a picture of a body and its arrows reaches, without the values of the loads.
+
+    Args:
+        view: from where the body is seen.
+        points: of the body and of its parts where they are drawn, m, (n, 3).
+        arrows: of each load, as :func:`.vtk_loads.arrows` gives them.
+    """
+    ends = [view.project(np.concatenate([tails, tails + ways])) for tails, ways in arrows]
+    half = np.full(2, HEAD)
+    return [Reach(view.project(points)), *(Reach(own, half, half) for own in ends)]
+
+
+def labels(
+    view: View,
+    clouds: Sequence[Array],
+    pulled: Sequence[LoadedSide],
+    arrows: Sequence[tuple[Array, Array]],
+    words: Sequence[Reach] = (),
+) -> list[Label]:
+    """The largest value of each load.
+
+    Args:
+        view: from where the body is seen.
+        clouds: points of the body and of each part that is drawn beside it, m, (n, 3).
+        pulled: the loads.
+        arrows: of each load.
+        words: what is written already.
+    """
+    reached = [*reaches(view, np.concatenate(clouds), arrows), *words]
+    scale = largest_scale(reached, (SIDE, TALLEST))
+    bodies = shapely.union_all([shapely.MultiPoint(view.project(c)).convex_hull.buffer(LINE / scale) for c in clouds])
+    taken = [_box(one, scale) for one in words]
+    for tails, ways in arrows:
+        strokes = np.stack([view.project(tails), view.project(tails + ways)], axis=1)
+        taken += list(shapely.buffer(shapely.linestrings(strokes), HEAD / scale))
+    found = list[Label]()
+    for load, (tails, ways) in zip(pulled, arrows, strict=True):
+        ends = view.project(np.concatenate([tails, tails + ways]))
+        value = quantity(float(np.linalg.norm(load.traction, axis=1).max()), "Pa")
+        found.append(_best([Label(value, end, way) for end in ends for way in WAYS], ends, taken, bodies, scale))
+        taken.append(_box(found[-1].reach, scale))
+    return found
+
+
+def _best(
+    candidates: list[Label], ends: Array, taken: list[shapely.Geometry], bodies: shapely.Geometry, scale: float
+) -> Label:
+    boxes = np.array([_box(label.reach, scale) for label in candidates])
+    spoilt = shapely.area(shapely.intersection(boxes, shapely.union_all(taken)))
+    covered = shapely.area(shapely.intersection(boxes, bodies))
+    middle = shapely.Point(ends.mean(axis=0))
+    size = float(np.hypot(*np.ptp(shapely.get_coordinates(bodies), axis=0)))
+    cost = (SPOILS * spoilt + covered) / shapely.area(boxes) + FAR * shapely.distance(boxes, middle) / size
+    return candidates[int(np.argmin(np.round(cost, 6)))]
+
+
+def _box(reach: Reach, scale: float) -> shapely.Geometry:
+    low, high = (reach.points[0] - reach.before / scale, reach.points[0] + reach.behind / scale)
+    return shapely.box(*low, *high)

@@ -1,0 +1,134 @@
+"""How far what a picture shows reaches: points of the body's plane, and letters or lines around them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.font_manager import FontProperties
+from matplotlib.textpath import TextPath
+
+from ...typing import Array
+from .style import INK
+
+LINE = 0.03
+"""Inches: half of the widest line, which is drawn around each point."""
+LETTERS, APART = 12.5, 0.09
+"""The size of a label's letters, points, and how far it stands from what it labels, inches."""
+
+
+@dataclass(frozen=True)
+class Reach:
+    """Points that a picture shows.
+
+    Attributes:
+        points: m, (n, 2).
+        before: what is drawn to the left of each point and below it, inches, (2,).
+        behind: what is drawn to the right of each point and above it, inches, (2,).
+    """
+
+    points: Array
+    before: Array = field(default_factory=lambda: np.full(2, LINE))
+    behind: Array = field(default_factory=lambda: np.full(2, LINE))
+
+
+@dataclass(frozen=True)
+class Label:
+    """Words at a point, or beside it.
+
+    Attributes:
+        words: the words.
+        at: the point, m, (2,).
+        way: from there to the words, (2,), of length 1; zero where they are written on the point.
+        weight: of the letters.
+        colour: of the letters.
+    """
+
+    words: str
+    at: Array
+    way: Array
+    weight: str = "bold"
+    colour: str = INK
+
+    @property
+    def _size(self) -> Array:
+        return letters(self.words, LETTERS, self.weight)
+
+    @property
+    def _away(self) -> Array:
+        """From ``at`` to the middle of the letters, inches: all of them lie beyond ``at``."""
+        return np.asarray(self.way * (float(np.abs(self.way) @ self._size) / 2 + APART))
+
+    @property
+    def reach(self) -> Reach:
+        """What it takes."""
+        half = self._size / 2
+        return Reach(self.at[None], half - self._away, half + self._away)
+
+    def draw(self, axes: Axes) -> None:
+        """Write it.
+
+        Args:
+            axes: to write on.
+        """
+        (x, y), (right, up) = (map(float, pair) for pair in (self.at, 72 * self._away))
+        axes.annotate(
+            self.words,
+            (x, y),
+            (right, up),
+            textcoords="offset points",
+            ha="center",
+            va="center",
+            size=LETTERS,
+            weight=self.weight,
+            color=self.colour,
+            bbox={"boxstyle": "round,pad=0.1", "fc": "white", "ec": "none", "alpha": 0.85},
+            annotation_clip=False,
+            zorder=9,
+        )
+
+
+def letters(words: str, size: float, weight: str = "normal") -> Array:
+    """The width and the height of a line of letters, inches, (2,).
+
+    Args:
+        words: the line.
+        size: of the letters, points.
+        weight: of the letters, as matplotlib names it.
+    """
+    width = TextPath((0.0, 0.0), words, size=size, prop=FontProperties(weight=weight)).get_extents().width
+    return np.array([float(width), 1.2 * size]) / 72
+
+
+def largest_scale(reaches: Sequence[Reach], room: tuple[float, float]) -> float:
+    """How large the points may be drawn, inches for a metre, so that all fits.
+
+    Args:
+        reaches: what is drawn.
+        room: width and height, inches.
+    """
+    low, high, before, behind = _ends(reaches)
+    extent = high[:, None] - low[None]  # from the lowest point of one to the highest of another
+    free = np.array(room) - behind[:, None] - before[None]
+    longest = float(extent.max())
+    counted = extent > 1e-3 * longest
+    return float((free[counted] / extent[counted]).min()) if longest > 0.0 else min(room)
+
+
+def corners(reaches: Sequence[Reach], scale: float) -> tuple[Array, Array]:
+    """The lower left and the upper right corner of all that is drawn at a scale, inches from the origin, (2,) each.
+
+    Args:
+        reaches: what is drawn.
+        scale: inches for a metre.
+    """
+    low, high, before, behind = _ends(reaches)
+    return (scale * low - before).min(axis=0), (scale * high + behind).max(axis=0)
+
+
+def _ends(reaches: Sequence[Reach]) -> tuple[Array, Array, Array, Array]:
+    found = [r for r in reaches if len(r.points)]
+    low, high = (np.array([end(r.points, axis=0) for r in found]) for end in (np.min, np.max))
+    return low, high, np.array([r.before for r in found]), np.array([r.behind for r in found])
