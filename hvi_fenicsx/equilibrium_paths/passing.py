@@ -56,9 +56,7 @@ def go_on(tracer: Tracer, bonds: BondTable, step: Step) -> Passing:
     if step.reversed:
         _turn_back(tracer, bonds, i, forward=forward)
     else:
-        number = int(tracer.cells.numbers[i]) + (1 if forward else -1)
-        segment = tracer.cells.chain(i)[number]
-        tracer.enter(i, number, segment.low if forward else segment.high)
+        tracer.enter(i, *tracer.cells.beyond(i, forward=forward))
     after, folds = tracer.cells.segment(i), tracer.factor_rate * before < 0.0
     return Passing(
         unknown=i,
