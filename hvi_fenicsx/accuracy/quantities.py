@@ -168,8 +168,7 @@ class Resultant(Observable):
     def read(self, level: AdaptiveLevel) -> Array:
         """Its components (d,), N/m in 2D, N in 3D."""
         states = [s for s in _states(level) if s.bounds is not None]
-        pushes = [s.surface.weights[:, None] * s.pressure[:, None] * s.surface.normals for s in states]
-        own = sum((p.sum(axis=0) for p in pushes), np.zeros(level.solution.scene.dimension))
+        own = sum((s.resultant for s in states), np.zeros(level.solution.scene.dimension))
         return np.asarray(level.comm.allreduce(own) * level.prepared.problem.scales.force)
 
 

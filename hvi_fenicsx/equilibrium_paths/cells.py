@@ -60,6 +60,17 @@ class Cells:
         """The segments of an unknown."""
         return self._chains[i]
 
+    def beyond(self, i: int, *, forward: bool) -> tuple[int, float]:
+        """The number of the segment next to an unknown's, and the coordinate of the end at which they meet.
+
+        Args:
+            i: the unknown.
+            forward: whether the one that comes after its own.
+        """
+        number = int(self.numbers[i]) + (1 if forward else -1)
+        segment = self._chains[i][number]
+        return number, segment.low if forward else segment.high
+
     def enter(self, i: int, number: int, coordinate: float) -> None:
         """Put an unknown on a segment.
 

@@ -34,13 +34,11 @@ class Landing:
         x: the displacements; of a body that escapes, far away, (n,).
         escapes: whether the energy falls without end.
         found: whether a stable equilibrium was found.
-        steps: of the iteration.
     """
 
     x: Array
     escapes: bool
     found: bool
-    steps: int
 
 
 class Descent:
@@ -138,16 +136,16 @@ class Descent:
             before: where one comes from: at a drop, its other side counts, (n,).
         """
         last = x  # of the minimisers: what is done between them bends the body to and fro, however far it goes
-        for step in range(1, self._most + 1):
+        for _ in range(self._most):
             following = self._convex_minimiser(x, x - before)
             if self._gone(following, following - last):
-                return Landing(x=following, escapes=True, found=False, steps=step)
+                return Landing(x=following, escapes=True, found=False)
             settled = self._settled(following)
             if settled is not None:
-                return Landing(x=settled, escapes=False, found=True, steps=step)
+                return Landing(x=settled, escapes=False, found=True)
             before, last, x = x, following, self._hastened(following, following - x)
             x = self._hastened(x, self._curved(x))
-        return Landing(x=x, escapes=False, found=False, steps=self._most)
+        return Landing(x=x, escapes=False, found=False)
 
     def _gone(self, x: Array, step: Array) -> bool:
         """Whether a rigid motion has taken the body out of all reach."""
@@ -199,9 +197,7 @@ class Descent:
                 self._cells = tracer.cells
                 return tracer.cells.x
             i, forward = step.variable, bool(tracer.rates[step.variable] > 0.0)
-            number = int(tracer.cells.numbers[i]) + (1 if forward else -1)
-            segment = tracer.cells.chain(i)[number]
-            tracer.enter(i, number, segment.low if forward else segment.high)
+            tracer.enter(i, *tracer.cells.beyond(i, forward=forward))
 
     def _convex_forces(self, x: Array) -> tuple[Array, Array]:
         """The least and the greatest force of rising parts and bounds, (n,) each."""
@@ -256,11 +252,6 @@ class Descent:
 
 def _number(segments: tuple[Segment, ...], x: float, *, held: bool) -> int:
     """The segment of a displacement: one on which it stands, if it is held, else a piece."""
-    found = [
-        abs(s.displacement(s.coordinate(x, s.force)) - x) + (0.0 if bool(s.rise) == held else np.inf) for s in segments
-    ]
-    return (
-        int(np.argmin(found))
-        if np.isfinite(min(found))
-        else int(np.argmin([abs(s.displacement(s.coordinate(x, s.force)) - x) for s in segments]))
-    )
+    away = np.array([abs(s.displacement(s.coordinate(x, s.force)) - x) for s in segments])
+    fits = np.array([bool(s.rise) == held for s in segments])
+    return int(np.argmin(np.where(fits, away, np.inf) if fits.any() else away))

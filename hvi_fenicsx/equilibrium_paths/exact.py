@@ -234,7 +234,7 @@ class ExactFollower(Follower):
         if found is not None and found.cells is not None:
             yield self._landed(found.cells, aim, found.inverse)
             return
-        landing = self._descended() if found is None else Landing(x=cells.x, escapes=True, found=False, steps=0)
+        landing = self._descended() if found is None else Landing(x=cells.x, escapes=True, found=False)
         if landing.escapes:
             self._bonds.restore(memory)
             self._come_off(factor, f"at the factor {factor:.6g} no equilibrium is left: a body comes off")

@@ -5,10 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from .bonds import BondTable
-from .segments import Kind, Segment
+from .segments import Kind, Segment, piece_at
 from .state import Event
 from .step import Step
 from .tracer import Tracer
+
+_ROUNDING = 1e-12
+"""A displacement so near to an end of a piece, relative, is at it."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,9 +59,7 @@ def go_on(tracer: Tracer, bonds: BondTable, step: Step) -> Passing:
     if step.reversed:
         _turn_back(tracer, bonds, i, forward=forward)
     else:
-        number = int(tracer.cells.numbers[i]) + (1 if forward else -1)
-        segment = tracer.cells.chain(i)[number]
-        tracer.enter(i, number, segment.low if forward else segment.high)
+        tracer.enter(i, *tracer.cells.beyond(i, forward=forward))
     after, folds = tracer.cells.segment(i), tracer.factor_rate * before < 0.0
     return Passing(
         unknown=i,
@@ -78,14 +79,8 @@ def _turn_back(tracer: Tracer, bonds: BondTable, i: int, *, forward: bool) -> No
     x, force = float(cells.x[i]), float(cells.bond_force[i])
     bonds.remember(i, x, force)
     chain = bonds.chain(i)
-    near = [k for k, s in enumerate(chain) if not s.rise and _contains(s, x)]
-    number = near[-1] if forward else near[0]
+    number = piece_at(chain, x, _ROUNDING, forward=forward)
     tracer.enter(i, number, chain[number].coordinate(x, force), chain)
-
-
-def _contains(piece: Segment, x: float) -> bool:
-    """Whether a displacement is on a piece or, but for rounding, at an end of it."""
-    return abs(piece.displacement(piece.coordinate(x, 0.0)) - x) <= 1e-12 * abs(x)
 
 
 def _change(before: Segment, after: Segment) -> int:

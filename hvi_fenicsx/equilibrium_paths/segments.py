@@ -116,6 +116,20 @@ class Segment:
         return abs(on - force) + stiffness * abs(self.displacement(at) - x)
 
 
+def piece_at(chain: Sequence[Segment], x: float, rounding: float, *, forward: bool) -> int:
+    """The number of the piece on which a displacement is or, but for rounding, at an end; of two the next one.
+
+    Args:
+        chain: the segments.
+        x: the displacement.
+        rounding: relative.
+        forward: whether the next one is the one after it.
+    """
+    pieces = [n for n, s in enumerate(chain) if not s.rise]
+    near = [n for n in pieces if abs(chain[n].displacement(chain[n].coordinate(x, 0.0)) - x) <= rounding * abs(x)]
+    return near[-1] if forward else near[0]
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Component:
     """One bond's law on an unknown.

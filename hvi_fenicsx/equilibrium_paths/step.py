@@ -18,13 +18,11 @@ class Step:
         variable: the unknown that reached the end of its segment; FACTOR: the factor reached its aim; None: nothing,
             the curve goes on for ever.
         before: the segment that the unknown left; None for the factor.
-        length: of the way of the driving variable.
         tied: how many unknowns reached an end at once.
         reversed: whether bonds with memory turned back.
     """
 
     variable: int | None
     before: Segment | None = None
-    length: float = 0.0
     tied: int = 1
     reversed: bool = False

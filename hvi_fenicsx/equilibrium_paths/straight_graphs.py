@@ -53,6 +53,4 @@ class StraightGraphs:
     def _pass_end(self, i: int) -> None:
         """Put an unknown at the end that it has passed, on the next segment."""
         forward = bool(self._cells.tau[i] > self._cells.high[i])
-        number = int(self._cells.numbers[i]) + (1 if forward else -1)
-        segment = self._cells.chain(i)[number]
-        self._cells.enter(i, number, segment.low if forward else segment.high)
+        self._cells.enter(i, *self._cells.beyond(i, forward=forward))

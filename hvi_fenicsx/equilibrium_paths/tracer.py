@@ -81,8 +81,7 @@ class Tracer:
         """Coordinates of the order ε, inside the segments where a coordinate is at an end; q follows from them."""
         cells = self.cells
         self.small = self._generator.uniform(0.5, 1.5, len(cells))
-        ends = np.isclose(cells.tau, cells.high, rtol=0.0, atol=0.0)
-        self.small[ends] *= -1.0
+        self.small[cells.tau == cells.high] *= -1.0
         self._lag = self._generator.uniform(0.5, 1.5, len(cells))
         self._behind = self._lag.copy()
 
@@ -150,9 +149,9 @@ class Tracer:
         self._move(length, small)
         if variable == FACTOR:
             self.factor = aim
-            return Step(variable=FACTOR, length=length)
+            return Step(variable=FACTOR)
         before, turned = self.cells.segment(variable), self._turns(variable)
-        return Step(variable=variable, before=before, length=length, tied=tied, reversed=turned)
+        return Step(variable=variable, before=before, tied=tied, reversed=turned)
 
     def _turns(self, i: int) -> bool:
         return bool(self.rates[i] * self.cells.outward[i] < 0.0)

@@ -88,8 +88,7 @@ def _contact(solution: Solution) -> dict[str, Any] | None:
     if not sum(agree(comm, len(solution.problem.bounds))) or examination is None:
         return None
     gaps = [s.gap[np.isfinite(s.gap)] for s in states]
-    forces = [s.surface.weights[:, None] * s.pressure[:, None] * s.surface.normals for s in states]
-    resultant = comm.allreduce(sum(f.sum(axis=0) for f in forces))
+    resultant = comm.allreduce(sum(s.resultant for s in states))
     return {
         "vertices": comm.allreduce(sum(len(s.gap) for s in states)),
         "active": comm.allreduce(sum(int(np.count_nonzero(s.contact)) for s in states)),

@@ -8,7 +8,7 @@ the states go round in circles, a proximal term is added, and taken away step by
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
@@ -131,26 +131,18 @@ class Optimum:
 
     Attributes:
         x: a point of the box, (n,).
-        value: the objective there.
         bound: no point of the box has a lower value.
-        states: at x, (n,), a start for a similar programme.
-        steps: linear systems solved.
     """
 
     x: Array
-    value: float
     bound: float
-    states: Integers
-    steps: int
 
 
 @dataclass(frozen=True, kw_only=True)
 class _Iterate:
-    """A point of the box, its states, linear systems solved for it, and whether no state changes any more."""
+    """A point of the box, and whether no state changes any more."""
 
     x: Array
-    states: Integers
-    steps: int
     done: bool
 
 
@@ -185,19 +177,19 @@ class _Programme:
         low, high = chains.interval(x)
         states = chains.states(x + np.clip(self._b - self._a @ x, low, high) / scale, scale)
         seen: set[bytes] = set()
-        for step in range(1, MOST_STEPS + 1):
+        for _ in range(MOST_STEPS):
             solved = self._solved(states)
             if solved is None:
-                return _Iterate(x=x, states=states, steps=step, done=False)
+                return _Iterate(x=x, done=False)
             y, following = solved
             x = np.clip(y, chains.low, chains.high)
             if np.array_equal(following, states) or self._stationary(x):
-                return _Iterate(x=x, states=states, steps=step, done=True)
+                return _Iterate(x=x, done=True)
             if following.tobytes() in seen:
                 break
             seen.add(following.tobytes())
             states = following
-        return _Iterate(x=x, states=states, steps=step, done=False)
+        return _Iterate(x=x, done=False)
 
     def _solved(self, states: Integers) -> tuple[Array, Integers] | None:
         """The solution of the states' linear system, and the states that follow; None where it is singular."""
@@ -221,7 +213,7 @@ class _Programme:
 
     def proximal(self, found: _Iterate) -> _Iterate:
         """The same with a proximal term, which shrinks where the states settle."""
-        best, least, steps, weight = found, self._objective(found.x), found.steps, 1.0
+        best, least, weight = found, self._objective(found.x), 1.0
         for _ in range(MOST_PROXIMAL):
             added = weight * self._scale
             near = _Programme(self._a + np.diag(added), self._b + added * best.x, self._chains)
@@ -231,11 +223,9 @@ class _Programme:
                 best, least = trial, value
             weight = weight * 0.3 if trial.done else weight * 10.0
             last = self.active_set(best.x)
-            steps += trial.steps + last.steps
             if last.done:
-                best = last
-                break
-        return replace(best, steps=steps)
+                return last
+        return best
 
     def _objective(self, x: Array) -> float:
         return float(0.5 * x @ (self._a @ x) - self._b @ x + self._chains.energy(x).sum())
@@ -262,4 +252,4 @@ class _Programme:
         sizes = 0.5 * np.abs(x) @ (np.abs(self._a) @ np.abs(x)) + np.abs(self._b) @ np.abs(x)
         safety = np.finfo(float).eps * len(x) * float(sizes + np.abs(chains.energy(x)).sum())
         bound = float(value - lost.sum() - safety)
-        return Optimum(x=x, value=value, bound=bound, states=found.states, steps=found.steps)
+        return Optimum(x=x, bound=bound)

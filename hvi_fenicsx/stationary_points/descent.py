@@ -85,7 +85,7 @@ def _minimiser(problem: ScalarProblem, chains: list[Sequence[Arc]], x: Array) ->
     force[lengths.members] += pull[lengths.there]
     risen = [[_steeper(a, slope) for a in c] for c, slope in zip(chains[n:], slopes, strict=True)]
     programme = LengthProgramme.of(problem, problem.stiffness, force, [*chains[:n], *risen], np.zeros(len(lengths)))
-    return programme.minimiser(x)[0]
+    return programme.minimiser(x)
 
 
 def _steeper(arc: Arc, slope: float) -> Arc:

@@ -130,22 +130,22 @@ class LengthProgramme:
         negative = np.where(self.lengths.opens, np.minimum(self.lengths.vectors(x)[:, 0], 0.0), 0.0)
         return float(0.5 * x @ (self.a @ x) - self.b @ x + laws + 0.5 * self.shut @ negative**2)
 
-    def minimiser(self, start: Array) -> tuple[Array, int]:
-        """A point at which no step lowers the objective, and the number of steps.
+    def minimiser(self, start: Array) -> Array:
+        """A point at which no step lowers the objective.
 
         Args:
             start: where to begin, (n,).
         """
         x = self._admissible(start)
         value = self.value(x)
-        for step in range(MOST_STEPS):
+        for _ in range(MOST_STEPS):
             found = self._better(x, value, near_zero=True) or self._better(x, value, near_zero=False)
             if found is None:
-                return x, step
+                break
             x, value, last = found
             if last:
-                return x, step
-        return x, MOST_STEPS
+                break
+        return x
 
     def multipliers(self, x: Array) -> Array:
         """Forces of the bounds of the vectors' unknowns at a minimiser, (n,).

@@ -50,7 +50,6 @@ class LinearTest:
 
     def __init__(self, problem: ScalarProblem) -> None:
         self._problem = problem
-        self.programmes = 0
 
     def excludes(self, low: Array, high: Array) -> bool:
         """Whether no stationary point is in a cell.
@@ -68,7 +67,6 @@ class LinearTest:
         slack = np.vstack([np.eye(n), np.zeros((n, n))])
         cost = np.concatenate([np.zeros(m), np.ones(2 * n)])
         found = linprog(cost, A_eq=np.hstack([columns, slack, -slack]), b_eq=right, bounds=(0, None), method="highs")
-        self.programmes += 1
         if found.status != 0 or found.fun <= 0.0:
             return False
         return self._least(-found.eqlin.marginals[:n] / size, corners) > 0.0

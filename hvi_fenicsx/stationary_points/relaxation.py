@@ -66,7 +66,6 @@ class Relaxation:
     def __init__(self, problem: ScalarProblem) -> None:
         self.problem = problem
         self._share = CurvatureShare(problem)
-        self.programmes = 0
 
     def undecided(self, low: Array, high: Array) -> Integers:
         """Arguments whose law is not convex on a box.
@@ -116,8 +115,7 @@ class Relaxation:
         chains = envelopes(problem, box.low, box.high, curvature.added)
         lent = self.lent(box, curvature)
         stack = Chains.of(chains)
-        x, value, bound, steps = self._minimised(box, curvature, lent, chains, stack)
-        self.programmes += steps
+        x, value, bound = self._minimised(box, curvature, lent, chains, stack)
         gaps = np.zeros(len(box.motion_low))
         gaps[np.flatnonzero(curvature.lent)] = _above(lent.gaps(x), TIGHT * problem.energy_size(x))
         box = replace(
@@ -167,17 +165,17 @@ class Relaxation:
 
     def _minimised(
         self, box: Box, curvature: Curvature, lent: Lent, chains: list[Array], stack: Chains
-    ) -> tuple[Array, float, float, int]:
-        """The minimiser, two lower bounds, that of the point and a better one, and the steps that it took."""
+    ) -> tuple[Array, float, float]:
+        """The minimiser, and two lower bounds: that of the point and a better one."""
         problem = self.problem
         a = problem.stiffness - np.diag(problem.diagonal(curvature.added)) + lent.matrix
         b = problem.force + lent.force
         if not len(problem.lengths):
             found = minimise(a, b, stack, box.x)
             bound = found.bound + lent.constant
-            return found.x, bound, bound, found.steps
+            return found.x, bound, bound
         programme = LengthProgramme.of(problem, a, b, list(map(arcs_of, chains)), curvature.added[problem.size :])
-        x, steps = programme.minimiser(box.x)
+        x = programme.minimiser(box.x)
         dual = DualBound(problem=problem, low=box.low, high=box.high, added=curvature.added, lent=lent)
         multipliers = programme.multipliers(x)
         value = bound = dual.at(x, multipliers)
@@ -185,7 +183,7 @@ class Relaxation:
             y, pushes = with_held_forces(programme, x, self._share.springs)
             rested = ((self._share.at_rest(p), forces) for p, forces in ((x, multipliers), (y, pushes)))
             bound = max(bound, *(dual.at(*each) for each in rested))  # at rest the forces have less rounding
-        return x, value, bound, steps
+        return x, value, bound
 
     def _weights(self, box: Box, undecided: Integers) -> Array:
         """How much of D each argument is to have, (n + m,)."""

@@ -7,6 +7,7 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar, get_args
 
+from ..class_registry import enter
 from ..errors import InputError
 from ..laws import smoothing
 from ..scene import Scene
@@ -32,7 +33,7 @@ class Axis:
         of_elements: whether its values are combined with those of the axes that are not combined, too.
     """
 
-    registry: ClassVar[dict[str, Axis]] = {}
+    registry: ClassVar[dict[str, type[Axis]]] = {}
     """All axes by name, in the order in which they are applied."""
 
     name: ClassVar[str]
@@ -43,7 +44,7 @@ class Axis:
 
     def __init_subclass__(cls) -> None:
         if "name" in vars(cls):
-            Axis.registry[cls.name] = cls()
+            enter(Axis.registry, cls, cls.name, "axis")
 
     def check(self, value: str) -> None:
         """Refuse a value that the axis does not have.
@@ -238,7 +239,7 @@ def values_of(name: str, values: Sequence[str]) -> AxisValues:
         name: of the axis.
         values: of it.
     """
-    return AxisValues(Axis.registry[name], tuple(values))
+    return AxisValues(Axis.registry[name](), tuple(values))
 
 
 def read(text: str) -> AxisValues:
@@ -253,9 +254,10 @@ def read(text: str) -> AxisValues:
         raise InputError(f"--axis {text}: {unknown('axis', name, tuple(Axis.registry))}")
     if not values:
         raise InputError(f"--axis {text}: needs values, like --axis epsilon=1,0.1,0.01,exact")
+    asked = values_of(name, values)
     for value in values:
-        Axis.registry[name].check(value)
-    return values_of(name, values)
+        asked.axis.check(value)
+    return asked
 
 
 def applied(tables: Tables, pairs: Mapping[str, str]) -> Tables:
@@ -270,5 +272,5 @@ def applied(tables: Tables, pairs: Mapping[str, str]) -> Tables:
     """
     for name, axis in Axis.registry.items():
         if name in pairs:
-            tables = axis.apply(tables, pairs[name], pairs.keys())
+            tables = axis().apply(tables, pairs[name], pairs.keys())
     return tables

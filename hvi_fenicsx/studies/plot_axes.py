@@ -10,7 +10,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from ..report.pictures.style import GREY
 from .error_norms import ERROR_NORMS
-from .sentences import ROUNDING, seconds
+from .sentences import NEGLIGIBLE, seconds
 
 LEAST = 1e-6
 """A smaller error is drawn on it."""
@@ -85,6 +85,6 @@ def apart(axes: Axes, one: float, other: float) -> bool:
 
 
 def span(values: Sequence[float]) -> tuple[float, float]:
-    """The least and the largest value that is not rounding."""
-    known = [v for v in values if v > ROUNDING] or [LEAST]
+    """The least and the largest value that is not negligible."""
+    known = [v for v in values if v > NEGLIGIBLE] or [LEAST]
     return min(known), max(known)

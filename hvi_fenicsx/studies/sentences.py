@@ -17,7 +17,7 @@ _HEADLINES = ("energy_norm", "u_t_l2", "friction_l1", "pressure_l1")
 """The quantities that sentences and pictures may show."""
 _NEARLY, _MOSTLY = 0.9, 0.65
 """Parts of an error from which on it is called nearly all of it, most of it."""
-ROUNDING = 1e-9
+NEGLIGIBLE = 1e-9
 """Relative errors below this are no errors of h or ε."""
 Certain = Mapping[str, Certainty]
 """How well the reference is known, by quantity."""
@@ -90,7 +90,7 @@ def share_of_epsilon(own: Row, exact: Row, quantity: str) -> float | None:
         0 to 1; None where it is not known.
     """
     part, bare = (own.epsilon_part or {}).get(quantity), exact.error(quantity)
-    if part is None or bare is None or part + bare < ROUNDING:
+    if part is None or bare is None or part + bare < NEGLIGIBLE:
         return None
     return part / (part + bare)
 
@@ -135,7 +135,7 @@ def _missed(rows: Sequence[Row], quantity: str, target: float, certain: Certain)
 
 def slope(points: Sequence[tuple[float, float]]) -> float | None:
     """The order p of y = C xᵖ through the two points (x, y) of smallest x; None where there are no two positive y."""
-    known = sorted((x, y) for x, y in points if x > 0.0 and y > ROUNDING)
+    known = sorted((x, y) for x, y in points if x > 0.0 and y > NEGLIGIBLE)
     if len(known) < 2 or known[0][0] == known[1][0]:
         return None
     (x0, y0), (x1, y1) = known[:2]

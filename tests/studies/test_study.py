@@ -313,8 +313,8 @@ def test_help_names_every_axis(capsys: pytest.CaptureFixture[str]) -> None:
     assert set(re.split(r", | or ", told)) == {name for name, kind in axes.Axis.registry.items() if is_own(kind)}
 
 
-def is_own(axis: axes.Axis) -> bool:
-    return type(axis).__module__ == axes.__name__
+def is_own(axis: type[axes.Axis]) -> bool:
+    return axis.__module__ == axes.__name__
 
 
 def test_combinations_that_are_no_scene_are_left_out() -> None:

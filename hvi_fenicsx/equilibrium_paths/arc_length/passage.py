@@ -17,12 +17,14 @@ import numpy as np
 
 from ...system.condensed_problem import CondensedProblem
 from ...typing import Array, Mask
-from ..segments import Kind, Segment
+from ..segments import Kind, Segment, piece_at
 from .curve import Curve
 from .equations import ROUNDING, STANDING, UNDECIDED, Refused
 
 _SLOW = 1e-6
 """A rate of a site's force at which it stands, but for rounding, beside the largest."""
+_AT_END = 1e-11
+"""A displacement so near to an end of a piece, relative, is at it."""
 _ROUND = 3
 """Times that the passages at one point come to the same cell: a straight line does so once, else they go round.
 
@@ -209,13 +211,7 @@ class Crossing:
         x, force = float(values.lengths[k]), float(values.tractions[k])
         sites.remember(k, x, force)
         self._turned.add(k)
-        near = [n for n, s in enumerate(sites.chain(k)) if not s.rise and _contains(s, x)]
-        sites.enter(k, near[-1] if forward else near[0])
+        sites.enter(k, piece_at(sites.chain(k), x, _AT_END, forward=forward))
         y = curve.here.y.copy()
         sites.set(y, k, sites.coordinate(k, x, force))
         return y
-
-
-def _contains(piece: Segment, x: float) -> bool:
-    """Whether a displacement is on a piece or, but for rounding, at an end of it."""
-    return abs(piece.displacement(piece.coordinate(x, 0.0)) - x) <= 1e-11 * abs(x)
