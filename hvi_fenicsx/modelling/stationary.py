@@ -9,6 +9,7 @@ from dataclasses import dataclass, fields
 from numbers import Real
 from typing import Any
 
+import numpy as np
 from mpi4py import MPI
 
 from ..errors import InputError
@@ -80,7 +81,7 @@ def equilibria(
     Raises:
         InputError: on all ranks alike: a law is of a kind that is not searched, or a number is not allowed.
     """
-    _check_numbers(gap, limit)
+    _check_arguments(gap, limit, lowest)
     prepared = check(model, comm, **options)
     searched = bodies.Equilibria(prepared)
     stop = _stop(prepared.system.comm, limit)
@@ -88,11 +89,17 @@ def equilibria(
     return _result(found, tuple(_certified(searched, found)), prepared.problem.scales.energy)
 
 
-def _check_numbers(gap: Any, limit: Any) -> None:
-    if isinstance(gap, bool) or not isinstance(gap, Real) or not 0.0 < float(gap) < 1.0:
+def _check_arguments(gap: Any, limit: Any, lowest: Any) -> None:
+    if not _is_number(gap) or not 0.0 < gap < 1.0:
         raise InputError(f"gap: must be a number between 0 and 1 (is {gap!r})")
-    if limit is not None and (isinstance(limit, bool) or not isinstance(limit, Real) or not float(limit) > 0.0):
+    if limit is not None and not (_is_number(limit) and limit > 0.0):
         raise InputError(f"limit: must be a number of seconds above 0, or None (is {limit!r})")
+    if not isinstance(lowest, bool | np.bool_):
+        raise InputError(f"lowest: must be True or False (is {lowest!r})")
+
+
+def _is_number(given: Any) -> bool:
+    return isinstance(given, Real) and not isinstance(given, bool)
 
 
 def _certified(searched: bodies.Equilibria, found: Found) -> Iterator[Solution]:

@@ -115,7 +115,7 @@ TABLE: dict[str, tuple[str, str]] = {
         'radius: must be a number (is "2"); write it without quotes',
     ),
     "a shape that is a list": ("boundary.floor.contact={obstacle={shape=[1]}}", "must be one of plane, sphere"),
-    "a factor beyond all numbers": ("path.to=1e308", "--set path.to: must be factors between -1e+100 and 1e+100"),
+    "a factor beyond all numbers": ("path.to=1e308", "--set path.to: must be a number up to 1e+100, or a list"),
     "too many unknowns": ("domain.cells=[100000, 100000]", "fewer cells"),
 }
 
