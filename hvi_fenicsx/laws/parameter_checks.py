@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import math
+import sys
 from numbers import Real
+from typing import Any
 
 from ..errors import InputError
 
 
-def require_number(owner: str, **parameters: object) -> None:
+def require_number(owner: str, **parameters: Any) -> None:
     """Refuse anything but finite real numbers.
 
     Args:
@@ -19,8 +20,13 @@ def require_number(owner: str, **parameters: object) -> None:
         InputError: with the first that is none.
     """
     for key, value in parameters.items():
-        if isinstance(value, bool) or not isinstance(value, Real) or not math.isfinite(value):
+        if isinstance(value, bool) or not isinstance(value, Real) or not _is_finite(value):
             raise InputError(f"{owner}: {key} = {value!r} is not usable; give a finite number")
+
+
+def _is_finite(value: Any) -> bool:
+    """Whether a number is finite as a float; whole numbers may be larger than any."""
+    return bool(abs(value) <= sys.float_info.max)
 
 
 def require_positive(owner: str, **parameters: object) -> None:

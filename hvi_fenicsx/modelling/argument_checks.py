@@ -37,6 +37,6 @@ def require_between(name: str, given: Any, high: float = math.inf) -> None:
         InputError: it is something else.
     """
     number = isinstance(given, Real) and not isinstance(given, bool | np.bool_)
-    if not number or not 0.0 < float(given) < high:
+    if not number or not 0.0 < given < high:
         wanted = "above 0" if math.isinf(high) else f"above 0 and below {high:g}"
         raise InputError(f"{name}: must be a number {wanted} (is {given!r})")

@@ -178,12 +178,16 @@ class Body:
             InputError: the name is taken, or there is no such side.
         """
         self._check_new("interface", name, first, second)
+        if not isinstance(tied, bool | np.bool_):
+            raise InputError(f"interface: tied must be True or False (is {tied!r})")
         body = copy.copy(self)
         body.interfaces = {**self.interfaces, name: Sides(first=first, second=second, tied=tied)}
         return body
 
     def _check_new(self, kind: str, name: str, *sides: str) -> None:
-        """Refuse a name that is taken, and sides that are none."""
+        """Refuse a name that is no text or is taken, and sides that are none."""
+        if not isinstance(name, str):
+            raise InputError(f"{kind}: the name must be a text (is {name!r})")
         for side in sides:
             if side not in self.sides:
                 raise InputError(f"{kind}: {unknown('side', side, self.sides)}")

@@ -241,6 +241,8 @@ class Cohesion(_Law):
     def effect(self, mesh: dmesh.Mesh) -> Effect:
         """The law."""
         keys = self._keys(mesh)
+        if self.mixity is not None and not isinstance(self.mixity, Mixity):
+            raise InputError(f"mixity: give a criterion, such as hvi.laws.PowerLaw(...), or None, not {self.mixity!r}")
         if self.mixity is not None:
             keys |= {"mixity": self.mixity.name, **asdict(self.mixity)}
         return checked(effects.cohesion.Cohesion, beta=values.number(self.beta), **keys)

@@ -139,7 +139,7 @@ def components(given: Any, mesh: dmesh.Mesh) -> list[Any]:
         return [_expression(given[i], mesh) for i in range(d)]
     if callable(given):
         return [PythonFunction(_component(given, i, d)) for i in range(d)]
-    if not isinstance(given, Sequence | np.ndarray) or isinstance(given, str):
+    if not isinstance(given, Sequence | np.ndarray) or isinstance(given, str | bytes) or not np.iterable(given):
         raise InputError(f"a vector is a list with {d} entries, a function or a UFL expression, not {given!r}")
     return [spatial_value(value, mesh) for value in given]
 
@@ -151,7 +151,7 @@ def numbers(given: Any, each: Callable[[Any], Any] | None = None) -> Any:
         given: what the user gave.
         each: what reads an entry; None: :func:`number`.
     """
-    if isinstance(given, str) or not np.iterable(given):
+    if isinstance(given, str | bytes) or not np.iterable(given):
         return given
     return tuple(map(each or number, given))
 
@@ -168,7 +168,7 @@ def number(given: Any) -> Any:
     if getattr(given, "dtype", None) == np.bool_:
         return plain(given)
     try:
-        return given if isinstance(given, str | bool) else float(given)
+        return given if isinstance(given, str | bytes | bool) else float(given)
     except (TypeError, ValueError, OverflowError):
         return given
 

@@ -52,11 +52,15 @@ def _value(text: str, assignment: str) -> Any:
         parsed = {}
     if set(parsed) == {"value"}:
         return parsed["value"]
+    raise InputError(f"--set {assignment}: {shown(text)} is not a TOML value{_mend(text, assignment)}")
+
+
+def _mend(text: str, assignment: str) -> str:
+    """How a text is written that has no quotes yet."""
+    if '"' in text or "\n" in text:
+        return ""
     key = assignment.partition("=")[0]
-    raise InputError(
-        f"--set {assignment}: {shown(text)} is not a TOML value; a text needs quotes, with quotes of "
-        f"the shell around them: --set '{key}=\"{text.strip()}\"'"
-    )
+    return f"; a text needs quotes, with quotes of the shell around them: --set '{key}=\"{text.strip()}\"'"
 
 
 def _put(data: dict[str, Any], steps: list[str], value: Any, assignment: str) -> Keys:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from itertools import pairwise
 from typing import Annotated, Any, Literal
@@ -18,10 +17,9 @@ _LARGEST = 1e100
 def _factors(value: Any) -> tuple[float, ...]:
     entries = value if isinstance(value, list | tuple) else [value]
     for entry in entries:
-        if isinstance(entry, bool) or not isinstance(entry, int | float) or not math.isfinite(entry):
-            raise refusal(f"must be a number, or a list of numbers like [1.0, 0.2, 1.5] (is {shown(value)})")
-        if abs(entry) > _LARGEST:
-            raise refusal(f"must be factors between {-_LARGEST:g} and {_LARGEST:g} (is {shown(value)})")
+        if isinstance(entry, bool) or not isinstance(entry, int | float) or not abs(entry) <= _LARGEST:
+            text = f"must be a number up to {_LARGEST:g}, or a list of numbers like [1.0, 0.2, 1.5]"
+            raise refusal(f"{text} (is {shown(value)})")
     return tuple(float(entry) for entry in entries)
 
 

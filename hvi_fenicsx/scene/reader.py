@@ -118,10 +118,15 @@ class _Source:
     def place(self, where: Keys) -> str:
         """A place as messages name it: file and line, or ``--set``; then the key."""
         key = ".".join(map(str, where))
-        if any(where[: len(place)] == place for place in self.overridden):
-            return f"--set {key}"
-        line = line_of(self._lines, where)
-        return f"{self.file}:{line}: {key}" if line else f"{self.file}: {key}"
+        known = max((n for n in range(1, len(where) + 1) if where[:n] in self._lines), default=0)
+        if any(where[: len(place)] == place or _shared(place, where) > known for place in self.overridden):
+            return f"--set {key}"  # also in a table that only an overridden value has made
+        return f"{self.file}:{line_of(self._lines, where)}: {key}" if known else f"{self.file}: {key}"
+
+
+def _shared(one: _Place, other: _Place) -> int:
+    """How many keys two places begin with alike."""
+    return next((n for n, (a, b) in enumerate(zip(one, other, strict=False)) if a != b), min(len(one), len(other)))
 
 
 def _large_numbers(value: Any, place: Keys) -> Iterator[Keys]:

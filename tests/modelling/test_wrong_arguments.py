@@ -77,6 +77,9 @@ def solved(body: hvi.Body, traction: Any) -> hvi.Solution:
         (hvi.In(3), "^In on the body: 3 is no effect"),  # type: ignore[arg-type]
         (hvi.On("bottom", Weight()), r"^On on bottom: weight acts in a body: write hvi.In\("),
         (hvi.In(Pull()), r"^In on the body: pull of a test acts on a side: write hvi.On\("),
+        (hvi.Cohesion("bottom", hvi.laws.Tresca(1.0), mixity="power_law"), "mixity: give a criterion, such as"),  # type: ignore[arg-type]
+        (hvi.Traction("right", np.array(3.0)), "^Traction on right: a vector is a list with 2 entries"),
+        (hvi.Moment("right", b"3"), "^Moment on right: value: must be a finite number"),  # type: ignore[arg-type]
     ],
 )
 def test_a_refusal_names_the_effect_and_its_place(square: hvi.Body, effect: Any, reason: str) -> None:
@@ -253,7 +256,8 @@ def test_options_may_be_numbers_of_numpy(square: hvi.Body) -> None:
 
 
 @pytest.mark.parametrize(
-    ("argument", "named"), [({"gap": "1e-3"}, "gap"), ({"limit": True}, "limit"), ({"limit": -1}, "limit")]
+    ("argument", "named"),
+    [({"gap": "1e-3"}, "gap"), ({"limit": True}, "limit"), ({"limit": -1}, "limit"), ({"gap": 10**400}, "gap")],
 )
 def test_a_search_names_its_wrong_argument(square: hvi.Body, argument: Any, named: str) -> None:
     with pytest.raises(hvi.InputError, match=f"^{named}: must be a number"):
@@ -283,3 +287,25 @@ def test_what_the_mesh_shows_names_effects_too(square: hvi.Body) -> None:
         hvi.InputError, match=r"^contact on (bottom|lower): shares facets with (bottom|lower), which has"
     ):
         hvi.check(hvi.Model(body, [STEEL, hvi.Contact("bottom"), hvi.Contact("lower")]))
+
+
+@pytest.mark.parametrize(
+    ("made", "reason"),
+    [
+        (lambda body: body.piece(3, "left", "y > 0.5"), "^piece: the name must be a text .is 3"),
+        (lambda body: body.interface([], "right", "left"), "^interface: the name must be a text"),
+        (
+            lambda body: body.interface("i", "right", "left", tied="no"),
+            "^interface: tied must be True or False .is 'no'",
+        ),
+        (lambda body: hvi.equilibria(hvi.Model(body, [STEEL]), lowest="no"), "^lowest: must be True or False"),
+        (lambda body: hvi.laws.Tresca(10**400), "yield_traction = 1000.* is not usable; give a finite number"),
+        (lambda body: hvi.follow(hvi.Model(body, [STEEL]), to=10**400), "^(path.)?to: must be a number up to 1e.100"),
+        (lambda body: hvi.study(hvi.Model(body, [STEEL]), mesh=[10**400]), "is no number of cells along x"),
+        (lambda body: hvi.study(hvi.Model(body, [STEEL]), mesh=["\u00b2"]), "is no number of cells along x"),
+    ],
+)
+def test_what_was_taken_in_silence_or_raised_no_words_is_refused(square: hvi.Body, made: Any, reason: str) -> None:
+    """The text "no" counted as True, and some of these raised a bare TypeError, OverflowError or ValueError."""
+    with pytest.raises(hvi.InputError, match=reason):
+        made(square)

@@ -63,6 +63,9 @@ TABLE: dict[str, tuple[str, str]] = {
         "solver={method='tao', epsilon=0.1, start='broken'}",
         "--set solver.start: is for the branch iteration",
     ),
+    "a table that there is not": ("solvr.tolerance=1e-3", 'hvi: --set solvr: unknown key "solvr"; did you mean'),
+    "a table that lacks a key": ("boundary.more.contact={gap=0.0}", "hvi: --set boundary.more.on: is missing"),
+    "a value of two lines": ('title="a\nb"', "is not a TOML value\n"),
     "two widths": ("solver={epsilon=0.1, epsilon_absolute=0.1}", "leave one of them out"),
     "no such mesh": ("domain={shape='file', file='absent.msh'}", "does not exist"),
     "more memory than there is": ("domain.cells=[32000, 32000]", "use fewer cells"),
@@ -115,7 +118,7 @@ TABLE: dict[str, tuple[str, str]] = {
         'radius: must be a number (is "2"); write it without quotes',
     ),
     "a shape that is a list": ("boundary.floor.contact={obstacle={shape=[1]}}", "must be one of plane, sphere"),
-    "a factor beyond all numbers": ("path.to=1e308", "--set path.to: must be factors between -1e+100 and 1e+100"),
+    "a factor beyond all numbers": ("path.to=1e308", "--set path.to: must be a number up to 1e+100, or a list"),
     "too many unknowns": ("domain.cells=[100000, 100000]", "fewer cells"),
 }
 

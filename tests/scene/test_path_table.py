@@ -47,7 +47,7 @@ REFUSED = {
     "path={to=0}": "path.to: begins with 0, where every path starts",
     "path={to=[]}": "path.to: is an empty list",
     "path={to=[1, 0.5, 0.5]}": "path.to: goes from 0.5 to 0.5, which is no way",
-    "path={to=true}": "path.to: must be a number, or a list of numbers like [1.0, 0.2, 1.5] (is true)",
+    "path={to=true}": "path.to: must be a number up to 1e+100, or a list of numbers like [1.0, 0.2, 1.5] (is true)",
     "path={to=inf}": "path.to: must be a number",
     "path={scaled='pull'}": 'path.scaled: unknown load, prescribed displacement or moved obstacle "pull"; allowed: '
     "wall.displacement, pull.traction, press.traction",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Iterator, Mapping
 from fractions import Fraction
 from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Self
@@ -71,7 +72,7 @@ class Block(DomainShape):
     def with_mesh(self, text: str, thresholds: Thresholds = DEFAULT) -> Self:
         """The block with so many cells along x, and along the other axes in proportion."""
         fewest, first = thresholds.fewest_study, self.cells[0]
-        if not text.isdigit() or int(text) < fewest:
+        if not re.fullmatch("[0-9]{1,18}", text) or int(text) < fewest:
             raise InputError(f"{text!r} is no number of cells along x ({fewest} or more)")
         block = self.refined(Fraction(int(text), first), thresholds)
         if block is None:
