@@ -114,6 +114,7 @@ def _acting(
     u: fem.Function,
     thresholds: Thresholds,
 ) -> ActingForces:
+    """What acts on the bodies at u; what contact and laws give follows from the holders. Collective."""
     problem = references.problem
     foundation = -problem.combined(problem.bulk.foundation_force(u))
     left = forces.pushing + foundation

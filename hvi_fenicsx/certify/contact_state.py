@@ -178,6 +178,7 @@ def _state(
     contact: Mapping[str, Array],
     near: Array,
 ) -> ContactState:
+    """The state of one part at a local array u, from what its vertices feel and which of it contact carries."""
     bounds = next((b for b in problem.bounds if b.surface is surface), None)
     here = tuple(law for law in laws if law.term.surface is surface)
     normal = np.sum(surface.values(u) * surface.normals, axis=1)

@@ -179,6 +179,7 @@ def _shared(terms: Sequence[LawTerm], bounds: Sequence[tuple[Bounds, Mask, Mask]
 
 
 def _of_law(term: LawTerm, row: Integers, free: Mask, u: Array, near: Array) -> Carrier:
+    """What a law may carry at the vertices that have a row."""
     rows = row[term.surface.blocks]
     own = np.flatnonzero(rows >= 0)
     rows = rows[own]
@@ -203,6 +204,7 @@ def _of_law(term: LawTerm, row: Integers, free: Mask, u: Array, near: Array) -> 
 
 
 def _of_bounds(bounds: Bounds, lower: Mask, upper: Mask, row: Integers, free: Mask) -> Carrier:
+    """What contact may carry at the vertices that have a row and are on a bound."""
     rows = row[bounds.surface.blocks]
     own = np.flatnonzero((rows >= 0) & (lower | upper))
     return Carrier(

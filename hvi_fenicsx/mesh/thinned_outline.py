@@ -145,6 +145,7 @@ Label = tuple[int, int | None, int | None]
 
 
 def _chains(edges: HalfEdges, places: Mapping[int, Array], thresholds: Thresholds) -> list[Chain]:
+    """The outline in chains of edges that are labelled alike, from corner to corner; a chain may be closed."""
     labels = _labels(edges)
     neighbours: dict[int, list[int]] = defaultdict(list)
     for a, b in labels:

@@ -22,6 +22,7 @@ from ..runtime.mpi import agree
 from ..spatial_value import SpatialValue
 from ..typing import Array, Entities
 from . import bulk, contact_parts, dirichlet, interfaces, part_facets, part_laws, scaling
+from .contact_surface import Surface
 from .domain_forms import DomainForms
 from .interface_sides import Sides
 from .part_laws import Modification, unchanged
@@ -120,10 +121,7 @@ def _problem(
     """All contributions together. Collective."""
     conditions, held, fixed = _conditions(context, scales, contributions, thresholds)
     prescribed = dirichlet.values(context, conditions)
-    surfaces = contact_parts.make_surfaces(context, contributions, fixed, model.interfaces, thresholds)
-    occupied = np.concatenate([fixed // context.dimension, *(surface.blocks for surface in surfaces.values())])
-    found = interfaces.find(context, model.interfaces, occupied.astype(np.int32), thresholds)
-    surfaces |= {one.name: one.surface for one in found}
+    surfaces, found = _surfaces(context, contributions, fixed, model, thresholds)
     fixed = np.unique(np.concatenate([fixed, *(one.tied for one in found)])).astype(np.int32)
     gaps = {one.name: one.gap for one in found}
     bounds = contact_parts.make_bounds(context, scales, surfaces, contributions, prescribed, gaps)
@@ -154,6 +152,20 @@ def _problem(
         part_facets=context.part_facets,
         interfaces=found,
     )
+
+
+def _surfaces(
+    context: DomainForms,
+    contributions: Sequence[PlacedContribution],
+    fixed: Entities,
+    model: Model,
+    thresholds: Thresholds,
+) -> tuple[dict[str, Surface], tuple[interfaces.Interface, ...]]:
+    """The parts of Γc by name, those of interfaces too, and the interfaces. Collective."""
+    surfaces = contact_parts.make_surfaces(context, contributions, fixed, model.interfaces, thresholds)
+    occupied = np.concatenate([fixed // context.dimension, *(surface.blocks for surface in surfaces.values())])
+    found = interfaces.find(context, model.interfaces, occupied.astype(np.int32), thresholds)
+    return surfaces | {one.name: one.surface for one in found}, found
 
 
 def _conditions(

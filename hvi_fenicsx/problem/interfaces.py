@@ -80,6 +80,10 @@ def find(
 def _interface(
     context: DomainForms, name: str, pairs: Mapping[str, Pair], taken: Integers, thresholds: Thresholds
 ) -> Interface:
+    """One interface: its intersections, which nodes of its first side carry something, normals, gaps. Collective.
+
+    Nodes that are taken, by other interfaces too, or that the second side does not cover, carry nothing.
+    """
     pair = pairs[name]
     overlaps = pair.overlaps(thresholds)
     interface_checks.check_facing(pair, overlaps)

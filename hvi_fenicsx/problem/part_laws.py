@@ -128,6 +128,7 @@ def _term(
     *,
     by_rule: bool,
 ) -> LawTerm:
+    """A law of an effect (its key) on a part; by a rule of quadrature where one lumps the functions. Collective."""
     length = law.direction.length(where.tangents.shape[1], law.slip)
     solved, exact = (_scaled(j, scales, f"boundary.{where.part}.{key}", law.slip) for j in (modify(law.law), law.law))
     if length is not None and np.any(solved.convex.kinks > 0):

@@ -12,7 +12,6 @@ from .motions import (
     Movable,
     RigidBody,
     fields_at,
-    motion_at,
     rigid_fields,
 )
 from .pressed import pressed, without_obstacles
@@ -48,7 +47,6 @@ __all__ = [
     "least_energy",
     "load_factors",
     "modes",
-    "motion_at",
     "null_space",
     "pressed",
     "rigid_fields",

@@ -234,14 +234,3 @@ def rigid_fields(points: Array, body: RigidBody) -> Array:
     else:
         fields[:, 3:, :] = np.cross(np.eye(3)[None], lever[:, None, :])
     return fields
-
-
-def motion_at(points: Array, body: RigidBody, coefficients: tuple[float, ...] | Array) -> Array:
-    """The displacement of a motion, (m, d). Local to the rank.
-
-    Args:
-        points: (m, 3), nondimensional.
-        body: the body that moves.
-        coefficients: (3|6,), on the basis of this module.
-    """
-    return np.asarray(np.einsum("n,mnd->md", np.asarray(coefficients), rigid_fields(points, body)))

@@ -42,7 +42,7 @@ class ConvexStep:
     def __init__(
         self, context: SolveContext, laws: Sequence[Superpotential], counts: Counts, *, check_bounded: bool
     ) -> None:
-        self._context, self._system, self._solver = context, context.system, context.solver
+        self._system, self._solver = context.system, context.solver
         self._laws, self._counts, self._check_bounded = laws, counts, check_bounded
         self._options, self._thresholds = context.options, context.options.thresholds.branch
         self._residual = context.system.load.duplicate()

@@ -14,8 +14,6 @@ from dataclasses import replace
 
 import numpy as np
 from petsc4py import PETSc
-from scipy.linalg import cho_factor, cho_solve
-from scipy.linalg.lapack import dpstrf
 
 from ..errors import SolverError
 from ..runtime.mpi import total
@@ -24,6 +22,7 @@ from . import carriers, condensed_laws, factor_counts, loading
 from .carriers import Carriers
 from .condensed_problem import CondensedProblem
 from .condensed_stiffness import CondensedStiffness, DenseStiffness
+from .elimination import Elimination
 from .factorisation import form_of
 from .factorised_stiffness import FactorisedStiffness
 from .interior import PREFIX, Interior
@@ -84,33 +83,19 @@ class Condensation:
 
     def _unformed(self) -> CondensedStiffness:
         """S of all kept unknowns, by factorisations. Collective."""
-        every = np.arange(self._interior.size)
-        self._gone, self._stay, self._factor = every[:0], every, None
-        self._coupling = np.zeros((0, len(every)))
+        self._elimination = Elimination.of_none(self._interior.size)
         return FactorisedStiffness(self._interior)
 
     def _formed(self, whole: Array, carrying: Integers) -> CondensedStiffness:
         """S of the unknowns that stay, the others being eliminated."""
-        rest = np.setdiff1d(np.arange(len(whole)), carrying)
-        gone = rest[_regular(whole[np.ix_(rest, rest)], len(whole) * self._system.thresholds.rounding)]
-        self._gone, self._stay = np.sort(gone), np.setdiff1d(np.arange(len(whole)), gone)
-        if not self._gone.size:
-            self._factor, self._coupling = None, np.zeros((0, len(whole)))
-            return DenseStiffness(whole)
-        self._factor = cho_factor(whole[np.ix_(self._gone, self._gone)])
-        self._coupling = at = whole[np.ix_(self._gone, self._stay)]
-        found = whole[np.ix_(self._stay, self._stay)] - at.T @ self._eliminated(at)
-        return DenseStiffness(0.5 * (found + found.T))
-
-    def _eliminated(self, right: Array) -> Array:
-        """The inverse stiffness of the eliminated unknowns times columns."""
-        return right if self._factor is None else np.asarray(cho_solve(self._factor, right))
+        self._elimination = Elimination.of(whole, carrying, self._system.thresholds.rounding)
+        return DenseStiffness(self._elimination.stiffness(whole))
 
     def _condensed(
         self, elastic: CondensedStiffness, found: Carriers, laws: condensed_laws.CondensedLaws
     ) -> CondensedProblem:
         """The problem on the unknowns that stay. Collective."""
-        stay = self._stay
+        stay = self._elimination.stay
         self._shift = found.shift[stay]
         force, applied, constant, applied_constant = self._loads()
         if isinstance(elastic, DenseStiffness):
@@ -136,7 +121,7 @@ class Condensation:
 
     def _balanced(self, elastic: DenseStiffness, force: Array) -> tuple[DenseStiffness, Array]:
         """Stiffness and loads as rounding has not changed them along rigid motions. Collective."""
-        motions = RigidMotions.of(self._system, self._interior, self._stay)
+        motions = RigidMotions.of(self._system, self._interior, self._elimination.stay)
         work = self._system.comm.allreduce(motions.fields.T @ self._loading.lifted)
         return DenseStiffness(motions.without_forces(elastic.array)), motions.with_work(force, work)
 
@@ -150,11 +135,11 @@ class Condensation:
         lifted[fixed] = 0.0
         self._force = interior.gathered(lifted) - interior.pulled(inside)
         held = 0.5 * load.prescribed.T @ load.pulled - load.prescribed.T @ load.applied
-        moved = self._eliminated(self._force[self._gone])
-        constant = total(held - 0.5 * lifted.T @ inside[: len(lifted)]) - 0.5 * self._force[self._gone].T @ moved
-        force = self._force[self._stay] - self._coupling.T @ moved
+        constant = total(held - 0.5 * lifted.T @ inside[: len(lifted)]) - 0.5 * self._elimination.works(
+            self._force, self._force
+        )
         product, outer = self.products(load.applied)
-        return force, outer.T, _quadratic(constant), _quadratic(product)
+        return self._elimination.reduced(self._force), outer.T, _quadratic(constant), _quadratic(product)
 
     def products(self, vectors: Array) -> tuple[Array, Array]:
         """The products of vectors c with the body's displacement u: c·u = constants + λ rates + rows x. Collective.
@@ -167,11 +152,10 @@ class Condensation:
         """
         interior = self._interior
         outer = interior.loads(vectors)
-        gone = self._eliminated(outer[self._gone])
         inside = interior.solve(self._loading.lifted)[: len(vectors)]
         inside = self._system.comm.allreduce(vectors.T @ inside)
-        rows = outer[self._stay] - self._coupling.T @ gone
-        constants = np.asarray(inside + gone.T @ self._force[self._gone])
+        rows = self._elimination.reduced(outer)
+        constants = np.asarray(inside + self._elimination.works(outer, self._force))
         constants[:, 1] += rows.T @ self._shift
         return constants, np.asarray(rows.T)
 
@@ -182,11 +166,7 @@ class Condensation:
             x: the condensed unknowns, (n,).
             factor: λ.
         """
-        found = np.empty(self._interior.size)
-        found[self._stay] = x + factor * self._shift
-        load = self._force[self._gone] @ np.array([1.0, factor])
-        found[self._gone] = self._eliminated(load - self._coupling @ found[self._stay])
-        return found
+        return self._elimination.completed(x + factor * self._shift, self._force @ np.array([1.0, factor]))
 
     def expand(self, x: Array, factor: float = 1.0) -> PETSc.Vec:
         """The unknowns of the whole body in equilibrium with condensed ones. Collective.
@@ -240,7 +220,7 @@ class Condensation:
             forces: (n,).
         """
         interior, whole = self._interior, np.zeros(self._interior.size)
-        whole[self._stay] = forces
+        whole[self._elimination.stay] = forces
         found = self._system.load.duplicate()
         found.array[interior.kept] = interior.own_part(whole)
         return found
@@ -252,7 +232,7 @@ class Condensation:
             forces: in the components of the unknowns.
         """
         outer = self._interior.loads(self._free(forces.array_r)[:, None])[:, 0]
-        return np.asarray(outer[self._stay] - self._coupling.T @ self._eliminated(outer[self._gone]))
+        return self._elimination.reduced(outer)
 
     def change(self, x: Array, forces: Array) -> Array:
         """How the unknowns of the whole body change, in balance with forces, where condensed ones do. Collective.
@@ -263,10 +243,7 @@ class Condensation:
         """
         right = self._free(forces)
         outer = self._interior.loads(right[:, None])[:, 0]
-        found = np.empty(self._interior.size)
-        found[self._stay] = x
-        found[self._gone] = self._eliminated(outer[self._gone] - self._coupling @ x)
-        return self._interior.expand(found, right)
+        return self._interior.expand(self._elimination.completed(x, outer), right)
 
     def _free(self, forces: Array) -> Array:
         """Forces off the supports, which carry the others, (local unknowns,)."""
@@ -293,14 +270,6 @@ class Condensation:
         self.problem.elastic.free()
         self._interior.free()
         self._form.free()
-
-
-def _regular(matrix: Array, tolerance: float) -> Integers:
-    """Numbers of the unknowns in a greatest regular part of a semidefinite matrix (pivoted Cholesky)."""
-    if not matrix.size:
-        return np.empty(0, np.int64)
-    _, pivots, rank, _ = dpstrf(matrix, tol=tolerance * float(np.max(np.diag(matrix))), lower=1)
-    return np.asarray(pivots[:rank] - 1, dtype=np.int64)
 
 
 def _shifted(by: Array, problem: CondensedProblem) -> CondensedProblem:

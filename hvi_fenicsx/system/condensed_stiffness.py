@@ -23,9 +23,6 @@ from typing_extensions import override
 from ..typing import Array, Integers, Mask
 from . import spectrum
 
-ZERO = 1e-11
-"""An eigenvalue so small beside the greatest is zero."""
-
 
 @dataclass(frozen=True, kw_only=True)
 class CellColumns:
@@ -145,7 +142,7 @@ class CondensedStiffness(ABC):
             moving: the unknowns that move, (n,).
             slope: of the laws' forces, (n,).
         """
-        return self.negative_directions(moving, slope, -ZERO) > 0
+        return self.negative_directions(moving, slope, -spectrum.ZERO) > 0
 
 
 class DenseStiffness(CondensedStiffness):

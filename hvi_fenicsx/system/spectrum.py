@@ -7,7 +7,7 @@ from scipy.linalg.lapack import dsytrf
 
 from ..typing import Array
 
-_ZERO = 1e-11
+ZERO = 1e-11
 """An eigenvalue so small beside the greatest is zero."""
 
 
@@ -18,7 +18,7 @@ def is_singular(stiffness: Array) -> bool:
         stiffness: symmetric, (n, n); of no unknowns, it is regular.
     """
     values = np.linalg.eigvalsh(stiffness) if len(stiffness) else np.ones(1)
-    return bool(values[0] <= _ZERO * values[-1])
+    return bool(values[0] <= ZERO * values[-1])
 
 
 def negative_directions(stiffness: Array, negligible: float) -> int:
