@@ -80,7 +80,7 @@ def loads(shape: DeformedBody, found: list[LoadedSide]) -> Iterator[Mark]:
 
 
 def _label(at: Array, way: Array, words: str) -> Mark:
-    label = Label(words, at, way / (float(np.linalg.norm(way)) or 1.0))
+    label = Label(words, at, np.asarray(way / (float(np.linalg.norm(way)) or 1.0), dtype=np.float64))
     return Mark(label.reach, label.draw, Artist, "")
 
 
