@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -120,8 +121,13 @@ def letters(words: str, size: float, weight: str = "normal") -> Array:
         size: of the letters, points.
         weight: of the letters, as matplotlib names it.
     """
-    width = TextPath((0.0, 0.0), words, size=size, prop=FontProperties(weight=weight)).get_extents().width
-    return np.array([float(width), 1.2 * size]) / 72
+    return np.array([_width(words, size, weight), 1.2 * size]) / 72
+
+
+@functools.cache
+def _width(words: str, size: float, weight: str) -> float:
+    """Points; kept, since it takes milliseconds and a label is tried in a hundred places."""
+    return float(TextPath((0.0, 0.0), words, size=size, prop=FontProperties(weight=weight)).get_extents().width)
 
 
 def largest_scale(reaches: Sequence[Reach], room: tuple[float, float]) -> float:
