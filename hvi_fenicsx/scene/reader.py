@@ -124,7 +124,7 @@ class _Source:
         return f"{self.file}:{line_of(self._lines, where)}: {key}" if known else f"{self.file}: {key}"
 
 
-def _shared(one: _Place, other: _Place) -> int:
+def _shared(one: Keys, other: Keys) -> int:
     """How many keys two places begin with alike."""
     return next((n for n, (a, b) in enumerate(zip(one, other, strict=False)) if a != b), min(len(one), len(other)))
 

@@ -696,3 +696,32 @@ def test_the_axes_of_a_map_are_in_a_unit_that_suits_and_inside_of_the_picture(tm
     named = [label for axes in fig.axes for label in (axes.xaxis.label, axes.yaxis.label) if label.get_text()]
     assert {label.get_text() for label in named} == {"x in mm", "y in mm"}
     assert min(label.get_window_extent().x0 for label in named) >= 0.0
+
+
+@pytest.mark.parametrize("height", [1.0, 0.03])
+def test_names_of_parts_cover_nothing_and_stay_in_the_picture(tmp_path: Path, height: float) -> None:
+    """Of a square and of a thin strip, whose ends are shorter than their names."""
+    body = square()
+    body.geometry.x[:, 1] *= height
+    folder = result(tmp_path / "r", body, np.zeros_like)
+    change(folder, parts={})
+    names = ("the_left_end_of_it", "the_right_end_of_it", "the_underside", "what_is_above", "another_above")
+    load = role(names[0], "traction", traction=[1e6, 0.0])
+    write_words(folder, 2, effects=[load, role(names[1], "displacement", prescribed=[0])])
+    sides: list[Callable[[Array], npt.NDArray[np.bool_]]] = [
+        lambda x: x[0] == 0,
+        lambda x: x[0] == 1,
+        lambda x: x[1] == 0,
+        lambda x: (x[1] == height) & (x[0] <= 0.5),
+        lambda x: (x[1] == height) & (x[0] >= 0.5),
+    ]
+    write_sides(folder, body, **dict(zip(names, sides, strict=True)))
+    fig = scene_plane.draw(reader.read(folder))
+    fig.canvas.draw()
+    said = fig.axes[0].texts
+    assert {text.get_text() for text in said} >= set(names)
+    boxes = [Text.get_window_extent(text) for text in said]
+    for i, box in enumerate(boxes):
+        assert 0.0 <= box.x0 <= box.x1 <= fig.bbox.width
+        assert not any(box.overlaps(other) for other in boxes[i + 1 :])
+        assert not any(box.overlaps(text.get_window_extent()) for text in fig.texts)

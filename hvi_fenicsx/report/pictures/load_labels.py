@@ -11,16 +11,13 @@ from ...typing import Array
 from ..units import quantity
 from .loads_supports import LoadedSide
 from .plane_canvas import SIDE, TALLEST
-from .reach import LINE, Label, Reach, largest_scale
+from .reach import LINE, WAYS, Label, Reach, largest_scale
 from .vtk_view import View
 
 HEAD = 0.09
 """Inches: half of the head of an arrow."""
 SPOILS, FAR = 10.0, 0.3
 """What it counts to cover an arrow or other words, or to be a body's size off the middle; to cover the body is 1."""
-_TURNS = np.radians(np.arange(0.0, 360.0, 45.0))
-WAYS = np.column_stack([np.cos(_TURNS), np.sin(_TURNS)])
-"""Where a label may stand beside the end of an arrow."""
 
 
 def reaches(view: View, points: Array, arrows: Sequence[tuple[Array, Array]]) -> list[Reach]:
@@ -55,7 +52,7 @@ def labels(
     reached = [*reaches(view, np.concatenate(clouds), arrows), *words]
     scale = largest_scale(reached, (SIDE, TALLEST))
     bodies = shapely.union_all([shapely.MultiPoint(view.project(c)).convex_hull.buffer(LINE / scale) for c in clouds])
-    taken = [_box(one, scale) for one in words]
+    taken = [one.hull(scale) for one in words]
     for tails, ways in arrows:
         strokes = np.stack([view.project(tails), view.project(tails + ways)], axis=1)
         taken += list(shapely.buffer(shapely.linestrings(strokes), HEAD / scale))
@@ -64,22 +61,17 @@ def labels(
         ends = view.project(np.concatenate([tails, tails + ways]))
         value = quantity(float(np.linalg.norm(load.traction, axis=1).max()), "Pa")
         found.append(_best([Label(value, end, way) for end in ends for way in WAYS], ends, taken, bodies, scale))
-        taken.append(_box(found[-1].reach, scale))
+        taken.append(found[-1].reach.hull(scale))
     return found
 
 
 def _best(
     candidates: list[Label], ends: Array, taken: list[shapely.Geometry], bodies: shapely.Geometry, scale: float
 ) -> Label:
-    boxes = np.array([_box(label.reach, scale) for label in candidates])
+    boxes = np.array([label.reach.hull(scale) for label in candidates])
     spoilt = shapely.area(shapely.intersection(boxes, shapely.union_all(taken)))
     covered = shapely.area(shapely.intersection(boxes, bodies))
     middle = shapely.Point(ends.mean(axis=0))
     size = float(np.hypot(*np.ptp(shapely.get_coordinates(bodies), axis=0)))
     cost = (SPOILS * spoilt + covered) / shapely.area(boxes) + FAR * shapely.distance(boxes, middle) / size
     return candidates[int(np.argmin(np.round(cost, 6)))]
-
-
-def _box(reach: Reach, scale: float) -> shapely.Geometry:
-    low, high = (reach.points[0] - reach.before / scale, reach.points[0] + reach.behind / scale)
-    return shapely.box(*low, *high)

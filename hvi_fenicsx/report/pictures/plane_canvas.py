@@ -48,6 +48,13 @@ def canvas(reaches: Sequence[Reach]) -> tuple[Figure, Axes]:
     return fig, axes
 
 
+def window(axes: Axes) -> Array:
+    """What axes show: the lower left and the upper right corner, m, and their distance apart in inches, (3, 2)."""
+    box = axes.get_window_extent()
+    inches = np.array([box.width, box.height]) / axes.figure.dpi
+    return np.array([*np.transpose([axes.get_xlim(), axes.get_ylim()]), inches])
+
+
 def paint(axes: Axes, shape: DeformedBody, values: Array, colours: Colormap, end: float) -> None:
     """Draw a plane body over its undeformed outline, in the colours of values at the corners of its cells.
 

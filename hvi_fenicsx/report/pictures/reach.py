@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+import shapely
 from matplotlib.axes import Axes
 from matplotlib.font_manager import FontProperties
 from matplotlib.textpath import TextPath
@@ -17,6 +19,11 @@ LINE = 0.03
 """Inches: half of the widest line, which is drawn around each point."""
 LETTERS, APART = 12.5, 0.09
 """The size of a label's letters, points, and how far it stands from what it labels, inches."""
+SLANTED = 0.35
+"""What both parts of a way are that is neither along an axis nor nearly so."""
+_TURNS = np.radians(np.arange(0.0, 360.0, 45.0))
+WAYS = np.column_stack([np.cos(_TURNS), np.sin(_TURNS)])
+"""Where a label may stand beside a point."""
 
 
 @dataclass(frozen=True)
@@ -33,6 +40,16 @@ class Reach:
     before: Array = field(default_factory=lambda: np.full(2, LINE))
     behind: Array = field(default_factory=lambda: np.full(2, LINE))
 
+    def hull(self, scale: float) -> shapely.Geometry:
+        """What lies between the outermost of the points and of what is drawn around them, m.
+
+        Args:
+            scale: inches for a metre.
+        """
+        low, high = self.points - self.before / scale, self.points + self.behind / scale
+        others = [np.column_stack([low[:, 0], high[:, 1]]), np.column_stack([high[:, 0], low[:, 1]])]
+        return shapely.MultiPoint(np.concatenate([low, high, *others])).convex_hull
+
 
 @dataclass(frozen=True)
 class Label:
@@ -44,6 +61,7 @@ class Label:
         way: from there to the words, (2,), of length 1; zero where they are written on the point.
         weight: of the letters.
         colour: of the letters.
+        upright: whether they are written upwards.
     """
 
     words: str
@@ -51,14 +69,18 @@ class Label:
     way: Array
     weight: str = "bold"
     colour: str = INK
+    upright: bool = False
 
     @property
     def _size(self) -> Array:
-        return letters(self.words, LETTERS, self.weight)
+        size = letters(self.words, LETTERS, self.weight)
+        return size[::-1] if self.upright else size
 
     @property
     def _away(self) -> Array:
-        """From ``at`` to the middle of the letters, inches: all of them lie beyond ``at``."""
+        """From ``at`` to the middle of the letters, inches: all lie beyond ``at``, a corner there on a slanted way."""
+        if np.abs(self.way).min() > SLANTED:
+            return np.asarray(np.sign(self.way) * self._size / 2 + APART * self.way)
         return np.asarray(self.way * (float(np.abs(self.way) @ self._size) / 2 + APART))
 
     @property
@@ -84,6 +106,7 @@ class Label:
             size=LETTERS,
             weight=self.weight,
             color=self.colour,
+            rotation=90 if self.upright else 0,
             bbox={"boxstyle": "round,pad=0.1", "fc": "white", "ec": "none", "alpha": 0.85},
             annotation_clip=False,
             zorder=9,
@@ -98,8 +121,13 @@ def letters(words: str, size: float, weight: str = "normal") -> Array:
         size: of the letters, points.
         weight: of the letters, as matplotlib names it.
     """
-    width = TextPath((0.0, 0.0), words, size=size, prop=FontProperties(weight=weight)).get_extents().width
-    return np.array([float(width), 1.2 * size]) / 72
+    return np.array([_width(words, size, weight), 1.2 * size]) / 72
+
+
+@functools.cache
+def _width(words: str, size: float, weight: str) -> float:
+    """Points; kept, since it takes milliseconds and a label is tried in a hundred places."""
+    return float(TextPath((0.0, 0.0), words, size=size, prop=FontProperties(weight=weight)).get_extents().width)
 
 
 def largest_scale(reaches: Sequence[Reach], room: tuple[float, float]) -> float:
