@@ -438,5 +438,4 @@ def test_a_full_disk_is_told_and_nothing_half_written_stays(room: int, scene: Pa
     assert done.returncode == 2, done.stderr
     assert "Traceback" not in done.stderr
     assert any(words in done.stderr for words in ("could not be written", "Is the disk full?", "is the disk full?"))
-    assert "vtk" not in done.stderr  # which tells of it in a screen of its own
     assert sorted(f.name for f in tmp_path.iterdir()) == ["r", "square.toml"]

@@ -6,6 +6,7 @@ import ast
 import csv
 import os
 import random
+import resource
 import shutil
 import subprocess
 from pathlib import Path
@@ -18,6 +19,8 @@ from runs import ROOT, hvi
 from scenes import two_blocks
 
 import hvi_fenicsx
+from hvi_fenicsx import InputError
+from hvi_fenicsx.results import vtk_files
 
 pyvista = pytest.importorskip("pyvista")
 MACRO = ROOT / "docs" / "open_result.py"
@@ -133,3 +136,17 @@ def test_both_sides_of_an_interface_are_written(tmp_path: Path) -> None:
     there = ~np.isnan(traction[:, 0])
     assert 8 <= np.count_nonzero(there) <= 9  # the upper block begins at 0.21, in the second facet
     assert np.all(np.sign(traction[there].sum(axis=0)[:2]) == np.sign(sums["seam.second"]))
+
+
+def test_on_a_full_disk_vtk_leaves_the_words_to_the_program(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    """No file may grow beyond so many bytes; VTK's pipeline printed a coloured screen before the message."""
+    points = np.random.default_rng(0).random((3_000, 3))
+    grid = vtk_files.Grid(points=points, cells=np.arange(3_000).reshape(-1, 3), at_points={}, in_cells={}, units={})
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1_000, limits[1]))
+    try:
+        with pytest.raises(InputError, match=r"VTK could not write it. Is the disk full"):
+            vtk_files.write(tmp_path / "body.pvd", MPI.COMM_SELF, grid)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert capfd.readouterr() == ("", "")
