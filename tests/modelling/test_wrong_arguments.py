@@ -17,7 +17,7 @@ STEEL = hvi.Isotropic(youngs_modulus=2e11, poisson_ratio=0.3)
 class Weight(Effect):
     """The weight of steel, as a user would write it."""
 
-    key = "weight"
+    key = "weight of a test"
     place = Place.BODY
     term = "<g, v> += -∫ ρ g v_y dx"
 
@@ -75,7 +75,7 @@ def solved(body: hvi.Body, traction: Any) -> hvi.Solution:
         (hvi.Friction("bottom", "graph"), "^Friction on bottom: law: give a law as an object"),  # type: ignore[arg-type]
         (hvi.On("bottom", 3), "^On on bottom: 3 is no effect"),  # type: ignore[arg-type]
         (hvi.In(3), "^In on the body: 3 is no effect"),  # type: ignore[arg-type]
-        (hvi.On("bottom", Weight()), r"^On on bottom: weight acts in a body: write hvi.In\("),
+        (hvi.On("bottom", Weight()), r"^On on bottom: weight of a test acts in a body: write hvi.In\("),
         (hvi.In(Pull()), r"^In on the body: pull of a test acts on a side: write hvi.On\("),
         (hvi.Cohesion("bottom", hvi.laws.Tresca(1.0), mixity="power_law"), "mixity: give a criterion, such as"),  # type: ignore[arg-type]
         (hvi.Traction("right", np.array(3.0)), "^Traction on right: a vector is a list with 2 entries"),
