@@ -77,6 +77,18 @@ def on_corner(graph: TractionGraph, x: float, traction: float, rounding: float =
     return nearest, next((end for end in ends if abs(end - traction) <= rounding * size), traction)
 
 
+def was_passed(x: Array, low: float | Array, high: float | Array, side: str) -> Mask:
+    """Whether the limit of a traction from a side is taken where a bond has been, (m,).
+
+    Args:
+        x: coordinates, (m,).
+        low: the least coordinate so far, 0 at first.
+        high: the greatest, likewise.
+        side: "left" or "right".
+    """
+    return np.asarray((x > low) & (x <= high) if side == "left" else (x >= low) & (x < high))
+
+
 def remembering(graph: TractionGraph, passed: Passed) -> TractionGraph:
     """The graph of a bond that has been so far: secants up to there, the law beyond.
 

@@ -10,7 +10,7 @@ import numpy as np
 from ...laws import Superpotential, TractionGraph
 from ...system.condensed_problem import Bonds, CondensedProblem
 from ...typing import Array
-from ..graphs import graph_of
+from ..graphs import graph_of, was_passed
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,8 +44,7 @@ class LawRows:
         """
         found = self.signs * np.where(self.signs > 0.0, self._limit(x, side), self._limit(-x, _other(side)))
         low, high, low_traction, high_traction = memory.T
-        left = side == "left"
-        inside = (x > low) & (x <= high) if left else (x >= low) & (x < high)
+        inside = was_passed(x, low, high, side)
         end, there = np.where(x < 0.0, low, high), np.where(x < 0.0, low_traction, high_traction)
         secant = np.divide(there, end, out=np.zeros_like(x), where=end != 0.0) * x
         return np.where(inside, secant, found)

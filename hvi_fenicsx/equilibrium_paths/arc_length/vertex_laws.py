@@ -9,8 +9,8 @@ import numpy as np
 
 from ...laws import Mixity, Superpotential, TractionGraph
 from ...system.condensed_problem import Bonds, CondensedProblem
-from ...typing import Array
-from ..graphs import Passed, graph_of, remembering, turned
+from ...typing import Array, Mask
+from ..graphs import Passed, graph_of, remembering, turned, was_passed
 
 
 @dataclass(slots=True, kw_only=True)
@@ -74,14 +74,10 @@ class VertexLaw:
         inside = self._inside(x, side)
         return np.where(inside, self.graph().traction(x, side), found) if np.any(inside) else found
 
-    def _inside(self, x: Array, side: str) -> Array:
+    def _inside(self, x: Array, side: str) -> Mask:
         """Whether the limit is taken where the bond has been."""
-        if self.passed is None or not np.any(self._ends):
-            return np.zeros(np.shape(x), dtype=bool)
-        low, high = self.passed.displacements
-        if side == "left":
-            return np.asarray((x > low) & (x <= high))
-        return np.asarray((x >= low) & (x < high))
+        low, high = (self.passed or Passed()).displacements
+        return was_passed(x, low, high, side)
 
     def remember(self, x: float, traction: float) -> None:
         """Note a coordinate and its traction.
