@@ -20,7 +20,7 @@ from .style import BLUE, GREY, INK, WIDTH
 LETTERS = 40
 """In one line of the legend."""
 UNITS = {"displacement": ("m", "m"), "force": ("N/m", "N"), "moment": ("N", "N m")}
-"""Of what drives a part as a whole, in the plane and in space."""
+"""The units of what drives a part as a whole, in the plane and in space."""
 
 
 def touches(roles: Iterable[Mapping[str, Any]]) -> bool:
