@@ -179,6 +179,24 @@ class Result:
         roles = sorted((role for _, role in self._roles("body")), key=lambda role: role["drive"] != "load")
         return list(dict.fromkeys(role["label"] for role in roles))
 
+    @property
+    def driven(self) -> list[tuple[str, str, Any]]:
+        """What drives a boundary part without a traction: the part, the effect's key, and its value in the scene.
+
+        These are total loads, and displacements that are not all zero or free.
+        """
+        found = []
+        for entry in self.summary.get("effects") or []:
+            role, part, key = entry.get("role") or {}, entry["where"], entry["effect"]
+            value = self.scene.get("boundary", {}).get(part, {}).get(key)
+            if role.get("place") != "boundary" or value is None or part in self.arrays.loads:
+                continue
+            total = role["drive"] == "load" and not role["traction"] and role["pressure"] is None
+            moved = role["prescribed"] and isinstance(value, list) and any(v not in (0, "free") for v in value)
+            if total or moved:
+                found.append((part, key, value))
+        return found
+
     def between_bodies(self, part: str) -> bool:
         """Whether a part is where two bodies meet.
 

@@ -725,3 +725,26 @@ def test_names_of_parts_cover_nothing_and_stay_in_the_picture(tmp_path: Path, he
         assert 0.0 <= box.x0 <= box.x1 <= fig.bbox.width
         assert not any(box.overlaps(other) for other in boxes[i + 1 :])
         assert not any(box.overlaps(text.get_window_extent()) for text in fig.texts)
+
+
+def test_what_drives_a_part_without_a_traction_is_said(tmp_path: Path) -> None:
+    """A moment and a displacement; a support that holds is no drive."""
+    folder = result(tmp_path / "r", square(4), pressed)
+    kinds = {
+        "turned": ("moment", -200.0),
+        "lifted": ("displacement", ["free", 1e-3]),
+        "held": ("displacement", [0.0, 0.0]),
+    }
+    effects = [
+        role(
+            part, key, drive="load" if key == "moment" else "kinematic", prescribed=[1] if key == "displacement" else []
+        )
+        for part, (key, _) in kinds.items()
+    ]
+    write_words(folder, 2, effects=effects)
+    scene = {"title": "t", "boundary": {part: {"on": part, key: value} for part, (key, value) in kinds.items()}}
+    (folder / "scene.toml").write_text(tomli_w.dumps(scene), encoding="utf-8")
+    write_sides(folder, square(4), turned=ON["pull"], lifted=ON["wall"], held=lambda x: x[1] == 0)
+    fig = scene_plane.draw(reader.read(folder))
+    said = [text.get_text().replace("\N{NARROW NO-BREAK SPACE}", " ") for text in fig.legends[0].get_texts()]
+    assert [line for line in said if "“" in line] == ["“turned”: moment -200 N", "“lifted”: displacement (free, 1 mm)"]

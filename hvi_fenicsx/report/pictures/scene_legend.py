@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Iterable, Mapping
 from typing import Any
 
@@ -16,6 +17,11 @@ from ..units import quantity, thousands
 from .legend import FOOT
 from .style import BLUE, GREY, INK, WIDTH
 
+LETTERS = 40
+"""In one line of the legend."""
+UNITS = {"displacement": ("m", "m"), "force": ("N/m", "N"), "moment": ("N", "N m")}
+"""The units of what drives a part as a whole, in the plane and in space."""
+
 
 def touches(roles: Iterable[Mapping[str, Any]]) -> bool:
     """Whether contact or a law acts on a part, from the roles of its effects."""
@@ -23,8 +29,18 @@ def touches(roles: Iterable[Mapping[str, Any]]) -> bool:
 
 
 def inside(result: Result) -> list[Artist]:
-    """The legend's lines on what acts everywhere and has no place in a drawing."""
-    return [Line2D([], [], color="none", label=f"and {words}") for words in result.within]
+    """The legend's lines on what has no place in a drawing: what acts everywhere, and what drives a part as a whole."""
+    parts = [f"“{part}”: {key} {_said(value, key, result.body.dimension)}" for part, key, value in result.driven]
+    lines = [*parts, *(f"and {words}" for words in result.within)]
+    return [Line2D([], [], color="none", label="\n".join(textwrap.wrap(words, LETTERS))) for words in lines]
+
+
+def _said(value: Any, key: str, dimension: int) -> str:
+    """A number with its unit, or those of a list in brackets; what is no number as it stands in the scene."""
+    if isinstance(value, list):
+        return f"({', '.join(_said(one, key, dimension) for one in value)})"
+    unit = UNITS.get(key, ("", ""))[dimension - 2]
+    return quantity(float(value), unit) if isinstance(value, int | float) and unit else str(value)
 
 
 def say(fig: Figure, body: BodyMesh) -> None:

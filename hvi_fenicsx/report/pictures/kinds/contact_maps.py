@@ -28,6 +28,8 @@ WIDEST, TALLEST = 5.8, 2.75
 LEFT, GAP, FOOT = 0.95, 0.62, 0.75
 ROOMY = 0.55
 """Part of the width at which a map ends that leaves room for words beside it."""
+STEPS = (1, 2, 2.5, 5, 10)
+"""Between ticks, times a power of ten."""
 ARROWS = 13
 """Along the longer side of a map."""
 
@@ -136,7 +138,7 @@ def _map(fig: Figure, axes: Axes, flat: FlatPart, values: Array, colours: Colorm
     box = axes.get_position()
     bar = fig.add_axes((box.x1 + 0.02, box.y0, 0.02, box.height))
     fig.colorbar(drawn, cax=bar)
-    bar.yaxis.set_major_locator(MaxNLocator(_intervals(axes)))
+    bar.yaxis.set_major_locator(MaxNLocator(_intervals(axes), steps=STEPS))
     bar.spines[:].set_visible(False)
     axes.set_title(words, loc="left", size=14, parse_math=True)
 
@@ -186,7 +188,7 @@ def _frame(axes: Axes, flat: FlatPart, *, last: bool) -> None:
     axes.spines[:].set_visible(False)
     unit = unit_for(max(map(abs, (left, right, bottom, top))), "m")
     for axis, intervals in ((axes.xaxis, 6), (axes.yaxis, _intervals(axes))):
-        axis.set_major_locator(MaxNLocator(intervals))
+        axis.set_major_locator(MaxNLocator(intervals, steps=STEPS))
         axis.set_major_formatter(lambda value, _: f"{value / unit.size:.4g}".replace("-", "−"))
     axes.set_ylabel(f"{flat.names[1]} in {unit.name}")
     axes.tick_params(labelbottom=last, bottom=last)
