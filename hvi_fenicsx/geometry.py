@@ -1,4 +1,4 @@
-"""Plane geometry: outlines of bodies, the curves that their sides lie on, and chains of edges."""
+"""Geometry: outlines of plane bodies, the curves that their sides lie on, chains of edges, tangents of normals."""
 
 from __future__ import annotations
 
@@ -142,3 +142,23 @@ def _walk(start: int, onwards: dict[int, list[int]]) -> Integers:
             del onwards[chain[-1]]
         chain.append(following.pop())
     return np.array(chain, dtype=np.int64)
+
+
+def tangents(normals: Array) -> Array:
+    """The unit tangents of outward normals, (m, d-1, d), that all results refer to.
+
+    In 2D the one whose larger component is positive; in 3D t1 is the projected x-axis (the y-axis where n is within
+    45° of x) and t2 = n x t1.
+
+    Args:
+        normals: (m, d).
+    """
+    if normals.shape[1] == 2:
+        t = np.column_stack([-normals[:, 1], normals[:, 0]])
+        rows = np.arange(len(t))
+        return (t * np.sign(t[rows, np.argmax(np.abs(t), axis=1)])[:, None])[:, None, :] + 0.0
+    steep = np.abs(normals[:, 0]) > np.sqrt(0.5)
+    axis = np.where(steep[:, None], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0])
+    t1 = axis - np.sum(axis * normals, axis=1)[:, None] * normals
+    t1 /= np.linalg.norm(t1, axis=1)[:, None]
+    return np.stack([t1, np.cross(normals, t1)], axis=1) + 0.0

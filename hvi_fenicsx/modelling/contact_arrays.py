@@ -8,7 +8,7 @@ from typing import Self
 
 import numpy as np
 
-from ..problem import contact_surface
+from .. import geometry
 from ..report.solution_arrays import PartArrays
 from ..typing import Array, Integers, Mask
 
@@ -57,7 +57,7 @@ class ContactArrays:
             s=columns.get("s"),
             weight=part.weights,
             normal=part.normals,
-            tangents=contact_surface.tangents(part.normals),
+            tangents=geometry.tangents(part.normals),
             displacement=columns["u_n"],
             gap=columns.get("gap", np.full(len(part.weights), np.nan)),
             slip=slip,

@@ -19,9 +19,10 @@ import numpy as np
 from mpi4py import MPI
 
 from ..errors import InputError
+from ..geometry import tangents
 from ..runtime.mpi import agree, largest
 from ..typing import Array, Entities, Integers
-from .contact_surface import Surface, tangents
+from .contact_surface import Surface
 from .thresholds import DEFAULT, Thresholds
 
 

@@ -14,6 +14,7 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from ..errors import InputError
+from ..geometry import tangents
 from ..typing import Array, Entities, Integers
 from . import facet_integrals
 from .vectors import nodal
@@ -108,23 +109,6 @@ def _weights(space: fem.FunctionSpace, normal: Array, test: Any, measure: Any, b
         return np.asarray(np.linalg.norm(normal, axis=1))
     ones = ufl.as_vector([fem.Constant(space.mesh, 1.0)] * space.mesh.geometry.dim)
     return np.asarray(nodal(ufl.inner(ones, test) * measure)[blocks, 0])
-
-
-def tangents(normals: Array) -> Array:
-    """Unit tangents of outward normals (m, d), shape (m, d-1, d).
-
-    In 2D the one whose larger component is positive; in 3D t1 is the projected x-axis (the y-axis where n is within
-    45° of x) and t2 = n x t1.
-    """
-    if normals.shape[1] == 2:
-        t = np.column_stack([-normals[:, 1], normals[:, 0]])
-        rows = np.arange(len(t))
-        return (t * np.sign(t[rows, np.argmax(np.abs(t), axis=1)])[:, None])[:, None, :] + 0.0
-    steep = np.abs(normals[:, 0]) > np.sqrt(0.5)
-    axis = np.where(steep[:, None], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0])
-    t1 = axis - np.sum(axis * normals, axis=1)[:, None] * normals
-    t1 /= np.linalg.norm(t1, axis=1)[:, None]
-    return np.stack([t1, np.cross(normals, t1)], axis=1) + 0.0
 
 
 def component_dofs(blocks: Entities, directions: Array) -> tuple[Integers, Array]:

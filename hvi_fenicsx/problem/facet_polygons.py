@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import KDTree
 
+from ..geometry import tangents
 from ..typing import Array, Integers, Mask
 from . import triangle_clipping
-from .contact_surface import tangents
 from .facet_overlaps import Facets, Overlaps
 from .thresholds import DEFAULT, Thresholds
 from .triangle_clipping import CORNERS, Polygons, barycentric, twice_areas

@@ -13,10 +13,11 @@ import numpy as np
 from dolfinx import fem
 from scipy.sparse import csr_array
 
+from ..geometry import tangents
 from ..runtime.mpi import agree
 from ..typing import Array, Entities, Integers
 from . import curved_shapes, dual_basis, interface_checks, interface_sides
-from .contact_surface import Surface, tangents
+from .contact_surface import Surface
 from .domain_forms import DomainForms
 from .dual_basis import RelativeRows
 from .facet_overlaps import Facets, Overlaps

@@ -37,12 +37,14 @@ class ContactPart:
         columns: the columns of ``contact.csv`` that it has, (m,) each, in the order of that table.
         vertices: the vertices of the body, (m,).
         facets: its facets by the vertices of the body, (k, 2) or (k, 3).
+        normals: outward unit normals, (m, 2) or (m, 3).
     """
 
     name: str
     columns: Mapping[str, Array]
     vertices: Integers
     facets: Integers
+    normals: Array
 
     def __getitem__(self, column: str) -> Array:
         """A column of the table, (m,); NaN where the table is empty."""
@@ -133,7 +135,9 @@ class Result:
     def parts(self) -> tuple[ContactPart, ...]:
         """The parts of Γc, in the order of ``contact.csv``; none where the body is carried off."""
         found = {} if self.carried_off else self.arrays.parts
-        return tuple(ContactPart(name, part.columns, part.vertices, part.facets) for name, part in found.items())
+        return tuple(
+            ContactPart(name, part.columns, part.vertices, part.facets, part.normals) for name, part in found.items()
+        )
 
     @property
     def sides(self) -> Mapping[str, Integers]:

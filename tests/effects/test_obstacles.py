@@ -102,7 +102,7 @@ def test_a_list_of_an_obstacle_that_is_no_vector_may_have_any_length() -> None:
     found = obstacle({"shape": Stairs.shape, "begin": [0.0, 0.0], "heights": (1.0, 2.0, 3.0), "force": [0.0, -1.0]})
     found.check(2)
     assert found.dimension == 2
-    with pytest.raises(InputError, match="has 2 components; a 3D scene wants 3"):
+    with pytest.raises(InputError, match="has 2 components; in 3D it has 3"):
         found.check(3)
 
 

@@ -10,7 +10,7 @@ import pytest
 from scenes import model
 
 from hvi_fenicsx import InputError, Scene, prepare
-from hvi_fenicsx.problem.contact_surface import tangents
+from hvi_fenicsx.geometry import tangents
 
 
 @pytest.mark.parametrize("degrees", [0, 20, 44, 46, 70, 90, 135, 160])

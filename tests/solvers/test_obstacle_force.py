@@ -193,7 +193,7 @@ def test_a_plate_that_presses_beside_the_foot_tips_the_block(foot: float, state:
         ({"force": [0.0, 0.0, 3e4]}, "away from the body"),
         ({"displacement": [0.0, 0.0, -1e-4]}, "give one of them"),
         ({"force": [0.0, 0.0, 0.0]}, "is zero"),
-        ({"force": [0.0, -3e4]}, "wants 3"),
+        ({"force": [0.0, -3e4]}, "in 3D it has 3"),
     ],
 )
 def test_forces_that_make_no_sense_are_refused(obstacle: Table, said: str) -> None:

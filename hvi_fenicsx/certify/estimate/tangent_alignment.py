@@ -1,6 +1,6 @@
 """Components along tangents that jump from one node of a facet to the next, as components along nearly equal ones.
 
-The tangents of files are fixed by the axes of space (:func:`.contact_surface.tangents`). On a curved part they change
+The tangents of files are fixed by the axes of space (:func:`.geometry.tangents`). On a curved part they change
 their sign, in space their direction, between two nodes; a component that is interpolated there means nothing.
 """
 

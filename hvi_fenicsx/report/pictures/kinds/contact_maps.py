@@ -1,9 +1,8 @@
-"""``contact.png`` in space: slip, -σ_t and contact pressure over a part, seen flat, from its mean normal."""
+"""``contact.png`` in space: slip, -σ_t and contact pressure over a part laid flat."""
 
 from __future__ import annotations
 
 import textwrap
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -13,15 +12,15 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from matplotlib.tri import Triangulation
 
-from ....typing import Array, Integers
-from ...body_mesh import BodyMesh
+from ....geometry import tangents
+from ....typing import Array
 from ...reader import ContactPart, Result
 from ...units import Unit, quantity, unit_for
-from ..deformed import PartGeometry, part_geometries
+from ..deformed import part_geometries
+from ..flat_parts import FlatPart, laid_flat
 from ..raster import shade
 from ..registry import picture
 from ..style import BLUE, GREEN, GREY, HEADING, INK, WIDTH, area, figure, heading, pressure_scale, shades
-from ..vtk_view import area_vectors
 
 WIDEST, TALLEST = 5.8, 2.75
 """Inches: a map."""
@@ -34,23 +33,6 @@ ARROWS = 13
 """Along the longer side of a map."""
 
 
-@dataclass(frozen=True)
-class FlatPart:
-    """A part laid flat.
-
-    Attributes:
-        points: its vertices, m, (m, 2).
-        triangles: its facets by its vertices, (k, 3).
-        axes: the two unit vectors that its coordinates run along, (2, 3).
-        names: of these axes.
-    """
-
-    points: Array
-    triangles: Integers
-    axes: Array
-    names: tuple[str, str]
-
-
 @picture("contact", dimension=3, of_part=True, caption="Along {part}: displacement, friction and pressure.")
 def draw(result: Result, part: ContactPart) -> Figure:
     """Draw the three maps of a part.
@@ -60,12 +42,12 @@ def draw(result: Result, part: ContactPart) -> Figure:
         part: the part of Γc, in space.
     """
     geometry = next(geometry for geometry in part_geometries(result) if geometry.part.name == part.name)
-    flat, normal = laid_flat(geometry, result.body)
+    flat = laid_flat(geometry, result.body)
     rows: list[tuple[str, str, Array, Array | None, Colormap | None]] = [
-        ("slip", "m", part.slip, _vectors(part, flat, normal, "u_t"), shades(BLUE))
+        ("slip", "m", part.slip, _vectors(part, flat, "u_t"), shades(BLUE))
     ]
     if result.resists(part.name, "slip", "separation"):
-        rows.append(("friction", "Pa", part.friction, _vectors(part, flat, normal, "friction_t"), shades(GREEN)))
+        rows.append(("friction", "Pa", part.friction, _vectors(part, flat, "friction_t"), shades(GREEN)))
     rows.append(("contact pressure", "Pa", part.pressure, None, None))
     width, height = _map_size(flat)
     fig = figure(HEADING + len(rows) * (height + GAP) + FOOT)
@@ -73,7 +55,7 @@ def draw(result: Result, part: ContactPart) -> Figure:
     for above, (words, name, values, arrows, colours) in enumerate(reversed(rows)):
         axes = area(fig, LEFT, FOOT + above * (height + GAP), width, height)
         unit = unit_for(float(np.nanmax(np.abs(values), initial=0.0)), name)
-        _map(fig, axes, flat, np.asarray(values / unit.size), colours, _symbol(words, unit))
+        _map(fig, axes, flat, np.asarray(values / unit.size)[flat.rows], colours, _symbol(words, unit))
         _grey_where_lifted(axes, flat, part)
         if arrows is not None:
             _arrows(axes, flat, arrows)
@@ -82,33 +64,16 @@ def draw(result: Result, part: ContactPart) -> Figure:
     return fig
 
 
-def laid_flat(geometry: PartGeometry, body: BodyMesh) -> tuple[FlatPart, Array]:
-    """Lay a part flat along two of the coordinate axes, those most along it.
+def _vectors(part: ContactPart, flat: FlatPart, column: str) -> Array:
+    """A tangential field of the table along the map's coordinates.
 
     Args:
-        geometry: where the part lies on the body.
-        body: the body.
-
-    Returns:
-        The flat part, and its mean unit normal (3,).
+        part: the part of Γc.
+        flat: the part laid flat.
+        column: of the field, without the number of the tangent.
     """
-    total = area_vectors(body.points, geometry.facets).sum(axis=0)
-    normal = total / (float(np.linalg.norm(total)) or 1.0)
-    kept = [i for i in range(3) if i != int(np.argmax(np.abs(normal)))]
-    axes = np.eye(3)[kept]
-    return FlatPart(
-        geometry.part.points @ axes.T, geometry.row[geometry.facets], axes, ("xyz"[kept[0]], "xyz"[kept[1]])
-    ), normal
-
-
-def _vectors(part: ContactPart, flat: FlatPart, normal: Array, column: str) -> Array:
-    """A tangential field of the table along the map's axes; its tangents are the contract's, of the mean normal."""
-    axis = np.array([0.0, 1.0, 0.0]) if abs(normal[0]) > np.cos(np.pi / 4) else np.array([1.0, 0.0, 0.0])
-    first = axis - (axis @ normal) * normal
-    first = first / np.linalg.norm(first)
-    tangents = np.stack([first, np.cross(normal, first)])
     values = np.nan_to_num(np.column_stack([part[f"{column}1"], part[f"{column}2"]]))
-    return np.asarray(values @ tangents @ flat.axes.T)
+    return flat.along(np.einsum("rk,rkd->rd", values, tangents(part.normals)))
 
 
 def _map_size(flat: FlatPart) -> tuple[float, float]:
@@ -159,7 +124,7 @@ def _image(axes: Axes, flat: FlatPart, values: Array) -> Array:
 
 def _grey_where_lifted(axes: Axes, flat: FlatPart, part: ContactPart) -> None:
     if part.idle.any():
-        image = _image(axes, flat, part.idle.astype(float))
+        image = _image(axes, flat, part.idle[flat.rows].astype(float))
         veil = np.zeros((*image.shape, 4))
         veil[...] = (0.55, 0.55, 0.55, 0.0)
         veil[..., 3] = np.where(image > 0.5, 0.45, 0.0)
@@ -212,7 +177,7 @@ def _notes(fig: Figure, result: Result, part: ContactPart, flat: FlatPart) -> No
         at = f"at {quantity(float(kink * stretch[0]), 'm')}" if constant else "at lengths that change"
         if np.nanmin(slip) < kink < np.nanmax(slip):
             triangles = Triangulation(flat.points[:, 0], flat.points[:, 1], flat.triangles)
-            axes.tricontour(triangles, slip, [kink], colors=INK, linestyles="--")
+            axes.tricontour(triangles, slip[flat.rows], [kink], colors=INK, linestyles="--")
             said.append(f"dashed: the law drops {at}")
         else:
             said.append(f"the law drops {at}, not reached")

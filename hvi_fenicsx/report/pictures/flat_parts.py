@@ -1,0 +1,134 @@
+"""Contact parts in space laid flat: along two of the coordinate axes, or unrolled where a part goes round an axis."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...typing import Array, Integers, Mask
+from ..body_mesh import BodyMesh
+from .deformed import PartGeometry
+from .vtk_view import area_vectors
+
+CLOSED = 0.5
+"""A part whose normals add up to less than this share of its area may go round an axis."""
+ALONG = 0.05
+"""So small a share of its area looks along that axis, and at least twice as much along any direction across."""
+OPEN = np.pi / 6
+"""A part that goes round leaves this angle open, or none."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class FlatPart:
+    """A part laid flat.
+
+    Attributes:
+        points: its vertices, m, (m, 2); those at a cut occur on both sides of it.
+        rows: of each of them its row in the part's table, (m,).
+        triangles: its facets by its vertices, (k, 3).
+        ways: the unit vectors along which the two coordinates grow at each vertex, (m, 2, 3).
+        names: of the coordinates.
+    """
+
+    points: Array
+    rows: Integers
+    triangles: Integers
+    ways: Array
+    names: tuple[str, str]
+
+    def along(self, vectors: Array) -> Array:
+        """The components of vectors along the coordinates, (m, 2).
+
+        Args:
+            vectors: by row of the part's table, (rows, 3).
+        """
+        return np.asarray(np.einsum("md,mwd->mw", vectors[self.rows], self.ways))
+
+
+def laid_flat(geometry: PartGeometry, body: BodyMesh) -> FlatPart:
+    """Lay a part flat: along the two coordinate axes that are most along it, or unrolled.
+
+    Args:
+        geometry: where the part lies on the body.
+        body: the body.
+    """
+    areas = area_vectors(body.points, geometry.facets)
+    total, size = areas.sum(axis=0), float(np.linalg.norm(areas, axis=1).sum())
+    axis = _axis(areas) if float(np.linalg.norm(total)) < CLOSED * size else None
+    points, triangles = geometry.part.points, geometry.row[geometry.facets]
+    if axis is None:
+        return _projected(points, triangles, total)
+    return _unrolled(points, triangles, axis, ~geometry.part.idle)
+
+
+def _axis(areas: Array) -> Array | None:
+    """The axis that a part goes round, its largest component positive; None where it goes round none."""
+    sizes = np.maximum(np.linalg.norm(areas, axis=1), 1e-300)
+    shares, directions = np.linalg.eigh(areas.T @ (areas / sizes[:, None]) / float(sizes.sum()))
+    if shares[0] > ALONG or shares[1] < 2.0 * ALONG:
+        return None
+    found = directions[:, 0]
+    return np.asarray(found * np.sign(found[np.argmax(np.abs(found))]))
+
+
+def _projected(points: Array, triangles: Integers, total: Array) -> FlatPart:
+    kept = [i for i in range(3) if i != int(np.argmax(np.abs(total)))]
+    axes = np.eye(3)[kept]
+    return FlatPart(
+        points=points @ axes.T,
+        rows=np.arange(len(points)),
+        triangles=triangles,
+        ways=np.broadcast_to(axes, (len(points), 2, 3)),
+        names=("xyz"[kept[0]], "xyz"[kept[1]]),
+    )
+
+
+def _unrolled(points: Array, triangles: Integers, axis: Array, touches: Mask) -> FlatPart:
+    """Angle times mean radius, and the way along the axis."""
+    towards = 0 if abs(axis[0]) < np.sqrt(0.5) else 1
+    first = np.eye(3)[towards] - axis[towards] * axis
+    plane = np.stack([first / np.linalg.norm(first), np.cross(axis, first / np.linalg.norm(first))])
+    across = points @ plane.T
+    across = across - _centre(across)
+    angles, radius = np.arctan2(across[:, 1], across[:, 0]), float(np.linalg.norm(across, axis=1).mean())
+    angles = _from_cut(angles, touches)
+    rows, triangles, turns = _cut(angles, triangles)
+    turned = angles[rows]
+    round_ways = -np.sin(turned)[:, None] * plane[0] + np.cos(turned)[:, None] * plane[1]
+    main = int(np.argmax(axis))
+    return FlatPart(
+        points=np.column_stack([radius * (turned + 2.0 * np.pi * turns), points[rows] @ axis]),
+        rows=rows,
+        triangles=triangles,
+        ways=np.stack([round_ways, np.broadcast_to(axis, round_ways.shape)], axis=1),
+        names=(f"way round, 0 towards +{'xyz'[towards]},", "xyz"[main] if axis[main] > 1.0 - 1e-9 else "way along,"),
+    )
+
+
+def _centre(points: Array) -> Array:
+    """The centre of the circle nearest to points in a plane, (2,)."""
+    matrix = np.column_stack([2.0 * points, np.ones(len(points))])
+    return np.asarray(np.linalg.lstsq(matrix, np.sum(points**2, axis=1))[0][:2])
+
+
+def _from_cut(angles: Array, touches: Mask) -> Array:
+    """Angles over one turn from a cut: in the middle of what a part leaves open, else opposite to where it touches."""
+    ordered = np.sort(angles)
+    gaps = np.diff(np.append(ordered, ordered[0] + 2.0 * np.pi))
+    widest = int(np.argmax(gaps))
+    opposite = float(np.angle(np.sum(np.exp(1j * angles[touches])))) - np.pi
+    start = ordered[widest] + 0.5 * gaps[widest] - 2.0 * np.pi if gaps[widest] > OPEN else opposite
+    return np.asarray(start + np.mod(angles - start, 2.0 * np.pi))
+
+
+def _cut(angles: Array, triangles: Integers) -> tuple[Integers, Integers, Array]:
+    """Facets across the cut get vertices of their own beyond its end: all vertices' rows, facets, and whole turns."""
+    corners = angles[triangles]
+    across = np.ptp(corners, axis=1) > np.pi
+    early = across[:, None] & (corners < corners.max(axis=1, keepdims=True) - np.pi)
+    copied, number = np.unique(triangles[early], return_inverse=True)
+    found = triangles.copy()
+    found[early] = len(angles) + number
+    turns = np.concatenate([np.zeros(len(angles)), np.ones(len(copied))])
+    return np.concatenate([np.arange(len(angles)), copied]), found, turns

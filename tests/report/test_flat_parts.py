@@ -1,0 +1,75 @@
+"""Contact parts that go round an axis are unrolled: no facet lies on another, and directions are those of the part."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from hvi_fenicsx.report.pictures.flat_parts import laid_flat
+from hvi_fenicsx.typing import Array, Integers, Mask
+
+RADIUS, HEIGHT, AROUND = 0.5, 1.2, 24
+
+
+def shell(turn: float) -> tuple[Array, Integers]:
+    """The inside of a bore about y over an angle: points (m, 3), and facets that look at the axis."""
+    closed = turn > 6.28
+    angles = np.linspace(0.0, turn, AROUND + (not closed), endpoint=not closed)
+    low, high = (np.column_stack([RADIUS * np.cos(angles), np.full(len(angles), y), RADIUS * np.sin(angles)])
+                 for y in (0.0, HEIGHT))  # fmt: skip
+    first = np.arange(AROUND)
+    other, above = (first + 1) % len(angles), len(angles)
+    facets = np.concatenate(
+        [np.stack([first, other, first + above], 1), np.stack([other, other + above, first + above], 1)]
+    )
+    return np.concatenate([low, high]), facets
+
+
+def bore(turn: float, idle: Mask | None = None) -> tuple[Any, Any]:
+    """A part that is all of a body's surface, and the body."""
+    points, facets = shell(turn)
+    none = np.zeros(len(points), dtype=bool)
+    part = SimpleNamespace(points=points, idle=none if idle is None else idle)
+    return SimpleNamespace(part=part, facets=facets, row=np.arange(len(points))), SimpleNamespace(points=points)
+
+
+def areas(points: Array, triangles: Integers) -> Array:
+    one, other = (points[triangles[:, k]] - points[triangles[:, 0]] for k in (1, 2))
+    return np.asarray(0.5 * (one[:, 0] * other[:, 1] - one[:, 1] * other[:, 0]))
+
+
+@pytest.mark.parametrize("turn", [2.0 * np.pi, 1.6 * np.pi])
+def test_an_unrolled_bore_has_the_area_of_its_shell(turn: float) -> None:
+    flat = laid_flat(*bore(turn))
+    each = areas(flat.points, flat.triangles)
+    assert np.all(each < 0.0) or np.all(each > 0.0)
+    assert abs(each.sum()) == pytest.approx(turn * RADIUS * HEIGHT, rel=1e-9)
+    assert np.ptp(flat.points[:, 0]) <= (turn + 2.0 * np.pi / AROUND) * RADIUS + 1e-12
+    assert flat.names[1] == "y"
+
+
+def test_where_a_bore_touches_is_in_the_middle_of_its_map() -> None:
+    points, _ = shell(2.0 * np.pi)
+    flat = laid_flat(*bore(2.0 * np.pi, points[:, 0] > -0.8 * RADIUS))
+    touching = flat.points[points[flat.rows, 0] <= -0.8 * RADIUS, 0]
+    ends = flat.points[:, 0].min(), flat.points[:, 0].max()
+    assert np.ptp(touching) < 0.25 * (ends[1] - ends[0])
+    assert abs(touching.mean() - np.mean(ends)) < 0.05 * (ends[1] - ends[0])
+
+
+def test_vectors_on_an_unrolled_bore_run_along_its_coordinates() -> None:
+    geometry, body = bore(2.0 * np.pi)
+    normals = -geometry.part.points * [1.0, 0.0, 1.0] / RADIUS
+    flat, around = laid_flat(geometry, body), np.cross([0.0, 1.0, 0.0], normals)
+    assert np.abs(flat.along(around)) == pytest.approx(np.tile([1.0, 0.0], (len(flat.rows), 1)), abs=1e-12)
+    assert flat.along(np.tile([0.0, 1.0, 0.0], (len(normals), 1)))[:, 1] == pytest.approx(np.ones(len(flat.rows)))
+
+
+def test_a_part_that_is_open_is_seen_along_its_axes() -> None:
+    geometry, body = bore(0.5 * np.pi)
+    flat = laid_flat(geometry, body)
+    assert "way" not in flat.names[0]
+    assert len(flat.rows) == len(geometry.part.points)
