@@ -3,30 +3,14 @@
 from __future__ import annotations
 
 import pytest
+from path_rows import path_row
 
 from hvi_fenicsx.equilibrium_paths.state import End
-from hvi_fenicsx.load_path import LoadPath, PathRow
-
-
-def row(factor: float, event: str) -> PathRow:
-    return PathRow(
-        factor=factor,
-        event=event,
-        part=None,
-        point=None,
-        energy=0.0,
-        work=0.0,
-        dissipated=0.0,
-        released=0.0,
-        unstable=0,
-        forces={},
-        displacements={},
-        certified=True,
-    )
+from hvi_fenicsx.load_path import LoadPath
 
 
 def path(sign: float, events: dict[str, float], end: str) -> LoadPath:
-    rows = tuple(row(sign * factor, event) for event, factor in events.items())
+    rows = tuple(path_row(sign * factor, event) for event, factor in events.items())
     return LoadPath(dimension=2, scaled=("pull.traction",), rows=rows, end=end, reason="", examined=0)
 
 

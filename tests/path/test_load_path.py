@@ -2,31 +2,15 @@
 
 from __future__ import annotations
 
-import numpy as np
+from path_rows import path_row
 
 from hvi_fenicsx.equilibrium_paths.state import End
-from hvi_fenicsx.load_path import LoadPath, PathRow
+from hvi_fenicsx.load_path import LoadPath
 
 
 def path(*factors: float, end: str = End.REACHED) -> LoadPath:
     """A path with these factors, and nothing else in its rows."""
-    rows = tuple(
-        PathRow(
-            factor=factor,
-            event="kink",
-            part=None,
-            point=None,
-            energy=0.0,
-            work=0.0,
-            dissipated=0.0,
-            released=0.0,
-            unstable=0,
-            forces={"pull": np.zeros(2)},
-            displacements={"pull": np.zeros(2)},
-            certified=True,
-        )
-        for factor in factors
-    )
+    rows = tuple(map(path_row, factors))
     return LoadPath(dimension=2, scaled=("pull.traction",), rows=rows, end=end, reason="", examined=len(rows))
 
 

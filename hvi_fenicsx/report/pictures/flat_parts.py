@@ -87,23 +87,28 @@ def _projected(points: Array, triangles: Integers, total: Array) -> FlatPart:
 def _unrolled(points: Array, triangles: Integers, axis: Array, touches: Mask) -> FlatPart:
     """Angle times mean radius, and the way along the axis."""
     towards = 0 if abs(axis[0]) < np.sqrt(0.5) else 1
-    first = np.eye(3)[towards] - axis[towards] * axis
-    plane = np.stack([first / np.linalg.norm(first), np.cross(axis, first / np.linalg.norm(first))])
-    across = points @ plane.T
-    across = across - _centre(across)
-    angles, radius = np.arctan2(across[:, 1], across[:, 0]), float(np.linalg.norm(across, axis=1).mean())
-    angles = _from_cut(angles, touches)
+    plane = _across(axis, towards)
+    arms = points @ plane.T
+    arms = arms - _centre(arms)
+    angles = _from_cut(np.arctan2(arms[:, 1], arms[:, 0]), touches)
     rows, triangles, turns = _cut(angles, triangles)
-    turned = angles[rows]
-    round_ways = -np.sin(turned)[:, None] * plane[0] + np.cos(turned)[:, None] * plane[1]
-    main = int(np.argmax(axis))
+    angles, radius = angles[rows], float(np.linalg.norm(arms, axis=1).mean())
+    onward = np.column_stack([-np.sin(angles), np.cos(angles)]) @ plane
+    along = "xyz"[int(np.argmax(axis))] if np.max(axis) > 1.0 - 1e-9 else "way along,"
     return FlatPart(
-        points=np.column_stack([radius * (turned + 2.0 * np.pi * turns), points[rows] @ axis]),
+        points=np.column_stack([radius * (angles + 2.0 * np.pi * turns), points[rows] @ axis]),
         rows=rows,
         triangles=triangles,
-        ways=np.stack([round_ways, np.broadcast_to(axis, round_ways.shape)], axis=1),
-        names=(f"way round, 0 towards +{'xyz'[towards]},", "xyz"[main] if axis[main] > 1.0 - 1e-9 else "way along,"),
+        ways=np.stack([onward, np.broadcast_to(axis, onward.shape)], axis=1),
+        names=(f"way round, 0 towards +{'xyz'[towards]},", along),
     )
+
+
+def _across(axis: Array, towards: int) -> Array:
+    """Two unit vectors across an axis, the first as near as possible to one of the coordinate axes, (2, 3)."""
+    first = np.eye(3)[towards] - axis[towards] * axis
+    first /= np.linalg.norm(first)
+    return np.stack([first, np.cross(axis, first)])
 
 
 def _centre(points: Array) -> Array:
