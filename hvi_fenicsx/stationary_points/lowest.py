@@ -38,6 +38,8 @@ LOST = 0.25
 """Share of a box's gap that the chords of rigid motions may take off."""
 WIDENED = 1e-9
 """Relative widening of radii, for rounding."""
+SHARE_USED = 0.999
+"""Share of the allowed gap that a search uses: so that rounding lifts no told gap above it."""
 ROUNDING = 1e-13
 """Energies that differ by less than this share of their parts are equal."""
 
@@ -171,7 +173,7 @@ class LowestSearch:
 
     @property
     def _allowed(self) -> float:
-        return max(self.gap * self._size, ROUNDING * self._parts)
+        return max(SHARE_USED * self.gap * self._size, ROUNDING * self._parts)
 
     @property
     def _parts(self) -> float:

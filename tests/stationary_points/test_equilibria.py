@@ -52,6 +52,8 @@ def test_python_finds_all_certified_and_proves_the_lowest(caplog: pytest.LogCapt
     assert lowest.proven
     assert lowest.lower_bound is not None
     assert energies()[0] * (1 + 2e-8) <= lowest.lower_bound <= energies()[0]
+    assert lowest.gap is not None
+    assert lowest.gap <= 1e-8
 
 
 def test_the_command_writes_each_equilibrium_and_refuses_what_is_there(
