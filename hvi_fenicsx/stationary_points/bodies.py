@@ -28,7 +28,13 @@ from .search_lowest import begun
 COARSE_GAP = 1e-3
 """Gap of the first search where laws are curved, from which the error of their polylines is chosen."""
 ERROR_SHARE = 0.05
-"""Share of the gap that this error may take."""
+"""Share of the gap that this error is aimed at,"""
+MOST_SHARE = 0.4
+"""and that it may take, on each side."""
+MOST_SEARCHES = 6
+"""First searches, each in the region that the one before has left."""
+SHORTER = 0.5
+"""The next one is made while some side of the region shrinks to this share."""
 
 SAME = 1e-9
 """Points of two ranks nearer than this share of the displacements are one."""
@@ -106,8 +112,16 @@ class Equilibria:
         start = begun(coarse, COARSE_GAP, stop, report)
         if start is None:
             return wanted
-        size = max(abs(start.energy), 1e-6 * coarse.energy_size(start.x))
-        self.problem = scalar_problem(self._condensation.problem, tolerance=ERROR_SHARE * wanted.gap * size)
+        for _ in range(MOST_SEARCHES):
+            size = max(abs(start.energy), 1e-6 * coarse.energy_size(start.x))
+            aim = ERROR_SHARE * wanted.gap * size
+            self.problem = scalar_problem(self._condensation.problem, tolerance=aim, within=start.reach)
+            if self.problem.error <= MOST_SHARE * wanted.gap * size:
+                break
+            nearer = begun(self.problem, COARSE_GAP, stop, report, start)
+            if nearer is None or np.all(nearer.reach > SHORTER * start.reach):
+                break
+            start = nearer
         return replace(wanted, start=start)
 
     def _check_same(self, x: Array) -> None:
