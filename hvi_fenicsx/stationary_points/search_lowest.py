@@ -19,7 +19,7 @@ from .search_task import MOST_BOXES, Task, stacked
 SIDES = 2.1
 """How often the gap counts the difference of energies of laws and their polylines: on both sides, and some more."""
 OWN_GAP = 0.05
-"""The least share of the gap that a search may leave where the laws are curved; what their polylines differ takes off."""
+"""The least share of the gap that a search may leave where laws are curved."""
 
 
 def lowest(task: Task) -> Found:
