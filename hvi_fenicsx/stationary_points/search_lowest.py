@@ -8,7 +8,7 @@ import numpy as np
 
 from ..errors import SolverError
 from ..typing import Array
-from .found import Found, Saved, Start
+from .found import Found, Saved, Start, Wanted
 from .length_kinds import kind_of
 from .lowest import LowestSearch, Progress
 from .point_list import StationaryPoint
