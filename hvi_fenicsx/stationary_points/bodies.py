@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..certify.uniqueness import is_convex
 from ..errors import SolverError
 from ..preparation import Preparation
 from ..runtime.mpi import agree
@@ -24,6 +25,7 @@ from .progress_words import Unit
 from .scalar_problem import ScalarProblem
 from .search import find
 from .search_lowest import begun
+from .stationarity import Kind
 
 COARSE_GAP = 1e-3
 """Gap of the first search where laws are curved, from which the error of their polylines is chosen."""
@@ -97,6 +99,8 @@ class Equilibria:
             energies=Unit(size=scales.energy, name="J/m" if scales.dimension == 2 else "J"),
         )
         with self._prepared.timer("solve"):
+            if not lowest and saved is None and (only := self._only()) is not None:
+                return only
             if self.problem.error and lowest:
                 wanted = self._refined(self.problem, wanted, stop, report)
             elif self.problem.error and not len(self.problem.lengths):
@@ -104,6 +108,20 @@ class Equilibria:
                 near = scalar_problem(condensed, tractions=True)
                 wanted = replace(wanted, curved=CurvedLaws(near=near, problem=condensed))
             return find(self.problem, wanted, stop, report, saved, keep)
+
+    def _only(self) -> Found | None:
+        """The only equilibrium, where convexity proves that it is the only one; else None. Collective."""
+        system = self._prepared.system
+        if not is_convex(system):
+            return None
+        known = finish(self._prepared, estimating=False)
+        result, examined, only = known.solve_result, known.examination, known.uniqueness
+        if result is None or examined is None or only is None or only.state != "unique":
+            return None
+        x, energy = self._condensation.restricted(system.unknowns(result.u)), examined.energy
+        point = StationaryPoint(x=x, energy=energy, kind=Kind.MINIMISER, isolated=True)
+        reason = f"the only equilibrium, proven: {only.why}"
+        return Found(points=(point,), complete=True, lower_bound=energy, proven=True, nodes=0, reason=reason)
 
     def _refined(
         self, coarse: ScalarProblem, wanted: Wanted, stop: Callable[[], bool], report: Callable[[str], None]
