@@ -341,7 +341,7 @@ def test_of_such_laws_equilibria_are_found_without_a_proof_that_these_are_all() 
 
 
 def test_where_the_energy_is_convex_the_only_equilibrium_is_proven_at_once() -> None:
-    """Friction that never weakens: the search for the lowest energy, which knows nothing of it, ends at the same one."""
+    """Friction that never weakens; the search for the lowest energy knows nothing of it, and ends there too."""
     table = space(2)
     table["boundary"]["floor"]["friction"] = {"law": "tresca", "yield_traction": 4e6}
     scene = hvi.Scene.model_validate(table)
