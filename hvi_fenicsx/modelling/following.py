@@ -23,6 +23,7 @@ from ..report.path_reader import PathResult
 from ..results import ResultFolder
 from ..results.output_folder import existing
 from ..runtime import log
+from ..runtime.argument_checks import require_path
 from ..scene import PathTable, Scene, SolverTable
 from ..schema import located_error, unknown
 from ..typing import Array
@@ -138,6 +139,7 @@ class ModelPath(LoadPath):
         Raises:
             InputError: on all ranks alike: the folder holds a result or other files, or cannot be written.
         """
+        require_path("folder", folder)
         comm = self.run.prepared.system.comm
         with ResultFolder(comm, Path(folder), existing(force=force)) as target:
             path_output.write(target, self.run, self, GIVEN, _LOG.warning, draw=pictures)

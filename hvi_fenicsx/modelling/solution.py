@@ -20,6 +20,7 @@ from ..results import ResultFolder, gathering
 from ..results.output_folder import existing
 from ..results.whole import picture_process, write_whole
 from ..runtime import log, notebook
+from ..runtime.argument_checks import require_kind, require_path
 from ..solution import Solution
 from ..solvers.result import SolveResult
 from ..typing import Array
@@ -135,6 +136,7 @@ class ModelSolution(Solution):
         Raises:
             InputError: on all ranks alike: there is no such picture of it.
         """
+        require_kind("picture", picture, (str, type(None)), "the name of a picture, or None")
         return plotting.draw(self, picture or ("escape" if self.solve_result is None else "body"))
 
     def write(self, folder: str | os.PathLike[str], *, force: bool = False, pictures: bool = True) -> None:
@@ -150,6 +152,7 @@ class ModelSolution(Solution):
         Raises:
             InputError: on all ranks alike: the folder holds a result or other files, or cannot be written.
         """
+        require_path("folder", folder)
         comm, dimension = self.problem.domain.mesh.comm, self.problem.scales.dimension
         with (
             ResultFolder(comm, Path(folder), existing(force=force)) as target,

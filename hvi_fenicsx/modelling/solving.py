@@ -18,6 +18,7 @@ from ..mesh.domain import Domain
 from ..path import last_borne
 from ..preparation import DEFAULT, Preparation, Thresholds
 from ..problem import spaces
+from ..runtime.argument_checks import require_kind, require_switch
 from ..runtime.log import newton_step
 from ..runtime.timing import Timer
 from ..scene import Scene, SolverTable
@@ -26,7 +27,6 @@ from ..solution import Solution
 from ..solvers.context import Progress
 from ..system import petsc_options
 from . import values
-from .argument_checks import require_switch
 from .model import Model, is_portable, scene_and_ranks
 from .solution import ModelSolution
 
@@ -106,6 +106,7 @@ def check(
     Raises:
         InputError: on all ranks alike: an option is not allowed, or the model does not fit its mesh.
     """
+    require_kind("timer", timer, (Timer, type(None)), "a Timer of hvi_fenicsx.runtime.timing, or None")
     scene, ranks = scene_and_ranks(model, comm)
     domain = _domain(model) if isinstance(model, Model) else None
     scene = _with_options(scene, options)

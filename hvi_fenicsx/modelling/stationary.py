@@ -9,6 +9,7 @@ from typing import Any
 from mpi4py import MPI
 
 from ..runtime import log
+from ..runtime.argument_checks import require_between, require_switch
 from ..runtime.mpi import time_over
 from ..scene import Scene
 from ..solution import Solution
@@ -16,7 +17,6 @@ from ..stationary_points import bodies
 from ..stationary_points.found import Found
 from ..stationary_points.passes import Pass
 from ..stationary_points.progress_words import Clock, certified_in_words
-from .argument_checks import require_between, require_switch
 from .model import Model
 from .solution import ModelSolution
 from .solving import check, fields_of

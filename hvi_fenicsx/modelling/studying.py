@@ -17,6 +17,7 @@ from mpi4py import MPI
 from ..errors import InputError
 from ..mesh.shapes import OnlyMesh
 from ..results.output_folder import OutputFolder, existing
+from ..runtime.argument_checks import require_path
 from ..runtime.mpi import on_root
 from ..scene import Scene
 from ..spatial_value import SpatialValue
@@ -91,6 +92,8 @@ def study(
             no number of solves.
         NoReferenceError: on all ranks alike: no solution exists, or the reference is not certified.
     """
+    if folder is not None:
+        require_path("folder", folder)
     scene, ranks = scene_and_ranks(model, comm)
     scene = _scene(model) if isinstance(model, Model) else scene
     _check_repeats(repeats)

@@ -18,6 +18,7 @@ from typing import Any, Self
 
 from ..errors import InputError
 from . import terminal
+from .argument_checks import require_kind
 from .newton_step import NewtonStep
 
 PACKAGE = __name__.partition(".")[0]
@@ -54,6 +55,7 @@ def set_log_level(level: int | str = logging.INFO) -> None:
     Raises:
         InputError: there is no such level.
     """
+    require_kind("log level", level, (int, str), 'a name such as "INFO", or a whole number')
     known = logging.getLevelNamesMapping()
     if isinstance(level, str) and level not in known:
         raise InputError(f"log level: there is no {level!r}; there are: {', '.join(known)}")

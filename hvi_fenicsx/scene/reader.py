@@ -15,6 +15,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from ..errors import InputError
+from ..runtime.argument_checks import require_path
 from ..schema import Keys, Mistake, mistakes_of
 from .named_tables import WHOLE
 from .overrides import override
@@ -41,6 +42,7 @@ def read_scene(path: str | os.PathLike[str], overrides: Sequence[str] = ()) -> S
         InputError: the file cannot be read or is not a valid scene; up to ten mistakes, one a line, each
             with its line in the file, the key, what is allowed and how to mend it.
     """
+    require_path("path", path)
     return _Source.read(path, overrides).scene()
 
 

@@ -309,3 +309,20 @@ def test_what_was_taken_in_silence_or_raised_no_words_is_refused(square: hvi.Bod
     """The text "no" counted as True, and some of these raised a bare TypeError, OverflowError or ValueError."""
     with pytest.raises(hvi.InputError, match=reason):
         made(square)
+
+
+@pytest.mark.parametrize(
+    ("made", "reason"),
+    [
+        (lambda model: hvi.read_scene(3), "^path: must be a path.* .is 3"),  # type: ignore[arg-type]
+        (lambda model: hvi.study(model, True), "^folder: must be a path.* .is True"),
+        (lambda model: hvi.set_log_level(None), "^log level: must be a name.* .is None"),  # type: ignore[arg-type]
+        (lambda model: hvi.solve(model, timer=3), "^timer: must be a Timer.* .is 3"),
+        (lambda model: hvi.solve(model, estimate=False).write(True), "^folder: must be a path.* .is True"),
+        (lambda model: hvi.solve(model, estimate=False).plot([1.0]), "^picture: must be the name.* .is .1.0"),
+    ],
+)
+def test_a_value_of_another_kind_is_refused_in_words(square: hvi.Body, made: Any, reason: str) -> None:
+    """They raised a bare TypeError or AttributeError."""
+    with pytest.raises(hvi.InputError, match=reason):
+        made(hvi.Model(square, [STEEL, hvi.Displacement("left", [0.0, 0.0]), hvi.Traction("right", [1e6, 0.0])]))
