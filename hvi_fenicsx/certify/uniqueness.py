@@ -57,6 +57,17 @@ class Uniqueness:
         return asdict(self)
 
 
+def is_convex(system: System, thresholds: UniquenessThresholds = UNIQUENESS) -> bool:
+    """Whether the energy is known to be convex; the laws' tangents of the system are set to 0. Collective.
+
+    Args:
+        system: the system.
+        thresholds: what is tried, and what is rounding.
+    """
+    modes = existence.motions(system.problem, contact_closed=False)
+    return _doubt(system, modes, _motions(system, modes), thresholds) is None
+
+
 def uniqueness(
     system: System, u: fem.Function, examination: Examination, thresholds: UniquenessThresholds = UNIQUENESS
 ) -> Uniqueness:
@@ -69,7 +80,7 @@ def uniqueness(
         thresholds: what is tried, and what is rounding.
     """
     modes = existence.motions(system.problem, contact_closed=False)
-    motions = [system.unknowns(field).array_r.copy() for field in free_motions.fields(system.problem, modes)]
+    motions = _motions(system, modes)
     doubt, pressed = _doubt(system, modes, motions, thresholds), any(b.force is not None for b in system.bounds)
     everywhere = "; at every position of the obstacle" if pressed else ""
     if doubt is not None:
@@ -87,6 +98,11 @@ def uniqueness(
         return Uniqueness(state="unique", why=f"{proof}, and no rigid motion leaves it as it is{here}")
     together = ", or by motions together with the obstacle" if pressed else ""
     return Uniqueness(state="lowest", why=f"{proof}; others of the same energy may differ by: {left}{together}")
+
+
+def _motions(system: System, modes: Sequence[Mode]) -> list[Array]:
+    """Rigid motions in this rank's unknowns, (n,) each. Collective."""
+    return [system.unknowns(field).array_r.copy() for field in free_motions.fields(system.problem, modes)]
 
 
 def _doubt(

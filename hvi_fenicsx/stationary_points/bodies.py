@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..certify.uniqueness import is_convex
 from ..errors import SolverError
 from ..preparation import Preparation
 from ..runtime.mpi import agree
@@ -24,11 +25,18 @@ from .progress_words import Unit
 from .scalar_problem import ScalarProblem
 from .search import find
 from .search_lowest import begun
+from .stationarity import Kind
 
 COARSE_GAP = 1e-3
 """Gap of the first search where laws are curved, from which the error of their polylines is chosen."""
 ERROR_SHARE = 0.05
-"""Share of the gap that this error may take."""
+"""Share of the gap that this error is aimed at,"""
+MOST_SHARE = 0.4
+"""and that it may take, on each side."""
+MOST_SEARCHES = 6
+"""First searches, each in the region that the one before has left."""
+SHORTER = 0.5
+"""The next one is made while some side of the region shrinks to this share."""
 
 SAME = 1e-9
 """Points of two ranks nearer than this share of the displacements are one."""
@@ -91,6 +99,8 @@ class Equilibria:
             energies=Unit(size=scales.energy, name="J/m" if scales.dimension == 2 else "J"),
         )
         with self._prepared.timer("solve"):
+            if not lowest and saved is None and (only := self._only()) is not None:
+                return only
             if self.problem.error and lowest:
                 wanted = self._refined(self.problem, wanted, stop, report)
             elif self.problem.error and not len(self.problem.lengths):
@@ -99,6 +109,20 @@ class Equilibria:
                 wanted = replace(wanted, curved=CurvedLaws(near=near, problem=condensed))
             return find(self.problem, wanted, stop, report, saved, keep)
 
+    def _only(self) -> Found | None:
+        """The only equilibrium, where convexity proves that it is the only one; else None. Collective."""
+        system = self._prepared.system
+        if not is_convex(system):
+            return None
+        known = finish(self._prepared, estimating=False)
+        result, examined, only = known.solve_result, known.examination, known.uniqueness
+        if result is None or examined is None or only is None or only.state != "unique":
+            return None
+        x, energy = self._condensation.restricted(system.unknowns(result.u)), examined.energy
+        point = StationaryPoint(x=x, energy=energy, kind=Kind.MINIMISER, isolated=True)
+        reason = f"the only equilibrium, proven: {only.why}"
+        return Found(points=(point,), complete=True, lower_bound=energy, proven=True, nodes=0, reason=reason)
+
     def _refined(
         self, coarse: ScalarProblem, wanted: Wanted, stop: Callable[[], bool], report: Callable[[str], None]
     ) -> Wanted:
@@ -106,8 +130,16 @@ class Equilibria:
         start = begun(coarse, COARSE_GAP, stop, report)
         if start is None:
             return wanted
-        size = max(abs(start.energy), 1e-6 * coarse.energy_size(start.x))
-        self.problem = scalar_problem(self._condensation.problem, tolerance=ERROR_SHARE * wanted.gap * size)
+        for _ in range(MOST_SEARCHES):
+            size = max(abs(start.energy), 1e-6 * coarse.energy_size(start.x))
+            aim = ERROR_SHARE * wanted.gap * size
+            self.problem = scalar_problem(self._condensation.problem, tolerance=aim, within=start.reach)
+            if self.problem.error <= MOST_SHARE * wanted.gap * size:
+                break
+            nearer = begun(self.problem, COARSE_GAP, stop, report, start)
+            if nearer is None or np.all(nearer.reach > SHORTER * start.reach):
+                break
+            start = nearer
         return replace(wanted, start=start)
 
     def _check_same(self, x: Array) -> None:

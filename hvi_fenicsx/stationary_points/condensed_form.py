@@ -11,6 +11,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..system.condensed_problem import Bonds, CondensedProblem
+from ..typing import Array
 from .arcs import FREE, Chain, chain, total
 from .law_graphs import LawGraph, exact_graph, law_graph, near_graph
 from .lengths import Lengths
@@ -25,7 +26,12 @@ ROUNDED = 1e-12
 
 
 def scalar_problem(
-    problem: CondensedProblem, factor: float = 1.0, *, tolerance: float | None = None, tractions: bool = False
+    problem: CondensedProblem,
+    factor: float = 1.0,
+    *,
+    tolerance: float | None = None,
+    tractions: bool = False,
+    within: Array | None = None,
 ) -> ScalarProblem:
     """The problem at a load factor.
 
@@ -34,12 +40,14 @@ def scalar_problem(
         factor: λ.
         tolerance: energy by which curved laws may differ from their polylines, altogether; None: a coarse one.
         tractions: whether the polylines are to be near the tractions, too; then `force_error` is how near.
+        within: displacements up to which curved laws are followed, (n,); None: far beyond all that the laws tell apart.
 
     Raises:
         InputError: a law has no potential, or acts on the length of a vector whose components have other laws.
     """
     found: dict[_Argument, list[Chain]] = {}
-    far, constant, error = _far(problem.bonds), problem.constant_at(factor), 0.0
+    far = np.full(problem.size, _far(problem.bonds)) if within is None else within
+    constant, error = problem.constant_at(factor), 0.0
     force_error = np.zeros(problem.size)
     graphs = _near_graphs(problem.bonds, far) if tractions else _graphs(problem.bonds, far, tolerance)
     for bonds, law in zip(problem.bonds, graphs, strict=True):
@@ -63,7 +71,7 @@ def scalar_problem(
         constant=constant,
         error=error,
         force_error=force_error if tractions else 0.0,
-        farthest=far if error else math.inf,
+        farthest=float(np.max(far)) if error else math.inf,
     )
 
 
@@ -102,18 +110,24 @@ def _lengths(vectors: Sequence[_Argument]) -> Lengths:
     )
 
 
-def _graphs(laws: Sequence[Bonds], far: float, tolerance: float | None) -> Iterator[LawGraph]:
+def _graphs(laws: Sequence[Bonds], far: Array, tolerance: float | None) -> Iterator[LawGraph]:
     """The laws as polylines; those of curved laws share the error by their areas."""
     area = sum(float(b.weights.sum()) for b in laws if exact_graph(b.law) is None)
     for b in laws:
         aim = COARSE * b.law.energy_scale if tolerance is None else tolerance / (area or 1.0)
-        yield law_graph(b.law, far, aim)
+        yield law_graph(b.law, _argument(b, far), aim)
 
 
-def _near_graphs(laws: Sequence[Bonds], far: float) -> Iterator[LawGraph]:
+def _near_graphs(laws: Sequence[Bonds], far: Array) -> Iterator[LawGraph]:
     """The laws as polylines near their tractions."""
     for b in laws:
-        yield near_graph(b.law, far, NEAR * b.law.traction_scale)
+        yield near_graph(b.law, _argument(b, far), NEAR * b.law.traction_scale)
+
+
+def _argument(bonds: Bonds, far: Array) -> float:
+    """The largest argument of a law within displacements (n,), and no less than its own length."""
+    arguments = np.linalg.norm(bonds.signs * far[bonds.unknowns], axis=1)
+    return float(np.max(arguments, initial=bonds.law.length_scale))
 
 
 def _far(laws: Sequence[Bonds]) -> float:

@@ -95,10 +95,12 @@ class CurvedCells:
         """What is known of a cell that may have several points."""
         free = np.flatnonzero(cell.low < cell.high)
         least, most = (ends[free] for ends in self._laws.slopes(cell.low, cell.high))
-        matrix = self._near.stiffness[np.ix_(free, free)] + np.diag(np.where(np.isfinite(least), least, 0.0))
-        straight = most - least <= STRAIGHT * np.maximum(np.abs(least), np.abs(most))
-        if np.all(straight) and is_singular(matrix):
-            return self._straight(cell, free, matrix)
+        # a jump, or a bound that bears, has an infinite slope
+        finite = bool(np.all(np.isfinite([least, most])))
+        if finite and np.all(most - least <= STRAIGHT * np.maximum(np.abs(least), np.abs(most))):
+            matrix = self._near.stiffness[np.ix_(free, free)] + np.diag(least)
+            if is_singular(matrix):
+                return self._straight(cell, free, matrix)
         return Verdict(undecided=True, points=points) if (points := self._degenerate(cell)) else self._left(cell)
 
     def _straight(self, cell: Box, free: Integers, matrix: Array) -> Verdict:

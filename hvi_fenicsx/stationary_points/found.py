@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from ..typing import Array
 from .curved_laws import CurvedLaws
 from .passes import Pass
@@ -24,14 +26,19 @@ class Start:
     Attributes:
         x: a point of low energy, (n,).
         energy: there.
-        low: of a box that holds all points of lower energy, (n,).
-        high: of that box, (n,).
+        low: of a box that holds all points of lower energy, (n + m,).
+        high: of that box, (n + m,).
     """
 
     x: Array
     energy: float
     low: Array
     high: Array
+
+    @property
+    def reach(self) -> Array:
+        """The largest displacement of each unknown in the box, (n,)."""
+        return np.asarray(np.max(np.abs([self.low, self.high]), axis=0)[: len(self.x)])
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -2,8 +2,9 @@
 
 Between two nodes a curve's traction becomes two lines that meet in the middle, such that tractions and energies at the
 nodes are the law's own (Schumaker 1983, SIAM Journal on Numerical Analysis 20, with the knot in the middle). The
-difference of the energies between nodes is bounded by sampling it, and between samples by its derivative, whose range
-follows from the derivatives of the law's convex parts at the samples: these never fall.
+difference of the energies between nodes is bounded by sampling it, and between samples by the ranges of its first
+derivative, which follows from the derivatives of the law's convex parts at the samples (these never fall), and of its
+second, where the law tells its slopes. The smaller bound counts.
 """
 
 from __future__ import annotations
@@ -140,13 +141,24 @@ def _rises(law: Superpotential, x: Array) -> Array:
     return np.asarray(rises).reshape(len(x), -1)
 
 
+def _slopes_apart(law: Superpotential, x: Array, traction: Array) -> Array:
+    """Bounds of what the slopes of the law and its polyline differ by between samples; inf if unknown, (n, k - 1)."""
+    least, most = law.slope_range(x[:, :-1].ravel(), x[:, 1:].ravel())
+    step = np.diff(x, axis=1)
+    slope = np.diff(traction, axis=1) / step
+    rounding = 4.0 * np.finfo(float).eps * np.abs(traction[:, 1:]) / step
+    below, above = (ends.reshape(slope.shape) for ends in (least, most))
+    return np.asarray(np.maximum(slope - below, above - slope) + rounding)
+
+
 def _traction_errors(law: Superpotential, begin: Array, end: Array) -> Array:
     """Bounds of the difference of the tractions on intervals, (n,)."""
     share, x = _samples(begin, end)
     traction = _polyline(law, begin, end, share)[1]
     after, before = (side(x.ravel()).reshape(x.shape) for side in (law.right, law.left))
     at_samples = np.maximum(np.abs(after - traction)[:, :-1], np.abs(before - traction)[:, 1:])
-    most = at_samples + _rises(law, x) + np.abs(np.diff(traction, axis=1))
+    between = 0.5 * np.diff(x, axis=1) * _slopes_apart(law, x, traction)
+    most = at_samples + np.minimum(between, _rises(law, x) + np.abs(np.diff(traction, axis=1)))
     rounding = 4.0 * np.finfo(float).eps * np.abs(after).max(axis=1)
     return np.asarray(most.max(axis=1) + rounding)
 
@@ -157,8 +169,10 @@ def _errors(law: Superpotential, begin: Array, end: Array) -> Array:
     energy, traction = _polyline(law, begin, end, share)
     value = law.value(x.ravel()).reshape(x.shape)
     difference = np.abs(energy + value[:, :1] - value)
+    step = np.diff(x, axis=1)
     span = np.abs(np.diff(traction, axis=1)) + _rises(law, x)
-    most = np.maximum(difference[:, 1:], difference[:, :-1]) + 0.25 * span * np.diff(x, axis=1)
+    between = step * np.minimum(0.25 * span, 0.125 * step * _slopes_apart(law, x, traction))
+    most = np.maximum(difference[:, 1:], difference[:, :-1]) + between
     rounding = np.finfo(float).eps * np.abs(value).max(axis=1)
     return np.asarray(most.max(axis=1) + rounding)
 

@@ -107,12 +107,30 @@ class LowestSearch:
         self.x = self._inside(np.zeros(problem.size))
         for x in (self.x, *points):
             self._try(self._inside(x))
-        box = fresh_box(low, high, self.x)
-        first, curvature = self._relaxation.solve(box, PARTS[0])
+        first, curvature = self._relaxation.solve(fresh_box(low, high, self.x), PARTS[0])
         if self._far(first.x):
             raise SolverError("no lowest energy: it falls without limit, or only a limit far away was found")
+        self._enter_level_set(first, curvature)
+
+    def start_within(self, low: Array, high: Array, point: Array) -> None:
+        """Bound the problem in a box that is known to hold all lower points.
+
+        Args:
+            low: of the box, (n + m,).
+            high: of the box, (n + m,).
+            point: of low energy, (n,).
+
+        Raises:
+            SolverError: no smaller box was found.
+        """
+        self._low, self._high = low, high
+        self._try(self._inside(point))
+        self._enter_level_set(*self._relaxation.solve(fresh_box(low, high, self.x), PARTS[0]))
+
+    def _enter_level_set(self, first: Box, curvature: Curvature) -> None:
+        """Enter what a relaxation leaves of its box."""
         self._try(first.x)
-        low, high = level_set(problem, first, curvature, self.upper + 2.0 * problem.error)
+        low, high = level_set(self.problem, first, curvature, self.upper + 2.0 * self.problem.error)
         self._low, self._high = low, high
         self._enter(self._moving(replace(fresh_box(low, high, first.x), bound=first.bound)))
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..errors import SolverError
 from ..typing import Array
-from .found import Found, Saved, Start
+from .found import Found, Saved, Start, Wanted
 from .length_kinds import kind_of
 from .lowest import LowestSearch, Progress
 from .point_list import StationaryPoint
@@ -16,8 +16,10 @@ from .progress_words import Clock, counted, lowest_in_words
 from .scalar_problem import ScalarProblem
 from .search_task import MOST_BOXES, Task, stacked
 
-OWN_GAP = 0.85
-"""Share of the gap that a search may leave where the laws are curved; the rest is for what their polylines differ."""
+SIDES = 2.1
+"""How often the gap counts the difference of energies of laws and their polylines: on both sides, and some more."""
+OWN_GAP = 0.05
+"""The least share of the gap that a search may leave where laws are curved."""
 
 
 def lowest(task: Task) -> Found:
@@ -27,7 +29,7 @@ def lowest(task: Task) -> Found:
         task: the search.
     """
     problem, saved = task.problem, task.saved
-    search = LowestSearch(problem=problem, gap=task.wanted.gap * (OWN_GAP if problem.error else 1.0))
+    search = LowestSearch(problem=problem, gap=_own_gap(problem, task.wanted))
     try:
         if saved is None:
             _begin(search, task.wanted.start)
@@ -47,14 +49,28 @@ def lowest(task: Task) -> Found:
     return _proof(search, task.wanted.gap)
 
 
+def _own_gap(problem: ScalarProblem, wanted: Wanted) -> float:
+    """The gap that a search may leave: what the polylines of curved laws differ, on both sides, is taken off."""
+    if not problem.error or wanted.start is None:
+        return wanted.gap
+    size = abs(wanted.start.energy) or 1.0
+    return max(wanted.gap - SIDES * problem.error / size, OWN_GAP * wanted.gap)
+
+
 def _begin(search: LowestSearch, known: Start | None) -> None:
     if known is None:
         search.start()
     else:
-        search.resume([(known.low, known.high, np.zeros(search.problem.size))], known.x)
+        search.resume([(known.low, known.high, np.zeros(len(search.problem.chains)))], known.x)
 
 
-def begun(problem: ScalarProblem, gap: float, stop: Callable[[], bool], report: Callable[[str], None]) -> Start | None:
+def begun(
+    problem: ScalarProblem,
+    gap: float,
+    stop: Callable[[], bool],
+    report: Callable[[str], None],
+    known: Start | None = None,
+) -> Start | None:
     """A first search; None where there is no lowest energy.
 
     Args:
@@ -62,10 +78,11 @@ def begun(problem: ScalarProblem, gap: float, stop: Callable[[], bool], report: 
         gap: relative gap that the search may leave.
         stop: asked before each box.
         report: told how far it is, in words.
+        known: where the lowest is, from polylines that were less near.
     """
     search = LowestSearch(problem=problem, gap=gap)
     try:
-        search.start()
+        search.start() if known is None else search.start_within(known.low, known.high, known.x)
     except SolverError:
         return None
     search.run(stop, lambda now: report(f"first search: gap {now.gap:.1e}, {counted(now.boxes, 'box', 'boxes')}"))
@@ -83,7 +100,7 @@ def _proof(search: LowestSearch, wanted: float) -> Found:
         isolated=True,
     )
     lower = now.lower - problem.error
-    proven = search.proven and (not problem.error or point.energy - lower <= wanted * abs(point.energy))
+    proven = search.proven and 2.0 * problem.error <= (wanted - search.gap) * abs(search.upper)
     left = {} if search.proven else _left_of_lowest(search)
     open_gap = max(point.energy - lower, 0.0) / (abs(point.energy) or 1.0)
     return Found(
@@ -92,17 +109,20 @@ def _proof(search: LowestSearch, wanted: float) -> Found:
         lower_bound=lower,
         proven=proven,
         nodes=now.boxes,
-        reason=(
-            "the lowest energy, proven"
-            if proven
-            else f"a gap of {open_gap:.1e} is open in {counted(now.waiting, 'box', 'boxes')}"
-        ),
+        reason="the lowest energy, proven" if proven else _open_in_words(open_gap, now.waiting),
         left=left,
     )
 
 
 def _left_of_lowest(search: LowestSearch) -> Saved:
     return {"lowest": np.array(True), "x": search.x[None], **stacked(list(search.open_boxes()))}
+
+
+def _open_in_words(gap: float, boxes: int) -> str:
+    """Why a proof is missing."""
+    if boxes:
+        return f"a gap of {gap:.1e} is open in {counted(boxes, 'box', 'boxes')}"
+    return f"a gap of {gap:.1e} is left: the curved laws are known no better than this"
 
 
 def bounded(task: Task, points: list[Array]) -> LowestSearch | None:

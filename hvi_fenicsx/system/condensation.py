@@ -180,6 +180,15 @@ class Condensation:
         found.array[:] = self._interior.expand(self.values(x, factor), right)
         return found
 
+    def restricted(self, u: PETSc.Vec, factor: float = 1.0) -> Array:
+        """The condensed unknowns of a displacement of the whole body, (n,). Collective.
+
+        Args:
+            u: the unknowns of the whole body.
+            factor: λ.
+        """
+        return np.asarray(self._interior.kept_values(u)[self._elimination.stay] - factor * self._shift)
+
     def load(self, factor: float = 1.0) -> PETSc.Vec:
         """The system's load at a factor, prescribed values in their rows, as :attr:`.System.load`. Collective.
 

@@ -80,6 +80,14 @@ class Interior:
         first = sum(agree(self._comm, len(self.kept))[: self._comm.rank])
         return slice(first, first + len(self.kept))
 
+    def kept_values(self, x: PETSc.Vec) -> Array:
+        """The kept unknowns of a vector, (n,). Collective.
+
+        Args:
+            x: the unknowns of the whole body.
+        """
+        return np.concatenate(agree(self._comm, x.array_r[self.kept]))
+
     def _columns(self, matrix: PETSc.Mat) -> csr_matrix:
         """The columns of kept unknowns in a matrix, this rank's rows, (rows, n)."""
         rows, total = matrix.getLocalSize()[0], matrix.getSize()[1]

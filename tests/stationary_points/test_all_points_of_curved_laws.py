@@ -275,3 +275,11 @@ def test_what_is_balanced_to_rounding_alone_is_not_called_proven() -> None:
     )
     assert not found.complete
     assert any(not p.isolated for p in found.points)
+
+
+def test_a_bound_that_bears_is_no_straight_traction() -> None:
+    """By hand: the first stands on its bound with a force of 0.3, the friction of the second holds at rest."""
+    bonds = condensed.bonds(laws.Exponential(2.0, 0.5, 1.0), [1])
+    found = searched(condensed.problem([[0.0, 0.0], [0.0, 3.0]], [-0.3, 0.4], bonds, lower=[-1.0, -np.inf]))
+    assert (found.reason, found.complete) == ("all equilibria, proven: 1", True)
+    np.testing.assert_allclose(found.points[0].x, [-1.0, 0.0], atol=1e-12)

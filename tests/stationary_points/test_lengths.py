@@ -310,6 +310,7 @@ def glued() -> Table:
 
 SCENES = [
     pytest.param(space(2), id="friction in space"),
+    pytest.param(space(1) | {"solver": {"smoothing": "chks", "epsilon": 0.05}}, id="smoothed friction in space"),
     pytest.param(glued(), id="cohesion", marks=pytest.mark.long),
 ]
 
@@ -337,3 +338,15 @@ def test_of_such_laws_equilibria_are_found_without_a_proof_that_these_are_all() 
     assert found.lower_bound <= min(energies)
     lowest = hvi.equilibria(hvi.Scene.model_validate(space(2)), lowest=True)
     assert min(energies) == pytest.approx(lowest.solutions[0].energy, rel=1e-8)
+
+
+def test_where_the_energy_is_convex_the_only_equilibrium_is_proven_at_once() -> None:
+    """Friction that never weakens: the search for the lowest energy, which knows nothing of it, ends at the same one."""
+    table = space(2)
+    table["boundary"]["floor"]["friction"] = {"law": "tresca", "yield_traction": 4e6}
+    scene = hvi.Scene.model_validate(table)
+    found, lowest = hvi.equilibria(scene), hvi.equilibria(scene, lowest=True)
+    assert (found.complete, found.proven, found.nodes, found.gap) == (True, True, 0, 0.0)
+    assert found.reason.startswith("the only equilibrium, proven: the energy is convex")
+    assert found.solutions[0].energy == pytest.approx(lowest.solutions[0].energy, rel=1e-10)
+    assert lowest.nodes > 0
