@@ -44,6 +44,33 @@ def test_a_cylinder_has_its_two_rims_however_coarse_its_mesh_is(sides: int) -> N
     assert set(points[edges.ravel(), 2]) == {0.0, 3.0}
 
 
+def roof(rise: float, cells: int) -> tuple[np.ndarray, np.ndarray]:
+    """The upper side of a wedge: two planes that meet along y at x = 1, each of so many cells across."""
+    x, y = (c.ravel() for c in np.meshgrid(np.linspace(0, 2, 2 * cells + 1), np.linspace(0, 1, 4), indexing="ij"))
+    low = np.array([[4 * i + j, 4 * i + 4 + j] for i in range(2 * cells) for j in range(3)])
+    facets = [np.column_stack([low[:, 0], low[:, 1], low[:, 1] + 1])]
+    facets += [np.column_stack([low[:, 0], low[:, 1] + 1, low[:, 0] + 1])]
+    return np.column_stack([x, y, rise * (1.0 - np.abs(x - 1.0))]), np.concatenate(facets)
+
+
+@pytest.mark.parametrize("cells", [1, 3])
+@pytest.mark.parametrize(("rise", "ridge"), [(0.0, 0), (0.01, 0), (0.1, 3), (0.4, 3)])
+def test_two_flat_faces_have_an_edge_between_them(cells: int, rise: float, ridge: int) -> None:
+    """Turned by 0, 1.1, 11.4 and 43.6 degrees; the border of the roof is drawn in all cases."""
+    points, facets = roof(rise, cells)
+    edges = creases(points, facets)
+    assert len(edges) == 2 * (2 * cells + 3) + ridge
+    assert np.sum((points[edges, 0] == 1.0).all(axis=1)) == ridge
+
+
+def test_the_strips_of_a_swept_arc_have_no_edges_between_them() -> None:
+    """Eight flat strips that turn by 10 degrees each."""
+    points, facets = roof(0.0, 4)
+    angle = np.radians(10.0 * np.round(points[:, 0] * 4))
+    bent = np.column_stack([np.sin(angle), points[:, 1], np.cos(angle)])
+    assert len(creases(bent, facets)) == 2 * (8 + 3)
+
+
 def test_a_cube_has_twelve_edges_and_one_face_of_it_its_border() -> None:
     points = np.array([[x, y, z] for z in (0.0, 1.0) for y in (0.0, 1.0) for x in (0.0, 1.0)])
     faces = [(0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5)]

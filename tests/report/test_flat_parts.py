@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import shapely
 
 from hvi_fenicsx.report.pictures.flat_parts import laid_flat
 from hvi_fenicsx.typing import Array, Integers, Mask
@@ -46,8 +47,11 @@ def test_an_unrolled_bore_has_the_area_of_its_shell(turn: float) -> None:
     flat = laid_flat(*bore(turn))
     each = areas(flat.points, flat.triangles)
     assert np.all(each < 0.0) or np.all(each > 0.0)
-    assert abs(each.sum()) == pytest.approx(turn * RADIUS * HEIGHT, rel=1e-9)
-    assert np.ptp(flat.points[:, 0]) <= (turn + 2.0 * np.pi / AROUND) * RADIUS + 1e-12
+    assert np.prod(flat.ends[1] - flat.ends[0]) == pytest.approx(turn * RADIUS * HEIGHT, rel=1e-9)
+    window = shapely.box(*flat.ends.ravel())
+    shown = shapely.intersection(shapely.polygons(flat.points[flat.triangles]), window)
+    assert shapely.area(shown).sum() == pytest.approx(window.area, rel=1e-9)  # no facet twice
+    assert shapely.union_all(shown, grid_size=1e-9).area == pytest.approx(window.area, rel=1e-6)  # straight ends
     assert flat.names[1] == "y"
 
 

@@ -32,6 +32,7 @@ def result(events: tuple[str, ...], stable: tuple[float, ...], end: str) -> Path
         (("start", *["kink"] * 5, "end"), (1,) * 7, "reached", 3),
         (EVENTS, (1,) * 7, "reached", 5),
         (EVENTS, (1, 1, 0, 1, 1, 0, 0), "escapes", 7),
+        (("start", *["free"] * 5, "end"), (1,) * 7, "reached", 2),
     ],
 )
 def test_the_legend_is_inside_the_picture_and_below_its_heading(
@@ -76,3 +77,18 @@ def test_under_a_moment_the_factor_is_drawn_over_the_displacement() -> None:
     assert axes.get_ylabel() == "load factor"
     drawn = axes.get_lines()[0].get_xydata()
     assert np.nanmax(np.asarray(drawn), axis=0) == pytest.approx([12.0, 6.0])  # mm; the factor
+
+
+def test_the_largest_force_is_seen_where_the_body_comes_off_under_it() -> None:
+    """Both marks stand at the last point, apart from each other; a stretch that has no length is no line."""
+    given = result(("start", *["kink"] * 5, "end"), (1, 1, 1, 1, 1, 0, 0), "escapes")
+    columns = dict(given.columns) | {"pull.fx": 1e3 * np.array([0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 5.0])}
+    columns |= {"pull.ux": 1e-4 * np.array([0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 5.0])}
+    fig = make(replace(given, columns=columns))
+    FigureCanvasAgg(fig).draw()
+    lines = {str(line.get_label()).split()[0]: line for line in fig.axes[0].get_lines()}
+    assert "unstable" not in lines
+    peak, end = lines["peak"], lines["escapes"]
+    assert peak.get_xydata() == pytest.approx(end.get_xydata())
+    assert not peak.get_window_extent().overlaps(end.get_window_extent())
+    assert peak.get_window_extent().y1 <= fig.axes[0].get_window_extent().y1

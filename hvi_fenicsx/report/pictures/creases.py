@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
-from ...typing import Array, Integers
+from ...typing import Array, Integers, Mask
 from .vtk_view import area_vectors
 
+FLAT, SHALLOW = 1.0, 5.0
+"""Degrees: facets that turn by less are one flat face; faces that turn by more have an edge between them."""
 SHARP = 55.0
 """Degrees: facets that turn by less may be of a round surface; seven of them make a cylinder on a coarse mesh."""
 
@@ -24,10 +28,47 @@ def creases(points: Array, facets: Integers) -> Integers:
     )
     owner = np.argsort(edge.ravel(), kind="stable") % len(facets)
     start = np.cumsum(count) - count
-    shared = count == 2
-    drawn = count == 1
-    drawn[shared] = _turns(points, facets, owner[start[shared]], owner[start[shared] + 1]) > SHARP
+    shared, drawn = count == 2, count == 1
+    pairs = np.column_stack([owner[start[shared]], owner[start[shared] + 1]])
+    turns = _turns(points, facets, *pairs.T)
+    drawn[shared] = (turns > SHARP) | _between_faces(facets, pairs, turns, sides[first[count == 1]])
     return np.asarray(sides[first[drawn]])
+
+
+def _between_faces(facets: Integers, pairs: Integers, turns: Array, border: Integers) -> Mask:
+    """Which pairs of facets turn where two flat faces meet; strips of a round surface are no faces.
+
+    Args:
+        facets: (m, 3).
+        pairs: facets that share an edge, (k, 2).
+        turns: their angles, degrees, (k,).
+        border: the edges of one facet only, (j, 2).
+    """
+    flat = pairs[turns < FLAT]
+    graph = coo_array((np.ones(len(flat)), (flat[:, 0], flat[:, 1])), shape=(len(facets), len(facets)))
+    patch = connected_components(graph, directed=False)[1]
+    beside = patch[pairs]
+    bent = (turns >= FLAT) & (turns <= SHARP) & (beside[:, 0] != beside[:, 1])
+    neighbours = np.unique(np.sort(beside[bent], axis=1), axis=0)
+    face = np.bincount(neighbours.ravel(), minlength=len(facets)) <= 1
+    face[_with_inside(facets, patch, border)] = True
+    return np.asarray(bent & (turns > SHALLOW) & face[beside].all(axis=1))
+
+
+def _with_inside(facets: Integers, patch: Integers, border: Integers) -> Integers:
+    """The patches that have a vertex inside: they are more than one cell wide.
+
+    Args:
+        facets: (m, 3).
+        patch: of each facet, (m,).
+        border: the edges of one facet only, (j, 2).
+    """
+    low, high = np.full(facets.max() + 1, len(facets)), np.full(facets.max() + 1, -1)
+    np.minimum.at(low, facets, patch[:, None])
+    np.maximum.at(high, facets, patch[:, None])
+    inside = low == high
+    inside[border] = False
+    return np.asarray(low[inside])
 
 
 def _turns(points: Array, facets: Integers, one: Integers, other: Integers) -> Array:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -11,12 +11,14 @@ import numpy as np
 from ...typing import Array, Integers
 from ..body_mesh import BodyMesh
 from ..reader import ContactPart, Result
-from ..units import round_below
+from ..units import round_below, times
 
 VISIBLE = 0.08
 """How large the largest displacement is drawn, of the body's size."""
 NEAR = 0.3
 """Gaps larger than this, magnified, of the body's size, are the body's own shape."""
+THIN, DRAWN = 1 / 60, 1 / 15
+"""A plane body whose height is a smaller part of its length is drawn higher (or wider), up to the second part."""
 
 
 @dataclass(frozen=True)
@@ -27,16 +29,34 @@ class DeformedBody:
         body: the body at rest.
         displacement: of its vertices, m, (n, 3).
         factor: by which the displacement is magnified.
+        stretch: by which the picture is stretched along each axis, (3,).
     """
 
     body: BodyMesh
     displacement: Array
     factor: float
+    stretch: Array = field(default_factory=lambda: np.ones(3))
 
     @cached_property
     def points(self) -> Array:
         """Where the vertices are drawn."""
-        return self.body.points + self.factor * self.displacement
+        return np.asarray((self.body.points + self.factor * self.displacement) * self.stretch)
+
+    @cached_property
+    def at_rest(self) -> Array:
+        """Where the vertices of the body at rest are drawn."""
+        return np.asarray(self.body.points * self.stretch)
+
+    @property
+    def stretched(self) -> str:
+        """How the picture is stretched, in words; empty where it is not."""
+        names = zip(("width", "height", "depth"), self.stretch, strict=True)
+        return "".join(f"{name} × {by:g}" for name, by in names if by != 1.0)
+
+    @property
+    def scales(self) -> str:
+        """What is drawn larger than it is, in words."""
+        return ", ".join(words for words in (times(self.factor), self.stretched) if words)
 
     @cached_property
     def amount(self) -> Array:
@@ -97,13 +117,27 @@ def deform(body: BodyMesh, parts: Sequence[PartGeometry]) -> DeformedBody:
         parts: its contact parts.
     """
     assert body.displacement is not None
-    u = np.nan_to_num(body.displacement)
-    largest = float(np.linalg.norm(u, axis=1).max(initial=0.0))
+    u, stretch = np.nan_to_num(body.displacement), _stretch(body)
+    largest = float(np.linalg.norm(u * stretch, axis=1).max(initial=0.0))
     if largest == 0.0:
-        return DeformedBody(body, u, 1.0)
+        return DeformedBody(body, u, 1.0, stretch)
     factor = 1.0 if largest > 0.5 * VISIBLE * body.size else round_below(VISIBLE * body.size / largest * 1.25)
     gap = max((float(np.nanmax(geometry.part["gap"], initial=0.0)) for geometry in parts), default=0.0)
-    return DeformedBody(body, u, factor if factor * gap < NEAR * body.size else 1.0)
+    return DeformedBody(body, u, factor if factor * gap * stretch.max() < NEAR * body.size else 1.0, stretch)
+
+
+def undeformed(body: BodyMesh) -> DeformedBody:
+    """The body at rest; a thin one is stretched as its deformed body is."""
+    return DeformedBody(body, np.zeros_like(body.points), 1.0, _stretch(body))
+
+
+def _stretch(body: BodyMesh) -> Array:
+    """By how much a picture is stretched along each axis, so that colours in a thin strip are seen, (3,)."""
+    stretch, extents = np.ones(3), np.ptp(body.points, axis=0)[: body.dimension]
+    thin = int(np.argmin(extents))
+    if body.dimension == 2 and 0.0 < extents[thin] < THIN * body.size:
+        stretch[thin] = max(1.0, round_below(DRAWN * body.size / float(extents[thin])))
+    return stretch
 
 
 def largest_stress(parts: list[PartGeometry]) -> float:

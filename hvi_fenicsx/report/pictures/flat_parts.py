@@ -24,11 +24,12 @@ class FlatPart:
     """A part laid flat.
 
     Attributes:
-        points: its vertices, m, (m, 2); those at a cut occur on both sides of it.
+        points: its vertices, m, (m, 2); those of facets across a cut occur on both sides of it.
         rows: of each of them its row in the part's table, (m,).
         triangles: its facets by its vertices, (k, 3).
         ways: the unit vectors along which the two coordinates grow at each vertex, (m, 2, 3).
         names: of the coordinates.
+        ends: the lower left and the upper right corner of the map, m, (2, 2); facets across a cut reach beyond.
     """
 
     points: Array
@@ -36,6 +37,7 @@ class FlatPart:
     triangles: Integers
     ways: Array
     names: tuple[str, str]
+    ends: Array
 
     def along(self, vectors: Array) -> Array:
         """The components of vectors along the coordinates, (m, 2).
@@ -75,12 +77,14 @@ def _axis(areas: Array) -> Array | None:
 def _projected(points: Array, triangles: Integers, total: Array) -> FlatPart:
     kept = [i for i in range(3) if i != int(np.argmax(np.abs(total)))]
     axes = np.eye(3)[kept]
+    flat = points @ axes.T
     return FlatPart(
-        points=points @ axes.T,
+        points=flat,
         rows=np.arange(len(points)),
         triangles=triangles,
         ways=np.broadcast_to(axes, (len(points), 2, 3)),
         names=("xyz"[kept[0]], "xyz"[kept[1]]),
+        ends=np.stack([flat.min(axis=0), flat.max(axis=0)]),
     )
 
 
@@ -90,17 +94,19 @@ def _unrolled(points: Array, triangles: Integers, axis: Array, touches: Mask) ->
     plane = _across(axis, towards)
     arms = points @ plane.T
     arms = arms - _centre(arms)
-    angles = _from_cut(np.arctan2(arms[:, 1], arms[:, 0]), touches)
+    angles, (start, end) = _from_cut(np.arctan2(arms[:, 1], arms[:, 0]), touches)
     rows, triangles, turns = _cut(angles, triangles)
     angles, radius = angles[rows], float(np.linalg.norm(arms, axis=1).mean())
+    height = points @ axis
     onward = np.column_stack([-np.sin(angles), np.cos(angles)]) @ plane
     along = "xyz"[int(np.argmax(axis))] if np.max(axis) > 1.0 - 1e-9 else "way along,"
     return FlatPart(
-        points=np.column_stack([radius * (angles + 2.0 * np.pi * turns), points[rows] @ axis]),
+        points=np.column_stack([radius * (angles + 2.0 * np.pi * turns), height[rows]]),
         rows=rows,
         triangles=triangles,
         ways=np.stack([onward, np.broadcast_to(axis, onward.shape)], axis=1),
         names=(f"way round, 0 towards +{'xyz'[towards]},", along),
+        ends=np.array([[radius * start, height.min()], [radius * end, height.max()]]),
     )
 
 
@@ -117,23 +123,40 @@ def _centre(points: Array) -> Array:
     return np.asarray(np.linalg.lstsq(matrix, np.sum(points**2, axis=1))[0][:2])
 
 
-def _from_cut(angles: Array, touches: Mask) -> Array:
-    """Angles over one turn from a cut: in the middle of what a part leaves open, else opposite to where it touches."""
+def _from_cut(angles: Array, touches: Mask) -> tuple[Array, tuple[float, float]]:
+    """Angles over one turn from a cut, and where the part begins and ends.
+
+    The cut is in the middle of what a part leaves open, else opposite to where it touches.
+    """
     ordered = np.sort(angles)
     gaps = np.diff(np.append(ordered, ordered[0] + 2.0 * np.pi))
     widest = int(np.argmax(gaps))
     opposite = float(np.angle(np.sum(np.exp(1j * angles[touches])))) - np.pi
-    start = ordered[widest] + 0.5 * gaps[widest] - 2.0 * np.pi if gaps[widest] > OPEN else opposite
-    return np.asarray(start + np.mod(angles - start, 2.0 * np.pi))
+    is_open = bool(gaps[widest] > OPEN)
+    start = ordered[widest] + 0.5 * gaps[widest] - 2.0 * np.pi if is_open else opposite
+    found = np.asarray(start + np.mod(angles - start, 2.0 * np.pi))
+    return found, (float(found.min()), float(found.max())) if is_open else (start, start + 2.0 * np.pi)
 
 
 def _cut(angles: Array, triangles: Integers) -> tuple[Integers, Integers, Array]:
-    """Facets across the cut get vertices of their own beyond its end: all vertices' rows, facets, and whole turns."""
+    """Facets across the cut are there twice, beyond its end and before its start, each time with vertices of its own.
+
+    Args:
+        angles: of the vertices, within one turn, (m,).
+        triangles: the facets by their vertices, (k, 3).
+
+    Returns:
+        The rows of all vertices, the facets, and the whole turns that are added to the angles of the vertices.
+    """
     corners = angles[triangles]
     across = np.ptp(corners, axis=1) > np.pi
-    early = across[:, None] & (corners < corners.max(axis=1, keepdims=True) - np.pi)
-    copied, number = np.unique(triangles[early], return_inverse=True)
-    found = triangles.copy()
-    found[early] = len(angles) + number
-    turns = np.concatenate([np.zeros(len(angles)), np.ones(len(copied))])
-    return np.concatenate([np.arange(len(angles)), copied]), found, turns
+    early = corners < corners.max(axis=1, keepdims=True) - np.pi
+    rows, turns, facets = [np.arange(len(angles))], [np.zeros(len(angles))], [triangles[~across]]
+    for turn, moved in ((1.0, early[across]), (-1.0, ~early[across])):
+        own = triangles[across]
+        copied, number = np.unique(own[moved], return_inverse=True)
+        own[moved] = sum(map(len, rows)) + number
+        rows.append(copied)
+        turns.append(np.full(len(copied), turn))
+        facets.append(own)
+    return np.concatenate(rows), np.concatenate(facets), np.concatenate(turns)

@@ -52,10 +52,7 @@ def labels(
     reached = [*reaches(view, np.concatenate(clouds), arrows), *words]
     scale = largest_scale(reached, (SIDE, TALLEST))
     bodies = shapely.union_all([shapely.MultiPoint(view.project(c)).convex_hull.buffer(LINE / scale) for c in clouds])
-    taken = [one.hull(scale) for one in words]
-    for tails, ways in arrows:
-        strokes = np.stack([view.project(tails), view.project(tails + ways)], axis=1)
-        taken += list(shapely.buffer(shapely.linestrings(strokes), HEAD / scale))
+    taken = [*(one.hull(scale) for one in words), *strokes(view, arrows, scale)]
     found = list[Label]()
     for load, (tails, ways) in zip(pulled, arrows, strict=True):
         ends = view.project(np.concatenate([tails, tails + ways]))
@@ -63,6 +60,18 @@ def labels(
         found.append(_best([Label(value, end, way) for end in ends for way in WAYS], ends, taken, bodies, scale))
         taken.append(found[-1].reach.hull(scale))
     return found
+
+
+def strokes(view: View, arrows: Sequence[tuple[Array, Array]], scale: float) -> list[shapely.Geometry]:
+    """What the arrows cover of a picture, m.
+
+    Args:
+        view: from where the body is seen.
+        arrows: of each load.
+        scale: of the picture, inches for a metre.
+    """
+    lines = [np.stack([view.project(tails), view.project(tails + ways)], axis=1) for tails, ways in arrows]
+    return [stroke for own in lines for stroke in shapely.buffer(shapely.linestrings(own), HEAD / scale)]
 
 
 def _best(

@@ -9,11 +9,12 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.transforms import ScaledTranslation
 
 from ...typing import Array, Mask
 from ..path_reader import PathResult, read
 from ..units import Unit, unit_for
-from .style import BLUE, GREEN, GREY, HEADING, INK, ORANGE, VERMILION, area, figure, save, titled
+from .style import BLUE, GREEN, GREY, HEADING, INK, PURPLE, VERMILION, area, figure, save, titled
 
 NAME = "path.png"
 _CAPTION = (
@@ -24,6 +25,10 @@ _ENTRIES = 0.35
 """Room for the second line of the legend, inches."""
 _DOTS = 40
 """So many events have a dot at most."""
+_SHORT = 1e-3
+"""Stretches that are shorter, in parts of the picture, are not seen."""
+_ABOVE = 11.0
+"""Points: the peak's mark stands so high above its point, which a turn or the end may have, too."""
 
 
 def draw(folder: Path) -> Path | None:
@@ -106,9 +111,16 @@ def _stretches(axes: Axes, result: PathResult, x: Array, y: Array) -> None:
         (~stable & ~jump, "unstable", {"color": VERMILION, "ls": (0, (4, 2)), "lw": 1.5, "zorder": 2}),
         (jump, "jump", {"color": GREY, "ls": ":", "lw": 2.2, "zorder": 2}),
     )
-    for chosen, name, look in kinds:
+    for kind, name, look in kinds:
+        chosen = kind & _visible(x, y)
         if np.any(chosen):
             axes.plot(*_with_gaps(x, y, chosen), label=name, **look)
+
+
+def _visible(x: Array, y: Array) -> Mask:
+    """Which stretches between neighbouring rows have a length in the picture."""
+    shares = [np.abs(np.diff(values)) / (float(np.ptp(values)) or 1.0) for values in (x, y)]
+    return np.asarray(np.hypot(*shares) > _SHORT)
 
 
 def _with_gaps(x: Array, y: Array, chosen: Mask) -> tuple[Array, Array]:
@@ -123,18 +135,27 @@ def _marks(axes: Axes, result: PathResult, x: Array, y: Array, units: tuple[Unit
     """Events as dots, the largest force, turns and the end by name."""
     events = np.flatnonzero([e in ("kink", "contact", "release", "fold") for e in result.events])
     shown = events[:: max(1, -(-len(events) // _DOTS))]
-    axes.plot(x[shown], y[shown], "o", color=INK, ms=3.4, alpha=0.8, mew=0, zorder=4, label="event")
-    for number, marker, colour, text in _named(result, x, y, units):
-        axes.plot(x[number], y[number], marker, color=colour, ms=9, mec="white", mew=0.8, zorder=6, label=text)
+    if len(shown):
+        axes.plot(x[shown], y[shown], "o", color=INK, ms=3.4, alpha=0.8, mew=0, zorder=4, label="event")
+    look: dict[str, Any] = {"ls": "", "ms": 9, "mec": "white", "mew": 0.8, "zorder": 6}
+    _peak(axes, x, y, units, look)
+    for number, marker, colour, text in _named(result):
+        axes.plot(x[number], y[number], marker=marker, color=colour, label=text, **look)
 
 
-def _named(
-    result: PathResult, x: Array, y: Array, units: tuple[Unit, Unit]
-) -> Iterator[tuple[int, str, str, str | None]]:
+def _peak(axes: Axes, x: Array, y: Array, units: tuple[Unit, Unit], look: dict[str, Any]) -> None:
+    """A triangle that points down at the largest force from above."""
     peak = int(np.argmax(y))
     load = f"{y[peak]:.4g} {units[1].name}".rstrip()
-    yield peak, "^", ORANGE, f"peak {load} at {x[peak]:.4g} {units[0].name}"
+    words = f"peak {load} at {x[peak]:.4g} {units[0].name}"
+    assert isinstance(axes.figure, Figure)
+    raised = axes.transData + ScaledTranslation(0.0, _ABOVE / 72, axes.figure.dpi_scale_trans)
+    axes.plot(x[peak], y[peak], marker="v", color=PURPLE, transform=raised, label=words, **look)
+
+
+def _named(result: PathResult) -> Iterator[tuple[int, str, str, str | None]]:
+    """Turns and the end: row, mark, colour and words."""
     for count, number in enumerate(n for n, event in enumerate(result.events) if event == "turn"):
         yield number, "s", INK, None if count else "turn"
     if result.path["end"] != "reached":
-        yield len(x) - 1, "X", VERMILION, str(result.path["end"])
+        yield len(result.events) - 1, "X", VERMILION, str(result.path["end"])

@@ -15,7 +15,6 @@ from matplotlib.patches import PathPatch
 
 from ...geometry import chains
 from ...typing import Array
-from ..body_mesh import BodyMesh
 from .deformed import DeformedBody
 from .legend import FOOT
 from .outline import closed_path
@@ -71,18 +70,18 @@ def paint(axes: Axes, shape: DeformedBody, values: Array, colours: Colormap, end
     drawn = _shading(axes, shape, values, lambda image: colours(image / (end or 1.0), bytes=True))
     drawn.set_clip_path(outline, axes.transData)
     for patch, style in (
-        (closed_path(body.points, loops), {"ec": GREY, "ls": (0, (5, 4)), "lw": 1.3, "zorder": 3}),
+        (closed_path(shape.at_rest, loops), {"ec": GREY, "ls": (0, (5, 4)), "lw": 1.3, "zorder": 3}),
         (outline, {"ec": INK, "lw": 1.6, "zorder": 4}),
     ):
         axes.add_artist(PathPatch(patch, fc="none", joinstyle="round", **style))
-    if _pixels_between_lines(axes, body) >= FEWEST_PIXELS:
+    if _pixels_between_lines(axes, shape) >= FEWEST_PIXELS:
         sides = np.unique(np.sort(np.concatenate([body.cells[:, c] for c in ((0, 1), (1, 2), (2, 0))]), axis=1), axis=0)
         axes.add_collection(LineCollection(list(points[sides, :2]), colors="white", lw=0.6, alpha=0.5, zorder=2))
 
 
-def _pixels_between_lines(axes: Axes, body: BodyMesh) -> float:
+def _pixels_between_lines(axes: Axes, shape: DeformedBody) -> float:
     per_metre = SIDE * DPI / float(np.ptp(axes.get_xlim()))
-    return per_metre * float(np.sqrt(np.prod(np.ptp(body.points[:, :2], axis=0)) / len(body.cells)))
+    return per_metre * float(np.sqrt(np.prod(np.ptp(shape.at_rest[:, :2], axis=0)) / len(shape.body.cells)))
 
 
 def _shading(axes: Axes, shape: DeformedBody, values: Array, coloured: Callable[[Array], Any]) -> AxesImage:

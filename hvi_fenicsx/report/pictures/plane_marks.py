@@ -222,7 +222,7 @@ def _contact(shape: DeformedBody, geometry: PartGeometry, largest: Largest) -> I
             outward = np.broadcast_to(geometry.obstacle[:2], outward.shape)
         gap = np.nan_to_num(geometry.values(geometry.part["gap"], chain))
         away = 0.0 if geometry.between_bodies else shape.factor * gap[:, None]
-        base = shape.points[chain, :2] + away * outward
+        base = shape.points[chain, :2] + away * outward * shape.stretch[:2]
         pressure = np.nan_to_num(geometry.values(geometry.part.pressure, chain))
         if geometry.part.has("gap") and not geometry.between_bodies:
             yield _obstacle(base + OBSTACLE * shape.body.size * outward)

@@ -43,14 +43,16 @@ def _said(value: Any, key: str, dimension: int) -> str:
     return quantity(float(value), unit) if isinstance(value, int | float) and unit else str(value)
 
 
-def say(fig: Figure, body: BodyMesh) -> None:
+def say(fig: Figure, body: BodyMesh, stretched: str = "") -> None:
     """Write the body's extent and how many cells it has.
 
     Args:
         fig: the picture.
         body: the body.
+        stretched: how the picture is stretched, in words.
     """
     extent = " × ".join(quantity(float(c), "m") for c in np.ptp(body.points, axis=0)[: body.dimension])
+    extent += f" (drawn {stretched})" if stretched else ""
     tall = fig.get_figheight()
     for line, words in enumerate(
         (extent, f"{thousands(len(body.cells))} {'triangles' if body.dimension == 2 else 'tetrahedra'}")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from matplotlib.figure import Figure
 
 from ...reader import Result
-from ...units import times, unit_for
+from ...units import unit_for
 from .. import plane_marks as marks
 from ..deformed import deform, part_geometries
 from ..legend import colour_bar, legend
@@ -31,7 +31,7 @@ def draw(result: Result) -> Figure:
         *marks.loads(shape, borne_loads(result)),
         *marks.contacts(shape, parts),
     ]
-    fig, axes = canvas([Reach(shape.points[:, :2]), Reach(body.points[:, :2]), *(m.reach for m in drawn)])
+    fig, axes = canvas([Reach(shape.points[:, :2]), Reach(shape.at_rest[:, :2]), *(m.reach for m in drawn)])
     heading(fig, result, "deformed body")
     largest = float(shape.amount.max())
     paint(axes, shape, shape.amount[body.cells], SLATE, largest)
@@ -39,6 +39,6 @@ def draw(result: Result) -> Figure:
         mark.draw(axes)
     unit = unit_for(largest, "m")
     words = f"displacement |u|, up to {unit.text(largest)}"
-    colour_bar(fig, SLATE, (0.0, largest / unit.size), words, times(shape.factor))
+    colour_bar(fig, SLATE, (0.0, largest / unit.size), words, shape.scales)
     legend(fig, [marks.undeformed(), *marks.keys(drawn)])
     return fig

@@ -77,7 +77,7 @@ def _vectors(part: ContactPart, flat: FlatPart, column: str) -> Array:
 
 
 def _map_size(flat: FlatPart) -> tuple[float, float]:
-    wide, tall = np.maximum(np.ptp(flat.points, axis=0), 1e-12)
+    wide, tall = np.maximum(flat.ends[1] - flat.ends[0], 1e-12)
     scale = min(WIDEST / wide, TALLEST / tall)
     return float(scale * wide), max(float(scale * tall), 0.6)
 
@@ -109,7 +109,7 @@ def _map(fig: Figure, axes: Axes, flat: FlatPart, values: Array, colours: Colorm
 
 
 def _extent(flat: FlatPart) -> tuple[float, float, float, float]:
-    (left, bottom), (right, top) = flat.points.min(axis=0), flat.points.max(axis=0)
+    (left, bottom), (right, top) = flat.ends
     return float(left), float(right), float(bottom), float(top)
 
 
@@ -133,7 +133,7 @@ def _grey_where_lifted(axes: Axes, flat: FlatPart, part: ContactPart) -> None:
 
 def _arrows(axes: Axes, flat: FlatPart, vectors: Array) -> None:
     """A field along the part at the nodes of a coarse grid, whatever the mesh."""
-    low, extent = flat.points.min(axis=0), np.ptp(flat.points, axis=0)
+    low, extent = flat.ends[0], flat.ends[1] - flat.ends[0]
     spacing = float(np.max(extent)) / ARROWS
     count = np.maximum(np.round(extent / spacing), 1).astype(int)
     pixels = (flat.points - low) / np.where(extent > 0.0, extent, 1.0) * count

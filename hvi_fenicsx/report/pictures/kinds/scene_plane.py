@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-import numpy as np
+from dataclasses import replace
+
 from matplotlib.artist import Artist
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
@@ -12,7 +13,7 @@ from matplotlib.patches import PathPatch
 from ....geometry import chains
 from ...reader import Result
 from .. import plane_marks as marks
-from ..deformed import DeformedBody
+from ..deformed import undeformed
 from ..legend import legend
 from ..loads_supports import held_sides, loaded_sides, roles_by_side
 from ..outline import closed_path
@@ -37,25 +38,27 @@ PALE_BODY = TINTS[0]
 def draw(result: Result) -> Figure:
     """Draw the scene of a plane body."""
     body = result.body
-    rest = DeformedBody(body, np.zeros_like(body.points), 1.0)
+    rest = undeformed(body)
+    points = rest.points
     drawn = [*marks.supports(rest, held_sides(result)), *marks.loads(rest, loaded_sides(result))]
-    fig, axes = canvas([Reach(body.points[:, :2]), *(mark.reach for mark in drawn)])
+    fig, axes = canvas([Reach(points[:, :2]), *(mark.reach for mark in drawn)])
     heading(fig, result, "the scene")
     areas = regions(result)
     for region in areas:
-        corners = body.points[body.cells[region.cells], :2]
+        corners = points[body.cells[region.cells], :2]
         axes.add_collection(PolyCollection(list(corners), fc=region.tint, ec=region.tint, lw=0.3, zorder=0.5))
-    outline = closed_path(body.points, chains(body.boundary))
+    outline = closed_path(points, chains(body.boundary))
     axes.add_patch(PathPatch(outline, fc="none" if areas else PALE_BODY, ec=INK, lw=1.6, joinstyle="round", zorder=1))
     found = list(roles_by_side(result))
     for side, roles in found:
         if touches(roles):
-            axes.plot(*body.points[side.vertices, :2].T, color=VERMILION, lw=5, solid_capstyle="butt", zorder=2)
+            axes.plot(*points[side.vertices, :2].T, color=VERMILION, lw=5, solid_capstyle="butt", zorder=2)
     for mark in drawn:
         mark.draw(axes)
-    for name in names(body, [side for side, _ in found], [mark.reach for mark in drawn], window(axes)):
+    drawn_body = replace(body, points=points)
+    for name in names(drawn_body, [side for side, _ in found], [mark.reach for mark in drawn], window(axes)):
         name.draw(axes)
-    say(fig, body)
+    say(fig, body, rest.stretched)
     legend(
         fig,
         [*keys(any(touches(roles) for _, roles in found)), *marks.keys(drawn), *region_keys(areas), *inside(result)],

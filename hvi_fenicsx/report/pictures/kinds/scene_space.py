@@ -21,13 +21,13 @@ from ..legend import legend
 from ..load_labels import labels, reaches
 from ..loads_supports import Side, held_sides, loaded_sides, roles_by_side
 from ..plane_canvas import canvas
-from ..reach import Label
 from ..regions import Region, regions
 from ..regions import keys as region_keys
 from ..registry import picture
 from ..scene_legend import inside, say, touches
-from ..style import BLUE, INK, PALE, heading
-from ..vtk_view import View, area_vectors, best_view, draw_edges, render, surface
+from ..space_names import names
+from ..style import INK, PALE, heading
+from ..vtk_view import area_vectors, best_view, draw_edges, render, surface
 
 if TYPE_CHECKING:
     import pyvista
@@ -71,9 +71,11 @@ def draw(result: Result) -> Figure:
     arrows = [vtk_loads.arrows(rest, load) for load in pulled]
     reached = [body.points, *(body.points[s.side.vertices] + s.away for s in shown)]
     everything = np.concatenate([*reached, *(end for tails, ways in arrows for end in (tails, tails + ways))])
-    names = [_name(view, body, part) for part in shown]
-    values = labels(view, reached, pulled, arrows, [name.reach for name in names])
-    words = [*names, *values]
+    written = names(
+        view, body.points, [(s.side.part, points) for s, points in zip(shown, reached[1:], strict=True)], arrows
+    )
+    values = labels(view, reached, pulled, arrows, [name.reach for name in written])
+    words = [*written, *values]
     fig, axes = canvas([*reaches(view, np.concatenate(reached), arrows), *(one.reach for one in words)])
     heading(fig, result, "the scene")
     depths = (float(view.depth(everything).min()), float(view.depth(everything).max()))
@@ -113,8 +115,3 @@ def _fill(
         draw_edges(plotter, points, creases(points, part.side.facets), INK, 2)
     for tails, ways in arrows:
         vtk_loads.fill(plotter, tails, ways)
-
-
-def _name(view: View, body: BodyMesh, part: ColouredSide) -> Label:
-    middle = view.project((body.points[part.side.vertices].mean(axis=0) + part.away)[None])[0]
-    return Label(part.side.part, middle, np.zeros(2), weight="normal", colour=BLUE)

@@ -6,7 +6,6 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ...reader import Result
-from ...units import times
 from .. import plane_marks as marks
 from ..deformed import deform, part_geometries
 from ..legend import legend
@@ -34,12 +33,12 @@ def draw(result: Result) -> Figure:
         *marks.loads(shape, borne_loads(result)),
         *marks.contacts(shape, parts),
     ]
-    fig, axes = canvas([Reach(shape.points[:, :2]), Reach(body.points[:, :2]), *(m.reach for m in drawn)])
+    fig, axes = canvas([Reach(shape.points[:, :2]), Reach(shape.at_rest[:, :2]), *(m.reach for m in drawn)])
     heading(fig, result, "stress in the body")
     scale = scale_of(body, values)
     paint(axes, shape, np.broadcast_to(values[:, None], body.cells.shape), EMBER, scale.end)
     for mark in drawn:
         mark.draw(axes)
-    bar(fig, scale, times(shape.factor))
+    bar(fig, scale, shape.scales)
     legend(fig, [marks.undeformed(), *marks.keys(drawn)])
     return fig

@@ -1,0 +1,27 @@
+"""The name of a part in space stands on the part and clear of its arrows."""
+
+from __future__ import annotations
+
+import numpy as np
+import shapely
+
+from hvi_fenicsx.report.pictures import load_labels, space_names
+from hvi_fenicsx.report.pictures.plane_canvas import SIDE, TALLEST
+from hvi_fenicsx.report.pictures.reach import largest_scale
+from hvi_fenicsx.report.pictures.vtk_view import best_view
+
+
+def test_a_name_is_clear_of_the_arrows_on_its_part() -> None:
+    """A plate that is pulled upwards, with an arrow in the very middle of its top."""
+    x, y, z = (c.ravel() for c in np.meshgrid(np.linspace(0, 0.2, 5), np.linspace(0, 0.2, 5), [0.0, 0.1]))
+    body = np.column_stack([x, y, z])
+    top, low = body[z > 0], body[z == 0] - [0, 0, 0.2]
+    arrows = [(top, np.broadcast_to([0.0, 0.0, 0.03], top.shape))]
+    view = best_view([np.array([0.0, 0.0, 1.0])])
+    pull, base = space_names.names(view, body, [("pull", top), ("base", low)], arrows)
+    scale = largest_scale(load_labels.reaches(view, np.concatenate([body, low]), arrows), (SIDE, TALLEST))
+    box = pull.reach.hull(scale)
+    tails, tips = view.project(top), view.project(top + arrows[0][1])
+    assert not any(box.intersects(shapely.LineString(line)) for line in zip(tails, tips, strict=True))
+    assert shapely.MultiPoint(view.project(top)).convex_hull.contains(box)
+    assert np.allclose(base.at, view.project(low).mean(axis=0))
