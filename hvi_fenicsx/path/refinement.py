@@ -75,9 +75,10 @@ def refined(system: System, condensation: Condensation, problem: Problem, graphs
         forces = contact_state.forces(problem, system.displacement(unknowns))
         left = reaction(system, forces)
         left.array[:] -= condensation.spread(-graphs.force).array_r
+        missing = condensation.condensed(-left.array_r)
         before = graphs.x
-        graphs.take(-condensation.condensed(left))
-        unknowns.array[:] += condensation.change(graphs.x - before, -left.array_r)
+        graphs.take(missing.condensed)
+        unknowns.array[:] += condensation.change(graphs.x - before, missing)
     u = system.displacement(unknowns)
     forces = contact_state.forces(problem, u)
     return Refined(u=u, x=graphs.x, force=graphs.force, forces=forces, carried=condensation.spread(-graphs.force))

@@ -11,7 +11,7 @@ from ..system.levels import Levels
 from ..system.system import System
 from ..typing import Integers
 from .result import SolveResult
-from .thresholds import DEFAULT
+from .thresholds import ActiveSetThresholds
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,19 +33,20 @@ class CoarseStart:
     way: float | None = None
 
 
-def prolonged(start: CoarseStart, system: System) -> PETSc.Vec:
+def prolonged(start: CoarseStart, system: System, thresholds: ActiveSetThresholds) -> PETSc.Vec:
     """The coarse solution on the finer mesh, within its bounds and with its prescribed values. Collective.
 
     Args:
         start: the coarse solution, and the way from there.
         system: on the finer mesh.
+        thresholds: what counts as on a bound.
     """
     coarse = start.system
     x, known = system.load.duplicate(), coarse.unknowns(start.result.u)
     start.prolongation.mult(known, x)
     _interpolate_relative(x, known, start, system)
     x.scale(coarse.problem.scales.displacement / system.problem.scales.displacement)
-    make_admissible(x, system)
+    make_admissible(x, system, thresholds)
     return x
 
 
@@ -78,15 +79,16 @@ def _relative_dofs(system: System) -> Integers:
     return np.concatenate([one.surface.dofs.ravel() for one in system.problem.interfaces])
 
 
-def make_admissible(x: PETSc.Vec, system: System) -> None:
+def make_admissible(x: PETSc.Vec, system: System, thresholds: ActiveSetThresholds) -> None:
     """Move unknowns within their bounds, onto a bound that only rounding keeps them from, and to prescribed values.
 
     Args:
         x: the unknowns, changed in place.
         system: with bounds and prescribed values.
+        thresholds: what counts as on a bound.
     """
     at, d = system.jacobian.rows.dofs, system.problem.scales.dimension
-    near = DEFAULT.active_set.on_bound * system.references.at(at // d)
+    near = thresholds.on_bound * system.references.at(at // d)
     values, lower, upper = (vector.array_r[at] for vector in (x, system.lower, system.upper))
     values = np.where(values <= lower + near, lower, np.where(values >= upper - near, upper, values))
     x.array[at] = values

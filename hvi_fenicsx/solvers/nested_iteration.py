@@ -115,7 +115,8 @@ def solve_from_coarser(
         SolverError: a convex step raised the energy.
     """
     kind, found = registry.choose(options, system), start.result
-    first = coarse_start.prolonged(start, system) if found.converged and kind.takes_start else None
+    takes = found.converged and kind.takes_start
+    first = coarse_start.prolonged(start, system, options.thresholds.active_set) if takes else None
     context = SolveContext.create(system, start.levels, solvability, options, control, steady=found.steady)
     _log_level(system, kind)
     result = kind(context).solve() if first is None else kind(context).solve(first)
@@ -158,7 +159,7 @@ def solve_from_displacement(
     levels = coarser_levels(model, system, options, control)
     first = system.unknowns(u)
     first.scale(1.0 / system.problem.scales.displacement)
-    coarse_start.make_admissible(first, system)
+    coarse_start.make_admissible(first, system, options.thresholds.active_set)
     _log_level(system, kind)
     context = SolveContext.create(system, levels, solvability, options, control)
     result = kind(context).solve(first)

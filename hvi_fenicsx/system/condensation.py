@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from petsc4py import PETSc
@@ -28,6 +28,21 @@ from .factorised_stiffness import FactorisedStiffness
 from .interior import PREFIX, Interior
 from .rigid_defect import RigidMotions
 from .system import System
+
+
+@dataclass(frozen=True, kw_only=True)
+class CondensedForces:
+    """Forces on the whole body, condensed.
+
+    Attributes:
+        body: on this rank's unknowns off the supports, (local unknowns,).
+        kept: on all unknowns of Γc that the body keeps, (n of the interior,).
+        condensed: on the condensed unknowns, (n,).
+    """
+
+    body: Array
+    kept: Array
+    condensed: Array
 
 
 class Condensation:
@@ -234,25 +249,27 @@ class Condensation:
         found.array[interior.kept] = interior.own_part(whole)
         return found
 
-    def condensed(self, forces: PETSc.Vec) -> Array:
-        """Forces on the whole body as forces on the condensed unknowns, (n,). Collective.
+    def condensed(self, forces: Array) -> CondensedForces:
+        """Forces on the whole body as forces on the condensed unknowns. Collective.
 
         Args:
-            forces: in the components of the unknowns.
+            forces: on this rank's unknowns, in their components, (local unknowns,).
         """
-        outer = self._interior.loads(self._free(forces.array_r)[:, None])[:, 0]
-        return self._elimination.reduced(outer)
+        body = self._free(forces)
+        kept = self._interior.loads(body[:, None])[:, 0]
+        return CondensedForces(body=body, kept=kept, condensed=self._elimination.reduced(kept))
 
-    def change(self, x: Array, forces: Array) -> Array:
+    def change(self, x: Array, forces: CondensedForces) -> Array:
         """How the unknowns of the whole body change, in balance with forces, where condensed ones do. Collective.
 
         Args:
             x: change of the condensed unknowns, (n,).
-            forces: on this rank's unknowns, (local unknowns,).
+            forces: on the body.
+
+        Returns:
+            The change of this rank's unknowns, (local unknowns,).
         """
-        right = self._free(forces)
-        outer = self._interior.loads(right[:, None])[:, 0]
-        return self._interior.expand(self._elimination.completed(x, outer), right)
+        return self._interior.expand(self._elimination.completed(x, forces.kept), forces.body)
 
     def _free(self, forces: Array) -> Array:
         """Forces off the supports, which carry the others, (local unknowns,)."""

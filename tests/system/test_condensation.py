@@ -237,3 +237,18 @@ def test_a_factorisation_without_memory_is_not_called_a_body_that_is_not_held() 
     little = {**CHOLESKY, "mat_mumps_icntl_14": -95}
     with pytest.raises(SolverError, match="no memory was left"):
         Interior(form_of(system), np.empty(0, dtype=np.int32), little)
+
+
+def test_forces_are_condensed_by_one_solve_and_followed_by_another(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The body in balance with forces inside it: A times the change is these, off Γc."""
+    system, condensation = condensed("pulled")
+    solves, solve = [], Interior.solve
+    monkeypatch.setattr(Interior, "solve", lambda self, right: solves.append(1) or solve(self, right))
+    forces = np.random.default_rng(5).standard_normal(system.load.local_size)
+    found = condensation.condensed(forces)
+    change, product = system.undisplaced(), system.load.duplicate()
+    change.array[:] = condensation.change(np.ones_like(found.condensed), found)
+    system.jacobian.elastic_product(change, product)
+    inner = np.setdiff1d(np.arange(len(forces)), np.union1d(system.jacobian.rows.dofs, system.problem.fixed))
+    assert np.max(np.abs(product.array_r - forces)[inner]) < 1e-12 * np.max(np.abs(product.array_r))
+    assert len(solves) == 2
