@@ -229,3 +229,20 @@ def test_with_energies_that_differ_every_state_is_an_equilibrium_of_its_own_mixi
     assert largest_distance(given, states, (0,)) < 1e-8
     assert largest_imbalance(given, states) < 1e-8
     assert np.all(np.diff([s.dissipated for s in states]) > -1e-6 * states[-1].dissipated)
+
+
+@pytest.mark.parametrize("angle", [0.0, 50.0])
+def test_a_jump_releases_what_a_bond_by_mode_does_not_dissipate(angle: float) -> None:
+    """As above on soft springs: torn off at once at the peak; by hand, the energy falls by e²/(2k) + e/2."""
+    across, along = np.cos(np.radians(angle)), np.sin(np.radians(angle)) / BETA
+    criterion, k = BenzeggaghKenane(3.0, 2.1), 0.1
+    e = float(criterion.energy(np.array([(BETA * along) ** 2]))[0])
+    given = replace(cohesion(graph(SOFTENING), 1), weights=np.ones(1), mixity=criterion)
+    springs = np.array([k, k * BETA**2])
+    torn = problem(np.diag(springs), 60.0 * springs * [-across, along], given)
+    follower, states = path(torn, programme=(1.0,), remember=(0,))
+    assert follower.end is End.REACHED, follower.reason
+    (jumped,) = [s for s in states if s.event is Event.JUMP]
+    assert jumped.dissipated == pytest.approx(2.5 * e, rel=1e-8)
+    assert jumped.released == pytest.approx(e**2 / (2.0 * k) + 0.5 * e - 2.5 * e, rel=1e-7)
+    assert largest_imbalance(torn, states) < 1e-8

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -27,6 +27,8 @@ class Stored:
         dissipated: lost in bonds with memory.
         size: of the terms.
         elastic: ½ a(u, u).
+        lost: by each bond with memory, for 1 at its mode, (b,).
+        scales: of the bonds' energies by mode, (b,).
     """
 
     energy: float
@@ -34,6 +36,8 @@ class Stored:
     dissipated: float
     size: float
     elastic: float = 0.0
+    lost: Array = field(default_factory=lambda: np.zeros(0))
+    scales: Array = field(default_factory=lambda: np.zeros(0))
 
 
 class Balance:
@@ -69,30 +73,32 @@ class Balance:
         elastic, load = 0.5 * float(x @ (problem.stiffness @ x)), float(problem.load(factor) @ x)
         constant = problem.constant_at(factor)
         plain = sum(b.energy(x) for n, b in enumerate(problem.bonds) if n not in self._in_sites)
-        back, lost = self._bonds(values)
+        back, lost, scales = self._bonds(values)
+        all_lost = float(scales @ lost)
         return Stored(
             energy=elastic - load + constant + plain + back,
             potential=problem.potential(x, factor),
-            dissipated=lost if self._potential else self._lost,
-            size=abs(elastic) + abs(load) + abs(constant) + abs(plain) + abs(back) + lost,
+            dissipated=all_lost if self._potential else self._lost,
+            size=abs(elastic) + abs(load) + abs(constant) + abs(plain) + abs(back) + all_lost,
             elastic=elastic,
+            lost=lost,
+            scales=scales,
         )
 
-    def _bonds(self, values: Values) -> tuple[float, float]:
-        """What bonds with memory give back, and what they have lost."""
-        back = lost = 0.0
-        if not self._in_sites:
-            return back, lost
+    def _bonds(self, values: Values) -> tuple[float, Array, Array]:
+        """What bonds give back, what each has lost for 1 at its mode, and the scales by mode, (b,)."""
+        back, found = 0.0, []
         for k, laws in enumerate(self._sites.laws):
             if not any(law.group in self._in_sites for law in laws):
                 continue
-            x = float(values.lengths[k])
+            x, scale = float(values.lengths[k]), float(values.energies[k])
             shares = self._sites.shares(k, x, self._sites.bond_force(k, values))
             for law, share in zip(laws, shares, strict=True):
                 if law.group in self._in_sites:
-                    back += float(values.energies[k]) * law.recoverable(x, share)
-                    lost += law.dissipated(x, share)
-        return back, lost
+                    back += scale * law.recoverable(x, share)
+                    found.append((law.dissipated(x, share), scale))
+        lost, scales = np.reshape(np.array(found), (-1, 2)).T
+        return back, lost, scales
 
     def begin(self, values: Values, factor: float) -> None:
         """Start at a state.
@@ -123,11 +129,17 @@ class Balance:
     def leap(self, values: Values, factor: float) -> float:
         """To another state at the same factor; returns the energy that is released.
 
+        Bonds whose energy depends on the mode lose what they break by at the mode of that state.
+
         Args:
             values: of the sites.
             factor: λ.
         """
-        before, self.stored = self.stored, self.at(values, factor)
+        before, after = self.stored, self.at(values, factor)
+        if not self._potential:
+            self._lost += float(after.scales @ (after.lost - before.lost))
+            after = replace(after, dissipated=self._lost)
+        self.stored = after
         self.work += self.stored.potential - before.potential
         return before.energy + before.dissipated - self.stored.energy - self.stored.dissipated
 
