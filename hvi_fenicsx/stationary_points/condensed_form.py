@@ -19,7 +19,7 @@ from .scalar_problem import FAR, ScalarProblem
 
 COARSE = 1e-4
 """Error of the energy of curved laws, relative to their scale, with which the first search is made."""
-NEAR = 1e-3
+NEAR = 5e-4
 """Error of the tractions of curved laws, relative to their scale, in the search for all equilibria."""
 ROUNDED = 1e-12
 """Widening of this error by rounding."""
