@@ -98,9 +98,9 @@ class Equilibria:
             bounded=self._prepared.solvability.state == "held",
             energies=Unit(size=scales.energy, name="J/m" if scales.dimension == 2 else "J"),
         )
+        if not lowest and saved is None and (only := self._only()) is not None:
+            return only
         with self._prepared.timer("solve"):
-            if not lowest and saved is None and (only := self._only()) is not None:
-                return only
             if self.problem.error and lowest:
                 wanted = self._refined(self.problem, wanted, stop, report)
             elif self.problem.error and not len(self.problem.lengths):
