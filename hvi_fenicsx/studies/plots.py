@@ -140,7 +140,7 @@ def _against_h(study: Study) -> Figure | None:
     drawn = [q for q in quantities(study) if len(over_h(study.rows, study.own, q)) > 1][:3]
     if not drawn:
         return None
-    fig, axes = page(study, "error against the mesh width h", len(drawn), 2.3, 5.3)
+    fig, axes = page(study, "error against the mesh width h", len(drawn), 2.3, 4.6)
     for quantity, here in zip(drawn, axes, strict=True):
         values, ends = _lines_over_h(here, study, quantity)
         found = order(study.rows, study.own, quantity, study.certain)

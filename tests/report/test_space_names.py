@@ -7,7 +7,7 @@ import shapely
 
 from hvi_fenicsx.report.pictures import load_labels, space_names
 from hvi_fenicsx.report.pictures.plane_canvas import SIDE, TALLEST
-from hvi_fenicsx.report.pictures.reach import largest_scale
+from hvi_fenicsx.report.pictures.reach import Reach, largest_scale
 from hvi_fenicsx.report.pictures.vtk_view import best_view
 
 
@@ -25,3 +25,14 @@ def test_a_name_is_clear_of_the_arrows_on_its_part() -> None:
     assert not any(box.intersects(shapely.LineString(line)) for line in zip(tails, tips, strict=True))
     assert shapely.MultiPoint(view.project(top)).convex_hull.contains(box)
     assert np.allclose(base.at, view.project(low).mean(axis=0))
+
+
+def test_a_name_does_not_hide_a_small_part() -> None:
+    """The top of a column on a wide plate, as wide as its name."""
+    corners = np.array([[x, y, 0.0] for x in (0.0, 1.0) for y in (0.0, 1.0)])
+    top = 0.12 * corners + [0.44, 0.44, 0.5]
+    view = best_view([np.array([0.0, 0.0, 1.0])])
+    (name,) = space_names.names(view, np.concatenate([corners, top]), [("pulled", top)], [])
+    scale = largest_scale([Reach(view.project(np.concatenate([corners, top])))], (SIDE, TALLEST))
+    assert not name.reach.hull(scale).intersects(shapely.MultiPoint(view.project(top)).convex_hull)
+    assert np.linalg.norm(name.at - view.project(top).mean(axis=0)) < 1e-9

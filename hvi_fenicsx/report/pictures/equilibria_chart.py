@@ -18,6 +18,7 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
 from ..equilibria_reader import EquilibriaResult, Row, read
+from ..units import number, unit_for
 from .equilibria import NAME
 from .style import BLUE, GREEN, GREY, HEADING, INK, ORANGE, PALE, PURPLE, VERMILION, area, figure, save, titled
 
@@ -50,17 +51,19 @@ def make(result: EquilibriaResult) -> Figure:
     return fig
 
 
-def _subject(result: EquilibriaResult, shown: int) -> tuple[str, str]:
+def _subject(result: EquilibriaResult, shown: int) -> tuple[str, str, str]:
     known, count = result.known, len(result.rows)
     below = f"{count} equilibria" if count != 1 else "one equilibrium"
     below += f", the {shown} lowest shown" if shown < count else ""
     if known["complete"]:
-        return below, "all, proven"
-    return below, "the lowest, proven" if known["proven"] else "there may be others"
+        return below, "✓ all, proven", GREEN
+    return (below, "✓ the lowest, proven", GREEN) if known["proven"] else (below, "there may be others", INK)
 
 
 def _energies(axes: Axes, result: EquilibriaResult, rows: Sequence[Row]) -> None:
     values = np.array(result.energies[: len(rows)]) - result.energies[0]
+    unit = unit_for(float(values[-1]), result.unit)
+    values = values / unit.size
     for one in result.known.get("barriers", []):
         top, ends = one["saddle"] - 1, [m - 1 for m in one["between"]]
         for end in ends:
@@ -75,7 +78,8 @@ def _energies(axes: Axes, result: EquilibriaResult, rows: Sequence[Row]) -> None
     axes.set_yticks(range(len(rows)), [row["index"] for row in rows])
     axes.xaxis.set_major_locator(MaxNLocator(2))
     axes.tick_params(axis="y", length=0)
-    axes.set_xlabel(f"energy above the lowest\nfound, {result.energies[0]:.6g} ({result.unit})")
+    axes.set_ylabel("equilibrium")
+    axes.set_xlabel(f"{unit.name} above the lowest found,\n{number(result.energies[0])} {result.unit}")
 
 
 def _strips(axes: Axes, rows: Sequence[Row], states: Sequence[Sequence[Row]]) -> None:

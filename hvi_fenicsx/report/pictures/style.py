@@ -84,7 +84,7 @@ def pressure_scale(lowest: float, largest: float) -> tuple[LinearSegmentedColorm
     """
     if lowest < -1e-6 * largest:
         return _BOTH, -largest, largest
-    return _PRESSED, 0.0, largest or 1.0
+    return _PRESSED, 0.0, largest
 
 
 def figure(height: float) -> Figure:

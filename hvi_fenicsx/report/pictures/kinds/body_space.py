@@ -104,7 +104,7 @@ def _fill_part(
         patch,
         scalars="pressure",
         cmap=scale[0],
-        clim=scale[1:],
+        clim=(scale[1], scale[2] or 1.0),
         nan_color=PALE,
         show_scalar_bar=False,
         lighting=False,

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from ....typing import Array
@@ -85,7 +86,7 @@ def draw(result: Result) -> Figure:
     for one in words:
         one.draw(axes)
     say(fig, body)
-    legend(fig, [*keys(shown), *region_keys(areas), *inside(result)])
+    legend(fig, [*keys(shown), *_apart(shown), *region_keys(areas), *inside(result)])
     return fig
 
 
@@ -93,6 +94,12 @@ def keys(shown: list[ColouredSide]) -> list[Artist]:
     """What the colours mean that are there."""
     words = {CONTACT: "contact, friction or adhesion", SUPPORT: "support", LOADED: "loaded"}
     return [Patch(fc=c, ec=INK, label=w) for c, w in words.items() if c in {s.colour for s in shown}]
+
+
+def _apart(shown: list[ColouredSide]) -> list[Artist]:
+    """The legend's line on parts that are not drawn on the body."""
+    moved = any(s.away.any() for s in shown)
+    return [Line2D([], [], color="none", label="hidden parts are drawn apart")] if moved else []
 
 
 def _fill(
