@@ -121,7 +121,7 @@ def _front_line(axes: Axes, best: Sequence[Row], quantity: str) -> None:
     xs, ys = zip(*points, strict=True)
     axes.plot(xs, ys, color=INK, lw=1.6, zorder=1, drawstyle="steps-post")
     named: list[float] = []
-    for r, (x, y) in list(zip(best, points, strict=True))[::-1]:
+    for r, (x, y) in zip(best, points, strict=True):  # the cheapest first: nothing stands to the left of it
         if all(apart(axes, y, other) for other in named):
             named.append(y)
             axes.annotate(

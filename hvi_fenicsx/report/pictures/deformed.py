@@ -19,7 +19,7 @@ NEAR = 0.3
 """Gaps larger than this, magnified, of the body's size, are the body's own shape."""
 KEPT = 0.75
 """A small body beside a large one is drawn with this part of its area or volume, at least."""
-THIN, DRAWN = 1 / 60, 1 / 15
+THIN, DRAWN = 1 / 40, 1 / 15
 """A plane body whose height is a smaller part of its length is drawn higher (or wider), up to the second part."""
 
 
