@@ -16,6 +16,7 @@ import uuid
 from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -709,6 +710,21 @@ def test_the_axes_of_a_map_are_in_a_unit_that_suits_and_inside_of_the_picture(tm
     named = [label for axes in fig.axes for label in (axes.xaxis.label, axes.yaxis.label) if label.get_text()]
     assert {label.get_text() for label in named} == {"x in mm", "y in mm"}
     assert min(label.get_window_extent().x0 for label in named) >= 0.0
+
+
+def test_the_numbers_of_a_narrow_map_stand_apart_and_its_arrows_are_as_wide_as_those_of_a_wide_one(
+    tmp_path: Path,
+) -> None:
+    """A part that is six times as long across as along, far from the origin."""
+    narrow = box()
+    narrow.geometry.x[:] = narrow.geometry.x * [0.1, 1.0, 1.0] + [500.0, 0.0, 0.0]
+    found = reader.read(result(tmp_path / "r", narrow, pressed))
+    fig = contact_maps.draw(found, found.parts[0])
+    fig.canvas.draw()
+    said = [text.get_window_extent() for text in fig.axes[0].get_xticklabels() if text.get_text()]
+    assert said
+    assert not any(one.overlaps(other) for one, other in pairwise(said))
+    assert {arrows.units for arrows in fig.findobj(Quiver)} == {"inches"}
 
 
 @pytest.mark.parametrize("height", [1.0, 0.03])
