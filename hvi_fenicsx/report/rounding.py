@@ -30,5 +30,15 @@ def without_noise(columns: Mapping[str, Array], body: BodyMesh) -> dict[str, Arr
     return kept
 
 
+def unless_noise(value: float, beside: float) -> float:
+    """A value; zero where it is rounding.
+
+    Args:
+        value: it.
+        beside: the largest size of what is beside it.
+    """
+    return value if abs(value) > ROUNDING * beside else 0.0
+
+
 def _largest(values: Array) -> float:
     return float(np.nanmax(np.abs(values), initial=0.0))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from hvi_fenicsx.report import units
+from hvi_fenicsx.report import rounding, units
 from hvi_fenicsx.report.pictures.legend import ticks
 from hvi_fenicsx.studies import plot_axes
 
@@ -37,3 +37,7 @@ def test_the_numbers_of_a_logarithmic_axis_look_alike() -> None:
     said = [axes.xaxis.get_major_formatter()(value) for value in np.power(10.0, np.arange(-5, 3))]
     assert said == ["0.00001", "0.0001", "0.001", "0.01", "0.1", "1", "10", "100"]
     assert axes.xaxis.get_major_formatter()(0.03125) == "0.0312"
+
+
+def test_a_force_that_is_rounding_beside_the_largest_is_zero() -> None:
+    assert [rounding.unless_noise(value, 1.5e4) for value in (-83e-9, -2.0e-5, 3.0)] == [0.0, -2.0e-5, 3.0]

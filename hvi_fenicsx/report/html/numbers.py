@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..reader import ContactPart, Result
-from ..rounding import ROUNDING
+from ..rounding import unless_noise
 from ..units import number, quantity, thousands, unit_for
 
 _PHASES = {
@@ -77,7 +77,7 @@ def forces(result: Result) -> dict[str, Any] | None:
     largest = max(abs(v) for force in places.values() for v in force)
     unit = unit_for(largest, "N" if dimension == 3 else "N/m")
     rows = [
-        {"name": name, "values": [unit.number(v if abs(v) > ROUNDING * largest else 0.0) for v in force]}
+        {"name": name, "values": [unit.number(unless_noise(v, largest)) for v in force]}
         for name, force in places.items()
     ]
     return {"axes": [f"{axis}, {unit.name}" for axis in "xyz"[:dimension]], "rows": rows}

@@ -66,7 +66,7 @@ def _subject(result: EquilibriaResult, shown: int) -> tuple[str, str, str]:
 def _energies(axes: Axes, result: EquilibriaResult, rows: Sequence[Row]) -> None:
     values = np.array(result.energies[: len(rows)]) - result.energies[0]
     unit = unit_for(float(values[-1]), result.unit)
-    values = values / unit.size
+    values = np.asarray(values / unit.size)
     for one in result.known.get("barriers", []):
         top, ends = one["saddle"] - 1, [m - 1 for m in one["between"]]
         for end in ends:

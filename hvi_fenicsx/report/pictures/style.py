@@ -139,7 +139,7 @@ def titled(fig: Figure, title: str, below: str, words: str = "", colour: str = I
     left = fig.text(0.3 / WIDTH, at, below, size=12, color=GREY, va="baseline")
     right = fig.text(1 - 0.3 / WIDTH, at, words, size=12, weight="bold", color=colour, ha="right", va="baseline")
     wide, other = (text.get_window_extent().width / fig.dpi for text in (left, right))
-    left.set_size(min(12.0, 12.0 * (WIDTH - 0.8 - other) / wide))  # it is never written into what is at its right
+    left.set_fontsize(min(12.0, 12.0 * (WIDTH - 0.8 - other) / wide))  # it is never written into what is at its right
 
 
 def _facts(result: Result) -> str:

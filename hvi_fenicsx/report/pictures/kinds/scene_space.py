@@ -21,11 +21,11 @@ from ..deformed import DeformedBody
 from ..legend import legend
 from ..load_labels import labels, reaches
 from ..loads_supports import Side, held_sides, loaded_sides, roles_by_side
-from ..plane_canvas import canvas
 from ..regions import Region, regions
 from ..regions import keys as region_keys
 from ..registry import picture
 from ..scene_legend import inside, say, touches
+from ..space_canvas import space_canvas
 from ..space_names import names
 from ..style import INK, PALE, heading
 from ..vtk_view import area_vectors, best_view, draw_edges, render, surface
@@ -77,7 +77,7 @@ def draw(result: Result) -> Figure:
     )
     values = labels(view, reached, pulled, arrows, [name.reach for name in written])
     words = [*written, *values]
-    fig, axes = canvas([*reaches(view, np.concatenate(reached), arrows), *(one.reach for one in words)])
+    fig, axes = space_canvas(view, [*reaches(view, np.concatenate(reached), arrows), *(one.reach for one in words)])
     heading(fig, result, "the scene")
     depths = (float(view.depth(everything).min()), float(view.depth(everything).max()))
     areas = regions(result)
