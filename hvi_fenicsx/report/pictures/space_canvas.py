@@ -37,8 +37,8 @@ def space_canvas(view: View, reaches: Sequence[Reach]) -> tuple[Figure, Axes]:
     taken = shapely.union_all([reach.hull(scale) for reach in reaches if len(reach.points)])
     boxes = np.array([shapely.box(*(box + origin).ravel()) for origin in origins])
     best = origins[int(np.argmin(np.round(shapely.area(shapely.intersection(boxes, taken)) * scale**2, 3)))]
-    for name, end in zip("xyz", ends.tolist(), strict=True):
-        _axis(axes, name, best, np.array(end), LETTER / scale)
+    for name, end in zip("xyz", ends, strict=True):
+        _axis(axes, name, best, end, LETTER / scale)
     return fig, axes
 
 
@@ -51,7 +51,9 @@ def _box(ends: Array, room: float) -> Array:
 def _axis(axes: Axes, name: str, origin: Array, end: Array, letter: float) -> None:
     halo = [withStroke(linewidth=3.0, foreground="white")]
     arrow = {"arrowstyle": "-|>,head_length=0.35,head_width=0.15", "color": GREY, "lw": 1.3, "shrinkA": 0, "shrinkB": 0}
-    (x, y), (right, up) = origin.tolist(), (origin + end).tolist()
+    beyond = end * (1.0 + letter / (float(np.hypot(*end)) or 1.0))
+    (x, y), (right, up), (across, above) = (
+        (float(point[0]), float(point[1])) for point in (origin, origin + end, origin + beyond)
+    )
     axes.annotate("", (right, up), (x, y), arrowprops=arrow, annotation_clip=False, zorder=8)
-    x, y = (origin + end * (1.0 + letter / (float(np.hypot(*end)) or 1.0))).tolist()
-    axes.text(x, y, name, size=12, color=GREY, ha="center", va="center", zorder=8, path_effects=halo)
+    axes.text(across, above, name, size=12, color=GREY, ha="center", va="center", zorder=8, path_effects=halo)
