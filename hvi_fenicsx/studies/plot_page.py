@@ -27,8 +27,8 @@ from .table import Row
 
 PANEL, GAP, FOOT = 2.6, 0.6, 0.85
 """Inches: a panel, the room for its title, the axis below the last."""
-_SMOOTHINGS = {None: GREEN, "quadratic": BLUE, "chks": PURPLE, "log_exp": ORANGE, "paper": VERMILION}
-_OTHER_SMOOTHING = "#56B4E9"
+_SMOOTHINGS = {None: GREEN, "quadratic": BLUE, "chks": "#56B4E9", "log_exp": ORANGE, "paper": VERMILION}
+_OTHER_SMOOTHING = PURPLE
 _IN_LINE = 6
 """Kinds of points that one line of the legend holds."""
 

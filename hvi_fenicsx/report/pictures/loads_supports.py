@@ -79,7 +79,7 @@ class LoadedSide:
     def sheared(self) -> Mask:
         """Where the load is along the side, so that an arrow to it would lie on it, (m,)."""
         across = np.abs(np.einsum("ki,ki->k", self.traction, self.side.normals))
-        return np.asarray(across < SHEAR * np.linalg.norm(self.traction, axis=1))
+        return np.asarray(across <= SHEAR * np.linalg.norm(self.traction, axis=1))
 
     def times(self, factor: float) -> LoadedSide:
         """A multiple of the load."""
