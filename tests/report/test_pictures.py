@@ -799,6 +799,17 @@ def test_arrows_of_a_load_along_its_side_are_beside_it_and_apart(tmp_path: Path,
         assert (tails + ways)[:, 1] == pytest.approx(np.ones(len(tails)))
 
 
+def test_a_load_on_a_hidden_side_is_drawn_where_the_side_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The underside is drawn below the box: the arrows of a load on it would be inside of the box."""
+    monkeypatch.setattr(scene_space, "render", lambda *_: None)
+    folder = result(tmp_path / "r", box(), pressed)
+    write_words(folder, 3, effects=[role("under", "traction", traction=[0.0, 0.0, -1e6])])
+    write_sides(folder, box(), under=lambda x: x[2] == 0)
+    words = {text.get_text()[:5]: text for text in scene_space.draw(reader.read(folder)).axes[0].texts}
+    name, value = (Text.get_window_extent(words[key]) for key in ("under", "1\N{NARROW NO-BREAK SPACE}MPa"))
+    assert value.y0 < name.y1
+
+
 @pytest.mark.parametrize(("body", "value"), [(square, "5 kN/m"), (box, "5 kN")], ids=["plane", "space"])
 def test_a_force_that_is_spread_over_a_part_has_arrows_and_its_own_value(
     tmp_path: Path, body: Callable[[], mesh.Mesh], value: str
