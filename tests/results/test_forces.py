@@ -75,7 +75,7 @@ def test_the_resultants_are_in_the_summary_and_on_the_page(uniform: Path) -> Non
     after = page.partition("Forces on the body")[2].partition("</table>")[0]
     assert ">wall<" in after
     assert ">x, MN/m<" in after
-    assert ">-1<" in after
+    assert ">−1<" in after
 
 
 def test_the_rows_of_a_part_add_up_to_its_resultant_and_all_parts_to_nothing(tmp_path: Path) -> None:
