@@ -51,6 +51,7 @@ def rows(folder: Path) -> tuple[list[str], npt.NDArray[np.float64]]:
     return [row["event"] for row in found], np.array([[float(row[key]) for key in keys] for row in found])
 
 
+@pytest.mark.long
 def test_a_joint_whose_vertices_all_soften_at_once_comes_off_at_its_strength() -> None:
     """S = 3e7 / sqrt(sin⁴ 30° + (sin 30° cos 30° / 0.7)²); the limit points of 28 vertices are 1e-10 apart."""
     path = hvi_fenicsx.follow(hvi_fenicsx.read_scene(ROOT / "demos" / "scarf_joint.toml"), to=1.3)
