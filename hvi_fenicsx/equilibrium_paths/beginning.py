@@ -17,7 +17,7 @@ from .placing import place
 from .step import FACTOR
 from .tracer import Tracer
 
-_FIRST = 1e-3
+FIRST = 1e-3
 """Part of the first load at which a body that nothing holds at rest is looked for."""
 
 
@@ -78,13 +78,13 @@ def _nearest(bonds: BondTable, x: Array, wanted: Array) -> Array:
 def _settled(bonds: BondTable, problem: CondensedProblem) -> Cells | None:
     """Where a small part of the loads takes a body that nothing holds at rest, and back to no load; None: away."""
     chains = [bonds.chain(i) for i in range(problem.size)]
-    load = problem.load(_FIRST)
+    load = problem.load(FIRST)
     start = np.clip(np.zeros(problem.size), problem.lower, problem.upper)
     landing = Descent(bonds, load).land(start, start)
     if not landing.found:
         return None
     cells = place(problem.elastic, chains, landing.x, load - problem.elastic @ landing.x)
-    tracer = Tracer(problem.elastic, problem.force, problem.force_rate, cells, _FIRST, driver=FACTOR, heading=-1)
+    tracer = Tracer(problem.elastic, problem.force, problem.force_rate, cells, FIRST, driver=FACTOR, heading=-1)
     while True:
         step = tracer.advance(0.0)
         if step.variable is None:

@@ -106,6 +106,41 @@ def test_piecewise_linear_paths_are_the_exact_ones(follow: Follow) -> None:
         assert states[-1].work == pytest.approx(wanted[-1].work, rel=1e-9)
 
 
+def floating(law: Superpotential, gaps: Any, seed: int, row: int = 3) -> CondensedProblem:
+    """A row of points with gaps below them, and slips that nothing but their law holds."""
+    generator = np.random.default_rng(seed)
+    coupling = 0.06 * generator.standard_normal((row, row))
+    coupling -= coupling.mean(axis=0)
+    coupling -= coupling.mean(axis=1, keepdims=True)
+    stiffness = np.block([[chain(row, 1.0), coupling], [coupling.T, chain(row, 2.0)]])
+    press = generator.standard_normal(row)
+    press -= press.mean() + 0.5
+    lower = np.r_[-np.broadcast_to(np.asarray(gaps, dtype=float), row), np.full(row, -np.inf)]
+    load = np.r_[press, generator.standard_normal(row)]
+    return problem(stiffness, load, bonds(law, np.arange(row, 2 * row)), lower=lower)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_body_that_nothing_touches_falls_where_the_exact_path_has_it(seed: int) -> None:
+    given = floating(graph([(0, 0), (1, 1), (1.5, 0.2)]), np.random.default_rng(seed).uniform(0.1, 2.0, 3), seed)
+    exact = ExactFollower(given, PathOptions(programme=(3.0,)))
+    wanted = list(exact.states())
+    follower, states = path(given, programme=(3.0,))
+    assert follower.end is exact.end
+    np.testing.assert_allclose(states[0].x, wanted[0].x, atol=1e-9)
+    assert peak(states) == pytest.approx(peak(wanted), rel=1e-9)
+
+
+@pytest.mark.parametrize("gap", [0.3, 1e3])
+def test_how_far_a_body_is_above_its_floor_does_not_matter(gap: float) -> None:
+    law = Exponential(1.0, 0.2, 0.5)
+    follower, states = path(floating(law, gap, 0), programme=(3.0,))
+    there, wanted = path(floating(law, 0.0, 0), programme=(3.0,))
+    assert follower.end is there.end
+    assert peak(states) == pytest.approx(peak(wanted), rel=1e-9)
+    np.testing.assert_allclose(states[0].x, wanted[0].x - np.r_[np.full(3, gap), np.zeros(3)], atol=1e-9)
+
+
 def test_a_closed_curve_is_gone_round_once() -> None:
     """The exact path knows it by its cells; the wanted factor is not on it, so loading does not lead there."""
     given = random_problem(165)

@@ -10,6 +10,7 @@ from typing_extensions import override
 
 from ...system.condensed_problem import CondensedProblem
 from ...typing import Array
+from ..beginning import FIRST
 from ..programme import Follower
 from ..rounds import Round, Rounds
 from ..state import End, Event, Follow, PathOptions, PathState, Place, Position, place_of
@@ -21,7 +22,8 @@ from .events import Move, Outcome
 from .felt import factors, felt
 from .jump import Jump
 from .passage import Crossing, Passage, order
-from .rest import Rest, at_rest, is_held
+from .rest import at_rest, is_held
+from .settling import settled
 from .sites import Sites
 from .vertex_laws import vertex_laws
 
@@ -73,8 +75,7 @@ class ArcLengthFollower(Follower):
 
     @override
     def _begun(self) -> Iterator[PathState]:
-        rest = at_rest(self._problem, self._sites)
-        z = self._loaded(rest)
+        z = self._first()
         if z is None:
             self._come_off(0.0, self.reason or "nothing holds the body at rest")
             return
@@ -84,11 +85,19 @@ class ArcLengthFollower(Follower):
         self._unstable = self._sites.unstable_directions(self._curve.here.values)
         yield self._state(Event.START)
 
-    def _loaded(self, rest: Rest) -> Array | None:
-        """From rest to the constant loads, as stable as it goes; where the sites are then."""
-        if rest.z is None or rest.constant is None:
+    def _first(self) -> Array | None:
+        """Where the sites are at the factor 0; None: the body comes off."""
+        rest = at_rest(self._problem, self._sites)
+        if rest.constant is not None:
+            return self._loaded(rest.constant)
+        if rest.held:
             return rest.z
-        follower = ArcLengthFollower(rest.constant, PathOptions(remember=self._options.remember), watch=self._watcher)
+        first = FIRST * self._options.programme[0]
+        return settled(self._problem, self._sites, rest.z, first, self._lag, self._watcher, held=self._is_held(first))
+
+    def _loaded(self, constant: CondensedProblem) -> Array | None:
+        """From rest to the constant loads, as stable as it goes; where the sites are then."""
+        follower = ArcLengthFollower(constant, PathOptions(remember=self._options.remember), watch=self._watcher)
         for _ in follower.states():
             pass
         if follower.end is End.INTERRUPTED:

@@ -10,7 +10,7 @@ sites comes from where they are, so that it is the same on any number of ranks.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,6 +20,7 @@ from ...typing import Array, Mask
 from ..segments import Kind, Segment, piece_at
 from .curve import Curve
 from .equations import ROUNDING, STANDING, UNDECIDED, Refused
+from .events import Move, Outcome
 
 _SLOW = 1e-6
 """A rate of a site's force at which it stands, but for rounding, beside the largest."""
@@ -74,6 +75,27 @@ def order(problem: CondensedProblem, sites: list[int]) -> Array:
         mixed = np.sin(float(np.dot(points[k], (12.9898, 78.233, 37.719))) + 4.1 * number) * 43_758.5453
         found[k] = 0.5 + mixed - np.floor(mixed)
     return found
+
+
+def advancing(curve: Curve, aim: float, lag: Array, step: Callable[[], None], most: int) -> Iterator[Move]:
+    """The steps of a curve, from event to event; after each one that is an event the sites pass.
+
+    Args:
+        curve: the curve; it has a direction.
+        aim: the factor at which a step ends.
+        lag: an order of the sites, (m,).
+        step: is called before each step and passage; it may raise an error to end them.
+        most: steps at most.
+
+    Raises:
+        Refused: there is no end of passing.
+    """
+    for _ in range(most):
+        step()
+        move = curve.advance(aim)
+        yield move
+        if move.outcome in (Outcome.END, Outcome.TURNED):
+            Crossing(curve, lag, step).run(move.site, turned=move.outcome is Outcome.TURNED)
 
 
 class Crossing:
