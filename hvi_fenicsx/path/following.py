@@ -134,7 +134,11 @@ class PathRun:
     def _follower(self, control: Control) -> Follower:
         wanted = self.wanted
         options = PathOptions(
-            programme=wanted.to, follow=Follow(wanted.follow), remember=self._remember, **self._limits()
+            programme=wanted.to,
+            follow=Follow(wanted.follow),
+            remember=self._remember,
+            stops=wanted.contact_at,
+            **self._limits(),
         )
         resume = self.states[-1] if self.states else None
         watch = Watch(control.interrupted, control.jumping)
@@ -206,7 +210,7 @@ class PathRun:
     def crossings(self, factor: float) -> Iterator[tuple[int, Problem, fem.Function]]:
         """The states at which the path crosses a factor: the row before, problem and displacement. Collective.
 
-        Between two events the path is straight.
+        Between two rows the path is straight; one that is not has a row there.
 
         Args:
             factor: λ.

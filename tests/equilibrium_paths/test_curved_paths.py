@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -258,6 +259,25 @@ def test_a_curved_law_softens_as_its_closed_form_says() -> None:
     assert float(fold.x[0]) == pytest.approx(at, rel=1e-5)
     assert fold.factor == pytest.approx(at + 2.0 * np.exp(-at), rel=1e-10)
     assert largest_imbalance(given, states) < 1e-8
+
+
+@pytest.mark.parametrize("follow", Follow)
+def test_a_curved_path_has_a_state_at_each_wanted_factor_that_it_comes_to(follow: Follow) -> None:
+    """A bond on a spring, up, round two limit points where it is followed exactly, and back: λ = x + t(x)."""
+    law, wanted = Exponential(2.0, 0.1, 0.5), (0.9, 1.6, 7.0)
+    given = problem(1.0, 1.0, bonds(law, 0))
+    plain = path(given, programme=(3.0, 0.5), follow=follow)[1]
+    times = {
+        f: sum((a.factor - f) * (b.factor - f) < 0.0 for a, b in pairwise(plain) if b.event is not Event.JUMP)
+        for f in wanted
+    }
+    states = path(given, programme=(3.0, 0.5), follow=follow, stops=wanted)[1]
+    assert {f: sum(s.factor == f for s in states) for f in wanted} == times
+    assert max(times.values()) > 1
+    assert times[7.0] == 0
+    for state in (s for s in states if s.factor in wanted):
+        least, most = law.interval(state.x, 1e-12)
+        assert least[0] - 1e-9 <= state.factor - state.x[0] <= most[0] + 1e-9
 
 
 def test_the_derivatives_of_the_forces_are_those_of_the_matrix() -> None:

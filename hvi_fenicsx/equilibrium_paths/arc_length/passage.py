@@ -10,7 +10,7 @@ sites comes from where they are, so that it is the same on any number of ranks.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,6 +18,7 @@ import numpy as np
 from ...system.condensed_problem import CondensedProblem
 from ...typing import Array, Mask
 from ..segments import Kind, Segment, piece_at
+from ..state import Event
 from .curve import Curve
 from .equations import ROUNDING, STANDING, UNDECIDED, Refused
 from .events import Move, Outcome
@@ -56,6 +57,20 @@ class Passage:
     def opens(self) -> bool:
         """Whether a contact opens."""
         return self.before.kind is Kind.BOUND
+
+
+def event_of(passages: Sequence[Passage], *, folds: bool) -> Event:
+    """The event of a state at which sites pass.
+
+    Args:
+        passages: at this state.
+        folds: whether the factor turns there.
+    """
+    if folds:
+        return Event.FOLD
+    if any(p.closes for p in passages):
+        return Event.CONTACT
+    return Event.RELEASE if any(p.opens for p in passages) else Event.KINK
 
 
 def order(problem: CondensedProblem, sites: list[int]) -> Array:
