@@ -151,10 +151,15 @@ class Equilibria:
             SolverError: on all ranks alike: they found different points.
         """
         self._check_same(point.x)
-        u = self._prepared.system.displacement(self._condensation.expand(point.x))
+        u = self._condensation.displacement(point.x)
         found = SolveResult(u=u, method="stationary points of the condensed problem", converged=True, reason=point.kind)
         known = certified(self._prepared, found)
         if known.converged or self.problem is None or not (self.problem.error or len(self.problem.lengths)):
             return known
         u.x.array[:] *= self._prepared.problem.scales.displacement  # the point is not exact
         return finish(self._prepared, start=u, estimating=False)
+
+    def free(self) -> None:
+        """Free the condensed body; no solution can be asked for any more. Collective."""
+        if self.problem is not None:
+            self._condensation.free()

@@ -19,7 +19,7 @@ from petsc4py import PETSc
 from ..problem import references
 from ..problem.law_term import LawTerm
 from ..problem.problem import Bounds, Problem
-from ..problem.vectors import assembled, new_vector, turn
+from ..problem.vectors import assembled, new_vector, product, turn
 from ..rigid import Mode
 from ..runtime.timing import Timer
 from ..typing import Array, Entities
@@ -163,16 +163,15 @@ class System:
         found.load.array[fixed] = self.load.array_r[fixed]
         if self.free_motions is not None:
             self.free_motions.null_space.remove(found.load)
+        given.destroy()
         found.equations = self.equations.with_load(found.load)
         return found
 
     def displacement(self, x: PETSc.Vec) -> fem.Function:
         """The displacement field of unknowns x: Cartesian, in units of u0, ghosts updated. Collective."""
         u = fem.Function(self.problem.space, name="displacement")
-        cartesian = x if self.rotation is None else self.rotation * x
-        if self.problem.coupling is not None:
-            cartesian = self.problem.coupling.matrix * cartesian
-        u.x.array[: x.local_size] = cartesian.array_r
+        coupling = self.problem.coupling
+        u.x.array[: x.local_size] = product(x, self.rotation, None if coupling is None else coupling.matrix)
         u.x.scatter_forward()
         return u
 
@@ -210,7 +209,9 @@ class System:
         """What the prescribed values took off the load at the vertices of Γc. Collective."""
         load, at = self._unlifted(), self.jacobian.rows.dofs
         turn(load, self.rotation)
-        return np.asarray(load.array_r[at] - self.load.array_r[at])
+        found = np.asarray(load.array_r[at] - self.load.array_r[at])
+        load.destroy()
+        return found
 
     def holding_forces(self, x: PETSc.Vec) -> Array:
         """The elastic forces that supports, contact and laws take up; zero elsewhere, (n,). Collective."""
@@ -234,6 +235,7 @@ class System:
         set_bc(prescribed, list(self.problem.conditions))
         rows = (self.problem.fixed_here + load.owner_range[0]).astype(PETSc.IntType)
         matrix.zeroRowsColumns(rows, 1.0, prescribed, load)
+        prescribed.destroy()
         matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
         matrix.setOption(PETSc.Mat.Option.SPD, True)
         return matrix, load
@@ -255,7 +257,10 @@ class System:
         return lower, upper
 
     def free(self) -> None:
-        """Free the PETSc objects: those too that systems made of this one share. Collective."""
+        """Free the PETSc objects, those too that systems made of this one share, and what solving has left. Collective.
+
+        On several ranks Python alone frees nothing: what no rank refers to any more waits for being freed together.
+        """
         for vector in (self.load, self.lower, self.upper, *self.forces.values()):
             vector.destroy()
         if self.rotation is not None:
@@ -263,3 +268,5 @@ class System:
         self.equations.free()
         self.jacobian.free()
         self.holding.free()
+        PETSc.garbage_cleanup(self.comm)
+        PETSc.garbage_cleanup(self.problem.space.dofmap.index_map.comm)  # dolfinx's vectors are on this one
