@@ -13,9 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..typing import Array, Integers
+from .cell_thresholds import BalanceThresholds
 from .interior_point import Iterate, Programme, iterates
 from .scalar_problem import ScalarProblem
-from .thresholds import BalanceThresholds
 from .weighed_balance import Graphs, Split
 
 

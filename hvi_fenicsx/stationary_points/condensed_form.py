@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -41,26 +41,17 @@ def scalar_problem(
     Raises:
         InputError: a law has no potential, or acts on the length of a vector whose components have other laws.
     """
-    found: dict[_Argument, list[Chain]] = {}
     polylines = thresholds.polylines
     far = np.full(problem.size, _far(problem.bonds, polylines.far)) if within is None else within
-    constant, error = problem.constant_at(factor), 0.0
-    force_error = np.zeros(problem.size)
     if tractions:
         graphs = _near_graphs(problem.bonds, far, polylines)
     else:
         graphs = _graphs(problem.bonds, far, tolerance, polylines)
-    for bonds, law in zip(problem.bonds, graphs, strict=True):
-        _refuse_mixity(bonds)
-        area = float(bonds.weights.sum())
-        constant, error = constant + area * law.offset, error + area * law.error
-        for argument, sign, weight in _arguments(bonds):
-            found.setdefault(argument, []).append(chain(law.graph, weight, sign))
-            force_error[list(argument.unknowns)] += abs(sign) * weight * law.traction_error * (1.0 + polylines.rounded)
-    vectors = [argument for argument in found if argument.radial]
-    _refuse_overlap(problem, found)
-    unknowns = [found.get(_Argument(unknowns=(i,)), []) for i in range(problem.size)]
-    chains = [*unknowns, *(found[v] for v in vectors)]
+    laws = _Laws.of(problem, graphs, problem.constant_at(factor), 1.0 + polylines.rounded)
+    vectors = [argument for argument in laws.chains if argument.radial]
+    _refuse_overlap(problem, laws.chains)
+    unknowns = [laws.chains.get(_Argument(unknowns=(i,)), []) for i in range(problem.size)]
+    chains = [*unknowns, *(laws.chains[v] for v in vectors)]
     return ScalarProblem(
         stiffness=problem.stiffness,
         force=problem.load(factor),
@@ -68,10 +59,10 @@ def scalar_problem(
         upper=problem.upper,
         chains=tuple(total(one) if one else FREE for one in chains),
         lengths=_lengths(vectors),
-        constant=constant,
-        error=error,
-        force_error=force_error if tractions else 0.0,
-        farthest=float(np.max(far)) if error else math.inf,
+        constant=laws.constant,
+        error=laws.error,
+        force_error=laws.force_error if tractions else 0.0,
+        farthest=float(np.max(far)) if laws.error else math.inf,
         thresholds=thresholds,
     )
 
@@ -87,6 +78,37 @@ class _Argument:
     @property
     def radial(self) -> bool:
         return bool(self.factors)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Laws:
+    """The laws of all bonds.
+
+    Attributes:
+        chains: those that act on an argument.
+        constant: of the energy.
+        error: of the energy, at most.
+        force_error: of the forces, at most, (n,).
+    """
+
+    chains: Mapping[_Argument, list[Chain]]
+    constant: float
+    error: float
+    force_error: Array
+
+    @classmethod
+    def of(cls, problem: CondensedProblem, graphs: Iterable[LawGraph], constant: float, widened: float) -> _Laws:
+        """Gather the laws; the constant is that without them, errors of forces are widened for rounding."""
+        found: dict[_Argument, list[Chain]] = {}
+        error, force_error = 0.0, np.zeros(problem.size)
+        for bonds, law in zip(problem.bonds, graphs, strict=True):
+            _refuse_mixity(bonds)
+            area = float(bonds.weights.sum())
+            constant, error = constant + area * law.offset, error + area * law.error
+            for argument, sign, weight in _arguments(bonds):
+                found.setdefault(argument, []).append(chain(law.graph, weight, sign))
+                force_error[list(argument.unknowns)] += abs(sign) * weight * law.traction_error * widened
+        return cls(chains=found, constant=constant, error=error, force_error=force_error)
 
 
 def _arguments(bonds: Bonds) -> Iterator[tuple[_Argument, float, float]]:

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
 from ..typing import Array, Integers
-from .thresholds import BalanceThresholds
+from .cell_thresholds import BalanceThresholds
 
 
 @dataclass(frozen=True, kw_only=True)
