@@ -133,7 +133,11 @@ class PathRun:
     def _follower(self, control: Control) -> Follower:
         wanted = self.wanted
         options = PathOptions(
-            programme=wanted.to, follow=Follow(wanted.follow), remember=self._remember, **self._limits()
+            programme=wanted.to,
+            follow=Follow(wanted.follow),
+            remember=self._remember,
+            thresholds=self.prepared.options.thresholds.path.following,
+            **self._limits(),
         )
         resume = self.states[-1] if self.states else None
         watch = Watch(control.interrupted, control.jumping)

@@ -113,7 +113,7 @@ def _on_first_rank(
 
     def followed(ask: Callable[[], bool]) -> FullLoad | None:
         with suppress(np.linalg.LinAlgError, InputError):  # some edges in space have no path
-            return at_full_load(problem, thresholds.most_events, Watch(ask))
+            return at_full_load(problem, thresholds.most_events, Watch(ask), thresholds.following)
         return None
 
     return on_root_asking(system.comm, followed, interrupted)

@@ -57,7 +57,7 @@ class ArcLengthFollower(Follower):
         super().__init__(problem, options, resume, watch)
         self._fineness = fineness
         self._laws = vertex_laws(problem, options.remember)
-        self._sites = Sites(problem, self._laws)
+        self._sites = Sites(problem, self._laws, options.thresholds)
         self._lag = order(problem, [int(group[0]) for group in self._sites.unknowns()])
         self._remembers = any(law.passed is not None for law in self._laws)
         self._last: PathState | None = None
@@ -88,7 +88,8 @@ class ArcLengthFollower(Follower):
         """From rest to the constant loads, as stable as it goes; where the sites are then."""
         if rest.z is None or rest.constant is None:
             return rest.z
-        follower = ArcLengthFollower(rest.constant, PathOptions(remember=self._options.remember), watch=self._watcher)
+        options = PathOptions(remember=self._options.remember, thresholds=self._options.thresholds)
+        follower = ArcLengthFollower(rest.constant, options, watch=self._watcher)
         for _ in follower.states():
             pass
         if follower.end is End.INTERRUPTED:
@@ -128,7 +129,7 @@ class ArcLengthFollower(Follower):
     @override
     def _towards(self, aim: float) -> Iterator[PathState]:
         self._orient(aim)
-        self._rounds = Rounds(self._curve.here.values.x / self._factors)
+        self._rounds = Rounds(self._curve.here.values.x / self._factors, self._options.thresholds.exact.same_place)
         while self.end is None and self._curve.factor != aim:
             if self._options.follow is Follow.STABLE and self._unstable > 0:
                 yield from self._jump(aim)
