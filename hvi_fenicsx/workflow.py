@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 
 from dolfinx import fem
 from mpi4py import MPI
-from petsc4py import PETSc
 
 from .certify import certificate, correction, plausibility
 from .certify.certificate import Examination
@@ -75,7 +74,9 @@ def finish(
         estimating: whether to estimate the error, which takes about as long as the solve.
     """
     found = find_solution(prepared, progress, interrupted, start)
-    return found.estimated() if estimating else found.solution
+    solution = found.estimated() if estimating else found.solution
+    found.free_levels()
+    return solution
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -107,11 +108,14 @@ class FoundSolution:
         return replace(found, estimate=errors, warnings=found.warnings + plausibility.of_estimate(errors))
 
     def free(self) -> None:
-        """Free the systems, and what solving them has left: on several ranks Python alone frees nothing. Collective."""
-        for system in (self.prepared.system, *(level.system for level in self.levels)):
-            system.free()
-            PETSc.garbage_cleanup(system.comm)
-            PETSc.garbage_cleanup(system.problem.space.dofmap.index_map.comm)  # dolfinx's vectors are on this one
+        """Free the systems, and what solving them has left. Collective."""
+        self.free_levels()
+        self.prepared.system.free()
+
+    def free_levels(self) -> None:
+        """Free the systems of the coarser levels. Collective."""
+        for level in reversed(self.levels):
+            level.free()
 
 
 def find_solution(

@@ -15,10 +15,8 @@ from .descent import Descent
 from .passing import go_on
 from .placing import place
 from .step import FACTOR
+from .thresholds import DEFAULT, ExactThresholds
 from .tracer import Tracer
-
-FIRST = 1e-3
-"""Part of the first load at which a body that nothing holds at rest is looked for."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,15 +36,18 @@ class Beginning:
     constant: CondensedProblem | None = None
 
 
-def at_rest(problem: CondensedProblem, remember: Collection[int], aim: float) -> Beginning:
+def at_rest(
+    problem: CondensedProblem, remember: Collection[int], aim: float, thresholds: ExactThresholds = DEFAULT.exact
+) -> Beginning:
     """The state at the factor 0, before constant loads act: these are applied along a path of their own.
 
     Args:
         problem: the problem.
         remember: numbers of the problem's bonds that remember.
         aim: the factor that the path goes to first.
+        thresholds: of the path.
     """
-    bonds = BondTable(problem, remember)
+    bonds = BondTable(problem, remember, thresholds)
     chains = [bonds.chain(i) for i in range(problem.size)]
     x = np.clip(np.zeros(problem.size), problem.lower, problem.upper)
     force = _nearest(bonds, x, problem.force - problem.elastic @ x)
@@ -78,13 +79,15 @@ def _nearest(bonds: BondTable, x: Array, wanted: Array) -> Array:
 def _settled(bonds: BondTable, problem: CondensedProblem) -> Cells | None:
     """Where a small part of the loads takes a body that nothing holds at rest, and back to no load; None: away."""
     chains = [bonds.chain(i) for i in range(problem.size)]
-    load = problem.load(FIRST)
+    first = bonds.thresholds.first_load
+    load = problem.load(first)
     start = np.clip(np.zeros(problem.size), problem.lower, problem.upper)
     landing = Descent(bonds, load).land(start, start)
     if not landing.found:
         return None
     cells = place(problem.elastic, chains, landing.x, load - problem.elastic @ landing.x)
-    tracer = Tracer(problem.elastic, problem.force, problem.force_rate, cells, FIRST, driver=FACTOR, heading=-1)
+    equations = problem.elastic, problem.force, problem.force_rate
+    tracer = Tracer(*equations, cells, first, heading=-1, thresholds=bonds.thresholds)
     while True:
         step = tracer.advance(0.0)
         if step.variable is None:

@@ -12,9 +12,6 @@ from .rounds import Round
 from .state import End, Event, PathOptions, PathState
 from .watch import Stopped, Watch
 
-_AT_LIMIT = 1e-6
-"""A factor so near to the largest that can be borne, relative to those of the programme, is at the limit."""
-
 
 class Follower(ABC):
     """Follows the path of a problem through a programme.
@@ -77,7 +74,7 @@ class Follower(ABC):
     @property
     def _small(self) -> float:
         """A difference of factors that does not count."""
-        return _AT_LIMIT * max(map(abs, self._options.programme))
+        return self._options.thresholds.at_limit * max(map(abs, self._options.programme))
 
     def _not_borne(self) -> str:
         return f"no factor above {self._options.borne:.6g} is borne by any equilibrium: a body comes off"

@@ -8,6 +8,7 @@ from enum import StrEnum
 
 from ..system.condensed_problem import CondensedProblem
 from ..typing import Array, Integers
+from .thresholds import DEFAULT, Thresholds
 
 
 class Event(StrEnum):
@@ -146,6 +147,7 @@ class PathOptions:
         borne: the largest factor with which there may be an equilibrium, where that is known.
         held: between these factors there is one, whatever the bonds remember; as far as that is known.
         stops: factors at which a path that is not straight has a state, each time it comes to one.
+        thresholds: the numbers that tune how it is followed.
     """
 
     programme: Sequence[float] = (1.0,)
@@ -155,3 +157,4 @@ class PathOptions:
     borne: float = float("inf")
     held: tuple[float, float] = (0.0, 0.0)
     stops: Sequence[float] = ()
+    thresholds: Thresholds = DEFAULT

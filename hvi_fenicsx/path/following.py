@@ -24,7 +24,6 @@ from ..scene import PathTable
 from ..solvers import obstacle_force
 from ..system import loading
 from ..system.condensation import Condensation
-from ..typing import Array
 from . import records
 from .certifying import Certifier, Verdict
 from .journal import Record
@@ -138,6 +137,7 @@ class PathRun:
             follow=Follow(wanted.follow),
             remember=self._remember,
             stops=wanted.contact_at,
+            thresholds=self.prepared.options.thresholds.path.following,
             **self._limits(),
         )
         resume = self.states[-1] if self.states else None
@@ -224,10 +224,11 @@ class PathRun:
                 continue
             share = (factor - before.factor) / (after.factor - before.factor)
             x = before.x + share * (after.x - before.x)
-            yield number, self._factored.at(factor), self._expanded(x, factor)
+            yield number, self._factored.at(factor), self._condensation.displacement(x, factor)
 
-    def _expanded(self, x: Array, factor: float) -> fem.Function:
-        return self.prepared.system.displacement(self._condensation.expand(x, factor))
+    def free(self) -> None:
+        """Free the condensed body; the rows stay, displacements cannot be asked for any more. Collective."""
+        self._condensation.free()
 
 
 def _finite(states: Iterator[PathState]) -> Iterator[PathState]:

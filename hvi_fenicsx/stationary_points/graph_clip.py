@@ -9,10 +9,6 @@ import numpy as np
 from ..typing import Array, Mask
 from .scalar_problem import ArcTable, ScalarProblem
 
-WIDENED = 1e-12
-"""Relative widening of what is found, for rounding."""
-
-
 Clip = Callable[[Array, Array], tuple[Array, Array] | None]
 """A pass over intervals: smaller ones, or None if one is empty."""
 
@@ -51,6 +47,7 @@ class GraphClip:
 
     def __init__(self, problem: ScalarProblem, springs: Array, *, joints_at_ends: bool) -> None:
         self._problem, self._springs, self._joints_at_ends = problem, springs, joints_at_ends
+        self._widened = problem.thresholds.cells.widened
         self._arcs = ArcTable.of(problem.chains[: problem.size])
 
     def clipped(self, low: Array, high: Array, least: Array, most: Array) -> tuple[Array, Array] | None:
@@ -74,7 +71,7 @@ class GraphClip:
         first, last = self._at_bounds(low, high, least, most, first, last)
         if np.any(first > last):
             return None
-        wide = WIDENED * (np.abs(first) + np.abs(last) + (high - low))
+        wide = self._widened * (np.abs(first) + np.abs(last) + (high - low))
         return np.maximum(low, first - wide), np.minimum(high, last + wide)
 
     def _on_arcs(self, begin: Array, end: Array, least: Array, most: Array, meets: Mask) -> tuple[Array, Array]:
@@ -114,7 +111,7 @@ class GraphClip:
             k = arcs.at(at)
             pull = arcs.tractions[rows, k] + arcs.slopes[rows, k] * (at - arcs.anchors[rows, k]) + self._springs * at
             sizes = sum(np.where(np.isfinite(part), np.abs(part), 0.0) for part in (pull, least, most))
-            pushes = (most >= pull - WIDENED * sizes) if upper else (least <= pull + WIDENED * sizes)
+            pushes = (most >= pull - self._widened * sizes) if upper else (least <= pull + self._widened * sizes)
             stays = (at == bound) & pushes
             first, last = np.where(stays, np.minimum(first, at), first), np.where(stays, np.maximum(last, at), last)
         return first, last

@@ -18,17 +18,7 @@ from .convex_programme import Chains, minimise
 from .length_frames import Frames, left_out, parts, unknowns_of
 from .lengths import Lengths
 from .scalar_problem import ScalarProblem
-
-MOST_STEPS = 60
-"""Newton steps; the bound holds for any point."""
-SHARES = tuple(0.5**k for k in range(16))
-"""Shares of a step that are tried."""
-SHORT = 1e-8
-"""A step whose displacements and forces are below this share of all changes the energy by its square: the last."""
-SETTLED = 1e-15
-"""A decrease below this share of the parts of the energy is rounding."""
-CLOSE = 1e-9
-"""A length nearer than this share of the largest one to a joint is on it."""
+from .thresholds import ProgrammeThresholds
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,6 +56,7 @@ class LengthProgramme:
         lower: bounds of the vectors' unknowns, (n,).
         upper: bounds of them, (n,).
         shut: d, (m,).
+        thresholds: how many steps, and what is rounding.
     """
 
     a: Array
@@ -75,6 +66,7 @@ class LengthProgramme:
     lower: Array
     upper: Array
     shut: Array
+    thresholds: ProgrammeThresholds
 
     @classmethod
     def of(
@@ -90,7 +82,14 @@ class LengthProgramme:
             shut: d.
         """
         return cls(
-            a=a, b=b, chains=chains, lengths=problem.lengths, lower=problem.lower, upper=problem.upper, shut=shut
+            a=a,
+            b=b,
+            chains=chains,
+            lengths=problem.lengths,
+            lower=problem.lower,
+            upper=problem.upper,
+            shut=shut,
+            thresholds=problem.thresholds.programmes,
         )
 
     @cached_property
@@ -138,7 +137,7 @@ class LengthProgramme:
         """
         x = self._admissible(start)
         value = self.value(x)
-        for _ in range(MOST_STEPS):
+        for _ in range(self.thresholds.newton_steps):
             found = self._better(x, value, near_zero=True) or self._better(x, value, near_zero=False)
             if found is None:
                 break
@@ -208,8 +207,8 @@ class LengthProgramme:
         whole = self._admissible(goal)
         if self._short(goal - x, x):
             return whole, value, True
-        least = SETTLED * (abs(value) + float(np.abs(self.b) @ np.abs(x)))
-        for share in SHARES:
+        least = self.thresholds.settled * (abs(value) + float(np.abs(self.b) @ np.abs(x)))
+        for share in self.thresholds.step_shares:
             trial = self._admissible(x + share * (goal - x))
             after = self.value(trial)
             if after < value - least:
@@ -218,7 +217,8 @@ class LengthProgramme:
 
     def _short(self, step: Array, x: Array) -> bool:
         pull = float(np.abs(self.a @ step).max())
-        return bool(np.abs(step).max() <= SHORT * np.abs(x).max() and pull <= SHORT * float(np.abs(self.b).max()))
+        short = self.thresholds.short
+        return bool(np.abs(step).max() <= short * np.abs(x).max() and pull <= short * float(np.abs(self.b).max()))
 
     def _tangent(self, x: Array, *, near_zero: bool) -> Tangent:
         """Frames and curvatures at a point; vectors that forces would hold at zero may be held there already."""
@@ -245,7 +245,7 @@ class LengthProgramme:
 
     def _traction(self, size: Array, force: Array) -> Array:
         """The tractions of the laws at lengths, nearest to forces at joints, (m,)."""
-        stack, n, near = self._stack, len(self.b), CLOSE * self._radius
+        stack, n, near = self._stack, len(self.b), self.thresholds.close * self._radius
         low = np.zeros(n + len(size))
         below, above = np.maximum(size - near, 0.0), np.minimum(size + near, self._radius)
         least, _ = stack.interval(np.concatenate([low[:n], below]))
@@ -256,7 +256,7 @@ class LengthProgramme:
         """The solution of the programme in the frames, as unknowns."""
         frames, lengths = here.frames, self.lengths
         chains = Chains.of(self._local(here))
-        found = minimise(frames.matrix(self.a), frames.forces(self.b), chains, frames.into(x))
+        found = minimise(frames.matrix(self.a), frames.forces(self.b), chains, frames.into(x), self.thresholds)
         y = parts(lengths, found.x)
         vectors = frames.turned(y)
         rows = np.arange(len(y))

@@ -13,6 +13,7 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
+from dolfinx import fem
 from petsc4py import PETSc
 
 from ..errors import SolverError
@@ -195,6 +196,18 @@ class Condensation:
         found.array[:] = self._interior.expand(self.values(x, factor), right)
         return found
 
+    def displacement(self, x: Array, factor: float = 1.0) -> fem.Function:
+        """The displacement field of the whole body in equilibrium with condensed unknowns. Collective.
+
+        Args:
+            x: the condensed unknowns, (n,).
+            factor: λ.
+        """
+        unknowns = self.expand(x, factor)
+        found = self._system.displacement(unknowns)
+        unknowns.destroy()
+        return found
+
     def restricted(self, u: PETSc.Vec, factor: float = 1.0) -> Array:
         """The condensed unknowns of a displacement of the whole body, (n,). Collective.
 
@@ -226,16 +239,8 @@ class Condensation:
         found = np.asarray(out.array_r - self._loading.lifted @ weights)
         applied = self._loading.applied @ weights
         found[fixed] = self._system.holding.at_prescribed(u, self._system.rotation) - applied[fixed]
+        out.destroy()
         return found
-
-    def carried(self, x: Array, factor: float) -> PETSc.Vec:
-        """What contact and laws carry, S x - f at their unknowns, in the components of the unknowns. Collective.
-
-        Args:
-            x: the condensed unknowns, (n,).
-            factor: λ.
-        """
-        return self.spread(self.problem.elastic @ x - self.problem.load(factor))
 
     def spread(self, forces: Array) -> PETSc.Vec:
         """Forces on the condensed unknowns as forces on the whole body, in the components of the unknowns.

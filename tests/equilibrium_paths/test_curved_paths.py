@@ -29,6 +29,7 @@ from hvi_fenicsx.equilibrium_paths.graphs import Passed, remembering
 from hvi_fenicsx.equilibrium_paths.kinds import ArcLengthKind, ExactKind, kind_of
 from hvi_fenicsx.equilibrium_paths.programme import Follower
 from hvi_fenicsx.equilibrium_paths.state import End, Event, Follow, PathOptions, PathState
+from hvi_fenicsx.equilibrium_paths.thresholds import CurveThresholds
 from hvi_fenicsx.errors import InputError
 from hvi_fenicsx.laws import Exponential, Superpotential, TractionGraph
 from hvi_fenicsx.laws.smoothing import create
@@ -295,9 +296,9 @@ def test_a_curve_is_followed_with_few_factorisations(monkeypatch: pytest.MonkeyP
     made = []
 
     class Counted(Bordered):
-        def __init__(self, matrix: Array) -> None:
+        def __init__(self, matrix: Array, thresholds: CurveThresholds) -> None:
             made.append(1)
-            super().__init__(matrix)
+            super().__init__(matrix, thresholds)
 
     monkeypatch.setattr(equations, "Bordered", Counted)
     given, options = line(Exponential(1.0, 0.2, 0.5), 8), {"programme": (9.0,), "follow": Follow.EXACT}

@@ -115,7 +115,7 @@ def test_energies_differ_by_what_those_of_the_whole_body_differ_by(name: str) ->
     system, condensation = condensed(name)
     whole, reduced = [], []
     for x in samples(condensation):
-        whole.append(system.energy(condensation.expand(x), [Right(t.law) for t in system.terms]))
+        whole.append(system.equations.energy(condensation.expand(x), [Right(t.law) for t in system.terms]))
         reduced.append(condensation.problem.energy(x))
     assert reduced[1] - reduced[0] == pytest.approx(whole[1] - whole[0], rel=1e-9)
 
@@ -127,7 +127,7 @@ def test_forces_are_those_of_the_whole_body(name: str) -> None:
     problem, residual = condensation.problem, system.load.duplicate()
     for x in samples(condensation):
         u = condensation.expand(x)
-        system.residual(u, residual, [Right(t.law) for t in system.terms])
+        system.equations.residual(u, residual, [Right(t.law) for t in system.terms])
         whole = np.array(residual.array_r)
         reduced = problem.stiffness @ x - problem.load(1.0) + tractions(condensation, x)
         size = np.max(np.abs(reduced))

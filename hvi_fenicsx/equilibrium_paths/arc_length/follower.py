@@ -10,7 +10,6 @@ from typing_extensions import override
 
 from ...system.condensed_problem import CondensedProblem
 from ...typing import Array
-from ..beginning import FIRST
 from ..programme import Follower
 from ..rounds import Round, Rounds
 from ..state import End, Event, Follow, PathOptions, PathState, Place, Position, place_of
@@ -59,7 +58,7 @@ class ArcLengthFollower(Follower):
         super().__init__(problem, options, resume, watch)
         self._fineness = fineness
         self._laws = vertex_laws(problem, options.remember)
-        self._sites = Sites(problem, self._laws)
+        self._sites = Sites(problem, self._laws, options.thresholds)
         self._lag = order(problem, [int(group[0]) for group in self._sites.unknowns()])
         self._remembers = any(law.passed is not None for law in self._laws)
         self._last: PathState | None = None
@@ -92,12 +91,13 @@ class ArcLengthFollower(Follower):
             return self._loaded(rest.constant)
         if rest.held:
             return rest.z
-        first = FIRST * self._options.programme[0]
+        first = self._options.thresholds.exact.first_load * self._options.programme[0]
         return settled(self._problem, self._sites, rest.z, first, self._lag, self._watcher, held=self._is_held(first))
 
     def _loaded(self, constant: CondensedProblem) -> Array | None:
         """From rest to the constant loads, as stable as it goes; where the sites are then."""
-        follower = ArcLengthFollower(constant, PathOptions(remember=self._options.remember), watch=self._watcher)
+        options = PathOptions(remember=self._options.remember, thresholds=self._options.thresholds)
+        follower = ArcLengthFollower(constant, options, watch=self._watcher)
         for _ in follower.states():
             pass
         if follower.end is End.INTERRUPTED:
@@ -137,7 +137,7 @@ class ArcLengthFollower(Follower):
     @override
     def _towards(self, aim: float) -> Iterator[PathState]:
         self._orient(aim)
-        self._rounds = Rounds(self._curve.here.values.x / self._factors)
+        self._rounds = Rounds(self._curve.here.values.x / self._factors, self._options.thresholds.exact.same_place)
         while self.end is None and self._curve.factor != aim:
             if self._options.follow is Follow.STABLE and self._unstable > 0:
                 yield from self._jump(aim)

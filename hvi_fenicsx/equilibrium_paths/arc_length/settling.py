@@ -14,15 +14,6 @@ from .passage import Crossing, advancing
 from .relaxation import Relaxation
 from .sites import Sites
 
-_MOST = 50
-"""Steps back to no load at most,"""
-_MORE = 20
-"""and so many more for each site."""
-_NO_LOAD = 1e-9
-"""A part of the small factor that is none,"""
-_ROUNDED = 100.0
-"""and so many roundings of the elastic forces: all contacts end at no load, and rounding says which one is first."""
-
 
 def settled(
     problem: CondensedProblem, sites: Sites, z: Array, first: float, lag: Array, watch: Watch, *, held: bool
@@ -52,11 +43,12 @@ def settled(
 
 def _unloaded(curve: Curve, lag: Array, watch: Watch) -> Array | None:
     """The coordinates where a curve comes to the factor 0."""
+    limits = curve.sites.thresholds.settling
     row, first = np.eye(1, len(curve.here.y), len(curve.here.y) - 1)[0], curve.factor
     curve.head(curve.tangent(curve.here.values, row, -np.sign(first)))
     Crossing(curve, lag, watch.step).run()
-    for move in advancing(curve, 0.0, lag, watch.step, _MOST + _MORE * len(curve.sites)):
-        if abs(curve.factor) <= max(_NO_LOAD * abs(first), _rounding(curve)):
+    for move in advancing(curve, 0.0, lag, watch.step, limits.steps + limits.more_steps * len(curve.sites)):
+        if abs(curve.factor) <= max(limits.no_load * abs(first), limits.roundings * _rounding(curve)):
             return curve.correct(curve.here.y, curve.at_factor(0.0))[:-1]
         if move.outcome in (Outcome.AWAY, Outcome.STUCK):
             return None
@@ -64,6 +56,6 @@ def _unloaded(curve: Curve, lag: Array, watch: Watch) -> Array | None:
 
 
 def _rounding(curve: Curve) -> float:
-    """The factor of a load that is no larger than some roundings of the elastic forces."""
+    """The factor of a load that is no larger than the rounding of the elastic forces."""
     elastic = np.abs(curve.sites.stiffness) @ np.abs(curve.here.values.x) / curve.sites.forces
-    return _ROUNDED * float(np.finfo(float).eps * np.max(elastic)) * curve.unit
+    return float(np.finfo(float).eps * np.max(elastic)) * curve.unit
