@@ -11,6 +11,8 @@ from .scalar_problem import ArcTable, ScalarProblem
 
 WIDENED = 1e-12
 """Relative widening of what is found, for rounding."""
+LEAST_WIDENED = float(np.finfo(float).tiny)
+"""The least widening: without it, an interval that is clipped again and again about a joint at zero would end there."""
 
 
 Clip = Callable[[Array, Array], tuple[Array, Array] | None]
@@ -74,7 +76,7 @@ class GraphClip:
         first, last = self._at_bounds(low, high, least, most, first, last)
         if np.any(first > last):
             return None
-        wide = WIDENED * (np.abs(first) + np.abs(last) + (high - low))
+        wide = np.maximum(WIDENED * (np.abs(first) + np.abs(last) + (high - low)), LEAST_WIDENED)
         return np.maximum(low, first - wide), np.minimum(high, last + wide)
 
     def _on_arcs(self, begin: Array, end: Array, least: Array, most: Array, meets: Mask) -> tuple[Array, Array]:

@@ -13,7 +13,7 @@ import pytest
 from enumeration import Floor, polyline
 from scenes import DELTA, block, model
 
-from hvi_fenicsx import Scene, prepare
+from hvi_fenicsx import Scene, prepare, solve
 from hvi_fenicsx.errors import SolverError
 from hvi_fenicsx.laws.traction_graph import TractionGraph
 from hvi_fenicsx.stationary_points.all_points import Enumeration
@@ -117,6 +117,22 @@ def test_cells_made_smaller_by_the_balance_of_bodies_keep_all_points(case: Case)
             ends = balance.tightened(low, high)
             assert ends is not None
             assert np.all((point.x >= ends[0]) & (point.x <= ends[1]))
+
+
+def test_bonds_that_stick_keep_their_point_however_often_its_cell_is_clipped() -> None:
+    """Points that hardly give way bear the block: they stick at zero, about which all cells close again and again."""
+    teeth = [[0, 0], [3e-6, 120], [3e-6, 40], [9e-6, 60], [9e-6, 30]]
+    table = block(2, 150.0, 100.0, {"law": "graph", "points": teeth})
+    table["domain"]["size"] = [1.0, 0.5]
+    table["material"] |= {"youngs_modulus": 6e7, "poisson_ratio": 0.0}
+    table["boundary"]["floor"]["support"] = {"law": "tresca", "yield_traction": 347.7}
+    del table["boundary"]["floor"]["contact"]
+    scene = Scene.model_validate(table)
+    known = solve(scene, estimate=False)
+    assert known.converged
+    points = found(scalar_problem(Condensation(prepare(scene).system).problem)).points
+    wanted = known.energy / known.problem.scales.energy
+    assert min(abs(point.energy / wanted - 1.0) for point in points) < 1e-9
 
 
 def test_the_balance_of_bodies_knows_that_all_bonds_must_bear_nearly_their_peak() -> None:
