@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
@@ -23,6 +24,8 @@ NEAR = 5e-4
 """Error of the tractions of curved laws, relative to their scale, in the search for all equilibria."""
 ROUNDED = 1e-12
 """Widening of this error by rounding."""
+OFF = 1e-11
+"""How far a bound is moved off a drop, relative to the displacements."""
 
 
 def scalar_problem(
@@ -61,18 +64,35 @@ def scalar_problem(
     _refuse_overlap(problem, found)
     unknowns = [found.get(_Argument(unknowns=(i,)), []) for i in range(problem.size)]
     chains = [*unknowns, *(found[v] for v in vectors)]
+    whole = tuple(total(one) if one else FREE for one in chains)
+    lower, upper = _off_drops(whole[: problem.size], problem.lower, problem.upper)
     return ScalarProblem(
         stiffness=problem.stiffness,
         force=problem.load(factor),
-        lower=problem.lower,
-        upper=problem.upper,
-        chains=tuple(total(one) if one else FREE for one in chains),
+        lower=lower,
+        upper=upper,
+        chains=whole,
         lengths=_lengths(vectors),
         constant=constant,
         error=error,
         force_error=force_error if tractions else 0.0,
         farthest=float(np.max(far)) if error else math.inf,
     )
+
+
+def _off_drops(chains: Sequence[Chain], lower: Array, upper: Array) -> tuple[Array, Array]:
+    """Bounds at which a traction drops moved off the drop, by less than points are told apart.
+
+    An unknown there may bear any traction of the drop, whether the bound pushes or not; so the drop must be inside.
+    """
+    low, high = lower.copy(), upper.copy()
+    for i in np.flatnonzero(lower < upper):
+        drops = [a.high for a, b in itertools.pairwise(chains[i]) if b.rate(b.low) < a.rate(a.high)]
+        if lower[i] in drops:
+            low[i] -= OFF * (1.0 + abs(lower[i]))
+        if upper[i] in drops:
+            high[i] += OFF * (1.0 + abs(upper[i]))
+    return low, high
 
 
 @dataclass(frozen=True, kw_only=True)

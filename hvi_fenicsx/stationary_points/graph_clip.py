@@ -48,7 +48,7 @@ class GraphClip:
         problem: the problem.
         springs: stiffness d of the springs, (n,).
         joints_at_ends: whether a joint at the end of an interval counts with all its tractions; if not, only where the
-            interval is that joint alone.
+            interval is that joint alone, or the end is a bound of the problem.
     """
 
     def __init__(self, problem: ScalarProblem, springs: Array, *, joints_at_ends: bool) -> None:
@@ -100,7 +100,8 @@ class GraphClip:
         at = arcs.high[:, :-1]
         inside = (at >= low[:, None]) & (at <= high[:, None])
         if not self._joints_at_ends:
-            inside &= ((at > low[:, None]) & (at < high[:, None])) | (low == high)[:, None]
+            apart = (at > low[:, None]) & (at < high[:, None]) | (low == high)[:, None]
+            inside &= apart | (at == self._problem.lower[:, None]) | (at == self._problem.upper[:, None])
         with np.errstate(invalid="ignore"):
             a, b = arcs.before[:, :-1] + d * at, arcs.after[:, 1:] + d * at
             meets = inside & (np.minimum(a, b) <= most) & (np.maximum(a, b) >= least)
