@@ -9,6 +9,7 @@ from there.
 from __future__ import annotations
 
 import contextlib
+import errno
 import glob
 import os
 import re
@@ -92,13 +93,15 @@ class OutputFolder:
             inputs: files that must not be replaced.
 
         Raises:
-            InputError: it holds other files, or such a folder; it would replace an input.
+            InputError: it holds other files, or such a folder; it would replace an input; it may not be written.
         """
         with self.told(), self._closed_on_error():
             if not self.target.exists():
                 return
             if not self.target.is_dir():
                 raise self._refused("is a file; choose a folder")
+            if not os.access(self.target, os.W_OK | os.X_OK):
+                raise PermissionError(errno.EACCES, "", str(self.target))  # now, not after hours
             if any(self.target.iterdir()):
                 self._check_files(existing, inputs)
 
@@ -223,7 +226,9 @@ class OutputFolder:
         try:
             yield
         except OSError as error:
-            raise self.in_words(writing.not_written(Path(error.filename or self.target), error.errno)) from None
+            file = Path(error.filename or self.target)
+            inside = any(file.is_relative_to(folder) for folder in (self.work, self.target) if folder)
+            raise self.in_words(writing.not_written(file if inside else self.target, error.errno)) from None
         except NotWrittenError as error:
             raise self.in_words(error) from None
 
@@ -234,8 +239,8 @@ class OutputFolder:
             error: of a file that could not be written.
         """
         found = placed(error, self.target, self.work)
-        kept = self.kind == "study" or any((self.target / name).exists() for name in self._announced)
-        if not kept or found is error:
+        kept = [manifest.NAME] if self.kind == "study" else self._announced
+        if found is error or not any((self.target / name).exists() for name in kept):
             return found
         words = f"{found}; what is finished is kept, --resume goes on from there"
         return NotWrittenError(found.file, found.reason, words)
