@@ -17,6 +17,8 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
+from ...errors import NotWrittenError
+from ...runtime import writing
 from ..equilibria_reader import EquilibriaResult, Row, read
 from .equilibria import NAME
 from .style import BLUE, GREEN, GREY, HEADING, INK, ORANGE, PALE, PURPLE, VERMILION, area, figure, save, titled
@@ -129,4 +131,7 @@ def _legend(fig: Figure, states: Sequence[Sequence[Row]]) -> None:
 
 if __name__ == "__main__":
     folder = Path(sys.argv[1])
-    save(make(read(folder)), folder / NAME, CAPTION)
+    try:
+        save(make(read(folder)), folder / NAME, CAPTION)
+    except NotWrittenError as error:
+        raise SystemExit(writing.hand_over(error)) from None
