@@ -85,7 +85,7 @@ def pressure_scale(lowest: float, largest: float) -> tuple[LinearSegmentedColorm
     """
     if lowest < -1e-6 * largest:
         return _BOTH, -largest, largest
-    return _PRESSED, 0.0, largest or 1.0
+    return _PRESSED, 0.0, largest
 
 
 def figure(height: float) -> Figure:
@@ -136,8 +136,11 @@ def titled(fig: Figure, title: str, below: str, words: str = "", colour: str = I
     lines = textwrap.wrap(title, _LINE) if len(title) > _LINE else [title]
     size, top, second = (17, 0.19, 0.76) if len(lines) == 1 else (13.5, 0.12, 0.85)
     fig.text(0.3 / WIDTH, 1 - top / tall, "\n".join(lines), size=size, weight="bold", va="top", linespacing=1.1)
-    fig.text(0.3 / WIDTH, 1 - second / tall, below, size=12, color=GREY, va="baseline")
-    fig.text(1 - 0.3 / WIDTH, 1 - second / tall, words, size=12, weight="bold", color=colour, ha="right", va="baseline")
+    at = 1 - second / tall
+    left = fig.text(0.3 / WIDTH, at, below, size=12, color=GREY, va="baseline")
+    right = fig.text(1 - 0.3 / WIDTH, at, words, size=12, weight="bold", color=colour, ha="right", va="baseline")
+    wide, other = (text.get_window_extent().width / fig.dpi for text in (left, right))
+    left.set_fontsize(min(12.0, 12.0 * (WIDTH - 0.8 - other) / wide))  # it is never written into what is at its right
 
 
 def _facts(result: Result) -> str:
