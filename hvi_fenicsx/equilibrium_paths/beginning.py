@@ -64,9 +64,10 @@ def at_rest(
     rate = away if np.max(np.abs(away), initial=0.0) > 1e-14 * size else aim * problem.force_rate
     cells = place(problem.elastic, chains, x, force)
     if cells.is_singular():
-        cells, reason = _settled(bonds, replace(problem, force=held, force_rate=rate))
-        if cells is None:
+        settled, reason = _settled(bonds, replace(problem, force=held, force_rate=rate))
+        if settled is None:
             return Beginning(cells=None, memory=bonds.memory, reason=reason, escapes=reason == AWAY)
+        cells = settled
     if rate is not away:
         return Beginning(cells=cells, memory=bonds.memory)
     alone = replace(problem, force=held, force_rate=away)
