@@ -11,8 +11,9 @@ from .scalar_problem import ArcTable, ScalarProblem
 
 WIDENED = 1e-12
 """Relative widening of what is found, for rounding."""
-LEAST_WIDENED = float(np.finfo(float).tiny)
-"""The least widening: without it, an interval that is clipped again and again about a joint at zero would end there."""
+LEAST_WIDENED = 1e-30
+"""The least widening, where displacements are about 1: without it, an interval that is clipped again and again about a
+joint at zero would end there."""
 
 
 Clip = Callable[[Array, Array], tuple[Array, Array] | None]
@@ -39,6 +40,19 @@ def clipped_again(
         if not shorter.any():
             break
     return low, high
+
+
+def widened(low: Array, high: Array, first: Array, last: Array) -> tuple[Array, Array]:
+    """The part of intervals between two places each, and a little more.
+
+    Args:
+        low: of the intervals, (n,), finite.
+        high: of the intervals, (n,), finite.
+        first: the first place, (n,).
+        last: the last place, (n,).
+    """
+    wide = np.maximum(WIDENED * (np.abs(first) + np.abs(last) + (high - low)), LEAST_WIDENED)
+    return np.maximum(low, first - wide), np.minimum(high, last + wide)
 
 
 class GraphClip:
@@ -76,8 +90,7 @@ class GraphClip:
         first, last = self._at_bounds(low, high, least, most, first, last)
         if np.any(first > last):
             return None
-        wide = np.maximum(WIDENED * (np.abs(first) + np.abs(last) + (high - low)), LEAST_WIDENED)
-        return np.maximum(low, first - wide), np.minimum(high, last + wide)
+        return widened(low, high, first, last)
 
     def _on_arcs(self, begin: Array, end: Array, least: Array, most: Array, meets: Mask) -> tuple[Array, Array]:
         """The ends of what is left of each arc; (inf, -inf) of those that are lost."""

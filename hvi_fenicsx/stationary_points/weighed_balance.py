@@ -18,7 +18,7 @@ import numpy as np
 from scipy.linalg import LinAlgError, cholesky
 
 from ..typing import Array, Mask
-from .graph_clip import WIDENED
+from .graph_clip import widened
 from .scalar_problem import ScalarProblem
 
 EPSILON = float(np.finfo(float).eps)
@@ -138,8 +138,7 @@ class Weighed:
         first, last = first.min(axis=1), last.max(axis=1)
         if np.any(first > last):
             return None
-        wide = WIDENED * (np.abs(first) + np.abs(last) + (high - low))
-        return np.maximum(low, first - wide), np.minimum(high, last + wide)
+        return widened(low, high, first, last)
 
     def _below(self, most: Array) -> tuple[Array, Array]:
         """The first and the last place on each arc where h is at most this; (inf, -inf) where it is nowhere."""
