@@ -16,6 +16,8 @@ class CellThresholds:
         most_looks: how often a cell is tested by the weighed balance before it is divided.
         shorter_look: it is tested again while some interval shrinks to this share.
         widened: relative widening of what intervals of forces leave, for rounding.
+        least_widened: the least widening, where displacements are about 1: without it, an interval that is clipped
+            again and again about a joint at zero would end there.
         force_passes: passes over all unknowns by their own balance.
         force_progress: a pass that makes no interval shorter by this share is the last.
         rigid_passes: passes over all unknowns by the balance of whole bodies.
@@ -46,6 +48,7 @@ class CellThresholds:
     most_looks: int = 4
     shorter_look: float = 0.7
     widened: float = 1e-12
+    least_widened: float = 1e-30
     force_passes: int = 8
     force_progress: float = 1e-3
     rigid_passes: int = 20

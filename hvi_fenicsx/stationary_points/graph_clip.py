@@ -7,10 +7,8 @@ from collections.abc import Callable
 import numpy as np
 
 from ..typing import Array, Mask
+from .cell_thresholds import CellThresholds
 from .scalar_problem import ArcTable, ScalarProblem
-
-LEAST_WIDENED = float(np.finfo(float).tiny)
-"""The least widening: without it, an interval that is clipped again and again about a joint at zero would end there."""
 
 Clip = Callable[[Array, Array], tuple[Array, Array] | None]
 """A pass over intervals: smaller ones, or None if one is empty."""
@@ -38,6 +36,20 @@ def clipped_again(
     return low, high
 
 
+def widened(low: Array, high: Array, first: Array, last: Array, thresholds: CellThresholds) -> tuple[Array, Array]:
+    """The part of intervals between two places each, and a little more.
+
+    Args:
+        low: of the intervals, (n,), finite.
+        high: of the intervals, (n,), finite.
+        first: the first place, (n,).
+        last: the last place, (n,).
+        thresholds: by how much more.
+    """
+    wide = np.maximum(thresholds.widened * (np.abs(first) + np.abs(last) + (high - low)), thresholds.least_widened)
+    return np.maximum(low, first - wide), np.minimum(high, last + wide)
+
+
 class GraphClip:
     """The graphs of a problem's laws and bounds, to which springs may be added.
 
@@ -50,7 +62,7 @@ class GraphClip:
 
     def __init__(self, problem: ScalarProblem, springs: Array, *, joints_at_ends: bool) -> None:
         self._problem, self._springs, self._joints_at_ends = problem, springs, joints_at_ends
-        self._widened = problem.thresholds.cells.widened
+        self._cells = problem.thresholds.cells
         self._arcs = ArcTable.of(problem.chains[: problem.size])
 
     def clipped(self, low: Array, high: Array, least: Array, most: Array) -> tuple[Array, Array] | None:
@@ -74,8 +86,7 @@ class GraphClip:
         first, last = self._at_bounds(low, high, least, most, first, last)
         if np.any(first > last):
             return None
-        wide = np.maximum(self._widened * (np.abs(first) + np.abs(last) + (high - low)), LEAST_WIDENED)
-        return np.maximum(low, first - wide), np.minimum(high, last + wide)
+        return widened(low, high, first, last, self._cells)
 
     def _on_arcs(self, begin: Array, end: Array, least: Array, most: Array, meets: Mask) -> tuple[Array, Array]:
         """The ends of what is left of each arc; (inf, -inf) of those that are lost."""
@@ -115,7 +126,9 @@ class GraphClip:
             k = arcs.at(at)
             pull = arcs.tractions[rows, k] + arcs.slopes[rows, k] * (at - arcs.anchors[rows, k]) + self._springs * at
             sizes = sum(np.where(np.isfinite(part), np.abs(part), 0.0) for part in (pull, least, most))
-            pushes = (most >= pull - self._widened * sizes) if upper else (least <= pull + self._widened * sizes)
+            pushes = (
+                (most >= pull - self._cells.widened * sizes) if upper else (least <= pull + self._cells.widened * sizes)
+            )
             stays = (at == bound) & pushes
             first, last = np.where(stays, np.minimum(first, at), first), np.where(stays, np.maximum(last, at), last)
         return first, last

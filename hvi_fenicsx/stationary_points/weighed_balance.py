@@ -18,6 +18,8 @@ import numpy as np
 from scipy.linalg import LinAlgError, cholesky
 
 from ..typing import Array, Mask
+from .cell_thresholds import CellThresholds
+from .graph_clip import widened
 from .scalar_problem import ScalarProblem
 
 EPSILON = float(np.finfo(float).eps)
@@ -108,7 +110,7 @@ class Weighed:
         least: the least of each h, (n,).
         total: the sum of all least values, less what it may be at a stationary point, and less its rounding.
         rounding: what was taken off for it.
-        widened: relative widening of what is left, for rounding.
+        thresholds: by how much what is left is widened for rounding.
     """
 
     graphs: Graphs
@@ -118,7 +120,7 @@ class Weighed:
     least: Array
     total: float
     rounding: float
-    widened: float
+    thresholds: CellThresholds
 
     @property
     def excludes(self) -> bool:
@@ -137,8 +139,7 @@ class Weighed:
         first, last = first.min(axis=1), last.max(axis=1)
         if np.any(first > last):
             return None
-        wide = self.widened * (np.abs(first) + np.abs(last) + (high - low))
-        return np.maximum(low, first - wide), np.minimum(high, last + wide)
+        return widened(low, high, first, last, self.thresholds)
 
     def _below(self, most: Array) -> tuple[Array, Array]:
         """The first and the last place on each arc where h is at most this; (inf, -inf) where it is nowhere."""
@@ -173,8 +174,8 @@ def weighed(problem: ScalarProblem, split: Split, ends: tuple[Array, Array], wei
     off = _rounding(problem, split, graphs, (low, high), y, point)
     off += float(np.sum(problem.force_error * np.maximum(np.abs(low + y), np.abs(high + y))))
     total = float(least.sum() - point @ bent - y @ problem.force) - off
-    widened = problem.thresholds.cells.widened
-    return Weighed(graphs=graphs, a=a, b=b, c=c, least=least, total=total, rounding=off, widened=widened)
+    cells = problem.thresholds.cells
+    return Weighed(graphs=graphs, a=a, b=b, c=c, least=least, total=total, rounding=off, thresholds=cells)
 
 
 def allowed(problem: ScalarProblem, low: Array, high: Array, weights: Array) -> Array:

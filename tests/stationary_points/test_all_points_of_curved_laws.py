@@ -68,6 +68,24 @@ def test_all_points_of_two_laws_with_bounds_are_those_of_a_scan(seed: int) -> No
     assert len(enumerated(problem).points) == scanned(problem)
 
 
+@pytest.mark.parametrize("seed", range(5))
+def test_bonds_that_can_all_stick_have_the_point_at_rest(seed: int) -> None:
+    """No bond's load is above its peak, so that rest is an equilibrium; there bounds and jumps of laws meet."""
+    random = np.random.default_rng(seed)
+    n = 2 + seed % 2
+    factor = random.normal(size=(n, n))
+    peaks = random.uniform(0.5, 1.5, n)
+    bonds = [condensed.bonds(laws.Exponential(p, 0.2 * p, random.uniform(0.3, 2.0)), [i]) for i, p in enumerate(peaks)]
+    problem = condensed.problem(
+        0.3 * factor @ factor.T + 0.02 * np.eye(n),
+        random.uniform(-0.5, 0.99, n) * peaks,
+        *bonds,
+        lower=np.where(random.uniform(size=n) < 0.5, 0.0, -np.inf),
+    )
+    points = enumerated(problem).points
+    assert min(float(np.max(np.abs(point.x))) for point in points) < 1e-9
+
+
 def condensed_scene(table: Table) -> CondensedProblem:
     return Condensation(prepare(Scene.model_validate(table)).system).problem
 
