@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -49,17 +50,18 @@ class BalanceTest:
     def __init__(self, relaxation: Relaxation) -> None:
         self._relaxation, self._problem = relaxation, relaxation.problem
 
-    def look(self, cell: Box) -> Look | None:
+    def look(self, cell: Box, cut: Callable[[], bool] = lambda: False) -> Look | None:
         """What is left of a cell; None if no stationary point is in it.
 
         Args:
             cell: the cell.
+            cut: whether to be content with less of a proof, asked at each step of the programme.
         """
         ends = cell.low, cell.high
         split = Split.of(self._problem, self._relaxation.curvature(cell, PART))
         if not np.isfinite(split.short):
             return Look(cell=cell, guide=None)
-        best, guide = self._best(split, ends)
+        best, guide = self._best(split, ends, cut)
         if best is None:
             return Look(cell=cell, guide=guide)
         smaller = None if best.excludes else best.smaller(*ends)
@@ -68,11 +70,15 @@ class BalanceTest:
         low, high = smaller
         return Look(cell=replace(cell, low=low, high=high, x=clipped(cell.x, low, high)), guide=guide)
 
-    def _best(self, split: Split, ends: tuple[Array, Array]) -> tuple[Weighed | None, Guide | None]:
+    def _best(
+        self, split: Split, ends: tuple[Array, Array], cut: Callable[[], bool]
+    ) -> tuple[Weighed | None, Guide | None]:
         """The best proof that was found, and the guide of the last iterate."""
         programme, best, before, last = BalanceProgramme(self._problem, split, *ends), None, -np.inf, None
         for step, here in enumerate(programme.iterates()):
             last = here
+            if cut():
+                break
             if step < FIRST or step % EVERY != FIRST % EVERY:
                 continue
             proof = weighed(self._problem, split, ends, *programme.weights(here))

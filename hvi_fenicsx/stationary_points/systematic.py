@@ -104,10 +104,11 @@ def _same(one: Array, other: Array) -> bool:
 
 
 def _starts(problem: ScalarProblem) -> Iterator[Array]:
-    loaded = [_loaded(problem, programme) for programme in PROGRAMMES]
-    yield from loaded
-    yield from (factor * loaded[0] for factor in MULTIPLES)
-    yield from _on_pieces(problem, loaded[0])
+    first = _loaded(problem, PROGRAMMES[0])
+    yield first
+    yield from (_loaded(problem, programme) for programme in PROGRAMMES[1:])
+    yield from (factor * first for factor in MULTIPLES)
+    yield from _on_pieces(problem, first)
 
 
 def _loaded(problem: ScalarProblem, programme: Sequence[float]) -> Array:
