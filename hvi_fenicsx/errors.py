@@ -69,3 +69,10 @@ class Interrupted(HviError):
     """A signal came before there was anything to write."""
 
     exit_code = ExitCode.INTERRUPTED
+
+    def __init__(self) -> None:
+        super().__init__("interrupted; nothing was written")
+
+    def __reduce__(self) -> tuple[type[Interrupted], tuple[()]]:
+        """What other ranks make it of."""
+        return type(self), ()

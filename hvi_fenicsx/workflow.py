@@ -93,15 +93,18 @@ class FoundSolution:
     solution: Solution
     levels: Levels
 
-    def estimated(self) -> Solution:
+    def estimated(self, interrupted: Callable[[], bool] = never) -> Solution:
         """The solution with an estimate of its error, where one can be given. Collective.
 
         It takes about as long as the solve.
+
+        Args:
+            interrupted: whether to stop (collective); then nothing is estimated.
         """
         prepared, found = self.prepared, self.solution
         if found.solve_result is None or found.examination is None or not prepared.problem.has_potential:
             return found
-        if not found.examination.certificate.passed:
+        if not found.examination.certificate.passed or interrupted():
             return found
         with prepared.timer("estimate"):
             errors = estimate(prepared.system, self.levels, found.solve_result.u, found.examination)

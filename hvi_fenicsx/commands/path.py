@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import argparse
-import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from .. import console, path_output, results
-from ..equilibrium_paths.state import End, Event
+from ..equilibrium_paths.state import End
 from ..load_path import PathRow
 from ..path import journal
 from ..path.following import Control, PathRun
@@ -82,9 +81,8 @@ def execute(options: argparse.Namespace) -> int:
 
 
 def _known(folder: results.ResultFolder, scene: Scene) -> list[Record]:
-    """The records of a path that was begun, without its end: why it ends is found again. Rank 0 only."""
-    found = journal.read(folder.target / journal.NAME, target.identity(scene, folder.target))
-    return list(itertools.takewhile(lambda record: record["event"] != Event.END, found))
+    """The records of a path that was begun. Rank 0 only."""
+    return journal.read(folder.target / journal.NAME, target.identity(scene, folder.target))
 
 
 def _done(record: dict[str, Any]) -> bool:
@@ -110,7 +108,7 @@ def _followed(request: PathRequest, interrupt: Interrupt) -> dict[str, Any]:
     """The summary of the path that was followed and written. Collective."""
     prepared = prepare(request.scene, COMM, request.timer)
     telling.say(console.heading(prepared, COMM.size))
-    run = PathRun(prepared, request.wanted)
+    run = PathRun(prepared, request.wanted, interrupt.requested)
     telling.say(console.path_wanted(request.wanted, run.scaled))
     if request.known:
         telling.say([f"{len(request.known)} rows are there already; on from factor {request.known[-1]['factor']:.6g}"])

@@ -53,9 +53,11 @@ class PathRun:
     Args:
         prepared: the scene, assembled.
         wanted: what path is wanted.
+        interrupted: whether to stop (collective), asked while the body is condensed.
 
     Raises:
         InputError: on all ranks alike: the path cannot be followed.
+        Interrupted: on all ranks alike: it is to stop.
 
     Attributes:
         prepared: the scene.
@@ -64,7 +66,9 @@ class PathRun:
         states: those found so far.
     """
 
-    def __init__(self, prepared: Preparation, wanted: PathTable) -> None:
+    def __init__(
+        self, prepared: Preparation, wanted: PathTable, interrupted: Callable[[], bool] = lambda: False
+    ) -> None:
         self.prepared, self.wanted = prepared, wanted
         system = prepared.system
         obstacle_force.refuse(system.problem, "no path is followed")
@@ -74,7 +78,7 @@ class PathRun:
             raise InputError("path: nothing drives the body; add a load or a prescribed displacement")
         with prepared.timer("setup"):
             most = prepared.options.thresholds.path.largest_dense
-            self._condensation = Condensation(system, self.scaled, most)
+            self._condensation = Condensation(system, self.scaled, most, interrupted)
             self._measures = Measures(system, self._condensation, self.scaled)
         self._remember = range(len(self._condensation.problem.bonds) if wanted.memory else 0)
         self._factored = FactoredProblem(system.problem, self.scaled)
@@ -107,7 +111,9 @@ class PathRun:
         Raises:
             InputError: on all ranks alike: the path cannot be followed.
         """
-        for one in known:
+        for one in itertools.takewhile(
+            lambda record: record["event"] != Event.END, known
+        ):  # why it ends is found again
             self._take(*records.state(one))
         rows = list(self._rows())
         follower = self._follower(control)

@@ -37,6 +37,7 @@ class Enumeration:
     Attributes:
         problem: the problem; of curved laws that of the polylines near them.
         laws: the laws, where these are curved.
+        cut: whether the test of a cell is to be cut short, since the search stops.
         points: found so far.
         cells: looked at so far.
         waiting: a stack of cells not yet decided.
@@ -45,6 +46,7 @@ class Enumeration:
 
     problem: ScalarProblem
     laws: CurvedLaws | None = None
+    cut: Callable[[], bool] = lambda: False
     points: PointList = field(init=False)
     cells: int = 0
     waiting: list[Box] = field(default_factory=list)
@@ -109,10 +111,10 @@ class Enumeration:
         """The cell made smaller, and where to divide it; None if no stationary point is in it."""
         look = None
         for _ in range(self._thresholds.most_looks):
-            if (tight := self._tightened(cell)) is None or (look := self._weighed.look(tight)) is None:
+            if (tight := self._tightened(cell)) is None or (look := self._weighed.look(tight, self.cut)) is None:
                 return None
-            cell = look.cell
-            if not np.any(cell.high - cell.low < self._thresholds.shorter_look * (tight.high - tight.low)):
+            cell, shorter = look.cell, self._thresholds.shorter_look
+            if self.cut() or not np.any(cell.high - cell.low < shorter * (tight.high - tight.low)):
                 break
         return look
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -37,17 +38,18 @@ class BalanceTest:
         self._relaxation, self._problem = relaxation, relaxation.problem
         self._thresholds = relaxation.problem.thresholds.balance
 
-    def look(self, cell: Box) -> Look | None:
+    def look(self, cell: Box, cut: Callable[[], bool] = lambda: False) -> Look | None:
         """What is left of a cell; None if no stationary point is in it.
 
         Args:
             cell: the cell.
+            cut: whether to be content with less of a proof, asked at each step of the programme.
         """
         ends = cell.low, cell.high
         split = Split.of(self._problem, self._relaxation.curvature(cell, self._thresholds.part))
         if not np.isfinite(split.short):
             return Look(cell=cell, guide=None)
-        best, guide = self._best(split, ends)
+        best, guide = self._best(split, ends, cut)
         if best is None:
             return Look(cell=cell, guide=guide)
         smaller = None if best.excludes else best.smaller(*ends)
@@ -56,12 +58,16 @@ class BalanceTest:
         low, high = smaller
         return Look(cell=replace(cell, low=low, high=high, x=clipped(cell.x, low, high)), guide=guide)
 
-    def _best(self, split: Split, ends: tuple[Array, Array]) -> tuple[Weighed | None, Guide | None]:
+    def _best(
+        self, split: Split, ends: tuple[Array, Array], cut: Callable[[], bool]
+    ) -> tuple[Weighed | None, Guide | None]:
         """The best proof that was found, and the guide of the last iterate."""
         limits = self._thresholds
         programme, best, before, last = BalanceProgramme(self._problem, split, *ends), None, -np.inf, None
         for step, here in enumerate(programme.iterates()):
             last = here
+            if cut():
+                break
             if step < limits.first or step % limits.every != limits.first % limits.every:
                 continue
             proof = weighed(self._problem, split, ends, *programme.weights(here))

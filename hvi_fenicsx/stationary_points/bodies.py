@@ -38,21 +38,28 @@ class Equilibria:
     Args:
         prepared: the scene, assembled.
         thresholds: the numbers that tune the search.
+        interrupted: whether to stop (collective), asked while the body is condensed.
 
     Attributes:
         problem: the condensed problem; None where no solution exists, and nothing is searched.
 
     Raises:
         InputError: on all ranks alike: a law is of a kind that is not searched.
+        Interrupted: on all ranks alike: it is to stop.
     """
 
-    def __init__(self, prepared: Preparation, thresholds: Thresholds = DEFAULT) -> None:
+    def __init__(
+        self,
+        prepared: Preparation,
+        thresholds: Thresholds = DEFAULT,
+        interrupted: Callable[[], bool] = lambda: False,
+    ) -> None:
         obstacle_force.refuse(prepared.problem, "equilibria are not searched")
         self._prepared, self._thresholds = prepared, thresholds
         self.problem: ScalarProblem | None = None
         if prepared.solvability.state != "escapes":
             with prepared.timer("assembly"):
-                self._condensation = Condensation(prepared.system)
+                self._condensation = Condensation(prepared.system, interrupted=interrupted)
                 self.problem = scalar_problem(self._condensation.problem, thresholds=thresholds)
 
     def find(

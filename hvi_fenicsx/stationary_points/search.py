@@ -85,7 +85,7 @@ def _left_of_all(search: Enumeration) -> Saved:
 def _fresh(task: Task) -> Enumeration:
     """A search for all points; of curved laws with polylines near their tractions."""
     curved = task.wanted.curved
-    return Enumeration(problem=task.problem if curved is None else curved.near, laws=curved)
+    return Enumeration(problem=task.problem if curved is None else curved.near, laws=curved, cut=task.stop)
 
 
 def _resumed(task: Task, saved: Saved) -> Enumeration:
@@ -102,7 +102,7 @@ def _resumed(task: Task, saved: Saved) -> Enumeration:
 def _started(task: Task, search: Enumeration, tell: Callable[[Enumeration], None]) -> None:
     """A few cells, which often are all; else what is found without a proof."""
     search.start()
-    if not search.run(lambda: search.cells >= task.most_boxes or task.stop(), tell):
+    if not search.run(lambda: search.cells >= task.most_boxes or task.stop(), tell) and not task.stop():
         for x in systematic.candidates(search.problem, search.points.listed, _patience(task, search.points)):
             search.enter(x)
 

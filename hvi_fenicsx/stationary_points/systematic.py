@@ -90,10 +90,11 @@ def _same(one: Array, other: Array, same: float) -> bool:
 
 def _starts(problem: ScalarProblem) -> Iterator[Array]:
     limits = problem.thresholds.systematic
-    loaded = [_loaded(problem, programme) for programme in limits.programmes]
-    yield from loaded
-    yield from (factor * loaded[0] for factor in limits.multiples)
-    yield from _on_pieces(problem, loaded[0])
+    first = _loaded(problem, limits.programmes[0])
+    yield first
+    yield from (_loaded(problem, programme) for programme in limits.programmes[1:])
+    yield from (factor * first for factor in limits.multiples)
+    yield from _on_pieces(problem, first)
 
 
 def _loaded(problem: ScalarProblem, programme: Sequence[float]) -> Array:

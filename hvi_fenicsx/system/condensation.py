@@ -8,7 +8,7 @@ are, one unknown for each such motion stays. Where these are many, the stiffness
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
@@ -55,6 +55,7 @@ class Condensation:
             None: all but the obstacles, which stay where they have been moved to.
         largest_dense: unknowns of Γc's vertices up to which S is formed, unless factors have far fewer numbers; None:
             it is always formed.
+        interrupted: whether to stop (collective), asked while S is formed.
 
     Attributes:
         problem: the arrays. Its unknowns x are those of Γc without λ times the obstacles' shift: their bounds stand.
@@ -62,9 +63,16 @@ class Condensation:
     Raises:
         InputError: on all ranks alike: a name in ``scaled`` is none; a law on |u_t| cannot be condensed.
         SolverError: a body without contact is not held.
+        Interrupted: on all ranks alike: it is to stop.
     """
 
-    def __init__(self, system: System, scaled: Collection[str] | None = None, largest_dense: int | None = None) -> None:
+    def __init__(
+        self,
+        system: System,
+        scaled: Collection[str] | None = None,
+        largest_dense: int | None = None,
+        interrupted: Callable[[], bool] = lambda: False,
+    ) -> None:
         self._system, self._loading = system, loading.make(system, scaled)
         kept = np.setdiff1d(system.jacobian.rows.dofs, np.union1d(system.problem.fixed, system.pins))
         self._form = form_of(system, PREFIX)
@@ -76,7 +84,7 @@ class Condensation:
             found, laws = found.of(chosen), laws.renumbered(chosen, interior.size)
             elastic = self._unformed()
         else:
-            elastic = self._formed(interior.stiffness(), found.carrying)
+            elastic = self._formed(interior.stiffness(interrupted), found.carrying)
         self.problem = self._condensed(elastic, found, laws)
 
     def _is_large(self, most: int, carrying: int) -> bool:
