@@ -799,6 +799,19 @@ def test_arrows_of_a_load_along_its_side_are_beside_it_and_apart(tmp_path: Path,
         assert (tails + ways)[:, 1] == pytest.approx(np.ones(len(tails)))
 
 
+def test_a_load_on_a_hidden_side_is_drawn_where_the_side_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The underside is drawn below the box: the arrows of a load on it would be inside of the box."""
+    drawn: list[Mapping[str, Any]] = []
+    monkeypatch.setattr(scene_space, "render", lambda *found: drawn.append(found[3].keywords))
+    folder = result(tmp_path / "r", box(), pressed)
+    write_words(folder, 3, effects=[role("under", "traction", traction=[0.0, 0.0, 1e6])])
+    write_sides(folder, box(), under=lambda x: x[2] == 0)
+    scene_space.draw(reader.read(folder))
+    ((tails, ways),), (side,) = drawn[0]["arrows"], drawn[0]["shown"]
+    assert side.away[2] < -0.4
+    assert (tails + ways)[:, 2] == pytest.approx(np.full(len(tails), side.away[2]))
+
+
 @pytest.mark.parametrize(("body", "value"), [(square, "5 kN/m"), (box, "5 kN")], ids=["plane", "space"])
 def test_a_force_that_is_spread_over_a_part_has_arrows_and_its_own_value(
     tmp_path: Path, body: Callable[[], mesh.Mesh], value: str

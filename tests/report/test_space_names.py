@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 import shapely
 
-from hvi_fenicsx.report.pictures import load_labels, space_names
+from hvi_fenicsx.report.pictures import load_labels, space_names, vtk_loads
 from hvi_fenicsx.report.pictures.plane_canvas import SIDE, TALLEST
 from hvi_fenicsx.report.pictures.reach import Reach, largest_scale
 from hvi_fenicsx.report.pictures.space_canvas import space_canvas
@@ -57,3 +58,12 @@ def test_the_axes_are_in_a_corner_that_is_empty() -> None:
     place = {name: np.array([box.x0 + box.x1, box.y0 + box.y1]) / 2 for name, box in letters.items()}
     assert place["z"][1] > place["x"][1]
     assert place["x"][0] > place["z"][0]
+
+
+@pytest.mark.parametrize(("width", "across"), [(0.06, [0.03]), (0.6, [0.0, 0.3, 0.6])])
+def test_a_narrow_face_has_one_row_of_arrows_in_its_middle(width: float, across: list[float]) -> None:
+    x, y = (c.ravel() for c in np.meshgrid(np.linspace(0, 1, 9), np.linspace(0, width, 5)))
+    points = np.column_stack([x, y, np.zeros_like(x)])
+    chosen = points[vtk_loads._sparse(points, 1.0)]
+    assert np.unique(np.round(chosen[:, 1], 9)) == pytest.approx(across)
+    assert np.unique(chosen[:, 0]) == pytest.approx([0.0, 0.25, 0.5, 0.75, 1.0])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import textwrap
 
 import numpy as np
@@ -16,6 +17,8 @@ from ..reader import Result
 from .legend import FOOT, legend
 from .style import GREY, INK, PALE, VERMILION, WIDTH
 
+_MINUS = re.compile(r"(?<=[\s(])-(?=[\dxyz])")
+"""A minus; other hyphens are of names."""
 WAY = np.linspace(0.0, 1.0, 25)
 """Parts of the motion at which a point's way is drawn."""
 
@@ -53,7 +56,7 @@ def say(fig: Figure, result: Result, keys: list[Artist]) -> None:
         result: whose body escapes.
         keys: the lines of the legend.
     """
-    words = str(result.solvability.get("direction") or "a rigid motion").replace("-", "−")
+    words = _MINUS.sub("−", str(result.solvability.get("direction") or "a rigid motion"))
     tall = fig.get_figheight()
     fig.text(0.3 / WIDTH, (FOOT - 0.28) / tall, "The load moves the body by", size=12.5, color=GREY, va="top")
     lines, size = textwrap.wrap(words, 27), 16.0

@@ -19,7 +19,7 @@ from .style import BLUE, GREY, INK, WIDTH
 
 LETTERS = 40
 """In one line of the legend."""
-UNITS = {"displacement": ("m", "m"), "force": ("N/m", "N"), "moment": ("N", "N\u202fm")}
+UNITS = {"displacement": ("m", "m"), "moment": ("N", "N\u202fm")}
 """The units of what drives a part as a whole, in the plane and in space."""
 
 
@@ -29,8 +29,9 @@ def touches(roles: Iterable[Mapping[str, Any]]) -> bool:
 
 
 def inside(result: Result) -> list[Artist]:
-    """The legend's lines on what has no place in a drawing: what acts everywhere, and what drives a part as a whole."""
-    parts = [f"“{part}”: {key} {_said(value, key, result.body.dimension)}" for part, key, value in result.driven]
+    """The legend's lines on what has no arrow: what acts everywhere, and moments and displacements of a part."""
+    d = result.body.dimension
+    parts = [f"“{part}”: {key} {_said(value, key, d)}" for part, key, value in result.driven if key != "force"]
     lines = [*parts, *(f"and {words}" for words in result.within)]
     return [Line2D([], [], color="none", label="\n".join(textwrap.wrap(words, LETTERS))) for words in lines]
 

@@ -58,12 +58,16 @@ def arrows(shape: DeformedBody, load: LoadedSide) -> tuple[Array, Array]:
 
 
 def _sparse(points: Array, size: float) -> Integers:
-    """One point of a face near each node of a coarse grid; of equally near ones that with the smallest coordinates."""
+    """One point of a face near each node of a coarse grid; of equally near ones that with the smallest coordinates.
+
+    Across a narrow face the grid has one node, in its middle.
+    """
     low = points.min(axis=0)
     extent = np.ptp(points, axis=0)
     flat = extent < 1e-9 * size
-    cells = np.where(flat, 0.0, np.maximum(np.round(extent / (0.25 * size)), 1.0))
-    place = (points - low) / np.where(flat, 1.0, extent) * cells
+    cells = np.where(flat, 0.0, np.round(extent / (0.25 * size)))
+    part = (points - low) / np.where(flat, 1.0, extent)
+    place = np.where(cells > 0.0, part * cells, np.where(flat, 0.0, part - 0.5))
     node = np.round(place)
     distance = np.round(np.linalg.norm(place - node, axis=1), 6)
     order = np.lexsort((*np.round(place, 6).T[::-1], distance))

@@ -20,7 +20,7 @@ from ..creases import creases
 from ..deformed import DeformedBody
 from ..legend import legend
 from ..load_labels import labels, reaches
-from ..loads_supports import Side, held_sides, loaded_sides, roles_by_side
+from ..loads_supports import LoadedSide, Side, held_sides, loaded_sides, roles_by_side
 from ..regions import Region, regions
 from ..regions import keys as region_keys
 from ..registry import picture
@@ -69,7 +69,7 @@ def draw(result: Result) -> Figure:
     sides = [side for side, _ in found]
     ways = apart.ways(view, body.points, ((body.points[s.vertices], s.normal) for s in sides), 0.05 * body.size)
     shown = [ColouredSide(s, c, way) for s, c, way in zip(sides, colours, ways, strict=True)]
-    arrows = [vtk_loads.arrows(rest, load) for load in pulled]
+    arrows = _arrows(rest, pulled, shown)
     reached = [body.points, *(body.points[s.side.vertices] + s.away for s in shown)]
     everything = np.concatenate([*reached, *(end for tails, ways in arrows for end in (tails, tails + ways))])
     written = names(
@@ -94,6 +94,13 @@ def keys(shown: list[ColouredSide]) -> list[Artist]:
     """What the colours mean that are there."""
     words = {CONTACT: "contact, friction or adhesion", SUPPORT: "support", LOADED: "loaded"}
     return [Patch(fc=c, ec=INK, label=w) for c, w in words.items() if c in {s.colour for s in shown}]
+
+
+def _arrows(rest: DeformedBody, pulled: list[LoadedSide], shown: list[ColouredSide]) -> list[tuple[Array, Array]]:
+    """The arrows of each load, where its part is drawn."""
+    away = {s.side.part: s.away for s in shown}
+    found = [(away[load.side.part], *vtk_loads.arrows(rest, load)) for load in pulled]
+    return [(tails + moved, ways) for moved, tails, ways in found]
 
 
 def _apart(shown: list[ColouredSide]) -> list[Artist]:
