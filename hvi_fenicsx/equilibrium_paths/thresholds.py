@@ -126,6 +126,24 @@ class JumpThresholds:
 
 
 @dataclass(frozen=True, kw_only=True)
+class SettlingThresholds:
+    """Where a path begins that nothing holds at rest, where laws are curved.
+
+    Attributes:
+        steps: from a small load back to none at most,
+        more_steps: and so many more for each site.
+        no_load: a part of the small factor that is none,
+        roundings: and so many roundings of the elastic forces: all contacts end at no load, and rounding says which one
+            is first.
+    """
+
+    steps: int = 50
+    more_steps: int = 20
+    no_load: float = 1e-9
+    roundings: float = 100.0
+
+
+@dataclass(frozen=True, kw_only=True)
 class Thresholds:
     """How paths are followed.
 
@@ -133,6 +151,7 @@ class Thresholds:
         exact: from event to event.
         curve: by predictor and corrector.
         jump: in jumps of these.
+        settling: where these begin.
         at_limit: a factor so near to the largest that can be borne, relative to those of the programme, is at the
             limit.
     """
@@ -140,6 +159,7 @@ class Thresholds:
     exact: ExactThresholds = field(default_factory=ExactThresholds)
     curve: CurveThresholds = field(default_factory=CurveThresholds)
     jump: JumpThresholds = field(default_factory=JumpThresholds)
+    settling: SettlingThresholds = field(default_factory=SettlingThresholds)
     at_limit: float = 1e-6
 
 

@@ -136,6 +136,7 @@ class PathRun:
             programme=wanted.to,
             follow=Follow(wanted.follow),
             remember=self._remember,
+            stops=wanted.contact_at,
             thresholds=self.prepared.options.thresholds.path.following,
             **self._limits(),
         )
@@ -209,7 +210,7 @@ class PathRun:
     def crossings(self, factor: float) -> Iterator[tuple[int, Problem, fem.Function]]:
         """The states at which the path crosses a factor: the row before, problem and displacement. Collective.
 
-        Between two events the path is straight.
+        Between two rows the path is straight; one that is not has a row there.
 
         Args:
             factor: λ.

@@ -127,7 +127,11 @@ def index_sum(problem: CondensedProblem, points: Array) -> int:
 
 
 @pytest.mark.parametrize(
-    ("smoothing", "epsilon", "count"), [("chks", 0.05, 23), ("chks", 0.02, 31), ("log_exp", 0.02, 33)]
+    ("smoothing", "epsilon", "count"),
+    [
+        ("chks", 0.05, 23),
+        *(pytest.param(*case, marks=pytest.mark.long) for case in [("chks", 0.02, 31), ("log_exp", 0.02, 33)]),
+    ],
 )
 def test_a_support_that_gives_way_has_no_points_but_those_listed(smoothing: str, epsilon: float, count: int) -> None:
     """Random starts reach two thirds of them, and no other; that none of the rest is missing, the indices tell."""
@@ -267,6 +271,7 @@ def test_two_blocks_that_slide_together_are_a_continuum_beside_an_isolated_point
     assert sliding.x[0] - sliding.x[1] == pytest.approx(0.2, rel=1e-9)
 
 
+@pytest.mark.long
 def test_what_is_balanced_to_rounding_alone_is_not_called_proven() -> None:
     """An exponential law comes to its residual only at infinity; far away the rest is below rounding."""
     stiffness = [[1.0, -1.0], [-1.0, 1.0]]

@@ -35,7 +35,7 @@ CASES = [
     ("narrow chks", (1.7, 1.6), 4),
     ("narrow chks", (2.4, 1.9), 3),
     ("teeth", (1.7, 1.6), 6),
-    ("teeth", (2.4, 1.9), 12),
+    pytest.param("teeth", (2.4, 1.9), 12, marks=pytest.mark.long),
     ("paper", (1.7, 1.6), 4),
     ("exponential", (1.7, 1.6), 2),
     ("smoothed exponential", (1.7, 1.6), 2),
@@ -71,6 +71,7 @@ def test_a_majorant_is_nowhere_below_the_laws_and_equal_to_them_at_its_point(see
             assert min(abs(a.at(float(x[i]))) for a in chains[i] if a.low <= x[i] <= a.high) < 1e-12
 
 
+@pytest.mark.long
 def test_a_step_down_is_nowhere_higher_than_its_begin() -> None:
     one_step = Thresholds(descent=DescentThresholds(curved_steps=1))
     problem = two_bonds(LAWS["teeth"], 0.7)

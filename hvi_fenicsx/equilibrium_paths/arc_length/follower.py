@@ -20,8 +20,9 @@ from .equations import Refused
 from .events import Move, Outcome
 from .felt import factors, felt
 from .jump import Jump
-from .passage import Crossing, Passage, order
-from .rest import Rest, at_rest, is_held
+from .passage import Crossing, Passage, event_of, order
+from .rest import at_rest, is_held
+from .settling import settled
 from .sites import Sites
 from .vertex_laws import vertex_laws
 
@@ -73,8 +74,7 @@ class ArcLengthFollower(Follower):
 
     @override
     def _begun(self) -> Iterator[PathState]:
-        rest = at_rest(self._problem, self._sites)
-        z = self._loaded(rest)
+        z = self._first()
         if z is None:
             self._come_off(0.0, self.reason or "nothing holds the body at rest")
             return
@@ -84,12 +84,20 @@ class ArcLengthFollower(Follower):
         self._unstable = self._sites.unstable_directions(self._curve.here.values)
         yield self._state(Event.START)
 
-    def _loaded(self, rest: Rest) -> Array | None:
-        """From rest to the constant loads, as stable as it goes; where the sites are then."""
-        if rest.z is None or rest.constant is None:
+    def _first(self) -> Array | None:
+        """Where the sites are at the factor 0; None: the body comes off."""
+        rest = at_rest(self._problem, self._sites)
+        if rest.constant is not None:
+            return self._loaded(rest.constant)
+        if rest.held:
             return rest.z
+        first = self._options.thresholds.exact.first_load * self._options.programme[0]
+        return settled(self._problem, self._sites, rest.z, first, self._lag, self._watcher, held=self._is_held(first))
+
+    def _loaded(self, constant: CondensedProblem) -> Array | None:
+        """From rest to the constant loads, as stable as it goes; where the sites are then."""
         options = PathOptions(remember=self._options.remember, thresholds=self._options.thresholds)
-        follower = ArcLengthFollower(rest.constant, options, watch=self._watcher)
+        follower = ArcLengthFollower(constant, options, watch=self._watcher)
         for _ in follower.states():
             pass
         if follower.end is End.INTERRUPTED:
@@ -134,17 +142,23 @@ class ArcLengthFollower(Follower):
             if self._options.follow is Follow.STABLE and self._unstable > 0:
                 yield from self._jump(aim)
                 continue
-            move = self._curve.advance(aim)
+            move = self._curve.advance(self._next(aim))
             if move.outcome in (Outcome.AWAY, Outcome.STUCK):
                 self._ended(move.outcome)
                 yield self._state(Event.END)
                 return
             self._balance.go(move, self._curve.unit)
-            if move.outcome is not Outcome.FACTOR:
+            if move.outcome is not Outcome.FACTOR or self._curve.factor != aim:
                 yield self._noted(move)
             self._watch()
             if self.end is not None:
                 yield self._state(Event.END)
+
+    def _next(self, aim: float) -> float:
+        """The next factor that the path may come to as it goes: one at which a state is wanted, or the aim."""
+        factor, up = self._curve.factor, self._curve.factor_rate > 0.0
+        ahead = [f for f in (*self._options.stops, aim) if f != factor and (f > factor) == up]
+        return min(ahead, key=lambda f: abs(f - factor), default=aim)
 
     def _orient(self, aim: float) -> None:
         """Set out towards a factor; a path that is resumed on its way goes on as it went."""
@@ -182,7 +196,7 @@ class ArcLengthFollower(Follower):
             self._curve.trend = -self._curve.trend
             self._unstable = self._beyond(move)
             return self._state(Event.FOLD)
-        if move.outcome is Outcome.STEP:
+        if move.outcome in (Outcome.STEP, Outcome.FACTOR):
             self._unstable = self._sites.unstable_directions(self._curve.here.values)
             return self._state(Event.STEP)
         if self._floats and self._is_off():  # all bonds are broken at once: nothing is left to pass
@@ -192,7 +206,7 @@ class ArcLengthFollower(Follower):
         self._curve.settle()
         self._trend()
         self._unstable = self._sites.unstable_directions(self._curve.here.values)
-        state = self._state(_event(passages, folds=before * self._curve.trend < 0), passages)
+        state = self._state(event_of(passages, folds=before * self._curve.trend < 0), passages)
         if self._rounds.note(state) is Round.CLOSED:
             self._go_round(Round.CLOSED)
         return state
@@ -284,11 +298,3 @@ class ArcLengthFollower(Follower):
         laws = self._sites.laws_at(passage.site)
         group = laws[0].group if laws and not (passage.closes or passage.opens) else None
         return place_of(self._problem, int(self._sites.unknowns_of(passage.site)[0]), group)
-
-
-def _event(passages: Sequence[Passage], *, folds: bool) -> Event:
-    if folds:
-        return Event.FOLD
-    if any(p.closes for p in passages):
-        return Event.CONTACT
-    return Event.RELEASE if any(p.opens for p in passages) else Event.KINK

@@ -19,7 +19,7 @@ from .curve import Curve
 from .energies import displacement_rate
 from .equations import Place, Refused
 from .events import Outcome
-from .passage import Crossing
+from .passage import Crossing, advancing
 from .relaxation import Relaxation
 from .sites import Sites
 
@@ -107,9 +107,7 @@ class Jump:
 
     def _to_its_end(self, curve: Curve, most: int) -> Landing | None:
         start = curve.here.y
-        for _ in range(most):
-            self.step()
-            move = curve.advance(0.0)
+        for move in advancing(curve, 0.0, self.lag, self.step, most):
             if move.outcome is Outcome.FACTOR:
                 stable = curve.sites.unstable_directions(curve.here.values) == 0
                 moved = float(np.max(np.abs(curve.here.y - start), initial=0.0))
@@ -119,8 +117,6 @@ class Jump:
                 return Landing(z=None) if off else None
             if move.outcome is Outcome.STUCK or curve.here.y[-1] > 1e-9:
                 return None
-            if move.outcome in (Outcome.END, Outcome.TURNED):
-                Crossing(curve, self.lag, self.step).run(move.site, turned=move.outcome is Outcome.TURNED)
         return None
 
     def _released(self) -> Landing | None:

@@ -10,7 +10,7 @@ sites comes from where they are, so that it is the same on any number of ranks.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,8 +18,10 @@ import numpy as np
 from ...system.condensed_problem import CondensedProblem
 from ...typing import Array, Mask
 from ..segments import Kind, Segment, piece_at
+from ..state import Event
 from .curve import Curve
 from .equations import Refused
+from .events import Move, Outcome
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,6 +49,20 @@ class Passage:
         return self.before.kind is Kind.BOUND
 
 
+def event_of(passages: Sequence[Passage], *, folds: bool) -> Event:
+    """The event of a state at which sites pass.
+
+    Args:
+        passages: at this state.
+        folds: whether the factor turns there.
+    """
+    if folds:
+        return Event.FOLD
+    if any(p.closes for p in passages):
+        return Event.CONTACT
+    return Event.RELEASE if any(p.opens for p in passages) else Event.KINK
+
+
 def order(problem: CondensedProblem, sites: list[int]) -> Array:
     """Numbers from 0.5 to 1.5 that look like random ones, from the vertices of unknowns, (m,).
 
@@ -64,6 +80,27 @@ def order(problem: CondensedProblem, sites: list[int]) -> Array:
         mixed = np.sin(float(np.dot(points[k], (12.9898, 78.233, 37.719))) + 4.1 * number) * 43_758.5453
         found[k] = 0.5 + mixed - np.floor(mixed)
     return found
+
+
+def advancing(curve: Curve, aim: float, lag: Array, step: Callable[[], None], most: int) -> Iterator[Move]:
+    """The steps of a curve, from event to event; after each one that is an event the sites pass.
+
+    Args:
+        curve: the curve; it has a direction.
+        aim: the factor at which a step ends.
+        lag: an order of the sites, (m,).
+        step: is called before each step and passage; it may raise an error to end them.
+        most: steps at most.
+
+    Raises:
+        Refused: there is no end of passing.
+    """
+    for _ in range(most):
+        step()
+        move = curve.advance(aim)
+        yield move
+        if move.outcome in (Outcome.END, Outcome.TURNED):
+            Crossing(curve, lag, step).run(move.site, turned=move.outcome is Outcome.TURNED)
 
 
 class Crossing:
