@@ -226,7 +226,7 @@ def add_texts(drawing: Any, title: str, text: str) -> None:
     """Title at the top and caption at the bottom."""
     height = drawing.get_figheight()
     drawing.text(0.04, 1 - 0.18 / height, title, size=15.5, weight="bold", va="top")
-    drawing.text(0.04, 0.2 / height, "\n".join(textwrap.wrap(text, 87)), size=12, va="bottom", linespacing=1.35)
+    drawing.text(0.04, 0.2 / height, "\n".join(textwrap.wrap(text, 85)), size=12, va="bottom", linespacing=1.35)
 
 
 # ## All together

@@ -10,11 +10,11 @@ from pathlib import Path
 from typing import Any
 
 from .. import console, results
-from ..errors import ExitCode, HviError
+from ..errors import ExitCode
 from ..preparation import Preparation, prepare
 from ..report.html import equilibria_page
 from ..report.pictures import equilibria as picture
-from ..results.whole import picture_process, write_whole
+from ..results.whole import made, picture_process, write_whole
 from ..runtime import log
 from ..runtime.mpi import on_root, time_over
 from ..runtime.signals import Interrupt
@@ -127,13 +127,10 @@ def _reporter() -> Callable[[str], None]:
 
 
 def _picture_and_page(folder: Path, *, draw: bool) -> None:
-    """From the other files; one that fails costs a line. Rank 0 only."""
-    try:
-        if draw:
-            picture.draw(folder)
-        equilibria_page.write(folder)
-    except HviError as error:
-        telling.say([f"picture and report: {error}"])
+    """From the other files; that one cannot be made costs a line. Rank 0 only."""
+    if draw:
+        made("picture", telling.LOG.info, lambda: picture.draw(folder))
+    made("report", telling.LOG.info, lambda: equilibria_page.write(folder))
 
 
 def _exit_code(prepared: Preparation, found: Found, *, interrupted: bool) -> ExitCode:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import argparse
+import itertools
 from collections.abc import Sequence
-from contextlib import ExitStack
 from dataclasses import dataclass
 from typing import Any
 
 from .. import console, path_output, results
-from ..equilibrium_paths.state import End
+from ..equilibrium_paths.state import End, Event
 from ..load_path import PathRow
 from ..path import journal
 from ..path.following import Control, PathRun
@@ -82,8 +82,9 @@ def execute(options: argparse.Namespace) -> int:
 
 
 def _known(folder: results.ResultFolder, scene: Scene) -> list[Record]:
-    """The records of a path that was begun. Rank 0 only."""
-    return journal.read(folder.target / journal.NAME, target.identity(scene, folder.target))
+    """The records of a path that was begun, without its end: why it ends is found again. Rank 0 only."""
+    found = journal.read(folder.target / journal.NAME, target.identity(scene, folder.target))
+    return list(itertools.takewhile(lambda record: record["event"] != Event.END, found))
 
 
 def _done(record: dict[str, Any]) -> bool:
@@ -113,10 +114,10 @@ def _followed(request: PathRequest, interrupt: Interrupt) -> dict[str, Any]:
     telling.say(console.path_wanted(request.wanted, run.scaled))
     if request.known:
         telling.say([f"{len(request.known)} rows are there already; on from factor {request.known[-1]['factor']:.6g}"])
-    with ExitStack() as stack:
-        writer = _JournalWriter(request, stack)
-        control = Control(keep=writer.keep, progress=_tell, interrupted=interrupt.requested, jumping=_tell_jump)
-        path = run.follow(control, request.known)
+    writer = _JournalWriter(request)
+    control = Control(keep=writer.keep, progress=_tell, interrupted=interrupt.requested, jumping=_tell_jump)
+    path = run.follow(control, request.known)
+    on_root(COMM, writer.close)
     telling.say(console.path_outcome(path))
     return path_output.write(request.folder, run, path, request.given, telling.LOG.info, draw=request.draw)
 
@@ -124,8 +125,8 @@ def _followed(request: PathRequest, interrupt: Interrupt) -> dict[str, Any]:
 class _JournalWriter:
     """Keeps each new state in the folder of the result; the file is opened with the first of them."""
 
-    def __init__(self, request: PathRequest, stack: ExitStack) -> None:
-        self._request, self._stack = request, stack
+    def __init__(self, request: PathRequest) -> None:
+        self._request = request
         self._journal: Journal | None = None
 
     def keep(self, record: Record) -> None:
@@ -137,8 +138,13 @@ class _JournalWriter:
             file = self._request.folder.announce(journal.NAME)
             if not self._request.known:
                 file.unlink(missing_ok=True)
-            self._journal = self._stack.enter_context(Journal(file, self._request.identity))
+            self._journal = Journal(file, self._request.identity)
         self._journal.append(record)
+
+    def close(self) -> None:
+        """Close the file, if there is one. Rank 0 only."""
+        if self._journal is not None:
+            self._journal.close()
 
 
 def _tell_jump(factor: float, steps: int) -> None:

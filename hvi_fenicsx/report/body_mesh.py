@@ -6,6 +6,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from ..typing import Array, Integers, Mask
 from .solution_arrays import SolutionArrays
@@ -42,13 +44,29 @@ class BodyMesh:
     @property
     def volumes(self) -> Array:
         """Area (m²) or volume (m³) of each cell, (c,)."""
+        return np.abs(self.signed_volumes(self.points))
+
+    def signed_volumes(self, points: Array) -> Array:
+        """Area (m²) or volume (m³) of each cell, (c,); it changes its sign where a cell is turned inside out.
+
+        Args:
+            points: where the vertices are, m, (n, 3).
+        """
         first, *others = self.cells.T
         d = self.dimension
-        sides = [[self.points[:, i][other] - self.points[:, i][first] for i in range(d)] for other in others]
+        sides = [[points[:, i][other] - points[:, i][first] for i in range(d)] for other in others]
         if d == 2:
             (a, b), (c, e) = sides
-            return np.asarray(np.abs(a * e - b * c) / 2)
-        return np.asarray(np.abs(np.sum(np.cross(sides[0], sides[1], axis=0) * sides[2], axis=0)) / 6)
+            return np.asarray((a * e - b * c) / 2)
+        return np.asarray(np.sum(np.cross(sides[0], sides[1], axis=0) * sides[2], axis=0) / 6)
+
+    @cached_property
+    def pieces(self) -> Integers:
+        """The number of the piece that each cell is in, (c,): pieces share no vertex."""
+        first, *others = self.cells.T
+        ends = np.tile(first, len(others)), np.concatenate(others)
+        graph = coo_array((np.ones(len(ends[0]), dtype=np.int8), ends), shape=(len(self.points),) * 2)
+        return np.asarray(connected_components(graph, directed=False)[1][first])
 
     @property
     def boundary(self) -> Integers:

@@ -18,6 +18,7 @@ from ..typing import Array, Integers, Mask
 from . import solution_arrays
 from .body_mesh import BodyMesh, body_mesh
 from .errors import ResultError
+from .rounding import without_noise
 from .solution_arrays import SolutionArrays
 
 if TYPE_CHECKING:
@@ -136,7 +137,8 @@ class Result:
         """The parts of Γc, in the order of ``contact.csv``; none where the body is carried off."""
         found = {} if self.carried_off else self.arrays.parts
         return tuple(
-            ContactPart(name, part.columns, part.vertices, part.facets, part.normals) for name, part in found.items()
+            ContactPart(name, without_noise(part.columns, self.body), part.vertices, part.facets, part.normals)
+            for name, part in found.items()
         )
 
     @property

@@ -1,4 +1,4 @@
-"""Numbers as people read them: SI prefixes, round factors, thin spaces between thousands."""
+"""Numbers as people read them: SI prefixes, round factors, thin spaces between thousands, a minus that is no hyphen."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def unit_for(largest: float, name: str) -> Unit:
         return Unit(1.0, name)
     exponent = 3 * math.floor(math.log10(abs(largest) * (1.0 + 1e-9)) / 3)
     least = 0 if name == "Pa" else -12  # mPa would be read as MPa
-    most = 0 if name == "m" else 12  # nobody says megametre
+    most = 3 if name == "m" else 12  # nobody says megametre
     nearest = min(max(exponent, least), most)
     if nearest - exponent in range(-6, 6):
         return Unit(10.0**nearest, _PREFIXES[nearest] + name)
@@ -79,9 +79,30 @@ def times(factor: float) -> str:
     return f"displacements × {'' if digits == '1' else f'{digits} × '}{_power(exponent)}"
 
 
-def thousands(number: int) -> str:
+def number(value: float, digits: int = 6) -> str:
+    """A number without a unit, very large and small ones with a power of ten.
+
+    Args:
+        value: the number.
+        digits: that are significant.
+    """
+    text = f"{value:.{digits}g}"
+    if "e" not in text and not 0 < abs(value) < 1e-3 and abs(value) < 1e5:
+        return text.replace("-", "−")
+    mantissa, exponent = f"{value:.{digits - 1}e}".split("e")
+    mantissa = (mantissa.rstrip("0").rstrip(".") if "." in mantissa else mantissa).replace("-", "−")
+    power = _power(int(exponent))
+    return mantissa.replace("1", power) if mantissa in ("1", "−1") else f"{mantissa}·{power}"
+
+
+def percent(share: float) -> str:
+    """A share of one as a percentage, to two digits."""
+    return f"{100.0 * share:.0f} %" if share >= 0.1 else f"{number(100.0 * share, 2)} %"
+
+
+def thousands(whole: int) -> str:
     """A whole number, its thousands apart."""
-    return f"{number:,}".replace(",", _NARROW)
+    return f"{whole:,}".replace(",", _NARROW)
 
 
 def _power(exponent: int) -> str:
@@ -93,7 +114,7 @@ def _digits(value: float) -> str:
     if value == 0.0:
         return "0"
     if not 1e-4 <= abs(value) < 1e9:
-        return f"{value:.3g}"
+        return number(value, 3)
     decimals = max(0, 2 - math.floor(math.log10(abs(value))))
-    text = f"{value:,.{decimals}f}".replace(",", _NARROW)
+    text = f"{value:,.{decimals}f}".replace(",", _NARROW).replace("-", "−")
     return text.rstrip("0").rstrip(".") if "." in text else text

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -52,12 +53,14 @@ def scalar_problem(
     _refuse_overlap(problem, laws.chains)
     unknowns = [laws.chains.get(_Argument(unknowns=(i,)), []) for i in range(problem.size)]
     chains = [*unknowns, *(laws.chains[v] for v in vectors)]
+    whole = tuple(total(one) if one else FREE for one in chains)
+    lower, upper = _off_drops(whole[: problem.size], problem.lower, problem.upper, polylines.off_drops)
     return ScalarProblem(
         stiffness=problem.stiffness,
         force=problem.load(factor),
-        lower=problem.lower,
-        upper=problem.upper,
-        chains=tuple(total(one) if one else FREE for one in chains),
+        lower=lower,
+        upper=upper,
+        chains=whole,
         lengths=_lengths(vectors),
         constant=laws.constant,
         error=laws.error,
@@ -65,6 +68,21 @@ def scalar_problem(
         farthest=float(np.max(far)) if laws.error else math.inf,
         thresholds=thresholds,
     )
+
+
+def _off_drops(chains: Sequence[Chain], lower: Array, upper: Array, way: float) -> tuple[Array, Array]:
+    """Bounds at which a traction drops moved off the drop, by less than points are told apart.
+
+    An unknown there may bear any traction of the drop, whether the bound pushes or not; so the drop must be inside.
+    """
+    low, high = lower.copy(), upper.copy()
+    for i in np.flatnonzero(lower < upper):
+        drops = [a.high for a, b in itertools.pairwise(chains[i]) if b.rate(b.low) < a.rate(a.high)]
+        if lower[i] in drops:
+            low[i] -= way * (1.0 + abs(lower[i]))
+        if upper[i] in drops:
+            high[i] += way * (1.0 + abs(upper[i]))
+    return low, high
 
 
 @dataclass(frozen=True, kw_only=True)

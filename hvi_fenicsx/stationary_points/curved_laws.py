@@ -227,9 +227,8 @@ class CurvedLaws:
             np.add.at(slope, at, bonds.weights * bonds.signs[:, 0] ** 2 * second)
             for kink in bonds.law.concave.kinks:
                 falls[at[(np.abs(argument - kink) <= close) & (bonds.weights > 0.0)]] = True
-        low = np.where(x <= self.near.lower + close, -np.inf, low)
-        high = np.where(x >= self.near.upper - close, np.inf, high)
-        return Subdifferential(low=low, high=high, falls=falls, least=slope, most=slope)
+        laws = Subdifferential(low=low, high=high, falls=falls, least=slope, most=slope)
+        return stationarity.with_bounds(self.near, x, laws)
 
 
 def _forces(bonds: Bonds, argument: Array, close: float) -> tuple[Array, Array]:

@@ -9,6 +9,9 @@ import numpy as np
 from ..typing import Array, Mask
 from .scalar_problem import ArcTable, ScalarProblem
 
+LEAST_WIDENED = float(np.finfo(float).tiny)
+"""The least widening: without it, an interval that is clipped again and again about a joint at zero would end there."""
+
 Clip = Callable[[Array, Array], tuple[Array, Array] | None]
 """A pass over intervals: smaller ones, or None if one is empty."""
 
@@ -42,7 +45,7 @@ class GraphClip:
         problem: the problem.
         springs: stiffness d of the springs, (n,).
         joints_at_ends: whether a joint at the end of an interval counts with all its tractions; if not, only where the
-            interval is that joint alone.
+            interval is that joint alone, or the end is a bound of the problem.
     """
 
     def __init__(self, problem: ScalarProblem, springs: Array, *, joints_at_ends: bool) -> None:
@@ -71,7 +74,7 @@ class GraphClip:
         first, last = self._at_bounds(low, high, least, most, first, last)
         if np.any(first > last):
             return None
-        wide = self._widened * (np.abs(first) + np.abs(last) + (high - low))
+        wide = np.maximum(self._widened * (np.abs(first) + np.abs(last) + (high - low)), LEAST_WIDENED)
         return np.maximum(low, first - wide), np.minimum(high, last + wide)
 
     def _on_arcs(self, begin: Array, end: Array, least: Array, most: Array, meets: Mask) -> tuple[Array, Array]:
@@ -95,7 +98,8 @@ class GraphClip:
         at = arcs.high[:, :-1]
         inside = (at >= low[:, None]) & (at <= high[:, None])
         if not self._joints_at_ends:
-            inside &= ((at > low[:, None]) & (at < high[:, None])) | (low == high)[:, None]
+            apart = (at > low[:, None]) & (at < high[:, None]) | (low == high)[:, None]
+            inside &= apart | (at == self._problem.lower[:, None]) | (at == self._problem.upper[:, None])
         with np.errstate(invalid="ignore"):
             a, b = arcs.before[:, :-1] + d * at, arcs.after[:, 1:] + d * at
             meets = inside & (np.minimum(a, b) <= most) & (np.maximum(a, b) >= least)

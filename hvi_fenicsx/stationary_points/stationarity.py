@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 
 import numpy as np
@@ -54,13 +54,33 @@ def subdifferential(problem: ScalarProblem, x: Array) -> Subdifferential:
     drop = (
         here[:, :-1] & here[:, 1:] & (t[:, :-1] - t[:, 1:] > accuracy * np.max(np.abs(problem.force), initial=1e-300))
     )
-    return Subdifferential(
-        low=np.where(x <= problem.lower + near, -np.inf, low),
-        high=np.where(x >= problem.upper - near, np.inf, high),
-        falls=np.asarray(drop.any(axis=1)),
-        least=np.where(here, arcs.slopes, np.inf).min(axis=1),
-        most=np.where(here, arcs.slopes, -np.inf).max(axis=1),
+    return with_bounds(
+        problem,
+        x,
+        Subdifferential(
+            low=low,
+            high=high,
+            falls=np.asarray(drop.any(axis=1)),
+            least=np.where(here, arcs.slopes, np.inf).min(axis=1),
+            most=np.where(here, arcs.slopes, -np.inf).max(axis=1),
+        ),
     )
+
+
+def with_bounds(problem: ScalarProblem, x: Array, laws: Subdifferential) -> Subdifferential:
+    """What laws and bounds allow at a point; a drop that a bound keeps the unknown on is none.
+
+    Args:
+        problem: the stiffness, the force and the bounds.
+        x: the point, (n,).
+        laws: what the laws allow there.
+    """
+    near = problem.thresholds.points.accuracy * (1.0 + np.max(np.abs(x), initial=0.0))
+    force = problem.force - problem.stiffness @ x
+    below, above = x <= problem.lower + near, x >= problem.upper - near
+    kept = (below & above) | (below & (force <= laws.low)) | (above & (force >= laws.high))
+    low, high = np.where(below, -np.inf, laws.low), np.where(above, np.inf, laws.high)
+    return replace(laws, low=low, high=high, falls=laws.falls & ~kept)
 
 
 def imbalance(problem: ScalarProblem, x: Array) -> float:

@@ -24,6 +24,7 @@ class PolylineThresholds:
         samples: intervals of an interval between two nodes on which the difference is bounded.
         most_nodes: nodes are not made denser beyond this number.
         one_place: places nearer than this share of their distance from zero are one.
+        off_drops: how far a bound is moved off a drop, relative to the displacements.
     """
 
     far: float = 1e6
@@ -34,6 +35,7 @@ class PolylineThresholds:
     samples: int = 512
     most_nodes: int = 2_000
     one_place: float = 1e-12
+    off_drops: float = 1e-11
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
@@ -41,7 +42,7 @@ def error_axis(axes: Axes, quantity: str, own: float | None, shown: Sequence[flo
                   va="bottom", size=10, color=GREY)  # fmt: skip
     axes.tick_params(axis="y", which="minor", length=0)
     axes.yaxis.set_major_locator(LogLocator(numticks=6))
-    axes.yaxis.set_major_formatter(FuncFormatter(lambda y, _: f"{100 * y:.8f}".rstrip("0").rstrip(".") + " %"))
+    axes.yaxis.set_major_formatter(FuncFormatter(lambda y, _: f"{_decimal(100 * y)} %"))
     axes.yaxis.set_minor_formatter(NullFormatter())
     axes.grid(which="major", color="#e6e6e6", lw=0.8)
     axes.set_axisbelow(True)
@@ -50,7 +51,7 @@ def error_axis(axes: Axes, quantity: str, own: float | None, shown: Sequence[flo
 
 
 def _name(quantity: str) -> str:
-    return ERROR_NORMS[quantity].name.replace("_t", "ₜ").replace("_n", "ₙ")
+    return ERROR_NORMS[quantity].name.replace("_t", "ₜ").replace("_n", "ₙ").replace("-", "−")
 
 
 def time_axis(axes: Axes) -> None:
@@ -66,9 +67,14 @@ def time_axis(axes: Axes) -> None:
 def plain_log(axes: Axes) -> None:
     """The x axis: numbers, logarithmic."""
     axes.set_xscale("log")
-    axes.xaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:.3g}"))
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda x, _: _decimal(x)))
     axes.xaxis.set_minor_formatter(NullFormatter())
     axes.tick_params(axis="x", which="minor", length=0)
+
+
+def _decimal(value: float) -> str:
+    """A number without a power of ten, however small, since those of one axis should look alike."""
+    return np.format_float_positional(value, precision=3, fractional=False, trim="-")
 
 
 def apart(axes: Axes, one: float, other: float) -> bool:

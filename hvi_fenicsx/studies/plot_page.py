@@ -27,8 +27,10 @@ from .table import Row
 
 PANEL, GAP, FOOT = 2.6, 0.6, 0.85
 """Inches: a panel, the room for its title, the axis below the last."""
-_SMOOTHINGS = {None: GREEN, "quadratic": BLUE, "chks": PURPLE, "log_exp": ORANGE, "paper": VERMILION}
-_OTHER_SMOOTHING = "#56B4E9"
+_SMOOTHINGS = {None: GREEN, "quadratic": BLUE, "chks": "#56B4E9", "log_exp": ORANGE, "paper": VERMILION}
+_OTHER_SMOOTHING = PURPLE
+_IN_LINE = 6
+"""Kinds of points that one line of the legend holds."""
 
 
 def page(study: Study, subject: str, panels: int, tall: float = PANEL, wide: float = 6.5) -> tuple[Figure, list[Axes]]:
@@ -82,7 +84,7 @@ def kinds(study: Study) -> list[Kind]:
 
 
 def legend(axes: Axes, found: Sequence[Kind]) -> None:
-    """Write the kinds of points above a panel.
+    """Write the kinds of points above a panel, in two lines where one would not hold them.
 
     Args:
         axes: the panel.
@@ -91,7 +93,8 @@ def legend(axes: Axes, found: Sequence[Kind]) -> None:
     for marker, shade, name in found:
         hollow: dict[str, Any] = {"mfc": "none", "mec": INK} if marker == "*" else {"mec": "white"}
         axes.plot([], [], marker, color=shade, label=name, ms=13 if marker == "*" else 7, **hollow)
+    columns = len(found) if len(found) <= _IN_LINE else -(-len(found) // 2)
     axes.legend(
-        loc="lower right", bbox_to_anchor=(1.015, 1.085), ncols=len(found), frameon=False, fontsize=10,
+        loc="lower right", bbox_to_anchor=(1.015, 1.085), ncols=columns, frameon=False, fontsize=10,
         handletextpad=0.0, columnspacing=0.6, borderaxespad=0.0,
     )  # fmt: skip

@@ -36,3 +36,17 @@ def test_displacements_of_a_stretched_strip_are_stretched_alike() -> None:
     assert lifted[1:3, 1] == pytest.approx(np.full(2, 10.0 * shape.factor * 1e-6))
     assert lifted[:, 1].max() < 0.12 * LENGTH
     assert shape.scales == f"displacements × {shape.factor:g}".replace("1000", "1\u202f000") + ", height × 10"
+
+
+def test_a_small_piece_beside_a_large_one_is_not_crushed() -> None:
+    """A large square whose far corner moves, and a small one that is pressed to half its height at 50 times."""
+    corners = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]])
+    points = np.concatenate([corners, 0.1 * corners + [0.0, 1.0, 0.0]])
+    u = np.zeros_like(points)
+    u[1, 0], u[6:, 1] = 1e-3, -1e-3
+    halves = np.array([[0, 1, 2], [2, 3, 0]])
+    body = BodyMesh(points=points, cells=np.concatenate([halves, 4 + halves]), displacement=u)
+    assert deform(BodyMesh(points=points[:4], cells=halves, displacement=u[:4]), []).factor == 100.0
+    shape = deform(body, [])
+    assert shape.factor == 20.0
+    assert np.abs(body.signed_volumes(shape.points))[2:].sum() == pytest.approx(0.8 * 0.01)

@@ -53,6 +53,7 @@ def test_an_unrolled_bore_has_the_area_of_its_shell(turn: float) -> None:
     assert shapely.area(shown).sum() == pytest.approx(window.area, rel=1e-9)  # no facet twice
     assert shapely.union_all(shown, grid_size=1e-9).area == pytest.approx(window.area, rel=1e-6)  # straight ends
     assert flat.names[1] == "y"
+    assert flat.how == "unrolled about y"
 
 
 def test_where_a_bore_touches_is_in_the_middle_of_its_map() -> None:
@@ -76,4 +77,27 @@ def test_a_part_that_is_open_is_seen_along_its_axes() -> None:
     geometry, body = bore(0.5 * np.pi)
     flat = laid_flat(geometry, body)
     assert "way" not in flat.names[0]
+    assert flat.how == "seen along x"
     assert len(flat.rows) == len(geometry.part.points)
+
+
+def test_the_whole_surface_of_a_ball_is_laid_flat_once() -> None:
+    """Height over angle about z: no facet lies on another, but for those at the two poles."""
+    angles, heights = np.linspace(0.0, 2.0 * np.pi, AROUND, endpoint=False), np.linspace(-0.999, 0.999, 9)
+    ring = np.sqrt(1.0 - heights**2)
+    points = np.column_stack(
+        [np.outer(ring, np.cos(angles)).ravel(), np.outer(ring, np.sin(angles)).ravel(), np.repeat(heights, AROUND)]
+    )
+    first = (np.arange(8)[:, None] * AROUND + np.arange(AROUND)).ravel()
+    other = (np.arange(8)[:, None] * AROUND + np.roll(np.arange(AROUND), -1)).ravel()
+    facets = np.concatenate(
+        [np.stack([first, other, first + AROUND], 1), np.stack([other, other + AROUND, first + AROUND], 1)]
+    )
+    part = SimpleNamespace(points=points, idle=np.zeros(len(points), dtype=bool))
+    flat = laid_flat(
+        SimpleNamespace(part=part, facets=facets, row=np.arange(len(points))), SimpleNamespace(points=points)
+    )
+    each = areas(flat.points, flat.triangles)
+    assert np.all(each > 0.0)
+    assert flat.how == "unrolled about z"
+    assert np.ptp(flat.ends[:, 1]) == pytest.approx(1.998)

@@ -16,12 +16,14 @@ import uuid
 from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 import pytest
+import shapely
 import tomli_w
 from dolfinx import mesh
 from matplotlib.figure import Figure
@@ -42,6 +44,7 @@ from hvi_fenicsx.report.pictures.kinds import (
     body_space,
     contact_curves,
     contact_maps,
+    escape_plane,
     scene_plane,
     scene_space,
 )
@@ -507,11 +510,11 @@ def test_shading_is_linear_and_has_no_holes(cells: int) -> None:
 
 def test_numbers_are_said_as_people_say_them() -> None:
     said = {units.quantity(value, unit).replace("\N{NARROW NO-BREAK SPACE}", " ") for value, unit in SAID}
-    assert said == {"1 MPa", "999 kPa", "9 µm", "126 nm", "1.5 m", "2 500 m", "0 Pa"}
+    assert said == {"1 MPa", "999 kPa", "9 µm", "126 nm", "1.5 m", "2.5 km", "−3 MPa", "0 Pa"}
     assert [units.round_below(v) for v in (1.0, 1.99, 4.9, 5.0, 23456.0, 0.3)] == [1.0, 1.0, 2.0, 5.0, 20000.0, 0.2]
 
 
-SAID = [(1e6, "Pa"), (0.999e6, "Pa"), (9e-6, "m"), (1.26e-7, "m"), (1.5, "m"), (2500.0, "m"), (0.0, "Pa")]
+SAID = [(1e6, "Pa"), (0.999e6, "Pa"), (9e-6, "m"), (1.26e-7, "m"), (1.5, "m"), (2500.0, "m"), (-3e6, "Pa"), (0.0, "Pa")]
 
 
 def test_where_no_prefix_suits_a_power_of_ten_is_said() -> None:
@@ -685,6 +688,17 @@ def test_a_load_on_short_stretches_has_arrows_on_each_and_its_value_beside_one(t
     assert 0.8 < value.xy[0] < 1.0
 
 
+def test_the_bars_of_a_body_that_nothing_moves_say_nothing_but_zero(tmp_path: Path) -> None:
+    folder = result(tmp_path / "r", box(), np.zeros_like)
+    part = load(folder / FILE).parts["floor"]
+    change(folder, parts={"floor": replace(part, columns={**part.columns, "sigma_n": 0.0 * part.columns["x"]})})
+    found = reader.read(folder)
+    fig = contact_maps.draw(found, found.parts[0])
+    fig.canvas.draw()
+    bars = [axes for axes in fig.axes if not axes.get_xlabel() and axes.get_position().width < 0.05]
+    assert {float(tick) for axes in bars for tick in axes.get_yticks()} == {0.0}
+
+
 def test_the_axes_of_a_map_are_in_a_unit_that_suits_and_inside_of_the_picture(tmp_path: Path) -> None:
     """A part of some millimetres on both sides of the origin."""
     small = box()
@@ -696,6 +710,21 @@ def test_the_axes_of_a_map_are_in_a_unit_that_suits_and_inside_of_the_picture(tm
     named = [label for axes in fig.axes for label in (axes.xaxis.label, axes.yaxis.label) if label.get_text()]
     assert {label.get_text() for label in named} == {"x in mm", "y in mm"}
     assert min(label.get_window_extent().x0 for label in named) >= 0.0
+
+
+def test_the_numbers_of_a_narrow_map_stand_apart_and_its_arrows_are_as_wide_as_those_of_a_wide_one(
+    tmp_path: Path,
+) -> None:
+    """A part that is six times as long across as along, far from the origin."""
+    narrow = box()
+    narrow.geometry.x[:] = narrow.geometry.x * [0.1, 1.0, 1.0] + [500.0, 0.0, 0.0]
+    found = reader.read(result(tmp_path / "r", narrow, pressed))
+    fig = contact_maps.draw(found, found.parts[0])
+    fig.canvas.draw()
+    said = [text.get_window_extent() for text in fig.axes[0].get_xticklabels() if text.get_text()]
+    assert said
+    assert not any(one.overlaps(other) for one, other in pairwise(said))
+    assert {arrows.units for arrows in fig.findobj(Quiver)} == {"inches"}
 
 
 @pytest.mark.parametrize("height", [1.0, 0.03])
@@ -725,6 +754,65 @@ def test_names_of_parts_cover_nothing_and_stay_in_the_picture(tmp_path: Path, he
         assert 0.0 <= box.x0 <= box.x1 <= fig.bbox.width
         assert not any(box.overlaps(other) for other in boxes[i + 1 :])
         assert not any(box.overlaps(text.get_window_extent()) for text in fig.texts)
+    corners = fig.axes[0].transData.transform([[0.0, 0.0], [1.0, 0.0], [1.0, height], [0.0, height]])
+    named = [shapely.box(*box.extents) for box, text in zip(boxes, said, strict=True) if text.get_text() in names]
+    assert not np.any(shapely.intersects(named, shapely.LinearRing(corners)))
+
+
+def test_an_escaping_strip_is_drawn_as_high_as_its_scene_is(tmp_path: Path) -> None:
+    body = square()
+    body.geometry.x[:, 1] *= 0.005
+    fig = escape_plane.draw(reader.read(escaping(tmp_path / "r", body, lambda x: np.stack([0 * x[0], 1 + 0 * x[1]]))))
+    at_rest, ghost = (patch.get_path().get_extents() for patch in fig.axes[0].patches[:2])
+    assert [at_rest.height, ghost.height] == pytest.approx([0.05, 0.05])
+    assert ghost.y0 == pytest.approx(0.3)
+    assert "the body at rest, height × 10" in [text.get_text() for text in fig.legends[0].get_texts()]
+
+
+def test_a_pressure_that_is_rounding_is_not_drawn(tmp_path: Path) -> None:
+    """On a part that has lifted off, beside the stress in the body."""
+    folder = result(tmp_path / "r", square(), pressed)
+    part = load(folder / FILE).parts["floor"]
+    noise = {"sigma_n": 1e-8 * (-1.0) ** np.arange(len(part.vertices))}
+    stress = np.full(len(load(folder / FILE).cells), LOAD, dtype=np.float32)
+    change(folder, parts={"floor": replace(part, columns=part.columns | noise)}, von_mises=stress)
+    found = reader.read(folder)
+    words = [text.get_text() for text in body_plane.draw(found).legends[0].get_texts()]
+    assert not [line for line in words if "pressure" in line or "tension" in line]
+    assert dict(numbers.contact(found.parts[0])["rows"])["largest pressure"].startswith("0")
+
+
+@pytest.mark.parametrize("along", [True, False])
+def test_arrows_of_a_load_along_its_side_are_beside_it_and_apart(tmp_path: Path, along: bool) -> None:
+    folder = result(tmp_path / "r", square(), pressed)
+    change(folder, parts={})
+    write_words(folder, 2, effects=[role("top", "traction", traction=[1e6, 0.0 if along else -1e6])])
+    write_sides(folder, square(), top=lambda x: x[1] == 1)
+    (arrows,) = scene_plane.draw(reader.read(folder)).axes[0].findobj(Quiver)
+    order = np.argsort(np.asarray(arrows.get_offsets())[:, 0])
+    tails, ways = np.asarray(arrows.get_offsets())[order], np.column_stack([arrows.U, arrows.V])[order]
+    if along:
+        assert np.all(tails[:, 1] > 1.02)
+        assert np.all(np.diff(tails[:, 0]) > 1.3 * ways[:-1, 0])
+        assert [tails[0, 0], (tails + ways)[-1, 0]] == pytest.approx([0.0, 1.0])
+    else:
+        assert (tails + ways)[:, 1] == pytest.approx(np.ones(len(tails)))
+
+
+@pytest.mark.parametrize(("body", "value"), [(square, "5 kN/m"), (box, "5 kN")], ids=["plane", "space"])
+def test_a_force_that_is_spread_over_a_part_has_arrows_and_its_own_value(
+    tmp_path: Path, body: Callable[[], mesh.Mesh], value: str
+) -> None:
+    folder, d = result(tmp_path / "r", body(), pressed), body().geometry.dim
+    force = [3000.0, 4000.0, 0.0][:d]
+    write_words(folder, d, effects=[role("pull", "force", drive="load")])
+    scene = {"title": "t", "boundary": {"pull": {"on": "right", "force": force}}}
+    (folder / "scene.toml").write_text(tomli_w.dumps(scene), encoding="utf-8")
+    write_sides(folder, body(), pull=ON["pull"])
+    (load,) = loads_supports.loaded_sides(reader.read(folder))
+    assert load.value.replace("\N{NARROW NO-BREAK SPACE}", " ") == value
+    area = 1.0 if d == 2 else 0.24
+    assert load.traction[:, :d] == pytest.approx(np.broadcast_to(np.array(force) / area, (len(load.traction), d)))
 
 
 def test_what_drives_a_part_without_a_traction_is_said(tmp_path: Path) -> None:
@@ -747,4 +835,4 @@ def test_what_drives_a_part_without_a_traction_is_said(tmp_path: Path) -> None:
     write_sides(folder, square(4), turned=ON["pull"], lifted=ON["wall"], held=lambda x: x[1] == 0)
     fig = scene_plane.draw(reader.read(folder))
     said = [text.get_text().replace("\N{NARROW NO-BREAK SPACE}", " ") for text in fig.legends[0].get_texts()]
-    assert [line for line in said if "“" in line] == ["“turned”: moment -200 N", "“lifted”: displacement (free, 1 mm)"]
+    assert [line for line in said if "“" in line] == ["“turned”: moment −200 N", "“lifted”: displacement (free, 1 mm)"]

@@ -17,7 +17,7 @@ from runs import ROOT, hvi, summary
 
 from hvi_fenicsx.errors import HviError
 from hvi_fenicsx.report.html import render, study_page
-from hvi_fenicsx.report.html.scene_text import number
+from hvi_fenicsx.report.units import number
 
 PUSHED = ROOT / "demos" / "pushed_block.toml"
 PIXEL = base64.b64decode(

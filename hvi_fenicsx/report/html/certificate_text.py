@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from ..reader import Result
-from .scene_text import number
+from ..units import number
 
 _ENTRIES = {
     "equilibrium": "Forces balance: the largest force that nothing carries, as a share of the load",

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from ..equilibria_reader import EquilibriaResult, read
-from ..units import quantity
+from ..units import number, quantity
 from . import scene_text
 from .content import picture, pictures
 from .render import page_of
@@ -23,7 +23,7 @@ def write(folder: Path) -> Path:
 
     Raises:
         ResultError: no search is there, or its files are damaged.
-        PageError: the page cannot be written.
+        NotWrittenError: the page cannot be written.
     """
     return page_of("equilibria.html.j2", _content(read(folder)), folder)
 
@@ -47,11 +47,11 @@ def _numbers(result: EquilibriaResult) -> Iterator[tuple[str, str]]:
     known = result.known
     yield "equilibria found", f"{known['count']}, {'all there are' if known['complete'] else 'there may be others'}"
     if known["lowest_energy"] is not None:
-        yield "lowest energy found", f"{known['lowest_energy']:.10g} {result.unit}"
+        yield "lowest energy found", f"{number(known['lowest_energy'], 10)} {result.unit}"
     if known["lower_bound"] is not None:
-        yield "no displacement has an energy below", f"{known['lower_bound']:.10g} {result.unit}"
+        yield "no displacement has an energy below", f"{number(known['lower_bound'], 10)} {result.unit}"
     if known["gap"] is not None:
-        yield "gap between the two, relative", f"{known['gap']:.2g}"
+        yield "gap between the two, relative", number(known["gap"], 2)
     yield "boxes that were bounded or tested", str(known["nodes"])
     if known["continua"]:
         yield "these stand for a continuum of equilibria", ", ".join(map(str, known["continua"]))
@@ -66,7 +66,7 @@ def _rows(result: EquilibriaResult) -> Iterator[dict[str, str]]:
         yield {
             "index": row["index"],
             "kind": row["kind"],
-            "energy": f"{float(row['energy']):.10g}",
+            "energy": number(float(row["energy"]), 10),
             "above": quantity(above, result.unit) if above > 0.0 else "–",
             "slip": quantity(float(row["max_slip"]), "m"),
             "opening": quantity(float(row["max_opening"]), "m"),

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from ..reader import ContactPart, Result
-from ..units import quantity, thousands, unit_for
+from ..rounding import unless_noise
+from ..units import number, quantity, thousands, unit_for
 
 _PHASES = {
     "jit": "compiling forms (cached for the next run)",
@@ -35,7 +36,7 @@ def facts(result: Result) -> Iterator[tuple[str, str]]:
         names = ("branch", "newton", "linear", "levels")
         yield "steps", ", ".join(f"{counts[n]} {n}" for n in names if counts.get(n) is not None)
     if energy is not None:
-        yield "energy", f"{energy:.8g} {'J' if result.body.dimension == 3 else 'J/m'}"
+        yield "energy", f"{number(energy, 8)} {'J' if result.body.dimension == 3 else 'J/m'}"
     if summary.get("peak_memory_mb"):
         yield "memory at its peak", f"{thousands(round(summary['peak_memory_mb']))} MB over all ranks"
 
@@ -73,8 +74,12 @@ def forces(result: Result) -> dict[str, Any] | None:
         return None
     places = {**found, "in all": [sum(component) for component in zip(*found.values(), strict=True)]}
     dimension = len(places["in all"])
-    unit = unit_for(max(abs(v) for force in places.values() for v in force), "N" if dimension == 3 else "N/m")
-    rows = [{"name": name, "values": [unit.number(v) for v in force]} for name, force in places.items()]
+    largest = max(abs(v) for force in places.values() for v in force)
+    unit = unit_for(largest, "N" if dimension == 3 else "N/m")
+    rows = [
+        {"name": name, "values": [unit.number(unless_noise(v, largest)) for v in force]}
+        for name, force in places.items()
+    ]
     return {"axes": [f"{axis}, {unit.name}" for axis in "xyz"[:dimension]], "rows": rows}
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from ..path_reader import PathResult, read
+from ..rounding import unless_noise
 from ..units import quantity
 from . import scene_text
 from .content import picture, pictures
@@ -18,7 +19,7 @@ def write(folder: Path) -> Path:
 
     Raises:
         ResultError: no load path is there, or its files are damaged.
-        PageError: the page cannot be written.
+        NotWrittenError: the page cannot be written.
     """
     return page_of("path.html.j2", _content(read(folder)), folder)
 
@@ -63,9 +64,10 @@ def _jump(jump: dict[str, float], energy: str) -> str:
 
 
 def _forces(result: PathResult) -> Iterator[tuple[str, str]]:
-    name = "N" if len(result.axes) == 3 else "N/m"
-    for part, found in result.path["peak_forces"].items():
-        values = ", ".join(quantity(f, name) for f in found["force"])
+    name, forces = "N" if len(result.axes) == 3 else "N/m", result.path["peak_forces"]
+    largest = max((abs(f) for found in forces.values() for f in found["force"]), default=0.0)
+    for part, found in forces.items():
+        values = ", ".join(quantity(unless_noise(f, largest), name) for f in found["force"])
         yield f"largest force on “{part}”", f"({values}), row {found['row']}"
 
 

@@ -7,9 +7,9 @@ from pathlib import PurePath
 from typing import Any
 
 from ..reader import Result
+from ..units import number
 
 _PLACE = {"on", "where", "region"}
-_SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def body(result: Result) -> Iterator[tuple[str, str]]:
@@ -92,14 +92,3 @@ def value_text(value: Any) -> str:
 def _pair(key: str, value: Any) -> str:
     text = f"({value_text(value)})" if isinstance(value, Mapping) else value_text(value)
     return text if key == "law" else f"{key} {text}"
-
-
-def number(value: float) -> str:
-    """A number to six digits, very large and small ones with a power of ten."""
-    text = f"{value:.6g}"
-    if "e" not in text and not 0 < abs(value) < 1e-3 and abs(value) < 1e5:
-        return text.replace("-", "−")
-    digits, exponent = f"{value:.6e}".split("e")
-    digits = digits.rstrip("0").rstrip(".").replace("-", "−")
-    power = f"10{str(int(exponent)).translate(_SUPERSCRIPTS)}"
-    return f"{digits}·{power}".replace("1·", "", 1) if digits in ("1", "−1") else f"{digits}·{power}"

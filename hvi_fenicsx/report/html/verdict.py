@@ -7,6 +7,7 @@ from typing import Any
 
 from ...errors import ExitCode
 from ..reader import Result
+from ..units import number, percent
 
 _STATES = {
     "held": "The load is held: along every rigid motion that supports and contact leave, the lasting (residual) "
@@ -44,7 +45,7 @@ def _rough(result: Result) -> str:
     """The mesh's error in words."""
     found = result.summary["estimate"]
     norm, part = found.get("energy_norm"), found.get("discretisation")
-    size = f"{100 * part / norm:.2g} % of the solution" if norm and part is not None else "as large as the solution"
+    size = f"{percent(part / norm)} of the solution" if norm and part is not None else "as large as the solution"
     return (
         f"the estimated error is {size}, so its numbers are rough; refine the mesh, or ask `hvi run` for an --accuracy"
     )
@@ -79,7 +80,7 @@ def _margin(found: Mapping[str, Any]) -> Iterator[str]:
     if margin is not None:
         sense = "is left over" if margin > 0 else "is lacking" if margin < 0 else "and load balance"
         unit = "resistance minus load along the worst motion of unit size, nondimensional"
-        yield f"Margin {margin:.3g} ({unit}): resistance {sense}."
+        yield f"Margin {number(margin, 3)} ({unit}): resistance {sense}."
 
 
 def _factors(found: Mapping[str, Any]) -> Iterator[str]:
@@ -107,7 +108,7 @@ def _paper(found: Mapping[str, Any]) -> Iterator[str]:
     if paper is not None and paper.get("satisfied") is not None:
         yield (
             f"The sufficient condition of Ovcharova and Gwinner (A2s) is {'' if paper.get('satisfied') else 'not '}"
-            f"satisfied (constant c = {paper.get('c'):.3g})."
+            f"satisfied (constant c = {number(paper['c'], 3)})."
         )
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -17,7 +17,9 @@ VISIBLE = 0.08
 """How large the largest displacement is drawn, of the body's size."""
 NEAR = 0.3
 """Gaps larger than this, magnified, of the body's size, are the body's own shape."""
-THIN, DRAWN = 1 / 60, 1 / 15
+KEPT = 0.75
+"""A small body beside a large one is drawn with this part of its area or volume, at least."""
+THIN, DRAWN = 1 / 40, 1 / 15
 """A plane body whose height is a smaller part of its length is drawn higher (or wider), up to the second part."""
 
 
@@ -46,6 +48,12 @@ class DeformedBody:
     def at_rest(self) -> Array:
         """Where the vertices of the body at rest are drawn."""
         return np.asarray(self.body.points * self.stretch)
+
+    @property
+    def as_drawn(self) -> BodyMesh:
+        """The body at rest as it is drawn, with its escape mode drawn alike."""
+        mode = self.body.escape_mode
+        return replace(self.body, points=self.at_rest, escape_mode=None if mode is None else mode * self.stretch)
 
     @property
     def stretched(self) -> str:
@@ -107,7 +115,7 @@ def part_geometries(result: Result) -> list[PartGeometry]:
 
 
 def deform(body: BodyMesh, parts: Sequence[PartGeometry]) -> DeformedBody:
-    """The body with a round factor that makes its displacement seen.
+    """The body with a round factor that makes its displacement seen, and crushes none of its pieces.
 
     Where a part leaves its obstacle by its own shape, as a disk does a floor, the factor is 1: magnified, displacements
     would push the body through the obstacle.
@@ -122,8 +130,22 @@ def deform(body: BodyMesh, parts: Sequence[PartGeometry]) -> DeformedBody:
     if largest == 0.0:
         return DeformedBody(body, u, 1.0, stretch)
     factor = 1.0 if largest > 0.5 * VISIBLE * body.size else round_below(VISIBLE * body.size / largest * 1.25)
+    while factor > 1.0 and _kept(body, factor * u) < KEPT:
+        factor = round_below(factor / 1.5)
     gap = max((float(np.nanmax(geometry.part["gap"], initial=0.0)) for geometry in parts), default=0.0)
     return DeformedBody(body, u, factor if factor * gap * stretch.max() < NEAR * body.size else 1.0, stretch)
+
+
+def _kept(body: BodyMesh, moved: Array) -> float:
+    """The smallest share of its area or volume that a piece of the body is drawn with.
+
+    Args:
+        body: the body.
+        moved: the displacement that it is drawn with, m, (n, 3).
+    """
+    at_rest, drawn = body.signed_volumes(body.points), body.signed_volumes(body.points + moved)
+    size = np.bincount(body.pieces, np.abs(at_rest))
+    return float(np.min(np.bincount(body.pieces, np.sign(at_rest) * drawn) / size))
 
 
 def undeformed(body: BodyMesh) -> DeformedBody:

@@ -17,8 +17,12 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
+from ...errors import NotWrittenError
+from ...runtime import writing
 from ..equilibria_reader import EquilibriaResult, Row, read
+from ..units import number, unit_for
 from .equilibria import NAME
+from .legend import ticks
 from .style import BLUE, GREEN, GREY, HEADING, INK, ORANGE, PALE, PURPLE, VERMILION, area, figure, save, titled
 
 MOST = 16
@@ -30,6 +34,8 @@ CAPTION = (
 ROW = 0.62
 """Height of a row, inches."""
 _PIECES = (BLUE, ORANGE, GREEN, PURPLE)
+_KINDS, _OTHER = {"minimiser": ("o", INK), "saddle": ("^", "white")}, ("s", "white")
+"""The mark of each kind of equilibrium, and its face."""
 
 
 def make(result: EquilibriaResult) -> Figure:
@@ -46,36 +52,38 @@ def make(result: EquilibriaResult) -> Figure:
     energies, strips = area(fig, 0.5, 1.35, 2.2, tall), area(fig, 4.15, 1.35, 3.55, tall)
     _energies(energies, result, rows)
     _strips(strips, rows, states)
-    _legend(fig, states)
+    _legend(fig, sorted({row["kind"] for row in rows}), states)
     return fig
 
 
-def _subject(result: EquilibriaResult, shown: int) -> tuple[str, str]:
+def _subject(result: EquilibriaResult, shown: int) -> tuple[str, str, str]:
     known, count = result.known, len(result.rows)
     below = f"{count} equilibria" if count != 1 else "one equilibrium"
     below += f", the {shown} lowest shown" if shown < count else ""
     if known["complete"]:
-        return below, "all, proven"
-    return below, "the lowest, proven" if known["proven"] else "there may be others"
+        return below, "✓ all, proven", GREEN
+    return (below, "✓ the lowest, proven", GREEN) if known["proven"] else (below, "there may be others", INK)
 
 
 def _energies(axes: Axes, result: EquilibriaResult, rows: Sequence[Row]) -> None:
     values = np.array(result.energies[: len(rows)]) - result.energies[0]
+    unit = unit_for(float(values[-1]), result.unit)
+    values = np.asarray(values / unit.size)
     for one in result.known.get("barriers", []):
         top, ends = one["saddle"] - 1, [m - 1 for m in one["between"]]
         for end in ends:
             if top < len(rows):
                 axes.plot([values[end], values[top]], [end, top], color=PALE, lw=1.6, zorder=0)
     for i, (row, value) in enumerate(zip(rows, values, strict=True)):
-        mark, face = {"minimiser": ("o", INK), "saddle": ("^", "white")}.get(row["kind"], ("s", "white"))
+        mark, face = _KINDS.get(row["kind"], _OTHER)
         axes.plot(value, i, mark, color=INK, mfc=face, ms=9, clip_on=False)
     spread = float(values[-1]) or 1.0
     axes.set_xlim(-0.06 * spread, 1.06 * spread)
     axes.set_ylim(len(rows) - 0.5, -0.5)
     axes.set_yticks(range(len(rows)), [row["index"] for row in rows])
-    axes.xaxis.set_major_locator(MaxNLocator(2))
+    axes.xaxis.set_major_locator(ticks((0.0, float(values[-1])), 2))
     axes.tick_params(axis="y", length=0)
-    axes.set_xlabel(f"energy above the lowest\nfound, {result.energies[0]:.6g} ({result.unit})")
+    axes.set_xlabel(f"{unit.name} above the lowest found,\n{number(result.energies[0])} {result.unit}")
 
 
 def _strips(axes: Axes, rows: Sequence[Row], states: Sequence[Sequence[Row]]) -> None:
@@ -103,7 +111,9 @@ def _strips(axes: Axes, rows: Sequence[Row], states: Sequence[Sequence[Row]]) ->
 
 
 def _branch(vertex: Row) -> str:
-    return vertex["branch_t"] or vertex["branch_n"]
+    """The piece that the laws of a vertex are on: of two laws the later one, or the kink that one of them is on."""
+    found = [vertex[column] for column in ("branch_t", "branch_n") if vertex[column]]
+    return "-1" if "-1" in found else max(found, key=int, default="")
 
 
 def _colour(vertex: Row) -> str:
@@ -113,11 +123,11 @@ def _colour(vertex: Row) -> str:
     return VERMILION if branch == "-1" else _PIECES[int(branch) % len(_PIECES)]
 
 
-def _legend(fig: Figure, states: Sequence[Sequence[Row]]) -> None:
+def _legend(fig: Figure, kinds: Sequence[str], states: Sequence[Sequence[Row]]) -> None:
     found = sorted({_branch(v) for vertices in states for v in vertices} - {"", "-1"}, key=int)
+    marks = {kind: _KINDS.get(kind, _OTHER) for kind in kinds}
     handles: list[Patch | Line2D] = [
-        Line2D([], [], marker="o", color=INK, ls="", label="minimiser"),
-        Line2D([], [], marker="^", color=INK, mfc="white", ls="", label="saddle"),
+        Line2D([], [], marker=mark, color=INK, mfc=face, ls="", label=kind) for kind, (mark, face) in marks.items()
     ]
     handles += [Patch(color=_PIECES[int(b) % len(_PIECES)], label=f"piece {int(b) + 1} of the law") for b in found[:4]]
     if any(_branch(v) == "-1" for vertices in states for v in vertices):
@@ -129,4 +139,7 @@ def _legend(fig: Figure, states: Sequence[Sequence[Row]]) -> None:
 
 if __name__ == "__main__":
     folder = Path(sys.argv[1])
-    save(make(read(folder)), folder / NAME, CAPTION)
+    try:
+        save(make(read(folder)), folder / NAME, CAPTION)
+    except NotWrittenError as error:
+        raise SystemExit(writing.hand_over(error)) from None

@@ -34,10 +34,15 @@ def arrow(axes: Axes, way: Array) -> None:
     axes.add_patch(drawn)
 
 
-def keys() -> list[Artist]:
-    """The legend's lines for the two bodies."""
+def keys(stretched: str = "") -> list[Artist]:
+    """The legend's lines for the two bodies.
+
+    Args:
+        stretched: how the picture is stretched, in words.
+    """
     ghost = Patch(fc="#fbe3d3", ec=VERMILION, ls="--", label="its ghost, on its way")
-    return [Patch(fc=PALE, ec=INK, label="the body at rest"), ghost]
+    words = f"the body at rest, {stretched}" if stretched else "the body at rest"
+    return [Patch(fc=PALE, ec=INK, label=words), ghost]
 
 
 def say(fig: Figure, result: Result, keys: list[Artist]) -> None:
@@ -48,10 +53,11 @@ def say(fig: Figure, result: Result, keys: list[Artist]) -> None:
         result: whose body escapes.
         keys: the lines of the legend.
     """
-    words = str(result.solvability.get("direction") or "a rigid motion")
+    words = str(result.solvability.get("direction") or "a rigid motion").replace("-", "−")
     tall = fig.get_figheight()
     fig.text(0.3 / WIDTH, (FOOT - 0.28) / tall, "The load moves the body by", size=12.5, color=GREY, va="top")
-    lines = textwrap.wrap(words, 27 if len(words) < 60 else 40)
-    size = 16 if len(lines) <= 2 and len(words) < 60 else 11.5
+    lines, size = textwrap.wrap(words, 27), 16.0
+    if len(lines) > 2:
+        lines, size = textwrap.wrap(words, 40), 11.5
     fig.text(0.3 / WIDTH, (FOOT - 0.56) / tall, "\n".join(lines), size=size, weight="bold", color=VERMILION, va="top")
     legend(fig, keys)

@@ -30,6 +30,7 @@ class FlatPart:
         ways: the unit vectors along which the two coordinates grow at each vertex, (m, 2, 3).
         names: of the coordinates.
         ends: the lower left and the upper right corner of the map, m, (2, 2); facets across a cut reach beyond.
+        how: it was laid flat, in words; empty of a plane part along coordinate axes.
     """
 
     points: Array
@@ -38,6 +39,7 @@ class FlatPart:
     ways: Array
     names: tuple[str, str]
     ends: Array
+    how: str
 
     def along(self, vectors: Array) -> Array:
         """The components of vectors along the coordinates, (m, 2).
@@ -49,7 +51,7 @@ class FlatPart:
 
 
 def laid_flat(geometry: PartGeometry, body: BodyMesh) -> FlatPart:
-    """Lay a part flat: along the two coordinate axes that are most along it, or unrolled.
+    """Lay a part flat: along the two coordinate axes that are most along it, or unrolled; a whole ball about z.
 
     Args:
         geometry: where the part lies on the body.
@@ -57,11 +59,13 @@ def laid_flat(geometry: PartGeometry, body: BodyMesh) -> FlatPart:
     """
     areas = area_vectors(body.points, geometry.facets)
     total, size = areas.sum(axis=0), float(np.linalg.norm(areas, axis=1).sum())
-    axis = _axis(areas) if float(np.linalg.norm(total)) < CLOSED * size else None
     points, triangles = geometry.part.points, geometry.row[geometry.facets]
-    if axis is None:
-        return _projected(points, triangles, total)
-    return _unrolled(points, triangles, axis, ~geometry.part.idle)
+    closed = float(np.linalg.norm(total)) < 1e-6 * size
+    axis = _axis(areas) if float(np.linalg.norm(total)) < CLOSED * size else None
+    if axis is None and not closed:
+        plane = float(np.abs(total).max()) > (1.0 - 1e-6) * size
+        return _projected(points, triangles, total, "" if plane else "seen along {}")
+    return _unrolled(points, triangles, np.array([0.0, 0.0, 1.0]) if axis is None else axis, ~geometry.part.idle)
 
 
 def _axis(areas: Array) -> Array | None:
@@ -74,8 +78,9 @@ def _axis(areas: Array) -> Array | None:
     return np.asarray(found * np.sign(found[np.argmax(np.abs(found))]))
 
 
-def _projected(points: Array, triangles: Integers, total: Array) -> FlatPart:
-    kept = [i for i in range(3) if i != int(np.argmax(np.abs(total)))]
+def _projected(points: Array, triangles: Integers, total: Array, how: str) -> FlatPart:
+    seen = int(np.argmax(np.abs(total)))
+    kept = [i for i in range(3) if i != seen]
     axes = np.eye(3)[kept]
     flat = points @ axes.T
     return FlatPart(
@@ -85,6 +90,7 @@ def _projected(points: Array, triangles: Integers, total: Array) -> FlatPart:
         ways=np.broadcast_to(axes, (len(points), 2, 3)),
         names=("xyz"[kept[0]], "xyz"[kept[1]]),
         ends=np.stack([flat.min(axis=0), flat.max(axis=0)]),
+        how=how.format("xyz"[seen]),
     )
 
 
@@ -99,14 +105,15 @@ def _unrolled(points: Array, triangles: Integers, axis: Array, touches: Mask) ->
     angles, radius = angles[rows], float(np.linalg.norm(arms, axis=1).mean())
     height = points @ axis
     onward = np.column_stack([-np.sin(angles), np.cos(angles)]) @ plane
-    along = "xyz"[int(np.argmax(axis))] if np.max(axis) > 1.0 - 1e-9 else "way along,"
+    named = "xyz"[int(np.argmax(axis))] if np.max(axis) > 1.0 - 1e-9 else ""
     return FlatPart(
         points=np.column_stack([radius * (angles + 2.0 * np.pi * turns), height[rows]]),
         rows=rows,
         triangles=triangles,
         ways=np.stack([onward, np.broadcast_to(axis, onward.shape)], axis=1),
-        names=(f"way round, 0 towards +{'xyz'[towards]},", along),
+        names=(f"way round, 0 towards +{'xyz'[towards]},", named or "way along,"),
         ends=np.array([[radius * start, height.min()], [radius * end, height.max()]]),
+        how=f"unrolled about {named or 'its axis'}",
     )
 
 

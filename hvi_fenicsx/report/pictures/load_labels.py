@@ -8,7 +8,6 @@ import numpy as np
 import shapely
 
 from ...typing import Array
-from ..units import quantity
 from .loads_supports import LoadedSide
 from .plane_canvas import SIDE, TALLEST
 from .reach import LINE, WAYS, Label, Reach, largest_scale
@@ -56,8 +55,7 @@ def labels(
     found = list[Label]()
     for load, (tails, ways) in zip(pulled, arrows, strict=True):
         ends = view.project(np.concatenate([tails, tails + ways]))
-        value = quantity(float(np.linalg.norm(load.traction, axis=1).max()), "Pa")
-        found.append(_best([Label(value, end, way) for end in ends for way in WAYS], ends, taken, bodies, scale))
+        found.append(_best([Label(load.value, end, way) for end in ends for way in WAYS], ends, taken, bodies, scale))
         taken.append(found[-1].reach.hull(scale))
     return found
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -11,13 +11,16 @@ import numpy as np
 from ...errors import HviError
 from ...formula import Formula
 from ...geometry import chains
-from ...typing import Array, Integers
+from ...typing import Array, Integers, Mask
 from ..body_mesh import BodyMesh
 from ..reader import Result
 from ..solution_arrays import LoadArrays
+from ..units import quantity
 from .outline import normals
 from .vtk_view import area_vectors
 
+SHEAR = 0.2
+"""A load is along its side where the part across it is smaller than this part of it."""
 CLOSED = 0.1
 """Length of the mean of a side's unit normals below which it closes on itself."""
 
@@ -53,10 +56,34 @@ class LoadedSide:
     Attributes:
         side: the side.
         traction: at its vertices, N/m², (m, 3).
+        total: the size of the force that is spread over the part, N, in the plane N/m; None of a load by area.
     """
 
     side: Side
     traction: Array
+    total: float | None = None
+
+    @property
+    def largest(self) -> float:
+        """The largest traction, N/m²."""
+        return float(np.linalg.norm(self.traction, axis=1).max())
+
+    @property
+    def value(self) -> str:
+        """How large it is, in words."""
+        if self.total is None:
+            return quantity(self.largest, "Pa")
+        return quantity(self.total, "N/m" if self.side.facets.shape[1] == 2 else "N")
+
+    @property
+    def sheared(self) -> Mask:
+        """Where the load is along the side, so that an arrow to it would lie on it, (m,)."""
+        across = np.abs(np.einsum("ki,ki->k", self.traction, self.side.normals))
+        return np.asarray(across <= SHEAR * np.linalg.norm(self.traction, axis=1))
+
+    def times(self, factor: float) -> LoadedSide:
+        """A multiple of the load."""
+        return replace(self, traction=factor * self.traction, total=None if self.total is None else factor * self.total)
 
 
 @dataclass(frozen=True)
@@ -73,20 +100,35 @@ class HeldSide:
 
 
 def loaded_sides(result: Result) -> list[LoadedSide]:
-    """The tractions that are not zero."""
-    found = []
+    """The tractions that are not zero, and the forces that are spread over their parts."""
+    found, forces = [], {part: _components(value) for part, key, value in result.driven if key == "force"}
     for side, roles in roles_by_side(result):
         traction = np.sum([_traction(role, result.body.points[side.vertices], side.normals) for role in roles], axis=0)
         traction = traction + _given(result.arrays.loads.get(side.part), side)
         if np.any(traction):
             found.append(LoadedSide(side, traction))
+        if np.any(force := forces.get(side.part, np.zeros(3))):
+            spread = np.broadcast_to(force / _measure(result, side.part), side.normals.shape)
+            found.append(LoadedSide(side, spread, float(np.linalg.norm(force))))
     return found
+
+
+def _components(force: Sequence[float]) -> Array:
+    return np.array([*force, 0.0][:3], dtype=np.float64)
+
+
+def _measure(result: Result, part: str) -> float:
+    """The length or the area of a boundary part, m or m²."""
+    facets, points = result.body.oriented(result.sides[part]), result.body.points
+    if facets.shape[1] == 2:
+        return float(np.linalg.norm(points[facets[:, 1]] - points[facets[:, 0]], axis=1).sum())
+    return float(np.linalg.norm(area_vectors(points, facets), axis=1).sum())
 
 
 def borne_loads(result: Result) -> list[LoadedSide]:
     """The tractions under which the state that is shown is in equilibrium: the scene's, or the part that is borne."""
     factor = 1.0 if result.last_borne is None else float(result.last_borne["factor"])
-    return [LoadedSide(load.side, factor * load.traction) for load in loaded_sides(result)]
+    return [load.times(factor) for load in loaded_sides(result)]
 
 
 def held_sides(result: Result) -> list[HeldSide]:

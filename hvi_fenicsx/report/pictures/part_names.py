@@ -11,14 +11,20 @@ from ...geometry import chains
 from ...typing import Array
 from ..body_mesh import BodyMesh
 from .loads_supports import Side
-from .reach import WAYS, Label, Reach
+from .reach import APART, WAYS, Label, Reach
 from .style import BLUE
 
 PLACES = (0.5, 0.4, 0.6, 0.25, 0.75, 0.1, 0.9)
 """Parts of a side's length at which its name may stand."""
-SPOILS, CROSSES, LEAVES, TURNS, FAR = 10.0, 4.0, 20.0, 0.4, 0.5
-"""What it counts to cover what is drawn, to cross an outline by half of its own border, to leave the picture, to stand
-outside of the body, and to be the side's length off its middle."""
+AWAY = (APART, 0.22, 0.4, 0.6)
+"""How far from there, inches; a name that is not beside its side has a line to it."""
+EDGE = 0.05
+"""Inches from an outline that a name leaves free: half of the line that marks contact, and a little."""
+SPOILS, TOUCHES, CROSSES, LEAVES, TURNS, FAR, AFAR = 10.0, 2.5, 0.5, 20.0, 0.4, 0.5, 0.6
+"""What it counts to cover what is drawn, to touch an outline or cross it with the line to a name, to leave the picture,
+to stand outside of the body, to be the side's length off its middle, and to be an inch away from it."""
+LIES, STANDS = 0.05, 0.3
+"""What it counts to lie beside an upright side, and to be upright away from it."""
 
 
 def names(body: BodyMesh, sides: Sequence[Side], drawn: Sequence[Reach], window: Array) -> list[Label]:
@@ -34,19 +40,27 @@ def names(body: BodyMesh, sides: Sequence[Side], drawn: Sequence[Reach], window:
     low, high, inches = window
     scale, inside = float(inches[0] / (high[0] - low[0])), shapely.box(*low, *high)
     lines = shapely.union_all([shapely.LineString(body.points[loop, :2]) for loop in chains(body.boundary)])
+    wide = lines.simplify(0.1 * EDGE / scale).buffer(EDGE / scale)
+    for geometry in (lines, wide):
+        shapely.prepare(geometry)
     taken, found = [reach.hull(scale) for reach in drawn if len(reach.points)], list[Label]()
     for side in sides:
         candidates = list(_candidates(body, side))
         labels = [label for label, _ in candidates]
         boxes = np.array([label.reach.hull(scale) for label in labels])
         spoilt = shapely.area(shapely.intersection(boxes, shapely.union_all(taken)))
-        crossed = shapely.length(shapely.intersection(boxes, lines)) / shapely.length(boxes)
         left = shapely.area(shapely.difference(boxes, inside))
-        cost = (SPOILS * spoilt + LEAVES * left) / shapely.area(boxes) + CROSSES * crossed
+        cost = (SPOILS * spoilt + LEAVES * left) / shapely.area(boxes) + TOUCHES * shapely.intersects(boxes, wide)
+        cost += CROSSES * shapely.intersects(np.array([_leader(label, scale) for label in labels]), lines)
         best = int(np.argmin(np.round(cost + [own for _, own in candidates], 6)))
         found.append(labels[best])
         taken.append(boxes[best])
     return found
+
+
+def _leader(label: Label, scale: float) -> shapely.Geometry:
+    """The line from a side to its name, without its beginning on the side."""
+    return shapely.LineString([label.at + inches / scale * label.way for inches in (EDGE, label.away)])
 
 
 def _candidates(body: BodyMesh, side: Side) -> list[tuple[Label, float]]:
@@ -60,6 +74,8 @@ def _candidates(body: BodyMesh, side: Side) -> list[tuple[Label, float]]:
         for way in WAYS:
             cost = FAR * abs(part - 0.5) + TURNS * (1.0 - float(way @ inward)) / 2
             for upright in {False, bool(abs(inward[0]) > 0.8)}:
-                label = Label(side.part, at, way, weight="normal", colour=BLUE, upright=upright)
-                found.append((label, cost + 0.05 * (not upright)))
+                for away in AWAY:
+                    label = Label(side.part, at, way, weight="normal", colour=BLUE, upright=upright, away=away)
+                    turned = LIES * (not upright) if away == APART else STANDS * upright
+                    found.append((label, cost + turned + AFAR * (away - APART)))
     return found

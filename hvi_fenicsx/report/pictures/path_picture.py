@@ -13,7 +13,7 @@ from matplotlib.transforms import ScaledTranslation
 
 from ...typing import Array, Mask
 from ..path_reader import PathResult, read
-from ..units import Unit, unit_for
+from ..units import Unit, number, unit_for
 from .style import BLUE, GREEN, GREY, HEADING, INK, PURPLE, VERMILION, area, figure, save, titled
 
 NAME = "path.png"
@@ -77,7 +77,7 @@ def _explain(axes: Axes) -> None:
     """The legend above the curve, in two lines where it has more than four entries."""
     count = len(axes.get_legend_handles_labels()[0])
     columns = count if count <= 4 else -(-count // 2)
-    axes.legend(loc="lower right", bbox_to_anchor=(1.015, 1.0), ncols=columns, frameon=False, fontsize=10,
+    axes.legend(loc="lower right", bbox_to_anchor=(1.015, 1.0), ncols=columns, frameon=False, fontsize=11,
                 borderaxespad=0.0, handlelength=1.6, columnspacing=0.9)  # fmt: skip
 
 
@@ -139,15 +139,15 @@ def _marks(axes: Axes, result: PathResult, x: Array, y: Array, units: tuple[Unit
         axes.plot(x[shown], y[shown], "o", color=INK, ms=3.4, alpha=0.8, mew=0, zorder=4, label="event")
     look: dict[str, Any] = {"ls": "", "ms": 9, "mec": "white", "mew": 0.8, "zorder": 6}
     _peak(axes, x, y, units, look)
-    for number, marker, colour, text in _named(result):
-        axes.plot(x[number], y[number], marker=marker, color=colour, label=text, **look)
+    for row, marker, colour, text in _named(result):
+        axes.plot(x[row], y[row], marker=marker, color=colour, label=text, **look)
 
 
 def _peak(axes: Axes, x: Array, y: Array, units: tuple[Unit, Unit], look: dict[str, Any]) -> None:
     """A triangle that points down at the largest force from above."""
     peak = int(np.argmax(y))
-    load = f"{y[peak]:.4g} {units[1].name}".rstrip()
-    words = f"peak {load} at {x[peak]:.4g} {units[0].name}"
+    load = f"{number(y[peak], 4)} {units[1].name}".rstrip()
+    words = f"peak {load} at {number(x[peak], 4)} {units[0].name}"
     assert isinstance(axes.figure, Figure)
     raised = axes.transData + ScaledTranslation(0.0, _ABOVE / 72, axes.figure.dpi_scale_trans)
     axes.plot(x[peak], y[peak], marker="v", color=PURPLE, transform=raised, label=words, **look)
@@ -155,7 +155,7 @@ def _peak(axes: Axes, x: Array, y: Array, units: tuple[Unit, Unit], look: dict[s
 
 def _named(result: PathResult) -> Iterator[tuple[int, str, str, str | None]]:
     """Turns and the end: row, mark, colour and words."""
-    for count, number in enumerate(n for n, event in enumerate(result.events) if event == "turn"):
-        yield number, "s", INK, None if count else "turn"
+    for count, row in enumerate(n for n, event in enumerate(result.events) if event == "turn"):
+        yield row, "s", INK, None if count else "turn"
     if result.path["end"] != "reached":
         yield len(result.events) - 1, "X", VERMILION, str(result.path["end"])

@@ -11,6 +11,7 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
+from matplotlib.patheffects import withStroke
 
 from ...geometry import chains
 from ...typing import Array, Mask
@@ -27,6 +28,14 @@ OBSTACLE, NOTHING = 0.004, 1e-6
 """How far behind its face an obstacle's line is drawn, of the body's size; what counts as no stress, of the largest."""
 ARROWS, APART, LEAST = 9, 0.03, 0.02
 """Along a side of the body's size; the least way between two, of that size; what has no arrow, of the largest."""
+HALO = 1.6
+"""Points of white around arrows, which may stand on any colour."""
+OFF, IN_LINE = 0.03, 1.4
+"""How far off their side arrows along it are drawn, of the body's size; the least way between them, of their length."""
+
+
+SLIDES = "support, free to slide"
+"""What the legend says of a wall with rollers."""
 
 
 @dataclass(frozen=True)
@@ -57,7 +66,9 @@ def undeformed() -> Artist:
 
 
 def loads(shape: DeformedBody, found: list[LoadedSide]) -> Iterator[Mark]:
-    """Arrows onto a side where it is pushed, from it where it is pulled; each load with its own scale and value.
+    """Arrows onto a side where it is pushed, from it where it is pulled, off it where they are along it.
+
+    Each load has its own scale and value.
 
     Args:
         shape: the deformed body.
@@ -66,17 +77,17 @@ def loads(shape: DeformedBody, found: list[LoadedSide]) -> Iterator[Mark]:
     size = shape.body.size
     for load in found:
         points, amount = shape.points[load.side.vertices, :2], np.linalg.norm(load.traction, axis=1)
-        largest = float(amount.max())
-        at, label = _on_stretches(points, amount, size, ARROWS)
-        arrows = _along(points, load.traction[:, :2], at) * float(LOAD * size / largest)
+        beside = bool(load.sheared.all())
+        at, label = _on_stretches(points, amount, size, ARROWS, along=LOAD if beside else 0.0)
+        arrows = _along(points, load.traction[:, :2], at) * float(LOAD * size / load.largest)
         feet, outward = _along(points, points, at), _along(points, load.side.normals[:, :2], at)
         pushed = np.einsum("ki,ki->k", arrows, outward) < -1e-6 * LOAD * size
-        tails = feet - np.where(pushed[:, None], arrows, 0.0)
+        tails = feet + OFF * size * outward - arrows / 2 if beside else feet - np.where(pushed[:, None], arrows, 0.0)
         yield _arrows(tails, arrows, INK, "load", size)
         ends = np.concatenate([tails - feet, tails + arrows - feet])
         reach = float(np.einsum("ki,ki->k", ends, np.concatenate([outward, outward])).max(initial=0.0))
         foot, way = _along(points, points, label)[0], _along(points, load.side.normals[:, :2], label)[0]
-        yield _label(foot + reach * way, way, quantity(largest, "Pa"))
+        yield _label(foot + reach * way, way, load.value)
 
 
 def _label(at: Array, way: Array, words: str) -> Mark:
@@ -89,16 +100,18 @@ def _lengths(points: Array) -> Array:
     return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
 
 
-def _spread(length: float, size: float, count: int = ARROWS, fewest: int = 2) -> Array:
+def _spread(length: float, size: float, count: int = ARROWS, fewest: int = 2, apart: float = APART) -> Array:
     """Where to put arrows on a stretch of a line, as lengths along it: so many on one of the body's size.
 
     On a short one there are as many as stand apart; one alone stands in the middle.
     """
-    number = min(max(fewest, round(count * length / size)), 1 + int(length / (APART * size)))
+    number = min(max(fewest, round(count * length / size)), 1 + int(length / (apart * size)))
     return np.linspace(0.0, length, number, dtype=np.float64) if number > 1 else np.array([length / 2])
 
 
-def _on_stretches(points: Array, amount: Array, size: float, count: int, fewest: int = 2) -> tuple[Array, Array]:
+def _on_stretches(
+    points: Array, amount: Array, size: float, count: int, *, fewest: int = 2, along: float = 0.0
+) -> tuple[Array, Array]:
     """Where to put arrows on a line, and the middle of the longest stretch on which there is something to show.
 
     Args:
@@ -107,6 +120,7 @@ def _on_stretches(points: Array, amount: Array, size: float, count: int, fewest:
         size: of the body, m.
         count: arrows on a line of that size.
         fewest: on a stretch.
+        along: how long arrows are that lie along the line, of the body's size; they end where the stretch ends.
 
     Returns:
         Lengths along the line, (k,) and (1,).
@@ -115,7 +129,10 @@ def _on_stretches(points: Array, amount: Array, size: float, count: int, fewest:
     runs = np.flatnonzero(np.diff(loaded)).reshape(-1, 2) - [0, 1]
     stretches = [(float(s[a]), float(s[b])) for a, b in runs]
     start, end = max(stretches, key=lambda stretch: stretch[1] - stretch[0])
-    at = [a + _spread(b - a, size, count, fewest) for a, b in stretches]
+    apart, at = max(APART, IN_LINE * along), list[Array]()
+    for a, b in stretches:
+        length = max(b - a - along * size, 0.0)
+        at.append((a + b - length) / 2 + _spread(length, size, count, fewest, apart))
     return np.concatenate(at), np.array([(start + end) / 2])
 
 
@@ -129,7 +146,8 @@ def _arrows(tails: Array, arrows: Array, colour: str, words: str, size: float) -
     long = np.linalg.norm(arrows, axis=1) > 0.012 * size
 
     def draw(axes: Axes) -> None:
-        axes.quiver(*tails[long].T, *arrows[long].T, color=colour, zorder=6, clip_on=False, **_ARROW, width=0.0042)
+        look = {**_ARROW, "color": colour, "path_effects": [withStroke(linewidth=HALO, foreground="white")]}
+        axes.quiver(*tails[long].T, *arrows[long].T, zorder=6, clip_on=False, width=0.0042, **look)
 
     key = Line2D([], [], color=colour, marker=">", ms=7, markevery=(1, 1), lw=1.6, label=words)
     key.set_data([0, 1], [0, 0])
@@ -164,7 +182,7 @@ def supports(shape: DeformedBody, found: list[HeldSide]) -> Iterator[Mark]:
 
 
 def _support(wall: Array, rollers: Array, outward: Array, size: float) -> Mark:
-    words = "support, free to slide" if len(rollers) else "support"
+    words = SLIDES if len(rollers) else "support"
 
     def draw(axes: Axes) -> None:
         _hatched(axes, wall, outward, size)
@@ -172,8 +190,14 @@ def _support(wall: Array, rollers: Array, outward: Array, size: float) -> Mark:
         style: dict[str, Any] = {"mfc": "white", "mec": INK, "mew": 1.2, "clip_on": False, "zorder": 5}
         axes.plot(*rollers.T, "o", ms=2 * ROLLER * size * per_metre, **style)
 
-    key = Line2D([], [], color=INK, lw=2.2, marker="o" if len(rollers) else "", mfc="white", ms=7, label=words)
-    return Mark(Reach(np.concatenate([wall, wall + 0.03 * size * outward])), draw, lambda: key, words)
+    return Mark(Reach(np.concatenate([wall, wall + 0.03 * size * outward])), draw, lambda: _support_key(words), words)
+
+
+def _support_key(words: str) -> Artist:
+    """The legend's line for a wall, with a roller where the side may slide."""
+    if words == SLIDES:
+        return Line2D([], [], color=INK, lw=2.2, marker="o", mfc="white", ms=7, label=words)
+    return Patch(fc="white", ec=GREY, hatch="/////", lw=0.0, label=words)
 
 
 def _hatched(axes: Axes, line: Array, outward: Array, size: float) -> None:
@@ -272,7 +296,8 @@ def _filled(base: Array, tips: Array, colour: str, words: str) -> Mark:
     def draw(axes: Axes) -> None:
         ends = np.where(np.isnan(tips), base, tips)
         axes.fill(*np.concatenate([base, ends[::-1]]).T, color=colour, alpha=0.16, lw=0, clip_on=False, zorder=2)
-        axes.plot(*tips.T, color=colour, lw=1.8, clip_on=False, zorder=5)
+        halo = [withStroke(linewidth=1.8 + HALO, foreground="white")]
+        axes.plot(*tips.T, color=colour, lw=1.8, clip_on=False, zorder=5, path_effects=halo)
 
     return Mark(
         Reach(tips[np.isfinite(tips[:, 0])]), draw, lambda: Patch(fc=colour, alpha=0.5, ec=colour, label=words), words

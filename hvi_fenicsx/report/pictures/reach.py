@@ -62,6 +62,7 @@ class Label:
         weight: of the letters.
         colour: of the letters.
         upright: whether they are written upwards.
+        away: how far the words stand from the point, inches; a line leads to those that are not beside it.
     """
 
     words: str
@@ -70,6 +71,7 @@ class Label:
     weight: str = "bold"
     colour: str = INK
     upright: bool = False
+    away: float = APART
 
     @property
     def _size(self) -> Array:
@@ -80,8 +82,12 @@ class Label:
     def _away(self) -> Array:
         """From ``at`` to the middle of the letters, inches: all lie beyond ``at``, a corner there on a slanted way."""
         if np.abs(self.way).min() > SLANTED:
-            return np.asarray(np.sign(self.way) * self._size / 2 + APART * self.way)
-        return np.asarray(self.way * (float(np.abs(self.way) @ self._size) / 2 + APART))
+            return np.asarray(np.sign(self.way) * self._size / 2 + self.away * self.way)
+        return np.asarray(self.way * (float(np.abs(self.way) @ self._size) / 2 + self.away))
+
+    @property
+    def _leads(self) -> bool:
+        return self.away > APART and bool(np.any(self.way))
 
     @property
     def reach(self) -> Reach:
@@ -108,6 +114,7 @@ class Label:
             color=self.colour,
             rotation=90 if self.upright else 0,
             bbox={"boxstyle": "round,pad=0.1", "fc": "white", "ec": "none", "alpha": 0.85},
+            arrowprops={"arrowstyle": "-", "color": self.colour, "lw": 0.9, "shrinkB": 0} if self._leads else None,
             annotation_clip=False,
             zorder=9,
         )

@@ -19,7 +19,7 @@ from .style import BLUE, GREY, INK, WIDTH
 
 LETTERS = 40
 """In one line of the legend."""
-UNITS = {"displacement": ("m", "m"), "force": ("N/m", "N"), "moment": ("N", "N m")}
+UNITS = {"displacement": ("m", "m"), "force": ("N/m", "N"), "moment": ("N", "N\u202fm")}
 """The units of what drives a part as a whole, in the plane and in space."""
 
 

@@ -22,6 +22,7 @@ from matplotlib.figure import Figure
 from PIL import Image
 from PIL.PngImagePlugin import PngInfo
 
+from ...runtime import writing
 from ..png_file import CAPTION
 from ..reader import Result
 from ..units import thousands
@@ -84,7 +85,7 @@ def pressure_scale(lowest: float, largest: float) -> tuple[LinearSegmentedColorm
     """
     if lowest < -1e-6 * largest:
         return _BOTH, -largest, largest
-    return _PRESSED, 0.0, largest or 1.0
+    return _PRESSED, 0.0, largest
 
 
 def figure(height: float) -> Figure:
@@ -135,8 +136,11 @@ def titled(fig: Figure, title: str, below: str, words: str = "", colour: str = I
     lines = textwrap.wrap(title, _LINE) if len(title) > _LINE else [title]
     size, top, second = (17, 0.19, 0.76) if len(lines) == 1 else (13.5, 0.12, 0.85)
     fig.text(0.3 / WIDTH, 1 - top / tall, "\n".join(lines), size=size, weight="bold", va="top", linespacing=1.1)
-    fig.text(0.3 / WIDTH, 1 - second / tall, below, size=12, color=GREY, va="baseline")
-    fig.text(1 - 0.3 / WIDTH, 1 - second / tall, words, size=12, weight="bold", color=colour, ha="right", va="baseline")
+    at = 1 - second / tall
+    left = fig.text(0.3 / WIDTH, at, below, size=12, color=GREY, va="baseline")
+    right = fig.text(1 - 0.3 / WIDTH, at, words, size=12, weight="bold", color=colour, ha="right", va="baseline")
+    wide, other = (text.get_window_extent().width / fig.dpi for text in (left, right))
+    left.set_fontsize(min(12.0, 12.0 * (WIDTH - 0.8 - other) / wide))  # it is never written into what is at its right
 
 
 def _facts(result: Result) -> str:
@@ -161,11 +165,12 @@ def _verdict(result: Result) -> tuple[str, str]:
 def unfinished(path: Path) -> Iterator[Path]:
     """A name to write to; renamed to ``path`` when all went well, else removed."""
     aside = path.with_name(f".{path.stem}.{os.getpid()}{UNFINISHED}")
-    try:
-        yield aside
-        os.replace(aside, path)
-    finally:
-        aside.unlink(missing_ok=True)
+    with writing.told(path):
+        try:
+            yield aside
+            os.replace(aside, path)
+        finally:
+            aside.unlink(missing_ok=True)
 
 
 def save(fig: Figure, path: Path, caption: str = "") -> None:
@@ -175,6 +180,9 @@ def save(fig: Figure, path: Path, caption: str = "") -> None:
         fig: the picture.
         path: its file.
         caption: what a reader should see under it; it is kept in the file.
+
+    Raises:
+        NotWrittenError: it cannot be written.
     """
     canvas = FigureCanvasAgg(fig)
     canvas.draw()

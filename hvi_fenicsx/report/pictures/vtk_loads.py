@@ -9,6 +9,7 @@ import numpy as np
 from ...typing import Array, Integers
 from .deformed import DeformedBody
 from .loads_supports import LoadedSide
+from .plane_marks import OFF
 from .style import INK
 
 if TYPE_CHECKING:
@@ -35,7 +36,7 @@ def fill(plotter: pyvista.Plotter, tails: Array, ways: Array) -> None:
 
 
 def arrows(shape: DeformedBody, load: LoadedSide) -> tuple[Array, Array]:
-    """The arrows of a load: onto the side where it is pushed, from it where it is pulled.
+    """The arrows of a load: onto the side where it is pushed, from it where it is pulled, off it along it.
 
     Args:
         shape: the deformed body.
@@ -46,11 +47,13 @@ def arrows(shape: DeformedBody, load: LoadedSide) -> tuple[Array, Array]:
     """
     chosen = _sparse(shape.body.points[load.side.vertices], shape.body.size)
     traction = load.traction[chosen]
-    ways = traction * ARROW * shape.body.size / float(np.linalg.norm(load.traction, axis=1).max())
+    ways = traction * ARROW * shape.body.size / load.largest
     feet = shape.points[load.side.vertices[chosen]]
     visible = np.linalg.norm(ways, axis=1) > 0.02 * shape.body.size
-    pushed = np.einsum("ki,ki->k", ways, load.side.normals[chosen]) < 0.0
+    normals, beside = load.side.normals[chosen], load.sheared[chosen]
+    pushed = np.einsum("ki,ki->k", ways, normals) < 0.0
     tails = feet - np.where(pushed[:, None], ways, 0.0)
+    tails[beside] = (feet + OFF * shape.body.size * normals - ways / 2)[beside]
     return tails[visible], ways[visible]
 
 

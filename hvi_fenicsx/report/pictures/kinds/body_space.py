@@ -19,8 +19,8 @@ from ..footprints import Footprint, footprints, guides
 from ..legend import colour_bar
 from ..load_labels import labels, reaches
 from ..loads_supports import borne_loads
-from ..plane_canvas import canvas
 from ..registry import picture
+from ..space_canvas import space_canvas
 from ..style import GREY, INK, PALE, SLATE, heading, pressure_scale
 from ..vtk_view import area_vectors, best_view, draw_edges, render, surface
 
@@ -49,7 +49,7 @@ def draw(result: Result) -> Figure:
     reached = [shape.points, body.points, *(s.points[s.geometry.vertices] for s in shown)]
     everything = np.concatenate([*reached, *(end for tails, ways in arrows for end in (tails, tails + ways))])
     found = labels(view, reached, pulled, arrows)
-    fig, axes = canvas([*reaches(view, np.concatenate(reached), arrows), *(label.reach for label in found)])
+    fig, axes = space_canvas(view, [*reaches(view, np.concatenate(reached), arrows), *(label.reach for label in found)])
     heading(fig, result, "deformed body")
     scale = pressure_scale(_lowest(parts), largest_stress(parts))
     depths = (float(view.depth(everything).min()), float(view.depth(everything).max()))
@@ -104,7 +104,7 @@ def _fill_part(
         patch,
         scalars="pressure",
         cmap=scale[0],
-        clim=scale[1:],
+        clim=(scale[1], scale[2] or 1.0),
         nan_color=PALE,
         show_scalar_bar=False,
         lighting=False,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
 
@@ -26,7 +26,6 @@ VEIL = 0.16
 """How much of its colour a lifted stretch has."""
 MARKED = 80
 """Vertices up to which each is marked."""
-STRESSES = ("sigma_n", "friction_t1")
 SHORT = 0.2
 """Part of a part's length; a closed stretch shorter than this is shown alone."""
 IN_RANGE = 1.6
@@ -76,8 +75,7 @@ def _panels(result: Result, part: ContactPart, length: Unit) -> Iterator[Callabl
 
     def displacement(values: Array, words: str, direction: str) -> Callable[[Axes], None]:
         drops = _drops(result, part, direction)
-        shown = _without_noise(values, part, ("u_n", "u_t1", "gap"), result.body.displacement)
-        return partial(_displacement, part=part, values=shown, drops=drops, words=words, length=length)
+        return partial(_displacement, part=part, values=values, drops=drops, words=words, length=length)
 
     yield displacement(part.slip, "slip $u_t$", "slip")
     if result.resists(part.name, "slip", "separation"):
@@ -86,7 +84,7 @@ def _panels(result: Result, part: ContactPart, length: Unit) -> Iterator[Callabl
         yield displacement(-part["u_n"], "opening $-u_n$", "opening")
     if result.resists(part.name, "penetration"):
         yield displacement(part["u_n"], "penetration $u_n$", "penetration")
-    yield partial(_pressure, part=part, result=result, length=length)
+    yield partial(_pressure, part=part, length=length)
 
 
 def _drops(result: Result, part: ContactPart, direction: str) -> Array:
@@ -141,7 +139,7 @@ def _listed(kinks: Array) -> str:
 
 
 def _friction(axes: Axes, *, part: ContactPart, result: Result, length: Unit) -> None:
-    values = _without_noise(part.friction, part, STRESSES, result.body.von_mises)
+    values = part.friction
     unit = unit_for(_largest(values), "Pa")
     law, note = result.law(part.name) if result.summary.get("smoothing") else None, ""
     if law is not None and (multipliers := result.multipliers(part)) is not None:
@@ -163,8 +161,8 @@ def _pieces(axes: Axes, part: ContactPart, length: Unit, unit: Unit) -> str:
     return f"hollow: past the drop ({np.count_nonzero(fallen)} of {len(fallen)} vertices)"
 
 
-def _pressure(axes: Axes, *, part: ContactPart, result: Result, length: Unit) -> None:
-    values = _without_noise(part.pressure, part, STRESSES, result.body.von_mises)
+def _pressure(axes: Axes, *, part: ContactPart, length: Unit) -> None:
+    values = part.pressure
     unit = unit_for(_largest(values), "Pa")
     _line(axes, part, values, length, unit, VERMILION)
     axes.fill_between(part["s"] / length.size, values / unit.size, color=VERMILION, alpha=0.15, lw=0)
@@ -225,9 +223,3 @@ def _say_lifted(fig: Figure, gap: float) -> None:
 
 def _largest(values: Array) -> float:
     return float(np.nanmax(np.abs(values), initial=0.0))
-
-
-def _without_noise(values: Array, part: ContactPart, names: Sequence[str], body: Array | None) -> Array:
-    """Values that are rounding beside these columns of the part, or beside the body's, are zero, and are drawn so."""
-    beside = [part[name] for name in names] + ([] if body is None else [body])
-    return values if _largest(values) > 1e-9 * max(map(_largest, beside)) else 0.0 * values

@@ -18,6 +18,7 @@ from ...reader import ContactPart, Result
 from ...units import Unit, quantity, unit_for
 from ..deformed import part_geometries
 from ..flat_parts import FlatPart, laid_flat
+from ..legend import STEPS, ticks
 from ..raster import shade
 from ..registry import picture
 from ..style import BLUE, GREEN, GREY, HEADING, INK, WIDTH, area, figure, heading, pressure_scale, shades
@@ -27,10 +28,8 @@ WIDEST, TALLEST = 5.8, 2.75
 LEFT, GAP, FOOT = 0.95, 0.62, 0.75
 ROOMY = 0.55
 """Part of the width at which a map ends that leaves room for words beside it."""
-STEPS = (1, 2, 2.5, 5, 10)
-"""Between ticks, times a power of ten."""
-ARROWS = 13
-"""Along the longer side of a map."""
+ARROWS, SHAFT = 13, 0.016
+"""Along the longer side of a map, and how wide they are, inches."""
 
 
 @picture("contact", dimension=3, of_part=True, caption="Along {part}: displacement, friction and pressure.")
@@ -61,6 +60,7 @@ def draw(result: Result, part: ContactPart) -> Figure:
             _arrows(axes, flat, arrows)
         _frame(axes, flat, last=above == 0)
     _notes(fig, result, part, flat)
+    fig.text(1 - 0.3 / WIDTH, 0.25 / fig.get_figheight(), flat.how, size=12, color=GREY, ha="right")
     return fig
 
 
@@ -90,12 +90,12 @@ def _symbol(words: str, unit: Unit) -> str:
 def _map(fig: Figure, axes: Axes, flat: FlatPart, values: Array, colours: Colormap | None, words: str) -> None:
     """Values as an image of the picture's own pixels, with a bar beside it, from zero; without colours, a pressure."""
     low, high = float(np.nanmin(values)), float(np.nanmax(np.abs(values)))
-    scale = pressure_scale(low, high) if colours is None else (colours, 0.0, high or 1.0)
+    scale = pressure_scale(low, high) if colours is None else (colours, 0.0, high)
     drawn = axes.imshow(
         _image(axes, flat, values),
         cmap=scale[0],
         vmin=scale[1],
-        vmax=scale[2],
+        vmax=scale[2] or 1.0,
         origin="lower",
         aspect="auto",
         extent=_extent(flat),
@@ -103,7 +103,7 @@ def _map(fig: Figure, axes: Axes, flat: FlatPart, values: Array, colours: Colorm
     box = axes.get_position()
     bar = fig.add_axes((box.x1 + 0.02, box.y0, 0.02, box.height))
     fig.colorbar(drawn, cax=bar)
-    bar.yaxis.set_major_locator(MaxNLocator(_intervals(axes), steps=STEPS))
+    bar.yaxis.set_major_locator(ticks(scale[1:], _intervals(axes)))
     bar.spines[:].set_visible(False)
     axes.set_title(words, loc="left", size=14, parse_math=True)
 
@@ -143,7 +143,7 @@ def _arrows(axes: Axes, flat: FlatPart, vectors: Array) -> None:
     ways[:, np.linalg.norm(ways, axis=0) < 0.05 * spacing] = np.nan
     x, y = (low[i] + (np.arange(count[i]) + 0.5) * extent[i] / count[i] for i in (0, 1))
     style: dict[str, Any] = {"angles": "xy", "scale_units": "xy", "scale": 1.0, "pivot": "mid"}
-    axes.quiver(*np.meshgrid(x, y), *ways, **style, width=0.0045, color=INK, alpha=0.85)
+    axes.quiver(*np.meshgrid(x, y), *ways, **style, units="inches", width=SHAFT, color=INK, alpha=0.85)
 
 
 def _frame(axes: Axes, flat: FlatPart, *, last: bool) -> None:
@@ -152,7 +152,7 @@ def _frame(axes: Axes, flat: FlatPart, *, last: bool) -> None:
     axes.set_ylim(bottom, top)
     axes.spines[:].set_visible(False)
     unit = unit_for(max(map(abs, (left, right, bottom, top))), "m")
-    for axis, intervals in ((axes.xaxis, 6), (axes.yaxis, _intervals(axes))):
+    for axis, intervals in ((axes.xaxis, _across(axes)), (axes.yaxis, _intervals(axes))):
         axis.set_major_locator(MaxNLocator(intervals, steps=STEPS))
         axis.set_major_formatter(lambda value, _: f"{value / unit.size:.4g}".replace("-", "−"))
     axes.set_ylabel(f"{flat.names[1]} in {unit.name}")
@@ -164,6 +164,11 @@ def _frame(axes: Axes, flat: FlatPart, *, last: bool) -> None:
 def _intervals(axes: Axes) -> int:
     """Between the ticks of a map's height, so many that their numbers stand apart."""
     return max(1, min(4, int(axes.get_window_extent().height / axes.figure.dpi / 0.5)))
+
+
+def _across(axes: Axes) -> int:
+    """The same of its width."""
+    return max(1, min(6, int(axes.get_window_extent().width / axes.figure.dpi / 0.7)))
 
 
 def _notes(fig: Figure, result: Result, part: ContactPart, flat: FlatPart) -> None:

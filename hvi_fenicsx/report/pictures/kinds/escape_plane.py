@@ -12,7 +12,7 @@ from ....typing import Array
 from ...body_mesh import BodyMesh
 from ...reader import Result
 from .. import plane_marks as marks
-from ..deformed import DeformedBody
+from ..deformed import undeformed
 from ..escape_marks import WAY, arrow, keys, say
 from ..finite_motion import fitted, followed
 from ..loads_supports import held_sides, loaded_sides
@@ -31,9 +31,9 @@ from ..style import INK, PALE, VERMILION, heading
 )
 def draw(result: Result) -> Figure:
     """Draw a plane body and its ghost."""
-    body, mover = result.body, result.body.moving()
+    rest = undeformed(result.body)
+    body, mover = rest.as_drawn, rest.as_drawn.moving()
     motion = fitted(mover)
-    rest = DeformedBody(body, np.zeros_like(body.points), 1.0)
     drawn = [*marks.supports(rest, held_sides(result)), *marks.loads(rest, loaded_sides(result))]
     ghost, posts = motion.at(mover.points), followed(mover, motion)
     ways = np.stack([motion.at(posts, part)[:, :2] for part in WAY], axis=1)
@@ -45,7 +45,7 @@ def draw(result: Result) -> Figure:
         mark.draw(axes)
     for way in ways:
         arrow(axes, way)
-    say(fig, result, [*keys(), *marks.keys(drawn)])
+    say(fig, result, [*keys(rest.stretched), *marks.keys(drawn)])
     return fig
 
 

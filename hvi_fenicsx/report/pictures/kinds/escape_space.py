@@ -18,8 +18,8 @@ from ..escape_marks import WAY, arrow, keys, say
 from ..finite_motion import fitted, followed
 from ..load_labels import labels, reaches
 from ..loads_supports import loaded_sides
-from ..plane_canvas import canvas
 from ..registry import picture
+from ..space_canvas import space_canvas
 from ..style import INK, PALE, VERMILION, heading
 from ..vtk_view import best_view, draw_edges, render, surface
 
@@ -46,7 +46,7 @@ def draw(result: Result) -> Figure:
     reached = [body.points, ghost, ways.reshape(-1, 3)]
     everything = np.concatenate([*reached, *(end for tails, along in arrows for end in (tails, tails + along))])
     found = labels(view, reached, pulled, arrows)
-    fig, axes = canvas([*reaches(view, np.concatenate(reached), arrows), *(label.reach for label in found)])
+    fig, axes = space_canvas(view, [*reaches(view, np.concatenate(reached), arrows), *(label.reach for label in found)])
     heading(fig, result, "rigid motion")
     depths = (float(view.depth(everything).min()), float(view.depth(everything).max()))
     nearer = ghost + 1e-3 * body.size * view.toward  # where the two share a face, the ghost's is seen

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from matplotlib.artist import Artist
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
@@ -55,8 +53,7 @@ def draw(result: Result) -> Figure:
             axes.plot(*points[side.vertices, :2].T, color=VERMILION, lw=5, solid_capstyle="butt", zorder=2)
     for mark in drawn:
         mark.draw(axes)
-    drawn_body = replace(body, points=points)
-    for name in names(drawn_body, [side for side, _ in found], [mark.reach for mark in drawn], window(axes)):
+    for name in names(rest.as_drawn, [side for side, _ in found], [mark.reach for mark in drawn], window(axes)):
         name.draw(axes)
     say(fig, body, rest.stretched)
     legend(

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from ....typing import Array
@@ -20,11 +21,11 @@ from ..deformed import DeformedBody
 from ..legend import legend
 from ..load_labels import labels, reaches
 from ..loads_supports import Side, held_sides, loaded_sides, roles_by_side
-from ..plane_canvas import canvas
 from ..regions import Region, regions
 from ..regions import keys as region_keys
 from ..registry import picture
 from ..scene_legend import inside, say, touches
+from ..space_canvas import space_canvas
 from ..space_names import names
 from ..style import INK, PALE, heading
 from ..vtk_view import area_vectors, best_view, draw_edges, render, surface
@@ -76,7 +77,7 @@ def draw(result: Result) -> Figure:
     )
     values = labels(view, reached, pulled, arrows, [name.reach for name in written])
     words = [*written, *values]
-    fig, axes = canvas([*reaches(view, np.concatenate(reached), arrows), *(one.reach for one in words)])
+    fig, axes = space_canvas(view, [*reaches(view, np.concatenate(reached), arrows), *(one.reach for one in words)])
     heading(fig, result, "the scene")
     depths = (float(view.depth(everything).min()), float(view.depth(everything).max()))
     areas = regions(result)
@@ -85,7 +86,7 @@ def draw(result: Result) -> Figure:
     for one in words:
         one.draw(axes)
     say(fig, body)
-    legend(fig, [*keys(shown), *region_keys(areas), *inside(result)])
+    legend(fig, [*keys(shown), *_apart(shown), *region_keys(areas), *inside(result)])
     return fig
 
 
@@ -93,6 +94,12 @@ def keys(shown: list[ColouredSide]) -> list[Artist]:
     """What the colours mean that are there."""
     words = {CONTACT: "contact, friction or adhesion", SUPPORT: "support", LOADED: "loaded"}
     return [Patch(fc=c, ec=INK, label=w) for c, w in words.items() if c in {s.colour for s in shown}]
+
+
+def _apart(shown: list[ColouredSide]) -> list[Artist]:
+    """The legend's line on parts that are not drawn on the body."""
+    moved = any(s.away.any() for s in shown)
+    return [Line2D([], [], color="none", label="hidden parts are drawn apart")] if moved else []
 
 
 def _fill(

@@ -17,8 +17,8 @@ from ..deformed import DeformedBody, deform, part_geometries
 from ..footprints import Footprint, footprints, guides
 from ..load_labels import labels, reaches
 from ..loads_supports import borne_loads
-from ..plane_canvas import canvas
 from ..registry import picture
+from ..space_canvas import space_canvas
 from ..stress_scale import bar, scale_of
 from ..style import EMBER, GREY, INK, heading
 from ..vtk_view import area_vectors, best_view, draw_edges, render, surface
@@ -46,7 +46,7 @@ def draw(result: Result) -> Figure:
     reached = [shape.points, body.points, *(p.points[p.geometry.vertices] for p in apart)]
     everything = np.concatenate([*reached, *(end for tails, ways in arrows for end in (tails, tails + ways))])
     found = labels(view, reached, pulled, arrows)
-    fig, axes = canvas([*reaches(view, np.concatenate(reached), arrows), *(label.reach for label in found)])
+    fig, axes = space_canvas(view, [*reaches(view, np.concatenate(reached), arrows), *(label.reach for label in found)])
     heading(fig, result, "stress in the body")
     scale = scale_of(body, values)
     depths = (float(view.depth(everything).min()), float(view.depth(everything).max()))

@@ -1,0 +1,43 @@
+"""Numbers on pictures and pages: a minus that is no hyphen, a power of ten that is no letter."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+from hvi_fenicsx.report import rounding, units
+from hvi_fenicsx.report.pictures.legend import ticks
+from hvi_fenicsx.studies import plot_axes
+
+
+@pytest.mark.parametrize(
+    ("value", "digits", "text"),
+    [(-24.6832, 6, "−24.6832"), (1.43e-07, 3, "1.43·10⁻⁷"), (-4.71e-12, 2, "−4.7·10⁻¹²"), (2.15e11, 6, "2.15·10¹¹")],
+)
+def test_a_number_has_neither_a_hyphen_nor_a_letter(value: float, digits: int, text: str) -> None:
+    assert units.number(value, digits) == text
+
+
+@pytest.mark.parametrize(
+    ("share", "text"), [(4.126, "413 %"), (0.13, "13 %"), (0.0042, "0.42 %"), (1e-9, "10⁻⁷ %"), (0.0, "0 %")]
+)
+def test_a_percentage_has_two_digits_or_all_before_the_point(share: float, text: str) -> None:
+    assert units.percent(share) == text
+
+
+def test_a_bar_of_nothing_has_one_number() -> None:
+    assert list(ticks((0.0, 0.0), 4).tick_values(0.0, 1.0)) == [0.0]
+    assert len(ticks((0.0, 3.0), 4).tick_values(0.0, 3.0)) > 2
+
+
+def test_the_numbers_of_a_logarithmic_axis_look_alike() -> None:
+    axes = Figure().add_subplot()
+    plot_axes.plain_log(axes)
+    said = [axes.xaxis.get_major_formatter()(value) for value in np.power(10.0, np.arange(-5, 3))]
+    assert said == ["0.00001", "0.0001", "0.001", "0.01", "0.1", "1", "10", "100"]
+    assert axes.xaxis.get_major_formatter()(0.03125) == "0.0312"
+
+
+def test_a_force_that_is_rounding_beside_the_largest_is_zero() -> None:
+    assert [rounding.unless_noise(value, 1.5e4) for value in (-83e-9, -2.0e-5, 3.0)] == [0.0, -2.0e-5, 3.0]
