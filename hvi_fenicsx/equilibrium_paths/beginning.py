@@ -18,6 +18,11 @@ from .step import FACTOR
 from .thresholds import DEFAULT, ExactThresholds
 from .tracer import Tracer
 
+AWAY = "nothing holds the body at rest"
+UNKNOWN = "nothing holds the body at rest, and no state was found to which a small load takes it"
+NEUTRAL = "nothing holds the body at rest, and where a small load takes it, it may still move without a force"
+"""Why a path does not begin."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Beginning:
@@ -27,12 +32,14 @@ class Beginning:
         cells: where the unknowns are; None: there is no such state.
         memory: what the bonds remember, (bonds, 4).
         reason: why there is none.
+        escapes: whether there is none since the body comes off.
         constant: the path from there to the constant loads, its factor from 0 to 1; None where there are none.
     """
 
     cells: Cells | None
     memory: Array
     reason: str = ""
+    escapes: bool = False
     constant: CondensedProblem | None = None
 
 
@@ -57,9 +64,9 @@ def at_rest(
     rate = away if np.max(np.abs(away), initial=0.0) > 1e-14 * size else aim * problem.force_rate
     cells = place(problem.elastic, chains, x, force)
     if cells.is_singular():
-        settled = _settled(bonds, replace(problem, force=held, force_rate=rate))
+        settled, reason = _settled(bonds, replace(problem, force=held, force_rate=rate))
         if settled is None:
-            return Beginning(cells=None, memory=bonds.memory, reason="nothing holds the body at rest")
+            return Beginning(cells=None, memory=bonds.memory, reason=reason, escapes=reason == AWAY)
         cells = settled
     if rate is not away:
         return Beginning(cells=cells, memory=bonds.memory)
@@ -76,22 +83,22 @@ def _nearest(bonds: BondTable, x: Array, wanted: Array) -> Array:
     return np.where((problem.lower == problem.upper), wanted, found)
 
 
-def _settled(bonds: BondTable, problem: CondensedProblem) -> Cells | None:
-    """Where a small part of the loads takes a body that nothing holds at rest, and back to no load; None: away."""
+def _settled(bonds: BondTable, problem: CondensedProblem) -> tuple[Cells | None, str]:
+    """Where a small part of the loads takes a body that nothing holds at rest, and back to no load; or why nowhere."""
     chains = [bonds.chain(i) for i in range(problem.size)]
     first = bonds.thresholds.first_load
     load = problem.load(first)
     start = np.clip(np.zeros(problem.size), problem.lower, problem.upper)
     landing = Descent(bonds, load).land(start, start)
     if not landing.found:
-        return None
+        return None, AWAY if landing.escapes else UNKNOWN
     cells = place(problem.elastic, chains, landing.x, load - problem.elastic @ landing.x)
     equations = problem.elastic, problem.force, problem.force_rate
     tracer = Tracer(*equations, cells, first, heading=-1, thresholds=bonds.thresholds)
     while True:
         step = tracer.advance(0.0)
         if step.variable is None:
-            return None
+            return None, UNKNOWN
         if step.variable == FACTOR:
-            return tracer.cells
+            return (None, NEUTRAL) if tracer.cells.is_singular() else (tracer.cells, "")
         go_on(tracer, bonds, step)

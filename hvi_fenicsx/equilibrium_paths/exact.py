@@ -79,7 +79,7 @@ class ExactFollower(Follower):
         self._bonds.restore(start.memory)
         self._balance = EnergyBalance(self._problem, self._bonds)
         if start.cells is None:
-            self._come_off(0.0, start.reason)
+            self._end_before(start.reason, escapes=start.escapes)
             return
         self._unstable = start.cells.unstable_directions()
         self._follow_from(start.cells, 0.0)
@@ -97,7 +97,8 @@ class ExactFollower(Follower):
             raise Stopped
         if follower.end is not End.REACHED:
             reason = f"under the constant loads alone: {follower.reason}"
-            return Beginning(cells=None, memory=follower.memory, reason=reason)
+            off = follower.end is End.ESCAPES
+            return Beginning(cells=None, memory=follower.memory, reason=reason, escapes=off)
         return Beginning(cells=follower.tracer.cells, memory=follower.memory)
 
     @override

@@ -135,6 +135,10 @@ class Follower(ABC):
         low, high = self._options.held
         return low + self._small < factor < high - self._small
 
+    def _end_before(self, reason: str, *, escapes: bool) -> None:
+        """End before the first state."""
+        (self._come_off if escapes else self._lose)(0.0, reason)
+
     def _come_off(self, factor: float, reason: str) -> None:
         """End where the way that was tried leads off; that proves nothing where the body is held."""
         if self._is_held(factor):

@@ -133,6 +133,24 @@ def test_a_body_that_nothing_touches_falls_where_the_exact_path_has_it(seed: int
     assert peak(states) == pytest.approx(peak(wanted), rel=1e-9)
 
 
+@pytest.mark.parametrize("kind", [ExactFollower, ArcLengthFollower])
+def test_a_body_that_rolls_on_its_floor_has_no_first_state_and_is_not_said_to_come_off(kind: type[Follower]) -> None:
+    """A beam of three points that rests on its middle one, where the load is: in balance at any inclination."""
+    bent = np.array([1.0, -2.0, 1.0])
+    given = problem(np.outer(bent, bent), [0.0, -1.0, 0.0], lower=[-np.inf, -0.5, -np.inf])
+    follower = kind(given, PathOptions(programme=(1.0,)))
+    assert list(follower.states()) == []
+    assert follower.end is End.LOST
+    assert follower.reason.startswith("nothing holds the body at rest, and")
+
+
+@pytest.mark.parametrize("kind", [ExactFollower, ArcLengthFollower])
+def test_a_body_that_a_small_load_takes_away_comes_off(kind: type[Follower]) -> None:
+    follower = kind(problem(chain(3, 1.0), [1.0, 1.0, 1.0], lower=-0.5), PathOptions(programme=(1.0,)))
+    assert list(follower.states()) == []
+    assert follower.end is End.ESCAPES
+
+
 @pytest.mark.parametrize("gap", [0.3, 1e3])
 def test_how_far_a_body_is_above_its_floor_does_not_matter(gap: float) -> None:
     law = Exponential(1.0, 0.2, 0.5)

@@ -10,6 +10,7 @@ from typing_extensions import override
 
 from ...system.condensed_problem import CondensedProblem
 from ...typing import Array
+from ..beginning import AWAY
 from ..programme import Follower
 from ..rounds import Round, Rounds
 from ..state import End, Event, Follow, PathOptions, PathState, Place, Position, place_of
@@ -76,7 +77,6 @@ class ArcLengthFollower(Follower):
     def _begun(self) -> Iterator[PathState]:
         z = self._first()
         if z is None:
-            self._come_off(0.0, self.reason or "nothing holds the body at rest")
             return
         self._follow_from(z, 0.0)
         self._balance = Balance(self._problem, self._sites)
@@ -85,14 +85,18 @@ class ArcLengthFollower(Follower):
         yield self._state(Event.START)
 
     def _first(self) -> Array | None:
-        """Where the sites are at the factor 0; None: the body comes off."""
+        """Where the sites are at the factor 0; None: the path has ended."""
         rest = at_rest(self._problem, self._sites)
         if rest.constant is not None:
             return self._loaded(rest.constant)
         if rest.held:
             return rest.z
         first = self._options.thresholds.exact.first_load * self._options.programme[0]
-        return settled(self._problem, self._sites, rest.z, first, self._lag, self._watcher, held=self._is_held(first))
+        held = self._is_held(first)
+        z, reason = settled(self._problem, self._sites, rest.z, first, self._lag, self._watcher, held=held)
+        if z is None:
+            self._end_before(reason, escapes=reason == AWAY)
+        return z
 
     def _loaded(self, constant: CondensedProblem) -> Array | None:
         """From rest to the constant loads, as stable as it goes; where the sites are then."""
@@ -103,7 +107,8 @@ class ArcLengthFollower(Follower):
         if follower.end is End.INTERRUPTED:
             raise Stopped
         if follower.end is not End.REACHED:
-            self.reason = f"under the constant loads alone: {follower.reason}"
+            reason = f"under the constant loads alone: {follower.reason}"
+            self._end_before(reason, escapes=follower.end is End.ESCAPES)
             return None
         self._sites, self._laws = follower._sites, follower._laws
         return follower._curve.here.y[:-1]

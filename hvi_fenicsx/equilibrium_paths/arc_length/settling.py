@@ -6,21 +6,23 @@ import numpy as np
 
 from ...system.condensed_problem import CondensedProblem
 from ...typing import Array
+from ..beginning import AWAY, NEUTRAL, UNKNOWN
 from ..watch import Watch
 from .curve import Curve
 from .equations import Refused
 from .events import Outcome
 from .passage import Crossing, advancing
 from .relaxation import Relaxation
+from .rest import is_held
 from .sites import Sites
 
 
 def settled(
     problem: CondensedProblem, sites: Sites, z: Array, first: float, lag: Array, watch: Watch, *, held: bool
-) -> Array | None:
-    """The coordinates at the factor 0, (n,); None where the body comes off or is lost.
+) -> tuple[Array | None, str]:
+    """The coordinates at the factor 0, (n,), or why there are none.
 
-    It moves as an overdamped one until something holds it; then the load is taken off again.
+    The body moves as an overdamped one until something holds it; then the load is taken off again.
 
     Args:
         problem: the problem, without constant loads.
@@ -34,11 +36,14 @@ def settled(
     watch.jumps(first)
     motion = Relaxation(problem, sites, z, problem.load(first), lag, held=held, step=watch.step)
     if not motion.run(np.zeros(len(sites))) or motion.escapes:
-        return None
+        return None, AWAY if motion.escapes else UNKNOWN
     try:
-        return _unloaded(Curve(problem.force, problem.force_rate, sites, motion.z, first), lag, watch)
+        found = _unloaded(Curve(problem.force, problem.force_rate, sites, motion.z, first), lag, watch)
     except (Refused, np.linalg.LinAlgError):
-        return None
+        found = None
+    if found is None:
+        return None, UNKNOWN
+    return (found, "") if is_held(problem, sites, found) else (None, NEUTRAL)
 
 
 def _unloaded(curve: Curve, lag: Array, watch: Watch) -> Array | None:
