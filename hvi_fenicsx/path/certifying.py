@@ -188,8 +188,8 @@ class Certifier:
         What bonds remember is in their graphs on Γc, not in the laws that the certificate of a single run knows. As
         there, what rounding makes of the stresses is excused, and no net force.
         """
-        reaction, spread = refinement.reaction(self._system, forces), self._condensation.spread(carried)
-        left, given = self._condensation.unbalanced(reaction, spread), product(spread, self._system.rotation)
+        reaction, spread = refinement.reaction(self._system, forces), self._condensation.forces.spread(carried)
+        left, given = self._condensation.forces.unbalanced(reaction, spread), product(spread, self._system.rotation)
         for vector in (reaction, spread):
             vector.destroy()
         size = max(self._norm(f) for f in (forces.load, forces.reaction))

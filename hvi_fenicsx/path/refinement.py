@@ -71,12 +71,12 @@ def refined(system: System, condensation: Condensation, problem: Problem, graphs
     unknowns = condensation.expand(graphs.x, factor)
     for _ in range(_STEPS):
         forces = contact_state.forces(problem, system.displacement(unknowns))
-        left, carried = reaction(system, forces), condensation.spread(-graphs.force)
+        left, carried = reaction(system, forces), condensation.forces.spread(-graphs.force)
         left.axpy(-1.0, carried)
-        missing = condensation.condensed(-left.array_r)
+        missing = condensation.forces.condensed(-left.array_r)
         before = graphs.x
         graphs.take(missing.condensed)
-        unknowns.array[:] += condensation.change(graphs.x - before, missing)
+        unknowns.array[:] += condensation.forces.change(graphs.x - before, missing)
         for vector in (left, carried):
             vector.destroy()
     u = system.displacement(unknowns)

@@ -11,6 +11,7 @@ from ..laws.arc import Arc
 from ..typing import Array
 from .arcs import Chain, on_interval
 from .convex_programme import Chains, minimise
+from .length_newton import LengthNewton
 from .length_programme import LengthProgramme
 from .scalar_problem import ScalarProblem
 
@@ -76,7 +77,7 @@ def _minimiser(problem: ScalarProblem, chains: list[Sequence[Arc]], x: Array) ->
     force[lengths.members] += pull[lengths.there]
     risen = [[_steeper(a, slope) for a in c] for c, slope in zip(chains[n:], slopes, strict=True)]
     programme = LengthProgramme.of(problem, problem.stiffness, force, [*chains[:n], *risen], np.zeros(len(lengths)))
-    return programme.minimiser(x)
+    return LengthNewton(programme).minimiser(x)
 
 
 def _steeper(arc: Arc, slope: float) -> Arc:

@@ -17,6 +17,7 @@ from .convex_programme import Chains, minimise
 from .curvature import Curvature, CurvatureShare
 from .dual_bound import DualBound
 from .held_forces import with_held_forces
+from .length_newton import LengthNewton
 from .length_programme import LengthProgramme
 from .motions import Lent
 from .scalar_problem import ScalarProblem
@@ -166,9 +167,10 @@ class Relaxation:
             bound = found.bound + lent.constant
             return found.x, bound, bound
         programme = LengthProgramme.of(problem, a, b, list(map(arcs_of, chains)), curvature.added[problem.size :])
-        x = programme.minimiser(box.x)
+        newton = LengthNewton(programme)
+        x = newton.minimiser(box.x)
         dual = DualBound(problem=problem, low=box.low, high=box.high, added=curvature.added, lent=lent)
-        multipliers = programme.multipliers(x)
+        multipliers = newton.multipliers(x)
         value = bound = dual.at(x, multipliers)
         if np.any(np.abs(self.shares(x)) > self.joints):
             y, pushes = with_held_forces(programme, x, self._share.springs)

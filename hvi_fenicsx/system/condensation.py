@@ -10,16 +10,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from dolfinx import fem
 from petsc4py import PETSc
 
 from ..errors import SolverError
-from ..runtime.mpi import total
 from ..typing import Array, Integers
 from . import carriers, condensed_laws, factor_counts, loading
+from .body_forces import BodyForces
 from .carriers import Carriers
 from .condensed_problem import CondensedProblem
 from .condensed_stiffness import CondensedStiffness, DenseStiffness
@@ -29,21 +29,6 @@ from .factorised_stiffness import FactorisedStiffness
 from .interior import PREFIX, Interior
 from .rigid_defect import RigidMotions
 from .system import System
-
-
-@dataclass(frozen=True, kw_only=True)
-class CondensedForces:
-    """Forces on the whole body, condensed.
-
-    Attributes:
-        body: on this rank's unknowns off the supports, (local unknowns,).
-        kept: on all unknowns of Γc that the body keeps, (n of the interior,).
-        condensed: on the condensed unknowns, (n,).
-    """
-
-    body: Array
-    kept: Array
-    condensed: Array
 
 
 class Condensation:
@@ -59,6 +44,7 @@ class Condensation:
 
     Attributes:
         problem: the arrays. Its unknowns x are those of Γc without λ times the obstacles' shift: their bounds stand.
+        forces: on the whole body, and condensed.
 
     Raises:
         InputError: on all ranks alike: a name in ``scaled`` is none; a law on |u_t| cannot be condensed.
@@ -86,6 +72,7 @@ class Condensation:
         else:
             elastic = self._formed(interior.stiffness(interrupted), found.carrying)
         self.problem = self._condensed(elastic, found, laws)
+        self.forces = BodyForces(system, self._interior, self._elimination)
 
     def _is_large(self, most: int, carrying: int) -> bool:
         """Whether Γc has more unknowns, or products with S of those that carry take longer than solves with factors."""
@@ -249,60 +236,6 @@ class Condensation:
         found[fixed] = self._system.holding.at_prescribed(u, self._system.rotation) - applied[fixed]
         out.destroy()
         return found
-
-    def spread(self, forces: Array) -> PETSc.Vec:
-        """Forces on the condensed unknowns as forces on the whole body, in the components of the unknowns.
-
-        Args:
-            forces: (n,).
-        """
-        interior, whole = self._interior, np.zeros(self._interior.size)
-        whole[self._elimination.stay] = forces
-        found = self._system.load.duplicate()
-        found.array[interior.kept] = interior.own_part(whole)
-        return found
-
-    def condensed(self, forces: Array) -> CondensedForces:
-        """Forces on the whole body as forces on the condensed unknowns. Collective.
-
-        Args:
-            forces: on this rank's unknowns, in their components, (local unknowns,).
-        """
-        body = self._free(forces)
-        kept = self._interior.loads(body[:, None])[:, 0]
-        return CondensedForces(body=body, kept=kept, condensed=self._elimination.reduced(kept))
-
-    def change(self, x: Array, forces: CondensedForces) -> Array:
-        """How the unknowns of the whole body change, in balance with forces, where condensed ones do. Collective.
-
-        Args:
-            x: change of the condensed unknowns, (n,).
-            forces: on the body.
-
-        Returns:
-            The change of this rank's unknowns, (local unknowns,).
-        """
-        return self._interior.expand(self._elimination.completed(x, forces.kept), forces.body)
-
-    def _free(self, forces: Array) -> Array:
-        """Forces off the supports, which carry the others, (local unknowns,)."""
-        found = np.array(forces)
-        found[self._system.problem.fixed_here] = 0.0
-        return found
-
-    def unbalanced(self, reaction: PETSc.Vec, carried: PETSc.Vec) -> float:
-        """What is left of forces on the body once contact and laws carry theirs. Collective.
-
-        Args:
-            reaction: internal forces minus loads of the whole body, in the components of the unknowns.
-            carried: by contact and laws, likewise.
-
-        Returns:
-            The Euclidean norm off the supports.
-        """
-        left = reaction.array - carried.array
-        left[np.union1d(self._system.problem.fixed_here, self._system.pins)] = 0.0
-        return float(np.sqrt(total(self._system.comm, float(left @ left))))
 
     def free(self) -> None:
         """Free the PETSc objects, those of the problem's stiffness too. Collective."""

@@ -245,9 +245,9 @@ def test_forces_are_condensed_by_one_solve_and_followed_by_another(monkeypatch: 
     solves, solve = [], Interior.solve
     monkeypatch.setattr(Interior, "solve", lambda self, right: solves.append(1) or solve(self, right))
     forces = np.random.default_rng(5).standard_normal(system.load.local_size)
-    found = condensation.condensed(forces)
+    found = condensation.forces.condensed(forces)
     change, product = system.undisplaced(), system.load.duplicate()
-    change.array[:] = condensation.change(np.ones_like(found.condensed), found)
+    change.array[:] = condensation.forces.change(np.ones_like(found.condensed), found)
     system.jacobian.elastic_product(change, product)
     inner = np.setdiff1d(np.arange(len(forces)), np.union1d(system.jacobian.rows.dofs, system.problem.fixed))
     assert np.max(np.abs(product.array_r - forces)[inner]) < 1e-12 * np.max(np.abs(product.array_r))
